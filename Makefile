@@ -1,0 +1,38 @@
+# Everything a clean machine needs: Python 3.11, make and a C compiler. `make` alone shows the targets.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/.ready
+
+.PHONY: help install demo test check bench clean
+
+help:
+	@echo "make demo   records six voltages on the simulated rig, identifies the damper, writes the report"
+	@echo "make test   style, types, import contracts and the test suite"
+	@echo "make check  style, types and import contracts only"
+	@echo "make bench  the benchmarks, as ratios against baselines of the same run"
+
+$(READY): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --editable '.[dev]'
+	touch $@
+
+install: $(READY)
+
+demo: $(READY)
+	$(BIN)/mrbench demo
+
+check: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: check
+	$(BIN)/pytest -n 2
+
+bench: $(READY)
+	$(BIN)/python -m benchmarks
+
+clean:
+	rm -rf $(VENV) runs build

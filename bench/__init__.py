@@ -1,0 +1,1 @@
+"""Runs tests, keeps their records, serves people."""

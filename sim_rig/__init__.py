@@ -1,0 +1,1 @@
+"""Plays the hardware: the specimen, its sensors and their faults."""

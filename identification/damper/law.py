@@ -55,7 +55,24 @@ def inner_velocity(
 def hysteresis_rate(slip: Number, z: Number, A: Number, beta: Number, gamma: Number, n: Number) -> Number:
     """Rate z' [m/s] of the hysteretic displacement for the slip velocity x' - y' [m/s] (eq. 3)."""
     size = abs(z)
-    return A * slip - gamma * abs(slip) * z * (size + Z_GUARD) ** (n - 1) - beta * slip * size**n
+    power = (size + Z_GUARD) ** (n - 1)
+    return A * slip - (gamma * abs(slip) * z + beta * slip * size) * power
+
+
+def hysteresis_slopes(
+    slip: Number, z: Number, A: Number, beta: Number, gamma: Number, n: Number
+) -> tuple[Number, Number]:
+    """Slopes of z' over the slip velocity [1] and over z [1/s], for implicit steps and sensitivities.
+
+    At the two kinks, slip = 0 and z = 0, the slope is that of the positive side.
+    """
+    size = abs(z)
+    power = (size + Z_GUARD) ** (n - 1)
+    slip_sign = 1.0 if slip >= 0 else -1.0
+    z_sign = 1.0 if z >= 0 else -1.0
+    over_slip = A - (gamma * slip_sign * z + beta * size) * power
+    over_z = -n * power * (gamma * abs(slip) + beta * slip * z_sign)
+    return over_slip, over_z
 
 
 def force(y_rate: Number, x: Number, c1: Number, k1: Number, x0: Number) -> Number:

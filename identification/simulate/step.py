@@ -1,0 +1,144 @@
+"""One implicit step of the damper, and the slopes of its rates.
+
+TR-BDF2 (Bank et al. 1985): a trapezoidal stage to gamma h, then a second-order backward difference to h. It is
+L-stable, which the law needs: at a reversal the hysteretic variable relaxes at some 2e4 1/s. In the regular
+coordinates the hysteretic variable is zeta = z / z_ss with A = 1/D_y, and y is linear in it, so that each stage
+is one scalar Newton iteration.
+
+``s`` below always holds the ten structural coordinates, those that enter the rates of the state by themselves:
+F_a F_b D_y rho n c0_a c0_b c1_a c1_b k0.
+"""
+
+import math
+
+from identification.arrays import Array, compiled
+from identification.damper import law
+
+GAMMA = 2.0 - math.sqrt(2.0)
+"""[1] where the first stage stands inside the step; makes both stages share one matrix."""
+HALF = GAMMA / 2.0
+WEIGHT_STAGE = 1.0 / (GAMMA * (2.0 - GAMMA))
+WEIGHT_START = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
+
+STRUCTURAL = 10
+"""How many structural coordinates there are."""
+
+_TOLERANCE = 1e-11
+_LARGEST_MOVE = 0.5
+_ITERATIONS = 40
+
+at_field = compiled(law.at_field)
+inner_velocity = compiled(law.inner_velocity)
+hysteresis_rate = compiled(law.hysteresis_rate)
+hysteresis_slopes = compiled(law.hysteresis_slopes)
+
+
+@compiled
+def between(x0: float, x1: float, v0: float, v1: float, h: float, t: float) -> tuple[float, float]:
+    """Displacement [m] and velocity [m/s] at the fraction t of a sample of h [s], by a Hermite cubic."""
+    d = x1 - x0
+    square = 3.0 * d - h * (2.0 * v0 + v1)
+    cube = h * (v0 + v1) - 2.0 * d
+    return x0 + t * (h * v0 + t * (square + t * cube)), v0 + t * (2.0 * square + 3.0 * t * cube) / h
+
+
+@compiled
+def through_middle(start: float, middle: float, end: float, t: float) -> float:
+    """Value at the fraction t of a sample, by the parabola through its start, middle and end."""
+    bend = 2.0 * (start + end) - 4.0 * middle
+    return start + t * (end - start - bend + t * bend)
+
+
+@compiled
+def rates(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> tuple[float, float]:
+    """Rates y' [m/s] and zeta' [1/s]."""
+    y_rate = inner_velocity(
+        x, v, y, zeta, at_field(s[0], s[1], u), at_field(s[5], s[6], u), at_field(s[7], s[8], u), s[9]
+    )
+    return y_rate, hysteresis_rate(v - y_rate, zeta, 1.0 / s[2], s[3] / s[2], (1.0 - s[3]) / s[2], s[4])
+
+
+@compiled
+def solve_stage(
+    s: Array, x: float, v: float, u: float, y_known: float, zeta_known: float, weight: float, zeta: float
+) -> tuple[float, float]:
+    """State at the end of a stage: state = known + weight * rates(state), by Newton from ``zeta``."""
+    c0 = at_field(s[5], s[6], u)
+    both = c0 + at_field(s[7], s[8], u)
+    inverse = 1.0 / (both + weight * s[9])
+    constant = (both * y_known + weight * (c0 * v + s[9] * x)) * inverse
+    slope = weight * at_field(s[0], s[1], u) * inverse
+    A = 1.0 / s[2]
+    beta = s[3] * A
+    gamma = A - beta
+    for _ in range(_ITERATIONS):
+        slip = v - (constant + slope * zeta - y_known) / weight
+        rate = hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
+        over_slip, over_zeta = hysteresis_slopes(slip, zeta, A, beta, gamma, s[4])
+        steepness = 1.0 - weight * over_zeta + over_slip * slope
+        move = (zeta_known + weight * rate - zeta) / max(steepness, 0.2)
+        zeta += min(max(move, -_LARGEST_MOVE), _LARGEST_MOVE)
+        if abs(move) < _TOLERANCE:
+            break
+    return constant + slope * zeta, zeta
+
+
+@compiled
+def rate_slopes(
+    s: Array,
+    x: float,
+    v: float,
+    u: float,
+    y: float,
+    zeta: float,
+    over_y: Array,
+    over_zeta: Array,
+    of_y: Array,
+    of_zeta: Array,
+) -> tuple[float, float]:
+    """Slopes of y' and zeta' over everything, written into the arrays given; returns y' and the slip slope.
+
+    Args:
+        s, x, v, u, y, zeta: where; as everywhere.
+        over_y: (2,) slopes of y' and zeta' over y.
+        over_zeta: (2,) slopes of y' and zeta' over zeta.
+        of_y: (13,) slopes of y' over the structural coordinates, then over x, v and u.
+        of_zeta: (13,) the same of zeta'.
+    """
+    yield_force = at_field(s[0], s[1], u)
+    c0 = at_field(s[5], s[6], u)
+    c1 = at_field(s[7], s[8], u)
+    inverse = 1.0 / (c0 + c1)
+    y_rate = inner_velocity(x, v, y, zeta, yield_force, c0, c1, s[9])
+    slip = v - y_rate
+    A = 1.0 / s[2]
+    beta = s[3] * A
+    gamma = A - beta
+    zeta_rate = hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
+    over_slip, steep = hysteresis_slopes(slip, zeta, A, beta, gamma, s[4])
+    of_y[0] = zeta * inverse
+    of_y[1] = u * zeta * inverse
+    of_y[2] = 0.0
+    of_y[3] = 0.0
+    of_y[4] = 0.0
+    of_y[5] = slip * inverse
+    of_y[6] = u * slip * inverse
+    of_y[7] = -y_rate * inverse
+    of_y[8] = -u * y_rate * inverse
+    of_y[9] = (x - y) * inverse
+    of_y[10] = s[9] * inverse
+    of_y[11] = c0 * inverse
+    of_y[12] = (s[1] * zeta + s[6] * v - (s[6] + s[8]) * y_rate) * inverse
+    for k in range(STRUCTURAL + 3):
+        of_zeta[k] = -over_slip * of_y[k]
+    of_zeta[11] += over_slip
+    size = abs(zeta)
+    power = (size + law.Z_GUARD) ** (s[4] - 1.0)
+    of_zeta[2] -= zeta_rate * A
+    of_zeta[3] += (abs(slip) * zeta - slip * size) * power * A
+    of_zeta[4] -= (gamma * abs(slip) * zeta + beta * slip * size) * power * math.log(size + law.Z_GUARD)
+    over_y[0] = -s[9] * inverse
+    over_zeta[0] = yield_force * inverse
+    over_y[1] = -over_slip * over_y[0]
+    over_zeta[1] = steep - over_slip * over_zeta[0]
+    return y_rate, over_slip

@@ -1,7 +1,7 @@
 """The arrays of this room and the one place where functions are compiled."""
 
 from collections.abc import Callable
-from typing import TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar, cast
 
 import numba
 import numpy as np
@@ -15,5 +15,4 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 def compiled(function: Function) -> Function:
     """The function as machine code, kept on disk between processes; it releases the interpreter's lock."""
-    fast: Function = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    return fast
+    return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))

@@ -1,4 +1,4 @@
-"""The march through a recording: states alone, or states with the slopes of the force over everything.
+"""The march through a recording: states alone, or with the slopes of the force over everything.
 
 The slopes are exact derivatives of the discrete solution: each implicit step is differentiated as it was
 taken, so that they agree with finite differences to rounding. Each sample is one step, but more where the
@@ -18,7 +18,6 @@ from identification.simulate.step import (
     STRUCTURAL,
     WEIGHT_STAGE,
     WEIGHT_START,
-    at_field,
     between,
     rate_slopes,
     rates,
@@ -88,9 +87,7 @@ def march(
             t = (k + GAMMA) / steps
             xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
             us = through_middle(u[i], u_middle[i], u[i + 1], t)
-            y1, zeta1 = solve_stage(
-                s, xs, vs, us, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta
-            )
+            y1, zeta1 = solve_stage(s, xs, vs, us, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
             t = (k + 1.0) / steps
             xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
             us = through_middle(u[i], u_middle[i], u[i + 1], t)
@@ -120,54 +117,54 @@ def march_with_slopes(
     h: float,
     y0: float,
     zeta0: float,
+    fineness: float,
     plan: Plan,
     dx: Array,
     dv: Array,
     du: Array,
     du_middle: Array,
-) -> tuple[Array, Array]:
-    """y' along a recording and the slopes of the dashpot force c1 y' over coordinates, y0 and inputs.
+) -> tuple[Array, Array, Array, Array]:
+    """States along a recording, and the slopes of the dashpot force c1 y' over coordinates, y0 and inputs.
 
     Args:
-        s, x, v, u, u_middle, h, y0, zeta0: as in ``march``; ``plan`` must be filled.
+        s, x, v, u, u_middle, h, y0, zeta0, fineness, plan: as in ``march``.
         c1: (N,) roll-off dashpot at the samples [N s/m].
-        dx, dv, du: (E, N) derivatives of the inputs over E further unknowns; du_middle (E, N-1).
+        du, du_middle: (E, N) and (E, N-1) derivatives of the field over E further unknowns.
+        dx, dv: (M, N) derivatives of the motion over the last M of them; the others leave it alone.
 
     Returns:
-        y' (N,) [m/s] and slopes (N, 10 + 1 + E): structural coordinates, y0, further unknowns.
+        y [m], zeta [1], y' [m/s], each (N,), and slopes (N, 10 + 1 + E): structural coordinates, y0, further.
     """
-    count, extra = len(x), len(dx)
-    columns = STRUCTURAL + 1 + extra
-    y_rates, slopes = np.empty(count), np.empty((count, columns))
-    Sy, Sz = np.zeros(columns), np.zeros(columns)
-    Sy1, Sz1 = np.zeros(columns), np.zeros(columns)
-    fy, fz = np.zeros(columns), np.zeros(columns)
-    gy, gz = np.zeros(columns), np.zeros(columns)
-    of_y, of_zeta = np.zeros(STRUCTURAL + 3), np.zeros(STRUCTURAL + 3)
-    over_y, over_zeta = np.zeros(2), np.zeros(2)
-    end_y, end_zeta = np.zeros(2), np.zeros(2)
+    count, columns = len(x), STRUCTURAL + 1 + len(du)
+    ys, zetas, y_rates, slopes = np.empty(count), np.empty(count), np.empty(count), np.empty((count, columns))
+    Sy, Sz, Sy1, Sz1 = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
+    fy, fz, gy, gz = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
+    over_inputs = np.zeros((2, 3))
+    over_y, over_zeta, stage_y, stage_zeta = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
     Sy[STRUCTURAL] = 1.0
     y, zeta = y0, zeta0
-    y_rate, zeta_rate = rates(s, x[0], v[0], u[0], y, zeta)
-    rate_slopes(s, x[0], v[0], u[0], y, zeta, over_y, over_zeta, of_y, of_zeta)
-    _explicit(of_y, of_zeta, dx, dv, du, du_middle, 0, 0.0, h, fy, fz)
-    _record(slopes, y_rates, 0, c1[0], u[0], s[8], y_rate, over_y, over_zeta, Sy, Sz, fy, du)
-    for i in range(count - 1):
+    y_rate, zeta_rate = rate_slopes(s, x[0], v[0], u[0], y, zeta, over_y, over_zeta, over_inputs, fy, fz)
+    _from_inputs(over_inputs, dx, dv, du, du_middle, 0, 0.0, h, fy, fz)
+    for i in range(count):
+        ys[i], zetas[i], y_rates[i] = y, zeta, y_rate
+        _record(slopes[i], c1[i], u[i], s[8], y_rate, over_y[0], over_zeta[0], Sy, Sz, fy, du[:, i])
+        if i == count - 1:
+            break
+        if plan[i] == 0:
+            plan[i] = _choose_steps(fineness, h, s[2], v[i], v[i + 1], y_rate, zeta, zeta_rate)
         steps = plan[i]
         weight = HALF * h / steps
         for k in range(steps):
             t = (k + GAMMA) / steps
             xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
             us = through_middle(u[i], u_middle[i], u[i + 1], t)
-            y1, zeta1 = solve_stage(
-                s, xs, vs, us, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta
-            )
-            rate_slopes(s, xs, vs, us, y1, zeta1, end_y, end_zeta, of_y, of_zeta)
-            _explicit(of_y, of_zeta, dx, dv, du, du_middle, i, t, h, gy, gz)
+            y1, zeta1 = solve_stage(s, xs, vs, us, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
+            rate_slopes(s, xs, vs, us, y1, zeta1, stage_y, stage_zeta, over_inputs, gy, gz)
+            _from_inputs(over_inputs, dx, dv, du, du_middle, i, t, h, gy, gz)
             for j in range(columns):
                 Sy1[j] = Sy[j] + weight * (over_y[0] * Sy[j] + over_zeta[0] * Sz[j] + fy[j] + gy[j])
                 Sz1[j] = Sz[j] + weight * (over_y[1] * Sy[j] + over_zeta[1] * Sz[j] + fz[j] + gz[j])
-            _solve(weight, end_y, end_zeta, Sy1, Sz1)
+            _solve(weight, stage_y, stage_zeta, Sy1, Sz1)
             t = (k + 1.0) / steps
             xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
             us = through_middle(u[i], u_middle[i], u[i + 1], t)
@@ -181,21 +178,18 @@ def march_with_slopes(
                 weight,
                 zeta1,
             )
-            y_rate, zeta_rate = rates(s, xs, vs, us, y, zeta)
-            rate_slopes(s, xs, vs, us, y, zeta, over_y, over_zeta, of_y, of_zeta)
-            _explicit(of_y, of_zeta, dx, dv, du, du_middle, i, t, h, fy, fz)
+            y_rate, zeta_rate = rate_slopes(s, xs, vs, us, y, zeta, over_y, over_zeta, over_inputs, fy, fz)
+            _from_inputs(over_inputs, dx, dv, du, du_middle, i, t, h, fy, fz)
             for j in range(columns):
                 Sy[j] = WEIGHT_STAGE * Sy1[j] - WEIGHT_START * Sy[j] + weight * fy[j]
                 Sz[j] = WEIGHT_STAGE * Sz1[j] - WEIGHT_START * Sz[j] + weight * fz[j]
             _solve(weight, over_y, over_zeta, Sy, Sz)
-        _record(slopes, y_rates, i + 1, c1[i + 1], u[i + 1], s[8], y_rate, over_y, over_zeta, Sy, Sz, fy, du)
-    return y_rates, slopes
+    return ys, zetas, y_rates, slopes
 
 
 @compiled
-def _explicit(
-    of_y: Array,
-    of_zeta: Array,
+def _from_inputs(
+    over_inputs: Array,
     dx: Array,
     dv: Array,
     du: Array,
@@ -206,19 +200,22 @@ def _explicit(
     fy: Array,
     fz: Array,
 ) -> None:
-    """Explicit slopes of the two rates over every unknown, at the fraction t of sample i."""
-    for j in range(STRUCTURAL):
-        fy[j] = of_y[j]
-        fz[j] = of_zeta[j]
-    for e in range(len(dx)):
-        if t == 0.0:
-            a, b, c = dx[e, i], dv[e, i], du[e, i]
-        else:
-            a, b = between(dx[e, i], dx[e, i + 1], dv[e, i], dv[e, i + 1], h, t)
-            c = through_middle(du[e, i], du_middle[e, i], du[e, i + 1], t)
+    """Slopes of the two rates over the unknowns that act through the inputs, at the fraction t of sample i."""
+    still = len(du) - len(dx)
+    for e in range(len(du)):
         j = STRUCTURAL + 1 + e
-        fy[j] = of_y[10] * a + of_y[11] * b + of_y[12] * c
-        fz[j] = of_zeta[10] * a + of_zeta[11] * b + of_zeta[12] * c
+        c = du[e, i] if t == 0.0 else through_middle(du[e, i], du_middle[e, i], du[e, i + 1], t)
+        fy[j] = over_inputs[0, 2] * c
+        fz[j] = over_inputs[1, 2] * c
+        if e < still:
+            continue
+        m = e - still
+        if t == 0.0:
+            a, b = dx[m, i], dv[m, i]
+        else:
+            a, b = between(dx[m, i], dx[m, i + 1], dv[m, i], dv[m, i + 1], h, t)
+        fy[j] += over_inputs[0, 0] * a + over_inputs[0, 1] * b
+        fz[j] += over_inputs[1, 0] * a + over_inputs[1, 1] * b
 
 
 @compiled
@@ -235,25 +232,22 @@ def _solve(weight: float, over_y: Array, over_zeta: Array, Sy: Array, Sz: Array)
 
 @compiled
 def _record(
-    slopes: Array,
-    y_rates: Array,
-    i: int,
+    row: Array,
     c1: float,
     u: float,
     c1_b: float,
     y_rate: float,
-    over_y: Array,
-    over_zeta: Array,
+    over_y: float,
+    over_zeta: float,
     Sy: Array,
     Sz: Array,
     fy: Array,
     du: Array,
 ) -> None:
-    """Write y' and the slopes of c1 y' at sample i."""
-    y_rates[i] = y_rate
+    """Write the slopes of c1 y' at one sample into its row."""
     for j in range(len(Sy)):
-        slopes[i, j] = c1 * (over_y[0] * Sy[j] + over_zeta[0] * Sz[j] + fy[j])
-    slopes[i, 7] += y_rate
-    slopes[i, 8] += u * y_rate
+        row[j] = c1 * (over_y * Sy[j] + over_zeta * Sz[j] + fy[j])
+    row[7] += y_rate
+    row[8] += u * y_rate
     for e in range(len(du)):
-        slopes[i, STRUCTURAL + 1 + e] += c1_b * du[e, i] * y_rate
+        row[STRUCTURAL + 1 + e] += c1_b * du[e] * y_rate

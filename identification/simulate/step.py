@@ -93,17 +93,19 @@ def rate_slopes(
     zeta: float,
     over_y: Array,
     over_zeta: Array,
+    over_inputs: Array,
     of_y: Array,
     of_zeta: Array,
 ) -> tuple[float, float]:
-    """Slopes of y' and zeta' over everything, written into the arrays given; returns y' and the slip slope.
+    """Slopes of y' and zeta' over everything, written into the arrays given; returns the rates too.
 
     Args:
         s, x, v, u, y, zeta: where; as everywhere.
         over_y: (2,) slopes of y' and zeta' over y.
         over_zeta: (2,) slopes of y' and zeta' over zeta.
-        of_y: (13,) slopes of y' over the structural coordinates, then over x, v and u.
-        of_zeta: (13,) the same of zeta'.
+        over_inputs: (2, 3) slopes of y' and zeta' over x, v and u.
+        of_y: (10 or more,) slopes of y' over the structural coordinates come first.
+        of_zeta: (10 or more,) the same of zeta'.
     """
     yield_force = at_field(s[0], s[1], u)
     c0 = at_field(s[5], s[6], u)
@@ -126,19 +128,21 @@ def rate_slopes(
     of_y[7] = -y_rate * inverse
     of_y[8] = -u * y_rate * inverse
     of_y[9] = (x - y) * inverse
-    of_y[10] = s[9] * inverse
-    of_y[11] = c0 * inverse
-    of_y[12] = (s[1] * zeta + s[6] * v - (s[6] + s[8]) * y_rate) * inverse
-    for k in range(STRUCTURAL + 3):
+    for k in range(STRUCTURAL):
         of_zeta[k] = -over_slip * of_y[k]
-    of_zeta[11] += over_slip
     size = abs(zeta)
     power = (size + law.Z_GUARD) ** (s[4] - 1.0)
     of_zeta[2] -= zeta_rate * A
     of_zeta[3] += (abs(slip) * zeta - slip * size) * power * A
     of_zeta[4] -= (gamma * abs(slip) * zeta + beta * slip * size) * power * math.log(size + law.Z_GUARD)
+    over_inputs[0, 0] = s[9] * inverse
+    over_inputs[0, 1] = c0 * inverse
+    over_inputs[0, 2] = (s[1] * zeta + s[6] * v - (s[6] + s[8]) * y_rate) * inverse
+    over_inputs[1, 0] = -over_slip * over_inputs[0, 0]
+    over_inputs[1, 1] = over_slip * (1.0 - over_inputs[0, 1])
+    over_inputs[1, 2] = -over_slip * over_inputs[0, 2]
     over_y[0] = -s[9] * inverse
-    over_zeta[0] = yield_force * inverse
     over_y[1] = -over_slip * over_y[0]
+    over_zeta[0] = yield_force * inverse
     over_zeta[1] = steep - over_slip * over_zeta[0]
-    return y_rate, over_slip
+    return y_rate, zeta_rate

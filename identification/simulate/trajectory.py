@@ -6,7 +6,8 @@ to the force, whose corners no interpolation would keep.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from dataclasses import field as default
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,7 +80,7 @@ class Trajectory:
     """(N,) field behind the drive [V or A]."""
     plan: Plan
     """(N-1,) steps taken in each sample; hand it back to keep later trajectories smooth in their unknowns."""
-    slopes: Array = field(default_factory=lambda: np.empty((0, 0)))
+    slopes: Array = default(default_factory=lambda: np.empty((0, 0)))
     """(N, unknowns) derivative of the force over each of ``columns``; empty unless asked for."""
     columns: tuple[str, ...] = ()
 
@@ -119,29 +120,44 @@ def simulate(
     s = np.array([c[i] for i in _STRUCTURAL_COLUMNS])
     plan = np.zeros(len(u) - 1, np.uint8) if plan is None else plan
     zeta0 = inputs.settled_hysteresis(moved.v[0])
-    y, zeta, y_rate = march(s, moved.x, moved.v, u, middle, h, setting.y0, zeta0, fineness, plan)
     c1 = c.c1_a + c.c1_b * u
+    if slopes:
+        rows = 2 + len(moved.dx)
+        y, zeta, y_rate, partial = march_with_slopes(
+            s,
+            c1,
+            moved.x,
+            moved.v,
+            u,
+            middle,
+            h,
+            setting.y0,
+            zeta0,
+            fineness,
+            plan,
+            moved.dx,
+            moved.dv,
+            _also_for_force_delay(du, rows),
+            _also_for_force_delay(dmiddle, rows),
+        )
+    else:
+        y, zeta, y_rate = march(s, moved.x, moved.v, u, middle, h, setting.y0, zeta0, fineness, plan)
     force = c1 * y_rate + c.k1 * moved.x - c.f0
-    beside = [e for e in setting.effects if e.effect.acts == "parallel_force"]
-    for effect, values in beside:
-        force += effect.act(moved.x, moved.v, *values)
+    for effect, values in setting.effects:
+        if effect.acts == "parallel_force":
+            force += effect.act(moved.x, moved.v, *values)
     found = Trajectory(force, y, zeta, u, plan)
-    if not slopes:
-        return found
-    extra = np.zeros((len(moved.dx) + 2, len(u)))
-    dx, dv, fields, middles = extra.copy(), extra.copy(), extra, np.zeros((len(extra), len(u) - 1))
-    dx[2:], dv[2:] = moved.dx, moved.dv
-    fields[:2], middles[:2] = du, dmiddle
-    fields[2], middles[2] = du[1], dmiddle[1]
-    y_rate, partial = march_with_slopes(
-        s, c1, moved.x, moved.v, u, middle, h, setting.y0, zeta0, plan, dx, dv, fields, middles
-    )
-    return _with_slopes(found, setting, moved, partial, y_rate)
+    return _with_slopes(found, setting, moved, partial) if slopes else found
 
 
-def _with_slopes(
-    found: Trajectory, setting: Setting, moved: _Motion, partial: Array, y_rate: Array
-) -> Trajectory:
+def _also_for_force_delay(derivative: Array, rows: int) -> Array:
+    """Rows for eta, drive delay, force delay (which delays the drive too), and zeros for what leaves it alone."""
+    wide = np.zeros((rows, derivative.shape[1]))
+    wide[:2], wide[2] = derivative, derivative[1]
+    return wide
+
+
+def _with_slopes(found: Trajectory, setting: Setting, moved: _Motion, partial: Array) -> Trajectory:
     """The trajectory with its slopes laid out as ``UNKNOWNS`` and the parameters of the effects."""
     names = [f"{e.effect.name}.{q.symbol}" for e in setting.effects for q in e.effect.parameters]
     J = np.zeros((len(found.force), len(UNKNOWNS) + len(names)))
@@ -151,33 +167,25 @@ def _with_slopes(
     J[:, _DRIVE_DELAY] = partial[:, STRUCTURAL + 2]
     J[:, _K1] = moved.x
     J[:, _F0] = -1.0
-    k1 = setting.coordinates.k1
-    moving = [_FORCE_DELAY]
-    for position, name in enumerate(names):
-        if _effect_acts(setting, name) == "displacement_follower":
-            moving.append(len(UNKNOWNS) + position)
+    places = _places(setting.effects)
+    moving = [_FORCE_DELAY, *(at for at, e in places if e.effect.acts == "displacement_follower")]
     for e, column in enumerate(moving):
-        J[:, column] = partial[:, STRUCTURAL + 3 + e] + k1 * moved.dx[e]
-    column = len(UNKNOWNS)
-    for effect, values in setting.effects:
-        width = len(values)
+        J[:, column] = partial[:, STRUCTURAL + 3 + e] + setting.coordinates.k1 * moved.dx[e]
+    for at, (effect, values) in places:
         if effect.acts == "parallel_force":
             over_x, over_v, *over = effect.slopes(moved.x, moved.v, *values)
-            J[:, column : column + width] = np.column_stack(over)
-            for e, other in enumerate(moving):
-                J[:, other] += over_x * moved.dx[e] + over_v * moved.dv[e]
-        column += width
-    column = len(UNKNOWNS)
-    for effect, values in setting.effects:
+            J[:, at : at + len(values)] = np.column_stack(over)
+            J[:, moving] += over_x[:, None] * moved.dx.T + over_v[:, None] * moved.dv.T
+    for at, (effect, _) in places:
         if effect.acts == "time_shift":
-            J[:, column] = J[:, _FORCE_DELAY]
-        column += len(values)
+            J[:, at] = J[:, _FORCE_DELAY]
     return replace(found, slopes=J, columns=(*UNKNOWNS, *names))
 
 
-def _effect_acts(setting: Setting, name: str) -> str:
-    """How the effect acts that owns the parameter ``effect.parameter``."""
-    return next(e.effect.acts for e in setting.effects if e.effect.name == name.partition(".")[0])
+def _places(effects: Sequence[ActiveEffect]) -> list[tuple[int, ActiveEffect]]:
+    """Each effect with the column of its first parameter."""
+    starts = np.cumsum([len(UNKNOWNS), *(len(e.values) for e in effects)])
+    return [(int(start), e) for start, e in zip(starts, effects, strict=False)]
 
 
 def _shift(effects: Sequence[ActiveEffect]) -> float:

@@ -1,0 +1,33 @@
+"""Errors of the bench.
+
+BenchError
+├── MethodError      a method document asks for what cannot be compiled or exceeds its own limits
+├── RunError         a run could not be carried out
+├── LogError         a log cannot be read, written or mended
+└── RecordingError   a recording made elsewhere cannot be taken in
+
+Each message says what failed, the value and the limit with unit, and what to do. ``exit_code`` tells the
+command line that the message is for a person and needs no traceback.
+"""
+
+
+class BenchError(Exception):
+    """Base of everything that the bench raises on purpose."""
+
+    exit_code = 1
+
+
+class MethodError(BenchError):
+    """A method asks for what cannot be compiled, or exceeds its own limits."""
+
+
+class RunError(BenchError):
+    """A run could not be carried out."""
+
+
+class LogError(BenchError):
+    """A log cannot be read, written or mended."""
+
+
+class RecordingError(BenchError):
+    """A recording made elsewhere cannot be taken in."""

@@ -10,6 +10,9 @@ import numpy.typing as npt
 Array: TypeAlias = npt.NDArray[np.float64]
 """Real numbers in SI units; the docstring at hand gives shape and unit."""
 
+BoolArray: TypeAlias = npt.NDArray[np.bool_]
+"""A mask over the same samples or unknowns."""
+
 Function = TypeVar("Function", bound=Callable[..., object])
 
 

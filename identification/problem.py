@@ -1,0 +1,152 @@
+"""What is minimised: measured minus simulated force over all training samples, in units of the noise.
+
+The unknowns are the search numbers, one inner displacement y(0) a stretch, and a small delay of the force and
+of the drive channel against the displacement, each held by a prior from the clock mapping.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.damper.coordinates import Coordinates
+from identification.search_space import SearchSpace
+from identification.simulate import UNKNOWNS, Setting, Stroke, Trajectory, simulate
+
+COORDINATE_COUNT = len(Coordinates._fields)
+_Y0_SCALE = 1e-3
+"""[m] what a change of order one of a y(0) unknown means."""
+_SHARED = COORDINATE_COUNT + 2
+"""Unknowns that all pieces share: the search numbers and the two delays."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One continuous stretch as the fit sees it."""
+
+    name: str
+    stroke: Stroke
+    force: Array
+    """(N,) recorded force [N]."""
+    train: Array
+    """(N,) 1.0 where the sample is fitted, 0.0 where it is held out or was not measured."""
+    force_delay: float = 0.0
+    """[s] known lag of the force channel behind the displacement channel."""
+    drive_delay: float = 0.0
+    """[s] known further lag of the force channel behind the drive channel."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """The cost at one point, and what a Gauss-Newton step needs."""
+
+    cost: float
+    """[1] sum of squared residuals in units of the noise, priors included."""
+    hessian: Array
+    """(U, U) J'J."""
+    gradient: Array
+    """(U,) J'r."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Pieces, noise and priors; the vector of unknowns is q (13), delays (2), y(0) of each piece."""
+
+    pieces: tuple[Piece, ...]
+    space: SearchSpace
+    noise: float
+    """[N] standard deviation of the force noise."""
+    delay_prior: float
+    """[s] standard deviation of each delay beyond what is known."""
+
+    @property
+    def samples(self) -> int:
+        """Fitted samples."""
+        return int(sum(p.train.sum() for p in self.pieces))
+
+    @property
+    def free(self) -> BoolArray:
+        """(U,) True where an unknown is free."""
+        delays = [True, not self.space.one_drive]
+        return np.concatenate([self.space.free, delays, np.ones(len(self.pieces), bool)])
+
+    @property
+    def delays(self) -> BoolArray:
+        """(U,) True for the two delays."""
+        mask = np.zeros(_SHARED + len(self.pieces), bool)
+        mask[COORDINATE_COUNT:_SHARED] = True
+        return mask
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest unknowns, (U,) each."""
+        low, high = self.space.bounds()
+        rest = np.full(2 + len(self.pieces), np.inf)
+        return np.concatenate([low, -rest]), np.concatenate([high, rest])
+
+    def start(self, coordinates: Coordinates) -> Array:
+        """(U,) unknowns at a point, delays as known, y(0) where the inner displacement would come to rest."""
+        y0 = [p.stroke.displacement.mean() / _Y0_SCALE for p in self.pieces]
+        return np.concatenate([self.space.to_search(coordinates), np.zeros(2), y0])
+
+    def setting(self, unknowns: Array, piece: int) -> Setting:
+        """What a piece is simulated with."""
+        p = self.pieces[piece]
+        force_delay, drive_delay = unknowns[COORDINATE_COUNT:_SHARED] * self.delay_prior
+        return Setting(
+            self.space.to_coordinates(unknowns[:COORDINATE_COUNT]),
+            y0=float(unknowns[_SHARED + piece]) * _Y0_SCALE,
+            force_delay=p.force_delay + float(force_delay),
+            drive_delay=p.drive_delay + float(drive_delay),
+        )
+
+    def simulate(self, unknowns: Array) -> list[Trajectory]:
+        """The trajectory of every piece."""
+        return [simulate(self.setting(unknowns, i), p.stroke) for i, p in enumerate(self.pieces)]
+
+    def columns(self, piece: int) -> list[int]:
+        """Places of the unknowns that a piece depends on: q, the two delays, its own y(0)."""
+        return [*range(_SHARED), _SHARED + piece]
+
+    def residuals(self, unknowns: Array, piece: int) -> tuple[Array, Array]:
+        """Residuals (N,) of a piece and their slopes (N, 16) over its ``columns``; zero where not fitted."""
+        weight, r, J = self._raw(unknowns, piece)
+        return r * weight, (J * weight[:, None]) @ self._scales(unknowns)
+
+    def evaluate(self, unknowns: Array) -> Evaluation:
+        """Cost, J'J and J'r at a point; an unstable point costs infinity."""
+        count = len(unknowns)
+        delays = np.zeros(count)
+        delays[COORDINATE_COUNT:_SHARED] = 1.0
+        hessian, gradient = np.diag(delays), delays * unknowns
+        cost = float(gradient @ gradient)
+        D = self._scales(unknowns)
+        for i in range(len(self.pieces)):
+            weight, r, J = self._raw(unknowns, i)
+            J *= weight[:, None]
+            r *= weight
+            columns = self.columns(i)
+            hessian[np.ix_(columns, columns)] += D.T @ (J.T @ J) @ D
+            gradient[columns] += D.T @ (J.T @ r)
+            cost += float(r @ r)
+        return Evaluation(cost if np.isfinite(cost) else np.inf, hessian, gradient)
+
+    def _raw(self, unknowns: Array, piece: int) -> tuple[Array, Array, Array]:
+        """Weights [1/N], force errors [N] and their slopes (N, 16) over coordinates, delays [s] and y(0) [m]."""
+        p = self.pieces[piece]
+        found = simulate(self.setting(unknowns, piece), p.stroke, slopes=True)
+        return p.train / self.noise, found.force - p.force, found.slopes
+
+    def _scales(self, unknowns: Array) -> Array:
+        """(16, 16) derivative of coordinates, y(0) and delays over a piece's unknowns."""
+        D = np.zeros((len(UNKNOWNS), _SHARED + 1))
+        D[:COORDINATE_COUNT, :COORDINATE_COUNT] = self.space.slopes(unknowns[:COORDINATE_COUNT])
+        D[UNKNOWNS.index("force_delay"), COORDINATE_COUNT] = self.delay_prior
+        D[UNKNOWNS.index("drive_delay"), COORDINATE_COUNT + 1] = self.delay_prior
+        D[UNKNOWNS.index("y0"), _SHARED] = _Y0_SCALE
+        return D
+
+    def with_training(self, train: Sequence[Array]) -> "Problem":
+        """The same problem with other samples fitted; one mask (N,) a piece."""
+        pieces = tuple(replace(p, train=t) for p, t in zip(self.pieces, train, strict=True))
+        return replace(self, pieces=pieces)

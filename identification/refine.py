@@ -1,0 +1,127 @@
+"""Output-error fit: Levenberg-Marquardt on the simulated force, started from a regression.
+
+Steps are shrunk whole, never element by element, and unknowns that would leave their bounds are set onto them
+while the others are solved again. If the best point stays above the noise floor, scattered starts are tried.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.problem import COORDINATE_COUNT, Evaluation, Problem
+from identification.start import scattered, starting_points
+
+_LARGEST_STEP = 1.5
+"""[1] largest change of a search number in one step: a factor 4.5 for the logarithmic ones."""
+_FLOOR_RATIO = 1.03
+"""[1] mean squared residual over the noise's above which other starts are tried."""
+_SAME_COST = 1e-3
+"""[1] relative difference below which two minima count as one."""
+_SCATTER = 3.0
+_NO_GAIN = 0.02
+"""[1] expected fall of the cost, in its own noise units, below which a descent ends: a seventh of a deviation."""
+_NEAR = 0.1
+"""[1] expected relative fall of the cost below which the delays are freed too."""
+
+Progress = Callable[[str, float], None]
+"""Told what is being done and the force error so far [N]."""
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where a descent ended."""
+
+    unknowns: Array
+    """(U,)"""
+    evaluation: Evaluation
+    iterations: int
+    converged: bool
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How hard to try."""
+
+    iterations: int = 60
+    """Most steps in one descent."""
+    restarts: int = 4
+    """Most scattered starts after the regression's own."""
+    seed: int = 1
+    """Of the scatter."""
+
+
+def refine(
+    problem: Problem, settings: Settings = Settings(), progress: Progress = lambda what, error: None
+) -> Minimum:
+    """The best minimum found.
+
+    Args:
+        problem: what is minimised.
+        settings: how hard to try.
+        progress: told of every step.
+    """
+    starts = starting_points(problem)
+    best = descend(problem, starts[0], settings.iterations, progress)
+    agreed = 0
+    for attempt in range(settings.restarts):
+        if best.evaluation.cost / problem.samples < _FLOOR_RATIO or agreed >= 2:
+            break
+        start = (
+            starts[attempt + 1]
+            if attempt + 1 < len(starts)
+            else scattered(problem, starts[0], _SCATTER, settings.seed + attempt)
+        )
+        other = descend(problem, start, settings.iterations, progress)
+        change = other.evaluation.cost / best.evaluation.cost - 1.0
+        agreed += abs(change) < _SAME_COST
+        if change < 0.0:
+            best = other
+    return best
+
+
+def descend(problem: Problem, start: Array, iterations: int, progress: Progress) -> Minimum:
+    """Levenberg-Marquardt from one start; the delays wait until the coordinates have come near."""
+    unknowns, here = start, problem.evaluate(start)
+    low, high = problem.bounds()
+    damping, scale = 1e-2, np.zeros(len(start))
+    free = problem.free & ~problem.delays
+    for iteration in range(iterations):
+        scale = np.maximum(scale, np.diag(here.hessian))
+        step = _step(here, free, damping * np.maximum(scale, 1e-12 * scale.max()), unknowns, low, high)
+        gain = -float(2.0 * here.gradient @ step + step @ here.hessian @ step)
+        small = _NO_GAIN * max(1.0, here.cost / problem.samples)
+        if gain < (small if free[problem.delays].any() else _NEAR * here.cost):
+            if (free == problem.free).all():
+                return Minimum(unknowns, here, iteration, converged=True)
+            free = problem.free
+            continue
+        there = problem.evaluate(unknowns + step)
+        if there.cost < here.cost:
+            unknowns, here = unknowns + step, there
+            damping = max(damping / 5.0, 1e-9)
+            progress("refine", problem.noise * float(np.sqrt(here.cost / problem.samples)))
+        elif gain < 100.0 * small or damping > 1e8:
+            return Minimum(unknowns, here, iteration, converged=True)
+        else:
+            damping *= 6.0
+    return Minimum(unknowns, here, iterations, converged=False)
+
+
+def _step(here: Evaluation, free: BoolArray, damping: Array, unknowns: Array, low: Array, high: Array) -> Array:
+    """The damped Gauss-Newton step (U,) inside the bounds, shrunk whole to a sensible length."""
+    step, moving = np.zeros(len(unknowns)), free.copy()
+    for _ in range(len(unknowns)):
+        pinned = here.hessian[np.ix_(moving, ~moving)] @ step[~moving]
+        matrix = here.hessian[np.ix_(moving, moving)] + np.diag(damping[moving])
+        step[moving] = np.linalg.solve(matrix, -here.gradient[moving] - pinned)
+        longest = np.abs(step[:COORDINATE_COUNT]).max()
+        if longest > _LARGEST_STEP:
+            step *= _LARGEST_STEP / longest
+        outside = moving & ((unknowns + step < low) | (unknowns + step > high))
+        if not outside.any():
+            break
+        step[outside] = np.clip(unknowns + step, low, high)[outside] - unknowns[outside]
+        moving &= ~outside
+    return step

@@ -4,6 +4,7 @@ Steps are shrunk whole, never element by element, and unknowns that would leave 
 while the others are solved again. If the best point stays above the noise floor, scattered starts are tried.
 """
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -19,6 +20,8 @@ _FLOOR_RATIO = 1.03
 """[1] mean squared residual over the noise's above which other starts are tried."""
 _SAME_COST = 1e-3
 """[1] relative difference below which two minima count as one."""
+_AGREED = 2
+"""Descents that must end in the same minimum before it is taken for the lowest."""
 _SCATTER = 3.0
 _NO_GAIN = 0.02
 """[1] expected fall of the cost, in its own noise units, below which a descent ends: a seventh of a deviation."""
@@ -50,10 +53,15 @@ class Settings:
     """Most scattered starts after the regression's own."""
     seed: int = 1
     """Of the scatter."""
+    budget: float | None = None
+    """[s] of processor time after which no further start is tried."""
 
 
 def refine(
-    problem: Problem, settings: Settings = Settings(), progress: Progress = lambda what, error: None
+    problem: Problem,
+    settings: Settings = Settings(),
+    progress: Progress = lambda what, error: None,
+    start: Array | None = None,
 ) -> Minimum:
     """The best minimum found.
 
@@ -61,19 +69,20 @@ def refine(
         problem: what is minimised.
         settings: how hard to try.
         progress: told of every step.
+        start: unknowns (U,) to begin with; the regression's if None.
     """
-    starts = starting_points(problem)
+    began = time.process_time()
+    starts = starting_points(problem) if start is None else [start]
     best = descend(problem, starts[0], settings.iterations, progress)
     agreed = 0
     for attempt in range(settings.restarts):
-        if best.evaluation.cost / problem.samples < _FLOOR_RATIO or agreed >= 2:
+        late = settings.budget is not None and time.process_time() - began > settings.budget
+        if late or agreed >= _AGREED or best.evaluation.cost / problem.samples < _FLOOR_RATIO:
             break
-        start = (
-            starts[attempt + 1]
-            if attempt + 1 < len(starts)
-            else scattered(problem, starts[0], _SCATTER, settings.seed + attempt)
-        )
-        other = descend(problem, start, settings.iterations, progress)
+        further = starts[attempt + 1] if attempt + 1 < len(starts) else None
+        if further is None:
+            further = scattered(problem, starts[0], _SCATTER, settings.seed + attempt)
+        other = descend(problem, further, settings.iterations, progress)
         change = other.evaluation.cost / best.evaluation.cost - 1.0
         agreed += abs(change) < _SAME_COST
         if change < 0.0:

@@ -1,0 +1,123 @@
+"""From recordings to the pieces that a fit or a prediction works on: smooth motion, known delays, masks."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatch
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.drive import steady_levels
+from identification.errors import NothingToFit
+from identification.gap.floor import Floor, combine_floors, measure_floor
+from identification.motion import estimate_motion
+from identification.problem import Piece
+from identification.recordings import Recording, Stretch
+from identification.simulate import Stroke
+
+_SKIPPED = 0.02
+"""[s] at the start of a stretch, while the hysteretic state that nobody recorded is forgotten."""
+
+_MAPPED = 20e-6
+"""[s] what remains between two device clocks that were mapped onto the bench clock."""
+
+
+@dataclass(frozen=True)
+class HoldOut:
+    """Which samples are kept out of the fit."""
+
+    patterns: tuple[str, ...] = ()
+    """Names of stretches or segments, with wildcards."""
+    after: float | None = None
+    """[1] fraction of each stretch after which it is held out."""
+
+    def mask(self, stretch: Stretch) -> BoolArray:
+        """(N,) True where a stretch is held out."""
+        count = len(stretch.time)
+        held = np.zeros(count, bool)
+        if self._names(stretch.name):
+            held[:] = True
+        for segment in stretch.segments:
+            if self._names(segment.name):
+                held[segment.start : segment.stop] = True
+        if self.after is not None:
+            held[round(self.after * count) :] = True
+        return held
+
+    def _names(self, name: str) -> bool:
+        return any(fnmatch(name, pattern) for pattern in self.patterns)
+
+
+@dataclass(frozen=True)
+class Assembled:
+    """All stretches of some recordings, ready to be simulated."""
+
+    pieces: tuple[Piece, ...]
+    """``train`` marks what is fitted."""
+    held_out: tuple[BoolArray, ...]
+    """(N,) of each piece."""
+    stretches: tuple[Stretch, ...]
+    floor: Floor
+    recordings: tuple[Recording, ...]
+
+    @property
+    def drive_unit(self) -> str:
+        """V or A."""
+        return self.recordings[0].drive_unit
+
+    @property
+    def delay_prior(self) -> float:
+        """[s] how well the channels' clocks are known against each other."""
+        return max(_clock_spread(r) for r in self.recordings)
+
+
+def _clock_spread(recording: Recording) -> float:
+    """Standard deviation [s] of a channel delay: as mapped on a bench, half a sample where nobody says."""
+    if recording.metadata["run"].get("source") == "run":
+        return _MAPPED
+    return 0.5 / min(s.rate for s in recording.stretches)
+
+
+def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> Assembled:
+    """Smooth the motion of every stretch and mark what is fitted.
+
+    Raises:
+        NothingToFit: the logs are driven in different ways, or a pattern holds nothing or everything out.
+    """
+    kinds = {r.drive_kind for r in recordings}
+    if len(kinds) > 1:
+        raise NothingToFit(f"the logs are driven in different ways ({', '.join(sorted(kinds))}); fit them apart")
+    stretches = [s for r in recordings for s in r.stretches]
+    held = [hold_out.mask(s) for s in stretches]
+    pieces, floors = [], []
+    for stretch, out in zip(stretches, held, strict=True):
+        motion = estimate_motion(stretch)
+        floors.append(measure_floor(stretch, motion))
+        fitted = stretch.measured & ~out
+        fitted[: round(_SKIPPED * stretch.rate)] = False
+        pieces.append(_piece(stretch, motion.displacement, motion.velocity, motion.acceleration, fitted))
+    _check(hold_out, held, pieces)
+    floor = combine_floors(stretches, floors)
+    return Assembled(tuple(pieces), tuple(held), tuple(stretches), floor, tuple(recordings))
+
+
+def _piece(stretch: Stretch, x: Array, v: Array, a: Array, fitted: BoolArray) -> Piece:
+    displacement_lag = stretch.displacement_delay
+    force_lag = stretch.force_delay
+    return Piece(
+        name=stretch.name,
+        stroke=Stroke(stretch.rate, x, v, a, steady_levels(stretch.drive)),
+        force=stretch.force,
+        train=fitted.astype(np.float64),
+        force_delay=force_lag - displacement_lag,
+        drive_delay=displacement_lag - stretch.drive_delay,
+    )
+
+
+def _check(hold_out: HoldOut, held: Sequence[BoolArray], pieces: Sequence[Piece]) -> None:
+    if hold_out.patterns and not any(m.any() for m in held):
+        raise NothingToFit(
+            f"--hold-out {','.join(hold_out.patterns)} names no stretch and no segment of these logs"
+        )
+    if sum(p.train.sum() for p in pieces) < 200:
+        raise NothingToFit("fewer than 200 samples are left to fit; hold less out")

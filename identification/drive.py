@@ -1,0 +1,55 @@
+"""The measured drive, with the noise of its measurement taken off where it stands still."""
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+from identification.arrays import Array
+
+Indices = npt.NDArray[np.intp]
+
+_JUMP = 8.0
+"""[1] deviations of the noise that make a step a step."""
+_STILL = 1.5
+"""[1] a level whose spread is below this many deviations of the noise is taken for constant."""
+_SHORTEST = 5
+"""[samples] shortest level that is averaged."""
+
+
+def steady_levels(drive: Array) -> Array:
+    """The drive (N,) [V or A] with every constant level replaced by its mean; anything that moves stays."""
+    steps = np.diff(drive)
+    noise = float(np.median(np.abs(steps - np.median(steps)))) / 0.6745 / np.sqrt(2.0)
+    edges = np.concatenate([[0], np.flatnonzero(np.abs(steps) > max(_JUMP * noise, 1e-12)) + 1, [len(drive)]])
+    result = drive.copy()
+    for start, stop in itertools.pairwise(edges):
+        level = drive[start:stop]
+        if stop - start >= _SHORTEST and level.std() <= _STILL * noise:
+            result[start:stop] = level.mean()
+    return result
+
+
+def drive_bins(drive: Array, most: int = 8) -> list[tuple[float, Indices]]:
+    """Samples by drive: constant levels by value, a varying drive in at most ``most`` bins of equal width.
+
+    Returns:
+        (value [V or A], indices of its samples), ascending.
+    """
+    span = float(np.ptp(drive))
+    if span < 1e-9:
+        return [(float(drive[0]), np.arange(len(drive)))]
+    coarse = np.round((drive - drive.min()) / (0.02 * span))
+    levels, counts = np.unique(coarse, return_counts=True)
+    frequent = levels[counts >= 0.01 * len(drive)]
+    if len(frequent) <= 12 and counts[np.isin(levels, frequent)].sum() > 0.9 * len(drive):
+        nearest = np.abs(coarse[:, None] - frequent[None, :]).argmin(axis=1)
+        groups = [np.flatnonzero(nearest == k) for k in range(len(frequent))]
+        return [(float(np.median(drive[g])), g) for g in groups]
+    place = np.minimum((most * (drive - drive.min()) / span).astype(int), most - 1)
+    width = span / most
+    return [
+        (float(drive.min() + (k + 0.5) * width), np.flatnonzero(place == k))
+        for k in range(most)
+        if (place == k).any()
+    ]

@@ -1,0 +1,73 @@
+"""A fit on another log: how well does it repeat the force there?"""
+
+from importlib.metadata import version
+
+import numpy as np
+
+from identification.assemble import HoldOut, assemble
+from identification.prediction import normalised, per_drive, predict_piece, rmse
+from identification.recordings import Recording
+from identification.results import Fit, Prediction, Provenance
+from identification.series import Series
+
+
+def predict_log(fit: Fit, recording: Recording, *, free_offset: bool = False) -> tuple[Prediction, Series]:
+    """Simulate a fit on a log.
+
+    Args:
+        fit: the damper, with the lags of its bench.
+        recording: the log; where the fit saw it, what was held out then is held out here.
+        free_offset: also estimate a constant force for each stretch.
+
+    Returns:
+        The errors, and recorded beside simulated force.
+    """
+    seen = recording.sha256 in fit.provenance.logs.values()
+    assembled = assemble([recording], _held_out_in(fit) if seen else HoldOut())
+    delays = (fit.nuisances.force_delay.value, fit.nuisances.drive_delay.value)
+    point = fit.point()
+    found = [predict_piece(p, point, delays, free_offset=free_offset) for p in assembled.pieces]
+    measured = [s.measured for s in assembled.stretches]
+    errors = [(f.force - p.force)[m] for f, p, m in zip(found, assembled.pieces, measured, strict=True)]
+    forces = [p.force[m] for p, m in zip(assembled.pieces, measured, strict=True)]
+    drives = [p.stroke.drive[m] for p, m in zip(assembled.pieces, measured, strict=True)]
+    error, force = np.concatenate(errors), np.concatenate(forces)
+    prediction = Prediction(
+        rmse_n=rmse(error),
+        nrmse=normalised(error, force),
+        bias_n=float(error.mean()),
+        noise_floor_n=assembled.floor.noise,
+        per_drive=per_drive(drives, errors, forces, assembled.drive_unit),
+        samples=len(error),
+        freed=["y0 of each stretch"] + (["force offset of each stretch"] if free_offset else []),
+        provenance=Provenance(
+            logs={recording.path.name: recording.sha256},
+            version=version("mrbench"),
+            seed=fit.provenance.seed,
+            settings={"free": "offset" if free_offset else None, "log_seen_by_fit": seen},
+        ),
+    )
+    held = assembled.held_out if seen else [np.ones(len(p.force), bool) for p in assembled.pieces]
+    series = Series(
+        time=np.concatenate([s.time for s in assembled.stretches]),
+        displacement=np.concatenate([p.stroke.displacement for p in assembled.pieces]),
+        velocity=np.concatenate([p.stroke.velocity for p in assembled.pieces]),
+        drive=np.concatenate([p.stroke.drive for p in assembled.pieces]),
+        force=np.concatenate([p.force for p in assembled.pieces]),
+        simulated=np.concatenate([f.force for f in found]),
+        stretch=np.repeat(np.arange(len(found)), [len(p.force) for p in assembled.pieces]),
+        held_out=np.concatenate(held),
+        names=tuple(p.name for p in assembled.pieces),
+        drive_unit=assembled.drive_unit,
+    )
+    return prediction, series
+
+
+def _held_out_in(fit: Fit) -> HoldOut:
+    """What the fit kept out of itself, from its own settings."""
+    patterns = fit.provenance.settings.get("hold_out")
+    after = fit.provenance.settings.get("hold_out_after")
+    return HoldOut(
+        tuple(patterns.split(",")) if isinstance(patterns, str) else (),
+        float(after) if after is not None else None,
+    )

@@ -1,0 +1,86 @@
+"""A model on recordings that it never saw: only the inner displacement at the start of each stretch is freed.
+
+The inner displacement y(0) is no property of the damper but of what was done to it before, and it fades within
+seconds; a force offset is freed only if asked for, and then it is said.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.damper.coordinates import Coordinates
+from identification.drive import drive_bins
+from identification.problem import Piece
+from identification.results import DriveError
+from identification.simulate import UNKNOWNS, Setting, simulate
+
+_Y0 = UNKNOWNS.index("y0")
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """One stretch, simulated."""
+
+    force: Array
+    """(N,) simulated force [N], offset included."""
+    y0: float
+    """[m]"""
+    offset: float
+    """[N] added to the simulated force; 0 unless it was freed."""
+
+
+def predict_piece(
+    piece: Piece, point: Coordinates, delays: tuple[float, float] = (0.0, 0.0), *, free_offset: bool = False
+) -> Predicted:
+    """Simulate one stretch with y(0), and on request a force offset, fitted to it by Gauss-Newton.
+
+    Args:
+        piece: the stretch; y(0) is found on its fitted samples, or on all where none is fitted.
+        point: the damper.
+        delays: residual lags of force and drive channel [s], beyond what the instruments report.
+        free_offset: also fit a constant force.
+    """
+    y0, offset = float(piece.stroke.displacement.mean()), 0.0
+    weight = piece.train if piece.train.any() else np.ones(len(piece.force))
+    for _ in range(_ROUNDS):
+        found = simulate(_setting(piece, point, delays, y0), piece.stroke, slopes=True)
+        columns = [found.slopes[:, _Y0]] + ([np.ones(len(piece.force))] if free_offset else [])
+        J = np.column_stack(columns)
+        step = np.linalg.lstsq(J * weight[:, None], (piece.force - found.force - offset) * weight, rcond=None)[0]
+        y0 += float(step[0])
+        offset += float(step[1]) if free_offset else 0.0
+    return Predicted(simulate(_setting(piece, point, delays, y0), piece.stroke).force + offset, y0, offset)
+
+
+def _setting(piece: Piece, point: Coordinates, delays: tuple[float, float], y0: float) -> Setting:
+    return Setting(point, y0, piece.force_delay + delays[0], piece.drive_delay + delays[1])
+
+
+def rmse(error: Array) -> float:
+    """Root mean square [N] of force errors (N,)."""
+    return float(np.sqrt(np.mean(error**2))) if len(error) else float("nan")
+
+
+def normalised(error: Array, force: Array) -> float:
+    """RMSE over the standard deviation of the recorded force, both (N,) [N]."""
+    return rmse(error) / max(float(force.std()), 1e-12)
+
+
+def per_drive(
+    drives: Sequence[Array], errors: Sequence[Array], forces: Sequence[Array], unit: str
+) -> list[DriveError]:
+    """Force error by drive over several stretches, each (N,)."""
+    drive, error, force = np.concatenate(drives), np.concatenate(errors), np.concatenate(forces)
+    return [
+        DriveError(
+            drive=round(value, 6),
+            unit=unit,
+            rmse_n=rmse(error[at]),
+            nrmse=normalised(error[at], force[at]),
+            samples=len(at),
+        )
+        for value, at in drive_bins(drive)
+    ]

@@ -1,0 +1,161 @@
+"""What the identification answers, as documents: frozen, to and from JSON.
+
+Keys carry the unit where no description can (``rmse_n`` is in newton); every other number stands beside its
+unit. The JSON Schemas in docs/reference/schemas are generated from these types.
+"""
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from identification.damper.coordinates import Coordinates
+from identification.errors import IdentificationError
+
+FIT_SCHEMA = "mrbench.fit/1"
+PREDICTION_SCHEMA = "mrbench.prediction/1"
+
+
+class Document(BaseModel):
+    """Base of all documents: frozen, and unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+class Estimate(Document):
+    """One number with its unit and how well it is known."""
+
+    value: float = Field(description="best value, in `unit`")
+    unit: str = Field(description="SI unit")
+    ci95: tuple[float, float] | None = Field(description="95 % interval, in `unit`; null where nothing bounds it")
+    ci99: tuple[float, float] | None = Field(default=None, description="99 % interval, in `unit`")
+    identifiable: bool = Field(description="whether these strokes fix it to better than half its size")
+    note: str = Field(default="", description="what a person should know about it")
+
+
+class Delay(Document):
+    """A lag between two channels, beyond what the instruments report."""
+
+    value: float = Field(description="lag in s")
+    unit: Literal["s"] = "s"
+    ci95: tuple[float, float] | None = Field(description="95 % interval in s")
+    prior_sd: float = Field(description="standard deviation allowed beforehand, in s")
+    outside_prior: bool = Field(description="three deviations or more away: more than a clock's error")
+
+
+class Nuisances(Document):
+    """What had to be estimated along with the damper."""
+
+    y0: dict[str, float] = Field(description="inner displacement at the start of each stretch, in m")
+    force_delay: Delay = Field(description="lag of the force channel behind the displacement channel")
+    drive_delay: Delay = Field(description="further lag of the force channel behind the drive channel")
+
+
+class NoiseFloor(Document):
+    """Noise of the recorded force, in newton, and how it was got."""
+
+    cycle_to_cycle: float | None = Field(description="from repeated cycles, in N; null where none repeat")
+    high_frequency: float = Field(description="from fourth differences, in N")
+    how: str = Field(description="which was used, and why")
+
+
+class Errors(Document):
+    """One measure of the force error on the samples fitted, on the validation part and on those held out."""
+
+    train: float
+    validation: float | None = Field(description="null where no part is set aside to choose settings by")
+    held_out: float | None = Field(description="null where nothing was held out")
+
+
+class DriveError(Document):
+    """Force error at one drive, or in one bin of a varying drive."""
+
+    drive: float = Field(description="drive, or middle of the bin, in `unit`")
+    unit: str = Field(description="V or A")
+    rmse_n: float = Field(description="root mean square force error in N")
+    nrmse: float = Field(description="that, over the standard deviation of the force in these samples")
+    samples: int
+
+
+class Stage(Document):
+    """One stage of the fit."""
+
+    name: str
+    seconds: float = Field(description="processor time in s")
+    rmse_n: float = Field(description="force error on the fitted samples after it, in N")
+    iterations: int
+    note: str = ""
+
+
+class Provenance(Document):
+    """What a document was made from."""
+
+    logs: dict[str, str] = Field(description="file name -> SHA-256 of its content")
+    version: str
+    seed: int
+    settings: dict[str, str | float | int | bool | None]
+
+
+class Fit(Document):
+    """The identified damper."""
+
+    schema_: Literal["mrbench.fit/1"] = Field(default="mrbench.fit/1", alias="schema")
+    specimen: str
+    drive_kind: str = Field(description="driver_command_v, coil_v or coil_a")
+    drive_unit: str = Field(description="V or A")
+    drive_range: tuple[float, float] = Field(description="lowest and highest drive fitted, in `drive_unit`")
+    parameters: dict[str, Estimate] = Field(description="the paper's fourteen")
+    coordinates: dict[str, Estimate] = Field(description="the regular coordinates that the fit searched")
+    nuisances: Nuisances
+    noise_floor_n: float = Field(description="noise of the recorded force in N")
+    floor: NoiseFloor
+    rmse_n: Errors = Field(description="root mean square force error in N")
+    nrmse: Errors = Field(description="that, over the standard deviation of the recorded force")
+    per_drive: list[DriveError]
+    stages: list[Stage]
+    agreement: str | None = Field(
+        description="whether the stages agree within their intervals; null for one stage"
+    )
+    result: str = Field(description="`converged`, or why not")
+    correlations: dict[str, float] = Field(
+        description="pairs of coordinates correlated beyond 0.9, `a,b` -> value"
+    )
+    provenance: Provenance
+
+    def point(self) -> Coordinates:
+        """The coordinates as numbers."""
+        return Coordinates(**{name: e.value for name, e in self.coordinates.items()})
+
+
+class Prediction(Document):
+    """A model simulated on a log that it never saw."""
+
+    schema_: Literal["mrbench.prediction/1"] = Field(default="mrbench.prediction/1", alias="schema")
+    rmse_n: float = Field(description="root mean square force error in N")
+    nrmse: float = Field(description="that, over the standard deviation of the recorded force")
+    bias_n: float = Field(description="mean of simulated minus recorded force in N")
+    noise_floor_n: float = Field(description="noise of the recorded force in N")
+    per_drive: list[DriveError]
+    samples: int
+    freed: list[str] = Field(description="what was estimated on this very log")
+    provenance: Provenance
+
+
+def read_fit(path: Path) -> Fit:
+    """A fit from its file.
+
+    Raises:
+        IdentificationError: the file is missing or is no fit.
+    """
+    try:
+        return Fit.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise IdentificationError(
+            f"{path}: cannot be read ({error.strerror}); give a fit made by `identify`"
+        ) from error
+    except ValueError as error:
+        first = str(error).splitlines()
+        raise IdentificationError(
+            f"{path}: no {FIT_SCHEMA} document ({first[1] if len(first) > 1 else first[0]}); "
+            "give a fit made by `mrbench identify`"
+        ) from error

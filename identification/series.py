@@ -1,0 +1,80 @@
+"""Recorded and simulated force side by side, for plots and other tools."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from identification.arrays import Array, BoolArray
+from identification.errors import IdentificationError
+
+
+@dataclass(frozen=True)
+class Series:
+    """All samples of a prediction, stretch after stretch; arrays (N,)."""
+
+    time: Array
+    """[s] on the log's clock."""
+    displacement: Array
+    """[m] as smoothed for the simulation."""
+    velocity: Array
+    """[m/s]"""
+    drive: Array
+    """[V or A]"""
+    force: Array
+    """[N] recorded."""
+    simulated: Array
+    """[N]"""
+    stretch: npt.NDArray[np.int64]
+    """Number of the stretch in ``names``."""
+    held_out: BoolArray
+    """True where the fit did not see the sample."""
+    names: tuple[str, ...]
+    drive_unit: str
+
+
+_COLUMNS = {
+    "time": "time_s",
+    "displacement": "displacement_m",
+    "velocity": "velocity_mps",
+    "force": "force_n",
+    "simulated": "simulated_force_n",
+}
+
+
+def write_series(path: Path, series: Series) -> None:
+    """Write a series as .npz (arrays and an ``info`` JSON text) or .csv (units in the header).
+
+    Raises:
+        IdentificationError: another suffix, or the file cannot be written.
+    """
+    try:
+        if path.suffix == ".npz":
+            _write_arrays(path, series)
+        elif path.suffix == ".csv":
+            _write_table(path, series)
+        else:
+            raise IdentificationError(f"{path}: a series is written as .npz or .csv")
+    except OSError as error:
+        raise IdentificationError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def _write_arrays(path: Path, series: Series) -> None:
+    info = json.dumps({"stretches": list(series.names), "drive_unit": series.drive_unit})
+    names = ("time", "displacement", "velocity", "drive", "force", "simulated", "stretch", "held_out")
+    np.savez_compressed(path, info=np.array(info), **{name: getattr(series, name) for name in names})
+
+
+def _write_table(path: Path, series: Series) -> None:
+    drive = "voltage_v" if series.drive_unit == "V" else "current_a"
+    columns = {header: getattr(series, name) for name, header in _COLUMNS.items()} | {drive: series.drive}
+    np.savetxt(
+        path,
+        np.column_stack(list(columns.values())),
+        delimiter=",",
+        header=",".join(columns),
+        comments="",
+        fmt="%.9g",
+    )

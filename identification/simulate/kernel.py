@@ -36,13 +36,16 @@ _STEPS_AT_REVERSAL = 4
 def _choose_steps(
     fineness: float, h: float, D_y: float, v0: float, v1: float, y_rate: float, zeta: float, zeta_rate: float
 ) -> int:
-    """Steps for one sample, so that zeta moves by about ``fineness`` in each; a few more where the slip turns."""
+    """Steps for one sample: the root of zeta's travel over ``fineness``; a few more where the slip turns.
+
+    The root, because the error of a step falls with its third power: many small travels add up as one large.
+    """
     slip_before = v0 - y_rate
     slip_after = v1 - y_rate
     travel = abs(zeta_rate) * h
     if slip_after * zeta < 0.0:
         travel = max(travel, 2.0 * abs(slip_after) * h / D_y)
-    steps = min(max(math.ceil(travel / fineness), 1), _MOST_STEPS)
+    steps = min(max(math.ceil(math.sqrt(travel / fineness)), 1), _MOST_STEPS)
     return max(steps, _STEPS_AT_REVERSAL) if slip_before * slip_after <= 0.0 else steps
 
 
@@ -67,7 +70,7 @@ def march(
         u_middle: (N-1,) field half way between them.
         h: [s] time between samples.
         y0, zeta0: state at the first sample [m], [1].
-        fineness: [1] largest move of zeta in one step, for the samples whose plan is still open.
+        fineness: [1] travel of zeta in a sample above which it takes more than one step, where the plan is open.
         plan: filled in place where it is 0.
 
     Returns:

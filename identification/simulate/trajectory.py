@@ -19,8 +19,8 @@ from identification.simulate import inputs
 from identification.simulate.kernel import Plan, march, march_with_slopes
 from identification.simulate.step import STRUCTURAL
 
-FINENESS = 0.2
-"""[1] largest move of zeta in a step: 3e-5 of the force's standard deviation; see benchmarks/simulation.py."""
+FINENESS = 0.1
+"""[1] travel of zeta above which a sample takes more steps: 4e-5 of the force's deviation at most."""
 
 UNKNOWNS: tuple[str, ...] = (*(q.symbol for q in COORDINATES), "y0", "force_delay", "drive_delay")
 """Columns of the slopes; parameters of effects follow as ``effect.parameter``."""
@@ -110,7 +110,7 @@ def simulate(
         stroke: the inputs.
         plan: steps per sample of an earlier trajectory; chosen anew if None.
         slopes: also the derivatives; costs some two and a half plain simulations.
-        fineness: largest move of the hysteretic state in one step [1], where the plan is open.
+        fineness: travel of the hysteretic state above which a sample takes more than one step [1].
     """
     c, h = setting.coordinates, 1.0 / stroke.rate
     moved = _mounting(setting.effects, _delayed(stroke, setting.force_delay + _shift(setting.effects)))

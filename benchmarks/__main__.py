@@ -1,0 +1,18 @@
+"""`python -m benchmarks [NAME...]`: run all benchmarks, or those named."""
+
+import importlib
+import sys
+
+from benchmarks.timing import reference_seconds
+
+NAMES = ("simulation", "fitting", "logs")
+
+
+def main() -> None:
+    """Print every benchmark beside what is asked of it."""
+    print(f"reference kernel (a million additions in plain Python): {reference_seconds() * 1e3:.1f} ms")
+    for name in sys.argv[1:] or NAMES:
+        importlib.import_module(f"benchmarks.{name}").run()
+
+
+main()

@@ -9,6 +9,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.drive import steady_levels
 from identification.errors import NothingToFit
+from identification.force_channel import filter_lag, low_pass
 from identification.gap.floor import Floor, combine_floors, measure_floor
 from identification.motion import estimate_motion
 from identification.problem import Piece
@@ -102,15 +103,15 @@ def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> 
 
 
 def _piece(stretch: Stretch, x: Array, v: Array, a: Array, fitted: BoolArray) -> Piece:
-    displacement_lag = stretch.displacement_delay
-    force_lag = stretch.force_delay
+    displacement_lag = stretch.displacement_delay + filter_lag(stretch.displacement_filter)
     return Piece(
         name=stretch.name,
         stroke=Stroke(stretch.rate, x, v, a, steady_levels(stretch.drive)),
         force=stretch.force,
         train=fitted.astype(np.float64),
-        force_delay=force_lag - displacement_lag,
+        force_delay=stretch.force_delay - displacement_lag,
         drive_delay=displacement_lag - stretch.drive_delay,
+        force_filter=low_pass(stretch.force_filter, stretch.rate) if stretch.force_filter else None,
     )
 
 

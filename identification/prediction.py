@@ -47,12 +47,13 @@ def predict_piece(
     weight = piece.train if piece.train.any() else np.ones(len(piece.force))
     for _ in range(_ROUNDS):
         found = simulate(_setting(piece, point, delays, y0), piece.stroke, slopes=True)
-        columns = [found.slopes[:, _Y0]] + ([np.ones(len(piece.force))] if free_offset else [])
+        columns = [piece.recorded(found.slopes[:, _Y0])] + ([np.ones(len(piece.force))] if free_offset else [])
         J = np.column_stack(columns)
-        step = np.linalg.lstsq(J * weight[:, None], (piece.force - found.force - offset) * weight, rcond=None)[0]
+        step = np.linalg.lstsq(J * weight[:, None], (piece.force - piece.recorded(found.force) - offset) * weight, rcond=None)[0]
         y0 += float(step[0])
         offset += float(step[1]) if free_offset else 0.0
-    return Predicted(simulate(_setting(piece, point, delays, y0), piece.stroke).force + offset, y0, offset)
+    force = simulate(_setting(piece, point, delays, y0), piece.stroke).force
+    return Predicted(piece.recorded(force) + offset, y0, offset)
 
 
 def _setting(piece: Piece, point: Coordinates, delays: tuple[float, float], y0: float) -> Setting:

@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.damper.coordinates import Coordinates
+from identification.force_channel import LowPass
 from identification.search_space import SearchSpace
 from identification.simulate import UNKNOWNS, Setting, Stroke, Trajectory, simulate
 
@@ -35,6 +36,12 @@ class Piece:
     """[s] known lag of the force channel behind the displacement channel."""
     drive_delay: float = 0.0
     """[s] known further lag of the force channel behind the drive channel."""
+    force_filter: LowPass | None = None
+    """What the force channel rounds off, beside its delay."""
+
+    def recorded(self, true: Array) -> Array:
+        """What the force channel makes of a force, or of its slopes: (N,) or (N, U)."""
+        return true if self.force_filter is None else self.force_filter.apply(true)
 
 
 @dataclass(frozen=True)
@@ -135,7 +142,7 @@ class Problem:
         """Weights [1/N], force errors [N] and their slopes (N, 16) over coordinates, delays [s] and y(0) [m]."""
         p = self.pieces[piece]
         found = simulate(self.setting(unknowns, piece), p.stroke, slopes=True)
-        return p.train / self.noise, found.force - p.force, found.slopes
+        return p.train / self.noise, p.recorded(found.force) - p.force, p.recorded(found.slopes)
 
     def _scales(self, unknowns: Array) -> Array:
         """(16, 16) derivative of coordinates, y(0) and delays over a piece's unknowns."""

@@ -79,6 +79,6 @@ def _regression(pieces: tuple[Piece, ...]) -> Array:
 def _plain_cost(problem: Problem, unknowns: Array) -> float:
     """Sum of squared force errors [N^2] over the fitted samples."""
     found = problem.simulate(unknowns)
-    errors = [((t.force - p.force) ** 2 * p.train).sum() for t, p in zip(found, problem.pieces, strict=True)]
+    errors = [((p.recorded(t.force) - p.force) ** 2 * p.train).sum() for t, p in zip(found, problem.pieces, strict=True)]
     total = float(np.sum(errors))
     return total if np.isfinite(total) else float("inf")

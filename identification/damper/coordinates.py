@@ -54,9 +54,7 @@ COORDINATES: tuple[Quantity, ...] = (
     Quantity("eta", "1/s", 2.0, 2000.0, 100.0, "how fast the field follows the drive"),
     Quantity("c0_a", "N s/m", 1.0, 1e5, 1e3, "viscous damping at large velocity, zero drive"),
     Quantity("c0_b", "N s/(m {drive})", -1e5, 1e5, 1e3, "growth of that damping with drive"),
-    Quantity(
-        "c1_a", "N s/m", 100.0, 1e7, 2e4, "dashpot that rounds the force off at low velocity, zero drive"
-    ),
+    Quantity("c1_a", "N s/m", 100.0, 1e7, 2e4, "dashpot that rounds the force off at low velocity, zero drive"),
     Quantity("c1_b", "N s/(m {drive})", -1e7, 1e7, 2e4, "growth of that dashpot with drive"),
     Quantity("k0", "N/m", -1e5, 1e5, 2e3, "stiffness at large velocity"),
     Quantity("k1", "N/m", -1e5, 1e5, 1e3, "stiffness of the gas accumulator"),

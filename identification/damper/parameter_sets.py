@@ -141,7 +141,5 @@ def check_drive_range(p: Parameters, lowest: float, highest: float) -> list[str]
         for drive in (lowest, highest):
             value = base + slope * drive
             if value < 0:
-                faults.append(
-                    f"{name} is {value:.4g} {unit} at drive {drive:g}: the damper would feed energy in"
-                )
+                faults.append(f"{name} is {value:.4g} {unit} at drive {drive:g}: the damper would feed energy in")
     return faults

@@ -1,0 +1,66 @@
+"""The arrays of this room and the one place where functions are compiled."""
+
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any, TypeAlias, TypeVar, cast
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+Array: TypeAlias = npt.NDArray[np.float64]
+"""Real numbers in SI units; the docstring at hand gives shape and unit."""
+
+OfTwo: TypeAlias = Callable[[float, float], float]
+"""A compiled function of two numbers that the plant takes as an argument."""
+
+Function = TypeVar("Function", bound=Callable[..., object])
+
+_OF_TWO = numba.float64(numba.float64, numba.float64)
+OF_TWO = numba.types.FunctionType(_OF_TWO)
+"""The type of ``OfTwo`` in explicit signatures: one compiled plant then takes any of them."""
+
+
+def compiled(function: Function, signature: Any = None) -> Function:
+    """The function as machine code, kept on disk between processes; it releases the interpreter's lock.
+
+    With a signature it is compiled at once and for that alone, else when it is called.
+    """
+    return cast(Function, numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function))
+
+
+def with_values(act: Callable[..., Any], values: Sequence[float]) -> OfTwo:
+    """An effect's form with its parameters fixed, as a compiled function of its first two arguments."""
+    form = numba.njit(nogil=True, error_model="numpy")(act)
+    fixed = tuple(values)
+
+    def acts(first: float, second: float) -> float:
+        return float(form(first, second, *fixed))
+
+    return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(acts))
+
+
+def sum_of(functions: Sequence[OfTwo]) -> OfTwo:
+    """The sum of compiled functions of the same two arguments; nothing adds up to zero."""
+    return reduce(_plus, functions) if functions else nothing
+
+
+def _plus(one: OfTwo, other: OfTwo) -> OfTwo:
+    def both(first: float, second: float) -> float:
+        return one(first, second) + other(first, second)
+
+    return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(both))
+
+
+def _nothing(first: float, second: float) -> float:
+    return 0.0
+
+
+def _second(first: float, second: float) -> float:
+    return second
+
+
+nothing: OfTwo = compiled(_nothing, _OF_TWO)
+"""No force beside the law."""
+rigid: OfTwo = compiled(_second, _OF_TWO)
+"""A mounting without play: the damper is where the actuator is."""

@@ -1,0 +1,27 @@
+"""Errors of the simulated rig.
+
+SimRigError
+├── ScenarioError   a scenario cannot be read, or asks for what does not exist or lies out of bounds
+├── CommandsError   the commands to play are no uniform record of displacement and drive
+└── PlantError      the specimen of the scenario has no finite motion under these commands
+
+``exit_code`` tells the command line that the message is for a person and needs no traceback.
+"""
+
+
+class SimRigError(Exception):
+    """Base of everything that the simulated rig raises on purpose."""
+
+    exit_code = 1
+
+
+class ScenarioError(SimRigError):
+    """A scenario cannot be read, or asks for what does not exist or lies out of bounds."""
+
+
+class CommandsError(SimRigError):
+    """The commands to play are no uniform record of displacement and drive."""
+
+
+class PlantError(SimRigError):
+    """The specimen of the scenario has no finite motion under these commands."""

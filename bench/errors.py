@@ -4,7 +4,8 @@ BenchError
 ├── MethodError      a method document asks for what cannot be compiled or exceeds its own limits
 ├── RunError         a run could not be carried out
 ├── LogError         a log cannot be read, written or mended
-└── RecordingError   a recording made elsewhere cannot be taken in
+├── RecordingError   a recording made elsewhere cannot be taken in
+└── ReportError      a report or a demo cannot be made
 
 Each message says what failed, the value and the limit with unit, and what to do. ``exit_code`` tells the
 command line that the message is for a person and needs no traceback.
@@ -31,3 +32,7 @@ class LogError(BenchError):
 
 class RecordingError(BenchError):
     """A recording made elsewhere cannot be taken in."""
+
+
+class ReportError(BenchError):
+    """A report or a demo cannot be made."""

@@ -1,7 +1,7 @@
 """One run straight from the simulated plant: method to samples, samples to the rig, its channels to a log."""
 
 import platform
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from importlib.metadata import version
@@ -17,7 +17,7 @@ from bench.methods import Method, Programme, ProgrammeSegment, compile_method
 from bench.recorder.header import Channel, RunHeader, text_values
 from bench.recorder.velocity import smooth_velocity
 from bench.recorder.writer import LogWriter
-from bench.rig_process import RigChannels, play
+from bench.rig_process import RIG, RigChannels, play
 
 REQUIRED = ("displacement", "force", "coil_drive")
 """Channels without which a sample is lost."""
@@ -53,6 +53,9 @@ def run_from_plant(
     out: Path,
     identity: Identity,
     progress: Callable[[float], None] = lambda share: None,
+    *,
+    seed: int | None = None,
+    rig: Sequence[str] = RIG,
 ) -> Programme:
     """Record a method from a scenario.
 
@@ -64,6 +67,8 @@ def run_from_plant(
         out: the log.
         identity: whose run it is.
         progress: told the share done, 0 to 1.
+        seed: of everything that chance decides on the rig; the scenario's own if None.
+        rig: the command that starts the rig.
 
     Returns:
         The programme that was run.
@@ -77,19 +82,20 @@ def run_from_plant(
         raise RunError(f"{out} cannot be written: there is no folder {out.parent}")
     programme = compile_method(method)
     commands = {"time": programme.time, "displacement": programme.displacement, "drive": programme.drive}
-    found = play(scenario, commands, progress)
+    options = () if seed is None else ("--seed", str(seed))
+    found = play(scenario, commands, progress, (*rig, *options))
     if found.info["drive_unit"] != method.drive_unit:
         raise RunError(
             f"method {method.name} drives in {method.drive_unit}, the scenario {scenario} in "
             f"{found.info['drive_unit']}; take a method with the drive_kind {found.info['drive_kind']}"
         )
     values = _sample_values(programme, found)
-    with LogWriter(out, _header(method, found, identity)) as log:
+    with LogWriter(out, _header(method, found, identity, seed)) as log:
         _record(log, programme, found, values, Path(scenario).stem)
     return programme
 
 
-def _header(method: Method, found: RigChannels, identity: Identity) -> RunHeader:
+def _header(method: Method, found: RigChannels, identity: Identity, seed: int | None) -> RunHeader:
     info = found.info
     known = Channel.model_fields
     return RunHeader(
@@ -101,6 +107,7 @@ def _header(method: Method, found: RigChannels, identity: Identity) -> RunHeader
         drive_unit=info["drive_unit"],
         source="run",
         versions={"mrbench": version("mrbench"), "python": platform.python_version(), "numpy": np.__version__},
+        seed=seed,
         utc_offset=identity.started.isoformat(),
         velocity_from="smoothed displacement",
         resampled=RESAMPLED,

@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.drive import steady_levels
 from identification.errors import NothingToFit
-from identification.force_channel import filter_lag, low_pass
+from identification.force_channel import LowPass, filter_lag
 from identification.gap.floor import Floor, combine_floors, measure_floor
 from identification.motion import estimate_motion
 from identification.problem import Piece
@@ -19,6 +19,8 @@ from identification.simulate import Stroke
 _SKIPPED = 0.02
 """[s] at the start of a stretch, while the hysteretic state that nobody recorded is forgotten."""
 
+_FILTER_RATE = 4000.0
+"""[Hz] at which the force is simulated in front of a filter."""
 _MAPPED = 20e-6
 """[s] what remains between two device clocks that were mapped onto the bench clock."""
 
@@ -111,8 +113,15 @@ def _piece(stretch: Stretch, x: Array, v: Array, a: Array, fitted: BoolArray) ->
         train=fitted.astype(np.float64),
         force_delay=stretch.force_delay - displacement_lag,
         drive_delay=displacement_lag - stretch.drive_delay,
-        force_filter=low_pass(stretch.force_filter, stretch.rate) if stretch.force_filter else None,
+        low_pass=_low_pass(stretch),
     )
+
+
+def _low_pass(stretch: Stretch) -> LowPass | None:
+    """The force channel's filter, on a grid fine enough for a force that turns within a millisecond."""
+    if stretch.force_filter is None:
+        return None
+    return LowPass(stretch.force_filter, stretch.rate, max(1, round(_FILTER_RATE / stretch.rate)))
 
 
 def _check(hold_out: HoldOut, held: Sequence[BoolArray], pieces: Sequence[Piece]) -> None:

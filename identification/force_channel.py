@@ -4,7 +4,8 @@ A filter is not only late: it rounds the corners that a loop has at its reversal
 fixes the yield displacement. The displacement's own filter needs no more than its delay, for strokes are slow.
 """
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import signal
@@ -13,28 +14,33 @@ from identification.arrays import Array
 from identification.recordings import ChannelFilter
 
 
-class LowPass(NamedTuple):
-    """A discrete filter, exact for a force that goes straight from sample to sample."""
+@dataclass(frozen=True)
+class LowPass:
+    """A discrete filter, exact for a force that goes straight from sample to sample.
 
-    numerator: Array
-    denominator: Array
-    lag: float
-    """[s] delay of slow signals."""
+    A force turns within a millisecond at a reversal, so it is simulated ``finer`` times as densely as recorded.
+    """
+
+    reported: ChannelFilter
+    """What the device says of it."""
+    rate: float
+    """[Hz] of the recording."""
+    finer: int = 1
 
     def apply(self, values: Array) -> Array:
-        """Values (N,) or (N, U) behind the filter, settled at their first."""
-        settled = signal.lfilter_zi(self.numerator, self.denominator)
+        """Values ((N - 1) finer + 1,) or (..., U) behind the filter, settled at their first, at the N samples."""
+        numerator, denominator = self._coefficients
+        settled = signal.lfilter_zi(numerator, denominator)
         start = settled if values.ndim == 1 else settled[:, None]
-        found: Array = signal.lfilter(self.numerator, self.denominator, values, axis=0, zi=start * values[:1])[0]
-        return found
+        found: Array = signal.lfilter(numerator, denominator, values, axis=0, zi=start * values[:1])[0]
+        return found[:: self.finer]
 
-
-def low_pass(reported: ChannelFilter, rate: float) -> LowPass:
-    """The Butterworth filter that a device reports, at a sampling rate [Hz]."""
-    turn = 2 * np.pi * reported.cutoff
-    analogue = signal.butter(reported.order, turn, analog=True)
-    numerator, denominator, _ = signal.cont2discrete(analogue, 1 / rate, method="foh")
-    return LowPass(np.ravel(numerator), np.ravel(denominator), filter_lag(reported))
+    @cached_property
+    def _coefficients(self) -> tuple[Array, Array]:
+        """Numerator and denominator of the Butterworth filter at the finer rate."""
+        analogue = signal.butter(self.reported.order, 2 * np.pi * self.reported.cutoff, analog=True)
+        numerator, denominator, _ = signal.cont2discrete(analogue, 1 / (self.rate * self.finer), method="foh")
+        return np.ravel(numerator), np.ravel(denominator)
 
 
 def filter_lag(reported: ChannelFilter | None) -> float:

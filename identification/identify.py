@@ -57,10 +57,13 @@ def identify(
     assembled = assemble(recordings, request.hold_out)
     began = time.process_time()
     problem = _problem(assembled, request)
-    minimum = refine(problem, request.settings, progress)
+    minimum = refine(problem.quicker(), request.settings, progress)
+    polish = replace(request.settings, restarts=0)
+    if any(p.low_pass for p in problem.pieces):
+        minimum = refine(problem, polish, progress, minimum.unknowns)
     if _ratio(problem, minimum) > _MISFIT:
         problem = replace(problem, noise=problem.noise * _ratio(problem, minimum))
-        minimum = refine(problem, replace(request.settings, restarts=0), progress, minimum.unknowns)
+        minimum = refine(problem, polish, progress, minimum.unknowns)
     return _document(assembled, request, problem, minimum, time.process_time() - began)
 
 

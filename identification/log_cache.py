@@ -45,7 +45,7 @@ def recall(sha256: str) -> RawLog | None:
     """The columns of the log with this content; None where they are not kept or damaged."""
     entry = folder() / f"{sha256}.{_FORM}.npz"
     try:
-        with np.load(entry, allow_pickle=False) as kept:
+        with entry.open("rb") as file, np.load(file, allow_pickle=False) as kept:
             said = json.loads(str(kept["said"]))
             samples = dict(zip(said["names"], kept["columns"], strict=True))
         os.utime(entry)

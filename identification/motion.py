@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.harmonics import Harmonics, fit_harmonics
 from identification.recordings import Stretch
 from identification.smoother import derivative, kept_noise, smoothed, stiffness
@@ -64,7 +64,7 @@ def estimate_motion(stretch: Stretch) -> Motion:
         The motion on the stretch's own time base.
     """
     weights = stretch.measured.astype(float)
-    noise = displacement_noise(stretch.displacement)
+    noise = displacement_noise(stretch.displacement, stretch.measured)
     give = _give_under_load(stretch, weights, noise)
     waves = _periodic_parts(stretch, weights, give, noise)
     regions = _regions(len(weights), waves, stretch.rate, bool(np.any(give)))
@@ -83,12 +83,13 @@ def estimate_motion(stretch: Stretch) -> Motion:
     )
 
 
-def displacement_noise(displacement: Array) -> float:
+def displacement_noise(displacement: Array, measured: BoolArray) -> float:
     """Standard deviation [m] of white noise or quantisation in a displacement (N,), by its fourth differences.
 
-    The largest hundredth of them (knocks, drop-outs) is left out, and put back as a Gaussian would have it.
+    The largest hundredth of them (knocks) is left out, and put back as a Gaussian would have it.
     """
-    squares = np.diff(displacement, 4) ** 2 / 70.0
+    whole = np.convolve(measured, np.ones(5), "valid") > 4.5
+    squares = np.diff(displacement, 4)[whole] ** 2 / 70.0
     usual = squares[squares <= np.quantile(squares, 0.99)]
     return float(np.sqrt(np.mean(usual) / 0.92476))
 

@@ -14,7 +14,7 @@ from identification.damper.coordinates import Coordinates
 from identification.drive import drive_bins
 from identification.problem import Piece
 from identification.results import DriveError
-from identification.simulate import UNKNOWNS, Setting, simulate
+from identification.simulate import UNKNOWNS, Setting
 
 _Y0 = UNKNOWNS.index("y0")
 _ROUNDS = 3
@@ -46,14 +46,13 @@ def predict_piece(
     y0, offset = float(piece.stroke.displacement.mean()), 0.0
     weight = piece.train if piece.train.any() else np.ones(len(piece.force))
     for _ in range(_ROUNDS):
-        found = simulate(_setting(piece, point, delays, y0), piece.stroke, slopes=True)
-        columns = [piece.recorded(found.slopes[:, _Y0])] + ([np.ones(len(piece.force))] if free_offset else [])
-        J = np.column_stack(columns)
-        step = np.linalg.lstsq(J * weight[:, None], (piece.force - piece.recorded(found.force) - offset) * weight, rcond=None)[0]
+        force, slopes = piece.recorded(_setting(piece, point, delays, y0), slopes=True)
+        J = np.column_stack([slopes[:, _Y0]] + ([np.ones(len(force))] if free_offset else []))
+        step = np.linalg.lstsq(J * weight[:, None], (piece.force - force - offset) * weight, rcond=None)[0]
         y0 += float(step[0])
         offset += float(step[1]) if free_offset else 0.0
-    force = simulate(_setting(piece, point, delays, y0), piece.stroke).force
-    return Predicted(piece.recorded(force) + offset, y0, offset)
+    force, _ = piece.recorded(_setting(piece, point, delays, y0))
+    return Predicted(force + offset, y0, offset)
 
 
 def _setting(piece: Piece, point: Coordinates, delays: tuple[float, float], y0: float) -> Setting:

@@ -6,6 +6,7 @@ of the drive channel against the displacement, each held by a prior from the clo
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from identification.arrays import Array, BoolArray
 from identification.damper.coordinates import Coordinates
 from identification.force_channel import LowPass
 from identification.search_space import SearchSpace
-from identification.simulate import UNKNOWNS, Setting, Stroke, Trajectory, simulate
+from identification.simulate import UNKNOWNS, Setting, Stroke, simulate
 
 COORDINATE_COUNT = len(Coordinates._fields)
 _Y0_SCALE = 1e-3
@@ -36,12 +37,20 @@ class Piece:
     """[s] known lag of the force channel behind the displacement channel."""
     drive_delay: float = 0.0
     """[s] known further lag of the force channel behind the drive channel."""
-    force_filter: LowPass | None = None
-    """What the force channel rounds off, beside its delay."""
+    low_pass: LowPass | None = None
+    """What the force channel does to the force, beside delaying it."""
 
-    def recorded(self, true: Array) -> Array:
-        """What the force channel makes of a force, or of its slopes: (N,) or (N, U)."""
-        return true if self.force_filter is None else self.force_filter.apply(true)
+    def recorded(self, setting: Setting, *, slopes: bool = False) -> tuple[Array, Array]:
+        """Force [N] (N,) as the channel would record it, and its slopes (N, unknowns) if asked for."""
+        if self.low_pass is None:
+            found = simulate(setting, self.stroke, slopes=slopes)
+            return found.force, found.slopes
+        found = simulate(setting, self._finer_stroke, slopes=slopes)
+        return self.low_pass.apply(found.force), self.low_pass.apply(found.slopes) if slopes else found.slopes
+
+    @cached_property
+    def _finer_stroke(self) -> Stroke:
+        return self.stroke.finer(self.low_pass.finer if self.low_pass else 1)
 
 
 @dataclass(frozen=True)
@@ -107,9 +116,9 @@ class Problem:
             drive_delay=p.drive_delay + float(drive_delay),
         )
 
-    def simulate(self, unknowns: Array) -> list[Trajectory]:
-        """The trajectory of every piece."""
-        return [simulate(self.setting(unknowns, i), p.stroke) for i, p in enumerate(self.pieces)]
+    def simulate(self, unknowns: Array) -> list[Array]:
+        """The force [N] of every piece as it would be recorded, (N,) each."""
+        return [p.recorded(self.setting(unknowns, i))[0] for i, p in enumerate(self.pieces)]
 
     def columns(self, piece: int) -> list[int]:
         """Places of the unknowns that a piece depends on: q, the two delays, its own y(0)."""
@@ -141,8 +150,8 @@ class Problem:
     def _raw(self, unknowns: Array, piece: int) -> tuple[Array, Array, Array]:
         """Weights [1/N], force errors [N] and their slopes (N, 16) over coordinates, delays [s] and y(0) [m]."""
         p = self.pieces[piece]
-        found = simulate(self.setting(unknowns, piece), p.stroke, slopes=True)
-        return p.train / self.noise, p.recorded(found.force) - p.force, p.recorded(found.slopes)
+        force, slopes = p.recorded(self.setting(unknowns, piece), slopes=True)
+        return p.train / self.noise, force - p.force, slopes
 
     def _scales(self, unknowns: Array) -> Array:
         """(16, 16) derivative of coordinates, y(0) and delays over a piece's unknowns."""
@@ -152,6 +161,11 @@ class Problem:
         D[UNKNOWNS.index("drive_delay"), COORDINATE_COUNT + 1] = self.delay_prior
         D[UNKNOWNS.index("y0"), _SHARED] = _Y0_SCALE
         return D
+
+    def quicker(self) -> "Problem":
+        """The same problem with filters applied at the samples only: a good way near, a little beside."""
+        pieces = [replace(p, low_pass=replace(p.low_pass, finer=1)) if p.low_pass else p for p in self.pieces]
+        return replace(self, pieces=tuple(pieces))
 
     def with_training(self, train: Sequence[Array]) -> "Problem":
         """The same problem with other samples fitted; one mask (N,) a piece."""

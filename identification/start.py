@@ -78,7 +78,7 @@ def _regression(pieces: tuple[Piece, ...]) -> Array:
 
 def _plain_cost(problem: Problem, unknowns: Array) -> float:
     """Sum of squared force errors [N^2] over the fitted samples."""
-    found = problem.simulate(unknowns)
-    errors = [((p.recorded(t.force) - p.force) ** 2 * p.train).sum() for t, p in zip(found, problem.pieces, strict=True)]
+    forces = problem.simulate(unknowns)
+    errors = [((f - p.force) ** 2 * p.train).sum() for f, p in zip(forces, problem.pieces, strict=True)]
     total = float(np.sum(errors))
     return total if np.isfinite(total) else float("inf")

@@ -15,6 +15,9 @@ def run(
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what the method will ask for.")] = False,
     specimen: Annotated[str, typer.Option(help="Name of the damper under test.")] = "",
     operator: Annotated[str, typer.Option(help="Who runs it.")] = "",
+    seed: Annotated[
+        int | None, typer.Option(help="Of everything that chance decides on the simulated rig.")
+    ] = None,
 ) -> None:
     """Run a method once and record it; with --scenario from the simulated plant, faster than real time."""
     if dry_run:
@@ -23,7 +26,7 @@ def run(
         raise typer.BadParameter("say what to run it on: --scenario NAME or FILE, or --dry-run")
     if out == "-":
         raise typer.BadParameter("a log goes to a file: --out run.mcap")
-    return _record(method, scenario, Path(out), specimen, operator)
+    return _record(method, scenario, Path(out), specimen, operator, seed)
 
 
 def _show_envelope(name: str, *, as_json: bool) -> None:
@@ -37,7 +40,7 @@ def _show_envelope(name: str, *, as_json: bool) -> None:
         typer.echo("\n".join(envelope_lines(found)))
 
 
-def _record(name: str, scenario: str, out: Path, specimen: str, operator: str) -> None:
+def _record(name: str, scenario: str, out: Path, specimen: str, operator: str, seed: int | None) -> None:
     from datetime import UTC, datetime
 
     from bench.methods import load_method
@@ -47,6 +50,6 @@ def _record(name: str, scenario: str, out: Path, specimen: str, operator: str) -
     method = load_method(name)
     identity = Identity(specimen, operator, datetime.now(UTC))
     with progress_bar(method.name) as progress:
-        programme = run_from_plant(method, scenario, out, identity, progress)
+        programme = run_from_plant(method, scenario, out, identity, progress, seed=seed)
     segments, duration = len(programme.segments), programme.duration
     typer.echo(f"{out}: {segments} segments, {duration:.1f} s, {len(programme.time)} samples", err=True)

@@ -120,7 +120,7 @@ def _weighed(repeated: float, swift: float) -> tuple[float, str]:
     if ratio > 1.0:
         return (
             repeated,
-            f"{ratio:.2f} times the high-frequency floor: something does not repeat or is no white noise",
+            f"{ratio:.2f} times the high-frequency floor: not all repeats, or the noise is coloured",
         )
     return repeated, f"only {ratio:.2f} of the high-frequency floor: swift force repeats with the stroke"
 

@@ -44,6 +44,17 @@ class Stroke:
     drive: Array
     """(N,) held between samples [V or A]."""
 
+    def finer(self, times: int) -> "Stroke":
+        """The same stroke at ``times`` the rate: (N - 1) times + 1 samples."""
+        if times == 1:
+            return self
+        place = np.arange((len(self.drive) - 1) * times + 1) / times
+        i = np.minimum(place.astype(np.int64), len(self.drive) - 2)
+        t, h = place - i, 1.0 / self.rate
+        x, _ = _hermite(self.displacement, self.velocity, i, t, h)
+        v, a = _hermite(self.velocity, self.acceleration, i, t, h)
+        return Stroke(self.rate * times, x, v, a, np.repeat(self.drive, times)[: len(place)])
+
 
 class ActiveEffect(NamedTuple):
     """An effect with values for its parameters."""

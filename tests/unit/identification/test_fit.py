@@ -35,7 +35,7 @@ def sine(amplitude, frequency, seconds=6.0, levels=LEVELS):
 
 
 def recorded(c, stroke, seed, noise=NOISE):
-    force = simulate(Setting(c, y0=2e-4), stroke, fineness=0.01).force
+    force = simulate(Setting(c, y0=2e-4), stroke, fineness=0.005).force
     return force + noise * np.random.default_rng(seed).standard_normal(len(force))
 
 
@@ -138,7 +138,7 @@ def test_a_fit_of_the_first_half_also_reaches_the_noise(fitted):
 
 def test_a_channel_delay_beyond_its_prior_is_found():
     stroke = sine(0.01, 2.0)
-    late = simulate(Setting(LABORATORY, force_delay=0.002), stroke, fineness=0.01).force
+    late = simulate(Setting(LABORATORY, force_delay=0.002), stroke, fineness=0.005).force
     noisy = late + NOISE * np.random.default_rng(3).standard_normal(len(late))
     pieces = (Piece("late", stroke, noisy, np.ones(len(noisy))),)
     problem = Problem(pieces, SearchSpace(0.0, 0.5), NOISE, 5e-4)

@@ -63,7 +63,7 @@ def test_force_agrees_with_an_independent_integrator(name, amplitude, frequency,
     exact = reference(c, amplitude, frequency, 1.2, drive)
     found = simulate(Setting(c), sine(amplitude, frequency, 1.2, drive)).force
     assert np.sqrt(np.mean((found - exact) ** 2)) < 2e-4 * exact.std()
-    fine = simulate(Setting(c), sine(amplitude, frequency, 1.2, drive), fineness=0.01).force
+    fine = simulate(Setting(c), sine(amplitude, frequency, 1.2, drive), fineness=0.005).force
     assert np.abs(fine - exact).max() < 1e-4 * np.abs(exact).max()
 
 

@@ -1,0 +1,103 @@
+"""The bench writes logs and the identification reads them; they share no code, only the file."""
+
+import numpy as np
+import pytest
+
+from bench.recorder.header import Channel, RunHeader
+from bench.recorder.reader import read_log
+from bench.recorder.writer import LogWriter
+from identification.errors import LogUnreadable
+from identification.recordings import load
+
+RATE = 1000
+COUNT = 600
+START = 3_000_000_000
+"""[ns]"""
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("MRBENCH_CACHE", str(tmp_path / "cache"))
+
+
+def header(**more):
+    lowpass = {"kind": "butterworth", "order": 2, "cutoff_hz": 200.0}
+    said = {
+        "id": "r1",
+        "specimen": "S-1",
+        "method": "two_sines",
+        "drive_kind": "coil_v",
+        "drive_unit": "V",
+        "source": "run",
+        "channels": {"force": Channel(unit="N", rate_hz=1000.0, filter=lowpass, delay_s=1.1e-3)},
+    }
+    return RunHeader(**(said | more))
+
+
+@pytest.fixture
+def log(tmp_path):
+    """Two segments of one continuous recording; the path and what was written."""
+    path = tmp_path / "run.mcap"
+    rng = np.random.default_rng(0)
+    time = START + np.arange(COUNT) * (10**9 // RATE)
+    fields = ("displacement", "velocity", "force", "coil_drive", "temperature")
+    written = {name: rng.standard_normal(COUNT) for name in fields}
+    with LogWriter(path, header()) as writer:
+        for index, (start, stop) in enumerate([(100, 300), (350, 500)]):
+            said = {"index": index, "name": f"s{index}", "stretch": "two_sines", "motion": "sine"}
+            said |= {"drive": "constant", "amplitude": 0.01, "frequency": 2.0, "drive_value": 0.1 * index}
+            writer.segment(int(time[start]), phase="start", **said)
+            writer.segment(int(time[stop - 1]), phase="end", **said)
+        writer.samples(time, written)
+    return path, written
+
+
+def test_every_sample_arrives_as_it_was_written(log):
+    path, written = log
+    (stretch,) = load(path).stretches
+    assert np.array_equal(stretch.displacement, written["displacement"])
+    assert np.array_equal(stretch.force, written["force"])
+    assert np.array_equal(stretch.drive, written["coil_drive"])
+    assert stretch.rate == pytest.approx(RATE)
+    assert np.all(stretch.measured)
+
+
+def test_segments_keep_their_samples(log):
+    (stretch,) = load(log[0]).stretches
+    assert stretch.name == "two_sines"
+    assert [(s.name, s.start, s.stop) for s in stretch.segments] == [("s0", 100, 300), ("s1", 350, 500)]
+    assert [s.drive_value for s in stretch.segments] == [0.0, 0.1]
+    assert {(s.amplitude, s.frequency) for s in stretch.segments} == {(0.01, 2.0)}
+
+
+def test_filter_delay_and_drive_arrive(log):
+    recording = load(log[0])
+    (stretch,) = recording.stretches
+    assert (recording.drive_kind, recording.drive_unit) == ("coil_v", "V")
+    assert recording.metadata["run"]["source"] == "run"
+    assert (stretch.force_filter.kind, stretch.force_filter.cutoff) == ("butterworth", 200.0)
+    assert stretch.force_delay == 1.1e-3
+    assert stretch.velocity is None
+
+
+def test_a_measured_velocity_arrives(tmp_path):
+    ramp = np.linspace(0.0, 1.0, COUNT)
+    values = dict.fromkeys(("displacement", "velocity", "force", "coil_drive"), ramp)
+    with LogWriter(tmp_path / "a.mcap", header(velocity_from="measured")) as writer:
+        writer.samples(np.arange(COUNT) * (10**9 // RATE), values)
+    assert np.array_equal(load(tmp_path / "a.mcap").stretches[0].velocity, ramp)
+
+
+def test_both_readers_see_the_same_log(log):
+    path, _ = log
+    theirs, (ours,) = read_log(path), load(path).stretches
+    assert np.array_equal(theirs.samples["force"], ours.force)
+    assert np.allclose(theirs.samples["time"], ours.time, atol=1e-9)
+    assert [(s.start, s.stop) for s in theirs.segments] == [(s.start, s.stop) for s in ours.segments]
+
+
+def test_a_log_that_was_cut_off_is_refused_until_salvaged(log):
+    path, _ = log
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(LogUnreadable, match="mrbench salvage"):
+        load(path)

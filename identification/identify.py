@@ -10,13 +10,15 @@ import numpy as np
 from identification.arrays import Array
 from identification.assemble import Assembled, HoldOut, assemble
 from identification.damper.coordinates import Coordinates
+from identification.motion_noise import motion_scatter, with_motion
 from identification.prediction import normalised, per_drive, predict_piece, rmse
 from identification.problem import COORDINATE_COUNT, Problem
-from identification.recordings import Recording
+from identification.recordings import Recording, Stretch
 from identification.refine import Minimum, Settings, refine
 from identification.results import Errors, Fit, NoiseFloor, Nuisances, Provenance, Stage
 from identification.search_space import SearchSpace
 from identification.uncertainty import (
+    Covariance,
     coordinate_covariance,
     coordinate_estimates,
     covariance,
@@ -57,14 +59,32 @@ def identify(
     assembled = assemble(recordings, request.hold_out)
     began = time.process_time()
     problem = _problem(assembled, request)
+    stretches = [s for s, p in zip(assembled.stretches, assembled.pieces, strict=True) if p.train.any()]
     minimum = refine(problem.quicker(), request.settings, progress)
     polish = replace(request.settings, restarts=0)
-    if any(p.low_pass for p in problem.pieces):
-        minimum = refine(problem, polish, progress, minimum.unknowns)
+    scatter = None
     if _ratio(problem, minimum) > _MISFIT:
         problem = replace(problem, noise=problem.noise * _ratio(problem, minimum))
         minimum = refine(problem, polish, progress, minimum.unknowns)
-    return _document(assembled, request, problem, minimum, time.process_time() - began)
+    else:
+        problem = _smoother_motion(problem, stretches, minimum)
+        minimum = refine(problem, polish, progress, minimum.unknowns)
+        scatter = motion_scatter(problem, stretches, minimum, request.settings.seed)
+    found = covariance(problem, minimum, scatter)
+    return _document(assembled, request, problem, minimum, found, time.process_time() - began)
+
+
+def _smoother_motion(problem: Problem, stretches: Sequence[Stretch], minimum: Minimum) -> Problem:
+    """The problem with every motion estimated again, the actuator giving way under the fitted force.
+
+    The recorded force would bring its noise into the motion, and what is common to both biases the fit.
+    """
+    forces = problem.simulate(minimum.unknowns)
+    pieces = [
+        with_motion(piece, replace(stretch, force=force))
+        for piece, stretch, force in zip(problem.pieces, stretches, forces, strict=True)
+    ]
+    return replace(problem, pieces=tuple(pieces))
 
 
 def _problem(assembled: Assembled, request: Request) -> Problem:
@@ -82,8 +102,9 @@ def _ratio(problem: Problem, minimum: Minimum) -> float:
     return float(np.sqrt(minimum.evaluation.cost / problem.samples))
 
 
-def _document(assembled: Assembled, request: Request, problem: Problem, minimum: Minimum, seconds: float) -> Fit:
-    found = covariance(problem, minimum)
+def _document(
+    assembled: Assembled, request: Request, problem: Problem, minimum: Minimum, found: Covariance, seconds: float
+) -> Fit:
     spread = coordinate_covariance(problem, minimum, found)
     point = problem.space.to_coordinates(minimum.unknowns[:COORDINATE_COUNT])
     unit = assembled.drive_unit

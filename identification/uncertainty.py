@@ -39,8 +39,14 @@ class Covariance:
     coloured: bool
 
 
-def covariance(problem: Problem, minimum: Minimum) -> Covariance:
-    """Covariance of the unknowns at a minimum."""
+def covariance(problem: Problem, minimum: Minimum, scatter: Array | None = None) -> Covariance:
+    """Covariance of the unknowns at a minimum.
+
+    Args:
+        problem: what was minimised.
+        minimum: where.
+        scatter: (U, U) what the noise of the motion adds, if it was played again.
+    """
     low, high = problem.bounds()
     p = minimum.unknowns
     inside = problem.free & (p > low + 1e-9) & (p < high - 1e-9)
@@ -56,6 +62,7 @@ def covariance(problem: Problem, minimum: Minimum) -> Covariance:
     widen = np.sqrt(np.maximum(ratio, 1.0)) if coloured else np.ones(len(ratio))
     found = np.zeros((len(p), len(p)))
     found[np.ix_(inside, inside)] = plain * np.outer(widen, widen)
+    found += 0.0 if scatter is None else scatter
     return Covariance(found, inside.astype(np.float64), coloured)
 
 

@@ -27,7 +27,7 @@ INFO = {
 def answering(lost: dict[str, slice] | None = None, **changes: object):
     """A rig whose force is 1000 times the drive, and that loses some readings."""
 
-    def play(scenario, commands, progress):
+    def play(scenario, commands, progress, rig):
         progress(1.0)
         channels = {
             "time": commands["time"],

@@ -1,0 +1,1 @@
+"""Records: writes, reads and mends logs, and takes in recordings made elsewhere."""

@@ -1,0 +1,268 @@
+"""Writes a log so that a kill at any moment costs a fraction of a second.
+
+A chunk is closed after 0.2 s of bench or wall time, whichever comes first, or when it is large; a closed chunk
+goes to the operating system at once and to the disk four times a second. The file has its final name from the
+start: what a kill leaves there, ``mrbench salvage`` mends.
+"""
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+import orjson
+
+from bench.errors import LogError
+from bench.recorder.columns import SECOND, checked_fields, not_finite, not_increasing, sample_messages
+from bench.recorder.header import RunHeader, text_values
+from bench.recorder.mcap_file import file_errors, finish, flush, started_writer
+from bench.recorder.messages import (
+    EVENT,
+    MESSAGES,
+    REQUIRED_FIELDS,
+    SAMPLE,
+    SEGMENT,
+    Event,
+    Outcome,
+    Phase,
+    Segment,
+    Timestamp,
+    message_schema,
+    schema_name,
+)
+
+CHUNK_TIME = 0.2
+"""[s] of bench or wall time after which a chunk is closed."""
+
+SYNC_PERIOD = 0.25
+"""[s] of wall time between two syncs to the disk."""
+
+_README = """This is a log of a damper test in the MCAP format, profile mrbench (https://mcap.dev).
+
+/bench/sample   one message a sample: displacement, velocity, force, drive and what else was measured
+/bench/segment  where each segment of the test starts and ends
+/bench/event    changes of state, commands, alarms
+
+Messages are JSON; the schema beside each topic says the unit of every field. The metadata records `run`,
+`units`, `calibration`, `clocks` and `channels` say how the recording was made, `outcome` how it ended.
+Log time and publish time are the bench clock. Positive displacement extends the damper; positive force is
+tension.
+"""
+
+
+class LogWriter:
+    """One log while it is being written; use it in a ``with`` block.
+
+    Leaving the block closes the log as ``clean``, or as ``lossy`` where samples were lost; leaving it by an
+    exception closes it as ``incomplete``.
+    """
+
+    def __init__(self, path: Path | str, header: RunHeader, clock: Callable[[], float] = time.monotonic) -> None:
+        """Open the log and write what is known before the first sample.
+
+        Args:
+            path: the log; a file there is replaced.
+            header: what the log says of itself.
+            clock: wall time [s]; paces chunks and syncs.
+
+        Raises:
+            LogError: the file cannot be written.
+        """
+        self.path = Path(path)
+        self._clock = clock
+        self._written: Counter[str] = Counter()
+        self._lost: Counter[str] = Counter()
+        self._last = -1
+        self._chunk_start: int | None = None
+        self._chunk_opened = self._synced = clock()
+        self._closed = False
+        with file_errors(self.path):
+            self._file = self.path.open("wb")
+            self._mcap = started_writer(self._file)
+            self._topics = {topic: self._register(topic) for topic in MESSAGES}
+            for name, record in header.records().items():
+                self._mcap.add_metadata(name, record)
+            self.attach("README.txt", "text/plain", _README.encode())
+            self._to_disk()
+
+    def __enter__(self) -> Self:
+        """The writer itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close the log; after an exception as ``incomplete``, with its reason."""
+        if not self._closed:
+            if kind is None:
+                self.close()
+            else:
+                self.close("incomplete", f"{kind.__name__}: {error}")
+
+    def sample(self, time_ns: int, values: Mapping[str, float | int]) -> None:
+        """Write one sample.
+
+        Args:
+            time_ns: bench clock [ns], later than the sample before.
+            values: by field of a sample, in its unit.
+
+        Raises:
+            LogError: a field is unknown, missing or not finite, time does not increase, or writing fails.
+        """
+        names = checked_fields(values)
+        for name in REQUIRED_FIELDS:
+            if not abs(values[name]) < float("inf"):
+                raise not_finite(name, values[name], time_ns)
+        message = {"timestamp": _clock_fields(time_ns), **_given(names, values)}
+        with file_errors(self.path):
+            self._put_sample(time_ns, orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY))
+
+    def samples(self, time_ns: npt.NDArray[np.int64], values: Mapping[str, npt.ArrayLike]) -> None:
+        """Write many samples at once.
+
+        Args:
+            time_ns: bench clock [ns], increasing, shape (samples,).
+            values: by field, each of shape (samples,); a NaN in an optional field, or a negative segment,
+                leaves the field out of that sample.
+
+        Raises:
+            LogError: as for `sample`; nothing is written then.
+        """
+        messages = sample_messages(np.asarray(time_ns, dtype=np.int64), values)
+        with file_errors(self.path):
+            for moment, message in messages:
+                self._put_sample(moment, message)
+
+    def segment(
+        self,
+        time_ns: int,
+        *,
+        phase: Phase,
+        index: int,
+        name: str,
+        stretch: str,
+        motion: str,
+        drive: str,
+        amplitude: float | None = None,
+        frequency: float | None = None,
+        drive_value: float | None = None,
+    ) -> None:
+        """Mark one end of a segment.
+
+        Args:
+            time_ns: bench clock [ns] of the segment's first sample, or of its last.
+            phase: start or end.
+            index: place of the segment in the log, from 0.
+            name: name of the segment.
+            stretch: name of the continuous recording that it stands in.
+            motion: kind of motion.
+            drive: kind of drive programme.
+            amplitude: [m], none where the motion has none.
+            frequency: [Hz], none where the motion has none.
+            drive_value: [V or A], none where the drive varies.
+        """
+        mark = Segment(
+            timestamp=Timestamp(**_clock_fields(time_ns)), phase=phase, index=index, name=name, stretch=stretch,
+            motion=motion, amplitude=amplitude, frequency=frequency, drive=drive, drive_value=drive_value,
+        )  # fmt: skip
+        with file_errors(self.path):
+            self._put(SEGMENT, time_ns, mark.model_dump_json().encode())
+
+    def event(self, time_ns: int, kind: str, text: str, **more: Any) -> None:
+        """Write an event.
+
+        Args:
+            time_ns: bench clock [ns].
+            kind: state, command, alarm, trip, checkpoint, ...
+            text: what happened, in words.
+            more: further fields of the message.
+        """
+        event = Event(timestamp=Timestamp(**_clock_fields(time_ns)), kind=kind, text=text, **more)
+        with file_errors(self.path):
+            self._put(EVENT, time_ns, event.model_dump_json().encode())
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Keep a document in the log: the method, a configuration, a certificate."""
+        with file_errors(self.path):
+            moment = max(self._last, 0)
+            self._mcap.add_attachment(moment, moment, name, media_type, data)
+
+    def lost(self, channel: str, samples: int = 1) -> None:
+        """Count samples of a channel that could not be recorded; the log will close as ``lossy``."""
+        self._lost[channel] += samples
+
+    def close(self, outcome: Outcome | None = None, reason: str = "") -> None:
+        """Write the outcome and the index, and bring everything to the disk.
+
+        Args:
+            outcome: how the recording ended; by default ``clean``, or ``lossy`` where samples were lost.
+            reason: why, in words.
+
+        Raises:
+            LogError: the file cannot be written, or is closed.
+        """
+        if self._closed:
+            raise LogError(f"{self.path}: this log is closed")
+        self._closed = True
+        with file_errors(self.path), self._file:
+            flush(self._mcap)
+            self._mcap.add_metadata(
+                "outcome", self._outcome(outcome or ("lossy" if self._lost else "clean"), reason)
+            )
+            finish(self._mcap)
+            self._file.flush()
+            os.fsync(self._file.fileno())
+
+    def _outcome(self, outcome: Outcome, reason: str) -> dict[str, str]:
+        counts = {topic: self._written[topic] for topic in MESSAGES}
+        last = {"last_time_ns": self._last}
+        return text_values({"outcome": outcome, "reason": reason, **counts, "lost": dict(self._lost), **last})
+
+    def _register(self, topic: str) -> int:
+        schema = self._mcap.register_schema(schema_name(topic), "jsonschema", orjson.dumps(message_schema(topic)))
+        return self._mcap.register_channel(topic, "json", schema)
+
+    def _put_sample(self, time_ns: int, message: bytes) -> None:
+        if time_ns <= self._last:
+            raise not_increasing(self._last, time_ns)
+        self._last = time_ns
+        self._put(SAMPLE, time_ns, message)
+
+    def _put(self, topic: str, time_ns: int, message: bytes) -> None:
+        start = self._chunk_start
+        if start is not None and (
+            time_ns - start >= CHUNK_TIME * SECOND or self._clock() - self._chunk_opened >= CHUNK_TIME
+        ):
+            self._end_chunk()
+        if self._chunk_start is None:
+            self._chunk_start, self._chunk_opened = time_ns, self._clock()
+        self._mcap.add_message(self._topics[topic], time_ns, message, time_ns, self._written[topic])
+        self._written[topic] += 1
+
+    def _end_chunk(self) -> None:
+        flush(self._mcap)
+        self._chunk_start = None
+        if self._clock() - self._synced >= SYNC_PERIOD:
+            self._to_disk()
+
+    def _to_disk(self) -> None:
+        flush(self._mcap)
+        os.fsync(self._file.fileno())
+        self._synced = self._clock()
+
+
+def _clock_fields(time_ns: int) -> dict[str, int]:
+    seconds, rest = divmod(time_ns, SECOND)
+    return {"sec": seconds, "nsec": rest}
+
+
+def _given(names: list[str], values: Mapping[str, float | int]) -> dict[str, float | int]:
+    """The values without a NaN, and without the segment between segments."""
+    return {
+        name: value for name in names if (value := values[name]) == value and (name != "segment" or value >= 0)
+    }

@@ -1,0 +1,61 @@
+"""What the noise of the displacement adds to the uncertainty of the fit.
+
+The motion that the simulation is fed was estimated from a noisy displacement, and what is wrong with it moves
+the yield displacement and the shape as much as the force noise does. So the noise is played again: the fitted
+motion gets fresh displacement and force noise, is estimated anew in the same way, and the change of the simulated
+force is carried on to the unknowns by one Gauss-Newton step (a parametric bootstrap, linearised).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.motion import displacement_noise, estimate_motion
+from identification.problem import Piece, Problem
+from identification.recordings import Stretch
+from identification.refine import Minimum
+from identification.simulate import Stroke
+
+DRAWS = 8
+"""Times the noise is played again."""
+
+
+def with_motion(piece: Piece, stretch: Stretch) -> Piece:
+    """A piece whose motion is that estimated from a stretch; all else stays."""
+    motion = estimate_motion(stretch)
+    stroke = Stroke(stretch.rate, motion.displacement, motion.velocity, motion.acceleration, piece.stroke.drive)
+    return replace(piece, stroke=stroke)
+
+
+def motion_scatter(problem: Problem, stretches: Sequence[Stretch], minimum: Minimum, seed: int) -> Array:
+    """Second moment (U, U) of the unknowns' errors that the displacement noise causes, bias included.
+
+    Args:
+        problem: with one piece for each of the stretches, in their order.
+        stretches: the recordings behind the pieces.
+        minimum: where the fit ended.
+        seed: of the noise.
+    """
+    problem = problem.quicker()
+    low, high = problem.bounds()
+    inside = problem.free & (minimum.unknowns > low + 1e-9) & (minimum.unknowns < high - 1e-9)
+    shifts = np.zeros((DRAWS, len(minimum.unknowns)))
+    for i, (piece, stretch) in enumerate(zip(problem.pieces, stretches, strict=True)):
+        _, J = problem.residuals(minimum.unknowns, i)
+        setting = problem.setting(minimum.unknowns, i)
+        force, _ = piece.recorded(setting)
+        spread = displacement_noise(stretch.displacement, stretch.measured)
+        for draw in range(DRAWS):
+            random = np.random.default_rng([seed, i, draw])
+            played = replace(
+                stretch,
+                displacement=piece.stroke.displacement + spread * random.standard_normal(len(force)),
+                force=force + problem.noise * random.standard_normal(len(force)),
+            )
+            change = with_motion(piece, played).recorded(setting)[0] - force
+            shifts[draw, problem.columns(i)] -= J.T @ (change * piece.train / problem.noise)
+    steps = np.zeros_like(shifts)
+    steps[:, inside] = np.linalg.solve(minimum.evaluation.hessian[np.ix_(inside, inside)], shifts[:, inside].T).T
+    return steps.T @ steps / DRAWS

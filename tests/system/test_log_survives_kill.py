@@ -1,0 +1,77 @@
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bench.errors import LogError
+from bench.recorder.reader import read_log
+
+RECORDER = Path(__file__).with_name("record_in_real_time.py")
+
+
+def record_and_kill(log, moment):
+    """Record until the bench clock has passed a moment [s], kill; the time of the last sample written [s]."""
+    with subprocess.Popen(
+        [sys.executable, str(RECORDER), str(log)], stdout=subprocess.PIPE, text=True
+    ) as recorder:
+        last = 0
+        for line in recorder.stdout:
+            if last < moment * 1e9 <= int(line):
+                recorder.send_signal(signal.SIGKILL)
+            if line.endswith("\n"):
+                last = int(line)
+    assert recorder.returncode == -signal.SIGKILL
+    return last * 1e-9
+
+
+def mrbench(*words):
+    command = [sys.executable, "-m", "bench.cli", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+
+
+@pytest.fixture(scope="module", params=[0.31, 0.64, 1.0, 1.73])
+def killed(request, tmp_path_factory):
+    """A log killed at some moment, as it was and salvaged, with the time of the last sample written."""
+    log = tmp_path_factory.mktemp("killed") / "run.mcap"
+    last = record_and_kill(log, request.param)
+    with pytest.raises(LogError, match="mrbench salvage"):
+        read_log(log)
+    return log, last, mrbench("salvage", log)
+
+
+def test_a_kill_loses_at_most_half_a_second(killed):
+    log, last, _ = killed
+
+    assert 0 <= last - read_log(log).samples["time_ns"][-1] * 1e-9 <= 0.5
+
+
+def test_what_is_kept_is_what_was_written_without_a_gap(killed):
+    samples = read_log(killed[0]).samples
+
+    np.testing.assert_array_equal(samples["force"], samples["time_ns"] * 1e-9)
+    assert set(samples["segment"]) == {0}
+
+
+def test_salvage_says_what_was_lost(killed):
+    log, _, result = killed
+
+    kept = len(read_log(log).samples["time"])
+    assert result.returncode == 0
+    assert f"{kept} samples kept" in result.stdout
+    assert "bytes dropped" in result.stdout
+
+
+def test_salvaged_log_says_of_itself_that_it_is_truncated(killed):
+    log = read_log(killed[0])
+
+    assert log.outcome == "truncated"
+    assert float(log.metadata["outcome"]["seconds_lost"]) >= 0
+    assert log.metadata["run"]["id"] == "endless"
+
+
+def test_salvaged_log_can_be_exported_and_has_nothing_left_to_mend(killed):
+    assert mrbench("export", killed[0], "--format", "csv").returncode == 0
+    assert "nothing to mend" in mrbench("salvage", killed[0]).stdout

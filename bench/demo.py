@@ -12,7 +12,7 @@ from rich.table import Table
 
 from bench.errors import ReportError
 from bench.report.documents import Fit, Prediction, read_fit, read_prediction
-from bench.report.values import newton, quantity, significant
+from bench.report.values import newton, quantity, times
 
 SCENARIO = "default"
 
@@ -121,7 +121,7 @@ def _error_table(fit: Fit, prediction: Prediction | None) -> Table:
         rows.append(("never seen", prediction.rmse_n, prediction.noise_floor_n))
     table = _table(f"Force error of {fit.specimen}", ["strokes", "RMSE", "noise floor", "RMSE over floor"])
     for which, rmse, floor in rows:
-        table.add_row(which, newton(rmse), newton(floor), f"{significant(rmse / floor)} times")
+        table.add_row(which, newton(rmse), newton(floor), times(rmse / floor))
     return table
 
 

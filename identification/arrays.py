@@ -1,11 +1,15 @@
 """The arrays of this room and the one place where functions are compiled."""
 
+import hashlib
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeAlias, TypeVar, cast
 
 import numba
 import numpy as np
 import numpy.typing as npt
+from platformdirs import user_cache_dir
 
 Array: TypeAlias = npt.NDArray[np.float64]
 """Real numbers in SI units; the docstring at hand gives shape and unit."""
@@ -14,6 +18,28 @@ BoolArray: TypeAlias = npt.NDArray[np.bool_]
 """A mask over the same samples or unknowns."""
 
 Function = TypeVar("Function", bound=Callable[..., object])
+
+
+def cache_folder() -> Path:
+    """Where this room keeps what it can make again; the variable MRBENCH_CACHE moves it."""
+    return Path(os.environ.get("MRBENCH_CACHE") or user_cache_dir("mrbench"))
+
+
+def _fingerprint() -> str:
+    """Of every source of this room: compiled code is kept for exactly this physics and no other.
+
+    The compiler's own cache looks at one file at a time and would not see that the law, which is compiled into
+    its callers, has changed in another.
+    """
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+numba.config.CACHE_DIR = str(  # type: ignore[attr-defined]  # made by numba when it is imported
+    cache_folder().resolve() / "compiled" / _fingerprint()
+)
 
 
 def compiled(function: Function) -> Function:

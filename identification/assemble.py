@@ -75,10 +75,10 @@ class Assembled:
 
 
 def _clock_spread(recording: Recording) -> float:
-    """Standard deviation [s] of a channel delay: as mapped on a bench, half a sample where nobody says."""
+    """Standard deviation [s] of a channel delay: as mapped on a bench, else half the shortest sample."""
     if recording.metadata["run"].get("source") == "run":
         return _MAPPED
-    return 0.5 / min(s.rate for s in recording.stretches)
+    return 0.5 / max(s.rate for s in recording.stretches)
 
 
 def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> Assembled:

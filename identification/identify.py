@@ -15,7 +15,7 @@ from identification.prediction import normalised, per_drive, predict_piece, rmse
 from identification.problem import COORDINATE_COUNT, Problem
 from identification.recordings import Recording, Stretch
 from identification.refine import Minimum, Settings, refine
-from identification.results import Errors, Fit, NoiseFloor, Nuisances, Provenance, Stage
+from identification.results import Delay, Errors, Fit, NoiseFloor, Nuisances, Provenance, Stage
 from identification.search_space import SearchSpace
 from identification.uncertainty import (
     Covariance,
@@ -27,6 +27,8 @@ from identification.uncertainty import (
     strong_correlations,
 )
 
+_OVERSHOOT = 0.005
+"""[1] part of the samples at each end of the drive's range that may be overshoots."""
 _MISFIT = 1.2
 """[1] force error over the floor above which the priors are weighed against the misfit, not the noise."""
 
@@ -92,9 +94,13 @@ def _problem(assembled: Assembled, request: Request) -> Problem:
     drives = np.concatenate(fitted)
     prior = assembled.delay_prior if request.delay_prior is None else request.delay_prior
     pieces = tuple(p for p in assembled.pieces if p.train.any())
-    return Problem(
-        pieces, SearchSpace(float(drives.min()), float(drives.max())), assembled.floor.noise, max(prior, 1e-9)
-    )
+    return Problem(pieces, SearchSpace(*_range(drives)), assembled.floor.noise, max(prior, 1e-9))
+
+
+def _range(drives: Array) -> tuple[float, float]:
+    """Lowest and highest drive at which a damper must be one; short overshoots of a driver do not count."""
+    low, high = np.quantile(drives, [_OVERSHOOT, 1.0 - _OVERSHOOT])
+    return float(low), float(high)
 
 
 def _ratio(problem: Problem, minimum: Minimum) -> float:
@@ -108,13 +114,12 @@ def _document(
     spread = coordinate_covariance(problem, minimum, found)
     point = problem.space.to_coordinates(minimum.unknowns[:COORDINATE_COUNT])
     unit = assembled.drive_unit
-    hidden, at_bound = _unseen(problem, found.known)
+    hidden, at_bound = _unseen(found)
     coordinates = coordinate_estimates(point, spread, hidden, at_bound, unit)
-    delays = minimum.unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] * problem.delay_prior
-    errors = _errors(assembled, point, (float(delays[0]), float(delays[1])))
+    nuisances = _nuisances(problem, minimum, found)
+    errors = _errors(assembled, point, (nuisances.force_delay.value, nuisances.drive_delay.value))
     train = _split(assembled, errors, held=False)
     held = _split(assembled, errors, held=True)
-    sd = np.sqrt(np.diag(found.unknowns)[COORDINATE_COUNT : COORDINATE_COUNT + 2]) * problem.delay_prior
     floor = assembled.floor
     return Fit(
         specimen=assembled.recordings[0].metadata["run"].get("specimen", ""),
@@ -123,14 +128,7 @@ def _document(
         drive_range=(problem.space.lowest_drive, problem.space.highest_drive),
         parameters=parameter_estimates(point, spread, coordinates, unit),
         coordinates=coordinates,
-        nuisances=Nuisances(
-            y0={
-                p.name: float(minimum.unknowns[-len(problem.pieces) + i]) * 1e-3
-                for i, p in enumerate(problem.pieces)
-            },
-            force_delay=delay_estimate(float(delays[0]), float(sd[0]), problem.delay_prior),
-            drive_delay=delay_estimate(float(delays[1]), float(sd[1]), problem.delay_prior),
-        ),
+        nuisances=nuisances,
         noise_floor_n=floor.noise,
         floor=NoiseFloor(cycle_to_cycle=floor.cycle_to_cycle, high_frequency=floor.high_frequency, how=floor.how),
         rmse_n=Errors(train=rmse(train[0]), validation=None, held_out=rmse(held[0]) if len(held[0]) else None),
@@ -144,7 +142,7 @@ def _document(
             Stage(name="refine", seconds=round(seconds, 3), rmse_n=rmse(train[0]), iterations=minimum.iterations)
         ],
         agreement=None,
-        result=_result(minimum, problem, found.coloured, rmse(train[0]) / floor.noise),
+        result=_result(minimum, rmse(train[0]) / floor.noise, nuisances.force_delay),
         correlations=strong_correlations(spread),
         provenance=Provenance(
             logs={r.path.name: r.sha256 for r in assembled.recordings},
@@ -161,11 +159,22 @@ def _document(
     )
 
 
-def _unseen(problem: Problem, known: Array) -> tuple[set[str], set[str]]:
+def _nuisances(problem: Problem, minimum: Minimum, found: Covariance) -> Nuisances:
+    delays = slice(COORDINATE_COUNT, COORDINATE_COUNT + 2)
+    values = minimum.unknowns[delays] * problem.delay_prior
+    sd = np.sqrt(np.diag(found.unknowns)[delays]) * problem.delay_prior
+    force, drive = (
+        delay_estimate(float(v), float(s), problem.delay_prior) for v, s in zip(values, sd, strict=True)
+    )
+    starts = {p.name: problem.setting(minimum.unknowns, i).y0 for i, p in enumerate(problem.pieces)}
+    return Nuisances(y0=starts, force_delay=force, drive_delay=drive)
+
+
+def _unseen(found: Covariance) -> tuple[set[str], set[str]]:
     """Coordinates that these strokes cannot show, and those that stand at a bound."""
     names = np.array(Coordinates._fields)
-    free = problem.space.free
-    return set(names[~free]), set(names[free & (known[:COORDINATE_COUNT] == 0)])
+    seen, inside = found.seen[:COORDINATE_COUNT], found.inside[:COORDINATE_COUNT]
+    return set(names[~seen]), set(names[seen & ~inside])
 
 
 def _errors(assembled: Assembled, point: Coordinates, delays: tuple[float, float]) -> list[Array]:
@@ -185,10 +194,17 @@ def _split(assembled: Assembled, errors: Sequence[Array], *, held: bool) -> tupl
     )
 
 
-def _result(minimum: Minimum, problem: Problem, coloured: bool, ratio: float) -> str:
-    """One line on how the fit ended."""
+def _result(minimum: Minimum, ratio: float, delay: Delay) -> str:
+    """How the fit ended, in a line."""
     if not minimum.converged:
         return f"not converged: stopped after {minimum.iterations} steps; raise the budget or hold less out"
+    words = ["converged"]
     if ratio > _MISFIT:
-        return f"converged; the law leaves {ratio:.3g} times the noise floor: something real is missing from it"
-    return "converged"
+        words.append(f"the law leaves {ratio:.3g} times the noise floor: something real is missing from it")
+    if delay.outside_prior:
+        side = "behind" if delay.value > 0 else "ahead of"
+        words.append(
+            f"the force stands {1e3 * abs(delay.value):.2g} ms {side} the displacement, more than their clocks "
+            f"explain ({1e3 * delay.prior_sd:.2g} ms): a filter, or phase that the law lacks"
+        )
+    return "; ".join(words)

@@ -13,9 +13,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import platformdirs
 
-from identification.arrays import Array
+from identification.arrays import Array, cache_folder
 
 _FORM = "1"
 """Of an entry; another form is another name."""
@@ -37,8 +36,7 @@ class RawLog(NamedTuple):
 
 def folder() -> Path:
     """Where the cache stands."""
-    named = os.environ.get("MRBENCH_CACHE")
-    return (Path(named) if named else platformdirs.user_cache_path("mrbench")) / "logs"
+    return cache_folder() / "logs"
 
 
 def recall(sha256: str) -> RawLog | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.damper.coordinates import COORDINATES, Coordinates, to_parameters
 from identification.damper.parameters import GAUGE, PARAMETERS, Parameters, Quantity
 from identification.problem import COORDINATE_COUNT, Problem
@@ -24,6 +24,8 @@ _COLOURED = 1.5
 """[1] mean ratio of sandwich to plain variance above which the misfit counts as coloured."""
 _KNOWN = 0.5
 """[1] relative standard deviation below which a number counts as identifiable."""
+_SEEN = 1e-2
+"""[1] least information on an unknown of order one: below it the noise would have to be ten times less."""
 _Z95, _Z99 = 1.959964, 2.575829
 _CORRELATED = 0.9
 
@@ -34,8 +36,10 @@ class Covariance:
 
     unknowns: Array
     """(U, U); zero rows where an unknown was not free or stood at a bound."""
-    known: Array
-    """(U,) 1.0 where the unknown was free and inside its bounds."""
+    seen: BoolArray
+    """(U,) True where the force depends on the unknown at all."""
+    inside: BoolArray
+    """(U,) True where the unknown is free, seen and inside its bounds."""
     coloured: bool
 
 
@@ -49,7 +53,8 @@ def covariance(problem: Problem, minimum: Minimum, scatter: Array | None = None)
     """
     low, high = problem.bounds()
     p = minimum.unknowns
-    inside = problem.free & (p > low + 1e-9) & (p < high - 1e-9)
+    seen = np.diag(minimum.evaluation.hessian) > _SEEN
+    inside = problem.free & seen & (p > low + 1e-9) & (p < high - 1e-9)
     H = minimum.evaluation.hessian[np.ix_(inside, inside)]
     size = np.sqrt(np.diag(H))
     size = np.where(size > 0, size, 1.0)
@@ -63,7 +68,7 @@ def covariance(problem: Problem, minimum: Minimum, scatter: Array | None = None)
     found = np.zeros((len(p), len(p)))
     found[np.ix_(inside, inside)] = plain * np.outer(widen, widen)
     found += 0.0 if scatter is None else scatter
-    return Covariance(found, inside.astype(np.float64), coloured)
+    return Covariance(found, problem.free & seen, inside, coloured)
 
 
 def _block_scores(problem: Problem, unknowns: Array) -> Array:

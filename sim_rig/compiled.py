@@ -1,12 +1,32 @@
 """The arrays of this room and the one place where functions are compiled."""
 
+import hashlib
+import os
 from collections.abc import Callable, Sequence
 from functools import reduce
+from pathlib import Path
 from typing import Any, TypeAlias, TypeVar, cast
 
 import numba
 import numpy as np
 import numpy.typing as npt
+from platformdirs import user_cache_dir
+
+_COMPILED_FROM = ("sim_rig", "identification/damper")
+"""Folders whose sources go into the machine code: a change in any of them makes all of it anew."""
+
+
+def _keep_code_of_these_sources() -> None:
+    """Keep compiled code apart for every state of the sources: a caller does not see what it calls change."""
+    top, digest = Path(__file__).parents[1], hashlib.sha256()
+    for source in sorted(path for folder in _COMPILED_FROM for path in (top / folder).rglob("*.py")):
+        digest.update(source.read_bytes())
+    cache = Path(os.environ.get("MRBENCH_CACHE") or user_cache_dir("mrbench")).resolve()
+    folder = cache / "compiled" / f"rig-{digest.hexdigest()[:16]}"
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # made by numba when it is imported
+
+
+_keep_code_of_these_sources()
 
 Array: TypeAlias = npt.NDArray[np.float64]
 """Real numbers in SI units; the docstring at hand gives shape and unit."""

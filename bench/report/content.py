@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 from bench.recorder.reader import Log
 from bench.report.documents import Delay, DriveError, Estimate, Fit
 from bench.report.summary import is_gauge
-from bench.report.values import level, newton, percent, quantity, significant, unit_text
+from bench.report.values import level, newton, percent, quantity, significant, times, unit_text
 from identification.damper.coordinates import COORDINATES
 from identification.damper.parameters import PARAMETERS
 
@@ -84,7 +84,7 @@ def drive_rows(errors: list[DriveError], floor: float) -> list[DriveRow]:
         DriveRow(
             f"{level(e.drive, span)} {e.unit}",
             newton(e.rmse_n),
-            f"{e.rmse_n / floor:.2f} times" if floor > 0 else "–",
+            times(e.rmse_n / floor) if floor > 0 else "–",
             percent(e.nrmse),
             e.samples,
             "hardly any force but noise" if e.rmse_n / max(e.nrmse, 1e-12) < _MOSTLY_NOISE * floor else "",

@@ -7,7 +7,7 @@ other key pass.
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bench.errors import ReportError
 
@@ -154,6 +154,7 @@ def _read(path: Path, kind: type[Document], wanted: str) -> Document:
         return kind.model_validate_json(path.read_bytes())
     except OSError as error:
         raise ReportError(f"{path}: cannot be read ({error.strerror}); give {wanted}") from error
-    except ValueError as error:
-        lines = str(error).splitlines()
-        raise ReportError(f"{path}: not {wanted} ({': '.join(line.strip() for line in lines[1:3])})") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(step) for step in first["loc"])
+        raise ReportError(f"{path}: not {wanted} ({': '.join(filter(None, (where, first['msg'])))})") from error

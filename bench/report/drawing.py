@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap, Normalize, to_rgb
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -49,7 +49,8 @@ class DriveColours:
 
     def of(self, drive: float) -> Colour:
         """The colour of one drive [V or A]."""
-        return to_rgb(self.scale.to_rgba(drive))  # type: ignore[arg-type]  # stubs: one number gives one colour
+        red, green, blue, _ = np.asarray(self.scale.to_rgba(np.array([drive])))[0]
+        return float(red), float(green), float(blue)
 
 
 def light(colour: Colour) -> Colour:

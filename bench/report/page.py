@@ -111,7 +111,7 @@ def render(report: Report, drawn: dict[str, Figure], command: str, made: datetim
         for name, figure in drawn.items()
     }
     return environment.get_template("report.html").render(
-        title=report.log.metadata["run"].get("specimen") or report.log.path.stem,
+        title=_title(report.log),
         run=content.header_facts(report.log, report.sha256),
         findings=findings(report.log, report.fit, report.prediction, report.seen),
         pictures=pictures,
@@ -122,6 +122,11 @@ def render(report: Report, drawn: dict[str, Figure], command: str, made: datetim
         version=version("mrbench"),
         command=command,
     )
+
+
+def _title(log: Log) -> str:
+    specimen = log.metadata["run"].get("specimen", "")
+    return log.path.stem if specimen in ("", "unknown") else specimen
 
 
 def _fit_context(report: Report) -> dict[str, object]:

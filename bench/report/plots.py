@@ -114,6 +114,7 @@ def by_drive(errors: Sequence[DriveError], floor: float, recording: Recording) -
     axes.bar(places, [e.rmse_n for e in errors], width=0.6, color=[colours.of(e.drive) for e in errors])
     axes.axhline(floor, color=INK, linewidth=1.2, linestyle=(0, (4, 3)), label=f"noise floor {floor:.3g} N")
     axes.set_xticks(places, [f"{level(e.drive, span)} {e.unit}" for e in errors])
+    axes.set_xlim(-0.7, max(len(errors), 6) - 0.3)
     axes.set_ylim(0, 1.25 * max([floor, *(e.rmse_n for e in errors)]))
     style(axes, "drive", "force error, RMSE [N]")
     axes.grid(visible=False, axis="x")

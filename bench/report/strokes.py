@@ -16,8 +16,8 @@ _ALIKE = 1.2
 _CYCLES = 2
 _SLACK = 0.03
 """[1] part of a cycle that may be missing from a whole one."""
-_WINDOW = 4.0
-"""[s] shown of a stroke that has no cycles or whose drive varies."""
+_WINDOW, _CROSSINGS = 4.0, 20
+"""[s] at most, and times that the motion passes its mean, shown of a stroke without steady cycles."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +129,15 @@ def _cycles(recording: Recording, drive: float, segment: LoggedSegment, frequenc
     rises = _first_rise(time, swing, frequency)
     whole = max(1, math.floor(frequency * (float(time[-1]) - rises) + _SLACK))
     cycles = min(_CYCLES, whole)
-    starts = [rises + (whole - n) / frequency for n in (cycles, 1, 0)]
-    first, last, end = (segment.start + int(np.searchsorted(time, start - 1e-9)) for start in starts)
-    stop = min(end + 1, segment.stop)
-    return Trace(drive, slice(first, stop), slice(last, stop))
+    first, end = (
+        segment.start + int(np.searchsorted(time, rises + n / frequency)) for n in (whole - cycles, whole)
+    )
+    period = int(np.searchsorted(time, 1 / frequency)) + 1
+    return Trace(
+        drive,
+        slice(first, min(end + 1, segment.stop)),
+        slice(max(segment.start, segment.stop - period), segment.stop),
+    )
 
 
 def _first_rise(time: Array, swing: Array, frequency: float) -> float:
@@ -148,8 +153,11 @@ def _middle(recording: Recording) -> Stroke:
 
 
 def _window(recording: Recording, start: int, stop: int) -> slice:
-    """The middle seconds of a part of a recording."""
+    """The middle of a part of a recording: some seconds, or fewer where the motion is swift."""
     time: Array = recording.time[start:stop]
+    swing = recording.displacement[start:stop]
+    crossings = int(np.count_nonzero(np.diff(np.signbit(swing - swing.mean()))))
+    length = min(_WINDOW, float(np.ptp(time)) * _CROSSINGS / max(crossings, 1))
     middle = 0.5 * float(time[0] + time[-1])
-    first, last = np.searchsorted(time, [middle - _WINDOW / 2, middle + _WINDOW / 2])
+    first, last = np.searchsorted(time, [middle - length / 2, middle + length / 2])
     return slice(start + int(first), start + int(last))

@@ -41,6 +41,11 @@ def newton(force: float) -> str:
     return f"{significant(force)} N"
 
 
+def times(ratio: float) -> str:
+    """A ratio [1] in words."""
+    return f"{ratio:.2f} times" if ratio < 10 else f"{significant(ratio)} times"
+
+
 def percent(share: float) -> str:
     """A share [1] in percent, two significant digits."""
     return f"{significant(100 * share, 2)} %"

@@ -1,0 +1,123 @@
+import dataclasses
+
+import numpy as np
+import pytest
+from report_examples import CYCLES, prediction, series, write_log
+
+from bench.errors import ReportError
+from bench.recorder.reader import read_log
+from bench.report import plots
+from bench.report.drawing import MOST_POINTS, DriveColours, envelope, thinned
+from bench.report.recording import recording_from
+from bench.report.strokes import choose_strokes
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    return read_log(write_log(tmp_path_factory.mktemp("report") / "run.mcap"))
+
+
+@pytest.fixture(scope="module")
+def recording(log):
+    return recording_from(log, series(held_out=True))
+
+
+def test_segments_find_their_samples_on_the_time_base_of_the_series(log):
+    late = {name: array[100:] for name, array in series().arrays.items()}
+    found = recording_from(log, dataclasses.replace(series(), arrays=late))
+    assert [(s.start, s.stop) for s in found.segments] == [(0, 900), (900, 1900), (1900, 2900)]
+
+
+def test_one_stroke_shows_its_constant_drives_and_another_the_varying_one(recording):
+    constant, varying = choose_strokes(recording)
+    assert [trace.drive for trace in constant.traces] == [0.1, 0.3]
+    assert varying.varying
+    assert varying.title == "sine, 10 mm, 2 Hz, drive steps"
+
+
+def test_a_loop_is_one_whole_cycle_and_a_time_picture_two(recording):
+    trace = choose_strokes(recording)[0].traces[0]
+    assert trace.loop.stop - trace.loop.start == pytest.approx(250, abs=2)
+    assert trace.rows.stop - trace.rows.start == pytest.approx(500, abs=2)
+    assert recording.displacement[trace.rows.start] == pytest.approx(0.0, abs=3e-4)
+    assert recording.velocity[trace.rows.start] > 0
+    assert trace.rows.start >= (CYCLES - 3) * 250
+
+
+def test_without_segments_the_middle_of_the_recording_is_shown(recording):
+    (middle,) = choose_strokes(dataclasses.replace(recording, segments=()))
+    rows = middle.traces[0].rows
+    assert recording.time[rows].mean() == pytest.approx(3.0, abs=0.01)
+    assert rows.stop - rows.start == 2000
+
+
+def test_of_a_swift_motion_less_is_shown(recording):
+    swift = np.sin(2 * np.pi * 40 * recording.time)
+    (middle,) = choose_strokes(dataclasses.replace(recording, segments=(), displacement=swift))
+    rows = middle.traces[0].rows
+    assert np.ptp(recording.time[rows]) == pytest.approx(0.25, abs=0.02)
+
+
+def test_of_many_strokes_the_slowest_and_the_fastest_are_among_those_shown(recording):
+    one = recording.segments[0]
+    segments = tuple(dataclasses.replace(one, amplitude=0.01 * 2**k, start=one.start + k) for k in range(6))
+    assert len(choose_strokes(dataclasses.replace(recording, segments=segments), most=3)) == 3
+
+
+def test_a_drive_has_the_same_colour_in_every_picture(recording):
+    colours = DriveColours.of_recording(recording)
+    assert colours.of(0.1) != colours.of(0.3)
+    first = plots.by_drive(prediction().per_drive, 1.9, recording).axes[0].patches[0]
+    assert first.get_facecolor()[:3] == pytest.approx(colours.of(0.10003))
+
+
+def test_no_line_has_more_than_so_many_points():
+    for length in (10, MOST_POINTS, 50_001):
+        kept = np.arange(length)[thinned(slice(0, length))]
+        assert len(kept) <= MOST_POINTS
+        assert kept[0] == 0
+
+
+def test_an_envelope_keeps_the_extremes_and_reaches_over_no_gap():
+    time = np.concatenate([np.arange(1000) * 1e-3, 5 + np.arange(1000) * 1e-3])
+    values = np.sin(40 * time)
+    values[777] = 9.0
+    found = envelope(time, values, time, bins=7)
+    assert found.high.max() == 9.0
+    assert found.low.min() == values.min()
+    assert not np.any((found.time > 1.0) & (found.time < 5.0))
+
+
+@pytest.mark.parametrize(("draw", "labels"), [
+    (plots.loops, ("displacement [mm]", "velocity [m/s]", "force [N]")),
+    (plots.over_time, ("time [s]", "force [N]")),
+    (plots.whole, ("displacement [mm]", "drive [V]", "force [N]", "time [s]")),
+])  # fmt: skip
+def test_every_axis_has_its_unit(recording, draw, labels):
+    axes = draw(recording).axes
+    said = {axis.get_xlabel() for axis in axes} | {axis.get_ylabel() for axis in axes}
+    assert set(labels) <= said
+    assert all("[" in label for label in said if label)
+
+
+def test_the_residual_is_drawn_with_the_floor_and_what_was_held_out(recording):
+    figure = plots.residual(recording, 1.9)
+    said = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert said == ["± twice the noise floor", "held out of the fit"]
+
+
+def test_there_is_no_residual_without_a_fit(log):
+    with pytest.raises(ReportError, match="give the report a fit"):
+        plots.residual(recording_from(log, None), 1.9)
+
+
+def test_plots_are_saved_as_png_and_svg(recording, tmp_path):
+    plots.save({"whole": plots.whole(recording)}, tmp_path / "plots")
+    assert (tmp_path / "plots" / "whole.png").read_bytes().startswith(b"\x89PNG")
+    assert "<svg" in (tmp_path / "plots" / "whole.svg").read_text()
+
+
+def test_plots_that_cannot_be_saved_cost_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ReportError, match="plots cannot be written there"):
+        plots.save({}, tmp_path / "file")

@@ -18,6 +18,7 @@ from identification.simulate.step import (
     STRUCTURAL,
     WEIGHT_STAGE,
     WEIGHT_START,
+    at_field,
     between,
     rate_slopes,
     rates,
@@ -29,14 +30,25 @@ Plan = npt.NDArray[np.uint8]
 """(samples - 1,) steps in each sample; 0 where they are still to be chosen."""
 
 _MOST_STEPS = 64
-_STEPS_AT_REVERSAL = 4
+_STEPS_AT_TURN = 4
+_FIELD_JUMP = 0.05
+"""[1] relative change of the yield force in one sample above which the field counts as turning."""
 
 
 @compiled
 def _choose_steps(
-    fineness: float, h: float, D_y: float, v0: float, v1: float, y_rate: float, zeta: float, zeta_rate: float
+    fineness: float,
+    s: Array,
+    h: float,
+    v0: float,
+    v1: float,
+    u0: float,
+    u1: float,
+    y_rate: float,
+    zeta: float,
+    zeta_rate: float,
 ) -> int:
-    """Steps for one sample: the root of zeta's travel over ``fineness``; a few more where the slip turns.
+    """Steps for one sample: the root of zeta's travel over ``fineness``; a few more where slip or field turn.
 
     The root, because the error of a step falls with its third power: many small travels add up as one large.
     """
@@ -44,9 +56,11 @@ def _choose_steps(
     slip_after = v1 - y_rate
     travel = abs(zeta_rate) * h
     if slip_after * zeta < 0.0:
-        travel = max(travel, 2.0 * abs(slip_after) * h / D_y)
+        travel = max(travel, 2.0 * abs(slip_after) * h / s[2])
     steps = min(max(math.ceil(math.sqrt(travel / fineness)), 1), _MOST_STEPS)
-    return max(steps, _STEPS_AT_REVERSAL) if slip_before * slip_after <= 0.0 else steps
+    turns = slip_before * slip_after <= 0.0
+    jumps = abs(s[1] * (u1 - u0)) > _FIELD_JUMP * abs(at_field(s[0], s[1], u0))
+    return max(steps, _STEPS_AT_TURN) if turns or jumps else steps
 
 
 @compiled
@@ -83,7 +97,7 @@ def march(
     ys[0], zetas[0], y_rates[0] = y, zeta, y_rate
     for i in range(count - 1):
         if plan[i] == 0:
-            plan[i] = _choose_steps(fineness, h, s[2], v[i], v[i + 1], y_rate, zeta, zeta_rate)
+            plan[i] = _choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
         steps = plan[i]
         weight = HALF * h / steps
         for k in range(steps):
@@ -154,7 +168,7 @@ def march_with_slopes(
         if i == count - 1:
             break
         if plan[i] == 0:
-            plan[i] = _choose_steps(fineness, h, s[2], v[i], v[i + 1], y_rate, zeta, zeta_rate)
+            plan[i] = _choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
         steps = plan[i]
         weight = HALF * h / steps
         for k in range(steps):

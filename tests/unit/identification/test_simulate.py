@@ -124,6 +124,23 @@ def test_every_corner_of_the_search_bounds_gives_a_finite_force():
         assert np.abs(found.zeta).max() < 2.0
 
 
+def test_force_is_accurate_for_random_dampers_all_over_the_search_bounds():
+    random = np.random.default_rng(3)
+    stroke = sine(0.01, 2.0, 2.0)
+    finest = np.full(len(stroke.drive) - 1, 250, np.uint8)
+    for _ in range(60):
+        values = {q.symbol: random.uniform(q.low, q.high) for q in COORDINATES}
+        values |= {
+            q.symbol: np.exp(random.uniform(np.log(q.low), np.log(q.high))) for q in COORDINATES if q.low > 0
+        }
+        slopes = {"c0_b": values["c0_a"], "c1_b": values["c1_a"]}
+        values |= {name: random.uniform(-1.8, 4.0) * base for name, base in slopes.items()}
+        c = Coordinates(**values)._replace(k0=abs(values["k0"]))
+        exact = simulate(Setting(c), stroke, finest).force
+        error = simulate(Setting(c), stroke).force - exact
+        assert error[20:].std() < 5e-4 * exact.std(), c
+
+
 def test_steps_are_refined_only_where_the_loop_turns():
     plan = simulate(Setting(LABORATORY), sine(0.01, 1.0, 3.0, 0.3)).plan
     assert plan.max() >= 4

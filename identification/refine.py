@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array, BoolArray
 from identification.problem import COORDINATE_COUNT, Evaluation, Problem
@@ -71,6 +72,12 @@ def refine(
         progress: told of every step.
         start: unknowns (U,) to begin with; the regression's if None.
     """
+    # The matrices are long and thin: more threads only wait for each other, at full power.
+    with threadpool_limits(1, "blas"):
+        return _search(problem, settings, progress, start)
+
+
+def _search(problem: Problem, settings: Settings, progress: Progress, start: Array | None) -> Minimum:
     began = time.process_time()
     starts = starting_points(problem) if start is None else [start]
     best = descend(problem, starts[0], settings.iterations, progress)

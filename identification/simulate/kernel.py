@@ -20,9 +20,10 @@ from identification.simulate.step import (
     WEIGHT_START,
     at_field,
     between,
+    first_stage,
     rate_slopes,
     rates,
-    solve_stage,
+    second_stage,
     through_middle,
 )
 
@@ -64,6 +65,15 @@ def _choose_steps(
 
 
 @compiled
+def _inputs(
+    x: Array, v: Array, u: Array, u_middle: Array, h: float, i: int, t: float
+) -> tuple[float, float, float]:
+    """Displacement, velocity and field at the fraction t of sample i."""
+    xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
+    return xs, vs, through_middle(u[i], u_middle[i], u[i + 1], t)
+
+
+@compiled
 def march(
     s: Array,
     x: Array,
@@ -94,32 +104,19 @@ def march(
     ys, zetas, y_rates = np.empty(count), np.empty(count), np.empty(count)
     y, zeta = y0, zeta0
     y_rate, zeta_rate = rates(s, x[0], v[0], u[0], y, zeta)
-    ys[0], zetas[0], y_rates[0] = y, zeta, y_rate
-    for i in range(count - 1):
+    for i in range(count):
+        ys[i], zetas[i], y_rates[i] = y, zeta, y_rate
+        if i == count - 1:
+            break
         if plan[i] == 0:
             plan[i] = _choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
-        steps = plan[i]
-        weight = HALF * h / steps
-        for k in range(steps):
-            t = (k + GAMMA) / steps
-            xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
-            us = through_middle(u[i], u_middle[i], u[i + 1], t)
-            y1, zeta1 = solve_stage(s, xs, vs, us, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
-            t = (k + 1.0) / steps
-            xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
-            us = through_middle(u[i], u_middle[i], u[i + 1], t)
-            y, zeta = solve_stage(
-                s,
-                xs,
-                vs,
-                us,
-                WEIGHT_STAGE * y1 - WEIGHT_START * y,
-                WEIGHT_STAGE * zeta1 - WEIGHT_START * zeta,
-                weight,
-                zeta1,
-            )
+        weight = HALF * h / plan[i]
+        for k in range(plan[i]):
+            xs, vs, us = _inputs(x, v, u, u_middle, h, i, (k + GAMMA) / plan[i])
+            y1, zeta1 = first_stage(s, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
+            xs, vs, us = _inputs(x, v, u, u_middle, h, i, (k + 1.0) / plan[i])
+            y, zeta = second_stage(s, xs, vs, us, weight, y, zeta, y1, zeta1)
             y_rate, zeta_rate = rates(s, xs, vs, us, y, zeta)
-        ys[i + 1], zetas[i + 1], y_rates[i + 1] = y, zeta, y_rate
     return ys, zetas, y_rates
 
 
@@ -156,8 +153,8 @@ def march_with_slopes(
     ys, zetas, y_rates, slopes = np.empty(count), np.empty(count), np.empty(count), np.empty((count, columns))
     Sy, Sz, Sy1, Sz1 = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
     fy, fz, gy, gz = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
-    over_inputs = np.zeros((2, 3))
     over_y, over_zeta, stage_y, stage_zeta = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
+    over_inputs = np.zeros((2, 3))
     Sy[STRUCTURAL] = 1.0
     y, zeta = y0, zeta0
     y_rate, zeta_rate = rate_slopes(s, x[0], v[0], u[0], y, zeta, over_y, over_zeta, over_inputs, fy, fz)
@@ -169,32 +166,21 @@ def march_with_slopes(
             break
         if plan[i] == 0:
             plan[i] = _choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
-        steps = plan[i]
-        weight = HALF * h / steps
-        for k in range(steps):
-            t = (k + GAMMA) / steps
-            xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
-            us = through_middle(u[i], u_middle[i], u[i + 1], t)
-            y1, zeta1 = solve_stage(s, xs, vs, us, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
+        weight = HALF * h / plan[i]
+        for k in range(plan[i]):
+            t = (k + GAMMA) / plan[i]
+            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+            y1, zeta1 = first_stage(s, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
             rate_slopes(s, xs, vs, us, y1, zeta1, stage_y, stage_zeta, over_inputs, gy, gz)
             _from_inputs(over_inputs, dx, dv, du, du_middle, i, t, h, gy, gz)
+            # The slopes take the very steps that the states took, so they are those of the discrete solution.
             for j in range(columns):
                 Sy1[j] = Sy[j] + weight * (over_y[0] * Sy[j] + over_zeta[0] * Sz[j] + fy[j] + gy[j])
                 Sz1[j] = Sz[j] + weight * (over_y[1] * Sy[j] + over_zeta[1] * Sz[j] + fz[j] + gz[j])
             _solve(weight, stage_y, stage_zeta, Sy1, Sz1)
-            t = (k + 1.0) / steps
-            xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
-            us = through_middle(u[i], u_middle[i], u[i + 1], t)
-            y, zeta = solve_stage(
-                s,
-                xs,
-                vs,
-                us,
-                WEIGHT_STAGE * y1 - WEIGHT_START * y,
-                WEIGHT_STAGE * zeta1 - WEIGHT_START * zeta,
-                weight,
-                zeta1,
-            )
+            t = (k + 1.0) / plan[i]
+            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+            y, zeta = second_stage(s, xs, vs, us, weight, y, zeta, y1, zeta1)
             y_rate, zeta_rate = rate_slopes(s, xs, vs, us, y, zeta, over_y, over_zeta, over_inputs, fy, fz)
             _from_inputs(over_inputs, dx, dv, du, du_middle, i, t, h, fy, fz)
             for j in range(columns):

@@ -76,11 +76,30 @@ def solve_stage(
         rate = hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         over_slip, over_zeta = hysteresis_slopes(slip, zeta, A, beta, gamma, s[4])
         steepness = 1.0 - weight * over_zeta + over_slip * slope
+        # Just after a reversal the slope may be nearly flat or negative; a bounded move gets past it.
         move = (zeta_known + weight * rate - zeta) / max(steepness, 0.2)
         zeta += min(max(move, -_LARGEST_MOVE), _LARGEST_MOVE)
         if abs(move) < _TOLERANCE:
             break
     return constant + slope * zeta, zeta
+
+
+@compiled
+def first_stage(
+    s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y_rate: float, zeta_rate: float
+) -> tuple[float, float]:
+    """State at the fraction GAMMA of a step from (y, zeta), inputs there; the weight is HALF times the step."""
+    return solve_stage(s, x, v, u, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
+
+
+@compiled
+def second_stage(
+    s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y1: float, zeta1: float
+) -> tuple[float, float]:
+    """State at the end of the step, from its start (y, zeta) and its first stage (y1, zeta1)."""
+    y_known = WEIGHT_STAGE * y1 - WEIGHT_START * y
+    zeta_known = WEIGHT_STAGE * zeta1 - WEIGHT_START * zeta
+    return solve_stage(s, x, v, u, y_known, zeta_known, weight, zeta1)
 
 
 @compiled

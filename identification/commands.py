@@ -49,6 +49,7 @@ def identify(
 
     if unknown := set(stages.split(",")) - {"refine"}:
         raise IdentificationError(f"no stage {', '.join(sorted(unknown))}; there is refine")
+    _check_place(out)
     held = HoldOut(_words(hold_out), hold_out_after)
     with progress_on_terminal("identify") as progress:
         found = fit(
@@ -57,6 +58,10 @@ def identify(
             progress,
         )
     _write(out, found)
+    _say(
+        f"{out}: force error {found.rmse_n.train:.3g} N ({100 * found.nrmse.train:.2g} % of its deviation), "
+        f"noise floor {found.noise_floor_n:.3g} N; {found.result}"
+    )
 
 
 def predict(
@@ -77,14 +82,32 @@ def predict(
 
     if free not in ("", "offset"):
         raise IdentificationError(f"--free {free}: only a force offset can be freed; say `--free offset`")
+    _check_place(out)
     prediction, found = predict_log(read_fit(model), load(log), free_offset=free == "offset")
     if series is not None:
         write_series(series, found)
     _write(out, prediction)
+    _say(
+        f"{out}: force error {prediction.rmse_n:.3g} N ({100 * prediction.nrmse:.2g} % of its deviation), "
+        f"noise floor {prediction.noise_floor_n:.3g} N; freed: {', '.join(prediction.freed)}"
+    )
 
 
 def _words(text: str) -> tuple[str, ...]:
     return tuple(word for word in text.split(",") if word)
+
+
+def _say(line: str) -> None:
+    """One line of result for a person, on standard error."""
+    typer.echo(line, err=True)
+
+
+def _check_place(out: Path) -> None:
+    """Refuse before the work what could not be written after it."""
+    from identification.errors import IdentificationError
+
+    if str(out) != "-" and not out.parent.is_dir():
+        raise IdentificationError(f"{out}: there is no folder {out.parent}; choose another place")
 
 
 def _write(out: Path, document: "Document") -> None:

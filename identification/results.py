@@ -7,7 +7,7 @@ unit. The JSON Schemas in docs/reference/schemas are generated from these types.
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError
@@ -153,9 +153,9 @@ def read_fit(path: Path) -> Fit:
         raise IdentificationError(
             f"{path}: cannot be read ({error.strerror}); give a fit made by `identify`"
         ) from error
-    except ValueError as error:
-        first = str(error).splitlines()
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the file"
         raise IdentificationError(
-            f"{path}: no {FIT_SCHEMA} document ({first[1] if len(first) > 1 else first[0]}); "
-            "give a fit made by `mrbench identify`"
+            f"{path}: no {FIT_SCHEMA} document ({place}: {first['msg'][:80]}); give a fit made by `mrbench identify`"
         ) from error

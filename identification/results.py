@@ -157,5 +157,5 @@ def read_fit(path: Path) -> Fit:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
         raise IdentificationError(
-            f"{path}: no {FIT_SCHEMA} document ({place}: {first['msg'][:80]}); give a fit made by `mrbench identify`"
+            f"{path}: no {FIT_SCHEMA} document ({place}: {first['msg'][:80]}); give one made by `mrbench identify`"
         ) from error

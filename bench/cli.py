@@ -11,6 +11,13 @@ from typing import Annotated
 import typer
 
 GROUP = "mrbench.commands"
+_EXTRAS = {
+    "numba": "identification",
+    "threadpoolctl": "identification",
+    "torch": "identification",
+    "pyarrow": "export",
+}
+"""Packages that a small installation leaves out, and the extra that brings them."""
 
 
 def _show_version(wanted: bool) -> None:
@@ -53,6 +60,13 @@ def main(arguments: list[str] | None = None) -> None:
     called = commands.select(name=words[0]) if words else commands
     try:
         _application(called or commands)(args=words, prog_name="mrbench")
+    except ModuleNotFoundError as error:
+        if error.name not in _EXTRAS:
+            raise
+        typer.echo(
+            f"mrbench: {error.name} is not installed; pip install 'mrbench[{_EXTRAS[error.name]}]'", err=True
+        )
+        sys.exit(1)
     except Exception as error:
         code: int | None = getattr(error, "exit_code", None)
         if code is None:

@@ -12,11 +12,12 @@ from identification.assemble import Assembled, HoldOut, assemble
 from identification.damper.coordinates import Coordinates
 from identification.motion_noise import motion_scatter, with_motion
 from identification.prediction import normalised, per_drive, predict_piece, rmse
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.recordings import Recording, Stretch
 from identification.refine import Minimum, Settings, refine
 from identification.results import Delay, Errors, Fit, NoiseFloor, Nuisances, Provenance, Stage
 from identification.search_space import SearchSpace
+from identification.start import sliding_damping
 from identification.uncertainty import (
     Covariance,
     coordinate_covariance,
@@ -27,6 +28,8 @@ from identification.uncertainty import (
     strong_correlations,
 )
 
+_GROWTH = 3.0
+"""[1] largest exponent by which the inner displacement may run away within a stretch."""
 _OVERSHOOT = 0.005
 """[1] part of the samples at each end of the drive's range that may be overshoots."""
 _MISFIT = 1.2
@@ -94,7 +97,17 @@ def _problem(assembled: Assembled, request: Request) -> Problem:
     drives = np.concatenate(fitted)
     prior = assembled.delay_prior if request.delay_prior is None else request.delay_prior
     pieces = tuple(p for p in assembled.pieces if p.train.any())
-    return Problem(pieces, SearchSpace(*_range(drives)), assembled.floor.noise, max(prior, 1e-9))
+    space = SearchSpace(*_range(drives), lowest_k0=_lowest_k0(pieces))
+    return Problem(pieces, space, assembled.floor.noise, max(prior, 1e-9))
+
+
+def _lowest_k0(pieces: Sequence[Piece]) -> float:
+    """Stiffness [N/m] at which the inner displacement would grow by e^3 in the longest stretch.
+
+    It moves with the time constant (c0 + c1) / k0. A more negative k0 fits a drift and simulates nonsense.
+    """
+    longest = max(len(p.force) / p.stroke.rate for p in pieces)
+    return -_GROWTH * sliding_damping(pieces) / longest
 
 
 def _range(drives: Array) -> tuple[float, float]:

@@ -1,7 +1,8 @@
 """What is minimised: measured minus simulated force over all training samples, in units of the noise.
 
 The unknowns are the search numbers, one inner displacement y(0) a stretch, and a small delay of the force and
-of the drive channel against the displacement, each held by a prior from the clock mapping.
+of the drive channel against the displacement. Priors hold the delays, by what is known of the clocks, and y(0),
+which cannot have been far outside the stroke: with a weak k0 it would else run off and carry a force offset.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,8 @@ from identification.simulate import UNKNOWNS, Setting, Stroke, simulate
 COORDINATE_COUNT = len(Coordinates._fields)
 _Y0_SCALE = 1e-3
 """[m] what a change of order one of a y(0) unknown means."""
+_Y0_STROKES = 1.0
+"""[1] standard deviation of y(0) about the middle of the motion, in half strokes."""
 _SHARED = COORDINATE_COUNT + 2
 """Unknowns that all pieces share: the search numbers and the two delays."""
 
@@ -135,11 +138,9 @@ class Problem:
 
     def evaluate(self, unknowns: Array) -> Evaluation:
         """Cost, J'J and J'r at a point; an unstable point costs infinity."""
-        count = len(unknowns)
-        delays = np.zeros(count)
-        delays[COORDINATE_COUNT:_SHARED] = 1.0
-        hessian, gradient = np.diag(delays), delays * unknowns
-        cost = float(gradient @ gradient)
+        centre, weight = self._priors()
+        pulled = weight * (unknowns - centre)
+        hessian, gradient, cost = np.diag(weight**2), weight * pulled, float(pulled @ pulled)
         D = self._scales(unknowns)
         for i in range(len(self.pieces)):
             weight, r, J = self._raw(unknowns, i)
@@ -150,6 +151,15 @@ class Problem:
             gradient[columns] += D.T @ (J.T @ r)
             cost += float(r @ r)
         return Evaluation(cost if np.isfinite(cost) else np.inf, hessian, gradient)
+
+    def _priors(self) -> tuple[Array, Array]:
+        """Centre and weight (U,) of the priors; a weight of zero holds nothing."""
+        stroke = max(float(np.ptp(p.stroke.displacement)) for p in self.pieces) / 2.0
+        means = np.array([p.stroke.displacement.mean() for p in self.pieces])
+        rest = np.zeros(COORDINATE_COUNT)
+        centre = np.concatenate([rest, [0.0, 0.0], means / _Y0_SCALE])
+        held = np.full(len(means), _Y0_SCALE / (_Y0_STROKES * stroke))
+        return centre, np.concatenate([rest, [1.0, 1.0], held])
 
     def _raw(self, unknowns: Array, piece: int) -> tuple[Array, Array, Array]:
         """Weights [1/N], force errors [N] and their slopes (N, 16) over coordinates, delays [s] and y(0) [m]."""

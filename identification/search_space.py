@@ -29,6 +29,8 @@ class SearchSpace:
     """[V or A]"""
     highest_drive: float
     """[V or A]"""
+    lowest_k0: float = _BOUNDS["k0"][0]
+    """[N/m] below which the inner displacement would run away within these strokes."""
 
     @property
     def one_drive(self) -> bool:
@@ -91,6 +93,7 @@ class SearchSpace:
             low[i], high[i] = (
                 (np.log(a), np.log(b)) if name in _LOGARITHMIC else (a / _SCALES[name], b / _SCALES[name])
             )
+        low[_NAMES.index("k0")] = self.lowest_k0 / _SCALES["k0"]
         for base, slope in _PAIRS:
             a, b = _BOUNDS[base]
             for name in (base, slope):

@@ -5,7 +5,7 @@ linear in what remains: (F_a + F_b u) sgn v + (c0_a + c0_b u) v + (k0 + k1) x - 
 these; the yield displacement is tried at a few fractions of the stroke.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -39,7 +39,12 @@ def scattered(problem: Problem, unknowns: Array, factor: float, seed: int) -> Ar
     return np.clip(moved, low, high)
 
 
-def _coordinates(pieces: tuple[Piece, ...]) -> Iterator[Coordinates]:
+def sliding_damping(pieces: Sequence[Piece]) -> float:
+    """Estimate of c0 + c1 [N s/m] at zero drive, from the regression."""
+    return (1.0 + _DASHPOT_RATIO) * max(float(_regression(pieces)[2]), 1.0)
+
+
+def _coordinates(pieces: Sequence[Piece]) -> Iterator[Coordinates]:
     F_a, F_b, c0_a, c0_b, stiffness, offset = _regression(pieces)
     stroke = max(float(np.ptp(p.stroke.displacement)) for p in pieces) / 2.0
     for fraction in _YIELD_FRACTIONS:
@@ -60,7 +65,7 @@ def _coordinates(pieces: tuple[Piece, ...]) -> Iterator[Coordinates]:
         )
 
 
-def _regression(pieces: tuple[Piece, ...]) -> Array:
+def _regression(pieces: Sequence[Piece]) -> Array:
     """F_a, F_b, c0_a, c0_b, k0 + k1 and the force offset, (6,)."""
     rows, forces = [], []
     for p in pieces:

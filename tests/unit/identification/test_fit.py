@@ -12,7 +12,7 @@ from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.refine import Settings, descend, refine
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, Stroke, simulate
-from identification.start import scattered, starting_points
+from identification.start import scattered, sliding_damping, starting_points
 from identification.uncertainty import (
     coordinate_covariance,
     coordinate_estimates,
@@ -188,3 +188,18 @@ def test_search_numbers_go_there_and_back_with_exact_slopes(drives):
         e[k] = 1e-6
         after, before = (np.array(space.to_coordinates(q + s * e)) for s in (1, -1))
         np.testing.assert_allclose(space.slopes(q)[:, k], (after - before) / 2e-6, rtol=1e-6, atol=1e-6)
+
+
+def test_an_inner_displacement_far_outside_the_stroke_costs_dearly():
+    problem = problem_of(LABORATORY, STROKES[:1])
+    quiet = replace(problem, noise=1e9)
+    here, far = problem.start(LABORATORY), problem.start(LABORATORY)
+    far[-1] += 10 * 0.005 / 1e-3
+    assert quiet.evaluate(far).cost - quiet.evaluate(here).cost == pytest.approx(100.0, rel=0.01)
+
+
+def test_a_stiffness_that_lets_the_inner_displacement_run_away_is_out_of_bounds():
+    wild = LABORATORY._replace(k0=-9000.0)
+    space = SearchSpace(0.0, 0.5, lowest_k0=-1000.0)
+    assert space.to_coordinates(space.to_search(wild)).k0 == pytest.approx(-1000.0)
+    assert 10e3 < sliding_damping(problem_of(LABORATORY, STROKES).pieces) / 0.7 < 30e3

@@ -36,7 +36,9 @@ def record(method: str, seed: int, folder: Path, scenario: str) -> tuple[Recordi
     run_from_plant(load_method(method), scenario, log, identity, seed=seed, rig=(*RIG, "--truth", str(truth)))
     with np.load(truth) as file:
         hidden = json.loads(str(file["info"]))
-    true = to_coordinates(Parameters(**hidden["parameters"]))._replace(f0=hidden["recorded_f0"])
+    true = to_coordinates(Parameters(**hidden["parameters"]))
+    # A zero of the displacement stretches the accumulator spring by as much, so the log shows another preload.
+    true = true._replace(f0=hidden["recorded_f0"] + true.k1 * hidden["drawn"]["displacement"]["zero"])
     offsets = {name: drawn["offset"] for name, drawn in hidden["drawn"].items()}
     return load(log), true, {"force_delay": offsets["displacement"] - offsets["force"]}
 

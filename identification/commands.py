@@ -58,10 +58,7 @@ def identify(
             progress,
         )
     _write(out, found)
-    _say(
-        f"{out}: force error {found.rmse_n.train:.3g} N ({100 * found.nrmse.train:.2g} % of its deviation), "
-        f"noise floor {found.noise_floor_n:.3g} N; {found.result}"
-    )
+    _say(out, found.rmse_n.train, found.nrmse.train, found.noise_floor_n, found.result)
 
 
 def predict(
@@ -88,8 +85,7 @@ def predict(
         write_series(series, found)
     _write(out, prediction)
     _say(
-        f"{out}: force error {prediction.rmse_n:.3g} N ({100 * prediction.nrmse:.2g} % of its deviation), "
-        f"noise floor {prediction.noise_floor_n:.3g} N; freed: {', '.join(prediction.freed)}"
+        out, prediction.rmse_n, prediction.nrmse, prediction.noise_floor_n, f"freed: {', '.join(prediction.freed)}"
     )
 
 
@@ -97,9 +93,11 @@ def _words(text: str) -> tuple[str, ...]:
     return tuple(word for word in text.split(",") if word)
 
 
-def _say(line: str) -> None:
-    """One line of result for a person, on standard error."""
-    typer.echo(line, err=True)
+def _say(out: Path, error: float, relative: float, floor: float, more: str) -> None:
+    """One line of result for a person, on standard error: force error and noise floor [N]."""
+    where = "printed" if str(out) == "-" else out
+    share = f"{100 * relative:.2g} % of the force's deviation"
+    typer.echo(f"{where}: force error {error:.3g} N ({share}), noise floor {floor:.3g} N; {more}", err=True)
 
 
 def _check_place(out: Path) -> None:

@@ -103,7 +103,7 @@ def _complaint(path: Path, error: Exception) -> str:
             return f"{path}: is no MCAP log; CSV recordings come in by `mrbench import`"
     if isinstance(error, orjson.JSONDecodeError):
         return f"{path}: a message is no JSON ({error}); give a log of the profile mrbench"
-    return f"{path}: is truncated or damaged ({error or type(error).__name__}); run `mrbench salvage {path}`"
+    return f"{path}: is truncated or damaged ({str(error) or type(error).__name__}); run `mrbench salvage {path}`"
 
 
 def _message_blocks(

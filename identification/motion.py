@@ -1,7 +1,7 @@
 """Displacement, velocity and acceleration of a stretch, from a displacement with noise and steps.
 
 Velocity enters the force through c0, so that noise of the displacement becomes noise of the force: a plain
-difference of 2 µm noise at 1 kHz would cost kilonewtons. What is known of the motion is used in turn:
+difference of 2 µm noise at 1 kHz is 2.8 mm/s, at 2000 N s/m some 6 N. What is known of the motion is used in turn:
 
 1. The actuator gives way under the load. What the displacement follows of the recorded force is regressed on
    the force at lags of -6 to 45 ms, if it is there at all.

@@ -62,7 +62,7 @@ class NoiseFloor(Document):
 class Errors(Document):
     """One measure of the force error on the samples fitted, on the validation part and on those held out."""
 
-    train: float
+    train: float = Field(description="on the samples that were fitted")
     validation: float | None = Field(description="null where no part is set aside to choose settings by")
     held_out: float | None = Field(description="null where nothing was held out")
 
@@ -74,33 +74,33 @@ class DriveError(Document):
     unit: str = Field(description="V or A")
     rmse_n: float = Field(description="root mean square force error in N")
     nrmse: float = Field(description="that, over the standard deviation of the force in these samples")
-    samples: int
+    samples: int = Field(description="how many samples")
 
 
 class Stage(Document):
     """One stage of the fit."""
 
-    name: str
+    name: str = Field(description="refine; later also pinn")
     seconds: float = Field(description="processor time in s")
     rmse_n: float = Field(description="force error on the fitted samples after it, in N")
-    iterations: int
-    note: str = ""
+    iterations: int = Field(description="steps of the last descent")
+    note: str = Field(default="", description="what a person should know about it")
 
 
 class Provenance(Document):
     """What a document was made from."""
 
     logs: dict[str, str] = Field(description="file name -> SHA-256 of its content")
-    version: str
-    seed: int
-    settings: dict[str, str | float | int | bool | None]
+    version: str = Field(description="of mrbench")
+    seed: int = Field(description="of everything that chance decided")
+    settings: dict[str, str | float | int | bool | None] = Field(description="what was asked for")
 
 
 class Fit(Document):
     """The identified damper."""
 
     schema_: Literal["mrbench.fit/1"] = Field(default="mrbench.fit/1", alias="schema")
-    specimen: str
+    specimen: str = Field(description="damper under test, as the first log names it")
     drive_kind: str = Field(description="driver_command_v, coil_v or coil_a")
     drive_unit: str = Field(description="V or A")
     drive_range: tuple[float, float] = Field(description="lowest and highest drive fitted, in `drive_unit`")
@@ -136,7 +136,7 @@ class Prediction(Document):
     bias_n: float = Field(description="mean of simulated minus recorded force in N")
     noise_floor_n: float = Field(description="noise of the recorded force in N")
     per_drive: list[DriveError]
-    samples: int
+    samples: int = Field(description="how many samples")
     freed: list[str] = Field(description="what was estimated on this very log")
     provenance: Provenance
 

@@ -171,7 +171,7 @@ def _channel_info(scenario: Scenario, name: str, rate: float) -> dict[str, Any]:
     unit = CHANNELS[name][0]
     return {
         "unit": scenario.drive_unit if unit == "drive" else unit,
-        "rate_hz": sensor.rate or rate,
+        "rate_hz": sensor.rate or round(rate, 6),
         "filter": low_pass,
         "delay_s": sensor.delay,
     }

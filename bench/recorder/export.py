@@ -36,6 +36,9 @@ _NAMES = {
     "segment": "segment",
 }
 
+_MADE_VELOCITY = "velocity_smoothed_mps"
+"""Not the importer's column: a velocity made from the displacement must not come back as a measured one."""
+
 
 def columns(log: Log) -> Columns:
     """The samples by column, in the order of the columns.
@@ -44,7 +47,10 @@ def columns(log: Log) -> Columns:
         log: a log that was read.
     """
     drive = _DRIVE_NAMES[log.metadata["run"]["drive_unit"]]
-    return {form.format(drive=drive): log.samples[name] for name, form in _NAMES.items() if name in log.samples}
+    names = dict(_NAMES)
+    if log.metadata["units"].get("velocity_from") != "measured":
+        names["velocity"] = _MADE_VELOCITY
+    return {form.format(drive=drive): log.samples[name] for name, form in names.items() if name in log.samples}
 
 
 def export_log(log: Log, form: Format, out: Path) -> None:

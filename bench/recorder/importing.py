@@ -57,7 +57,8 @@ def import_recordings(
             index = write_stretch(writer, name, time_ns, _values(recording, measured), _spans(recording), index)
             start = int(time_ns[-1]) + PAUSE
     samples = sum(len(recording.time_ns) for recording in recordings)
-    text = f"{samples} samples in {len(recordings)} stretches and {index} segments"
+    stretches = "one stretch" if len(recordings) == 1 else f"{len(recordings)} stretches"
+    text = f"{samples} samples in {stretches} and {index} segments"
     return "; ".join([text, *_notes(recordings, measured)])
 
 

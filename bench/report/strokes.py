@@ -116,7 +116,8 @@ def _title(segment: LoggedSegment) -> str:
 
 
 def _trace(recording: Recording, drive: float | None, segment: LoggedSegment) -> Trace:
-    if drive is None or not segment.frequency:
+    lasts = (segment.stop - segment.start - 1) * _step(recording)
+    if drive is None or not segment.frequency or lasts * segment.frequency < 1.0 + _SLACK:
         rows = _window(recording, segment.start, segment.stop)
         return Trace(drive, rows, rows)
     return _cycles(recording, drive, segment, segment.frequency)
@@ -138,6 +139,11 @@ def _cycles(recording: Recording, drive: float, segment: LoggedSegment, frequenc
         slice(first, min(end + 1, segment.stop)),
         slice(max(segment.start, segment.stop - period), segment.stop),
     )
+
+
+def _step(recording: Recording) -> float:
+    """Usual time between samples [s]."""
+    return float(np.median(np.diff(recording.time)))
 
 
 def _first_rise(time: Array, swing: Array, frequency: float) -> float:

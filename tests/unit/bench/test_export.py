@@ -21,7 +21,14 @@ def log(tmp_path_factory):
 
 
 def test_every_column_says_its_unit(log):
-    assert list(columns(log)) == ["time_s", "displacement_m", "velocity_mps", "force_n", "voltage_v", "segment"]
+    assert list(columns(log)) == [
+        "time_s",
+        "displacement_m",
+        "velocity_smoothed_mps",
+        "force_n",
+        "voltage_v",
+        "segment",
+    ]
 
 
 def test_drive_in_ampere_is_a_current(tmp_path):

@@ -281,7 +281,7 @@ def test_command_writes_a_log(tmp_path, capsys):
     path = write_csv(tmp_path / "a.csv", renamed(csv_columns(), force_n="load"))
 
     assert run_command(path, "--out", tmp_path / "run.mcap", "--column", "force_n=load") == 0
-    assert "1000 samples in 1 stretches and 2 segments" in capsys.readouterr().err
+    assert "1000 samples in one stretch and 2 segments" in capsys.readouterr().err
 
 
 def test_command_leaves_nothing_of_a_refused_file_and_keeps_the_log_before_it(tmp_path, capsys):

@@ -121,3 +121,10 @@ def test_plots_that_cannot_be_saved_cost_one_line(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ReportError, match="plots cannot be written there"):
         plots.save({}, tmp_path / "file")
+
+
+def test_a_segment_shorter_than_a_cycle_is_shown_as_it_is(recording):
+    short = dataclasses.replace(recording.segments[0], stop=recording.segments[0].start + 60)
+    (stroke, *_) = choose_strokes(dataclasses.replace(recording, segments=(short,)))
+    rows = stroke.traces[0].rows
+    assert (rows.start, rows.stop) == (short.start, short.stop)

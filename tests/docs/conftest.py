@@ -1,0 +1,46 @@
+"""What the pages take for granted: the command on the path, and a folder with recordings made elsewhere."""
+
+import os
+import sys
+from pathlib import Path
+
+import blocks
+import pytest
+
+STROKES = {"10mm_1Hz.csv": (0, 7500), "5mm_2.5Hz.csv": (7500, 15704)}
+"""Which samples of `quick` each file holds."""
+
+
+@pytest.fixture(scope="session")
+def environment():
+    cache = os.environ.get("MRBENCH_CACHE")
+    more = {"MRBENCH_CACHE": str(Path(cache).resolve())} if cache else {}
+    return os.environ | more | {"PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"}
+
+
+@pytest.fixture(scope="session")
+def recordings(tmp_path_factory, environment):
+    """Two strokes as files of five columns, and the first once more under a vendor's headers."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    blocks.run("mrbench run quick --scenario default --out a.mcap", folder, environment)
+    blocks.run("mrbench export a.mcap --format csv --out a.csv", folder, environment)
+    header, *rows = (folder / "a.csv").read_text().splitlines()
+    kept = [header.split(",").index(name) for name in ("time_s", "displacement_m", "force_n", "voltage_v")]
+
+    def lines(start, stop):
+        return [",".join(row.split(",")[place] for place in kept) for row in rows[start:stop]]
+
+    files = {
+        f"recordings/{name}": ["time_s,displacement_m,force_n,voltage_v", *lines(*span)]
+        for name, span in STROKES.items()
+    }
+    return files | {"vendor.csv": ["Time,LVDT,Load,Command", *lines(*STROKES["10mm_1Hz.csv"])]}
+
+
+@pytest.fixture
+def folder(tmp_path, recordings):
+    """Where a reader stands."""
+    (tmp_path / "recordings").mkdir()
+    for name, lines in recordings.items():
+        (tmp_path / name).write_text("\n".join(lines) + "\n")
+    return tmp_path

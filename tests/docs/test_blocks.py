@@ -1,0 +1,34 @@
+"""Every block of README, tutorial and how-to is run, in the order of its page, as a reader would."""
+
+import blocks
+import pytest
+
+RUNNABLE = ("sh", "console")
+
+
+@pytest.mark.parametrize("page", blocks.PAGES, ids=lambda page: page.stem)
+def test_every_block_of_the_page_works(page, folder, environment):
+    found = blocks.blocks(page)
+    assert any(block.language in RUNNABLE and block.mark != "not run" for block in found)
+    for block in found:
+        blocks.carry_out(block, folder, environment)
+
+
+@pytest.mark.parametrize("page", blocks.PAGES, ids=lambda page: page.stem)
+def test_a_block_that_is_not_run_says_why(page):
+    for block in blocks.blocks(page):
+        assert block.mark != "not run" or len(block.said) > 10
+
+
+@pytest.mark.parametrize(
+    ("said", "expected", "same"),
+    [
+        ("a.mcap: 100 samples", "a.mcap: 100 samples", True),
+        ("a.mcap: 103 samples", "a.mcap: 100 samples", True),
+        ("a.mcap: 120 samples", "a.mcap: 100 samples", False),
+        ("first\nand more\nlast", "first\n...\nlast", True),
+        ("first\nand more", "first", False),
+    ],
+)
+def test_outputs_shown_are_compared_with_outputs(said, expected, same):
+    assert blocks.as_shown(said, expected) is same

@@ -1,0 +1,74 @@
+"""What pages refer to is there, and what they repeat of the code is what the code says."""
+
+import importlib.util
+import re
+from importlib.metadata import entry_points
+
+import blocks
+import pytest
+
+HIDDEN = {".venv", "node_modules", "build", "runs"}
+ALL_PAGES = [p for p in sorted(blocks.ROOT.rglob("*.md")) if not HIDDEN & set(p.relative_to(blocks.ROOT).parts)]
+REFERENCE = sorted(blocks.ROOT.glob("docs/reference/*.md"))
+COMMAND_LINE = blocks.ROOT / "docs" / "reference" / "command-line.md"
+
+
+def name(page):
+    return str(page.relative_to(blocks.ROOT))
+
+
+@pytest.fixture(scope="module")
+def generator():
+    spec = importlib.util.spec_from_file_location("generate", blocks.ROOT / "docs" / "generate_reference.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def anchors(page):
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- /]", "", heading.lower()).replace(" ", "-").replace("/", "") for heading in headings}
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=name)
+def test_every_link_leads_somewhere(page):
+    text = re.sub(r"```.*?```", "", page.read_text(), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^)]+)\)", text):
+        if "://" in link:
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{name(page)} links to {link}"
+        assert not anchor or anchor in anchors(target), f"{name(page)} links to {link}"
+
+
+@pytest.mark.parametrize("page", [p for p in ALL_PAGES if "docs" in p.parts], ids=name)
+def test_every_page_of_the_documentation_is_reached_from_its_index(page):
+    index = blocks.ROOT / "docs" / "index.md"
+    assert page == index or str(page.relative_to(index.parent)) in index.read_text()
+
+
+@pytest.mark.parametrize("page", REFERENCE, ids=name)
+def test_generated_parts_of_the_reference_are_up_to_date(page, generator):
+    text = page.read_text()
+    assert "<!-- generated: " in text
+    assert text == generator.filled(text), "run: python docs/generate_reference.py"
+
+
+@pytest.mark.parametrize("command", sorted(entry.name for entry in entry_points(group="mrbench.commands")))
+def test_every_command_stands_in_the_reference(command):
+    assert f"\n## {command}\n" in COMMAND_LINE.read_text()
+
+
+@pytest.mark.parametrize("readme", sorted(blocks.ROOT.glob("*/**/README.md")), ids=name)
+def test_a_room_is_described_in_at_most_sixty_lines(readme):
+    if not HIDDEN & set(readme.relative_to(blocks.ROOT).parts):
+        assert len(readme.read_text().splitlines()) <= 60
+
+
+@pytest.mark.parametrize("decision", sorted(blocks.ROOT.glob("docs/decisions/*.md")), ids=name)
+def test_a_decision_says_what_it_must_in_at_most_sixty_lines(decision):
+    text = decision.read_text()
+    assert len(text.splitlines()) <= 60
+    for heading in ("## Context", "## Options", "## Decision", "## Consequences"):
+        assert f"\n{heading}\n" in text

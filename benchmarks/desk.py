@@ -1,0 +1,59 @@
+"""A folder in which the product's commands are typed as a person would type them."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from benchmarks.prediction_series import Series, read_series
+
+
+@dataclass(frozen=True)
+class Desk:
+    """A folder in which commands are typed, and what was typed."""
+
+    folder: Path
+    typed: list[str] = field(default_factory=list)
+
+    def type(self, line: str) -> None:
+        """Run a command line as a person would; stop with its own words where it fails."""
+        self.typed.append(line)
+        print(line, file=sys.stderr)
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        done = subprocess.run(
+            ["sh", "-c", line], cwd=self.folder, env=os.environ | {"PATH": path}, capture_output=True, text=True
+        )
+        if done.returncode:
+            sys.exit(f"{line}\nended with {done.returncode}: {done.stderr}")
+
+    def document(self, name: str) -> dict[str, Any]:
+        """A JSON document."""
+        found: dict[str, Any] = json.loads((self.folder / f"{name}.json").read_text())
+        return found
+
+    def fit(self, log: str, name: str, options: str) -> "Found":
+        """Identify a log and simulate the fit on all of it."""
+        self.type(f"mrbench identify {log}.mcap {options} --out {name}.json")
+        return self.simulated(log, name, name)
+
+    def simulated(self, log: str, name: str, series: str, options: str = "") -> "Found":
+        """A fit on the whole log."""
+        self.type(f"mrbench predict {name}.json {log}.mcap{options} --out {series}.p.json --series {series}.npz")
+        return Found(self.document(name), read_series(self.folder / f"{series}.npz"))
+
+
+@dataclass(frozen=True)
+class Found:
+    """A fit, and its force beside the recorded one."""
+
+    document: dict[str, Any]
+    series: Series
+
+    @property
+    def delay(self) -> dict[str, Any]:
+        """Lag of the force behind the displacement, as the fit reports it."""
+        found: dict[str, Any] = self.document["nuisances"]["force_delay"]
+        return found

@@ -91,7 +91,7 @@ def run(seeds: int = SEEDS, scenario: str = "default") -> None:
     line("processor time of a fit of 82 301 samples, median", float(np.median(spent)), "s", "")
     for name in rows[0]:
         z = np.array([row[name] for row in rows if name in row])
-        line(f"  {name}: mean and spread of its error in deviations", z.mean(), "", f"{z.std():.2f}")
+        line(f"  {name}: true minus found in deviations, mean and spread", z.mean(), "", f"{z.std():.2f}")
 
 
 if __name__ == "__main__":

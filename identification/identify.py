@@ -30,6 +30,8 @@ from identification.uncertainty import (
 
 _GROWTH = 3.0
 """[1] largest exponent by which the inner displacement may run away within a stretch."""
+_MORE_THAN_PRIOR = 1.01
+"""[1] information on a delay, in units of its prior's, above which the recording adds to the prior."""
 _OVERSHOOT = 0.005
 """[1] part of the samples at each end of the drive's range that may be overshoots."""
 _MISFIT = 1.2
@@ -174,10 +176,13 @@ def _document(
 
 def _nuisances(problem: Problem, minimum: Minimum, found: Covariance) -> Nuisances:
     delays = slice(COORDINATE_COUNT, COORDINATE_COUNT + 2)
-    values = minimum.unknowns[delays] * problem.delay_prior
-    sd = np.sqrt(np.diag(found.unknowns)[delays]) * problem.delay_prior
+    prior = problem.delay_prior
+    values = minimum.unknowns[delays] * prior
+    sd = np.sqrt(np.diag(found.unknowns)[delays]) * prior
+    seen = np.diag(minimum.evaluation.hessian)[delays] > _MORE_THAN_PRIOR
     force, drive = (
-        delay_estimate(float(v), float(s), problem.delay_prior) for v, s in zip(values, sd, strict=True)
+        delay_estimate(float(v), float(s), prior, seen=bool(by_data))
+        for v, s, by_data in zip(values, sd, seen, strict=True)
     )
     starts = {p.name: problem.setting(minimum.unknowns, i).y0 for i, p in enumerate(problem.pieces)}
     return Nuisances(y0=starts, force_delay=force, drive_delay=drive)

@@ -41,6 +41,7 @@ class Delay(Document):
     ci95: tuple[float, float] | None = Field(description="95 % interval in s")
     prior_sd: float = Field(description="standard deviation allowed beforehand, in s")
     outside_prior: bool = Field(description="three deviations or more away: more than a clock's error")
+    note: str = Field(default="", description="what a person should know about it")
 
 
 class Nuisances(Document):

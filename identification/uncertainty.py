@@ -183,8 +183,8 @@ def _estimate(
     return Estimate(
         value=value,
         unit=unit,
-        ci95=_interval(value, sd, _Z95, positive),
-        ci99=_interval(value, sd, _Z99, positive),
+        ci95=_possible(_interval(value, sd, _Z95, positive), value, quantity),
+        ci99=_possible(_interval(value, sd, _Z99, positive), value, quantity),
         identifiable=known,
         note=note,
     )
@@ -198,10 +198,20 @@ def _interval(value: float, sd: float, z: float, positive: bool) -> tuple[float,
     return value - z * sd, value + z * sd
 
 
-def delay_estimate(value: float, sd: float, prior: float) -> Delay:
-    """A channel's residual delay [s] beside its prior [s]."""
+def _possible(interval: tuple[float, float], value: float, quantity: Quantity) -> tuple[float, float]:
+    """The part of an interval in which the quantity can lie; it always holds the value."""
+    low, high = interval
+    return min(max(low, quantity.low), value), max(min(high, quantity.high), value)
+
+
+def delay_estimate(value: float, sd: float, prior: float, *, seen: bool) -> Delay:
+    """A channel's residual delay [s] beside its prior [s]; without an interval where only the prior speaks."""
     return Delay(
-        value=value, ci95=_interval(value, sd, _Z95, False), prior_sd=prior, outside_prior=abs(value) > 3.0 * prior
+        value=value,
+        ci95=_interval(value, sd, _Z95, False) if seen else None,
+        prior_sd=prior,
+        outside_prior=abs(value) > 3.0 * prior,
+        note="" if seen else "cannot be seen: these strokes show no change that it would delay",
     )
 
 

@@ -95,6 +95,8 @@ def drive_rows(errors: list[DriveError], floor: float) -> list[DriveRow]:
 
 def delay_text(delay: Delay) -> str:
     """A lag, and whether the clocks explain it."""
+    if delay.ci95 is None:
+        return "cannot be seen in these strokes"
     verdict = "more than the clocks explain" if delay.outside_prior else "within what the clocks explain"
     prior = quantity(delay.prior_sd, None, "s")
     return f"{quantity(delay.value, delay.ci95, 's')} ({verdict}: {prior} standard deviation)"

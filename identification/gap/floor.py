@@ -139,7 +139,9 @@ def _summary(floors: Sequence[Floor]) -> str:
     if not repeated:
         return floors[0].how
     differ = [f for f in repeated if "agrees" not in f.how]
-    words = f"cycle to cycle in {len(repeated)} of {len(floors)} stretches, high frequency in the others"
+    words = f"cycle to cycle in {len(repeated)} of {len(floors)} stretches"
+    if len(repeated) < len(floors):
+        words += ", high frequency in the others"
     if differ:
         words += f"; the two differ by more than {_AGREE - 1:.0%} in {len(differ)}"
     return words

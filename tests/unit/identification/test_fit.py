@@ -17,6 +17,7 @@ from identification.uncertainty import (
     coordinate_covariance,
     coordinate_estimates,
     covariance,
+    delay_estimate,
     parameter_estimates,
     strong_correlations,
 )
@@ -203,3 +204,18 @@ def test_a_stiffness_that_lets_the_inner_displacement_run_away_is_out_of_bounds(
     space = SearchSpace(0.0, 0.5, lowest_k0=-1000.0)
     assert space.to_coordinates(space.to_search(wild)).k0 == pytest.approx(-1000.0)
     assert 10e3 < sliding_damping(problem_of(LABORATORY, STROKES).pieces) / 0.7 < 30e3
+
+
+def test_an_interval_never_leaves_what_is_possible():
+    spread = np.zeros((COORDINATE_COUNT, COORDINATE_COUNT))
+    spread[4, 4] = 0.2**2
+    n = coordinate_estimates(LABORATORY._replace(n=1.1), spread, set(), set(), "V")["n"]
+    assert n.ci95[0] == 1.0
+    assert n.ci95[1] == pytest.approx(1.1 * np.exp(1.96 * 0.2 / 1.1), rel=1e-4)
+
+
+def test_a_delay_that_only_its_prior_holds_has_no_interval():
+    unseen, seen = (delay_estimate(1e-5, 2e-5, 2e-5, seen=s) for s in (False, True))
+    assert unseen.ci95 is None
+    assert "cannot be seen" in unseen.note
+    assert seen.ci95 == pytest.approx((1e-5 - 1.96 * 2e-5, 1e-5 + 1.96 * 2e-5), rel=1e-4)

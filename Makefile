@@ -4,11 +4,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: help install demo test check bench clean
+.PHONY: help install demo test wire check bench clean
 
 help:
 	@echo "make demo   records six voltages on the simulated rig, identifies the damper, writes the report"
 	@echo "make test   style, types, import contracts and the test suite"
+	@echo "make wire   the drivers against the simulated instruments over their real protocols"
 	@echo "make check  style, types and import contracts only"
 	@echo "make bench  the benchmarks, as ratios against baselines of the same run"
 
@@ -30,6 +31,9 @@ check: $(READY)
 
 test: check
 	$(BIN)/pytest -n 2
+
+wire: $(READY)
+	$(BIN)/pytest -n 2 -m wire
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks

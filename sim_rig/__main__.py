@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from sim_rig.commands import sim
 from sim_rig.errors import SimRigError
 from sim_rig.scenario import load_scenario, scenario_schema
 
@@ -38,6 +39,9 @@ def play(
     playing.write_channels(out, chosen, played)
     if truth is not None:
         playing.write_truth(truth, chosen, played)
+
+
+app.command("serve")(sim)
 
 
 @app.command()

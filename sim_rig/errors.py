@@ -3,7 +3,8 @@
 SimRigError
 ├── ScenarioError   a scenario cannot be read, or asks for what does not exist or lies out of bounds
 ├── CommandsError   the commands to play are no uniform record of displacement and drive
-└── PlantError      the specimen of the scenario has no finite motion under these commands
+├── PlantError      the specimen of the scenario has no finite motion under these commands
+└── WireError       a wire of the rig cannot be opened, or nobody can be told where it is
 
 ``exit_code`` tells the command line that the message is for a person and needs no traceback.
 """
@@ -25,3 +26,7 @@ class CommandsError(SimRigError):
 
 class PlantError(SimRigError):
     """The specimen of the scenario has no finite motion under these commands."""
+
+
+class WireError(SimRigError):
+    """A wire of the rig cannot be opened, or nobody can be told where it is."""

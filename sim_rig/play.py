@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sim_rig.channel import Drawn
 from sim_rig.compiled import Array
 from sim_rig.errors import CommandsError
 from sim_rig.plant import Plant, Truth, chunks, faded_in
 from sim_rig.scenario import Scenario
-from sim_rig.sensors import CHANNELS, Drawn, report, with_faults
+from sim_rig.sensors import CHANNELS, report, with_faults
 from sim_rig.settings import Sensor
 
 _CHUNK = 10_000

@@ -2,19 +2,25 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from sim_rig.channel import ChannelStream, FilterStream, View, at_instants, drawn_for
 from sim_rig.play import info, play
-from sim_rig.sensors import Source, at_instants, drawn_for, filtered, readings
+from sim_rig.sensors import readings
 from sim_rig.settings import Clock, Filter, Sensor
 
 TIME = np.arange(20_000) * 1e-3
 FINE = np.arange(160_000) / 8e3
 
 
-def report(sensor, values=None, seed=1, clock=None, **source):
-    """Readings of a channel that looks at ``values`` (nothing, if None)."""
+def channel(sensor, seed=1, clock=None, **view):
+    """A channel that looks at truth kept every eighth of a millisecond."""
     random = np.random.default_rng(seed)
-    truth = Source(np.zeros(len(FINE)) if values is None else values, 1 / 8e3, **source)
-    return readings(truth, TIME, sensor, drawn_for(sensor, clock or Clock(), random), random)
+    drawn = drawn_for(sensor, clock or Clock(), random)
+    return ChannelStream(View(1 / 8e3, **view), sensor.rate or 1e3, sensor, drawn, random)
+
+
+def report(sensor, values=None, **settings):
+    """Readings of a channel that looks at ``values`` (nothing, if None)."""
+    return readings(channel(sensor, **settings), np.zeros(len(FINE)) if values is None else values, TIME)
 
 
 def lag_of(values, frequency):
@@ -67,7 +73,7 @@ def test_zero_shift_and_clock_offset_are_drawn_with_the_stated_spread():
 @pytest.mark.parametrize(("order", "frequency"), [(2, 5.0), (2, 300.0), (4, 200.0)])
 def test_the_filter_is_the_analogue_butterworth_that_it_claims_to_be(order, frequency):
     wave = np.sin(2 * np.pi * frequency * FINE)
-    passed = filtered(wave, 1 / 8e3, Filter(order=order))[8000:]
+    passed = FilterStream(Filter(order=order), 1 / 8e3).take(wave)[8000:]
     analogue = signal.butter(order, 2 * np.pi * 300, analog=True)
     response = signal.freqs(*analogue, worN=[2 * np.pi * frequency])[1][0]
     expected = np.imag(response * np.exp(2j * np.pi * frequency * FINE[8000:]))
@@ -75,7 +81,7 @@ def test_the_filter_is_the_analogue_butterworth_that_it_claims_to_be(order, freq
 
 
 def test_a_filter_is_settled_at_the_first_value():
-    assert np.allclose(filtered(np.full(100, 16.0), 1 / 8e3, Filter()), 16.0)
+    assert np.allclose(FilterStream(Filter(), 1 / 8e3).take(np.full(100, 16.0)), 16.0)
 
 
 def test_filter_and_delay_add_up_to_the_lag_of_the_channel(sine):
@@ -120,7 +126,7 @@ def test_what_the_devices_claim_is_what_the_scenario_applies(varied):
 def test_the_default_rig_has_noise_of_a_decent_laboratory(varied, strokes):
     played = play(varied("default"), strokes)
     sensors = varied("default").sensors
-    fine = filtered(played.truth.force, 1 / 8e3, sensors.force.filter)
+    fine = FilterStream(sensors.force.filter, 1 / 8e3).take(played.truth.force)
     error = played.channels["force"] - at_instants(fine, 1 / 8e3, played.time - 2e-4)
     assert np.std(error) == pytest.approx(2.5, rel=0.15)
     assert np.mean(error) == pytest.approx(played.drawn["force"].zero, abs=0.2)
@@ -147,3 +153,30 @@ def test_a_stuck_channel_repeats_itself_and_a_cut_one_has_no_values(varied, stro
     assert np.all(channels["force"][1000:1100] == channels["force"][999])
     assert np.flatnonzero(np.isnan(channels["displacement"])).tolist() == list(range(2000, 2050))
     assert np.isfinite(channels["force"]).all()
+
+
+BUSY = Sensor(noise=2.0, slow_noise=1.0, filter=Filter(), delay=2e-4, jitter=1e-6, resolution=0.01, drift=0.1)
+
+
+@pytest.mark.parametrize("sensor", [BUSY, Sensor(), Sensor(rate=10.0, delay=0.1), Sensor(delay=1e-3, jitter=2e-5)])
+@pytest.mark.parametrize("held", [False, True])
+def test_readings_do_not_depend_on_how_the_truth_is_cut(sine, sensor, held):
+    clock = Clock(mapping_error=1e-5, wander=3e-6)
+    whole = channel(sensor, clock=clock, held=held)
+    whole.take(sine)
+    stamps, expected = whole.make(whole.ready())
+    cut, parts = channel(sensor, clock=clock, held=held), []
+    for piece in np.split(sine, np.sort(np.random.default_rng(5).integers(0, len(sine), 3000))):
+        cut.take(piece)
+        parts.append(cut.make(cut.ready()))
+    assert np.array_equal(np.concatenate([part[0] for part in parts]), stamps)
+    assert np.array_equal(np.concatenate([part[1] for part in parts]), expected)
+    assert len(expected) > 19.9 * (sensor.rate or 1e3)
+
+
+def test_a_channel_keeps_no_more_of_the_truth_than_it_needs(sine):
+    busy = channel(BUSY)
+    for piece in np.split(sine, 1000):
+        busy.take(piece)
+        busy.make(busy.ready())
+    assert len(busy._truth) < 200

@@ -1,0 +1,340 @@
+"""The servo actuator: a CiA 402 drive in cyclic synchronous position.
+
+Whoever leads the rod calls `command` every 4 ms: one setpoint, one SYNC, and, as long as the calls are on time,
+now and then the heartbeat by which the drive knows that it is led. The drive interpolates between setpoints
+(60C2h) and stops by itself when they are stale (event timer of its RPDO) or when the heartbeat goes (1016h,
+6007h): nothing here needs to be alive for that. Positions are in metres from the centre once a specimen is
+centred, from home before.
+"""
+
+import threading
+from pathlib import Path
+
+from drivers import cia402
+from drivers.actuator_samples import ActuatorSamples, Scale
+from drivers.can_bus import CanAddress, CanBus
+from drivers.canopen_node import CanopenNode
+from drivers.channel import Block, Channel, Reading
+from drivers.cia402 import DriveState, Fault, Mounting
+from drivers.errors import DriverError, OutOfRange, Refused
+from drivers.instrument import Clock, Health, Tap
+from drivers.servo_drive import COUNT, ActuatorSettings, ServoDrive
+
+_EDS = Path(__file__).parent / "wire" / "actuator.eds"
+_OBJECTS = {"actuator_position": 0x6064, "actuator_velocity": 0x606C, "actuator_torque": 0x6077}
+_USUAL = ActuatorSettings()
+
+
+class Actuator:
+    """The drive as an instrument of the bench.
+
+    Args:
+        name: in configuration, logs and messages.
+        address: of the CAN bus.
+        clock: of the bench [ns].
+        node_id: of the drive.
+        master_id: of the bench, for its heartbeat.
+        settings: limits and times.
+        clamped: whether a specimen is clamped already.
+        eds: data sheet of the drive.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        address: CanAddress,
+        clock: Clock,
+        *,
+        node_id: int = 5,
+        master_id: int = 127,
+        settings: ActuatorSettings = _USUAL,
+        clamped: bool = False,
+        eds: Path = _EDS,
+    ) -> None:
+        self.settings = settings
+        self._name = name
+        self._clock = clock
+        self._master_id = master_id
+        self._bus = CanBus(address, clock)
+        self._node = CanopenNode(name, self._bus, node_id, eds, clock, silent_after=settings.drive_silent_after)
+        self._drive = ServoDrive(name, self._node)
+        self._mounting = cia402.found(clamped, referenced=False)
+        self._clamped = clamped
+        self._origin = 0.0
+        self._samples = self.decoder(0.0, 1.0)
+        self._bus.listen(lambda frame: self._samples.take(frame))
+        self._leading = threading.RLock()
+        self._armed_ns: int | None = None
+        self._boots = 0
+        self._last_ns = self._beat_ns = 0
+        self._last = 0.0
+        self._words = ""
+
+    @property
+    def name(self) -> str:
+        """Name in configuration, logs and messages."""
+        return self._name
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Position, velocity and torque."""
+        low, high = (limit - self._origin for limit in self.settings.travel)
+        speed, torque = 4 * self.settings.top_speed, 4 * self._drive.rated_torque
+        return (
+            Channel("actuator_position", "m", low, high, "read_write", "rod position by the drive's encoder"),
+            Channel("actuator_velocity", "m/s", -speed, speed, "read", "rod velocity by the drive"),
+            Channel("actuator_torque", "N m", -torque, torque, "read", "torque of the motor"),
+        )
+
+    @property
+    def mounting(self) -> Mounting:
+        """What the rod carries, and whether it knows where it is."""
+        return self._mounting
+
+    @property
+    def origin(self) -> float:
+        """Drive position that counts as zero [m from home]."""
+        return self._origin
+
+    @property
+    def rated_torque(self) -> float:
+        """[N m] as the drive said."""
+        return self._drive.rated_torque
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """What the drive reported and has not taken back."""
+        return self._drive.faults
+
+    # Connection
+
+    def connect(self) -> None:
+        """Open the bus, check that the drive is the right one, set its limits, leave it without voltage."""
+        self._armed_ns, self._words = None, ""
+        self._bus.open()
+        try:
+            self._node.attach()
+            self._drive.set_up(self.settings)
+            referenced = self._drive.referenced()
+        except DriverError:
+            self._bus.close()
+            raise
+        self._boots = self._node.boots
+        if not referenced or self._mounting not in (Mounting.MOUNTED, Mounting.CENTRED):
+            self._mounting, self._origin = cia402.found(self._clamped, referenced), 0.0
+        self._samples = self.decoder(self._origin, self._drive.rated_torque)
+
+    def close(self) -> None:
+        """Bring the rod to rest and close the bus."""
+        if self._bus.is_open:
+            self.make_safe()
+        self._bus.close()
+
+    def health(self) -> Health:
+        """Counts of samples, and the state in words."""
+        samples = self._samples
+        corrupted = samples.corrupted + self._bus.corrupted
+        words = "; ".join(filter(None, [self._words, *map(str, self.faults)]))
+        return Health(self._bus.is_open, samples.received, samples.lost, corrupted, 0, samples.last_ns, words)
+
+    def listen(self, tap: Tap) -> None:
+        """Tell ``tap`` of every frame from now on."""
+        self._bus.listen(tap)
+
+    def acquire(self, timeout: float) -> list[Block]:
+        """Samples that came since the last call, waiting up to ``timeout`` [s] for the first.
+
+        Raises:
+            NotConnected: the bus has gone.
+            NoReply: the drive's heartbeat has.
+        """
+        blocks = self._samples.blocks(timeout)
+        if not blocks:
+            self._node.check_alive()
+        return blocks
+
+    def decoder(self, origin: float, rated_torque: float) -> ActuatorSamples:
+        """What turns frames into samples, for a replay, too; origin [m from home], rated torque [N m]."""
+        scale = Scale(COUNT, COUNT, rated_torque / 1000)
+        return ActuatorSamples(self._node.layouts, self._node.node_id, scale, origin, self.settings.cycle)
+
+    def read(self, channel: str) -> Reading:
+        """Ask the drive for one value.
+
+        Raises:
+            OutOfRange: there is no such channel.
+            NoReply, BadReply, Refused, NotConnected: as the case may be.
+        """
+        if channel not in _OBJECTS:
+            raise OutOfRange(f"{self._name}: no channel {channel}; there are {', '.join(_OBJECTS)}")
+        raw = self._node.number(_OBJECTS[channel])
+        value = raw * (self._drive.rated_torque / 1000 if channel == "actuator_torque" else COUNT)
+        zero = self._origin if channel == "actuator_position" else 0.0
+        return Reading(value - zero, self._clock(), None, raw, "good")
+
+    def write(self, channel: str, value: float) -> None:
+        """Set the position: one call of `command`."""
+        if channel != "actuator_position":
+            raise OutOfRange(f"{self._name}: {channel} cannot be written; nothing was sent")
+        self.command(value)
+
+    # Leading the rod
+
+    def arm(self) -> float:
+        """Switch the drive on where it stands; from now on `command` must be called in every cycle.
+
+        Returns:
+            Where the rod stands, and the first setpoint should be [m].
+
+        Raises:
+            Refused: a fault stands, the reference is lost, or the drive does not switch on.
+        """
+        if self._mounting in (Mounting.UNMOUNTED, Mounting.STRANDED):
+            way = "home it" if self._mounting is Mounting.UNMOUNTED else "unclamp the specimen, unmount and home"
+            raise Refused(f"{self._name}: the rod does not know where it is; {way} first")
+        self._drive.check_no_fault()
+        self._drive.lead_from_now(self._master_id, self.settings)
+        here = self.read("actuator_position").value
+        with self._leading:
+            self._armed_ns = self._last_ns = self._clock()
+            self._beat_ns, self._last = 0, here
+        return here
+
+    def command(self, position: float) -> None:
+        """One setpoint, to be called every cycle.
+
+        Args:
+            position: [m] from the centre, or from home before a specimen is centred.
+
+        Raises:
+            OutOfRange: outside the travel or too fast from the last one; nothing was sent.
+            Refused: not armed, or the drive has stopped by itself, with its reason.
+            NoReply, NotConnected: the drive or the bus has gone.
+        """
+        with self._leading:
+            now = self._clock()
+            self._check_led()
+            since = (now - self._last_ns) / 1e9
+            self._check_setpoint(position, since)
+            target = round((position + self._origin) / COUNT)
+            self._node.send_process_data({0x6040: cia402.ENABLE, 0x6060: cia402.CYCLIC_POSITION, 0x607A: target})
+            self._node.send_sync()
+            if since <= 2 * self.settings.cycle and now - self._beat_ns >= self.settings.master_beat * 1e9:
+                self._node.send_heartbeat(self._master_id)
+                self._beat_ns = now
+            self._last_ns, self._last = now, position
+
+    def sample(self) -> None:
+        """Ask for one sample without moving anything: a SYNC alone."""
+        self._node.send_sync()
+
+    def rest(self) -> None:
+        """End leading the rod in good order, where it stands: no voltage."""
+        self._disarm()
+        self._drive.switch_off()
+
+    def make_safe(self) -> None:
+        """Quick stop by the drive's own ramp, watched until the rod stands or the deadline is over."""
+        self._disarm()
+        try:
+            self._drive.stop(self.settings.stop_within)
+            self._words = ""
+        except DriverError as error:
+            self._words = f"quick stop not confirmed: {error}"
+
+    def reset(self) -> None:
+        """Take back the faults; the drive is left without voltage and nothing moves.
+
+        Raises:
+            NoReply: a fault stays.
+        """
+        self._disarm()
+        self._drive.reset()
+        self._words = ""
+
+    # Home, specimen, centre
+
+    def home(self, within: float = 30.0, method: int = 17) -> None:
+        """Seek the reference; never with a specimen clamped.
+
+        Args:
+            within: deadline [s].
+            method: of 6098h; 17 seeks the negative limit switch, 37 takes the present position.
+
+        Raises:
+            Refused: a specimen is clamped, or a fault stands.
+            NoReply: the reference was not found in time.
+        """
+        after = cia402.step(self._mounting, "home")
+        self._drive.check_no_fault()
+        self._disarm()
+        try:
+            self._drive.home(method, within)
+        except DriverError:
+            self.make_safe()
+            raise
+        self._set_origin(0.0)
+        self._mounting = after
+
+    def mount(self) -> None:
+        """Take note that a specimen has been clamped."""
+        self._mounting = cia402.step(self._mounting, "mount")
+        self._clamped = True
+
+    def centre(self) -> None:
+        """Count positions from where the rod now stands: the middle of the specimen."""
+        after = cia402.step(self._mounting, "centre")
+        self._check_not_led("centre")
+        self._set_origin(self.read("actuator_position").value + self._origin)
+        self._mounting = after
+
+    def unmount(self) -> None:
+        """Take note that nothing is clamped any more; positions count from home again."""
+        self._check_not_led("unmount")
+        self._mounting = cia402.step(self._mounting, "unmount")
+        self._clamped = False
+        self._set_origin(0.0)
+
+    def _set_origin(self, origin: float) -> None:
+        self._origin = self._samples.origin = origin
+
+    def _disarm(self) -> None:
+        with self._leading:
+            self._armed_ns = None
+
+    def _check_not_led(self, verb: str) -> None:
+        if self._armed_ns is not None:
+            raise Refused(f"{self._name}: cannot {verb} while the rod is led; call rest first")
+
+    def _check_led(self) -> None:
+        """See that the drive still does what it is told."""
+        if self._armed_ns is None:
+            raise Refused(f"{self._name}: not armed; call arm first")
+        self._node.check_alive()
+        why = self._stopped(self._armed_ns)
+        if why:
+            self._armed_ns = None
+            raise Refused(f"{self._name}: the drive has stopped by itself: {why}; find the cause, then reset")
+
+    def _stopped(self, armed_ns: int) -> str:
+        """Why the drive no longer follows, empty if it does."""
+        if self._node.boots != self._boots:
+            return "it has restarted (connect again)"
+        if self.faults:
+            return "; ".join(map(str, self.faults))
+        samples = self._samples
+        if samples.last_ns is None or samples.last_ns < armed_ns or samples.statusword is None:
+            return ""
+        state = cia402.drive_state(samples.statusword)
+        return "" if state is DriveState.ENABLED else state.value
+
+    def _check_setpoint(self, position: float, since: float) -> None:
+        """See that a setpoint lies within the travel and can be reached."""
+        self.channels[0].checked(position)
+        time = max(min(since, self.settings.stale_after), self.settings.cycle)
+        speed = abs(position - self._last) / time
+        if speed > self.settings.top_speed:
+            raise OutOfRange(
+                f"{self._name}: {position:.6g} m is {speed:.3g} m/s from the last setpoint, "
+                f"{self.settings.top_speed:g} m/s are allowed; nothing was sent"
+            )

@@ -1,0 +1,225 @@
+"""From frames to samples: what the drive sent in answer to each SYNC.
+
+Works on recorded frames as on live ones, so that a replay gives the same samples. The frames of one SYNC come in
+the order of their identifiers; a sample is used only when all of them are there. Each SYNC asks for one sample: as
+many as stay unanswered for a while, beyond what the drive's clock shows to be merely late, are lost, and the
+running number leaps over them.
+"""
+
+import threading
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from drivers.can_bus import unpack_frame
+from drivers.canopen_node import PdoLayout
+from drivers.channel import Block, Frame
+
+STATUSWORD, POSITION, VELOCITY, TORQUE, TIME_STAMP = 0x6041, 0x6064, 0x606C, 0x6077, 0x1013
+_PATIENCE_NS = 100_000_000
+"""A SYNC unanswered for this long never will be."""
+_REMEMBERED = 256
+"""SYNCs"""
+_DRIFT = 1e-4
+"""Share by which the drive's clock may be slow without looking late."""
+_WRAP = 1 << 32
+_MICROSECOND = 1000
+
+
+class Scale(NamedTuple):
+    """What one count of each object is."""
+
+    position: float
+    """[m]"""
+    velocity: float
+    """[m/s]"""
+    torque: float
+    """[N m]"""
+
+
+class _Answers:
+    """How many SYNCs are unanswered, and how many of them for good."""
+
+    def __init__(self, cycle: float) -> None:
+        self._slack = cycle / 2 * 1e9
+        self.lost = 0
+        self.waiting = 0
+        self._least = 0
+        self._window_ns = 0
+        self._syncs: deque[int] = deque(maxlen=_REMEMBERED)
+        self._soonest: float | None = None
+        self._last_ns: int | None = None
+
+    def asked(self, now_ns: int) -> int:
+        """One more sample is to come; how many older ones are lost, as just found."""
+        gone = self._settle(now_ns)
+        self.waiting += 1
+        self._syncs.append(now_ns)
+        return gone
+
+    def answered(self, device_ns: int | None, now_ns: int) -> int:
+        """A sample came; how many others are lost, as just found."""
+        self.waiting -= 1
+        on_their_way = 0 if device_ns is None else self._on_their_way(device_ns, now_ns)
+        self._least = min(self._least, max(self.waiting - on_their_way, 0))
+        return self._settle(now_ns)
+
+    def restarted(self) -> None:
+        """The drive's clock begins anew."""
+        self._soonest = self._last_ns = None
+
+    def _settle(self, now_ns: int) -> int:
+        """What stayed unanswered throughout a while is lost."""
+        if now_ns - self._window_ns < _PATIENCE_NS:
+            return 0
+        gone = self._least
+        self.lost += gone
+        self.waiting -= gone
+        self._least, self._window_ns = self.waiting, now_ns
+        return gone
+
+    def _on_their_way(self, device_ns: int, now_ns: int) -> int:
+        """SYNCs whose samples may still be coming, judged by how late this one is."""
+        transit = float(now_ns - device_ns)
+        if self._soonest is None or self._last_ns is None:
+            self._soonest = transit
+        else:
+            self._soonest = min(transit, self._soonest + _DRIFT * (now_ns - self._last_ns))
+        self._last_ns = now_ns
+        # The drive's stamp may be somewhat older than the SYNC that it answers.
+        asked_since = now_ns - (transit - self._soonest) + self._slack
+        return sum(sync > asked_since for sync in self._syncs)
+
+
+class _Sample(NamedTuple):
+    number: int
+    device_ns: int | None
+    received_ns: int
+    raw: dict[int, int]
+
+
+class ActuatorSamples:
+    """Collects the samples of one drive.
+
+    Args:
+        layouts: the frames that it sends.
+        node_id: on the bus.
+        scale: of its counts.
+        origin: [m] drive position that counts as zero.
+        cycle: [s] between SYNCs.
+    """
+
+    def __init__(
+        self, layouts: tuple[PdoLayout, ...], node_id: int, scale: Scale, origin: float = 0.0, cycle: float = 0.004
+    ) -> None:
+        self.received = self.corrupted = 0
+        self.last_ns: int | None = None
+        """Bench clock of the last sample [ns]."""
+        self.statusword: int | None = None
+        """Of the last sample."""
+        self.origin = origin
+        self._layouts = {layout.identifier: layout for layout in layouts if layout.on_sync}
+        self._order = sorted(self._layouts)
+        self._boot = 0x700 + node_id
+        self._scale = scale
+        self._parts: dict[int, int] = {}
+        self._due = 0
+        self._number = 0
+        self._answers = _Answers(cycle)
+        self._clock: tuple[int, int] | None = None
+        self._batches: list[list[_Sample]] = []
+        self._ready = threading.Condition()
+
+    @property
+    def lost(self) -> int:
+        """Samples that were asked for and never came whole."""
+        return self._answers.lost
+
+    def take(self, frame: Frame) -> None:
+        """A frame has passed, sent or received."""
+        identifier, data = unpack_frame(frame.data)
+        with self._ready:
+            if identifier == 0x80:
+                self._number += self._answers.asked(frame.received_ns)
+            elif identifier in self._layouts and not frame.sent:
+                self._part(identifier, data, frame.received_ns)
+            elif identifier == self._boot and data == b"\x00":
+                self._clock = None
+                self._answers.restarted()
+
+    def blocks(self, timeout: float = 0.0) -> list[Block]:
+        """The samples since the last call, waiting up to ``timeout`` [s] for the first."""
+        with self._ready:
+            self._ready.wait_for(lambda: bool(self._batches), timeout)
+            batches, self._batches = self._batches, []
+        return [block for batch in batches for block in self._blocks_of(batch)]
+
+    def _part(self, identifier: int, data: bytes, now_ns: int) -> None:
+        """One of the frames that make a sample; out of turn, it belongs to none."""
+        layout = self._layouts[identifier]
+        if identifier == self._order[0]:
+            self._due, self._parts = 0, {}
+        whole = len(data) == layout.size
+        self.corrupted += not whole
+        if not whole or identifier != self._order[self._due]:
+            self._due, self._parts = 0, {}
+            return
+        for field in layout.fields:
+            part = data[field.start : field.start + field.size]
+            self._parts[field.entry] = int.from_bytes(part, "little", signed=field.signed)
+        self._due += 1
+        if self._due == len(self._order):
+            self._due, raw, self._parts = 0, self._parts, {}
+            self._complete(raw, now_ns)
+
+    def _complete(self, raw: dict[int, int], now_ns: int) -> None:
+        """All frames are there; a sample that was given up, or is older than the last, is not used."""
+        if self._answers.waiting == 0 or not self._advance_clock(raw.get(TIME_STAMP)):
+            return
+        self.statusword, self.last_ns = raw.get(STATUSWORD), now_ns
+        device_ns = self._clock[1] * _MICROSECOND if self._clock is not None else None
+        self._keep(_Sample(self._number, device_ns, now_ns, raw))
+        self.received += 1
+        self._number += 1 + self._answers.answered(device_ns, now_ns)
+        self._ready.notify_all()
+
+    def _advance_clock(self, stamp: int | None) -> bool:
+        """Undo the wrapping of the drive's clock; false if it went backwards."""
+        if stamp is None:
+            return True
+        last, total = self._clock if self._clock is not None else (stamp, stamp)
+        step = (stamp - last) % _WRAP
+        if step > _WRAP // 2:
+            return False
+        self._clock = stamp, total + step
+        return True
+
+    def _keep(self, sample: _Sample) -> None:
+        """A batch has no gaps."""
+        last = self._batches[-1][-1] if self._batches else None
+        if last is not None and last.number == sample.number - 1:
+            self._batches[-1].append(sample)
+        else:
+            self._batches.append([sample])
+
+    def _blocks_of(self, batch: list[_Sample]) -> list[Block]:
+        scale = self._scale
+        return [
+            self._block("actuator_position", POSITION, scale.position, self.origin, batch),
+            self._block("actuator_velocity", VELOCITY, scale.velocity, 0.0, batch),
+            self._block("actuator_torque", TORQUE, scale.torque, 0.0, batch),
+        ]
+
+    def _block(self, channel: str, index: int, count: float, zero: float, batch: list[_Sample]) -> Block:
+        raw = np.array([sample.raw[index] for sample in batch], dtype=np.float64)
+        stamped = [sample.device_ns for sample in batch if sample.device_ns is not None]
+        return Block(
+            channel=channel,
+            first=batch[0].number,
+            device_ns=np.array(stamped, dtype=np.int64) if stamped else None,
+            received_ns=batch[-1].received_ns,
+            values=raw * count - zero,
+            raw=raw,
+            quality="good" if stamped else "uncertain",
+        )

@@ -1,0 +1,247 @@
+"""One CAN bus: opened, listened to, and known to be dead when it is.
+
+python-can does the talking: `socketcan` on real hardware, its own `socketcand` client over TCP, `virtual` inside
+one process. What it leaves open is closed here: its notifier thread dies of any error in silence, so the receiving
+thread is ours and says why it ended; its socketcand client neither limits the greeting nor sees that the server
+has hung up. Every frame is stamped on the bench clock and shown to the tap before anybody acts on it.
+"""
+
+import contextlib
+import os
+import select
+import socket
+import struct
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import can
+from can.interfaces.socketcand import SocketCanDaemonBus
+
+from drivers.channel import Frame
+from drivers.errors import DriverError, NotConnected
+from drivers.instrument import Clock, Tap
+
+Heard = Callable[[int, int, bytes], None]
+"""Told of each received frame: bench clock [ns], identifier, data."""
+
+_FRAME = struct.Struct("<IB3x8s")
+_TURN = 0.1
+"""[s] the receiving thread waits before it looks whether it is still wanted."""
+_ATTEMPTS = 3
+"""A greeting may be spoilt by a frame that follows it too closely."""
+
+
+@dataclass(frozen=True)
+class CanAddress:
+    """Where a bus is found."""
+
+    interface: Literal["socketcan", "socketcand", "virtual"]
+    channel: str = "can0"
+    """Name of the bus."""
+    host: str = "127.0.0.1"
+    """Of a socketcand server."""
+    port: int = 29536
+    """Of a socketcand server."""
+
+    def __str__(self) -> str:
+        where = f" at {self.host}:{self.port}" if self.interface == "socketcand" else ""
+        return f"CAN bus {self.channel} ({self.interface}{where})"
+
+
+def pack_frame(identifier: int, data: bytes) -> bytes:
+    """A frame as Linux writes it: identifier, length, eight bytes."""
+    return _FRAME.pack(identifier, len(data), data)
+
+
+def unpack_frame(packed: bytes) -> tuple[int, bytes]:
+    """Identifier and data of a packed frame."""
+    identifier, size, data = _FRAME.unpack(packed)
+    return int(identifier), bytes(data[:size])
+
+
+class _SocketcandBus(SocketCanDaemonBus):
+    """python-can's client with a deadline for the greeting and an eye on the other end."""
+
+    def __init__(self, address: CanAddress, timeout: float) -> None:
+        # A refused connection would be tried again in a busy loop for ten seconds.
+        socket.create_connection((address.host, address.port), timeout).close()
+        hang_up = threading.Timer(timeout, self._hang_up)
+        hang_up.start()
+        try:
+            client: Any = super()
+            client.__init__(address.channel, address.host, address.port, tcp_tune=os.name == "posix")
+        except BaseException:
+            self._line().close()
+            raise
+        finally:
+            hang_up.cancel()
+        self._line().settimeout(timeout)
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        client: Any = super()
+        message, filtered = client._recv_internal(timeout)  # noqa: SLF001 - the one place where its bus can be seen
+        if message is None and self._hung_up():
+            raise can.CanOperationError("the server has closed the connection")
+        return message, filtered
+
+    def _hung_up(self) -> bool:
+        """Whether the other end is gone: readable, and nothing to read."""
+        line = self._line()
+        return bool(select.select([line], [], [], 0)[0]) and not line.recv(1, socket.MSG_PEEK)
+
+    def _hang_up(self) -> None:
+        with contextlib.suppress(OSError, KeyError):
+            self._line().shutdown(socket.SHUT_RDWR)
+
+    def _line(self) -> socket.socket:
+        # The library keeps its socket to itself, and without it neither deadline nor hang-up can be had.
+        line = self.__dict__["_SocketCanDaemonBus__socket"]
+        assert isinstance(line, socket.socket)  # noqa: S101 - for the type checker
+        return line
+
+
+class CanBus:
+    """An open bus and the thread that listens to it.
+
+    Args:
+        address: where it is.
+        clock: of the bench [ns].
+        timeout: for opening and for a send that does not get away [s].
+    """
+
+    def __init__(self, address: CanAddress, clock: Clock, timeout: float = 2.0) -> None:
+        self.received = 0
+        """Frames taken since it was opened."""
+        self.corrupted = 0
+        """Frames that were errors, or that nobody could read."""
+        self._address = address
+        self._clock = clock
+        self._timeout = timeout
+        self._bus: can.BusABC | None = None
+        self._thread: threading.Thread | None = None
+        self._ended: Exception | None = None
+        self._heard: list[Heard] = []
+        self._taps: list[Tap] = []
+        self._order, self._sending = threading.Lock(), threading.Lock()
+
+    def __str__(self) -> str:
+        return str(self._address)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether frames can pass."""
+        return self._bus is not None and self._ended is None
+
+    def open(self) -> None:
+        """Open the bus and begin to listen.
+
+        Raises:
+            NotConnected: there is no such bus, nobody serves it, or the greeting fails.
+        """
+        self.close()
+        self._bus, self._ended = self._opened(), None
+        self.received = self.corrupted = 0
+        self._thread = threading.Thread(target=self._listen, args=(self._bus,), name=str(self), daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Stop listening and close; harmless when repeated."""
+        bus, self._bus = self._bus, None
+        if self._thread is not None:
+            self._thread.join(self._timeout)
+            self._thread = None
+        if bus is not None:
+            bus.shutdown()
+
+    def check(self) -> None:
+        """See whether the bus is still there.
+
+        Raises:
+            NotConnected: it was never opened, or it has gone.
+        """
+        if self._bus is None:
+            raise NotConnected(f"{self}: not open; connect first")
+        if self._ended is not None:
+            raise NotConnected(f"{self}: gone: {self._ended}; connect again") from self._ended
+
+    def send(self, identifier: int, data: bytes) -> None:
+        """Put a frame on the bus.
+
+        Raises:
+            NotConnected: the bus has gone.
+        """
+        self.check()
+        message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+        with self._sending:
+            with self._order:
+                self._show(self._clock(), True, identifier, data)
+            try:
+                bus = self._bus
+                if bus is not None:
+                    bus.send(message, self._timeout)
+            except (can.CanError, OSError) as error:
+                self._ended = error
+        self.check()
+
+    def subscribe(self, heard: Heard) -> None:
+        """Tell ``heard`` of every frame received, on the receiving thread."""
+        self._heard.append(heard)
+
+    def unsubscribe(self, heard: Heard) -> None:
+        """Tell it no more."""
+        self._heard = [other for other in self._heard if other != heard]
+
+    def listen(self, tap: Tap) -> None:
+        """Show ``tap`` every frame, sent and received, in the order of their stamps."""
+        self._taps.append(tap)
+
+    def _opened(self) -> can.BusABC:
+        error: Exception | None = None
+        for _ in range(_ATTEMPTS):
+            try:
+                return self._attempt()
+            except TimeoutError as timeout:
+                error = timeout
+                break
+            except (can.CanError, OSError, ImportError, ValueError) as failed:
+                error = failed
+        raise NotConnected(
+            f"{self}: cannot be opened within {self._timeout:g} s: {error}; "
+            "see that it is up and that its name is right"
+        ) from error
+
+    def _attempt(self) -> can.BusABC:
+        if self._address.interface == "socketcand":
+            return _SocketcandBus(self._address, self._timeout)
+        options: dict[str, Any] = {"interface": self._address.interface, "channel": self._address.channel}
+        return can.Bus(**options)
+
+    def _listen(self, bus: can.BusABC) -> None:
+        try:
+            while self._bus is bus and self._ended is None:
+                message = bus.recv(_TURN)
+                if message is not None:
+                    self._take(message)
+        except Exception as error:
+            # Whatever it was, nothing is heard any more: `check` tells.
+            self._ended = error
+
+    def _take(self, message: can.Message) -> None:
+        if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
+            self.corrupted += message.is_error_frame
+            return
+        with self._order:
+            now = self._clock()
+            self.received += 1
+            self._show(now, False, message.arbitration_id, bytes(message.data))
+        for heard in self._heard:
+            try:
+                heard(now, message.arbitration_id, bytes(message.data))
+            except (DriverError, ValueError, IndexError, struct.error):
+                self.corrupted += 1
+
+    def _show(self, now: int, sent: bool, identifier: int, data: bytes) -> None:
+        for tap in self._taps:
+            tap(Frame(now, sent, pack_frame(identifier, data)))

@@ -1,0 +1,305 @@
+"""Coil amplifier over Modbus: what drives the damper's coil, and what it measures there.
+
+The output goes to its setpoint by a ramp. Steps that must be exact are not sent one by one, since a polled bus is
+as late as the coil itself is slow: a table of times and levels is uploaded, read back, armed, and run by the
+amplifier's own clock from its trigger on. The amplifier watches its wire: when nobody has spoken for a while it
+ramps its output to zero by itself. `make_safe` is the faster way there, never the only one.
+"""
+
+import time
+from dataclasses import replace
+from enum import IntEnum, IntFlag
+from typing import Literal, NamedTuple
+
+from drivers.channel import Block, Channel, Numbers, Reading
+from drivers.coil_table import StepTable, TableProgress
+from drivers.errors import DriverError, OutOfRange, Refused
+from drivers.instrument import Clock, Health, Tap
+from drivers.modbus_address import ModbusAddress
+from drivers.modbus_ring import Stamp
+from drivers.modbus_sampler import Sampler
+
+Mode = Literal["voltage", "current"]
+_LONGEST_RAMP = 3.0
+"""[s] that connecting waits for an output that another host has left on."""
+DRIVE_UNITS: dict[Mode, str] = {"voltage": "V", "current": "A"}
+
+
+class CoilMode(IntEnum):
+    """What the amplifier holds at its setpoint."""
+
+    OFF = 0
+    VOLTAGE = 1
+    CURRENT = 2
+
+
+class CoilFault(IntFlag):
+    """What has taken the output to zero; it stays there until it is reset."""
+
+    NONE = 0
+    OVER_TEMPERATURE = 1
+    OPEN_COIL = 2
+    OVER_CURRENT = 4
+
+
+class CoilState(IntFlag):
+    """What the amplifier is doing."""
+
+    IDLE = 0
+    OUTPUT_ON = 1
+    RAMPING = 2
+    WATCHDOG_TRIPPED = 4
+
+
+class Condition(NamedTuple):
+    """All that the amplifier says of itself."""
+
+    fault: CoilFault
+    state: CoilState
+    output: float
+    """What the output is set to at this moment, ramp and table included [V or A]."""
+
+    @property
+    def words(self) -> str:
+        """For a person; empty where all is well."""
+        names = [fault.name or "" for fault in self.fault]
+        if self.state & CoilState.WATCHDOG_TRIPPED:
+            names.append("watchdog tripped: nobody spoke for too long")
+        return ", ".join(name.lower().replace("_", " ") for name in names)
+
+
+class CoilAmplifier:
+    """One amplifier on its wire."""
+
+    def __init__(
+        self,
+        name: str,
+        address: ModbusAddress,
+        clock: Clock,
+        *,
+        mode: Mode = "voltage",
+        ramp: float = 100.0,
+        watchdog: float = 0.5,
+        unit: int | None = None,
+        timeout: float = 0.2,
+    ) -> None:
+        """Prepare; nothing is opened yet.
+
+        Args:
+            name: in configuration, logs and messages.
+            address: of its wire; a baud rate that is left out is that of its wire file.
+            clock: the bench clock.
+            mode: whether it holds voltage or current; the drive is in V or in A accordingly.
+            ramp: [V/s or A/s] towards a new setpoint and, when nobody speaks, to zero.
+            watchdog: [s] of silence after which it ramps to zero, 0.05 to 10.
+            unit: its Modbus number; its wire file's if none.
+            timeout: [s] of silence after which a request has failed.
+
+        Raises:
+            OutOfRange: the serial line does not carry its samples, or a setting is out of its range.
+        """
+        self._sampler = Sampler(name, "coil_amplifier", address, clock, unit, timeout)
+        registers = self._sampler.registers.map.registers
+        self._mode: Mode = mode
+        self._settings = {
+            "ramp": registers["ramp"].channel().checked(ramp),
+            "watchdog": registers["watchdog"].channel().checked(watchdog),
+        }
+        limit = float(self._sampler.registers.map.document["limits"][mode])
+        drive = replace(registers["setpoint"], low=-limit, high=limit).channel()
+        self._drive = replace(drive, name="coil_drive", unit=DRIVE_UNITS[mode])
+        self._table = StepTable(self._sampler.registers, self._drive)
+
+    @property
+    def name(self) -> str:
+        """Name in configuration, logs and messages."""
+        return self._sampler.line.name
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Voltage and current as measured, and the drive that is asked for."""
+        return (*self._sampler.channels(), self._drive)
+
+    @property
+    def stamp(self) -> Stamp | None:
+        """Its clock beside the bench's, from the newest block."""
+        return self._sampler.ring.stamp
+
+    @property
+    def faults(self) -> CoilFault:
+        """Its faults, from the newest block; `condition` asks anew."""
+        return CoilFault(self._sampler.ring.status & 0xFF)
+
+    @property
+    def state(self) -> CoilState:
+        """What it is doing, from the newest block; `condition` asks anew."""
+        return CoilState(self._sampler.ring.status >> 8)
+
+    def connect(self) -> None:
+        """Open the wire, check who answers, bring the output to zero, set mode, ramp and watchdog.
+
+        Raises:
+            NotConnected: the wire cannot be opened.
+            NoReply, BadReply: it opens, but no coil amplifier answers.
+            Refused: it is in a fault that does not go away, or does not take a setting.
+        """
+        self._sampler.connect()
+        try:
+            self._configure()
+        except DriverError:
+            self._sampler.line.close()
+            raise
+
+    def close(self) -> None:
+        """Bring the output to zero where that can still be done, and close the wire."""
+        if self._sampler.line.connected:
+            self.make_safe()
+        self._sampler.line.close()
+
+    def acquire(self, timeout: float) -> list[Block]:
+        """Samples of voltage and current since the last call, waiting up to ``timeout`` [s] for the first.
+
+        Raises:
+            NotConnected: the wire has gone, or the amplifier has restarted.
+        """
+        return self._sampler.ring.acquire(timeout)
+
+    def age(self) -> float | None:
+        """[s] since the newest sample that came was made; none before the first."""
+        return self._sampler.ring.age()
+
+    def read(self, channel: str) -> Reading:
+        """The newest measured sample, or for ``coil_drive`` what the output is set to at this moment.
+
+        Raises:
+            OutOfRange: it has no such channel.
+            NotConnected, NoReply, BadReply, Refused: it did not come.
+        """
+        if channel != self._drive.name:
+            return self._sampler.read(channel)
+        found, answer = self._sampler.registers.read_together("output")
+        value, raw = found["output"]
+        return Reading(value, answer.received_ns, None, raw, "good")
+
+    def write(self, channel: str, value: float) -> None:
+        """Set the drive; the output goes there by the ramp.
+
+        Raises:
+            OutOfRange: it is too large, or is not the drive; nothing was sent.
+            NotConnected, NoReply, BadReply: not confirmed.
+            Refused: a fault, the watchdog or a running table forbids it; the message says which.
+        """
+        if channel != self._drive.name:
+            raise OutOfRange(f"{self.name}: {channel} is measured and cannot be set; coil_drive can")
+        try:
+            self._sampler.registers.write("setpoint", self._drive.checked(value))
+        except Refused as error:
+            words = self.condition().words or f"its table is {self._table.progress().state.name.lower()}"
+            raise Refused(f"{error}; {words}; reset it, or abort the table") from error
+
+    def condition(self) -> Condition:
+        """Faults, state and output, asked for now.
+
+        Raises:
+            NotConnected, NoReply, BadReply, Refused: they did not come.
+        """
+        found, _ = self._sampler.registers.read_together("fault", "state", "output")
+        return Condition(CoilFault(found["fault"].raw), CoilState(found["state"].raw), found["output"].value)
+
+    def reset(self) -> None:
+        """Clear the tripped watchdog, and faults whose cause has gone; the output stays at zero.
+
+        Raises:
+            NotConnected, NoReply, BadReply: not confirmed.
+            Refused: a fault is still there.
+        """
+        self._sampler.registers.write("reset", 1)
+        if words := self.condition().words:
+            raise Refused(f"{self.name}: after a reset still: {words}; find the cause")
+
+    def upload(self, times: Numbers, levels: Numbers) -> None:
+        """Bring steps into its table and read them back; nothing moves yet.
+
+        Args:
+            times: (steps,) [s] after the trigger, from 0 or later, rising.
+            levels: (steps,) of the drive [V or A], each from its time on; the last one stays.
+
+        Raises:
+            OutOfRange: too many, not rising, or a level too large; nothing was sent.
+            NotConnected, NoReply, Refused: not confirmed.
+            BadReply: something else stands in the table.
+        """
+        self._table.upload(times, levels)
+
+    def arm(self) -> None:
+        """Let the table start with the next trigger (the SYNC input).
+
+        Raises:
+            NotConnected, NoReply, BadReply, Refused: it is not armed.
+        """
+        self._table.command("arm")
+
+    def start_table(self) -> None:
+        """Start the armed table now, for benches whose amplifier sees no SYNC.
+
+        Raises:
+            NotConnected, NoReply, BadReply, Refused: it may not have started; `table` says.
+        """
+        self._table.command("start")
+
+    def abort_table(self) -> None:
+        """Stop the table; the output stays where it is.
+
+        Raises:
+            NotConnected, NoReply, BadReply, Refused: not confirmed.
+        """
+        self._table.command("abort")
+
+    def table(self) -> TableProgress:
+        """How far the table is, asked for now.
+
+        Raises:
+            NotConnected, NoReply, BadReply, Refused: it did not say.
+        """
+        return self._table.progress(self._sampler.ring.device_ns)
+
+    def make_safe(self) -> None:
+        """Bring the output to zero by its ramp; where the wire is dead, the amplifier's watchdog does it."""
+        for _ in range(2):
+            try:
+                self._table.command("abort")
+                self._sampler.registers.write("setpoint", 0.0)
+            except DriverError:  # refused in a fault or after its watchdog: it is at zero or on its way
+                continue
+            return
+
+    def health(self) -> Health:
+        """Counts and state, faults included."""
+        health = self._sampler.ring.health()
+        return replace(health, words=health.words or Condition(self.faults, self.state, 0.0).words)
+
+    def listen(self, tap: Tap) -> None:
+        """Tell ``tap`` of every frame from now on."""
+        self._sampler.line.listen(tap)
+
+    def _wait_for_zero(self) -> None:
+        deadline = time.monotonic() + _LONGEST_RAMP
+        while (output := self.condition().output) != 0.0:
+            if time.monotonic() > deadline:
+                raise Refused(
+                    f"{self.name}: the output is still at {output:.4g} {self._drive.unit} after "
+                    f"{_LONGEST_RAMP:.0f} s of waiting for zero; set a steeper ramp"
+                )
+            time.sleep(0.01)
+
+    def _configure(self) -> None:
+        registers = self._sampler.registers
+        registers.write("table_command", registers.map.document["codes"]["table_command"]["abort"])
+        self.reset()
+        registers.write("setpoint", 0.0)
+        self._wait_for_zero()
+        for name, value in self._settings.items():
+            registers.write(name, value)
+        mode = CoilMode[self._mode.upper()]
+        if registers.read("mode").raw != mode:
+            registers.write("mode", mode)

@@ -1,0 +1,288 @@
+"""Load cell: a serial stream of framed samples at up to 1 kHz, tared in the instrument, both readings kept.
+
+``force`` is what the instrument shows after its tare, ``force_raw`` what the cell carries: taring with the damper
+mounted takes its preload out of ``force``, and only ``force_raw`` still knows it.
+
+Two threads may use it: one calls `LoadCell.acquire` again and again, another asks (tare, rate). Whoever reads the
+line feeds the one stream; samples that come while an answer is awaited are kept for the next `acquire`.
+"""
+
+import contextlib
+import itertools
+import threading
+import time
+from typing import Final
+
+from drivers.channel import Block, Channel, Reading
+from drivers.errors import BadReply, DriverError, NoReply, OutOfRange, Refused
+from drivers.instrument import Clock, Health, Tap
+from drivers.load_cell_frames import CONTRACT, Acknowledgement, Answer, Identity, Request, encode
+from drivers.load_cell_stream import Counts, SampleStream
+from drivers.serial_line import SerialLine
+
+_COMMANDS: Final[dict[str, int]] = CONTRACT["commands"]
+_STATUS: Final[dict[str, int]] = CONTRACT["status"]
+_INSTRUMENT = CONTRACT["instrument"]
+_DEADLINES = CONTRACT["deadlines"]
+_CODES = {code: name.replace("_", " ") for name, code in CONTRACT["codes"].items()}
+_HINTS = {
+    "tare": "; the reading must be steady and in range: hold the actuator still",
+    "set_rate": "; stop the stream first",
+}
+_SLICE = 0.01
+"""[s] that one thread waits before it looks whether the other has read its answer."""
+
+
+class LoadCell:
+    """A load cell on its serial line."""
+
+    def __init__(self, name: str, port: str, clock: Clock, *, rate: int = 1000, baud: int | None = None) -> None:
+        """A load cell that is not connected yet.
+
+        Args:
+            name: in configuration, logs and messages.
+            port: ``/dev/tty*``, ``socket://host:port`` or ``rfc2217://host:port``.
+            clock: the bench clock [ns].
+            rate: samples a second [Hz], one of those that the instrument offers.
+            baud: [bit/s]; that of the contract if none.
+
+        Raises:
+            OutOfRange: the instrument does not offer this rate.
+        """
+        full_scale: float = _INSTRUMENT["full_scale_n"]
+        self.name: Final = name
+        self.channels: Final = (
+            Channel(
+                "force", "N", -2 * full_scale, 2 * full_scale, "read", "axial force as tared in the instrument"
+            ),
+            Channel("force_raw", "N", -full_scale, full_scale, "read", "axial force, never tared"),
+        )
+        self._clock = clock
+        self._rate = self._offered(rate)
+        self._line = SerialLine(name, port, baud or CONTRACT["line"]["baud"], clock, _DEADLINES["write_s"])
+        self._stream = SampleStream()
+        self._before = Counts()
+        self._pending: list[Block] = []
+        self._newest: dict[str, Block] = {}
+        self._tokens = itertools.count()
+        self._reading = threading.RLock()
+        self._asking = threading.Lock()
+
+    def connect(self) -> None:
+        """Open the line, check that a load cell of this calibration answers, and start its stream.
+
+        Raises:
+            NotConnected: the line cannot be opened.
+            NoReply, BadReply, Refused: it opens, but no such load cell answers.
+        """
+        self._line.open()
+        try:
+            self.stop()
+            self._identify()
+            self._set_rate(self._rate)
+            with self._reading:
+                self._pending = []
+                self._before = self._stream.counts()
+            self.start()
+        except DriverError:
+            self._line.close()
+            raise
+
+    def close(self) -> None:
+        """Stop the stream and close the line; harmless when repeated or when never connected."""
+        if self._line.is_open:
+            with contextlib.suppress(DriverError):
+                self.stop()
+        with self._reading:
+            self._line.close()
+
+    def acquire(self, timeout: float) -> list[Block]:
+        """Samples that came since the last call, waiting up to ``timeout`` [s] for the first; empty if none.
+
+        Both channels come in blocks of their own, cut where samples are missing or the quality changes.
+
+        Raises:
+            NotConnected: the line has gone, or was never opened.
+        """
+        deadline = time.monotonic() + timeout
+        while True:
+            left = deadline - time.monotonic()
+            self._pump(0.0 if self._pending else max(left, 0.0))
+            if self._pending or left <= 0:
+                break
+        with self._reading:
+            taken, self._pending = self._pending, []
+        return taken
+
+    def read(self, channel: str) -> Reading:
+        """The next sample of a channel; `acquire` still hands it out.
+
+        Raises:
+            NoReply: none came in time; the stream may be stopped.
+            OutOfRange: there is no such channel.
+        """
+        self._known(channel)
+        seen = self._newest.get(channel)
+        deadline = time.monotonic() + _DEADLINES["reply_s"] + 1 / self._rate
+        while (block := self._newest.get(channel)) is seen or block is None:
+            if time.monotonic() >= deadline:
+                raise NoReply(
+                    f"{self.name}: no sample of {channel} within {_DEADLINES['reply_s'] + 1 / self._rate:.3g} s; "
+                    "check that the stream has been started and the instrument has power"
+                )
+            self._pump(_SLICE)
+        device_ns = None if block.device_ns is None else int(block.device_ns[-1])
+        return Reading(float(block.values[-1]), block.received_ns, device_ns, float(block.raw[-1]), block.quality)
+
+    def write(self, channel: str, value: float) -> None:
+        """Refuse: a load cell takes no values.
+
+        Raises:
+            OutOfRange: always.
+        """
+        self._known(channel)
+        raise OutOfRange(f"{self.name}: {channel} is measured, never set to {value:.6g} N; nothing was sent")
+
+    def make_safe(self) -> None:
+        """Nothing: it moves nothing, and what brings the rest to rest still wants its samples."""
+
+    def start(self) -> None:
+        """Start the stream.
+
+        Raises:
+            NoReply, BadReply, Refused: it did not start, or not at the rate that was set.
+        """
+        self._rate_agreed("start", self._acknowledged("start"))
+
+    def stop(self) -> None:
+        """Stop the stream."""
+        self._acknowledged("stop")
+
+    def tare(self) -> float:
+        """Make the present reading the zero of ``force``.
+
+        Returns:
+            What is taken off from now on [N]; ``force_raw`` keeps it.
+
+        Raises:
+            Refused: the reading is not steady, or out of range.
+        """
+        return self._acknowledged("tare").value / float(_INSTRUMENT["counts_per_newton"])
+
+    def clear_tare(self) -> None:
+        """Let ``force`` be ``force_raw`` again."""
+        self._acknowledged("clear_tare")
+
+    def set_rate(self, rate: int) -> None:
+        """Change the samples a second [Hz]; a running stream is stopped for it and starts again.
+
+        Raises:
+            OutOfRange: the instrument does not offer this rate; nothing was sent.
+        """
+        self._offered(rate)
+        running = self._stream.rate is not None
+        if running:
+            self.stop()
+        self._set_rate(rate)
+        if running:
+            self.start()
+
+    def health(self) -> Health:
+        """Counts since it was connected, and what is wrong in words."""
+        counts = self._stream.counts().since(self._before)
+        return Health(self._line.is_open, *counts, self._stream.last_ns, self._words())
+
+    def listen(self, tap: Tap) -> None:
+        """Tell ``tap`` of all bytes from now on; a `SampleStream` given those received repeats the blocks."""
+        self._line.listen(tap)
+
+    def _words(self) -> str:
+        if not self._line.is_open:
+            return "not connected"
+        if self._stream.rate is None:
+            return "stopped"
+        found = [name.replace("_", " ") for name in ("overload", "sensor_fault") if self._status() & _STATUS[name]]
+        silent = (self._clock() - (self._stream.last_ns or 0)) * 1e-9
+        if silent > max(_DEADLINES["silence_s"], 5 / self._stream.rate):
+            found.append(f"silent for {silent:.3g} s")
+        if self._stream.unchanged >= _DEADLINES["stuck_samples"]:
+            found.append(f"stuck: the same reading {self._stream.unchanged + 1} times")
+        return "; ".join(found)
+
+    def _status(self) -> int:
+        return 0 if self._stream.latest is None else self._stream.latest.status
+
+    def _known(self, channel: str) -> None:
+        names = [known.name for known in self.channels]
+        if channel not in names:
+            raise OutOfRange(f"{self.name}: no channel {channel!r}, only {', '.join(names)}; nothing was sent")
+
+    def _offered(self, rate: int) -> int:
+        offered: list[int] = _INSTRUMENT["rates_hz"]
+        if rate not in offered:
+            raise OutOfRange(f"{self.name}: {rate} Hz is none of the rates {offered} Hz; nothing was sent")
+        return rate
+
+    def _identify(self) -> None:
+        answer = self._ask("identify")
+        if not isinstance(answer, Identity):
+            raise BadReply(f"{self.name}: identify was answered by {answer}; check that this is the load cell")
+        for what in ("protocol", "counts_per_newton"):
+            said, expected = getattr(answer, what), _INSTRUMENT[what]
+            if said != expected:
+                raise BadReply(
+                    f"{self.name}: it says {what} {said}, expected {expected}; set it, or mend the wire file"
+                )
+
+    def _set_rate(self, rate: int) -> None:
+        self._rate = rate
+        self._rate_agreed("set_rate", self._acknowledged("set_rate", rate))
+
+    def _rate_agreed(self, command: str, answer: Acknowledgement) -> None:
+        if answer.value != self._rate:
+            raise BadReply(f"{self.name}: {command} gave {answer.value} Hz, not {self._rate} Hz; set it again")
+
+    def _acknowledged(self, command: str, argument: int = 0) -> Acknowledgement:
+        answer = self._ask(command, argument)
+        if not isinstance(answer, Acknowledgement):
+            raise BadReply(f"{self.name}: {command} was answered by {answer}; check that this is the load cell")
+        if answer.code:
+            reason = _CODES.get(answer.code, f"code {answer.code}")
+            raise Refused(f"{self.name}: {command} {argument or ''} refused: {reason}{_HINTS.get(command, '')}")
+        return answer
+
+    def _ask(self, command: str, argument: int = 0) -> Answer:
+        """Send a request until it is answered; its token tells a late answer from the right one."""
+        with self._asking:
+            request = Request(next(self._tokens) % 256, _COMMANDS[command], argument)
+            self._stream.answers.pop(request.token, None)
+            for _ in range(_DEADLINES["attempts"]):
+                self._line.write(encode(request))
+                if (answer := self._answer_to(request)) is not None:
+                    return answer
+        raise NoReply(
+            f"{self.name}: {command} was not answered within {_DEADLINES['reply_s']:.3g} s, "
+            f"asked {_DEADLINES['attempts']} times; check power, cable and baud rate"
+        )
+
+    def _answer_to(self, request: Request) -> Answer | None:
+        deadline = time.monotonic() + _DEADLINES["reply_s"]
+        while time.monotonic() < deadline:
+            self._pump(_SLICE)
+            answer = self._stream.answers.get(request.token)
+            if answer is not None and answer.command == request.command:
+                return answer
+        return None
+
+    def _pump(self, timeout: float) -> None:
+        """Read once, or wait as long for the other thread that is reading."""
+        if not self._reading.acquire(timeout=timeout):
+            return
+        try:
+            frame = self._line.read(timeout)
+            if frame is not None:
+                blocks = self._stream.feed(frame.received_ns, frame.data)
+                self._pending += blocks
+                self._newest.update((block.channel, block) for block in blocks)
+        finally:
+            self._reading.release()

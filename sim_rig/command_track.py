@@ -1,0 +1,65 @@
+"""Commands that come at any instant, as the plant takes them at its samples."""
+
+from collections import deque
+
+import numpy as np
+import numpy.typing as npt
+
+from sim_rig.compiled import Array
+
+Instants = npt.NDArray[np.int64]
+"""On the rig's clock [ns]."""
+
+
+class HeldTrack:
+    """Each command stands until the next: the amplifier's drive."""
+
+    def __init__(self, value: float) -> None:
+        """Begin with a value that has always stood."""
+        self._points: deque[tuple[int, float]] = deque([(-(2**62), value)])
+
+    def add(self, at_ns: int, value: float) -> None:
+        """A command at an instant [ns], not before the last one."""
+        self._points.append((at_ns, value))
+
+    def at(self, instants: Instants) -> Array:
+        """(N,) what stands at increasing instants [ns]; what came before the last of them is forgotten."""
+        times = np.array([at for at, _ in self._points])
+        values = np.array([value for _, value in self._points])
+        found = values[np.searchsorted(times, instants, side="right") - 1]
+        if len(instants):
+            while len(self._points) > 1 and self._points[1][0] <= instants[-1]:
+                self._points.popleft()
+        return np.asarray(found)
+
+
+class JoinedTrack:
+    """Commands joined by straight lines: the demand of the actuator, which takes up each over a short time.
+
+    A command of instant t is reached at t + take_up, on a line that begins where the one before it was reached, or
+    at t if that is later. So commands that come often enough are followed as they were meant, only later, and none
+    is followed before it came.
+    """
+
+    def __init__(self, value: float, take_up_ns: int) -> None:
+        """Begin with a value that has always stood; ``take_up_ns`` [ns] is above 0."""
+        self._take_up = take_up_ns
+        self._vertices: deque[tuple[int, float]] = deque([(-(2**62), value)])
+
+    def add(self, at_ns: int, value: float) -> None:
+        """A command at an instant [ns], not before the last one."""
+        reached, last = self._vertices[-1]
+        if at_ns + self._take_up == reached:
+            self._vertices.pop()
+        elif at_ns > reached:
+            self._vertices.append((at_ns, last))
+        self._vertices.append((at_ns + self._take_up, value))
+
+    def at(self, instants: Instants) -> Array:
+        """(N,) where the demand is at increasing instants [ns]; what came before the last of them is forgotten."""
+        times = [at for at, _ in self._vertices]
+        found = np.interp(instants, times, [value for _, value in self._vertices])
+        if len(instants):
+            while len(self._vertices) > 1 and self._vertices[1][0] <= instants[-1]:
+                self._vertices.popleft()
+        return np.asarray(found, dtype=np.float64)

@@ -1,0 +1,239 @@
+"""Every instrument of the rig on its own wire, and the ``bench.toml`` that reaches them all."""
+
+import json
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple, cast
+
+import numpy as np
+
+from sim_rig.canopen_actuator import CanopenActuator, Machine
+from sim_rig.clock import Clock
+from sim_rig.errors import WireError
+from sim_rig.faults import FaultProxy, WireFault
+from sim_rig.live_rig import LiveRig
+from sim_rig.modbus_coil_amplifier import CoilAmplifierDevice
+from sim_rig.modbus_device import DeviceClock, wire_file
+from sim_rig.modbus_frames import MBAP
+from sim_rig.modbus_lvdt import LvdtDevice
+from sim_rig.modbus_server import Device, ModbusServer
+from sim_rig.modbus_thermometer import ThermometerDevice
+from sim_rig.scenario import Scenario
+from sim_rig.serial_ascii_load_cell import serial_ascii_load_cell
+from sim_rig.serial_load_cell import DeviceClock as SerialClock
+from sim_rig.serial_load_cell import serial_load_cell
+from sim_rig.socketcand_server import SocketcandServer
+
+_SYNC = 0x80
+_LONGEST_UP = 3_600_000_000_000
+"""[ns] that an instrument may have been switched on before the rig's clock began."""
+
+Faults = dict[str, tuple[WireFault, ...]]
+Section = dict[str, str | int | float | bool]
+"""Of ``bench.toml``."""
+
+
+@dataclass(frozen=True)
+class Choices:
+    """Which wire an instrument is on, where there is a choice."""
+
+    lvdt: Literal["tcp", "rtu"] = "tcp"
+    load_cell: Literal["pty", "tcp", "ascii"] = "pty"
+
+
+class Wire(NamedTuple):
+    """How one instrument is reached."""
+
+    instrument: str
+    protocol: str
+    """For a person."""
+    settings: Section
+    """Its section of ``bench.toml``."""
+
+    @property
+    def where(self) -> str:
+        """Address, for a person."""
+        settings = self.settings
+        return str(settings.get("url") or f"{settings['interface']}://{settings['host']}:{settings['port']}")
+
+
+class SyncLine:
+    """The line by which the SYNC of the bus starts the amplifier's table; a `sim_rig.socketcand_server.Node`."""
+
+    def __init__(self, trigger: Callable[[], object]) -> None:
+        self._trigger = trigger
+
+    def join(self, send: Callable[[int, bytes, int], None], now_ns: int) -> None:
+        """It has nothing to say."""
+
+    def take(self, identifier: int, data: bytes, now_ns: int) -> None:
+        """A frame has passed."""
+        if identifier == _SYNC:
+            self._trigger()
+
+    def tick(self, now_ns: int) -> None:
+        """Nothing happens by itself."""
+
+
+class ServedRig:
+    """A live rig with its wires open; a context manager."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        clock: Clock,
+        choices: Choices = Choices(),
+        faults: Faults | None = None,
+        block: int = 2,
+    ) -> None:
+        """Build it; nothing is served before it is entered.
+
+        Args:
+            scenario: what is real.
+            clock: the rig's time.
+            choices: of wires.
+            faults: on the wires, by instrument.
+            block: samples that the plant lets come together.
+
+        Raises:
+            PlantError: the specimen has no finite force at rest.
+            WireError: a fault is on a wire that is none of TCP.
+        """
+        self.rig = LiveRig(scenario, clock, block=block)
+        self.wires: list[Wire] = []
+        self._scenario, self._clock, self._choices = scenario, clock, choices
+        self._faults = dict(faults or {})
+        self._open = ExitStack()
+        self._offsets = np.random.default_rng([scenario.seed, 4711])
+
+    def __enter__(self) -> "ServedRig":
+        try:
+            self._serve()
+        except BaseException:
+            self._open.close()
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._open.close()
+
+    def _serve(self) -> None:
+        self._open.enter_context(self.rig)
+        try:
+            amplifier = self._amplifier()
+            self._load_cell()
+            self._lvdt()
+            self._modbus("thermometer", ThermometerDevice(self.rig, self._clock_of("thermometer")))
+            self._actuator(amplifier)
+        except OSError as error:
+            raise WireError(f"a wire of the rig cannot be opened: {error}") from error
+        if self._faults:
+            named = ", ".join(sorted(self._faults))
+            raise WireError(f"wire faults stand for {named}: no instrument of that name is on a TCP wire")
+
+    def _clock_of(self, device: str) -> DeviceClock:
+        """A device's clock: as far off as the scenario says, and switched on at some time before."""
+        clock = getattr(self._scenario.clocks, device)
+        return DeviceClock(int(self._offsets.integers(_LONGEST_UP)), clock.ppm)
+
+    def _amplifier(self) -> CoilAmplifierDevice:
+        unit = self._scenario.drive_unit
+        device = CoilAmplifierDevice(self.rig, self._clock_of("coil_amplifier"), unit)
+        self._modbus("coil_amplifier", cast("Device", device), mode="voltage" if unit == "V" else "current")
+        self.rig.attend = [device.advance]
+        return device
+
+    def _lvdt(self) -> None:
+        device = LvdtDevice(self.rig, self._clock_of("lvdt"))
+        if self._choices.lvdt == "tcp":
+            return self._modbus("lvdt", device)
+        document = wire_file("lvdt")
+        line = {name: document["serial"][name] for name in ("baud", "parity", "stop_bits")}
+        server = ModbusServer(device, document["unit"], baud=line["baud"]).listen_pty()
+        self._open.enter_context(server)
+        self._reached("lvdt", "Modbus RTU on a pty", {"url": server.address, "unit": document["unit"], **line})
+        return None
+
+    def _modbus(self, name: str, device: Device, **settings: str) -> None:
+        unit: int = wire_file(name)["unit"]
+        server = ModbusServer(device, unit, MBAP).listen()
+        self._open.enter_context(server)
+        url = self._behind_faults(name, server.address)
+        self._reached(name, "Modbus TCP", {"url": url, "unit": unit, **settings})
+
+    def _load_cell(self) -> None:
+        choice, clock = self._choices.load_cell, self._clock_of("load_cell")
+        address = "127.0.0.1:0" if choice == "tcp" else "pty"
+        if choice == "ascii":
+            adapter, _ = serial_ascii_load_cell(self.rig, address)
+            driver, baud = "ascii_load_cell", wire_file("ascii_load_cell")["line"]["baud"]
+        else:
+            adapter, _ = serial_load_cell(self.rig, address, SerialClock(*clock))
+            driver, baud = "load_cell", wire_file("load_cell")["line"]["baud"]
+        self._open.enter_context(adapter)
+        url = self._behind_faults("load_cell", adapter.address)
+        kind = "lines of text" if choice == "ascii" else "framed stream"
+        line = "a TCP socket" if choice == "tcp" else "a pty"
+        self._reached("load_cell", f"{kind} on {line}", {"driver": driver, "url": url, "baud": baud})
+
+    def _actuator(self, amplifier: CoilAmplifierDevice) -> None:
+        """The drive: its encoder knows where it is, for the specimen is clamped and it could not be homed."""
+        clock = self._clock_of("actuator")
+        machine = Machine(ppm=clock.ppm, clock_offset_ns=clock.offset_ns)
+        drive = CanopenActuator(self.rig, referenced=True, machine=machine)
+        server = SocketcandServer([drive, SyncLine(amplifier.trigger)], self.rig.now_ns)
+        self._open.enter_context(server)
+        host, port = self._behind_faults("actuator", f"tcp://127.0.0.1:{server.port}").split("/")[2].split(":")
+        settings: Section = {"interface": "socketcand", "host": host, "port": int(port), "channel": "can0"}
+        settings |= {"node": 5, "clamped": True}
+        self._reached("actuator", "CANopen, CiA 402, over socketcand", settings)
+
+    def _behind_faults(self, name: str, url: str) -> str:
+        """Where an instrument is reached through its faults, if its wire has any."""
+        scheme, _, place = url.partition("://")
+        if not place or name not in self._faults:
+            return url
+        host, port = place.split(":")
+        proxy = FaultProxy((host, int(port)), self._clock, self._faults.pop(name))
+        self._open.enter_context(proxy)
+        return f"{scheme}://{proxy.host}:{proxy.port}"
+
+    def _reached(self, name: str, protocol: str, settings: Section) -> None:
+        self.wires.append(Wire(name, protocol, {"driver": name, **settings}))
+
+
+def bench_toml(wires: list[Wire]) -> str:
+    """The configuration that reaches these wires."""
+    lines = ["# Reaches the simulated rig for as long as it runs; made anew each time it is started."]
+    for wire in wires:
+        lines += ["", f"[instruments.{wire.instrument}]"]
+        lines += [f"{key} = {json.dumps(value)}" for key, value in wire.settings.items()]
+    return "\n".join(lines) + "\n"
+
+
+def write_bench_toml(path: Path, wires: list[Wire]) -> None:
+    """Write it in one go: whoever waits for the file finds it whole.
+
+    Raises:
+        WireError: it cannot be written.
+    """
+    try:
+        draft = path.with_name(f".{path.name}.draft")
+        draft.write_text(bench_toml(wires), "utf-8")
+        draft.replace(path)
+    except OSError as error:
+        raise WireError(
+            f"{path}: cannot be written ({error.strerror}); choose another place with --out"
+        ) from error
+
+
+def table(wires: list[Wire]) -> str:
+    """The wires for a person, a line each."""
+    rows = [
+        ("instrument", "wire", "reached at"),
+        *((wire.instrument, wire.protocol, wire.where) for wire in wires),
+    ]
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    return "\n".join(f"{name:{widths[0]}}  {protocol:{widths[1]}}  {where}" for name, protocol, where in rows)

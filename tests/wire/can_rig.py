@@ -1,0 +1,145 @@
+"""A drive on a socketcand server with a made-up rod, for the tests of the actuator."""
+
+import bisect
+import contextlib
+import math
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from drivers.actuator import Actuator
+from drivers.can_bus import CanAddress
+from drivers.servo_drive import ActuatorSettings
+from sim_rig.canopen_actuator import CanopenActuator
+from sim_rig.socketcand_server import SocketcandServer
+
+STEP_NS = 1_000_000
+
+
+def wait_until(condition: Callable[[], object], deadline: float = 5.0) -> None:
+    """Poll until a condition holds."""
+    end = time.monotonic() + deadline
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.001)
+
+
+class MadeUpRod:
+    """Signals of a rod that is wherever it is commanded, sampled every millisecond."""
+
+    def __init__(self) -> None:
+        self.force = 120.0
+        self.stuck = False
+        self._start = time.monotonic_ns()
+        self._lock = threading.Lock()
+        self._times, self._targets = [-10 * STEP_NS], [0.0]
+
+    def now_ns(self) -> int:
+        return time.monotonic_ns() - self._start
+
+    def command(self, channel: str, value: float) -> None:
+        assert channel == "displacement"
+        if not self.stuck:
+            with self._lock:
+                self._times.append(self.now_ns())
+                self._targets.append(value)
+
+    def latest(self, channel: str, count: int, before_ns: int):
+        last = before_ns // STEP_NS
+        times = np.arange(last - count + 1, last + 1, dtype=np.int64) * STEP_NS
+        if channel == "force":
+            return times, np.full(count, self.force)
+        assert channel == "actuator_position"
+        with self._lock:
+            places = [max(bisect.bisect_right(self._times, t) - 1, 0) for t in times]
+            return times, np.array([self._targets[place] for place in places])
+
+    @property
+    def position(self) -> float:
+        return self._targets[-1]
+
+
+class CanRig:
+    """Rod, drive and server."""
+
+    def __init__(self, **drive) -> None:
+        self.rod = MadeUpRod()
+        self.drive = CanopenActuator(self.rod, **drive)
+        self.server = SocketcandServer([self.drive], self.rod.now_ns).start()
+
+    @property
+    def injection(self):
+        return self.drive.slave.injection
+
+    def close(self) -> None:
+        self.server.close()
+
+
+# Tests run beside others on busy cores: the drive is given more patience than on a bench.
+PATIENT = ActuatorSettings(stale_after=0.5, master_lost_after=1.0, drive_silent_after=1.0, top_speed=5.0)
+
+
+def sine(t: float) -> float:
+    """10 mm at 2 Hz."""
+    return 0.01 * math.sin(2 * math.pi * 2 * t)
+
+
+@contextlib.contextmanager
+def connected(rig: CanRig, settings: ActuatorSettings = PATIENT, **options):
+    """An actuator that has been connected and will be closed."""
+    address = CanAddress("socketcand", port=rig.server.port)
+    actuator = Actuator("actuator", address, time.monotonic_ns, settings=settings, **options)
+    actuator.connect()
+    try:
+        yield actuator
+    finally:
+        actuator.close()
+
+
+def positions(actuator: Actuator, at_least: int) -> list:
+    """Position blocks until there are enough samples."""
+    blocks = []
+
+    def enough() -> bool:
+        blocks.extend(b for b in actuator.acquire(0.05) if b.channel == "actuator_position")
+        return sum(len(b.values) for b in blocks) >= at_least
+
+    wait_until(enough)
+    return blocks
+
+
+class Leader:
+    """Calls `command` every cycle until stopped, as the agent does."""
+
+    def __init__(self, actuator, path: Callable[[float], float]) -> None:
+        self.error: Exception | None = None
+        self.sent: list[float] = []
+        self._actuator, self._path = actuator, path
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._lead, daemon=True)
+
+    def __enter__(self) -> "Leader":
+        self._actuator.arm()
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self) -> None:
+        self._stop.set()
+        self._thread.join(5)
+
+    def _lead(self) -> None:
+        cycle, start = self._actuator.settings.cycle, time.monotonic()
+        for k in range(100_000):
+            if self._stop.wait(max(start + k * cycle - time.monotonic(), 0)):
+                return
+            try:
+                self._actuator.command(self._path(k * cycle))
+            except Exception as error:
+                self.error = error
+                return
+            self.sent.append(self._path(k * cycle))

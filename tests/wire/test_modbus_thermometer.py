@@ -1,0 +1,62 @@
+"""The thermometer: driver against simulated instrument."""
+
+import time
+
+import numpy as np
+import pytest
+from modbus_bench import TIMEOUT, WIRES, FakeSignals, served, truth, until
+
+from drivers.errors import OutOfRange
+from drivers.thermometer import Thermometer
+from sim_rig.modbus_server import WireFault
+from sim_rig.modbus_thermometer import ThermometerDevice
+
+pytestmark = pytest.mark.timeout(60)
+
+
+@pytest.fixture(params=WIRES)
+def bench(request):
+    signals = FakeSignals()
+    with served(ThermometerDevice(signals), request.param, unit=3) as (server, address):
+        driver = Thermometer("thermometer", address, time.monotonic_ns, timeout=TIMEOUT)
+        driver.connect()
+        yield signals, server, driver
+        driver.close()
+
+
+@pytest.mark.parametrize("fault", [None, WireFault("drop"), WireFault("crc")], ids=str)
+def test_temperatures_come_ten_times_a_second(bench, fault):
+    signals, server, driver = bench
+    signals.step(2_000)
+    if fault:
+        server.inject(fault, function=4)
+    blocks = []
+    until(lambda: blocks.extend(driver.acquire(0.05)) or sum(len(b.values) for b in blocks) >= 20)
+    times = np.concatenate([block.device_ns for block in blocks])
+    values = np.concatenate([block.values for block in blocks])
+    assert np.all(np.diff(times) == 100_000_000)
+    assert values == pytest.approx(truth("temperature", times), abs=0.005 + 1e-9)
+    assert driver.health().lost == 0
+
+
+def test_the_temperature_can_be_asked_for(bench):
+    signals, _, driver = bench
+    assert driver.read("temperature").value == pytest.approx(27.0)
+    assert driver.read("temperature").quality == "good"
+    signals.dead.add("temperature")
+    assert driver.read("temperature").quality == "bad"
+
+
+def test_out_of_range_is_said(bench):
+    signals, _, driver = bench
+    signals.step(240_000)
+    assert driver.read("temperature").quality == "uncertain"
+
+
+def test_it_only_measures(bench):
+    _, _, driver = bench
+    assert [(c.name, c.unit) for c in driver.channels] == [("temperature", "degC")]
+    assert driver.age() is None
+    driver.make_safe()
+    with pytest.raises(OutOfRange, match="only measures"):
+        driver.write("temperature", 20.0)

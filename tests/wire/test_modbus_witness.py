@@ -1,0 +1,133 @@
+"""Independent witnesses: a plain pymodbus client and a plain socket talk to the simulated instruments."""
+
+import socket
+import struct
+
+import pytest
+from modbus_bench import MS, FakeSignals, served, truth
+from pymodbus import FramerType
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+
+from sim_rig.modbus_coil_amplifier import CoilAmplifierDevice
+from sim_rig.modbus_device import DeviceClock
+from sim_rig.modbus_lvdt import LvdtDevice
+from sim_rig.modbus_server import WireFault
+from sim_rig.modbus_thermometer import ThermometerDevice
+
+pytestmark = pytest.mark.timeout(60)
+
+
+def client_of(server):
+    if server.address.startswith("/dev/"):
+        return ModbusSerialClient(server.address, baudrate=115200, timeout=1, retries=0)
+    port = int(server.address.rpartition(":")[2])
+    framer = FramerType.SOCKET if server.address.startswith("tcp") else FramerType.RTU
+    return ModbusTcpClient("127.0.0.1", port=port, framer=framer, timeout=1, retries=0)
+
+
+@pytest.fixture(params=["tcp", "rtu over socket", "rtu over pty"])
+def lvdt(request):
+    signals = FakeSignals()
+    with served(LvdtDevice(signals, DeviceClock(1_000_000_000)), request.param) as (server, _):
+        client = client_of(server)
+        assert client.connect()
+        yield client, server, signals
+        client.close()
+
+
+def number(client, registers, type_):
+    return client.convert_from_registers(registers, getattr(client.DATATYPE, type_))
+
+
+def test_a_plain_client_reads_the_displacement(lvdt):
+    client, _, signals = lvdt
+    registers = client.read_input_registers(0, count=13).registers
+    assert registers[0] == 0x4C56
+    assert number(client, registers[2:4], "UINT32") == 1000
+    assert number(client, registers[4:6], "UINT32") == 5000
+    assert number(client, registers[6:8], "UINT32") == 6_000_000
+    signals.step(250)
+    value = number(client, client.read_input_registers(8, count=2).registers, "INT32") * 1e-7
+    assert value == pytest.approx(truth("displacement", 5_250 * MS), abs=1e-7)
+
+
+def test_a_plain_client_reads_the_ring_again_and_again(lvdt):
+    client, _, signals = lvdt
+    client.write_registers(0, client.convert_to_registers(4000, client.DATATYPE.UINT32))
+    block = client.read_input_registers(100, count=125).registers
+    assert number(client, block[1:3], "UINT32") == 4000
+    assert block[9] == 57
+    assert number(client, block[3:5], "UINT32") == 5_000_000
+    for place in range(57):
+        raw = number(client, block[11 + 2 * place : 13 + 2 * place], "INT32")
+        assert raw * 1e-7 == pytest.approx(truth("displacement", (4000 + place) * MS), abs=1e-7)
+    signals.step(20)
+    again = client.read_input_registers(100, count=125).registers
+    assert again[:5] + again[9:] == block[:5] + block[9:]
+
+
+def test_what_does_not_exist_is_refused_with_the_right_code(lvdt):
+    client, _, _ = lvdt
+    assert client.read_input_registers(60, count=2).exception_code == 2
+    assert client.read_holding_registers(8, count=2).exception_code == 2
+    assert client.write_register(0, 1).exception_code == 2  # half a number
+    assert client.write_register(500, 1).exception_code == 2
+    assert client.read_coils(0, count=1).exception_code == 1
+    assert client.diag_query_data(b"\x12\x34").message == b"\x12\x34"
+
+
+def test_every_injected_exception_reaches_a_plain_client(lvdt):
+    client, server, _ = lvdt
+    server.inject(WireFault("exception", 6))
+    assert client.read_input_registers(0, count=1).exception_code == 6
+    assert client.read_input_registers(0, count=1).registers == [0x4C56]
+
+
+def test_another_unit_is_not_answered(lvdt):
+    client, server, _ = lvdt
+    client.comm_params.timeout_connect = 0.05
+    with pytest.raises(Exception, match="No response"):
+        client.read_input_registers(0, count=1, device_id=9)
+    assert server.answered == 0
+
+
+def test_a_plain_client_drives_the_coil():
+    signals = FakeSignals()
+    with served(CoilAmplifierDevice(signals), "tcp") as (server, _):
+        client = client_of(server)
+        assert client.write_register(3, 0).isError()  # half a number
+        setpoint = client.convert_to_registers(1_500_000, client.DATATYPE.INT32)
+        assert client.write_registers(3, setpoint).exception_code == 4  # no mode yet
+        assert client.write_register(2, 2).exception_code == 3  # this rig drives by voltage
+        assert not client.write_register(2, 1).isError()
+        assert not client.write_registers(3, setpoint).isError()
+        signals.step(100)
+        assert number(client, client.read_input_registers(15, count=2).registers, "INT32") == 1_500_000
+        assert client.read_input_registers(13, count=2).registers == [0, 1]
+        assert client.write_registers(3, [0x7FFF, 0xFFFF]).exception_code == 3
+        client.close()
+    assert signals.drive == 1.5
+
+
+def test_a_plain_client_reads_the_temperature():
+    with served(ThermometerDevice(FakeSignals()), "rtu over pty") as (server, _):
+        client = client_of(server)
+        client.connect()
+        assert client.read_input_registers(8, count=1).registers == [2700]
+        client.close()
+
+
+def test_pipelined_requests_are_answered_in_order_with_their_own_numbers():
+    with served(LvdtDevice(FakeSignals()), "tcp") as (server, _):
+        server.inject(WireFault("delay", 0.05))
+        with socket.create_connection(("127.0.0.1", int(server.address.rpartition(":")[2])), 5) as plain:
+            for tid, (address, count) in enumerate([(0, 1), (2, 2), (4, 2)], 41):
+                plain.sendall(struct.pack(">HHHBBHH", tid, 0, 6, 1, 4, address, count))
+            heard = b""
+            while len(heard) < 11 + 13 + 13:
+                heard += plain.recv(4096)
+    assert heard == (
+        bytes.fromhex("0029 0000 0005 01 04 02 4c56")
+        + bytes.fromhex("002a 0000 0007 01 04 04 000003e8")
+        + bytes.fromhex("002b 0000 0007 01 04 04 00001388")
+    )

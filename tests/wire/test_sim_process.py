@@ -1,0 +1,220 @@
+"""The simulated rig as a process: plain clients talk to every wire that its bench.toml names."""
+
+import binascii
+import itertools
+import json
+import signal
+import struct
+import subprocess
+import sys
+import time
+import tomllib
+from contextlib import contextmanager
+from pathlib import Path
+
+import canopen
+import pytest
+import serial
+from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+
+pytestmark = pytest.mark.timeout(120)
+EDS = Path(__file__).parents[2] / "drivers" / "wire" / "actuator.eds"
+DEADLINE = 60.0
+START, TARE = 1, 3
+
+
+def started(*words):
+    return subprocess.Popen(
+        [sys.executable, "-m", "sim_rig", "serve", *map(str, words)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@contextmanager
+def running(folder, *words):
+    """The rig as a process: its wires, what it printed, and itself; it is stopped in the end."""
+    process = started("--out", folder / "bench.toml", *words)
+    try:
+        said = []
+        while process.stdout and (line := process.stdout.readline()):
+            said.append(line)
+            if "Ctrl-C" in line:
+                break
+        assert said, process.communicate(timeout=DEADLINE)[1]
+        yield tomllib.loads((folder / "bench.toml").read_text())["instruments"], said, process
+    finally:
+        process.kill()
+        process.communicate(timeout=DEADLINE)
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory):
+    with running(tmp_path_factory.mktemp("sim"), "--scenario", "default") as rig:
+        yield rig
+
+
+@contextmanager
+def modbus(section):
+    url = section["url"]
+    if url.startswith("/dev/"):
+        client = ModbusSerialClient(url, baudrate=section["baud"], timeout=5, retries=0)
+    else:
+        host, port = url.removeprefix("tcp://").split(":")
+        client = ModbusTcpClient(host, port=int(port), timeout=5, retries=0)
+    try:
+        assert client.connect()
+        yield client
+    finally:
+        client.close()
+
+
+def number(client, section, address, type_):
+    registers = client.read_input_registers(
+        address, count=2 if "32" in type_ else 1, device_id=section["unit"]
+    ).registers
+    return client.convert_from_registers(registers, getattr(client.DATATYPE, type_))
+
+
+def until(true, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.005)
+
+
+def test_it_says_where_every_instrument_is_reached(rig):
+    wires, said, _ = rig
+    assert set(wires) == {"actuator", "load_cell", "lvdt", "coil_amplifier", "thermometer"}
+    for name, section in wires.items():
+        assert section["driver"] == name
+        place = section.get("url") or str(section["port"])
+        assert any(name in line and place in line for line in said)
+
+
+def test_a_plain_modbus_client_reads_the_lvdt(rig):
+    section = rig[0]["lvdt"]
+    with modbus(section) as client:
+        assert number(client, section, 0, "UINT16") == 0x4C56
+        assert abs(number(client, section, 8, "INT32") * 1e-7) < 2e-4
+        before = number(client, section, 4, "UINT32")
+        until(lambda: number(client, section, 4, "UINT32") > before + 100)
+
+
+def test_a_plain_modbus_client_reads_the_room_from_the_thermometer(rig):
+    section = rig[0]["thermometer"]
+    with modbus(section) as client:
+        until(lambda: 20.0 < number(client, section, 8, "INT16") * 0.01 < 25.0)
+
+
+def test_a_plain_modbus_client_drives_the_coil_and_measures_there(rig):
+    section = rig[0]["coil_amplifier"]
+    with modbus(section) as client:
+        client.write_register(2, 1, device_id=section["unit"])
+        client.write_registers(3, [*divmod(300_000, 65536)], device_id=section["unit"])
+        until(lambda: abs(number(client, section, 8, "INT32") * 1e-4 - 0.3) < 0.02)
+        until(lambda: abs(number(client, section, 10, "INT16") * 1e-4 - 0.06) < 0.02)
+        client.write_registers(3, [0, 0], device_id=section["unit"])
+        until(lambda: abs(number(client, section, 8, "INT32") * 1e-4) < 0.02)
+
+
+def framed(kind, payload):
+    covered = bytes([len(payload), kind]) + payload
+    return b"\xa5\x5a" + covered + struct.pack("<H", binascii.crc_hqx(covered, 0xFFFF))
+
+
+def frames(data):
+    """Type and payload of the good frames among bytes."""
+    place, good = 0, []
+    while (place := data.find(b"\xa5\x5a", place)) >= 0 and place + 6 <= len(data):
+        end = place + 4 + data[place + 2]
+        whole = data[place + 2 : end]
+        if data[end : end + 2] == struct.pack("<H", binascii.crc_hqx(whole, 0xFFFF)):
+            good.append((whole[1], whole[2:]))
+        place += 2
+    return good
+
+
+def test_a_plain_serial_reader_hears_the_load_cell(rig):
+    section = rig[0]["load_cell"]
+    with serial.Serial(section["url"], section["baud"], timeout=5) as port:
+        port.write(framed(0x10, struct.pack("<BBI", 7, START, 0)))
+        found = frames(port.read(21 * 300))
+    assert struct.pack("<BBBi", 7, START, 0, 1000) in [payload for kind, payload in found if kind == 0x11]
+    samples = [struct.unpack("<HIiiB", payload) for kind, payload in found if kind == 0x01]
+    assert [sample[0] for sample in samples] == list(range(len(samples)))
+    assert len(samples) > 250
+    assert all(abs(sample[2] / 800 + 16.0) < 40.0 for sample in samples)
+    micros = [later[1] - earlier[1] for earlier, later in itertools.pairwise(samples)]
+    assert all(abs(step % 2**32 - 1000) <= 1 for step in micros)
+
+
+def test_a_plain_canopen_node_reads_the_drive(rig):
+    section = rig[0]["actuator"]
+    network = canopen.Network()
+    network.NOTIFIER_CYCLE = 0.05
+    keys = ("interface", "channel", "host", "port")
+    network.connect(**{key: section[key] for key in keys})
+    try:
+        node = network.add_node(section["node"], str(EDS))
+        node.sdo.RESPONSE_TIMEOUT = 5.0
+        statusword = node.sdo[0x6041].raw
+        assert statusword & 0x4F == 0x40
+        assert statusword & 0x8000, "its encoder knows where it is"
+        assert abs(node.sdo[0x6064].raw) < 100
+        node.nmt.wait_for_heartbeat(5.0)
+    finally:
+        network.disconnect()
+
+
+@pytest.mark.parametrize("number_", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_it_well_whoever_listens(tmp_path, number_):
+    with running(tmp_path, "--speed", "4", "--lvdt", "rtu", "--load-cell", "tcp") as (wires, _, process):
+        host, port = wires["load_cell"]["url"].removeprefix("socket://").split(":")
+        with serial.serial_for_url(f"socket://{host}:{port}"), modbus(wires["lvdt"]) as client:
+            assert number(client, wires["lvdt"], 0, "UINT16") == 0x4C56
+            process.send_signal(number_)
+            _, complaint = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, complaint) == (0, "")
+
+
+def test_text_lines_of_an_indicator_come_in_place_of_the_framed_stream(tmp_path):
+    with running(tmp_path, "--load-cell", "ascii") as (wires, _, _process):
+        section = wires["load_cell"]
+        assert section["driver"] == "ascii_load_cell"
+        with serial.Serial(section["url"], section["baud"], timeout=5) as port:
+            port.read_until(b"\r\n")
+            assert port.read_until(b"\r\n").decode("ascii").split(",")[1] == "GS"
+
+
+def test_a_wire_with_faults_is_reached_through_them(tmp_path):
+    faults = {"thermometer": [{"kind": "closed", "duration": 1e6}]}
+    (tmp_path / "faults.json").write_text(json.dumps(faults))
+    with running(tmp_path, "--faults", tmp_path / "faults.json") as (wires, _, _process):
+        with modbus(wires["lvdt"]) as client:
+            assert number(client, wires["lvdt"], 0, "UINT16") == 0x4C56
+        with pytest.raises(Exception, match=r"(?i)connection|no response"), modbus(wires["thermometer"]) as client:
+            number(client, wires["thermometer"], 0, "UINT16")
+
+
+FAULTS = '{"load_cell": [{"kind": "late", "duration": 1}]}'
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--scenario", "nowhere"), "scenario nowhere: cannot be read"),
+        (("--out", "no/such/place/bench.toml"), "bench.toml: cannot be written"),
+        (("--faults", "none.json"), "none.json: cannot be read"),
+        (("--faults", "faults.json"), "wire faults stand for load_cell: no instrument of that name"),
+    ],
+)
+def test_what_cannot_be_served_exits_1_with_one_line(tmp_path, monkeypatch, words, message):
+    monkeypatch.setenv("PYTHONPATH", str(EDS.parents[2]))
+    monkeypatch.chdir(tmp_path)
+    Path("faults.json").write_text(FAULTS)
+    _, complaint = (failed := started(*words)).communicate(timeout=DEADLINE)
+    assert failed.returncode == 1
+    assert message in complaint
+    assert complaint.count("\n") == 1

@@ -13,7 +13,6 @@ from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError
 
 FIT_SCHEMA = "mrbench.fit/1"
-PREDICTION_SCHEMA = "mrbench.prediction/1"
 
 
 class Document(BaseModel):

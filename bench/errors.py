@@ -3,6 +3,7 @@
 BenchError
 ├── MethodError      a method document asks for what cannot be compiled or exceeds its own limits
 ├── RunError         a run could not be carried out
+├── AgentUnreachable the rig agent does not answer
 ├── LogError         a log cannot be read, written or mended
 ├── RecordingError   a recording made elsewhere cannot be taken in
 └── ReportError      a report or a demo cannot be made
@@ -24,6 +25,10 @@ class MethodError(BenchError):
 
 class RunError(BenchError):
     """A run could not be carried out."""
+
+
+class AgentUnreachable(BenchError):  # noqa: N818 - reads as the sentence it makes
+    """The rig agent does not answer."""
 
 
 class LogError(BenchError):

@@ -17,11 +17,21 @@ _SHORTEST = 5
 """[samples] shortest level that is averaged."""
 
 
+def drive_noise(drive: Array) -> float:
+    """Standard deviation [V or A] of the noise of a measured drive (N,), from its changes between samples.
+
+    The median passes over the steps of a staircase, and the second difference over a ramp; a drive that curves
+    as much within three samples as it is noisy looks noisier than it is.
+    """
+    changes = np.diff(drive, 2)
+    return float(np.median(np.abs(changes))) / 0.6745 / np.sqrt(6.0) if len(changes) else 0.0
+
+
 def steady_levels(drive: Array) -> Array:
     """The drive (N,) [V or A] with every constant level replaced by its mean; anything that moves stays."""
-    steps = np.diff(drive)
-    noise = float(np.median(np.abs(steps - np.median(steps)))) / 0.6745 / np.sqrt(2.0)
-    edges = np.concatenate([[0], np.flatnonzero(np.abs(steps) > max(_JUMP * noise, 1e-12)) + 1, [len(drive)]])
+    noise = drive_noise(drive)
+    steps = np.abs(np.diff(drive))
+    edges = np.concatenate([[0], np.flatnonzero(steps > max(_JUMP * noise, 1e-12)) + 1, [len(drive)]])
     result = drive.copy()
     for start, stop in itertools.pairwise(edges):
         level = drive[start:stop]

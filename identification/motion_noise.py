@@ -1,9 +1,11 @@
-"""What the noise of the displacement adds to the uncertainty of the fit.
+"""What the noise of displacement and drive adds to the uncertainty of the fit.
 
 The motion that the simulation is fed was estimated from a noisy displacement, and what is wrong with it moves
-the yield displacement and the shape as much as the force noise does. So the noise is played again: the fitted
-motion gets fresh displacement and force noise, is estimated anew in the same way, and the change of the simulated
-force is carried on to the unknowns by one Gauss-Newton step (a parametric bootstrap, linearised).
+the yield displacement and the shape as much as the force noise does. The drive is measured, too: the mean of a
+level that lasts two seconds is wrong by a thirtieth of its noise, and moves the yield force as much as a hundredth
+of a newton. So the noise is played again: the fitted motion and the drive get fresh noise, are estimated anew in
+the same way, and the change of the simulated force is carried on to the unknowns by one Gauss-Newton step (a
+parametric bootstrap, linearised).
 """
 
 from collections.abc import Sequence
@@ -12,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
+from identification.drive import drive_noise, steady_levels
 from identification.motion import displacement_noise, estimate_motion
 from identification.problem import Piece, Problem
 from identification.recordings import Stretch
@@ -23,14 +26,15 @@ DRAWS = 8
 
 
 def with_motion(piece: Piece, stretch: Stretch) -> Piece:
-    """A piece whose motion is that estimated from a stretch; all else stays."""
+    """A piece whose motion and drive are those estimated from a stretch; all else stays."""
     motion = estimate_motion(stretch)
-    stroke = Stroke(stretch.rate, motion.displacement, motion.velocity, motion.acceleration, piece.stroke.drive)
+    drive = steady_levels(stretch.drive)
+    stroke = Stroke(stretch.rate, motion.displacement, motion.velocity, motion.acceleration, drive)
     return replace(piece, stroke=stroke)
 
 
 def motion_scatter(problem: Problem, stretches: Sequence[Stretch], minimum: Minimum, seed: int) -> Array:
-    """Second moment (U, U) of the unknowns' errors that the displacement noise causes, bias included.
+    """Second moment (U, U) of the unknowns' errors that noise of motion and drive causes, bias included.
 
     Args:
         problem: with one piece for each of the stretches, in their order.
@@ -47,11 +51,13 @@ def motion_scatter(problem: Problem, stretches: Sequence[Stretch], minimum: Mini
         setting = problem.setting(minimum.unknowns, i)
         force, _ = piece.recorded(setting)
         spread = displacement_noise(stretch.displacement, stretch.measured)
+        unsteady = _level_noise(stretch.drive)
         for draw in range(DRAWS):
             random = np.random.default_rng([seed, i, draw])
             played = replace(
                 stretch,
                 displacement=piece.stroke.displacement + spread * random.standard_normal(len(force)),
+                drive=piece.stroke.drive + unsteady * random.standard_normal(len(force)),
                 force=force + problem.noise * random.standard_normal(len(force)),
             )
             change = with_motion(piece, played).recorded(setting)[0] - force
@@ -59,3 +65,12 @@ def motion_scatter(problem: Problem, stretches: Sequence[Stretch], minimum: Mini
     steps = np.zeros_like(shifts)
     steps[:, inside] = np.linalg.solve(minimum.evaluation.hessian[np.ix_(inside, inside)], shifts[:, inside].T).T
     return steps.T @ steps / DRAWS
+
+
+def _level_noise(drive: Array) -> Array:
+    """Standard deviation (N,) [V or A] of the drive's noise where it stands still.
+
+    A drive that moves goes into the simulation as it was measured: its noise is in the fit already.
+    """
+    still = steady_levels(drive) != drive
+    return np.where(still, drive_noise(drive), 0.0)

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from identification.drive import drive_bins, steady_levels
+from identification.drive import drive_bins, drive_noise, steady_levels
 from identification.errors import IdentificationError
 from identification.series import Series, write_series
 
@@ -18,6 +18,12 @@ def test_noise_is_taken_off_constant_levels_only():
     found = steady_levels(noisy)
     assert np.abs(found - true).max() < 2e-4
     assert len(np.unique(found)) == 3
+
+
+@pytest.mark.parametrize("true", [np.repeat([0.0, 0.3, 0.1], 500), np.linspace(0.0, 5.0, 1500)])
+def test_the_noise_of_a_drive_is_seen_through_its_steps_and_ramps(true):
+    noisy = true + 1e-3 * RANDOM.standard_normal(len(true))
+    assert drive_noise(noisy) == pytest.approx(1e-3, rel=0.1)
 
 
 def test_a_ramp_stays_as_measured():

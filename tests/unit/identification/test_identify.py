@@ -191,6 +191,17 @@ def test_displacement_noise_adds_to_the_uncertainty():
     assert noisy[2, 2] > 4 * motion_scatter(problem, [quiet], minimum, 1)[2, 2]
 
 
+def test_noise_of_the_measured_drive_adds_to_the_uncertainty_of_the_yield_force():
+    random = np.random.default_rng(3)
+    quiet = replace(FAST, displacement=np.array(assemble([recording(FAST)]).pieces[0].stroke.displacement))
+    noisy = replace(quiet, drive=FAST.drive + 3e-3 * random.standard_normal(len(FAST.drive)))
+    scatter = []
+    for stretch in (quiet, noisy):
+        problem = Problem(assemble([recording(stretch)]).pieces, SearchSpace(0.0, 0.5), NOISE, 20e-6)
+        scatter.append(motion_scatter(problem, [stretch], refine(problem), 1))
+    assert scatter[1][0, 0] > 1.5 * scatter[0][0, 0]
+
+
 def test_a_piece_without_a_filter_is_its_own_quicker_self():
     piece = Piece("p", Stroke(RATE, *(np.zeros(3),) * 4), np.zeros(3), np.ones(3))
     assert piece.quicker() is piece

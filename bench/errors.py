@@ -2,7 +2,9 @@
 
 BenchError
 ├── MethodError      a method document asks for what cannot be compiled or exceeds its own limits
+├── ConfigError      bench.toml does not describe a bench
 ├── RunError         a run could not be carried out
+│   └── Interlocked  an interlock forbids what was to be sent
 ├── AgentUnreachable the rig agent does not answer
 ├── LogError         a log cannot be read, written or mended
 ├── RecordingError   a recording made elsewhere cannot be taken in
@@ -41,3 +43,11 @@ class RecordingError(BenchError):
 
 class ReportError(BenchError):
     """A report or a demo cannot be made."""
+
+
+class ConfigError(BenchError):
+    """``bench.toml`` does not describe a bench."""
+
+
+class Interlocked(RunError):  # noqa: N818 - reads as the sentence it makes
+    """An interlock forbids what was to be sent."""

@@ -11,8 +11,9 @@ from pydantic import BaseModel
 
 from bench.methods.document import Method
 from bench.methods.envelope import Envelope
+from bench.rig.config import BenchConfig
 
-DOCUMENTS: dict[str, type[BaseModel]] = {"method": Method, "envelope": Envelope}
+DOCUMENTS: dict[str, type[BaseModel]] = {"method": Method, "envelope": Envelope, "bench": BenchConfig}
 """Type of each document, by the name of its schema's file."""
 FOLDER = Path(__file__).parent.parent / "docs" / "reference" / "schemas"
 """Where the schemas are kept."""

@@ -18,6 +18,7 @@ from bench.recorder.messages import EVENT, SAMPLE, SEGMENT, message_schema
 from identification.damper.coordinates import COORDINATES
 from identification.damper.effects import EFFECTS
 from identification.damper.parameters import PARAMETERS, Quantity
+from identification.gap.documents import Diagnosis
 from identification.results import Delay, Estimate, Fit, Prediction
 
 FOLDER = Path(__file__).parent / "reference"
@@ -77,11 +78,12 @@ def quantities(of: Iterable[Quantity]) -> str:
 
 
 def effects() -> str:
-    """Every effect with its place, its form and its parameters."""
+    """Every effect with its place, its forms and their parameters."""
     parts = []
     for effect in EFFECTS.values():
-        about = f"Stage `{effect.stage}`, form `{effect.form}`, acts as `{effect.acts}`: {effect.meaning}."
-        parts.append(f"## {effect.name}\n\n{about}\n\n{quantities(effect.parameters)}")
+        parts.append(f"## {effect.name}\n\nStage `{effect.stage}`: {effect.meaning}.")
+        for form in effect.forms:
+            parts.append(f"Form `{form.name}`, acts as `{form.acts}`:\n\n{quantities(form.parameters)}")
     return "\n\n".join(parts)
 
 
@@ -163,6 +165,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "messages": messages,
     "fit": lambda: fields(Fit),
     "prediction": lambda: fields(Prediction),
+    "diagnosis": lambda: fields(Diagnosis),
     "estimate": lambda: fields(Estimate),
     "delay": lambda: fields(Delay),
 }

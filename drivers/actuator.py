@@ -7,21 +7,25 @@ now and then the heartbeat by which the drive knows that it is led. The drive in
 centred, from home before.
 """
 
+import contextlib
 import threading
 from pathlib import Path
+from typing import Any
 
 from drivers import cia402
-from drivers.actuator_samples import ActuatorSamples, Scale
+from drivers.actuator_samples import TIME_STAMP, ActuatorSamples, Scale
 from drivers.can_bus import CanAddress, CanBus
 from drivers.canopen_node import CanopenNode
-from drivers.channel import Block, Channel, Reading
+from drivers.channel import Block, Channel, Reading, Stamp
 from drivers.cia402 import DriveState, Fault, Mounting
-from drivers.errors import DriverError, OutOfRange, Refused
+from drivers.errors import BadReply, DriverError, NoReply, OutOfRange, Refused
 from drivers.instrument import Clock, Health, Tap
 from drivers.servo_drive import COUNT, ActuatorSettings, ServoDrive
 
 _EDS = Path(__file__).parent / "wire" / "actuator.eds"
 _OBJECTS = {"actuator_position": 0x6064, "actuator_velocity": 0x606C, "actuator_torque": 0x6077}
+_CLOCK_EVERY_NS = 50_000_000
+"""[ns] between two readings of the drive's clock."""
 _USUAL = ActuatorSettings()
 
 
@@ -66,7 +70,7 @@ class Actuator:
         self._leading = threading.RLock()
         self._armed_ns: int | None = None
         self._boots = 0
-        self._last_ns = self._beat_ns = 0
+        self._last_ns = self._beat_ns = self._clock_asked_ns = 0
         self._last = 0.0
         self._words = ""
 
@@ -100,6 +104,11 @@ class Actuator:
     def rated_torque(self) -> float:
         """[N m] as the drive said."""
         return self._drive.rated_torque
+
+    @property
+    def stamp(self) -> Stamp | None:
+        """The drive's clock beside the bench's, the newest reading; none before the first."""
+        return self._samples.stamp
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -148,10 +157,27 @@ class Actuator:
             NotConnected: the bus has gone.
             NoReply: the drive's heartbeat has.
         """
+        if self._clock() - self._clock_asked_ns >= _CLOCK_EVERY_NS:
+            self._clock_asked_ns = self._clock()
+            with contextlib.suppress(NoReply, BadReply, Refused):
+                self._node.number(TIME_STAMP)
         blocks = self._samples.blocks(timeout)
         if not blocks:
             self._node.check_alive()
         return blocks
+
+    def describe(self) -> dict[str, Any]:
+        """What a replay needs beside the frames from now on, see `drivers.replay`."""
+        layouts = self._node.layouts
+        return {
+            "decoder": "actuator",
+            "layouts": [{**one._asdict(), "fields": [list(field) for field in one.fields]} for one in layouts],
+            "node_id": self._node.node_id,
+            "rated_torque": self._drive.rated_torque,
+            "origin": self._origin,
+            "cycle": self.settings.cycle,
+            "state": self._samples.state(),
+        }
 
     def decoder(self, origin: float, rated_torque: float) -> ActuatorSamples:
         """What turns frames into samples, for a replay, too; origin [m from home], rated torque [N m]."""

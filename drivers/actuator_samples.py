@@ -8,13 +8,15 @@ running number leaps over them.
 
 import threading
 from collections import deque
-from typing import NamedTuple
+from collections.abc import Mapping
+from itertools import takewhile
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from drivers.can_bus import unpack_frame
 from drivers.canopen_node import PdoLayout
-from drivers.channel import Block, Frame
+from drivers.channel import Block, Frame, Stamp
 
 STATUSWORD, POSITION, VELOCITY, TORQUE, TIME_STAMP = 0x6041, 0x6064, 0x606C, 0x6077, 0x1013
 _PATIENCE_NS = 100_000_000
@@ -25,6 +27,10 @@ _DRIFT = 1e-4
 """Share by which the drive's clock may be slow without looking late."""
 _WRAP = 1 << 32
 _MICROSECOND = 1000
+_FRAME_NS = 108_000
+"""[ns] that a frame of eight bytes is on a bus of 1 Mbit/s, the fastest there is: no question is quicker."""
+_CLOCK_WANTED, _CLOCK_COMES = b"\x40\x13\x10\x00", b"\x43\x13\x10\x00"
+"""How an object access for the drive's clock begins, and its answer."""
 
 
 class Scale(NamedTuple):
@@ -65,6 +71,19 @@ class _Answers:
         self._least = min(self._least, max(self.waiting - on_their_way, 0))
         return self._settle(now_ns)
 
+    def state(self) -> dict[str, Any]:
+        """What `resume` needs to go on from here."""
+        return {
+            "lost": self.lost, "waiting": self.waiting, "least": self._least, "window_ns": self._window_ns,
+            "syncs": list(self._syncs), "soonest": self._soonest, "last_ns": self._last_ns,
+        }  # fmt: skip
+
+    def resume(self, state: Mapping[str, Any]) -> None:
+        """Go on from a `state`."""
+        self.lost, self.waiting, self._least = state["lost"], state["waiting"], state["least"]
+        self._window_ns, self._soonest, self._last_ns = state["window_ns"], state["soonest"], state["last_ns"]
+        self._syncs = deque(state["syncs"], maxlen=_REMEMBERED)
+
     def restarted(self) -> None:
         """The drive's clock begins anew."""
         self._soonest = self._last_ns = None
@@ -89,7 +108,7 @@ class _Answers:
         self._last_ns = now_ns
         # The drive's stamp may be somewhat older than the SYNC that it answers.
         asked_since = now_ns - (transit - self._soonest) + self._slack
-        return sum(sync > asked_since for sync in self._syncs)
+        return sum(1 for _ in takewhile(lambda sync: sync > asked_since, reversed(self._syncs)))
 
 
 class _Sample(NamedTuple):
@@ -118,7 +137,11 @@ class ActuatorSamples:
         """Bench clock of the last sample [ns]."""
         self.statusword: int | None = None
         """Of the last sample."""
+        self.stamp: Stamp | None = None
+        """The drive's clock beside the bench's, from the newest answer to the question for it."""
         self.origin = origin
+        self._asks, self._answers_with = 0x600 + node_id, 0x580 + node_id
+        self._asked_ns: int | None = None
         self._layouts = {layout.identifier: layout for layout in layouts if layout.on_sync}
         self._order = sorted(self._layouts)
         self._boot = 0x700 + node_id
@@ -127,6 +150,7 @@ class ActuatorSamples:
         self._due = 0
         self._number = 0
         self._answers = _Answers(cycle)
+        self._seen_ns = 0
         self._clock: tuple[int, int] | None = None
         self._batches: list[list[_Sample]] = []
         self._ready = threading.Condition()
@@ -140,13 +164,34 @@ class ActuatorSamples:
         """A frame has passed, sent or received."""
         identifier, data = unpack_frame(frame.data)
         with self._ready:
+            self._seen_ns = frame.received_ns
             if identifier == 0x80:
                 self._number += self._answers.asked(frame.received_ns)
             elif identifier in self._layouts and not frame.sent:
                 self._part(identifier, data, frame.received_ns)
+            elif identifier == self._asks and data[:4] == _CLOCK_WANTED:
+                self._asked_ns = frame.received_ns
+            elif identifier == self._answers_with and data[:4] == _CLOCK_COMES:
+                self._stamped(int.from_bytes(data[4:8], "little"), frame.received_ns)
             elif identifier == self._boot and data == b"\x00":
                 self._clock = None
                 self._answers.restarted()
+
+    def state(self) -> dict[str, Any]:
+        """Where it stands: what `resume` needs to go on with the frames after ``at_ns`` as this one does."""
+        with self._ready:
+            return {
+                "at_ns": self._seen_ns, "number": self._number, "due": self._due, "clock": self._clock,
+                "parts": {str(entry): value for entry, value in self._parts.items()},
+                "answers": self._answers.state(),
+            }  # fmt: skip
+
+    def resume(self, state: Mapping[str, Any]) -> None:
+        """Go on from a `state`."""
+        self._number, self._due = state["number"], state["due"]
+        self._clock = None if state["clock"] is None else (state["clock"][0], state["clock"][1])
+        self._parts = {int(entry): value for entry, value in state["parts"].items()}
+        self._answers.resume(state["answers"])
 
     def blocks(self, timeout: float = 0.0) -> list[Block]:
         """The samples since the last call, waiting up to ``timeout`` [s] for the first."""
@@ -183,6 +228,16 @@ class ActuatorSamples:
         self.received += 1
         self._number += 1 + self._answers.answered(device_ns, now_ns)
         self._ready.notify_all()
+
+    def _stamped(self, clock: int, now_ns: int) -> None:
+        """Its clock was read between question and answer; a sample's stamp is of its position, which is older."""
+        if self._asked_ns is None:
+            return
+        last, total = self._clock if self._clock is not None else (clock, clock)
+        turned = (clock - last + _WRAP // 2) % _WRAP - _WRAP // 2
+        earliest = min(self._asked_ns + _FRAME_NS, now_ns)
+        self.stamp = Stamp((total + turned) * _MICROSECOND, earliest, max(now_ns - _FRAME_NS, earliest))
+        self._asked_ns = None
 
     def _advance_clock(self, stamp: int | None) -> bool:
         """Undo the wrapping of the drive's clock; false if it went backwards."""

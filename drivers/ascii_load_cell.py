@@ -6,9 +6,10 @@ reading is ``uncertain``, and times are those of the bench when the line ended.
 """
 
 import re
+import threading
 import time
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -93,6 +94,19 @@ class ReadingStream:
             self.last_ns = received_ns
         return list(_blocks(lines, received_ns))
 
+    def state(self) -> dict[str, Any]:
+        """Where it stands: what `resume` needs to go on with the bytes after ``at_ns`` as this one does."""
+        return {
+            "at_ns": self._fed_ns, "buffer": self._buffer.hex(), "number": self._number, "before": self._before,
+            "accepted": self._accepted, "astray": self._astray, "wild_step": self._wild_step,
+        }  # fmt: skip
+
+    def resume(self, state: Mapping[str, Any]) -> None:
+        """Go on from a `state`."""
+        self._fed_ns, self._buffer, self._number = state["at_ns"], bytes.fromhex(state["buffer"]), state["number"]
+        self._before, self._accepted = state["before"], state["accepted"]
+        self._astray, self._wild_step = state["astray"], state["wild_step"]
+
     def _complete(self) -> Iterator[Line]:
         *ended, rest = re.split(rb"[\r\n]+", self._buffer)
         for text in ended:
@@ -176,6 +190,7 @@ class AsciiLoadCell:
         self._stream = ReadingStream(wild_step)
         self._before = (0, 0, 0, 0)
         self._pending: list[Block] = []
+        self._feeding = threading.Lock()
 
     def connect(self) -> None:
         """Open the line and wait for two readings that agree.
@@ -239,6 +254,11 @@ class AsciiLoadCell:
         self._known(channel)
         raise OutOfRange(f"{self.name}: {channel} is measured, never set to {value:.6g} N; nothing was sent")
 
+    def describe(self) -> dict[str, Any]:
+        """What a replay needs beside the frames from now on, see `drivers.replay`."""
+        with self._feeding:
+            return {"decoder": "ascii_load_cell", "state": self._stream.state()}
+
     def make_safe(self) -> None:
         """Nothing: it moves nothing."""
 
@@ -277,6 +297,7 @@ class AsciiLoadCell:
             left = deadline - time.monotonic()
             frame = self._line.read(0.0 if self._pending else max(left, 0.0))
             if frame is not None:
-                self._pending += self._stream.feed(frame.received_ns, frame.data)
+                with self._feeding:
+                    self._pending += self._stream.feed(frame.received_ns, frame.data)
             if self._pending or left <= 0:
                 return bool(self._pending)

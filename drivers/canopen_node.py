@@ -6,6 +6,7 @@ answer is waited for before the next question, so that it can never be taken for
 """
 
 import contextlib
+import logging
 import queue
 import struct
 import threading
@@ -19,6 +20,9 @@ import canopen
 from drivers.can_bus import CanBus
 from drivers.errors import BadReply, NoReply, NotConnected, Refused
 from drivers.instrument import Clock
+
+# What goes wrong is raised or counted here; a library that also writes it on standard error says it twice.
+logging.getLogger("canopen").addHandler(logging.NullHandler())
 
 _SILENCE = "No SDO response received"
 _EMERGENCY = struct.Struct("<HB5s")

@@ -77,6 +77,17 @@ class Block(NamedTuple):
     quality: Quality
 
 
+class Stamp(NamedTuple):
+    """The instrument's clock beside the bench's: it was read between the two."""
+
+    device_ns: int
+    """The instrument's clock, unwrapped [ns]."""
+    sent_ns: int
+    """Bench clock when the question went out [ns]."""
+    received_ns: int
+    """Bench clock when the answer was complete [ns]."""
+
+
 class Frame(NamedTuple):
     """What passed on the wire, for the log and for replay."""
 

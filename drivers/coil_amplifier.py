@@ -9,14 +9,13 @@ ramps its output to zero by itself. `make_safe` is the faster way there, never t
 import time
 from dataclasses import replace
 from enum import IntEnum, IntFlag
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
-from drivers.channel import Block, Channel, Numbers, Reading
+from drivers.channel import Block, Channel, Numbers, Reading, Stamp
 from drivers.coil_table import StepTable, TableProgress
 from drivers.errors import DriverError, OutOfRange, Refused
 from drivers.instrument import Clock, Health, Tap
 from drivers.modbus_address import ModbusAddress
-from drivers.modbus_ring import Stamp
 from drivers.modbus_sampler import Sampler
 
 Mode = Literal["voltage", "current"]
@@ -217,6 +216,11 @@ class CoilAmplifier:
         if words := self.condition().words:
             raise Refused(f"{self.name}: after a reset still: {words}; find the cause")
 
+    @property
+    def table_capacity(self) -> int:
+        """Steps that its table holds."""
+        return self._table.capacity
+
     def upload(self, times: Numbers, levels: Numbers) -> None:
         """Bring steps into its table and read them back; nothing moves yet.
 
@@ -262,6 +266,10 @@ class CoilAmplifier:
             NotConnected, NoReply, BadReply, Refused: it did not say.
         """
         return self._table.progress(self._sampler.ring.device_ns)
+
+    def describe(self) -> dict[str, Any]:
+        """What a replay needs beside the frames from now on, see `drivers.replay`."""
+        return self._sampler.describe()
 
     def make_safe(self) -> None:
         """Bring the output to zero by its ramp; where the wire is dead, the amplifier's watchdog does it."""

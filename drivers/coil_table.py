@@ -42,6 +42,11 @@ class StepTable:
         self._columns = table["columns"]
         self._commands: dict[str, int] = registers.map.document["codes"]["table_command"]
 
+    @property
+    def capacity(self) -> int:
+        """Steps that it holds."""
+        return self._capacity
+
     def upload(self, times: Numbers, levels: Numbers) -> None:
         """Write steps and read them back.
 

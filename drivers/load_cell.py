@@ -11,11 +11,12 @@ import contextlib
 import itertools
 import threading
 import time
-from typing import Final
+from typing import Any, Final
 
-from drivers.channel import Block, Channel, Reading
+from drivers.channel import Block, Channel, Reading, Stamp
 from drivers.errors import BadReply, DriverError, NoReply, OutOfRange, Refused
 from drivers.instrument import Clock, Health, Tap
+from drivers.load_cell_clock import ClockReader
 from drivers.load_cell_frames import CONTRACT, Acknowledgement, Answer, Identity, Request, encode
 from drivers.load_cell_stream import Counts, SampleStream
 from drivers.serial_line import SerialLine
@@ -59,8 +60,10 @@ class LoadCell:
         )
         self._clock = clock
         self._rate = self._offered(rate)
-        self._line = SerialLine(name, port, baud or CONTRACT["line"]["baud"], clock, _DEADLINES["write_s"])
+        baud = baud or int(CONTRACT["line"]["baud"])
+        self._line = SerialLine(name, port, baud, clock, _DEADLINES["write_s"])
         self._stream = SampleStream()
+        self._clock_reader = ClockReader(self._stream, clock, baud)
         self._before = Counts()
         self._pending: list[Block] = []
         self._newest: dict[str, Block] = {}
@@ -87,6 +90,12 @@ class LoadCell:
         except DriverError:
             self._line.close()
             raise
+        self._clock_reader.restart()
+
+    @property
+    def stamp(self) -> Stamp | None:
+        """Its clock beside the bench's, the newest reading; none before the first."""
+        return self._clock_reader.stamp
 
     def close(self) -> None:
         """Stop the stream and close the line; harmless when repeated or when never connected."""
@@ -107,7 +116,9 @@ class LoadCell:
         deadline = time.monotonic() + timeout
         while True:
             left = deadline - time.monotonic()
-            self._pump(0.0 if self._pending else max(left, 0.0))
+            with contextlib.suppress(DriverError):  # of a line that has gone, reading tells
+                self._clock_reader.attend(self._token, self._line.write)
+            self._pump(0.0 if self._pending else max(min(left, self._clock_reader.patience() or _SLICE), 0.0))
             if self._pending or left <= 0:
                 break
         with self._reading:
@@ -142,6 +153,11 @@ class LoadCell:
         """
         self._known(channel)
         raise OutOfRange(f"{self.name}: {channel} is measured, never set to {value:.6g} N; nothing was sent")
+
+    def describe(self) -> dict[str, Any]:
+        """What a replay needs beside the frames from now on, see `drivers.replay`."""
+        with self._reading:
+            return {"decoder": "load_cell", "state": self._stream.state()}
 
     def make_safe(self) -> None:
         """Nothing: it moves nothing, and what brings the rest to rest still wants its samples."""
@@ -254,7 +270,7 @@ class LoadCell:
     def _ask(self, command: str, argument: int = 0) -> Answer:
         """Send a request until it is answered; its token tells a late answer from the right one."""
         with self._asking:
-            request = Request(next(self._tokens) % 256, _COMMANDS[command], argument)
+            request = Request(self._token(), _COMMANDS[command], argument)
             self._stream.answers.pop(request.token, None)
             for _ in range(_DEADLINES["attempts"]):
                 self._line.write(encode(request))
@@ -264,6 +280,9 @@ class LoadCell:
             f"{self.name}: {command} was not answered within {_DEADLINES['reply_s']:.3g} s, "
             f"asked {_DEADLINES['attempts']} times; check power, cable and baud rate"
         )
+
+    def _token(self) -> int:
+        return next(self._tokens) % 256
 
     def _answer_to(self, request: Request) -> Answer | None:
         deadline = time.monotonic() + _DEADLINES["reply_s"]

@@ -120,6 +120,15 @@ class Decoder:
         self._buffer = bytearray()
         self._astray = False
 
+    @property
+    def rest(self) -> bytes:
+        """Bytes that are no whole frame yet."""
+        return bytes(self._buffer)
+
+    @rest.setter
+    def rest(self, rest: bytes) -> None:
+        self._buffer = bytearray(rest)
+
     def feed(self, data: bytes) -> list[Packet]:
         """The frames that are complete with ``data``, in order."""
         self._buffer += data

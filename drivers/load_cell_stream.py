@@ -5,9 +5,9 @@ It depends on nothing but the bytes and their stamps, so that a replay of the re
 bit for bit.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import groupby
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,6 +53,8 @@ class SampleStream:
     def __init__(self) -> None:
         self.answers: dict[int, Answer] = {}
         """The last answer to each token."""
+        self.answered_ns: dict[int, int] = {}
+        """Bench clock when it was complete, by token [ns]."""
         self.latest: Sample | None = None
         """The newest sample."""
         self.last_ns: int | None = None
@@ -67,7 +69,7 @@ class SampleStream:
         self._restarted = 0
         self._number = -1
         self._time = 0
-        self._sampled_ns = 0
+        self._sampled_ns = self._fed_ns = 0
         self._fresh = True
 
     def counts(self) -> Counts:
@@ -82,15 +84,43 @@ class SampleStream:
             received_ns: bench clock of the last byte [ns].
             data: as it came from the line, cut anywhere.
         """
+        self._fed_ns = received_ns
         numbered = []
         for packet in self._decoder.feed(data):
             self._received += 1
             if isinstance(packet, Acknowledgement | Identity):
                 self._answered(packet)
+                self.answered_ns[packet.token] = received_ns
             elif isinstance(packet, Sample) and self.rate is not None:
                 numbered.append(self._placed(packet, self.rate, received_ns))
             self.last_ns = received_ns
         return list(_blocks(numbered, received_ns))
+
+    def unwrapped(self, clock: int) -> int:
+        """Its clock [us] without its turns, from a reading, signed or not, that is close to the newest sample."""
+        if self.latest is None:
+            return clock % _TICKS
+        return self._time + (clock - self.latest.time + _TICKS // 2) % _TICKS - _TICKS // 2
+
+    def state(self) -> dict[str, Any]:
+        """Where it stands: what `resume` needs to go on with the bytes after ``at_ns`` as this one does."""
+        return {
+            "at_ns": self._fed_ns,
+            "buffer": self._decoder.rest.hex(),
+            "rate": self.rate,
+            "fresh": self._fresh,
+            "number": self._number,
+            "time": self._time,
+            "sampled_ns": self._sampled_ns,
+            "latest": None if self.latest is None else list(self.latest),
+        }
+
+    def resume(self, state: Mapping[str, Any]) -> None:
+        """Go on from a `state`."""
+        self._decoder.rest = bytes.fromhex(state["buffer"])
+        self.rate, self._fresh, self._number = state["rate"], state["fresh"], state["number"]
+        self._time, self._sampled_ns = state["time"], state["sampled_ns"]
+        self.latest = None if state["latest"] is None else Sample(*state["latest"])
 
     def _answered(self, answer: Answer) -> None:
         self.answers[answer.token] = answer

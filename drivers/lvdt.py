@@ -5,11 +5,12 @@ the time that a sample arrives it is tens of milliseconds old (`Lvdt.age` says h
 late for limits that must act fast.
 """
 
-from drivers.channel import Block, Channel, Reading
+from typing import Any
+
+from drivers.channel import Block, Channel, Reading, Stamp
 from drivers.errors import OutOfRange
 from drivers.instrument import Clock, Health, Tap
 from drivers.modbus_address import ModbusAddress
-from drivers.modbus_ring import Stamp
 from drivers.modbus_sampler import Sampler
 
 
@@ -89,6 +90,10 @@ class Lvdt:
             OutOfRange: always.
         """
         raise OutOfRange(f"{self.name}: {channel} cannot be set to {value:.6g}: an LVDT only measures")
+
+    def describe(self) -> dict[str, Any]:
+        """What a replay needs beside the frames from now on, see `drivers.replay`."""
+        return self._sampler.describe()
 
     def make_safe(self) -> None:
         """Nothing to do: it moves nothing."""

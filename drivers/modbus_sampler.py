@@ -1,6 +1,7 @@
 """What the Modbus instruments have in common: a line, named registers, a ring of samples."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,8 +11,13 @@ from drivers.instrument import Clock
 from drivers.modbus_address import ModbusAddress, carried
 from drivers.modbus_line import ModbusLine
 from drivers.modbus_registers import RegisterMap, Registers, load_map
-from drivers.modbus_ring import Layout, Ring
+from drivers.modbus_ring import Ring
+from drivers.modbus_samples import Layout
 
+_EVERY = 0.05
+"""[s] between two readings of a ring at most, but for an instrument that is slower: it is read once a sample."""
+_FULL = 0.9
+"""Share of a block that is waited for: each reading costs the host as much, however little stands in it."""
 _SPARE = 1.1
 """A wire must carry this much more than the samples made, or it never catches up."""
 
@@ -66,7 +72,10 @@ class Sampler:
         self.rate = check_rate(name, address, map_)
         self.line = ModbusLine(name, address, unit or map_.unit, clock, timeout)
         self.registers = Registers(self.line, map_)
-        self.ring = Ring(self.registers, clock)
+        layout = Layout(map_)
+        interval = layout.interval_ns * 1e-9
+        every = max(min(_FULL * layout.capacity * interval, _EVERY), interval)
+        self.ring = Ring(self.registers, clock, every=every)
 
     def channels(self) -> tuple[Channel, ...]:
         """The channels of its samples."""
@@ -85,6 +94,15 @@ class Sampler:
         except Exception:
             self.line.close()
             raise
+
+    def describe(self) -> dict[str, Any]:
+        """What `drivers.replay.decoder` needs beside the frames from now on."""
+        return {
+            "decoder": "modbus_ring",
+            "instrument": self.registers.map.instrument,
+            "rtu": self.line.address.rtu,
+            "state": self.ring.state(),
+        }
 
     def read(self, channel: str) -> Reading:
         """Its newest sample of a channel, asked for now.

@@ -1,10 +1,11 @@
 """Thermometer over Modbus: the temperature of the damper's cylinder, ten times a second."""
 
-from drivers.channel import Block, Channel, Reading
+from typing import Any
+
+from drivers.channel import Block, Channel, Reading, Stamp
 from drivers.errors import OutOfRange
 from drivers.instrument import Clock, Health, Tap
 from drivers.modbus_address import ModbusAddress
-from drivers.modbus_ring import Stamp
 from drivers.modbus_sampler import Sampler
 
 
@@ -84,6 +85,10 @@ class Thermometer:
             OutOfRange: always.
         """
         raise OutOfRange(f"{self.name}: {channel} cannot be set to {value:.6g}: a thermometer only measures")
+
+    def describe(self) -> dict[str, Any]:
+        """What a replay needs beside the frames from now on, see `drivers.replay`."""
+        return self._sampler.describe()
 
     def make_safe(self) -> None:
         """Nothing to do: it moves nothing."""

@@ -1,12 +1,13 @@
 """From recordings to the pieces that a fit or a prediction works on: smooth motion, known delays, masks."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatch
 
 import numpy as np
+import orjson
 
-from identification.arrays import Array, BoolArray
+from identification.arrays import BoolArray
 from identification.drive import steady_levels
 from identification.errors import NothingToFit
 from identification.force_channel import LowPass, filter_lag
@@ -21,6 +22,8 @@ _SKIPPED = 0.02
 
 _FILTER_RATE = 4000.0
 """[Hz] at which the force is simulated in front of a filter."""
+_TIMED = {"force", "displacement", "coil_voltage", "coil_current"}
+"""Channels between which a delay matters."""
 _MAPPED = 20e-6
 """[s] what remains between two device clocks that were mapped onto the bench clock."""
 
@@ -77,8 +80,24 @@ class Assembled:
 def _clock_spread(recording: Recording) -> float:
     """Standard deviation [s] of a channel delay: as mapped on a bench, else half the shortest sample."""
     if recording.metadata["run"].get("source") == "run":
-        return _MAPPED
+        return max(_MAPPED, _largest_skew(_clocks(recording)))
     return 0.5 / max(s.rate for s in recording.stretches)
+
+
+def _clocks(recording: Recording) -> Mapping[str, str]:
+    """What the log says of its clocks, at its end if it has one: by then they are known best."""
+    metadata = recording.metadata
+    return metadata.get("clock_skew") or metadata.get("clocks", {})
+
+
+def _largest_skew(clocks: Mapping[str, str]) -> float:
+    """Standard deviation [s] of the delay between force and the other channels, as the log's clocks say.
+
+    Each says within how much it was mapped, in 95 of 100 samples; two of them stand between two channels.
+    """
+    known = [facts for words in clocks.values() if isinstance(facts := orjson.loads(words), dict)]
+    left = sorted(facts.get("skew_s") or 0.0 for facts in known if _TIMED & set(facts.get("channels", ())))
+    return float(np.hypot(left[-2], left[-1])) / 2 if len(left) > 1 else 0.0
 
 
 def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> Assembled:
@@ -92,23 +111,26 @@ def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> 
         raise NothingToFit(f"the logs are driven in different ways ({', '.join(sorted(kinds))}); fit them apart")
     stretches = [s for r in recordings for s in r.stretches]
     held = [hold_out.mask(s) for s in stretches]
+    starts = [s.time[0] - r.stretches[0].time[0] for r in recordings for s in r.stretches]
     pieces, floors = [], []
-    for stretch, out in zip(stretches, held, strict=True):
+    for stretch, out, start in zip(stretches, held, starts, strict=True):
         motion = estimate_motion(stretch)
         floors.append(measure_floor(stretch, motion))
         fitted = stretch.measured & ~out
         fitted[: round(_SKIPPED * stretch.rate)] = False
-        pieces.append(_piece(stretch, motion.displacement, motion.velocity, motion.acceleration, fitted))
+        power = np.abs(stretch.force * motion.velocity)
+        stroke = Stroke(stretch.rate, *motion[:3], steady_levels(stretch.drive), start=float(start), power=power)
+        pieces.append(_piece(stretch, stroke, fitted))
     _check(hold_out, held, pieces)
     floor = combine_floors(stretches, floors)
     return Assembled(tuple(pieces), tuple(held), tuple(stretches), floor, tuple(recordings))
 
 
-def _piece(stretch: Stretch, x: Array, v: Array, a: Array, fitted: BoolArray) -> Piece:
+def _piece(stretch: Stretch, stroke: Stroke, fitted: BoolArray) -> Piece:
     displacement_lag = stretch.displacement_delay + filter_lag(stretch.displacement_filter)
     return Piece(
         name=stretch.name,
-        stroke=Stroke(stretch.rate, x, v, a, steady_levels(stretch.drive)),
+        stroke=stroke,
         force=stretch.force,
         train=fitted.astype(np.float64),
         force_delay=stretch.force_delay - displacement_lag,

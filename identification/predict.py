@@ -1,18 +1,22 @@
-"""A fit on another log: how well does it repeat the force there?"""
+"""A fit, a twin or a scenario on another log: how well does it repeat the force there?"""
 
 from importlib.metadata import version
 
 import numpy as np
 
-from identification.assemble import HoldOut, assemble
-from identification.prediction import normalised, per_drive, predict_piece, rmse
+from identification.assemble import Assembled, HoldOut, assemble
+from identification.gap.model import Model, model_of_fit
+from identification.prediction import normalised, per_drive, rmse
 from identification.recordings import Recording
 from identification.results import Fit, Prediction, Provenance
 from identification.series import Series
 
+_NEAR_FLOOR = 1.02
+"""[1] RMSE over the floor below which there is no gap to shrink."""
 
-def predict_log(fit: Fit, recording: Recording, *, free_offset: bool = False) -> tuple[Prediction, Series]:
-    """Simulate a fit on a log.
+
+def predict_log(fit: Fit | Model, recording: Recording, *, free_offset: bool = False) -> tuple[Prediction, Series]:
+    """Simulate a fit, or a model from any other document, on a log.
 
     Args:
         fit: the damper, with the lags of its bench.
@@ -22,28 +26,31 @@ def predict_log(fit: Fit, recording: Recording, *, free_offset: bool = False) ->
     Returns:
         The errors, and recorded beside simulated force.
     """
-    seen = recording.sha256 in fit.provenance.logs.values()
-    assembled = assemble([recording], _held_out_in(fit) if seen else HoldOut())
-    delays = (fit.nuisances.force_delay.value, fit.nuisances.drive_delay.value)
-    point = fit.point()
-    found = [predict_piece(p, point, delays, free_offset=free_offset) for p in assembled.pieces]
+    model = model_of_fit(fit) if isinstance(fit, Fit) else fit
+    seen = isinstance(fit, Fit) and recording.sha256 in fit.provenance.logs.values()
+    assembled = assemble([recording], _held_out_in(fit) if seen and isinstance(fit, Fit) else HoldOut())
+    found = [model.on(p, free_offset=free_offset) for p in assembled.pieces]
     measured = [s.measured for s in assembled.stretches]
     errors = [(f.force - p.force)[m] for f, p, m in zip(found, assembled.pieces, measured, strict=True)]
     forces = [p.force[m] for p, m in zip(assembled.pieces, measured, strict=True)]
     drives = [p.stroke.drive[m] for p, m in zip(assembled.pieces, measured, strict=True)]
     error, force = np.concatenate(errors), np.concatenate(forces)
+    before = _before(model, assembled, free_offset)
+    floor = assembled.floor.noise
     prediction = Prediction(
         rmse_n=rmse(error),
         nrmse=normalised(error, force),
         bias_n=float(error.mean()),
-        noise_floor_n=assembled.floor.noise,
+        noise_floor_n=floor,
         per_drive=per_drive(drives, errors, forces, assembled.drive_unit),
         samples=len(error),
         freed=["y0 of each stretch"] + (["force offset of each stretch"] if free_offset else []),
+        before_n=before,
+        shrinkage=None if before is None else _shrinkage(before, rmse(error), floor),
         provenance=Provenance(
             logs={recording.path.name: recording.sha256},
             version=version("mrbench"),
-            seed=fit.provenance.seed,
+            seed=fit.provenance.seed if isinstance(fit, Fit) else 0,
             settings={"free": "offset" if free_offset else None, "log_seen_by_fit": seen},
         ),
     )
@@ -61,6 +68,25 @@ def predict_log(fit: Fit, recording: Recording, *, free_offset: bool = False) ->
         drive_unit=assembled.drive_unit,
     )
     return prediction, series
+
+
+def _before(model: Model, assembled: Assembled, free_offset: bool) -> float | None:
+    """RMSE [N] of a twin's baseline, the fit without effects; none of other models."""
+    if model.baseline is None:
+        return None
+    plain = model_of_fit(model.baseline)
+    errors = [
+        (plain.on(p, free_offset=free_offset).force - p.force)[s.measured]
+        for p, s in zip(assembled.pieces, assembled.stretches, strict=True)
+    ]
+    return rmse(np.concatenate(errors))
+
+
+def _shrinkage(before: float, after: float, floor: float) -> float | None:
+    """Part of the gap's variance that the effects take away; none within two per cent of the floor."""
+    if before < _NEAR_FLOOR * floor:
+        return None
+    return 1.0 - (after**2 - floor**2) / (before**2 - floor**2)
 
 
 def _held_out_in(fit: Fit) -> HoldOut:

@@ -14,7 +14,7 @@ from identification.damper.coordinates import Coordinates
 from identification.drive import drive_bins
 from identification.problem import Piece
 from identification.results import DriveError
-from identification.simulate import UNKNOWNS, Setting
+from identification.simulate import UNKNOWNS, ActiveEffect, Setting
 
 _Y0 = UNKNOWNS.index("y0")
 _ROUNDS = 2
@@ -33,7 +33,12 @@ class Predicted:
 
 
 def predict_piece(
-    piece: Piece, point: Coordinates, delays: tuple[float, float] = (0.0, 0.0), *, free_offset: bool = False
+    piece: Piece,
+    point: Coordinates,
+    delays: tuple[float, float] = (0.0, 0.0),
+    *,
+    effects: tuple[ActiveEffect, ...] = (),
+    free_offset: bool = False,
 ) -> Predicted:
     """Simulate one stretch with y(0), and on request a force offset, fitted to it by Gauss-Newton.
 
@@ -41,23 +46,26 @@ def predict_piece(
         piece: the stretch; y(0) is found on its fitted samples, or on all where none is fitted.
         point: the damper.
         delays: residual lags of force and drive channel [s], beyond what the instruments report.
+        effects: what acts beside the law.
         free_offset: also fit a constant force.
     """
     y0, offset = float(piece.stroke.displacement.mean()), 0.0
     quick = piece.quicker()
     weight = piece.train if piece.train.any() else np.ones(len(piece.force))
     for _ in range(_ROUNDS):
-        force, slopes = quick.recorded(_setting(piece, point, delays, y0), slopes=True)
+        force, slopes = quick.recorded(_setting(piece, point, delays, y0, effects), slopes=True)
         J = np.column_stack([slopes[:, _Y0]] + ([np.ones(len(force))] if free_offset else []))
         step = np.linalg.lstsq(J * weight[:, None], (piece.force - force - offset) * weight, rcond=None)[0]
         y0 += float(step[0])
         offset += float(step[1]) if free_offset else 0.0
-    force, _ = piece.recorded(_setting(piece, point, delays, y0))
+    force, _ = piece.recorded(_setting(piece, point, delays, y0, effects))
     return Predicted(force + offset, y0, offset)
 
 
-def _setting(piece: Piece, point: Coordinates, delays: tuple[float, float], y0: float) -> Setting:
-    return Setting(point, y0, piece.force_delay + delays[0], piece.drive_delay + delays[1])
+def _setting(
+    piece: Piece, point: Coordinates, delays: tuple[float, float], y0: float, effects: tuple[ActiveEffect, ...]
+) -> Setting:
+    return Setting(point, y0, piece.force_delay + delays[0], piece.drive_delay + delays[1], effects)
 
 
 def rmse(error: Array) -> float:

@@ -3,6 +3,7 @@
 The unknowns are the search numbers, one inner displacement y(0) a stretch, and a small delay of the force and
 of the drive channel against the displacement. Priors hold the delays, by what is known of the clocks, and y(0),
 which cannot have been far outside the stroke: with a weak k0 it would else run off and carry a force offset.
+Effects beside the law bring their parameters as further unknowns, behind all others.
 """
 
 from collections.abc import Sequence
@@ -13,9 +14,10 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.damper.coordinates import Coordinates
+from identification.effect_choice import EffectChoice
 from identification.force_channel import LowPass
 from identification.search_space import SearchSpace
-from identification.simulate import UNKNOWNS, Setting, Stroke, simulate
+from identification.simulate import UNKNOWNS, ActiveEffect, Setting, Stroke, simulate
 
 COORDINATE_COUNT = len(Coordinates._fields)
 _Y0_SCALE = 1e-3
@@ -24,6 +26,8 @@ _Y0_STROKES = 1.0
 """[1] standard deviation of y(0) about the middle of the motion, in half strokes."""
 _SHARED = COORDINATE_COUNT + 2
 """Unknowns that all pieces share: the search numbers and the two delays."""
+_FAR = 10.0
+"""[1] change of an effect's size, in its usual unit, that counts like one of a search number."""
 
 
 @dataclass(frozen=True)
@@ -42,22 +46,43 @@ class Piece:
     """[s] known further lag of the force channel behind the drive channel."""
     low_pass: LowPass | None = None
     """What the force channel does to the force, beside delaying it."""
+    finer_for_play: int = 4
+    """Times the rate at which play in the mounting is looked at."""
 
     def recorded(self, setting: Setting, *, slopes: bool = False) -> tuple[Array, Array]:
         """Force [N] (N,) as the channel would record it, and its slopes (N, unknowns) if asked for."""
-        if self.low_pass is None:
-            found = simulate(setting, self.stroke, slopes=slopes)
-            return found.force, found.slopes
-        found = simulate(setting, self._finer_stroke, slopes=slopes)
-        return self.low_pass.apply(found.force), self.low_pass.apply(found.slopes) if slopes else found.slopes
+        if self.low_pass is not None:
+            found = simulate(setting, self._finer(self.low_pass.finer), slopes=slopes)
+            passed = self.low_pass.apply(found.force)
+            return passed, self.low_pass.apply(found.slopes) if slopes else found.slopes
+        # Play begins and ends within a sample, and the damper's velocity jumps there.
+        times = self.finer_for_play if setting.acting("displacement_follower") else 1
+        found = simulate(setting, self._finer(times), slopes=slopes)
+        return found.force[::times], found.slopes[::times]
 
     def quicker(self) -> "Piece":
-        """The same with the filter applied at the samples only: a good way near, a little beside."""
-        return replace(self, low_pass=replace(self.low_pass, finer=1)) if self.low_pass else self
+        """The same with filter and play looked at in the samples only: a good way near, a little beside."""
+        low_pass = replace(self.low_pass, finer=1) if self.low_pass else None
+        return replace(self, low_pass=low_pass, finer_for_play=1)
+
+    def coarser(self, times: int) -> "Piece":
+        """The same at every so many samples; a filter keeps its own rate no longer, so it only comes near."""
+        stroke = self.stroke.coarser(times)
+        thin = slice(0, len(stroke.displacement) * times, times)
+        low_pass = self.low_pass and replace(self.low_pass, rate=stroke.rate, finer=1)
+        return replace(
+            self.quicker(), stroke=stroke, force=self.force[thin], train=self.train[thin], low_pass=low_pass
+        )
+
+    def _finer(self, times: int) -> Stroke:
+        """The stroke at a higher rate, made once."""
+        if times not in self._finer_strokes:
+            self._finer_strokes[times] = self.stroke.finer(times)
+        return self._finer_strokes[times]
 
     @cached_property
-    def _finer_stroke(self) -> Stroke:
-        return self.stroke.finer(self.low_pass.finer if self.low_pass else 1)
+    def _finer_strokes(self) -> dict[int, Stroke]:
+        return {}
 
 
 @dataclass(frozen=True)
@@ -74,7 +99,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Problem:
-    """Pieces, noise and priors; the vector of unknowns is q (13), delays (2), y(0) of each piece."""
+    """Pieces, noise and priors; the vector of unknowns is q (13), delays (2), y(0) of each piece, effects."""
 
     pieces: tuple[Piece, ...]
     space: SearchSpace
@@ -82,6 +107,8 @@ class Problem:
     """[N] standard deviation of the force noise."""
     delay_prior: float
     """[s] standard deviation of each delay beyond what is known."""
+    effects: tuple[EffectChoice, ...] = ()
+    """What is fitted along with the law."""
 
     @property
     def samples(self) -> int:
@@ -92,12 +119,22 @@ class Problem:
     def free(self) -> BoolArray:
         """(U,) True where an unknown is free."""
         delays = [True, not self.space.one_drive]
-        return np.concatenate([self.space.free, delays, np.ones(len(self.pieces), bool)])
+        return np.concatenate([self.space.free, delays, np.ones(len(self.pieces) + self.effect_count, bool)])
+
+    @property
+    def effect_count(self) -> int:
+        """Parameters of the effects."""
+        return sum(len(e.quantities) for e in self.effects)
+
+    @property
+    def first_effect(self) -> int:
+        """Place of the effects' first unknown."""
+        return _SHARED + len(self.pieces)
 
     @property
     def delays(self) -> BoolArray:
         """(U,) True for the two delays."""
-        mask = np.zeros(_SHARED + len(self.pieces), bool)
+        mask = np.zeros(self.first_effect + self.effect_count, bool)
         mask[COORDINATE_COUNT:_SHARED] = True
         return mask
 
@@ -105,12 +142,31 @@ class Problem:
         """Lowest and highest unknowns, (U,) each."""
         low, high = self.space.bounds()
         rest = np.full(2 + len(self.pieces), np.inf)
-        return np.concatenate([low, -rest]), np.concatenate([high, rest])
+        own = [e.bounds() for e in self.effects]
+        lows, highs = [b[0] for b in own], [b[1] for b in own]
+        return np.concatenate([low, -rest, *lows]), np.concatenate([high, rest, *highs])
 
     def start(self, coordinates: Coordinates) -> Array:
         """(U,) unknowns at a point, delays as known, y(0) where the inner displacement would come to rest."""
         y0 = [p.stroke.displacement.mean() / _Y0_SCALE for p in self.pieces]
-        return np.concatenate([self.space.to_search(coordinates), np.zeros(2), y0])
+        own = [e.to_search(e.form.starts[0]) for e in self.effects]
+        return np.concatenate([self.space.to_search(coordinates), np.zeros(2), y0, *own])
+
+    def step_length(self, step: Array) -> float:
+        """Largest change in a step (U,), in units of a search number; delays and y(0) do not count."""
+        own = np.abs(step[self.first_effect :])
+        if not len(own):
+            return float(np.abs(step[:COORDINATE_COUNT]).max())
+        logarithmic = np.concatenate([e.logarithmic for e in self.effects])
+        sizes = np.where(logarithmic, own, own / _FAR)
+        return float(max(np.abs(step[:COORDINATE_COUNT]).max(), sizes.max()))
+
+    def active_effects(self, unknowns: Array) -> tuple[ActiveEffect, ...]:
+        """The effects with their values."""
+        starts = np.cumsum([self.first_effect, *(len(e.quantities) for e in self.effects)])
+        return tuple(
+            e.active(unknowns[at : at + len(e.quantities)]) for at, e in zip(starts, self.effects, strict=False)
+        )
 
     def setting(self, unknowns: Array, piece: int) -> Setting:
         """What a piece is simulated with."""
@@ -121,6 +177,7 @@ class Problem:
             y0=float(unknowns[_SHARED + piece]) * _Y0_SCALE,
             force_delay=p.force_delay + float(force_delay),
             drive_delay=p.drive_delay + float(drive_delay),
+            effects=self.active_effects(unknowns),
         )
 
     def simulate(self, unknowns: Array) -> list[Array]:
@@ -128,11 +185,12 @@ class Problem:
         return [p.recorded(self.setting(unknowns, i))[0] for i, p in enumerate(self.pieces)]
 
     def columns(self, piece: int) -> list[int]:
-        """Places of the unknowns that a piece depends on: q, the two delays, its own y(0)."""
-        return [*range(_SHARED), _SHARED + piece]
+        """Places of the unknowns that a piece depends on: q, the two delays, its own y(0), effects."""
+        effects = range(self.first_effect, self.first_effect + self.effect_count)
+        return [*range(_SHARED), _SHARED + piece, *effects]
 
     def residuals(self, unknowns: Array, piece: int) -> tuple[Array, Array]:
-        """Residuals (N,) of a piece and their slopes (N, 16) over its ``columns``; zero where not fitted."""
+        """Residuals (N,) of a piece and their slopes (N, 16 + P) over its ``columns``; zero where not fitted."""
         weight, r, J = self._raw(unknowns, piece)
         return r * weight, (J * weight[:, None]) @ self._scales(unknowns)
 
@@ -152,33 +210,54 @@ class Problem:
             cost += float(r @ r)
         return Evaluation(cost if np.isfinite(cost) else np.inf, hessian, gradient)
 
+    def cost(self, unknowns: Array) -> float:
+        """The cost alone; an unstable point costs infinity."""
+        centre, weight = self._priors()
+        total = float(np.sum((weight * (unknowns - centre)) ** 2))
+        for force, p in zip(self.simulate(unknowns), self.pieces, strict=True):
+            total += float(np.sum((p.train / self.noise * (force - p.force)) ** 2))
+        return total if np.isfinite(total) else np.inf
+
     def _priors(self) -> tuple[Array, Array]:
         """Centre and weight (U,) of the priors; a weight of zero holds nothing."""
         stroke = max(float(np.ptp(p.stroke.displacement)) for p in self.pieces) / 2.0
         means = np.array([p.stroke.displacement.mean() for p in self.pieces])
-        rest = np.zeros(COORDINATE_COUNT)
-        centre = np.concatenate([rest, [0.0, 0.0], means / _Y0_SCALE])
+        rest, own = np.zeros(COORDINATE_COUNT), np.zeros(self.effect_count)
+        centre = np.concatenate([rest, [0.0, 0.0], means / _Y0_SCALE, own])
         held = np.full(len(means), _Y0_SCALE / (_Y0_STROKES * stroke))
-        return centre, np.concatenate([rest, [1.0, 1.0], held])
+        return centre, np.concatenate([rest, [1.0, 1.0], held, own])
 
     def _raw(self, unknowns: Array, piece: int) -> tuple[Array, Array, Array]:
-        """Weights [1/N], force errors [N] and their slopes (N, 16) over coordinates, delays [s] and y(0) [m]."""
+        """Weights [1/N], force errors [N] and their slopes (N, 16 + P) over what ``UNKNOWNS`` says and effects."""
         p = self.pieces[piece]
         force, slopes = p.recorded(self.setting(unknowns, piece), slopes=True)
         return p.train / self.noise, force - p.force, slopes
 
     def _scales(self, unknowns: Array) -> Array:
-        """(16, 16) derivative of coordinates, y(0) and delays over a piece's unknowns."""
-        D = np.zeros((len(UNKNOWNS), _SHARED + 1))
+        """(16 + P, 16 + P) derivative of coordinates, y(0), delays and effects over a piece's unknowns."""
+        D = np.zeros((len(UNKNOWNS) + self.effect_count, _SHARED + 1 + self.effect_count))
         D[:COORDINATE_COUNT, :COORDINATE_COUNT] = self.space.slopes(unknowns[:COORDINATE_COUNT])
         D[UNKNOWNS.index("force_delay"), COORDINATE_COUNT] = self.delay_prior
         D[UNKNOWNS.index("drive_delay"), COORDINATE_COUNT + 1] = self.delay_prior
         D[UNKNOWNS.index("y0"), _SHARED] = _Y0_SCALE
+        at = self.first_effect
+        for e in self.effects:
+            own = np.arange(at, at + len(e.quantities)) - self.first_effect
+            D[len(UNKNOWNS) + own, _SHARED + 1 + own] = e.slopes(unknowns[at : at + len(own)])
+            at += len(own)
         return D
 
     def quicker(self) -> "Problem":
         """The same problem with quicker pieces, for the way to the minimum but not for its end."""
         return replace(self, pieces=tuple(p.quicker() for p in self.pieces))
+
+    def coarser(self, times: int) -> "Problem":
+        """The same problem on every so many samples, for a first look."""
+        return replace(self, pieces=tuple(p.coarser(times) for p in self.pieces)) if times > 1 else self
+
+    def with_effects(self, effects: tuple[EffectChoice, ...]) -> "Problem":
+        """The same problem with other effects beside the law."""
+        return replace(self, effects=effects)
 
     def with_training(self, train: Sequence[Array]) -> "Problem":
         """The same problem with other samples fitted; one mask (N,) a piece."""

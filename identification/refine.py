@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array, BoolArray
-from identification.problem import COORDINATE_COUNT, Evaluation, Problem
+from identification.problem import Evaluation, Problem
 from identification.start import scattered, starting_points
 
 _LARGEST_STEP = 1.5
@@ -100,12 +100,11 @@ def _search(problem: Problem, settings: Settings, progress: Progress, start: Arr
 def descend(problem: Problem, start: Array, iterations: int, progress: Progress) -> Minimum:
     """Levenberg-Marquardt from one start; the delays wait until the coordinates have come near."""
     unknowns, here = start, problem.evaluate(start)
-    low, high = problem.bounds()
     damping, scale = 1e-2, np.zeros(len(start))
     free = problem.free & ~problem.delays
     for iteration in range(iterations):
         scale = np.maximum(scale, np.diag(here.hessian))
-        step = _step(here, free, damping * np.maximum(scale, 1e-12 * scale.max()), unknowns, low, high)
+        step = bounded_step(problem, here, free, damping * np.maximum(scale, 1e-12 * scale.max()), unknowns)
         gain = -float(2.0 * here.gradient @ step + step @ here.hessian @ step)
         small = _NO_GAIN * max(1.0, here.cost / problem.samples)
         if gain < (small if free[problem.delays].any() else _NEAR * here.cost):
@@ -125,14 +124,15 @@ def descend(problem: Problem, start: Array, iterations: int, progress: Progress)
     return Minimum(unknowns, here, iterations, converged=False)
 
 
-def _step(here: Evaluation, free: BoolArray, damping: Array, unknowns: Array, low: Array, high: Array) -> Array:
+def bounded_step(problem: Problem, here: Evaluation, free: BoolArray, damping: Array, unknowns: Array) -> Array:
     """The damped Gauss-Newton step (U,) inside the bounds, shrunk whole to a sensible length."""
+    low, high = problem.bounds()
     step, moving = np.zeros(len(unknowns)), free.copy()
     for _ in range(len(unknowns)):
         pinned = here.hessian[np.ix_(moving, ~moving)] @ step[~moving]
         matrix = here.hessian[np.ix_(moving, moving)] + np.diag(damping[moving])
         step[moving] = np.linalg.solve(matrix, -here.gradient[moving] - pinned)
-        longest = np.abs(step[:COORDINATE_COUNT]).max()
+        longest = problem.step_length(step)
         if longest > _LARGEST_STEP:
             step *= _LARGEST_STEP / longest
         outside = moving & ((unknowns + step < low) | (unknowns + step > high))

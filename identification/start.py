@@ -69,7 +69,7 @@ def _regression(pieces: Sequence[Piece]) -> Array:
     """F_a, F_b, c0_a, c0_b, k0 + k1 and the force offset, (6,)."""
     rows, forces = [], []
     for p in pieces:
-        v, u = p.stroke.velocity, p.stroke.drive
+        v, u = p.stroke.velocity, p.stroke.drive_seen
         fast = np.flatnonzero((np.abs(v) > _FAST * np.abs(v).max()) & (p.train > 0))
         fast = fast[:: max(1, len(fast) * len(pieces) // _ROWS)]
         v, u, sign = v[fast], u[fast], np.sign(v[fast])

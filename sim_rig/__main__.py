@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -45,9 +45,13 @@ app.command("serve")(sim)
 
 
 @app.command()
-def schema() -> None:
-    """Print the JSON Schema of a scenario."""
-    typer.echo(scenario_schema(), nl=False)
+def schema(
+    document: Annotated[Literal["scenario", "trial"], typer.Argument(help="Which document.")] = "scenario",
+) -> None:
+    """Print the JSON Schema of a document."""
+    from sim_rig.trial.answer import trial_schema
+
+    typer.echo(trial_schema() if document == "trial" else scenario_schema(), nl=False)
 
 
 def _say(done: float) -> None:

@@ -97,7 +97,7 @@ class CanopenActuator:
         self.demand.advance(now_ns)
         if self.state in (State.ENABLED, State.QUICK_STOP, State.FAULT_REACTION):
             self._watch(now_ns)
-            self._push()
+            self._push(now_ns)
         self.slave.tick(now_ns)
 
     def fail(self, code: int, now_ns: int | None = None) -> None:
@@ -120,14 +120,19 @@ class CanopenActuator:
             if self.state not in (State.FAULT, State.FAULT_REACTION):
                 self.fail(0x7320, now_ns)
             return
-        own = self._machine.clock_offset_ns + round(taken_ns * (1 + self._machine.ppm * 1e-6))
-        self.objects.put(0x1013, own // 1000 % 2**32)
+        self.objects.put(0x1013, self._micros(taken_ns))
         self.objects.put(0x6064, _counts(position - self._zero))
         self.objects.put(0x606C, _counts(velocity))
         self.objects.put(0x60F4, _counts(self.demand.position - position))
         self.objects.put(0x6077, self._torque(now_ns))
         self.objects.put(0x6061, self.objects.number(0x6060))
         self.objects.put(0x6041, self._statusword())
+
+    def asked(self, index: int, now_ns: int) -> None:
+        """Process data carry the instant of their position; a client that asks for the clock gets the clock."""
+        if index == 0x1013:
+            self.objects.put(0x1013, self._micros(now_ns))
+            self._refreshed_ns = -1
 
     def written(self, index: int, sub: int, now_ns: int) -> None:
         """Act on what a client wrote."""
@@ -271,12 +276,17 @@ class CanopenActuator:
         self._zero = self.demand.position - offset * _COUNT
         self._homing, self._homed, self.referenced = False, True, True
 
-    def _push(self) -> None:
+    def _push(self, now_ns: int) -> None:
         if self.demand.position != self._pushed:
             self._pushed = self.demand.position
-            self._signals.command("displacement", self.demand.position)
+            self._signals.command("displacement", self.demand.position, now_ns)
 
     # The rig
+
+    def _micros(self, rig_ns: int) -> int:
+        """What its clock shows at an instant of the rig's [us], wrapped."""
+        own = self._machine.clock_offset_ns + round(rig_ns * (1 + self._machine.ppm * 1e-6))
+        return own // 1000 % 2**32
 
     def _rig_position(self) -> tuple[int, float]:
         times, values = self._signals.latest("actuator_position", 1, self._signals.now_ns())

@@ -33,6 +33,9 @@ class Device(Protocol):
     def refresh(self, now_ns: int) -> None:
         """Bring the actual values up to date."""
 
+    def asked(self, index: int, now_ns: int) -> None:
+        """An object is about to be read by a client, the actual values being up to date."""
+
     def written(self, index: int, sub: int, now_ns: int) -> None:
         """An object was written by a client or by process data."""
 
@@ -231,6 +234,7 @@ class CanopenSlave:
 
     def _start_upload(self, index: int, sub: int, now_ns: int) -> bytes:
         self._device.refresh(now_ns)
+        self._device.asked(index, now_ns)
         content = self.objects.upload(index, sub)
         if len(content) <= 4:
             return struct.pack("<BHB4s", 0x43 | (4 - len(content)) << 2, index, sub, content)

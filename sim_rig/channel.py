@@ -22,6 +22,8 @@ from sim_rig.settings import Clock, Filter, Sensor
 
 _WANDER_PERIOD = 100.0
 """[s] of the slow drift that the mapping of a clock leaves."""
+_NO_LAG = 8e-5
+"""[s] a hidden lag below which there is none: faster than any filter that a device can have."""
 _LARGEST_JITTER = 9.0
 """Standard deviations by which no stamp is ever off."""
 _BEYOND = 3
@@ -57,6 +59,8 @@ class View(NamedTuple):
     """Whether each value stands until the next, as the output of the amplifier does."""
     lag: float = 0.0
     """[s] by which the channel comes later than it claims."""
+    slow: float = 0.0
+    """[s] time constant of a lag of which it says nothing."""
 
 
 class ChannelStream:
@@ -76,7 +80,9 @@ class ChannelStream:
         """[Hz] readings a second."""
         self._view, self._sensor, self._drawn = view, sensor, drawn
         self._jitter, self._white, self._shocks = random.spawn(3)
-        self._filter = FilterStream(sensor.filter, view.dt) if sensor.filter else None
+        hidden = [Filter(order=1, cutoff=1 / (2 * math.pi * view.slow))] if view.slow > _NO_LAG else []
+        device = [sensor.filter] if sensor.filter else []
+        self._filters = [FilterStream(low_pass, view.dt) for low_pass in hidden + device]
         self._truth = np.empty(0)
         self._first = 0
         self._next = 0
@@ -85,7 +91,9 @@ class ChannelStream:
 
     def take(self, truth: Array) -> None:
         """The truth goes on, (K,) values in the channel's unit."""
-        self._truth = np.concatenate([self._truth, self._filter.take(truth) if self._filter else truth])
+        for low_pass in self._filters:
+            truth = low_pass.take(truth)
+        self._truth = np.concatenate([self._truth, truth])
 
     def ready(self) -> int:
         """How many readings the truth so far allows beside those already made."""

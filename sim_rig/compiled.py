@@ -34,11 +34,18 @@ Array: TypeAlias = npt.NDArray[np.float64]
 OfTwo: TypeAlias = Callable[[float, float], float]
 """A compiled function of two numbers that the plant takes as an argument."""
 
+Scales: TypeAlias = Callable[[float, float, float], tuple[float, float, float]]
+"""A compiled function of displacement [m], velocity [m/s] and energy [J]: factors of alpha, c0 and c1."""
+
 Function = TypeVar("Function", bound=Callable[..., object])
 
 _OF_TWO = numba.float64(numba.float64, numba.float64)
 OF_TWO = numba.types.FunctionType(_OF_TWO)
 """The type of ``OfTwo`` in explicit signatures: one compiled plant then takes any of them."""
+_THREE = numba.types.UniTuple(numba.float64, 3)  # type: ignore[no-untyped-call]
+_SCALES = _THREE(numba.float64, numba.float64, numba.float64)
+SCALES = numba.types.FunctionType(_SCALES)
+"""The type of ``Scales``."""
 
 
 def compiled(function: Function, signature: Any = None) -> Function:
@@ -60,6 +67,64 @@ def with_values(act: Callable[..., Any], values: Sequence[float]) -> OfTwo:
     return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(acts))
 
 
+def of_first(act: Callable[..., Any], values: Sequence[float]) -> OfTwo:
+    """A form of one number with its parameters fixed, as a compiled function that leaves its second argument."""
+    form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
+
+    def acts(first: float, second: float) -> float:
+        return float(form(first, *fixed))
+
+    return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(acts))
+
+
+def of_energy(act: Callable[..., Any], values: Sequence[float]) -> Scales:
+    """A form over the energy in the damper, as factors over displacement, velocity and energy."""
+    form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
+
+    def scales(x: float, velocity: float, energy: float) -> tuple[float, float, float]:
+        a, b, c = form(energy, *fixed)
+        return float(a), float(b), float(c)
+
+    return cast(Scales, numba.njit(_SCALES, nogil=True, error_model="numpy")(scales))
+
+
+def of_motion(act: Callable[..., Any], values: Sequence[float]) -> Scales:
+    """A form over displacement and velocity, as factors over displacement, velocity and energy."""
+    form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
+
+    def scales(x: float, velocity: float, energy: float) -> tuple[float, float, float]:
+        a, b, c = form(x, velocity, *fixed)
+        return float(a), float(b), float(c)
+
+    return cast(Scales, numba.njit(_SCALES, nogil=True, error_model="numpy")(scales))
+
+
+def product_of(functions: Sequence[Scales]) -> Scales:
+    """The product of factors; nothing leaves the law as it is."""
+    return reduce(_times, functions) if functions else unscaled
+
+
+def _times(one: Scales, other: Scales) -> Scales:
+    def both(x: float, velocity: float, energy: float) -> tuple[float, float, float]:
+        a, b, c = one(x, velocity, energy)
+        d, e, f = other(x, velocity, energy)
+        return a * d, b * e, c * f
+
+    return cast(Scales, numba.njit(_SCALES, nogil=True, error_model="numpy")(both))
+
+
+def chain_of(functions: Sequence[OfTwo]) -> OfTwo:
+    """Compiled functions one after another in their first argument; the second is the same for all."""
+    return reduce(_after, functions) if functions else first
+
+
+def _after(one: OfTwo, other: OfTwo) -> OfTwo:
+    def chained(value: float, second: float) -> float:
+        return other(one(value, second), second)
+
+    return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(chained))
+
+
 def sum_of(functions: Sequence[OfTwo]) -> OfTwo:
     """The sum of compiled functions of the same two arguments; nothing adds up to zero."""
     return reduce(_plus, functions) if functions else nothing
@@ -76,6 +141,14 @@ def _nothing(first: float, second: float) -> float:
     return 0.0
 
 
+def _first(first: float, second: float) -> float:
+    return first
+
+
+def _unscaled(x: float, velocity: float, energy: float) -> tuple[float, float, float]:
+    return 1.0, 1.0, 1.0
+
+
 def _second(first: float, second: float) -> float:
     return second
 
@@ -84,3 +157,7 @@ nothing: OfTwo = compiled(_nothing, _OF_TWO)
 """No force beside the law."""
 rigid: OfTwo = compiled(_second, _OF_TWO)
 """A mounting without play: the damper is where the actuator is."""
+first: OfTwo = compiled(_first, _OF_TWO)
+"""A field that the damper sees as it is."""
+unscaled: Scales = compiled(_unscaled, _SCALES)
+"""A law that nothing scales."""

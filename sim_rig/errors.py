@@ -4,7 +4,8 @@ SimRigError
 ├── ScenarioError   a scenario cannot be read, or asks for what does not exist or lies out of bounds
 ├── CommandsError   the commands to play are no uniform record of displacement and drive
 ├── PlantError      the specimen of the scenario has no finite motion under these commands
-└── WireError       a wire of the rig cannot be opened, or nobody can be told where it is
+├── WireError       a wire of the rig cannot be opened, or nobody can be told where it is
+└── TrialError      a blind trial cannot go on: its seal is broken, or what it needs cannot be recorded
 
 ``exit_code`` tells the command line that the message is for a person and needs no traceback.
 """
@@ -30,3 +31,7 @@ class PlantError(SimRigError):
 
 class WireError(SimRigError):
     """A wire of the rig cannot be opened, or nobody can be told where it is."""
+
+
+class TrialError(SimRigError):
+    """A blind trial cannot go on: its seal is broken, or what it needs cannot be recorded."""

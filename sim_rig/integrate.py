@@ -16,14 +16,15 @@ import numba
 import numpy as np
 
 from identification.damper import law
-from sim_rig.compiled import OF_TWO, Array, OfTwo, compiled
+from sim_rig.compiled import OF_TWO, SCALES, Array, OfTwo, Scales, compiled
 
-STATES = 8
+STATES = 11
 """Command behind the lag [m], actuator position [m] and velocity [m/s], y [m], z [m], field u, amplifier output
-[both V or A], temperature [degC]."""
-COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE = range(STATES)
+[both V or A], temperature [degC], drive behind a second lag [V or A], energy in the damper [J], displacement of
+the damper behind a fixture that gives way [m]."""
+COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND = range(STATES)
 
-CONSTANTS = 12
+CONSTANTS = 18
 """Rates and weights of everything but the law, in the order of the names below."""
 (
     LAG,  # [1/s] rate of the command's lag
@@ -38,6 +39,12 @@ CONSTANTS = 12
     SATURATED,  # [m] z_ss, where z settles in long motion
     EVER_PRESENT,  # [1/s] fastest rate beside that of the law
     PLAY,  # 1 where the mounting holds the damper back, else 0
+    GIVE,  # [m/N] of the fixture between load cell and damper
+    MASS,  # [kg] between load cell and damper
+    SECOND_LAG,  # [1/s] rate of the coil's second lag, 0 without one
+    DEAD_TIME,  # [s] between output and field
+    COOLING,  # [1/s] rate with which the energy leaves the damper
+    MEMORY,  # 1 where the iron remembers, else 0
 ) = range(CONSTANTS)
 
 STABLE = 0.8
@@ -54,6 +61,10 @@ _FELT = 1e-7
 """[1] least move of z, as a part of its saturation, for which a corner is worth the steps."""
 _SETTLED = 1e-7
 """[1] part of the drive within which the amplifier's output counts as settled and costs no more steps."""
+_YIELDING_STEPS = 8.0
+"""Least steps in a block where the fixture gives way: the damper's velocity is then not the actuator's."""
+_BALANCED = 1e-9
+"""[m/s] to which the velocity of the damper behind its fixture is found."""
 _AHEAD = 1e-6
 """[s] how far the mounting looks ahead to tell whether it carries the damper along."""
 
@@ -74,49 +85,116 @@ def _damper_motion(position: float, speed: float, held: float, play: float, foll
 
 
 @compiled
+def _damper_force(
+    s: Array, x: float, v: float, u: float, p: Array, parallel: OfTwo, scales: Scales
+) -> tuple[float, float]:
+    """Force of the damper [N] and y' [m/s] at displacement x [m], velocity v [m/s] and the field seen."""
+    a, b, c = scales(x, v, s[ENERGY])
+    alpha, c0, c1 = a * at_field(p[0], p[1], u), b * at_field(p[6], p[7], u), c * at_field(p[8], p[9], u)
+    y_rate = inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
+    return damper_force(y_rate, x, c1, p[11], p[13]) + parallel(x, v), y_rate
+
+
+@compiled
+def _balanced_velocity(
+    s: Array, load: float, guess: float, u: float, p: Array, parallel: OfTwo, scales: Scales
+) -> float:
+    """Velocity [m/s] at which the damper resists with the load [N] of its fixture, by bracketing and secants."""
+    x, width = s[BEHIND], 1e-3
+    low, high = guess - width, guess + width
+    below = _damper_force(s, x, low, u, p, parallel, scales)[0] - load
+    above = _damper_force(s, x, high, u, p, parallel, scales)[0] - load
+    for _ in range(60):
+        if below <= 0.0 <= above:
+            break
+        width *= 2.0
+        if below > 0.0:
+            high, above, low = low, below, low - width
+            below = _damper_force(s, x, low, u, p, parallel, scales)[0] - load
+        else:
+            low, below, high = high, above, high + width
+            above = _damper_force(s, x, high, u, p, parallel, scales)[0] - load
+    side = 0
+    for _ in range(60):
+        v = high - above * (high - low) / (above - below) if above != below else 0.5 * (low + high)
+        rest = _damper_force(s, x, v, u, p, parallel, scales)[0] - load
+        if high - low < _BALANCED or abs(rest) < 1e-9:
+            break
+        if rest > 0.0:
+            high, above = v, rest
+            below = 0.5 * below if side == 1 else below
+            side = 1
+        else:
+            low, below = v, rest
+            above = 0.5 * above if side == -1 else above
+            side = -1
+    return v
+
+
+@compiled
 def rates(
     s: Array,
     held: float,
+    remembered: float,
     command: float,
     drive: float,
+    late: float,
     k: Array,
     p: Array,
     follow: OfTwo,
     parallel: OfTwo,
+    seen: OfTwo,
+    scales: Scales,
     rate: Array,
 ) -> tuple[float, float, float, float]:
     """Rates of all states, written to ``rate``.
 
     Args:
-        s: (8,) the states.
+        s: (11,) the states.
         held: [m] where the damper stood when the step began.
+        remembered: what the iron remembered then.
         command: [m] commanded displacement now.
         drive: [V or A] commanded drive.
-        k: (12,) constants of actuator, amplifier and heat.
+        late: [V or A] output as it reaches the coil after its dead time.
+        k: (18,) constants of actuator, amplifier, heat and mounting.
         p: (14,) the parameters of the law in the paper's order.
         follow: displacement of the damper over (held, actuator) [m].
         parallel: force beside the law [N] over (displacement [m], velocity [m/s]).
-        rate: (8,) the answer.
+        seen: field that the damper sees over (field, remembered) [V or A].
+        scales: factors of alpha, c0 and c1 over displacement, velocity and energy.
+        rate: (11,) the answer.
 
     Returns:
         Force on the load cell [N], displacement [m], velocity [m/s] and slip velocity [m/s] of the damper.
     """
     x, v = _damper_motion(s[POSITION], s[SPEED], held, k[PLAY], follow)
-    alpha, c0, c1 = at_field(p[0], p[1], s[FIELD]), at_field(p[6], p[7], s[FIELD]), at_field(p[8], p[9], s[FIELD])
-    y_rate = inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
+    u = seen(s[FIELD], remembered)
+    if k[GIVE] > 0.0:
+        load, x_pin = (x - s[BEHIND]) / k[GIVE], x
+        x = s[BEHIND]
+        v = _balanced_velocity(s, load, v, u, p, parallel, scales)
+        force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
+        force = (x_pin - x) / k[GIVE]
+    else:
+        force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
     slip = v - y_rate
-    force = damper_force(y_rate, x, c1, p[11], p[13]) + parallel(x, v)
+    rate[BEHIND] = v
     rate[COMMAND] = k[LAG] * (command - s[COMMAND])
     rate[POSITION] = s[SPEED]
     error = s[COMMAND] - s[POSITION] - k[COMPLIANCE] * force
-    rate[SPEED] = k[SERVO] * (k[SERVO] * error - 2.0 * k[DAMPING] * s[SPEED])
+    wanted = k[SERVO] * (k[SERVO] * error - 2.0 * k[DAMPING] * s[SPEED])
+    rate[SPEED] = wanted / (1.0 + k[SERVO] * k[SERVO] * k[COMPLIANCE] * k[MASS])
     rate[Y] = y_rate
     rate[Z] = hysteresis_rate(slip, s[Z], p[5], p[2], p[3], p[12])
-    rate[FIELD] = field_rate(s[FIELD], s[OUTPUT], p[4])
+    source = late if k[DEAD_TIME] > 0.0 else s[OUTPUT]
+    rate[LAGGED] = k[SECOND_LAG] * (source - s[LAGGED])
+    rate[FIELD] = field_rate(s[FIELD], s[LAGGED] if k[SECOND_LAG] > 0.0 else source, p[4])
     rate[OUTPUT] = k[AMPLIFIER] * (drive - s[OUTPUT])
-    heat = abs(force * v) + k[COIL] * s[OUTPUT] * s[OUTPUT]
+    warmth = abs(force * v)
+    rate[ENERGY] = warmth - k[COOLING] * s[ENERGY]
+    heat = warmth + k[COIL] * s[OUTPUT] * s[OUTPUT]
     rate[TEMPERATURE] = (heat - k[HEAT_LOSS] * (s[TEMPERATURE] - k[AMBIENT])) / k[HEAT_CAPACITY]
-    return force, x, v, slip
+    return force + k[MASS] * rate[SPEED], x, v, slip
 
 
 @compiled
@@ -128,6 +206,9 @@ def _stiffness(s: Array, slip: float, drive: float, k: Array, p: Array) -> float
     inner = (tangent + abs(p[10])) / both
     servo = k[SERVO] * math.sqrt(k[COMPLIANCE] * (tangent + abs(p[10]) + abs(p[11])))
     moving = s[OUTPUT] != drive
+    if k[GIVE] > 0.0:
+        c0, c1 = abs(at_field(p[6], p[7], s[FIELD])), abs(at_field(p[8], p[9], s[FIELD]))
+        inner += (tangent + 1.0 / k[GIVE]) / c0 + 1.0 / (k[GIVE] * c1)
     return float(hysteresis + inner + servo + k[EVER_PRESENT] + (k[AMPLIFIER] if moving else 0.0))
 
 
@@ -145,6 +226,8 @@ def steps_for(
         if carried != carried_later:
             steps = CONTACT_STEPS
             fastest += abs(s[SPEED])
+    if k[GIVE] > 0.0:
+        steps = max(steps, _YIELDING_STEPS)
     per_slip = p[5] * h / k[SATURATED]
     travel = abs(rate[Z]) * h / k[SATURATED] + turn * per_slip
     if slip * s[Z] < 0.0 or abs(slip) <= turn:
@@ -159,41 +242,61 @@ def steps_for(
 def _step(
     s: Array,
     held: float,
+    remembered: float,
     start: float,
     end: float,
     drive: float,
+    late: float,
     h: float,
     k: Array,
     p: Array,
     follow: OfTwo,
     parallel: OfTwo,
+    seen: OfTwo,
+    memory: OfTwo,
+    scales: Scales,
     work: Array,
-) -> float:
+) -> tuple[float, float]:
     """One classical Runge-Kutta step of h [s], in place; the command goes straight from start to end [m].
 
     Returns:
-        Where the damper stands [m].
+        Where the damper stands [m], and what the iron remembers.
     """
     a, b, c, d, mid = work[0], work[1], work[2], work[3], work[4]
-    half = 0.5 * (start + end)
-    rates(s, held, start, drive, k, p, follow, parallel, a)
+    half, field = 0.5 * (start + end), s[FIELD]
+    rates(s, held, remembered, start, drive, late, k, p, follow, parallel, seen, scales, a)
     for j in range(STATES):
         mid[j] = s[j] + 0.5 * h * a[j]
-    rates(mid, held, half, drive, k, p, follow, parallel, b)
+    rates(mid, held, remembered, half, drive, late, k, p, follow, parallel, seen, scales, b)
     for j in range(STATES):
         mid[j] = s[j] + 0.5 * h * b[j]
-    rates(mid, held, half, drive, k, p, follow, parallel, c)
+    rates(mid, held, remembered, half, drive, late, k, p, follow, parallel, seen, scales, c)
     for j in range(STATES):
         mid[j] = s[j] + h * c[j]
-    rates(mid, held, end, drive, k, p, follow, parallel, d)
+    rates(mid, held, remembered, end, drive, late, k, p, follow, parallel, seen, scales, d)
     for j in range(STATES):
         s[j] += h / 6.0 * (a[j] + 2.0 * (b[j] + c[j]) + d[j])
-    return float(follow(held, s[POSITION]))
+    if k[MEMORY] != 0.0 and s[FIELD] != field:
+        remembered = memory(remembered, s[FIELD] - field)
+    return float(follow(held, s[POSITION])), remembered
+
+
+@compiled
+def _arrived(past: Array, block: int, late_by: float) -> float:
+    """Output of the amplifier that reaches the coil half way through a block, ``late_by`` [blocks] after."""
+    place = max(block + 0.5 - late_by, 0.0)
+    i = min(int(place), block)
+    t = min(place - i, 1.0) if i < block else 0.0
+    one, other = past[i % len(past)], past[min(i + 1, block) % len(past)]
+    return float(one + t * (other - one))
 
 
 def _march(
     s: Array,
     held: float,
+    remembered: float,
+    past: Array,
+    before: int,
     command: Array,
     drive: Array,
     h: float,
@@ -202,29 +305,36 @@ def _march(
     p: Array,
     follow: OfTwo,
     parallel: OfTwo,
+    seen: OfTwo,
+    memory: OfTwo,
+    scales: Scales,
     positions: Array,
     forces: Array,
     outputs: Array,
     damper: Array,
     states: Array,
-) -> tuple[float, int]:
+) -> tuple[float, float, int]:
     """Move the states on through M command samples, in place.
 
     Args:
-        s: (8,) states at the first instant.
+        s: (11,) states at the first instant.
         held: [m] where the damper stands.
+        remembered: what the iron remembers.
+        past: ring of the amplifier's outputs at the start of each block, long enough for the dead time.
+        before: blocks played so far.
         command: (M+1,) commanded displacement [m] at the start of each sample and the end of the last.
         drive: (M,) commanded drive [V or A], held through each sample.
         h: [s] one block; ``blocks`` of them make a sample.
-        k, p, follow, parallel: as in ``rates``.
+        k, p, follow, parallel, seen, scales: as in ``rates``.
+        memory: what the iron remembers after (remembered, change of the field).
         positions, forces: (M blocks,) filled with actuator position [m] and force on the load cell [N] at the
             start of each block.
         outputs: (M,) filled with the amplifier's output half way through each sample.
         damper: (M, 2) filled with displacement [m] and velocity [m/s] of the damper at each sample.
-        states: (M, 8) filled with the states at each sample.
+        states: (M, 11) filled with the states at each sample.
 
     Returns:
-        Where the damper stands [m], and the sample in which the motion was lost, or M.
+        Where the damper stands [m], what the iron remembers, and the sample in which the motion was lost, or M.
     """
     work, rate = np.empty((5, STATES)), np.empty(STATES)
     for i in range(len(drive)):
@@ -234,7 +344,12 @@ def _march(
             end = command[i] + (command[i + 1] - command[i]) * (j + 1) / blocks
             if abs(drive[i] - s[OUTPUT]) < _SETTLED * (abs(drive[i]) + 1e-3):
                 s[OUTPUT] = drive[i]
-            force, x, v, slip = rates(s, held, start, drive[i], k, p, follow, parallel, rate)
+            block = before + i * blocks + j
+            past[block % len(past)] = s[OUTPUT]
+            late = _arrived(past, block, k[DEAD_TIME] / h)
+            force, x, v, slip = rates(
+                s, held, remembered, start, drive[i], late, k, p, follow, parallel, seen, scales, rate
+            )
             positions[i * blocks + j], forces[i * blocks + j] = s[POSITION], force
             if j == 0:
                 damper[i, 0], damper[i, 1] = x, v
@@ -242,18 +357,21 @@ def _march(
                 outputs[i] = s[OUTPUT]
             steps = steps_for(s, rate, x, slip, drive[i], h, k, p, follow)
             if not (steps <= MOST_STEPS and math.isfinite(force) and math.isfinite(s[Z])):
-                return held, i
+                return held, remembered, i
             for step in range(int(steps)):
                 one = start + (end - start) * step / steps
                 other = start + (end - start) * (step + 1) / steps
-                held = _step(s, held, one, other, drive[i], h / steps, k, p, follow, parallel, work)
-    return held, len(drive)
+                held, remembered = _step(
+                    s, held, remembered, one, other, drive[i], late, h / steps, k, p,
+                    follow, parallel, seen, memory, scales, work,
+                )  # fmt: skip
+    return held, remembered, len(drive)
 
 
 _ROW, _TABLE, _NUMBER = numba.float64[::1], numba.float64[:, ::1], numba.float64
 _SIGNATURE = (
-    *(_ROW, _NUMBER, _ROW, _ROW, _NUMBER, numba.int64, _ROW, _ROW, OF_TWO, OF_TWO),
-    *(_ROW, _ROW, _ROW, _TABLE, _TABLE),
+    *(_ROW, _NUMBER, _NUMBER, _ROW, numba.int64, _ROW, _ROW, _NUMBER, numba.int64, _ROW, _ROW),
+    *(OF_TWO, OF_TWO, OF_TWO, OF_TWO, SCALES, _ROW, _ROW, _ROW, _TABLE, _TABLE),
 )
 march = compiled(_march, _SIGNATURE)
 """``_march`` compiled when first imported, once for every kind of effect."""

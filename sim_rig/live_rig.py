@@ -19,15 +19,20 @@ from sim_rig.clock import Clock
 from sim_rig.command_track import HeldTrack, JoinedTrack
 from sim_rig.compiled import Array
 from sim_rig.errors import CommandsError
-from sim_rig.plant import Plant, Truth
+from sim_rig.plant import Truth
 from sim_rig.recent import Recent
 from sim_rig.scenario import Scenario
+from sim_rig.sealed_plant import plant_for
 from sim_rig.sensors import failed, faults_of, looked_at, streams
 
 STEP_NS = 1_000_000
 """[ns] a sample of the rig."""
-TAKE_UP_NS = 2_000_000
-"""[ns] over which the actuator takes up a demand."""
+TAKE_UP_NS = 4_000_000
+"""[ns] over which the actuator takes up a demand: as late may the thread that hands it over be, and no more."""
+_CALM_NS = 2_000_000_000
+"""[ns] without a command after which the rig counts as calm."""
+_CALM_BLOCK = 4
+"""Blocks that come together while it is calm: nobody is in a hurry, and the machine has other work."""
 _LONGEST = 200
 """Samples played at once, however late the thread is."""
 _KEPT = 8192
@@ -74,8 +79,8 @@ class LiveRig:
         self.behind_ns = 0
         """[ns] by which the plant was behind the clock when last looked at."""
         self._clock, self._scenario, self._block_ns = clock, scenario, block * STEP_NS
-        self._origin = self._done = clock.now_ns()
-        self._plant = Plant(scenario, displacement, drive)
+        self._origin = self._done = self._commanded_ns = clock.now_ns()
+        self._plant = plant_for(scenario, displacement, drive)
         self._channels = {
             name: _Channel(scenario, name, stream, self._origin)
             for name, stream in streams(scenario, STEP_NS * 1e-9, mapped=False)[0].items()
@@ -98,8 +103,8 @@ class LiveRig:
         with self._lock:
             return self._channels[channel].recent.latest(count, before_ns)
 
-    def command(self, channel: str, value: float) -> None:
-        """Command ``displacement`` [m] or ``drive`` [V or A], from now on.
+    def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
+        """Command ``displacement`` [m] or ``drive`` [V or A] from an instant [ns] on, now if none is given.
 
         Raises:
             CommandsError: there is no such command, or the value is not finite.
@@ -109,8 +114,9 @@ class LiveRig:
         if not math.isfinite(value):
             raise CommandsError(f"the commanded {channel} is {value}; it has to be finite")
         track = self._displacement if channel == "displacement" else self._drive
+        self._commanded_ns = self._clock.now_ns()
         with self._lock:
-            track.add(self._clock.now_ns(), value)
+            track.add(self._clock.now_ns() if at_ns is None else at_ns, value)
 
     def truth(self) -> Stretch:
         """What happened in the last ten seconds or so: for tests and measurements, never for an instrument."""
@@ -157,7 +163,8 @@ class LiveRig:
                     continue
                 for attend in self.attend:
                     attend()
-                if due - self._done >= self._block_ns:
+                calm = due - self._commanded_ns > _CALM_NS
+                if due - self._done >= self._block_ns * (_CALM_BLOCK if calm else 1):
                     self.catch_up()
                 due = max(due + self._block_ns // 2, self._clock.now_ns())
         except Exception as error:  # the thread's end is looked at by whoever runs the rig
@@ -169,7 +176,8 @@ class LiveRig:
         with self._lock:
             command, drive = self._displacement.at(edges), self._drive.at(edges[:-1])
         truth = self._plant.play(STEP_NS * 1e-9, command, drive)
-        seen = looked_at(self._scenario, truth)
+        start = (self._done - self._origin) * 1e-9
+        seen = looked_at(self._scenario, truth, start, STEP_NS * 1e-9)
         for name, channel in self._channels.items():
             times, values = channel.report(seen[name])
             with self._lock:

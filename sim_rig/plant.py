@@ -7,20 +7,35 @@ once, through the same compiled steps.
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from identification.damper.effects import EFFECTS
-from identification.damper.effects.effect import Action
+from identification.damper.effects import EFFECTS, Action, Form
 from sim_rig import integrate
-from sim_rig.compiled import Array, rigid, sum_of, with_values
+from sim_rig.compiled import (
+    Array,
+    OfTwo,
+    Scales,
+    chain_of,
+    nothing,
+    of_energy,
+    of_first,
+    of_motion,
+    product_of,
+    rigid,
+    sum_of,
+    with_values,
+)
 from sim_rig.errors import PlantError
 from sim_rig.scenario import Scenario
 
 _LONGEST_BLOCK = 1.25e-4
 """[s] the truth is kept at least this finely, so that filters can be run on it."""
+_SHORTEST_BLOCK = 2.5e-5
+"""[s] of the fastest sampling that the rig plays: what a dead time has to be kept for."""
+_NO_LAG = 2e-5
+"""[s] a second lag of the coil below which there is none."""
 
 
 class Truth(NamedTuple):
@@ -46,28 +61,61 @@ class Truth(NamedTuple):
     """(M,) of the damper [degC]."""
 
 
-@dataclass(frozen=True)
+Values = tuple[float, ...]
+
+
 class Effects:
     """The effects of a scenario, sorted by how they act."""
 
-    parallel: tuple[tuple[str, tuple[float, ...]], ...]
-    """Forces beside the law: name, values."""
-    follower: tuple[str, tuple[float, ...]] | None
-    """What holds the displacement back."""
-    force_lag: float
-    """[s] by which the force channel comes late."""
+    def __init__(self, scenario: Scenario) -> None:
+        self._played = [
+            (form, tuple(effect.parameters[q.symbol] for q in form.parameters))
+            for effect in scenario.effects
+            for form in (EFFECTS[effect.name].form(effect.form),)
+        ]
 
-    @staticmethod
-    def of(scenario: Scenario) -> "Effects":
-        """The effects at work in a scenario."""
-        parallel, followers = _values(scenario, "parallel_force"), _values(scenario, "displacement_follower")
-        lag = sum(-float(EFFECTS[name].act(0.0, *values)) for name, values in _values(scenario, "time_shift"))
-        return Effects(tuple(parallel), followers[0] if followers else None, lag)
+    def that(self, *acts: Action) -> list[tuple[Form, Values]]:
+        """Those that act in certain ways, with their values."""
+        return [(form, values) for form, values in self._played if form.acts in acts]
 
+    def total(self, acts: Action) -> float:
+        """Sum of what those give that are a single number: a delay [s], a lag [s], a give [m/N]."""
+        return float(sum(form.act(*values) for form, values in self.that(acts)))
 
-def _values(scenario: Scenario, acts: Action) -> list[tuple[str, tuple[float, ...]]]:
-    chosen = [effect for effect in scenario.effects if EFFECTS[effect.name].acts == acts]
-    return [(e.name, tuple(e.parameters[q.symbol] for q in EFFECTS[e.name].parameters)) for e in chosen]
+    def parallel(self) -> OfTwo:
+        """Force beside the law [N] over displacement [m] and velocity [m/s]."""
+        return sum_of([with_values(form.act, values) for form, values in self.that("parallel_force")])
+
+    def follow(self) -> OfTwo:
+        """Where the damper stands [m] over where it stood and where the actuator is."""
+        followers = self.that("displacement_follower")
+        return with_values(followers[0][0].act, followers[0][1]) if followers else rigid
+
+    def scales(self) -> Scales:
+        """Factors of alpha, c0 and c1 over displacement [m], velocity [m/s] and energy [J]."""
+        moving = [of_motion(form.act, values) for form, values in self.that("scaling")]
+        return product_of(moving + [of_energy(form.act, values) for form, values in self.that("softening")])
+
+    def seen(self) -> OfTwo:
+        """Field that the damper sees over the coil's own and what the iron remembers [V or A]."""
+        maps = [
+            with_values(form.act, values) if form.memory else of_first(form.act, values)
+            for form, values in self.that("field", "field_memory")
+        ]
+        return chain_of(maps)
+
+    def memory(self) -> OfTwo:
+        """What the iron remembers after (remembered, change of the field)."""
+        for form, values in self.that("field_memory"):
+            if form.memory is not None:
+                return with_values(form.memory, values)
+        return nothing
+
+    def cooling(self) -> float:
+        """Rate [1/s] with which the energy leaves the damper."""
+        for form, values in self.that("softening"):
+            return 1.0 / values[[q.symbol for q in form.parameters].index("recovery")]
+        return 0.0
 
 
 class Plant:
@@ -82,15 +130,16 @@ class Plant:
         Raises:
             PlantError: the effects have no finite force there.
         """
-        effects = Effects.of(scenario)
+        effects = Effects(scenario)
         self._law = np.array(scenario.parameters)
-        self._parallel = sum_of([with_values(EFFECTS[name].act, values) for name, values in effects.parallel])
-        self._follow = (
-            with_values(EFFECTS[effects.follower[0]].act, effects.follower[1]) if effects.follower else rigid
-        )
+        self._parallel, self._follow, self._scales = effects.parallel(), effects.follow(), effects.scales()
+        self._seen, self._memory = effects.seen(), effects.memory()
         self._constants = _constants(scenario, self._law, effects)
         self._command = displacement
         self._states, self._held = self._settled(displacement, drive)
+        self._remembered, self._blocks = 0.0, 0
+        dead = self._constants[integrate.DEAD_TIME] / _SHORTEST_BLOCK
+        self._past = np.full(math.ceil(dead) + 3, float(drive))
         self._samples = 0
 
     def advance(self, dt: float, displacement: float, drive: float) -> Truth:
@@ -115,11 +164,14 @@ class Plant:
         count, blocks = len(drive), blocks_in(dt)
         position, force, output = np.empty(count * blocks), np.empty(count * blocks), np.empty(count)
         damper, states = np.empty((count, 2)), np.empty((count, integrate.STATES))
-        self._held, done = integrate.march(
-            self._states, self._held, np.ascontiguousarray(command, float), np.ascontiguousarray(drive, float),
-            dt / blocks, blocks, self._constants, self._law, self._follow, self._parallel,
+        self._held, self._remembered, done = integrate.march(
+            self._states, self._held, self._remembered, self._past, self._blocks,
+            np.ascontiguousarray(command, float), np.ascontiguousarray(drive, float),
+            dt / blocks, blocks, self._constants, self._law,
+            self._follow, self._parallel, self._seen, self._memory, self._scales,
             position, force, output, damper, states,
         )  # fmt: skip
+        self._blocks += count * blocks
         if done < count:
             raise PlantError(
                 f"the specimen runs away {(self._samples + done) * dt:.3f} s into its motion, at "
@@ -148,8 +200,10 @@ class Plant:
         if not math.isfinite(place):
             raise PlantError(f"the specimen has no finite force at rest at {displacement:.4g} m")
         states = np.zeros(integrate.STATES)
-        states[[integrate.COMMAND, integrate.POSITION, integrate.Y]] = displacement, place, place
-        states[[integrate.FIELD, integrate.OUTPUT]] = drive
+        behind = place - self._constants[integrate.GIVE] * load
+        states[[integrate.COMMAND, integrate.POSITION, integrate.Y]] = displacement, place, behind
+        states[integrate.BEHIND] = behind
+        states[[integrate.FIELD, integrate.OUTPUT, integrate.LAGGED]] = drive
         states[integrate.TEMPERATURE] = self._constants[integrate.AMBIENT]
         return states, place
 
@@ -195,16 +249,30 @@ def _constants(scenario: Scenario, law: Array, effects: Effects) -> Array:
     k[integrate.COIL] = resistance if scenario.drive_unit == "A" else 1 / resistance
     k[integrate.SATURATED] = (law[5] / (law[2] + law[3])) ** (1 / law[12])
     mass = actuator.stiffness / servo**2
-    friction = sum(_steepest(name, values) for name, values in effects.parallel)
+    steep = _steepest(effects.parallel())
     viscous = min(abs(law[6]) + 2 * abs(law[7]), 1e6)
     k[integrate.EVER_PRESENT] = (
-        max(k[integrate.LAG], 2 * servo * max(actuator.damping, 1)) + (friction + viscous) / mass
+        max(k[integrate.LAG], 2 * servo * max(actuator.damping, 1)) + (steep + viscous) / mass
     )
-    k[integrate.PLAY] = effects.follower is not None
+    dead, lag = _coil(effects)
+    k[integrate.SECOND_LAG] = 1.0 / lag if lag > _NO_LAG else 0.0
+    k[integrate.DEAD_TIME] = dead
+    k[integrate.EVER_PRESENT] += k[integrate.SECOND_LAG]
+    k[integrate.PLAY] = bool(effects.that("displacement_follower"))
+    k[integrate.GIVE] = effects.total("compliance")
+    k[integrate.MASS] = sum(form.act(1.0, *values) for form, values in effects.that("inertia"))
+    k[integrate.COOLING] = effects.cooling()
+    k[integrate.MEMORY] = bool(effects.that("field_memory"))
     return k
 
 
-def _steepest(name: str, values: tuple[float, ...]) -> float:
-    """Largest slope of a force beside the law over the velocity [N s/m], near rest."""
-    speeds = np.concatenate([[0.0], np.geomspace(1e-5, 1.0, 60)])
-    return float(np.max(np.abs(EFFECTS[name].slopes(0.0, speeds, *values)[1])))
+def _coil(effects: Effects) -> tuple[float, float]:
+    """Dead time [s] and second lag [s] between the amplifier's output and the field."""
+    parts = [form.act(*values) for form, values in effects.that("drive_delay")]
+    return float(sum(part[0] for part in parts)), float(sum(part[1] for part in parts))
+
+
+def _steepest(parallel: OfTwo) -> float:
+    """Largest slope of the forces beside the law over the velocity [N s/m], near rest."""
+    speeds = np.geomspace(1e-5, 1.0, 60)
+    return max(float(abs(parallel(0.0, v * 1.01) - parallel(0.0, v * 0.99)) / (0.02 * v)) for v in speeds)

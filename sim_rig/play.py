@@ -15,8 +15,9 @@ import numpy as np
 from sim_rig.channel import Drawn
 from sim_rig.compiled import Array
 from sim_rig.errors import CommandsError
-from sim_rig.plant import Plant, Truth, chunks, faded_in
+from sim_rig.plant import Truth, chunks, faded_in
 from sim_rig.scenario import Scenario
+from sim_rig.sealed_plant import plant_for
 from sim_rig.sensors import CHANNELS, report, with_faults
 from sim_rig.settings import Sensor
 
@@ -65,7 +66,7 @@ def play(scenario: Scenario, commands: Commands, progress: Callable[[float], Non
     dt = float(commands.time[-1] - commands.time[0]) / (count - 1)
     command = faded_in(scenario, commands.time, commands.displacement)
     ahead = np.append(command, command[-1])
-    plant, parts = Plant(scenario, float(command[0]), float(commands.drive[0])), []
+    plant, parts = plant_for(scenario, float(command[0]), float(commands.drive[0])), []
     for part in chunks(count, _CHUNK):
         parts.append(plant.play(dt, ahead[part.start : part.stop + 1], commands.drive[part]))
         progress(part.stop / count)

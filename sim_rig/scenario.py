@@ -16,6 +16,7 @@ from identification.damper.effects import EFFECTS
 from identification.damper.parameter_sets import PARAMETER_SETS, parameter_set
 from identification.damper.parameters import PARAMETERS, Parameters, Quantity
 from sim_rig.errors import ScenarioError
+from sim_rig.sealed_effects import check_sealed
 from sim_rig.settings import (
     Actuator,
     Amplifier,
@@ -44,6 +45,9 @@ class Scenario(Setting):
     drive_unit: Literal["V", "A"] = Field(default="V", description="unit of the drive")
     specimen: Specimen = Field(default=Specimen(), description="name plate")
     effects: tuple[EffectInPlay, ...] = Field(default=(), description="what is real beside the law")
+    sealed: tuple[EffectInPlay, ...] = Field(
+        default=(), max_length=3, description="the same in the trial's own forms, instead of `effects`"
+    )
     actuator: Actuator = Field(default=Actuator(), description="the servo that moves the rod")
     amplifier: Amplifier = Field(default=Amplifier(), description="the coil's amplifier")
     thermal: Thermal = Field(default=Thermal(), description="how the damper warms")
@@ -83,6 +87,13 @@ class Scenario(Setting):
         if len(set(names)) < len(names):
             raise ValueError(f"an effect stands twice among {_listed(names)}; merge its entries")
         return effects
+
+    @model_validator(mode="after")
+    def _sealed_alone(self) -> "Scenario":
+        if self.sealed and self.effects:
+            raise ValueError("sealed forms stand alone; leave `effects` empty")
+        check_sealed(self.sealed)
+        return self
 
     @model_validator(mode="after")
     def _one_unit(self) -> "Scenario":
@@ -142,12 +153,14 @@ def _check_effect(effect: EffectInPlay) -> None:
     known = EFFECTS.get(effect.name)
     if known is None:
         raise ValueError(f"no effect {effect.name!r}; there are {_listed(EFFECTS)}")
-    if effect.form not in (None, known.form):
-        raise ValueError(f"{effect.name} has the form {known.form!r}, not {effect.form!r}")
-    wanted = {quantity.symbol for quantity in known.parameters}
+    forms = [form.name for form in known.forms]
+    if effect.form is not None and effect.form not in forms:
+        raise ValueError(f"{effect.name} has the form {_listed(forms)}, not {effect.form}")
+    quantities = known.form(effect.form).parameters
+    wanted = {quantity.symbol for quantity in quantities}
     if effect.parameters.keys() != wanted:
         raise ValueError(f"{effect.name} takes {_listed(wanted)}, not {_listed(effect.parameters)}")
-    _within(known.parameters, effect.parameters, f"{effect.name}.")
+    _within(quantities, effect.parameters, f"{effect.name}.")
 
 
 def _within(quantities: Iterable[Quantity], values: dict[str, float], prefix: str = "") -> None:

@@ -56,8 +56,9 @@ def report(scenario: Scenario, time: Array, truth: Truth) -> tuple[dict[str, Arr
         time: (N,) on the bench clock, from 0 [s], N at least 2.
         truth: what happened, N samples.
     """
-    made, chances = streams(scenario, float(time[-1] - time[0]) / (len(time) - 1))
-    seen = looked_at(scenario, truth)
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    made, chances = streams(scenario, step)
+    seen = looked_at(scenario, truth, 0.0, step)
     values = {name: readings(stream, seen[name], time) for name, stream in made.items()}
     return values, chances
 
@@ -78,13 +79,21 @@ def readings(stream: ChannelStream, truth: Array, time: Array) -> Array:
     return stream.make(int(ticks[-1]) + 1)[1][ticks]
 
 
-def looked_at(scenario: Scenario, truth: Truth) -> dict[str, Array]:
-    """What each channel looks at, in its unit and in the order of ``CHANNELS``."""
+def looked_at(scenario: Scenario, truth: Truth, start: float, step: float) -> dict[str, Array]:
+    """What each channel looks at, in its unit and in the order of ``CHANNELS``.
+
+    Args:
+        scenario: the amplifier, and effects on channels.
+        truth: what happened.
+        start: [s] its first instant, since the start of the run.
+        step: [s] a sample of the bench.
+    """
     resistance, drive = scenario.amplifier.resistance, truth.output
     by_current = scenario.drive_unit == "A"
+    effects = Effects(scenario)
     return {
-        "displacement": truth.position,
-        "force": truth.force,
+        "displacement": _bent(effects, truth),
+        "force": truth.force + _added(effects, truth, start, step),
         "coil_drive": drive,
         "actuator_position": truth.position,
         "coil_current": drive if by_current else drive / resistance,
@@ -93,12 +102,28 @@ def looked_at(scenario: Scenario, truth: Truth) -> dict[str, Array]:
     }
 
 
+def _bent(effects: Effects, truth: Truth) -> Array:
+    """The actuator's position [m] with what the displacement channel adds to it."""
+    bends = effects.that("displacement_map")
+    return np.asarray(truth.position + sum(form.act(truth.position, *values) for form, values in bends))
+
+
+def _added(effects: Effects, truth: Truth, start: float, step: float) -> Array:
+    """What the force channel adds [N], at the start of each block."""
+    blocks = len(truth.force) // len(truth.output)
+    time = start + np.arange(len(truth.force)) * (step / blocks)
+    drive = np.repeat(truth.output, blocks)
+    added = effects.that("added_force")
+    return np.asarray(0.0 * time + sum(form.act(time, drive, *values) for form, values in added))
+
+
 def _views(scenario: Scenario, step: float) -> dict[str, View]:
     """How each channel looks at it; ``step`` [s] is a sample of the bench."""
-    fine, held = View(step / blocks_in(step)), View(step, held=True)
+    fine, held, effects = View(step / blocks_in(step)), View(step, held=True), Effects(scenario)
+    late, slow = effects.total("time_shift"), effects.total("force_lag")
     return {
-        "displacement": fine,
-        "force": fine._replace(lag=Effects.of(scenario).force_lag),
+        "displacement": fine._replace(lag=effects.total("displacement_shift")),
+        "force": fine._replace(lag=late, slow=slow),
         "coil_drive": held,
         "actuator_position": fine,
         "coil_current": held,

@@ -124,7 +124,8 @@ class LoadCellDevice:
             good = frame[2:4] == kind and checksum(frame[2:-2]).to_bytes(2, "little") == frame[-2:]
             self._heard = self._heard[start + (size if good else 1) :]
             if good:
-                answers.append(self._answer(*_REQUEST.unpack(frame[4:-2])))
+                token, command, argument = _REQUEST.unpack(frame[4:-2])
+                answers.append(self._answer(token, command, argument, now_ns))
         self._heard = self._heard[-size:]
         return answers
 
@@ -166,11 +167,11 @@ class LoadCellDevice:
         full = bool(counts) and self._recent[-1][0] - self._recent[0][0] >= 0.9e9 * _INSTRUMENT["tare_time_s"]
         return full and max(counts) - min(counts) <= _INSTRUMENT["tare_band_n"] * _COUNTS
 
-    def _answer(self, token: int, command: int, argument: int) -> bytes:
+    def _answer(self, token: int, command: int, argument: int, now_ns: int) -> bytes:
         name = _COMMANDS.get(command)
         if name == "identify":
             return framed("identity", token, command, _INSTRUMENT["protocol"], self._serial, _COUNTS)
-        code, value = self._done(name, argument)
+        code, value = self._done(name, argument) if name != "read_clock" else ("done", self._micros(now_ns))
         return framed("acknowledgement", token, command, _CODES[code], value)
 
     def _done(self, name: str | None, argument: int) -> tuple[str, int]:
@@ -186,6 +187,11 @@ class LoadCellDevice:
         if name in ("tare", "clear_tare"):
             return self._set_tare(name == "tare")
         return "unknown_command", 0
+
+    def _micros(self, now_ns: int) -> int:
+        """All 32 bits of its clock [us], as the signed number that the answer has room for."""
+        micros = self._clock.at(now_ns) // 1000 % (1 << 32)
+        return micros - (1 << 32) if micros >= 1 << 31 else micros
 
     def _set_rate(self, rate: int) -> tuple[str, int]:
         if self._running:

@@ -114,6 +114,10 @@ class SerialPort:
             self._begun_ns = now_ns
         self._waiting += through
 
+    def until_batch(self, now_ns: int) -> float:
+        """[s] until the next batch may go, 0 if it may."""
+        return max(self._batched_ns + self._batch_ns - now_ns, 0) * 1e-9
+
     def flush(self, now_ns: int) -> None:
         """Hand over what the line could have carried until ``now_ns`` [ns], if a batch is due."""
         self._carry(now_ns)
@@ -288,7 +292,7 @@ class SerialAdapter:
 
     def _serve(self) -> None:
         while not self._stopping.is_set():
-            heard = self.port.receive(self._poll)
+            heard = self.port.receive(min(self._poll, self.port.until_batch(self._now()) or self._poll))
             if self._hanging_up.is_set():
                 self._hanging_up.clear()
                 self.port.hang_up()

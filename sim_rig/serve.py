@@ -21,9 +21,11 @@ from sim_rig.modbus_lvdt import LvdtDevice
 from sim_rig.modbus_server import Device, ModbusServer
 from sim_rig.modbus_thermometer import ThermometerDevice
 from sim_rig.scenario import Scenario
+from sim_rig.sensors import CHANNELS
 from sim_rig.serial_ascii_load_cell import serial_ascii_load_cell
 from sim_rig.serial_load_cell import DeviceClock as SerialClock
 from sim_rig.serial_load_cell import serial_load_cell
+from sim_rig.settings import Sensor
 from sim_rig.socketcand_server import SocketcandServer
 
 _SYNC = 0x80
@@ -103,6 +105,8 @@ class ServedRig:
         """
         self.rig = LiveRig(scenario, clock, block=block)
         self.wires: list[Wire] = []
+        self.clocks: dict[str, DeviceClock] = {}
+        """Each device's clock: for tests and measurements."""
         self._scenario, self._clock, self._choices = scenario, clock, choices
         self._faults = dict(faults or {})
         self._open = ExitStack()
@@ -136,7 +140,8 @@ class ServedRig:
     def _clock_of(self, device: str) -> DeviceClock:
         """A device's clock: as far off as the scenario says, and switched on at some time before."""
         clock = getattr(self._scenario.clocks, device)
-        return DeviceClock(int(self._offsets.integers(_LONGEST_UP)), clock.ppm)
+        self.clocks[device] = DeviceClock(int(self._offsets.integers(_LONGEST_UP)), clock.ppm)
+        return self.clocks[device]
 
     def _amplifier(self) -> CoilAmplifierDevice:
         unit = self._scenario.drive_unit
@@ -204,16 +209,31 @@ class ServedRig:
         self.wires.append(Wire(name, protocol, {"driver": name, **settings}))
 
 
-def bench_toml(wires: list[Wire]) -> str:
-    """The configuration that reaches these wires."""
+def bench_toml(wires: list[Wire], scenario: Scenario) -> str:
+    """The configuration that reaches these wires, with what the instruments claim of their channels."""
     lines = ["# Reaches the simulated rig for as long as it runs; made anew each time it is started."]
+    specimen = ", ".join(str(value) for value in scenario.specimen.model_dump().values())
+    lines += ["", "[rig]", 'name = "simulated rig"', f"specimen = {json.dumps(specimen)}"]
     for wire in wires:
         lines += ["", f"[instruments.{wire.instrument}]"]
         lines += [f"{key} = {json.dumps(value)}" for key, value in wire.settings.items()]
+    for name in CHANNELS:
+        # The drive is measured by the channel of voltage or current.
+        if name != "coil_drive":
+            lines += ["", f"[channels.{name}]", *_claimed(getattr(scenario.sensors, name))]
     return "\n".join(lines) + "\n"
 
 
-def write_bench_toml(path: Path, wires: list[Wire]) -> None:
+def _claimed(sensor: Sensor) -> list[str]:
+    """What the data sheet of a channel would say, a line each."""
+    lines = [f"delay = {sensor.delay!r}", 'calibration = "as reported by the simulated instrument"']
+    if sensor.filter is not None:
+        form = sensor.filter
+        lines.append(f'filter = {{ kind = "{form.kind}", order = {form.order}, cutoff = {form.cutoff!r} }}')
+    return lines
+
+
+def write_bench_toml(path: Path, wires: list[Wire], scenario: Scenario) -> None:
     """Write it in one go: whoever waits for the file finds it whole.
 
     Raises:
@@ -221,7 +241,7 @@ def write_bench_toml(path: Path, wires: list[Wire]) -> None:
     """
     try:
         draft = path.with_name(f".{path.name}.draft")
-        draft.write_text(bench_toml(wires), "utf-8")
+        draft.write_text(bench_toml(wires, scenario), "utf-8")
         draft.replace(path)
     except OSError as error:
         raise WireError(

@@ -27,5 +27,11 @@ class Signals(Protocol):
             sensor has none; K is less than ``count`` where so many are not there or no longer kept.
         """
 
-    def command(self, channel: str, value: float) -> None:
-        """Command ``displacement`` [m] of the actuator or ``drive`` [V or A] of the amplifier, from now on."""
+    def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
+        """Command ``displacement`` [m] of the actuator or ``drive`` [V or A] of the amplifier.
+
+        Args:
+            channel: which of the two.
+            value: in its unit.
+            at_ns: [ns] on the rig's clock, from which it holds; not before that of the last one; now if none.
+        """

@@ -1,6 +1,8 @@
 """The process of the simulated rig: from its start to the signal that ends it."""
 
+import contextlib
 import gc
+import os
 import signal
 import sys
 import threading
@@ -10,14 +12,16 @@ from typing import NamedTuple
 import typer
 
 from sim_rig.clock import RunningClock
-from sim_rig.errors import SimRigError
+from sim_rig.errors import SimRigError, WireError
 from sim_rig.scenario import Scenario
 from sim_rig.serve import Choices, Faults, ServedRig, table, write_bench_toml
 
-_BLOCK = 2
+_BLOCK = 4
 """Samples that the plant lets come together in real time."""
 _SWITCH = 5e-4
 """[s] after which a thread that computes lets another one go on: wires do not wait for the plant."""
+_PRIORITY = 10
+"""Of SCHED_FIFO: hardware is on time whatever the machine is busy with; an agent beside it stands higher."""
 _LOOK = 0.2
 """[s] between two looks at whether the plant still moves."""
 
@@ -40,10 +44,13 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: Settings) -> None
     stopping = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopping.set())
+    _remove(out)
     block = max(_BLOCK, round(_BLOCK * settings.speed))
     clock = RunningClock(settings.speed)
-    with ServedRig(scenario, clock, settings.choices, settings.faults, block) as served:
-        write_bench_toml(out, served.wires)
+    rig = ServedRig(scenario, clock, settings.choices, settings.faults, block)
+    _ahead_of_ordinary_work()
+    with rig as served:
+        write_bench_toml(out, served.wires, scenario)
         _spare_the_wires()
         typer.echo(f"{table(served.wires)}\n{out} reaches them all; Ctrl-C ends the rig")
         sys.stdout.flush()
@@ -52,6 +59,22 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: Settings) -> None
                 raise served.rig.failure
     if isinstance(served.rig.failure, SimRigError):
         raise served.rig.failure
+
+
+def _remove(out: Path) -> None:
+    """Remove what an earlier rig has left: it would lead whoever waits for the file to ports that are closed."""
+    try:
+        out.unlink(missing_ok=True)
+    except OSError as error:
+        raise WireError(
+            f"{out}: cannot be replaced ({error.strerror}); choose another place with --out"
+        ) from error
+
+
+def _ahead_of_ordinary_work() -> None:
+    """Real-time priority for this thread and all that it starts; without, the rig is as late as the machine."""
+    with contextlib.suppress(OSError, AttributeError):
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
 
 
 def _spare_the_wires() -> None:

@@ -36,6 +36,9 @@ class RunCommand(Message):
     method: dict[str, Any] = Field(description="a document `mrbench.method/1`")
     specimen: str = Field(default="", description="the damper under test")
     operator: str = Field(default="", description="who runs it")
+    resume_after: str = Field(
+        default="", description="segment, a checkpoint of the method, after which an interrupted run goes on"
+    )
     log: str | None = Field(
         default=None, description="file of the log; made from the run's id in the agent's folder"
     )

@@ -11,13 +11,13 @@ def demo(
         bool, typer.Option("--quick", help="A shorter method, and no second recording of unseen strokes.")
     ] = False,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where everything goes.")] = Path("runs/demo"),
+    serve: Annotated[bool, typer.Option("--serve", help="Leave the bench up in the end, with its page.")] = False,
 ) -> None:
-    """Record six drives on the simulated rig, identify the damper, predict unseen strokes and write a report."""
+    """Bring up a simulated bench, record six drives over its wires, identify the damper, write a report."""
     from rich.console import Console
 
-    from bench.demo import Demo, carry_out, summarise
+    from bench.demo.demo import Demo
+    from bench.demo.folder import DemoFolder
 
-    planned = Demo(out, "quick", None) if quick else Demo(out, "six_voltages", "validation")
-    if not carry_out(planned, Console(stderr=True)):
-        raise typer.Exit(1)
-    summarise(planned, Console())
+    folder = DemoFolder(out, "quick", None) if quick else DemoFolder(out, "six_voltages", "validation")
+    Demo(folder, Console(stderr=True)).carry_out(Console(), serve=serve)

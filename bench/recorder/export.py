@@ -33,6 +33,7 @@ _NAMES = {
     "coil_current": "coil_current_a",
     "coil_voltage": "coil_voltage_v",
     "temperature": "temperature_c",
+    "force_raw": "force_raw_n",
     "segment": "segment",
 }
 

@@ -1,4 +1,4 @@
-"""What stands in a log: the messages of its three topics, and what its metadata records say.
+"""What stands in a log: the messages of its topics, and what its metadata records say.
 
 Every message is one JSON object that carries its own time. The JSON Schema in the log says each field's unit.
 Viewers know only plain types there: no references, no unions. So the time is written out in place, an optional
@@ -54,6 +54,7 @@ class Sample(BaseModel):
     coil_current: float | None = _quantity("current through the coil", "A", default=None)
     coil_voltage: float | None = _quantity("voltage across the coil", "V", default=None)
     temperature: float | None = _quantity("temperature of the specimen", "degC", default=None)
+    force_raw: float | None = _quantity("axial force without the tare of its instrument", "N", default=None)
     segment: int | None = _quantity("index of the segment; left out between segments", "1", default=None, ge=0)
 
 
@@ -84,11 +85,55 @@ class Event(BaseModel):
     text: str = Field(description="what happened, in words")
 
 
+def _list_of(text: str, unit: str) -> Any:
+    return Field(description=f"[{unit}] {text}, one a sample", json_schema_extra={"unit": unit})
+
+
+class Readings(BaseModel):
+    """Samples of one channel as its instrument gave them: consecutive, of one quality."""
+
+    model_config = _FROZEN
+
+    timestamp: Timestamp = Field(description="[s] bench clock of the first sample, as mapped")
+    channel: str = Field(description="name of the channel")
+    first: int = _quantity("running number of the first sample; a gap to the message before is a loss", "1")
+    quality: Literal["good", "uncertain", "bad"] = Field(
+        description="good: checked and in range; uncertain: no checksum or clock vouches for it; bad: not used"
+    )
+    received: list[int] = _list_of("bench clock when the sample had come, after the timestamp", "ns")
+    bench: list[int] = _list_of("bench clock of the conversion as mapped, after the timestamp", "ns")
+    device: list[int] = _list_of("the instrument's own clock at the conversion; empty where it has none", "ns")
+    raw: list[float] = _list_of("what stood on the wire, in the wire's own unit", "1")
+    values: list[float] = _list_of("in the channel's unit, see attachment `instruments.json`", "SI")
+    missing: list[int] = Field(description="[1] places among the values that are no numbers; zero stands there")
+
+
+class Frames(BaseModel):
+    """What passed on one wire, as it was received and sent."""
+
+    model_config = _FROZEN
+
+    timestamp: Timestamp = Field(description="[s] bench clock of the first frame")
+    at: list[int] = Field(description="[ns] bench clock of each frame, after the timestamp")
+    sent: list[bool] = Field(description="[1] whether each frame was sent by the bench; else it was received")
+    data: list[str] = Field(description="[1] the bytes of each frame, base64")
+
+
+INSTRUMENT, WIRE = "/instrument/", "/wire/"
+"""Beginnings of the topics that there is one of for each instrument."""
+
 MESSAGES: dict[str, type[BaseModel]] = {SAMPLE: Sample, SEGMENT: Segment, EVENT: Event}
-"""Message type by topic."""
+"""Message type by topic; these stand in every log."""
+FAMILIES: dict[str, type[BaseModel]] = {INSTRUMENT: Readings, WIRE: Frames}
+"""Message type by the beginning of a topic, for topics that end with the name of an instrument."""
 
 SAMPLE_FIELDS: tuple[str, ...] = tuple(name for name in Sample.model_fields if name != "timestamp")
 REQUIRED_FIELDS: tuple[str, ...] = SAMPLE_FIELDS[:4]
+
+
+def model_of(topic: str) -> type[BaseModel]:
+    """Message type of a topic, or of the beginning of one."""
+    return next((model for begin, model in FAMILIES.items() if topic.startswith(begin)), None) or MESSAGES[topic]
 
 
 def _accepts_none(field: FieldInfo) -> bool:
@@ -106,9 +151,9 @@ def message_schema(topic: str) -> JsonSchema:
     """JSON Schema of a topic's message, the unit in every field's description.
 
     Args:
-        topic: one of `MESSAGES`.
+        topic: one of `MESSAGES`, or one that begins like one of `FAMILIES`.
     """
-    model = MESSAGES[topic]
+    model = model_of(topic)
     schema = model.model_json_schema()
     clock = schema.pop("$defs")["Timestamp"]
     inside = {name: _plain(field) for name, field in clock["properties"].items()}
@@ -135,7 +180,7 @@ def message_schema(topic: str) -> JsonSchema:
 
 def schema_name(topic: str) -> str:
     """Name under which a topic's schema stands in the log: ``mrbench.Sample`` and so on."""
-    return f"{PROFILE}.{MESSAGES[topic].__name__}"
+    return f"{PROFILE}.{model_of(topic).__name__}"
 
 
 def sample_units(drive_unit: str) -> dict[str, str]:

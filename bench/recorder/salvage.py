@@ -197,7 +197,7 @@ def _outcome(remains: _Remains, size: int) -> dict[str, str]:
         {
             "outcome": "truncated",
             "reason": "the recorder was killed; mended by salvage",
-            **{topic: remains.counts[topic] for topic in MESSAGES},
+            **{topic: remains.counts[topic] for topic in {**MESSAGES, **remains.counts}},
             "lost": {},
             "last_time_ns": remains.last_time_ns,
             "known_until_ns": known,

@@ -7,7 +7,7 @@ import json
 import sys
 from pathlib import Path
 
-from bench.recorder.messages import MESSAGES, message_schema
+from bench.recorder.messages import FAMILIES, MESSAGES, message_schema
 
 FOLDER = Path(__file__).parents[2] / "docs" / "reference" / "schemas"
 """Where the schemas are kept."""
@@ -17,7 +17,7 @@ def schema_texts() -> dict[str, str]:
     """Each message's schema as text, by the name of its file."""
     return {
         f"{model.__name__.lower()}.json": json.dumps(message_schema(topic), indent=2, ensure_ascii=False) + "\n"
-        for topic, model in MESSAGES.items()
+        for topic, model in {**MESSAGES, **FAMILIES}.items()
     }
 
 

@@ -47,6 +47,8 @@ _README = """This is a log of a damper test in the MCAP format, profile mrbench 
 /bench/sample   one message a sample: displacement, velocity, force, drive and what else was measured
 /bench/segment  where each segment of the test starts and ends
 /bench/event    changes of state, commands, alarms
+/instrument/*   where the log was made on a rig: each instrument's own readings with its own clock and raw counts
+/wire/*         and what passed on its wire, byte by byte
 
 Messages are JSON; the schema beside each topic says the unit of every field. The metadata records `run`,
 `units`, `calibration`, `clocks` and `channels` say how the recording was made, `outcome` how it ended.
@@ -84,7 +86,10 @@ class LogWriter:
         with file_errors(self.path):
             self._file = self.path.open("wb")
             self._mcap = started_writer(self._file)
-            self._topics = {topic: self._register(topic) for topic in MESSAGES}
+            self._schemas: dict[str, int] = {}
+            self._topics: dict[str, int] = {}
+            for topic in MESSAGES:
+                self._register(topic)
             for name, record in header.records().items():
                 self._mcap.add_metadata(name, record)
             self.attach("README.txt", "text/plain", _README.encode())
@@ -186,6 +191,25 @@ class LogWriter:
         with file_errors(self.path):
             self._put(EVENT, time_ns, event.model_dump_json().encode())
 
+    def message(self, topic: str, time_ns: int, content: bytes) -> None:
+        """Write a message of an instrument or its wire.
+
+        Args:
+            topic: one that begins like one of `bench.recorder.messages.FAMILIES`; known from its first message on.
+            time_ns: bench clock [ns].
+            content: JSON that keeps to the topic's schema.
+        """
+        with file_errors(self.path):
+            if topic not in self._topics:
+                self._register(topic)
+            self._put(topic, time_ns, content)
+
+    def record(self, name: str, values: Mapping[str, Any]) -> None:
+        """Write a metadata record: what is known only after the recording has begun."""
+        with file_errors(self.path):
+            flush(self._mcap)
+            self._mcap.add_metadata(name, text_values(values))
+
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Keep a document in the log: the method, a configuration, a certificate."""
         with file_errors(self.path):
@@ -195,6 +219,11 @@ class LogWriter:
     def lost(self, channel: str, samples: int = 1) -> None:
         """Count samples of a channel that could not be recorded; the log will close as ``lossy``."""
         self._lost[channel] += samples
+
+    @property
+    def lossy(self) -> bool:
+        """Whether samples could not be recorded."""
+        return bool(self._lost)
 
     def close(self, outcome: Outcome | None = None, reason: str = "") -> None:
         """Write the outcome and the index, and bring everything to the disk.
@@ -219,13 +248,16 @@ class LogWriter:
             os.fsync(self._file.fileno())
 
     def _outcome(self, outcome: Outcome, reason: str) -> dict[str, str]:
-        counts = {topic: self._written[topic] for topic in MESSAGES}
+        counts = {topic: self._written[topic] for topic in self._topics}
         last = {"last_time_ns": self._last}
         return text_values({"outcome": outcome, "reason": reason, **counts, "lost": dict(self._lost), **last})
 
-    def _register(self, topic: str) -> int:
-        schema = self._mcap.register_schema(schema_name(topic), "jsonschema", orjson.dumps(message_schema(topic)))
-        return self._mcap.register_channel(topic, "json", schema)
+    def _register(self, topic: str) -> None:
+        name = schema_name(topic)
+        if name not in self._schemas:
+            content = orjson.dumps(message_schema(topic))
+            self._schemas[name] = self._mcap.register_schema(name, "jsonschema", content)
+        self._topics[topic] = self._mcap.register_channel(topic, "json", self._schemas[name])
 
     def _put_sample(self, time_ns: int, message: bytes) -> None:
         if time_ns <= self._last:

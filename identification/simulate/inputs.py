@@ -1,13 +1,158 @@
-"""What reaches the damper: the field behind the drive, and the displacement behind the mounting.
+"""The field behind the drive, at the samples and half way between them, with its derivatives.
 
-Each comes with its derivatives over the unknowns that shape it, which the kernel carries on to the force.
+Without an effect of the coil it comes in closed form. With one, the derivatives are differences of the whole
+transform: it is cheap beside the march.
 """
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from identification.arrays import Array, compiled
+from identification.damper.parameters import Quantity
+from identification.simulate.curves import over_parameters
+from identification.simulate.motion import machine
+from identification.simulate.setting import Setting, Stroke
+
+_AT_ONCE = 1e-6
+"""[s] a second lag below which the drive passes as it is."""
+_ETA = Quantity("eta", "1/s", 0.0, math.inf, 100.0, "")
+_DELAY = Quantity("delay", "s", -math.inf, math.inf, 0.1, "")
+
+
+class Field(NamedTuple):
+    """Field that the damper sees, and its derivatives over A unknowns: eta, drive delay, coil, force delay."""
+
+    u: Array
+    """(N,) [V or A]"""
+    middle: Array
+    """(N-1,) half way between samples."""
+    du: Array
+    """(A, N)"""
+    dmiddle: Array
+    """(A, N-1)"""
+    columns: tuple[int, ...]
+    """Columns of the unknowns between the first two and the last, among the parameters of the effects."""
+
+
+def damper_field(setting: Setting, stroke: Stroke, slopes: bool = True) -> Field:
+    """Field behind the drive of a stroke; derivatives through effects of the coil only on request."""
+    late = sum(values[0] for _, _, values in setting.acting("time_shift"))
+    delay, h = setting.force_delay + setting.drive_delay + late, 1.0 / (stroke.rate * stroke.drive_finer)
+    coil = setting.acting("drive_delay", "field", "field_memory")
+    if not coil:
+        u, middle, du, dmiddle = field(stroke.drive, setting.coordinates.eta, delay, h)
+        u, middle = _thinned(u, middle, stroke.drive_finer)
+        du, dmiddle = _thinned(du, dmiddle, stroke.drive_finer)
+        return Field(u, middle, np.vstack([du, du[1:]]), np.vstack([dmiddle, dmiddle[1:]]), ())
+    values = (setting.coordinates.eta, delay, *(v for _, _, some in coil for v in some))
+    quantities = (_ETA, _DELAY, *(q for _, form, _ in coil for q in form.parameters))
+
+    def whole(*parameters: float) -> Array:
+        return _through(coil, parameters, stroke.drive, h)
+
+    both = whole(*values)
+    columns = tuple(at + k for at, _, some in coil for k in range(len(some)))
+    finer = stroke.drive_finer
+    if not slopes:
+        return Field(*_parted(both, finer), np.empty((0, 0)), np.empty((0, 0)), columns)
+    rows = over_parameters(whole, values, quantities)
+    return Field(*_parted(both, finer), *_parted(np.stack([*rows, rows[1]]), finer), columns)
+
+
+def _parted(both: Array, finer: int) -> tuple[Array, Array]:
+    """Values at the samples of the motion, and half way between them, from half samples of the drive."""
+    return np.ascontiguousarray(both[..., :: 2 * finer]), np.ascontiguousarray(both[..., finer :: 2 * finer])
+
+
+def _thinned(at: Array, middle: Array, finer: int) -> tuple[Array, Array]:
+    """The same from samples of the drive and the values half way between those."""
+    if finer == 1:
+        return at, middle
+    halves = at[..., finer // 2 :: finer] if finer % 2 == 0 else middle[..., finer // 2 :: finer]
+    return np.ascontiguousarray(at[..., ::finer]), np.ascontiguousarray(halves)
+
+
+def _through(coil: Any, parameters: tuple[float, ...], drive: Array, h: float) -> Array:
+    """(2N-1,) field on the grid of half samples, through every effect of the coil in the order of the chain."""
+    eta, delay, lag, at = parameters[0], parameters[1], 0.0, 2
+    maps = []
+    for _, form, some in coil:
+        own = parameters[at : at + len(some)]
+        at += len(some)
+        if form.acts == "drive_delay":
+            further, slower = form.act(*own)
+            delay, lag = delay + further, lag + slower
+        else:
+            maps.append((form, own))
+    u = twice_lagged(drive, eta, lag, delay, h)
+    for form, own in maps:
+        if form.acts == "field":
+            u = form.act(u, *own)
+        else:
+            u = form.act(u, _remembered(machine(form.memory), u, *own), *own)
+    return np.asarray(u)
+
+
+@compiled
+def _remembered(memory: Any, u: Array, *values: float) -> Array:
+    """What a form with memory remembers along a field (N,); nothing at its start."""
+    found = np.zeros(len(u))
+    for i in range(1, len(u)):
+        change = u[i] - u[i - 1]
+        found[i] = found[i - 1] if change == 0.0 else memory(found[i - 1], change, *values)
+    return found
+
+
+@compiled
+def twice_lagged(drive: Array, eta: float, lag: float, delay: float, h: float) -> Array:
+    """(2N-1,) field on the grid of half samples behind two lags and a dead time (exact for a held drive)."""
+    count = len(drive)
+    found = np.empty(2 * count - 1)
+    whole = math.floor(delay / h)
+    early = delay / h - whole
+    usual = _weights(eta, lag, 0.5 * h)
+    w = u = drive[0]
+    found[0] = u
+    for i in range(count - 1):
+        old = drive[min(max(i - whole - 1, 0), count - 1)]
+        new = drive[min(max(i - whole, 0), count - 1)]
+        for half in range(2):
+            switch = min(max(early - 0.5 * half, 0.0), 0.5)
+            if old == new or switch == 0.0:
+                w, u = _lag_both(w, u, new, usual)
+            elif switch == 0.5:
+                w, u = _lag_both(w, u, old, usual)
+            else:
+                w, u = _lag_both(w, u, old, _weights(eta, lag, switch * h))
+                w, u = _lag_both(w, u, new, _weights(eta, lag, (0.5 - switch) * h))
+            found[2 * i + 1 + half] = u
+    return found
+
+
+@compiled
+def _lag_both(w: float, u: float, drive: float, weights: tuple[float, float, float]) -> tuple[float, float]:
+    """Lagged drive and field after some time towards a drive."""
+    slow, fade, mixed = weights
+    return drive + (w - drive) * slow, drive + (u - drive) * fade + (w - drive) * mixed
+
+
+@compiled
+def _weights(eta: float, lag: float, t: float) -> tuple[float, float, float]:
+    """What is left after t [s] of the lagged drive, of the field, and of the first in the second."""
+    fade = math.exp(-eta * t)
+    if lag < _AT_ONCE:
+        return 0.0, fade, 0.0
+    slow = math.exp(-t / lag)
+    difference = eta - 1.0 / lag
+    if abs(difference * t) < 1e-7:
+        mixed = t * slow
+    elif difference > 0.0:
+        mixed = -slow * math.expm1(-difference * t) / difference
+    else:
+        mixed = fade * math.expm1(difference * t) / difference
+    return slow, fade, eta * mixed
 
 
 @compiled

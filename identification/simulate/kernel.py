@@ -7,6 +7,7 @@ as a plan, so that later marches with slopes or with nearby coordinates are smoo
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -37,7 +38,7 @@ _FIELD_JUMP = 0.05
 
 
 @compiled
-def _choose_steps(
+def choose_steps(
     fineness: float,
     s: Array,
     h: float,
@@ -74,12 +75,28 @@ def _inputs(
 
 
 @compiled
+def scaled(s: Array, factors: Array, middle: Array, i: int, t: float, out: Array) -> None:
+    """Structural coordinates (10,) with alpha, c0 and c1 scaled, at the fraction t of sample i."""
+    a, b, c = factors[0, i], factors[1, i], factors[2, i]
+    if t > 0.0:
+        a = through_middle(a, middle[0, i], factors[0, i + 1], t)
+        b = through_middle(b, middle[1, i], factors[1, i + 1], t)
+        c = through_middle(c, middle[2, i], factors[2, i + 1], t)
+    out[:] = s
+    out[0], out[1] = a * s[0], a * s[1]
+    out[5], out[6] = b * s[5], b * s[6]
+    out[7], out[8] = c * s[7], c * s[8]
+
+
+@compiled
 def march(
     s: Array,
     x: Array,
     v: Array,
     u: Array,
     u_middle: Array,
+    factors: Array,
+    factors_middle: Array,
     h: float,
     y0: float,
     zeta0: float,
@@ -90,6 +107,7 @@ def march(
 
     Args:
         s: (10,) structural coordinates.
+        factors, factors_middle: (3, N) and (3, N-1) of alpha, c0 and c1 [1]; (3, 0) where nothing scales.
         x, v, u: (N,) displacement [m], velocity [m/s] and field [V or A] at the samples.
         u_middle: (N-1,) field half way between them.
         h: [s] time between samples.
@@ -102,22 +120,51 @@ def march(
     """
     count = len(x)
     ys, zetas, y_rates = np.empty(count), np.empty(count), np.empty(count)
+    scales, sc = factors.shape[1] > 0, s.copy()
     y, zeta = y0, zeta0
-    y_rate, zeta_rate = rates(s, x[0], v[0], u[0], y, zeta)
+    if scales:
+        scaled(s, factors, factors_middle, 0, 0.0, sc)
+    y_rate, zeta_rate = rates(sc, x[0], v[0], u[0], y, zeta)
     for i in range(count):
         ys[i], zetas[i], y_rates[i] = y, zeta, y_rate
         if i == count - 1:
             break
         if plan[i] == 0:
-            plan[i] = _choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
+            plan[i] = choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
         weight = HALF * h / plan[i]
         for k in range(plan[i]):
-            xs, vs, us = _inputs(x, v, u, u_middle, h, i, (k + GAMMA) / plan[i])
-            y1, zeta1 = first_stage(s, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
-            xs, vs, us = _inputs(x, v, u, u_middle, h, i, (k + 1.0) / plan[i])
-            y, zeta = second_stage(s, xs, vs, us, weight, y, zeta, y1, zeta1)
-            y_rate, zeta_rate = rates(s, xs, vs, us, y, zeta)
+            t = (k + GAMMA) / plan[i]
+            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+            if scales:
+                scaled(s, factors, factors_middle, i, t, sc)
+            y1, zeta1 = first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
+            t = (k + 1.0) / plan[i]
+            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+            if scales:
+                scaled(s, factors, factors_middle, i, t, sc)
+            y, zeta = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
+            y_rate, zeta_rate = rates(sc, xs, vs, us, y, zeta)
     return ys, zetas, y_rates
+
+
+class Derivatives(NamedTuple):
+    """Derivatives of the inputs over E further unknowns: A of the field, then motion and factors.
+
+    Those of the motion and of the factors both begin at the last of the field's: the delay moves everything.
+    """
+
+    du: Array
+    """(A, N) field."""
+    du_middle: Array
+    """(A, N-1)"""
+    dx: Array
+    """(M, N) displacement."""
+    dv: Array
+    """(M, N) velocity."""
+    df: Array
+    """(S, 3, N) factors; S is 0 where nothing scales."""
+    df_middle: Array
+    """(S, 3, N-1)"""
 
 
 @compiled
@@ -128,51 +175,57 @@ def march_with_slopes(
     v: Array,
     u: Array,
     u_middle: Array,
+    factors: Array,
+    factors_middle: Array,
     h: float,
     y0: float,
     zeta0: float,
     fineness: float,
     plan: Plan,
-    dx: Array,
-    dv: Array,
-    du: Array,
-    du_middle: Array,
+    over: Derivatives,
 ) -> tuple[Array, Array, Array, Array]:
     """States along a recording, and the slopes of the dashpot force c1 y' over coordinates, y0 and inputs.
 
     Args:
-        s, x, v, u, u_middle, h, y0, zeta0, fineness, plan: as in ``march``.
-        c1: (N,) roll-off dashpot at the samples [N s/m].
-        du, du_middle: (E, N) and (E, N-1) derivatives of the field over E further unknowns.
-        dx, dv: (M, N) derivatives of the motion over the last M of them; the others leave it alone.
+        s, x, v, u, u_middle, factors, factors_middle, h, y0, zeta0, fineness, plan: as in ``march``.
+        c1: (N,) roll-off dashpot at the samples [N s/m], unscaled.
+        over: derivatives of the inputs over E further unknowns.
 
     Returns:
         y [m], zeta [1], y' [m/s], each (N,), and slopes (N, 10 + 1 + E): structural coordinates, y0, further.
     """
-    count, columns = len(x), STRUCTURAL + 1 + len(du)
+    field_rows, motion_rows, scale_rows = len(over.du), len(over.dx), len(over.df)
+    columns = STRUCTURAL + 1 + max(field_rows, field_rows - 1 + max(motion_rows, scale_rows))
+    count = len(x)
     ys, zetas, y_rates, slopes = np.empty(count), np.empty(count), np.empty(count), np.empty((count, columns))
     Sy, Sz, Sy1, Sz1 = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
     fy, fz, gy, gz = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
     over_y, over_zeta, stage_y, stage_zeta = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
     over_inputs = np.zeros((2, 3))
+    scales, sc = factors.shape[1] > 0, s.copy()
     Sy[STRUCTURAL] = 1.0
     y, zeta = y0, zeta0
-    y_rate, zeta_rate = rate_slopes(s, x[0], v[0], u[0], y, zeta, over_y, over_zeta, over_inputs, fy, fz)
-    _from_inputs(over_inputs, dx, dv, du, du_middle, 0, 0.0, h, fy, fz)
+    if scales:
+        scaled(s, factors, factors_middle, 0, 0.0, sc)
+    y_rate, zeta_rate = rate_slopes(sc, x[0], v[0], u[0], y, zeta, over_y, over_zeta, over_inputs, fy, fz)
+    _from_inputs(over_inputs, over, s, sc, 0, 0.0, h, fy, fz)
     for i in range(count):
         ys[i], zetas[i], y_rates[i] = y, zeta, y_rate
-        _record(slopes[i], c1[i], u[i], s[8], y_rate, over_y[0], over_zeta[0], Sy, Sz, fy, du[:, i])
+        f1 = factors[2, i] if scales else 1.0
+        _record(slopes[i], c1[i], f1, u[i], s[8], y_rate, over_y[0], over_zeta[0], Sy, Sz, fy, over, i)
         if i == count - 1:
             break
         if plan[i] == 0:
-            plan[i] = _choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
+            plan[i] = choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
         weight = HALF * h / plan[i]
         for k in range(plan[i]):
             t = (k + GAMMA) / plan[i]
             xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
-            y1, zeta1 = first_stage(s, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
-            rate_slopes(s, xs, vs, us, y1, zeta1, stage_y, stage_zeta, over_inputs, gy, gz)
-            _from_inputs(over_inputs, dx, dv, du, du_middle, i, t, h, gy, gz)
+            if scales:
+                scaled(s, factors, factors_middle, i, t, sc)
+            y1, zeta1 = first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
+            rate_slopes(sc, xs, vs, us, y1, zeta1, stage_y, stage_zeta, over_inputs, gy, gz)
+            _from_inputs(over_inputs, over, s, sc, i, t, h, gy, gz)
             # The slopes take the very steps that the states took, so they are those of the discrete solution.
             for j in range(columns):
                 Sy1[j] = Sy[j] + weight * (over_y[0] * Sy[j] + over_zeta[0] * Sz[j] + fy[j] + gy[j])
@@ -180,9 +233,11 @@ def march_with_slopes(
             _solve(weight, stage_y, stage_zeta, Sy1, Sz1)
             t = (k + 1.0) / plan[i]
             xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
-            y, zeta = second_stage(s, xs, vs, us, weight, y, zeta, y1, zeta1)
-            y_rate, zeta_rate = rate_slopes(s, xs, vs, us, y, zeta, over_y, over_zeta, over_inputs, fy, fz)
-            _from_inputs(over_inputs, dx, dv, du, du_middle, i, t, h, fy, fz)
+            if scales:
+                scaled(s, factors, factors_middle, i, t, sc)
+            y, zeta = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
+            y_rate, zeta_rate = rate_slopes(sc, xs, vs, us, y, zeta, over_y, over_zeta, over_inputs, fy, fz)
+            _from_inputs(over_inputs, over, s, sc, i, t, h, fy, fz)
             for j in range(columns):
                 Sy[j] = WEIGHT_STAGE * Sy1[j] - WEIGHT_START * Sy[j] + weight * fy[j]
                 Sz[j] = WEIGHT_STAGE * Sz1[j] - WEIGHT_START * Sz[j] + weight * fz[j]
@@ -193,10 +248,9 @@ def march_with_slopes(
 @compiled
 def _from_inputs(
     over_inputs: Array,
-    dx: Array,
-    dv: Array,
-    du: Array,
-    du_middle: Array,
+    over: Derivatives,
+    s: Array,
+    sc: Array,
     i: int,
     t: float,
     h: float,
@@ -204,21 +258,49 @@ def _from_inputs(
     fz: Array,
 ) -> None:
     """Slopes of the two rates over the unknowns that act through the inputs, at the fraction t of sample i."""
-    still = len(du) - len(dx)
-    for e in range(len(du)):
-        j = STRUCTURAL + 1 + e
-        c = du[e, i] if t == 0.0 else through_middle(du[e, i], du_middle[e, i], du[e, i + 1], t)
-        fy[j] = over_inputs[0, 2] * c
-        fz[j] = over_inputs[1, 2] * c
-        if e < still:
-            continue
-        m = e - still
+    field_rows, scale_rows = len(over.du), len(over.df)
+    first = STRUCTURAL + 1
+    for j in range(first, len(fy)):
+        fy[j] = fz[j] = 0.0
+    for e in range(field_rows):
+        c = between_rows(over.du, over.du_middle, e, i, t)
+        fy[first + e] = over_inputs[0, 2] * c
+        fz[first + e] = over_inputs[1, 2] * c
+    first += field_rows - 1
+    for m in range(len(over.dx)):
         if t == 0.0:
-            a, b = dx[m, i], dv[m, i]
+            a, b = over.dx[m, i], over.dv[m, i]
         else:
-            a, b = between(dx[m, i], dx[m, i + 1], dv[m, i], dv[m, i + 1], h, t)
-        fy[j] += over_inputs[0, 0] * a + over_inputs[0, 1] * b
-        fz[j] += over_inputs[1, 0] * a + over_inputs[1, 1] * b
+            a, b = between(over.dx[m, i], over.dx[m, i + 1], over.dv[m, i], over.dv[m, i + 1], h, t)
+        fy[first + m] += over_inputs[0, 0] * a + over_inputs[0, 1] * b
+        fz[first + m] += over_inputs[1, 0] * a + over_inputs[1, 1] * b
+    for m in range(scale_rows):
+        # Slopes over the scaled coordinates stand in fy and fz: carried to the three factors.
+        for k in range(3):
+            a, b = _PAIRS[k]
+            c = between_rows(over.df[m], over.df_middle[m], k, i, t)
+            fy[first + m] += (s[a] * fy[a] + s[b] * fy[b]) * c
+            fz[first + m] += (s[a] * fz[a] + s[b] * fz[b]) * c
+    if scale_rows > 0:
+        for k in range(3):
+            a, b = _PAIRS[k]
+            factor = sc[a] / s[a]
+            fy[a] *= factor
+            fy[b] *= factor
+            fz[a] *= factor
+            fz[b] *= factor
+
+
+_PAIRS = ((0, 1), (5, 6), (7, 8))
+"""Structural coordinates that each factor scales."""
+
+
+@compiled
+def between_rows(values: Array, middle: Array, row: int, i: int, t: float) -> float:
+    """Value of a row at the fraction t of sample i, by the parabola through the sample's middle."""
+    if t == 0.0:
+        return float(values[row, i])
+    return through_middle(values[row, i], middle[row, i], values[row, i + 1], t)
 
 
 @compiled
@@ -237,6 +319,7 @@ def _solve(weight: float, over_y: Array, over_zeta: Array, Sy: Array, Sz: Array)
 def _record(
     row: Array,
     c1: float,
+    factor: float,
     u: float,
     c1_b: float,
     y_rate: float,
@@ -245,12 +328,15 @@ def _record(
     Sy: Array,
     Sz: Array,
     fy: Array,
-    du: Array,
+    over: Derivatives,
+    i: int,
 ) -> None:
-    """Write the slopes of c1 y' at one sample into its row."""
+    """Write the slopes of the scaled c1 y' at one sample into its row."""
     for j in range(len(Sy)):
-        row[j] = c1 * (over_y * Sy[j] + over_zeta * Sz[j] + fy[j])
-    row[7] += y_rate
-    row[8] += u * y_rate
-    for e in range(len(du)):
-        row[STRUCTURAL + 1 + e] += c1_b * du[e] * y_rate
+        row[j] = factor * c1 * (over_y * Sy[j] + over_zeta * Sz[j] + fy[j])
+    row[7] += factor * y_rate
+    row[8] += factor * u * y_rate
+    for e in range(len(over.du)):
+        row[STRUCTURAL + 1 + e] += factor * c1_b * over.du[e, i] * y_rate
+    for m in range(len(over.df)):
+        row[STRUCTURAL + len(over.du) + m] += c1 * over.df[m, 2, i] * y_rate

@@ -23,9 +23,9 @@ WEIGHT_START = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
 STRUCTURAL = 10
 """How many structural coordinates there are."""
 
-_TOLERANCE = 1e-11
-_LARGEST_MOVE = 0.5
-_ITERATIONS = 40
+TOLERANCE = 1e-11
+LARGEST_MOVE = 0.5
+ITERATIONS = 40
 
 at_field = compiled(law.at_field)
 inner_velocity = compiled(law.inner_velocity)
@@ -71,15 +71,15 @@ def solve_stage(
     A = 1.0 / s[2]
     beta = s[3] * A
     gamma = A - beta
-    for _ in range(_ITERATIONS):
+    for _ in range(ITERATIONS):
         slip = v - (constant + slope * zeta - y_known) / weight
         rate = hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         over_slip, over_zeta = hysteresis_slopes(slip, zeta, A, beta, gamma, s[4])
         steepness = 1.0 - weight * over_zeta + over_slip * slope
         # Just after a reversal the slope may be nearly flat or negative; a bounded move gets past it.
         move = (zeta_known + weight * rate - zeta) / max(steepness, 0.2)
-        zeta += min(max(move, -_LARGEST_MOVE), _LARGEST_MOVE)
-        if abs(move) < _TOLERANCE:
+        zeta += min(max(move, -LARGEST_MOVE), LARGEST_MOVE)
+        if abs(move) < TOLERANCE:
             break
     return constant + slope * zeta, zeta
 

@@ -7,6 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from bench.agent.link import AgentClient
+from bench.agent.messages import StatusCommand
+from bench.errors import AgentUnreachable
+from bench.recorder.reader import read_log
+from bench.rig.config import load_config
+
+pytestmark = pytest.mark.wire
 COMMAND = Path(sys.executable).parent / "mrbench"
 
 
@@ -23,17 +30,32 @@ def demo(tmp_path_factory):
 def test_the_demo_leaves_log_fit_report_and_plots(demo):
     done, folder = demo
     assert done.returncode == 0, done.stderr
-    assert {one.name for one in folder.iterdir()} == {"quick.mcap", "fit.json", "report.html", "plots"}
+    assert {"quick.mcap", "fit.json", "report.html", "plots", "bench.toml"} <= {
+        one.name for one in folder.iterdir()
+    }
     assert len(list((folder / "plots").glob("*.svg"))) == 5
 
 
 def test_each_step_is_announced_on_standard_error(demo):
-    announced = [line for line in demo[0].stderr.splitlines() if line[1:3] == "/3"]
+    announced = [line for line in demo[0].stderr.splitlines() if line[1:3] == "/4"]
     assert announced == [
-        "1/3 record quick from the simulated rig",
-        "2/3 identify the damper",
-        "3/3 write the report",
+        "1/4 bring up simulated rig, agent, service and worker",
+        "2/4 record quick over the wires",
+        "3/4 identify the damper",
+        "4/4 write the report",
     ]
+
+
+def test_the_log_was_recorded_over_the_wires_and_is_clean(demo):
+    log = read_log(demo[1] / "quick.mcap")
+    assert log.outcome == "clean"
+    assert "decoders.json" in log.attachments
+
+
+def test_nothing_is_left_running(demo):
+    agent = load_config(demo[1] / "bench.toml").agent
+    with pytest.raises(AgentUnreachable):
+        AgentClient(agent.commands, agent.samples).send(StatusCommand(), timeout=0.5)
 
 
 def test_the_numbers_printed_are_those_of_the_fit(demo):
@@ -62,12 +84,13 @@ def test_the_report_of_the_demo_says_that_its_recording_was_fitted(demo):
 
 
 def test_a_step_that_fails_ends_the_demo_with_its_own_line(tmp_path):
-    (tmp_path / "demo" / "quick.mcap").mkdir(parents=True)
+    (tmp_path / "demo" / "rig.toml").mkdir(parents=True)
     done = mrbench("demo", "--quick", "--out", tmp_path / "demo")
     assert done.returncode == 1
     announced, said = done.stderr.splitlines()
-    assert announced == "1/3 record quick from the simulated rig"
-    assert said.startswith("mrbench: ")
+    assert announced.startswith("1/4 ")
+    assert said.startswith("mrbench: a process of the demo ended at once: ")
+    assert "rig.toml: cannot be replaced" in said
     assert done.stdout == ""
 
 

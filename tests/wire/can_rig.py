@@ -39,7 +39,7 @@ class MadeUpRod:
     def now_ns(self) -> int:
         return time.monotonic_ns() - self._start
 
-    def command(self, channel: str, value: float) -> None:
+    def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
         assert channel == "displacement"
         if not self.stuck:
             with self._lock:

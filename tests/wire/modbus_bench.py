@@ -52,7 +52,7 @@ class FakeSignals:
         values = truth(channel, times)
         return times, np.full_like(values, np.nan) if channel in self.dead else values
 
-    def command(self, channel: str, value: float) -> None:
+    def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
         self.commands.append((self._now, channel, value))
 
     @property

@@ -1,65 +1,182 @@
-"""Effects: forms, slopes and senses."""
+"""Effects: what they declare, and the physics of each form."""
+
+import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
-from identification.damper.effects import EFFECTS
+from identification.damper.effects import EFFECTS, USUAL
 
 STAGES = ("coil", "damper", "mounting", "force_channel", "displacement_channel")
-FORCES = [e for e in EFFECTS.values() if e.acts == "parallel_force"]
-X = np.linspace(-0.012, 0.012, 7)
-V = np.linspace(0.11, -0.13, 7)
+FORMS = [(e, f) for e in EFFECTS.values() for f in e.forms]
+IDS = [f"{e.name}-{f.name}" for e, f in FORMS]
+V = np.linspace(-0.3, 0.3, 61)
+X = np.linspace(-0.03, 0.03, 61)
 
 
-@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda e: e.name)
-def test_each_effect_declares_its_place_and_parameters(effect):
+def act(name, form=None):
+    return EFFECTS[name].form(form).act
+
+
+def test_the_usual_ones_are_those_that_a_diagnosis_owes():
+    assert (
+        *("field_saturation", "magnetic_remanence", "coil_lag"),
+        *(
+            "gas_spring",
+            "seal_friction",
+            "orifice_turbulence",
+            "direction_asymmetry",
+            "viscous_heating",
+            "end_stop",
+        ),
+        *("clevis_backlash", "fixture_compliance", "moving_mass"),
+        *("force_delay", "force_drift", "mains_hum"),
+        "displacement_nonlinearity",
+    ) == USUAL
+
+
+@pytest.mark.parametrize(("effect", "form"), FORMS, ids=IDS)
+def test_each_form_declares_its_place_and_parameters(effect, form):
     assert effect.stage in STAGES
-    assert all(q.low < q.high and q.low <= q.scale <= q.high and q.unit for q in effect.parameters)
+    assert len({f.name for f in effect.forms}) == len(effect.forms)
+    assert all(q.low < q.high and q.low <= q.scale <= q.high and q.unit for q in form.parameters)
+    for start in form.starts:
+        assert all(q.low <= value <= q.high for q, value in zip(form.parameters, start, strict=True))
 
 
-@pytest.mark.parametrize("effect", FORCES, ids=lambda e: e.name)
-def test_slopes_of_a_force_agree_with_differences(effect):
-    point = [X, V, *(q.scale for q in effect.parameters)]
-    for i, slope in enumerate(effect.slopes(*point)):
-        step = 1e-6 * (np.max(np.abs(point[i])))
-        after, before = list(point), list(point)
-        after[i], before[i] = point[i] + step, point[i] - step
-        difference = (effect.act(*after) - effect.act(*before)) / (2 * step)
-        np.testing.assert_allclose(slope, difference, rtol=1e-5, atol=1e-6 * (np.abs(difference).max() + 1e-9))
+@pytest.mark.parametrize(
+    ("name", "symbol"),
+    [
+        ("moving_mass", "mass"),
+        ("force_delay", "delay"),
+        ("fixture_compliance", "compliance"),
+        ("orifice_turbulence", "coefficient"),
+        ("viscous_heating", "softening"),
+        ("clevis_backlash", "gap"),
+    ],
+)
+def test_what_cannot_be_negative_is_not(name, symbol):
+    (quantity,) = [q for q in EFFECTS[name].form().parameters if q.symbol == symbol]
+    assert quantity.low == 0.0
+
+
+def test_the_usual_form_comes_first_and_others_by_name():
+    assert EFFECTS["gas_spring"].form().name == "polytropic"
+    assert EFFECTS["gas_spring"].form("polytropic_turned").name == "polytropic_turned"
+    with pytest.raises(KeyError):
+        EFFECTS["gas_spring"].form("cubic")
 
 
 def test_gas_spring_is_at_rest_in_the_middle_and_stiffens_in_compression():
-    force = EFFECTS["gas_spring"].act
+    force = act("gas_spring")
     assert force(0.0, 0.0, 90.0, 0.05) == 0.0
     assert -force(-0.01, 0.0, 90.0, 0.05) > force(0.01, 0.0, 90.0, 0.05) > 0
 
 
-def test_gas_spring_with_both_signs_turned_is_the_recording_turned_round():
-    force = EFFECTS["gas_spring"].act
-    assert force(0.01, 0.0, -90.0, -0.05) == pytest.approx(-force(-0.01, 0.0, 90.0, 0.05))
+def test_the_turned_gas_spring_is_the_recording_turned_round():
+    one, other = act("gas_spring"), act("gas_spring", "polytropic_turned")
+    np.testing.assert_allclose(other(X, 0.0, 90.0, 0.05), -one(-X, 0.0, 90.0, 0.05))
 
 
-def test_friction_dissipates_and_peaks_near_rest():
-    force = EFFECTS["seal_friction"].act
+@pytest.mark.parametrize("form", ["stribeck", "stribeck_gentle"])
+def test_friction_dissipates_and_peaks_near_rest(form):
+    force = act("seal_friction", form)
     assert force(0.0, 0.003, 20.0, 10.0, 0.015) > force(0.0, 0.2, 20.0, 10.0, 0.015) > 19.9
-    assert force(0.0, -0.2, 20.0, 10.0, 0.015) == -force(0.0, 0.2, 20.0, 10.0, 0.015)
+    np.testing.assert_allclose(force(0.0, -V, 20.0, 10.0, 0.015), -force(0.0, V, 20.0, 10.0, 0.015))
+
+
+@pytest.mark.parametrize(("form", "values"), [("quadratic", (1000.0,)), ("power", (10.0, 2.0))])
+def test_turbulence_grows_with_the_square_of_the_speed(form, values):
+    force = act("orifice_turbulence", form)
+    assert force(0.0, 0.1, *values) == pytest.approx(10.0)
+    assert force(0.0, -0.2, *values) == pytest.approx(-40.0)
+
+
+def test_asymmetry_adds_to_extension_what_it_takes_from_compression():
+    alpha, c0, c1 = act("direction_asymmetry")(0.0, np.array([-0.2, 0.2]), 0.1, 0.2, 0.01)
+    np.testing.assert_allclose(alpha, [0.9, 1.1], rtol=1e-3)
+    np.testing.assert_allclose(c0, [0.8, 1.2], rtol=1e-3)
+    np.testing.assert_array_equal(c0, c1)
+    one_way = act("direction_asymmetry", "one_way")
+    np.testing.assert_allclose(one_way(0.0, V, 100.0, 5.0, 0.01), one_way(0.0, -V, 100.0, 5.0, 0.01))
+
+
+def test_heat_softens_the_oil_and_in_one_form_the_yield_too():
+    assert act("viscous_heating")(500.0, 2e-3, 100.0) == pytest.approx((1.0, 0.5, 0.5))
+    assert act("viscous_heating", "whole")(500.0, 2e-3, 100.0) == pytest.approx((0.5, 0.5, 0.5))
+
+
+def test_an_end_stop_is_silent_inside_its_gap_and_pushes_back_beyond():
+    both, out, back = (act("end_stop", f) for f in ("both_ends", "extended_end", "compressed_end"))
+    values = (2e4, 0.01, 1e-3)
+    assert both(0.0099, 0.0, *values) == out(-0.02, 0.0, *values) == back(0.02, 0.0, *values) == 0.0
+    assert both(0.02, 0.0, *values) == out(0.02, 0.0, *values) > 0.8 * 2e4 * 0.01
+    assert both(-0.02, 0.0, *values) == back(-0.02, 0.0, *values) == -both(0.02, 0.0, *values)
 
 
 def test_backlash_holds_the_damper_until_the_gap_is_crossed():
-    follow = EFFECTS["clevis_backlash"].act
+    follow = act("clevis_backlash")
     held = follow(0.0, 0.001, 2e-4)
     assert held == pytest.approx(0.0009)
     assert follow(held, 0.00085, 2e-4) == held
     assert follow(held, 0.0007, 2e-4) == pytest.approx(0.0008)
 
 
-@pytest.mark.parametrize(
-    ("x", "slopes"), [(0.001, (0.0, 1.0, -0.5)), (0.0, (1.0, 0.0, 0.0)), (-0.001, (0.0, 1.0, 0.5))]
-)
-def test_backlash_slopes_say_which_side_pushes(x, slopes):
-    assert EFFECTS["clevis_backlash"].slopes(0.0, x, 2e-4) == slopes
+@pytest.mark.parametrize(("form", "values"), [("tanh", (2.0,)), ("knee", (2.0, 3.0))])
+def test_a_saturated_field_is_bounded_and_begins_straight(form, values):
+    field = act("field_saturation", form)
+    assert field(1e-4, *values) == pytest.approx(1e-4, rel=1e-6)
+    assert field(0.4, *values) < 0.4
+    assert field(50.0, *values) == pytest.approx(0.5, rel=1e-3)
 
 
-def test_delay_looks_back():
-    assert EFFECTS["force_delay"].act(1.0, 0.004) == pytest.approx(0.996)
-    assert EFFECTS["force_delay"].slopes(1.0, 0.004) == (1.0, -1.0)
+@pytest.mark.parametrize(("form", "values"), [("exponential", (0.02, 0.05)), ("play", (0.02,))])
+def test_iron_is_below_on_the_way_up_and_above_on_the_way_down(form, values):
+    shape = EFFECTS["magnetic_remanence"].form(form)
+    up = shape.memory(0.0, 0.5, *values)
+    down = shape.memory(up, -0.5, *values)
+    assert shape.act(0.5, up, *values) == pytest.approx(0.48, abs=1e-4)
+    assert shape.act(0.0, down, *values) == pytest.approx(0.02, abs=1e-4)
+
+
+@pytest.mark.parametrize(("form", "values"), [("exponential", (0.02, 0.05)), ("play", (0.02,))])
+def test_what_iron_remembers_does_not_depend_on_how_a_change_is_cut(form, values):
+    memory = EFFECTS["magnetic_remanence"].form(form).memory
+    cut = 0.01
+    for _ in range(30):
+        cut = memory(cut, 0.001, *values)
+    assert cut == pytest.approx(memory(0.01, 0.03, *values))
+
+
+def test_a_bent_channel_has_no_gain_of_its_own_and_stays_bounded():
+    bend = act("displacement_nonlinearity")
+    assert bend(1e-6, 1e-4, 1e-4, 0.015) / 1e-6 < 1e-4
+    assert np.abs(bend(np.array([-1.0, 1.0]), 1e-4, 1e-4, 0.015)).max() < 2.01e-4
+
+
+@pytest.mark.parametrize(("form", "values"), [("settling", (5.0, 60.0)), ("swinging", (3.0, 4.0, 100.0))])
+def test_a_drift_stays_bounded_for_all_time(form, values):
+    time = np.linspace(0.0, 1e5, 10_001)
+    assert np.abs(act("force_drift", form)(time, 0.0, *values)).max() <= 5.0 + 1e-9
+
+
+@pytest.mark.parametrize(("effect", "form"), FORMS, ids=IDS)
+def test_forms_without_memory_take_arrays_as_they_take_numbers(effect, form):
+    arguments = {"parallel_force": 2, "scaling": 2, "added_force": 2, "softening": 1, "field": 1}.get(form.acts, 0)
+    if not arguments:
+        return
+    values = [q.scale for q in form.parameters]
+    many = np.asarray(form.act(*[np.abs(X) + 1e-3] * arguments, *values))
+    one = np.asarray(form.act(*[abs(X[7]) + 1e-3] * arguments, *values))
+    np.testing.assert_allclose(many[..., 7], one)
+
+
+def test_the_library_needs_no_compiler():
+    code = (
+        "import sys, json; import identification.damper.effects;"
+        "print(json.dumps([m for m in ('numba', 'torch', 'scipy') if m in sys.modules]))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(found.stdout) == []

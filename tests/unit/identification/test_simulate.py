@@ -75,8 +75,8 @@ def _moved(setting: Setting, name: str, relative: float) -> Setting:
         return replace(setting, **{name: getattr(setting, name) + 1e-3 * relative})
     owner, _, symbol = name.partition(".")
     effects = []
-    for effect, values in setting.effects:
-        at = [q.symbol for q in effect.parameters].index(symbol) if effect.name == owner else None
+    for effect, values, _ in setting.effects:
+        at = [q.symbol for q in effect.form().parameters].index(symbol) if effect.name == owner else None
         moved = tuple(v * (1 + relative) if i == at else v for i, v in enumerate(values))
         effects.append(ActiveEffect(effect, moved))
     return replace(setting, effects=tuple(effects))
@@ -88,8 +88,8 @@ def _size(setting: Setting, name: str) -> float:
     if name in UNKNOWNS:
         return 1e-3
     owner, _, symbol = name.partition(".")
-    effect, values = next(e for e in setting.effects if e.effect.name == owner)
-    return values[[q.symbol for q in effect.parameters].index(symbol)]
+    effect, values, _ = next(e for e in setting.effects if e.effect.name == owner)
+    return values[[q.symbol for q in effect.form().parameters].index(symbol)]
 
 
 @pytest.mark.parametrize("effects", [(), SOME_EFFECTS[:2], SOME_EFFECTS], ids=["law", "forces", "all"])

@@ -1,5 +1,6 @@
 """Where the drive wants to be, and what a bus does to frames, without sockets."""
 
+import numpy as np
 import pytest
 
 from sim_rig.can_bus import BusTiming, CanFrame, frame_bits
@@ -8,43 +9,69 @@ from sim_rig.drive_motion import Demand, Motion
 MILLISECOND = 1_000_000
 
 
-def test_setpoint_is_reached_in_a_straight_line_after_one_period():
+def test_setpoint_is_reached_in_a_straight_line_three_periods_after_it_came():
     demand = Demand()
-    demand.follow(4e-4, 4 * MILLISECOND, 1.0, 10.0)
+    demand.follow(12e-4, 4 * MILLISECOND, 1.0, 10.0)
     places = []
-    for k in range(5):
+    for k in range(13):
         demand.advance(k * MILLISECOND)
         places.append(demand.position)
-    assert places == pytest.approx([0, 1e-4, 2e-4, 3e-4, 4e-4])
+    assert places == pytest.approx([k * 1e-4 for k in range(13)])
+
+
+def test_setpoints_that_come_unpunctually_are_followed_at_a_steady_pace():
+    demand, random, period = Demand(), np.random.default_rng(7), 4 * MILLISECOND
+    places, coming = [], []
+    for k in range(500):
+        coming.append((k * period + int(random.integers(3 * MILLISECOND)), k * 2e-4))
+    for now in range(0, 500 * period, MILLISECOND // 4):
+        while coming and coming[0][0] <= now:
+            at, target = coming.pop(0)
+            demand.advance(at)
+            demand.follow(target, period, 1.0, 10.0)
+        demand.advance(now)
+        places.append(demand.position)
+    velocity = np.diff(places)[2000:] / 0.25e-3
+    assert velocity.mean() == pytest.approx(0.05, rel=1e-3)
+    assert velocity.std() < 0.05 * 0.05
 
 
 def test_late_setpoint_is_bridged_and_then_the_rod_brakes_by_itself():
     demand = Demand()
     demand.follow(4e-4, 4 * MILLISECOND, 1.0, 10.0)
-    demand.advance(12 * MILLISECOND)
+    demand.advance(20 * MILLISECOND)
     assert demand.position == pytest.approx(12e-4)
-    demand.advance(16 * MILLISECOND)
+    demand.advance(22 * MILLISECOND)
     assert demand.motion is Motion.BRAKE
     demand.advance(100 * MILLISECOND)
     assert demand.motion is Motion.REST
     assert demand.position == pytest.approx(12e-4 + 0.1**2 / 2 / 10)
 
 
-def test_setpoints_that_come_in_a_heap_are_bridged_at_their_own_pace():
+def test_of_setpoints_that_come_in_a_heap_the_last_counts():
     demand = Demand()
     for k in range(1, 6):
         demand.follow(k * 1e-4, 4 * MILLISECOND, 1.0, 10.0)
-    demand.advance(4 * MILLISECOND)
+    demand.advance(12 * MILLISECOND)
     assert demand.position == pytest.approx(5e-4)
-    demand.advance(8 * MILLISECOND)
-    assert demand.position == pytest.approx(6e-4)
 
 
 def test_speed_is_limited():
     demand = Demand()
     demand.follow(1.0, 4 * MILLISECOND, 0.5, 10.0)
-    demand.advance(4 * MILLISECOND)
+    demand.advance(12 * MILLISECOND)
     assert demand.position == pytest.approx(0.002)
+
+
+def test_a_setpoint_that_is_nearly_a_period_late_leaves_the_grid_where_it_was():
+    late, punctual, period = Demand(), Demand(), 4 * MILLISECOND
+    apart = []
+    for k in range(60):
+        for demand, delay in ((late, 3_700_000 if k == 20 else 0), (punctual, 0)):
+            demand.advance(k * period + delay)
+            demand.follow(k * k * 1e-6, period, 1.0, 10.0)
+        apart.append(abs(late.position - punctual.position) if k != 20 else 0.0)
+    assert max(apart[25:]) < 2e-6
 
 
 @pytest.mark.parametrize("target", [0.01, -0.01])

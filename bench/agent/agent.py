@@ -1,0 +1,436 @@
+"""The rig agent: owns instruments, interlocks, sequencer and recorder; nothing else writes to a wire.
+
+Its state is one of idle, preparing, running, stopping, tripped. Samples come on one thread a wire and are judged
+by the interlocks there and then; a thread of its own brings them onto one time base, records and publishes them. A
+run is carried out by a thread of its own, its setpoints by another that does nothing else.
+"""
+
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TypeAlias
+
+from bench.agent.bench_thread import BenchThread
+from bench.agent.header import LogFacts, clock_words, decoders, documents, force_rate, run_header
+from bench.agent.messages import (
+    AgentEvent,
+    AgentState,
+    AgentStatus,
+    Answer,
+    InstrumentStatus,
+    RunCommand,
+    RunStatus,
+    Samples,
+)
+from bench.agent.run import Run, order
+from bench.agent.warden import Warden
+from bench.errors import BenchError, LogError
+from bench.methods import Method
+from bench.methods.compile import BETWEEN
+from bench.recorder.live import LiveRecorder
+from bench.rig.acquisition import Acquisition, Batch
+from bench.rig.alignment import Aligner
+from bench.rig.config import BenchConfig
+from bench.rig.instruments import Named, build_rig
+from bench.rig.priority import (
+    HASTE,
+    freeze_memory,
+    ordinary_priority,
+    pause_collection,
+    raise_priority,
+    resume_collection,
+)
+from bench.safety.interlocks import Interlocks
+from bench.safety.limits import Action, specimen_matrix, stricter
+from bench.sequencer.plan import RunPlan
+from bench.sequencer.sequencer import Sequencer
+from drivers.channel import Frame
+from drivers.errors import DriverError
+
+Publish: TypeAlias = Callable[[AgentStatus | Samples | AgentEvent], None]
+
+_STATUS_PERIOD = 0.25
+"""[s] between two statuses where nothing changes."""
+_SWITCH = 2e-4
+"""[s] after which a thread that computes lets another one go on: setpoints do not wait for a summary."""
+_END_WITHIN = 20.0
+"""[s] for a run to end in good order when the agent is shut down."""
+_CLOCK_KNOWN = 20.0
+"""[s] after which a device's clock is known to a few parts in a million; before, it is better taken as right."""
+_CLOCKS_SETTLE = 4.0
+"""[s] from opening the wires until their clocks are mapped well enough for a log."""
+_REMEMBERED = 100
+"""Ended runs that the status lists."""
+
+
+class BenchClock:
+    """The bench clock [ns]: monotonic, zero when the agent starts."""
+
+    def __init__(self) -> None:
+        self._began = time.monotonic_ns()
+
+    def __call__(self) -> int:
+        """Now."""
+        return time.monotonic_ns() - self._began
+
+
+class Agent:
+    """The agent; a context manager that holds all wires open.
+
+    Args:
+        config: of the bench.
+        source: its file, kept in every log; logs go beside it.
+        publish: takes what is published, from any thread; must not wait.
+    """
+
+    def __init__(
+        self, config: BenchConfig, source: Path | None = None, publish: Publish = lambda message: None
+    ) -> None:
+        """Build everything; no wire is opened yet.
+
+        Raises:
+            DriverError: a driver refuses a setting.
+        """
+        self._config, self._source, self._publish = config, source, publish
+        self._clock = BenchClock()
+        self._no_priority = _no_priority()
+        self._rig = build_rig(config, self._clock, prompt=not self._no_priority)
+        self._interlocks = Interlocks(config.limits.matrix(), self._rig.drive_channel)
+        self._warden = Warden(self._rig, self._interlocks, self._clock, self._tell, self._stop_run)
+        actuator = self._rig.actuator
+        self._acquisition = Acquisition(
+            {one.name: one.instrument for one in self._rig.named},
+            self._take,
+            self._instrument_failed,
+            idle={actuator.name: actuator},
+        )
+        aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
+        self._bench = BenchThread(aligner, force_rate(config), publish, self._beat, self._log_failed)
+        self._lock = threading.RLock()
+        self._state: AgentState = "idle"
+        self._run: Run | None = None
+        self._thread: threading.Thread | None = None
+        self._finished: list[RunStatus] = []
+        self._told: tuple[AgentState, str] | None = None
+        self._told_at = 0.0
+        self._opened_ns = 0
+        self._open = contextlib.ExitStack()
+        for one in self._rig.named:
+            one.instrument.listen(partial(self._keep, one.name))
+
+    def __enter__(self) -> "Agent":
+        """Open all wires and begin to read.
+
+        Raises:
+            DriverError: an instrument does not answer as itself; nothing stays open.
+        """
+        sys.setswitchinterval(_SWITCH)
+        with_priority(self._open_all)
+        freeze_memory()
+        # Whoever asks for the status holds the interpreter: put aside meanwhile, it would hold up the setpoints.
+        raise_priority(-HASTE)
+        return self
+
+    def _open_all(self) -> None:
+        with contextlib.ExitStack() as opening:
+            opening.enter_context(self._rig.connected())
+            opening.callback(self._acquisition.stop)
+            self._acquisition.start()
+            opening.enter_context(self._bench)
+            self._acquisition.reconnect = True
+            self._opened_ns = self._clock()
+            self._open = opening.pop_all()
+
+    def __exit__(self, *_: object) -> None:
+        self.shut_down()
+        self._open.close()
+        ordinary_priority()
+
+    # Commands
+
+    def status(self) -> AgentStatus:
+        """All that the agent says of itself."""
+        with self._lock:
+            state, finished = self._state, tuple(self._finished[-_REMEMBERED:])
+        return AgentStatus(
+            state=state,
+            trip=self._interlocks.tripped,
+            run=self.run_status(),
+            finished=finished,
+            instruments=tuple(self._instrument_status(one) for one in self._rig.named),
+            warnings=self._warnings(),
+            drive_kind=self._rig.drive_kind,
+            drive_unit=self._rig.drive_unit,
+        )
+
+    def run_status(self) -> RunStatus | None:
+        """The run that goes on, or the last one; none before the first."""
+        with self._lock:
+            return self._run.status() if self._run else self._finished[-1] if self._finished else None
+
+    def run(self, command: RunCommand) -> Answer:
+        """Begin a run; answered as soon as it is accepted."""
+        with self._lock:
+            if error := self._not_ready():
+                return Answer(ok=False, error=error, status=self.status())
+            self._set_state("preparing")
+        try:
+            self._begin(command)
+        except (BenchError, DriverError) as found:
+            self._set_state("idle", instead_of=("preparing",))
+            return Answer(ok=False, error=str(found), status=self.status())
+        return Answer(ok=True, status=self.status())
+
+    def stop(self) -> Answer:
+        """End the run in good order; harmless when nothing runs."""
+        self._tell("command", "stop")
+        self._stop_run("stopped on request", False)
+        return Answer(ok=True, status=self.status())
+
+    def reset(self) -> Answer:
+        """Take back a trip whose cause has gone; nothing moves."""
+        self._tell("command", "reset")
+        with self._lock:
+            error = self._reset()
+        return Answer(ok=not error, error=error, status=self.status())
+
+    def shut_down(self) -> None:
+        """End the run in good order and bring everything to rest; harmless when repeated."""
+        thread = self._thread
+        if thread is not None and thread.is_alive():
+            self._stop_run("the agent was shut down", False)
+            thread.join(_END_WITHIN)
+
+    def wait(self, timeout: float) -> bool:
+        """Wait [s] for the run to end; whether it has."""
+        thread = self._thread
+        if thread is not None:
+            thread.join(timeout)
+        return thread is None or not thread.is_alive()
+
+    # A run
+
+    def _not_ready(self) -> str:
+        """Why no run can begin; empty where one can."""
+        if self._state != "idle":
+            why = f" ({self._interlocks.tripped}); find the cause, then reset" if self._state == "tripped" else ""
+            return f"the agent is {self._state}{why}; nothing was started"
+        down = ", ".join(self._acquisition.down)
+        return f"{down} does not answer; nothing was started; see its wire" if down else ""
+
+    def _begin(self, command: RunCommand) -> None:
+        """Check what can be checked, and start.
+
+        Raises:
+            MethodError, RunError: it cannot be run.
+        """
+        what = order(command, self._rig, self._config.rig.specimen, self._folder())
+        plan = RunPlan()
+        sequencer = Sequencer(
+            self._rig.actuator,
+            self._rig.amplifier,
+            self._interlocks,
+            plan,
+            self._clock,
+            self._tell,
+            self._warden.late,
+            self._warden.trip,
+            self._set_led,
+            partial(self._limit_by, what.method),
+            self._amplifier_rate,
+        )
+        run = Run(what, plan, sequencer, self._bench, self._clock, self._tell)
+        kept = documents(what.method, self._config, self._rig, self._source)
+        maps, now = self._acquisition.maps, self._clock()
+        header = run_header(what.method, what.identity, self._config, self._rig, maps, now)
+        facts = LogFacts(header, kept, partial(decoders, self._rig), partial(clock_words, self._rig, maps))
+        self._run = run
+        self._thread = threading.Thread(target=self._carry_out, args=(run, facts), name="run", daemon=True)
+        self._thread.start()
+
+    def _carry_out(self, run: Run, facts: LogFacts) -> None:
+        self._let_clocks_settle()
+        # The way to where a method begins may lie outside of where the method stays.
+        self._limit_by(run.what.method, without="displacement")
+        self._interlocks.expect_force(self._clock())
+        self._acquisition.reconnect, self._warden.plan = False, run.plan
+        raise_priority(-HASTE)
+        pause_collection()
+        try:
+            run.carry_out(facts, self._warden.settled, self._acquisition.maps)
+        finally:
+            resume_collection()
+            self._warden.plan = None
+            self._interlocks.expect_force(None)
+            self._interlocks.matrix = self._config.limits.matrix()
+            self._acquisition.reconnect = True
+            self._end(run)
+
+    def _let_clocks_settle(self) -> None:
+        """Wait, right after the wires were opened, until enough answers tell where the devices' clocks stand."""
+        left = self._opened_ns + round(_CLOCKS_SETTLE * 1e9) - self._clock()
+        time.sleep(max(left * 1e-9, 0.0))
+
+    def _limit_by(self, method: Method, without: str = "") -> None:
+        """Let a method's limits hold beside the fixture's."""
+        specimen = {name: steps for name, steps in specimen_matrix(method).items() if name != without}
+        self._interlocks.matrix = stricter(self._config.limits.matrix(), specimen)
+
+    def _amplifier_rate(self) -> float:
+        """How fast the amplifier's clock is, as a share; nothing as long as it has not been watched for long."""
+        known = self._clock() - self._opened_ns >= _CLOCK_KNOWN * 1e9
+        return self._acquisition.maps[self._rig.amplifier.name].rate() if known else 0.0
+
+    def _set_led(self, led: bool) -> None:
+        """While nobody leads the rod, it has to be asked for samples."""
+        self._acquisition.led = led
+
+    def _end(self, run: Run) -> None:
+        with self._lock:
+            status = run.status()
+            self._finished.append(status)
+            self._run = None
+            self._set_state("tripped" if self._interlocks.tripped else "idle")
+        self._tell("run_finished", f"{status.id}: {status.outcome} {status.reason}".strip())
+
+    def _stop_run(self, why: str, hold: bool) -> None:
+        run = self._run
+        if run is not None:
+            run.sequencer.stop(why, hold)
+        if self._interlocks.tripped:
+            self._set_state("tripped")
+        elif run is not None:
+            self._set_state("stopping", instead_of=("preparing", "running"))
+
+    def _reset(self) -> str:
+        if self._state != "tripped":
+            return "" if self._state == "idle" else f"the agent is {self._state}; stop it first"
+        if self._run is not None:
+            return "the run has not ended yet; try again in a moment"
+        if down := self._acquisition.down:
+            return f"{', '.join(down)} does not answer; see its wire, then reset"
+        try:
+            self._rig.amplifier.reset()
+            self._rig.actuator.reset()
+        except DriverError as error:
+            return str(error)
+        self._interlocks.reset()
+        self._set_state("idle")
+        return ""
+
+    # On the threads of wires
+
+    def _take(self, batch: Batch) -> None:
+        self._warden.look(batch)
+        self._bench.feed(batch)
+        if (log := self._log) is not None:
+            log.blocks(batch.instrument, batch.blocks)
+
+    def _keep(self, name: str, frame: Frame) -> None:
+        if (log := self._log) is not None:
+            log.frame(name, frame)
+
+    def _instrument_failed(self, name: str, error: DriverError) -> None:
+        driver = next(one.driver for one in self._rig.named if one.name == name)
+        action = self._config.silence.action(driver) if self._run is not None else Action.INDICATE
+        self._warden.act(action, str(error))
+
+    def _log_failed(self, error: LogError) -> None:
+        self._warden.act(Action.CONTROLLED_STOP, str(error))
+
+    # What is said
+
+    def _beat(self) -> None:
+        """Every turn of the bench thread."""
+        self._warden.tick()
+        run, now = self._run, time.monotonic()
+        segment = ""
+        if run is not None:
+            _, index = run.plan.progress(self._clock())
+            segment = "" if index == BETWEEN else run.what.programme.segments[index].name
+            if any(entry.passage for entry in run.plan.entries):
+                self._set_state("running", instead_of=("preparing",))
+        if (self._state, segment) != self._told or now - self._told_at >= _STATUS_PERIOD:
+            self._told, self._told_at = (self._state, segment), now
+            self._publish(self.status())
+
+    def _set_state(self, state: AgentState, instead_of: tuple[AgentState, ...] | None = None) -> None:
+        """Change the state, where it is one of those that are given."""
+        with self._lock:
+            if state == self._state or (instead_of is not None and self._state not in instead_of):
+                return
+            self._state = state
+        self._tell("state", f"agent {state}")
+
+    def _tell(self, kind: str, text: str, time_ns: int | None = None) -> None:
+        """An event, into the log that is open and to whoever listens."""
+        moment = self._clock() if time_ns is None else time_ns
+        if (log := self._log) is not None:
+            log.event(moment, kind, text)
+        self._publish(AgentEvent(time_ns=moment, kind=kind, text=text))
+
+    @property
+    def _log(self) -> LiveRecorder | None:
+        run = self._run
+        return None if run is None else run.log
+
+    def _warnings(self) -> tuple[str, ...]:
+        found = dict.fromkeys(self._acquisition.warnings)
+        if self._no_priority:
+            stale = self._rig.actuator.settings.stale_after
+            found[f"{self._no_priority}; the drive stops by itself {stale:g} s after the last setpoint"] = None
+        return tuple(found)
+
+    def _instrument_status(self, one: Named) -> InstrumentStatus:
+        health, clock = one.instrument.health(), self._acquisition.maps[one.name]
+        down = one.name in self._acquisition.down
+        return InstrumentStatus(
+            name=one.name,
+            driver=one.driver,
+            address=one.address,
+            connected=health.connected and not down,
+            received=health.received,
+            lost=health.lost,
+            corrupted=health.corrupted,
+            resynchronised=health.resynchronised,
+            age_s=None if health.last_ns is None else (self._clock() - health.last_ns) * 1e-9,
+            skew_s=clock.skew() if clock.known else None,
+            words=health.words or ("does not answer" if down else ""),
+        )
+
+    def _folder(self) -> Path:
+        base = Path() if self._source is None else self._source.parent
+        return base / self._config.rig.folder
+
+
+def _no_priority() -> str:
+    """Why threads of this process get no real-time priority; empty where they do."""
+    said: list[str] = []
+    with_priority(lambda: said.append(raise_priority()))
+    return said[0]
+
+
+def with_priority(work: Callable[[], None]) -> None:
+    """Do something in a thread of real-time priority, which all threads that it starts inherit.
+
+    Every thread of the agent needs it: one that holds the interpreter and is put aside for another process would
+    hold up the setpoints, too. The calling thread stays as it is.
+    """
+    failures: list[BaseException] = []
+
+    def run() -> None:
+        raise_priority(-HASTE)
+        try:
+            work()
+        except BaseException as error:
+            failures.append(error)
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    thread.join()
+    if failures:
+        raise failures[0]

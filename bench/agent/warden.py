@@ -1,0 +1,106 @@
+"""Acts on what the interlocks find: alarm, hold, controlled stop, trip.
+
+Called on the threads of the wires, at the moment that a sample has come; a trip starts its own threads at once and
+waits for nobody.
+"""
+
+import threading
+from collections.abc import Callable
+
+import numpy as np
+
+from bench.rig.acquisition import Batch
+from bench.rig.instruments import Rig
+from bench.safety.interlocks import Interlocks, following_error
+from bench.safety.limits import Action, Verdict
+from bench.safety.trip import DEADLINE, bring_to_rest
+from bench.sequencer.plan import RunPlan
+
+Stop = Callable[[str, bool], None]
+"""Ends the run in good order: why, and whether the rod is held."""
+
+
+class Warden:
+    """The interlocks at work.
+
+    Args:
+        rig: what is brought to rest in a trip.
+        interlocks: that judge.
+        clock: of the bench [ns].
+        tell: told of what happens: kind, words.
+        stop: ends a run in good order.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        interlocks: Interlocks,
+        clock: Callable[[], int],
+        tell: Callable[[str, str], None],
+        stop: Stop,
+    ) -> None:
+        self.plan: RunPlan | None = None
+        """What the rod was sent to, while a run leads it."""
+        self._rig, self._interlocks, self._clock = rig, interlocks, clock
+        self._tell, self._stop = tell, stop
+        self._rest: threading.Thread | None = None
+        self._cycle_ns = round(rig.actuator.settings.cycle * 1e9)
+
+    def look(self, batch: Batch) -> None:
+        """Judge what has just come."""
+        now = self._clock()
+        verdicts = self._interlocks.check(batch.blocks, now)
+        if self.plan is not None and batch.instrument == self._rig.actuator.name:
+            verdicts += self._interlocks.check_value(
+                "following_error", self._following_error(batch, self.plan), now
+            )
+        for verdict in verdicts:
+            self._act_on(verdict)
+
+    def tick(self) -> None:
+        """Judge what no sample tells: that none comes."""
+        for verdict in self._interlocks.check((), self._clock()):
+            self._act_on(verdict)
+
+    def late(self, now_ns: int, late: float) -> None:
+        """A setpoint left late [s]."""
+        for verdict in self._interlocks.check_value("setpoint_lateness", late, now_ns):
+            self._act_on(verdict)
+
+    def act(self, action: Action, why: str) -> None:
+        """Do what an action means."""
+        if action is Action.TRIP:
+            self.trip(why)
+        elif action is not Action.NONE:
+            self._tell("alarm", why)
+            if action is not Action.INDICATE:
+                self._stop(why, action is Action.HOLD)
+
+    def trip(self, why: str) -> None:
+        """Bring coil and actuator to rest at once, each in a thread of its own; latched."""
+        if not self._interlocks.latch(why):
+            return
+        self._rest = threading.Thread(target=self._bring_to_rest, name="trip", daemon=True)
+        self._rest.start()
+        self._tell("trip", why)
+        self._stop(why, False)
+
+    def settled(self) -> str:
+        """Wait until a trip has done its work; why it tripped, empty where it did not."""
+        if self._rest is not None:
+            self._rest.join(2 * DEADLINE)
+        return self._interlocks.tripped
+
+    def _act_on(self, verdict: Verdict) -> None:
+        self.act(verdict.action, str(verdict))
+
+    def _bring_to_rest(self) -> None:
+        rest = bring_to_rest([self._rig.amplifier, self._rig.actuator])
+        self._tell("state", f"brought to rest: {rest}")
+
+    def _following_error(self, batch: Batch, plan: RunPlan) -> float:
+        """The samples of a batch are one cycle apart, the last one fresh."""
+        positions = [block for block in batch.blocks if block.channel == "actuator_position"]
+        values = np.concatenate([block.values for block in positions])
+        ages = np.arange(len(values))[::-1] * self._cycle_ns
+        return following_error(values, positions[-1].received_ns - ages, plan.positions)

@@ -1,0 +1,1 @@
+"""The catalogue: which runs there are, where their logs lie, and the jobs on them."""

@@ -1,0 +1,56 @@
+"""Opens the database of a catalogue and brings its tables to this version."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from alembic import command
+from alembic.config import Config
+from alembic.util import CommandError
+from sqlalchemy import Engine, create_engine, event
+from sqlalchemy.exc import SQLAlchemyError
+
+from bench.catalogue.errors import CatalogueError
+
+_PRAGMAS = ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON", "busy_timeout=5000")
+"""With a write-ahead log, readers never wait for a writer; a kill loses nothing that was committed."""
+
+
+def sqlite_url(path: Path) -> str:
+    """The address of an SQLite file."""
+    return f"sqlite:///{path}"
+
+
+def open_database(url: str) -> Engine:
+    """Connect and run the migrations that the database lacks.
+
+    Args:
+        url: as SQLAlchemy has it, such as ``sqlite:///runs/catalogue.db`` or ``postgresql+psycopg://…``.
+
+    Raises:
+        CatalogueError: it cannot be opened, is no database, or was made by a later version.
+    """
+    try:
+        engine = create_engine(url)
+        if engine.dialect.name == "sqlite":
+            event.listen(engine, "connect", _set_pragmas)
+        _migrate(engine)
+    except CommandError as error:
+        raise CatalogueError(f"the catalogue {url} is of a later version ({error}); take that mrbench") from error
+    except (SQLAlchemyError, ImportError) as error:
+        raise CatalogueError(f"the catalogue {url} cannot be opened: {str(error).splitlines()[0]}") from error
+    return engine
+
+
+def _set_pragmas(connection: Any, record: object) -> None:
+    execute: Callable[[str], object] = connection.execute
+    for pragma in _PRAGMAS:
+        execute(f"PRAGMA {pragma}")
+
+
+def _migrate(engine: Engine) -> None:
+    config = Config()
+    config.set_main_option("script_location", "bench.catalogue:migrations")
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")

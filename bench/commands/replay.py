@@ -1,0 +1,55 @@
+"""``mrbench replay``: a log back through the decoders that made it, and to a live view."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def replay(
+    log: Annotated[Path, typer.Argument(help="The log.")],
+    speed: Annotated[
+        str, typer.Option(help="Times as fast as recorded, for --publish; or max.", metavar="N|max")
+    ] = "max",
+    out: Annotated[str | None, typer.Option(help="Write what was found as JSON; - prints it.")] = None,
+    publish: Annotated[
+        str | None, typer.Option(help="Address where live views hear the samples, such as tcp://127.0.0.1:5571.")
+    ] = None,
+) -> None:
+    """Decode the raw frames of a log anew and check that the same readings come out, bit for bit.
+
+    With --publish the samples are then played to live views. Exits with 1 where a reading differs.
+    """
+    import orjson
+
+    from bench.recorder.reader import read_log
+    from bench.recorder.replacement import replacing
+    from bench.replay.compare import replay_frames
+    from bench.replay.play import parse_speed, play
+
+    pace = parse_speed(speed)
+    samples = len(read_log(log).samples["time"])
+    found = replay_frames(log)
+    typer.echo(f"{log}: {samples} bench samples", err=True)
+    for one in found:
+        typer.echo(str(one), err=True)
+    if not found:
+        typer.echo("the log holds no frames of wires: it was imported, or made without wires", err=True)
+    equal = all(one.equal for one in found)
+    if out is not None:
+        report = {
+            "log": str(log),
+            "samples": samples,
+            "equal": equal,
+            "instruments": [one._asdict() for one in found],
+        }
+        text = orjson.dumps(report, option=orjson.OPT_INDENT_2)
+        if out == "-":
+            typer.echo(text.decode())
+        else:
+            with replacing(Path(out)) as beside:
+                beside.write_bytes(text + b"\n")
+    if publish is not None:
+        play(log, pace, publish)
+    if not equal:
+        raise typer.Exit(1)

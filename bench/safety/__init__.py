@@ -1,0 +1,1 @@
+"""Interlocks: what must not happen, and what is done about it."""

@@ -1,0 +1,1 @@
+"""The sequencer: plays a compiled method on actuator and coil amplifier."""

@@ -1,0 +1,1 @@
+"""The service: REST, live values and the page, in front of the rig agent, the catalogue and the jobs."""

@@ -1,0 +1,112 @@
+"""Errors as `application/problem+json` (RFC 9457), each kind with a stable type, never with a traceback."""
+
+import logging
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import BaseModel, Field
+from starlette.exceptions import HTTPException
+
+from bench.errors import AgentUnreachable, BenchError, LogError, MethodError
+
+MEDIA_TYPE = "application/problem+json"
+_LOG = logging.getLogger(__name__)
+
+
+class Problem(BaseModel):
+    """What went wrong."""
+
+    type: str = Field(description="`urn:mrbench:problem:NAME`; the names stay as they are")
+    title: str = Field(description="the kind, for a person")
+    status: int = Field(description="HTTP status")
+    detail: str = Field(description="what failed, the value and the limit with unit, what to do")
+
+
+class ProblemError(Exception):
+    """Raised by routes; answered as a problem."""
+
+    def __init__(self, status: HTTPStatus, name: str, title: str, detail: str) -> None:
+        super().__init__(detail)
+        self.problem = Problem(type=f"urn:mrbench:problem:{name}", title=title, status=status, detail=detail)
+
+
+def not_found(what: str, name: str) -> ProblemError:
+    """There is no such thing."""
+    return ProblemError(HTTPStatus.NOT_FOUND, "not-found", "Not found", f"there is no {what} {name}")
+
+
+def unauthorised() -> ProblemError:
+    """The token is missing or wrong."""
+    words = "give the token as `Authorization: Bearer ...`; `mrbench serve --new-token` makes another"
+    return ProblemError(HTTPStatus.UNAUTHORIZED, "unauthorised", "The token is missing or wrong", words)
+
+
+def conflict(name: str, title: str, detail: str) -> ProblemError:
+    """It cannot be done in the present state."""
+    return ProblemError(HTTPStatus.CONFLICT, name, title, detail)
+
+
+RESPONSES: dict[int | str, dict[str, Any]] = {
+    status: {"description": words, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
+    for status, words in (
+        (401, "The token is missing or wrong"),
+        (404, "There is no such thing"),
+        (409, "Not possible in the present state"),
+        (422, "The request does not have its form"),
+        (503, "The rig agent does not answer"),
+    )
+}
+"""What any call may answer instead."""
+
+_OF_BENCH: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
+    (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method is refused"),
+    (AgentUnreachable, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
+    (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
+    (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),
+)
+
+
+def install(app: FastAPI) -> None:
+    """Have an application answer every error as a problem."""
+
+    @app.exception_handler(ProblemError)
+    async def _problem(request: Request, error: ProblemError) -> JSONResponse:
+        return _answer(error.problem)
+
+    @app.exception_handler(BenchError)
+    async def _of_bench(request: Request, error: BenchError) -> JSONResponse:
+        status, name, title = next(kind[1:] for kind in _OF_BENCH if isinstance(error, kind[0]))
+        return _answer(ProblemError(status, name, title, str(error)).problem)
+
+    @app.exception_handler(RequestValidationError)
+    async def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
+        return _answer(_of_validation(error))
+
+    @app.exception_handler(HTTPException)
+    async def _http(request: Request, error: HTTPException) -> JSONResponse:
+        status = HTTPStatus(error.status_code)
+        name = status.phrase.lower().replace(" ", "-")
+        problem = ProblemError(status, name, status.phrase, f"{request.method} {request.url.path}: {error.detail}")
+        return _answer(problem.problem, error.headers)
+
+    @app.exception_handler(Exception)
+    async def _defect(request: Request, error: Exception) -> JSONResponse:
+        _LOG.error("defect", exc_info=error, extra={"path": request.url.path})
+        words = "the service has a defect; its log says more"
+        return _answer(ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "Defect", words).problem)
+
+
+def _of_validation(error: RequestValidationError) -> Problem:
+    first = error.errors()[0]
+    place = ".".join(str(step) for step in first["loc"])
+    others = len(error.errors()) - 1
+    more = f" (and {others} more)" if others else ""
+    detail = f"{place}: {first['msg'].removeprefix('Value error, ')}{more}"
+    return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "Invalid request", detail).problem
+
+
+def _answer(problem: Problem, headers: Any = None) -> JSONResponse:
+    return JSONResponse(problem.model_dump(), problem.status, headers=headers, media_type=MEDIA_TYPE)

@@ -1,0 +1,141 @@
+"""The processes that the service starts: a worker that it keeps alive, an agent that outlives it."""
+
+import asyncio
+import contextlib
+import logging
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator, Sequence
+from pathlib import Path
+
+from bench.agent.messages import ShutDownCommand, StatusCommand
+from bench.errors import AgentUnreachable
+from bench.jobs.engine import DaskEngine, local_scheduler
+from bench.service.agent_watch import AgentLink
+from bench.service.errors import ServiceError
+
+MRBENCH = (sys.executable, "-m", "bench.cli")
+AGENT_WITHIN = 90.0
+"""[s] from its start to an agent's first answer."""
+LONGEST_PAUSE = 30.0
+"""[s] between two starts of a worker that ends at once."""
+_TERM_WITHIN = 5.0
+_LOG = logging.getLogger(__name__)
+
+
+@contextlib.asynccontextmanager
+async def local_engine(data: Path, mrbench: Sequence[str] = MRBENCH) -> AsyncIterator[DaskEngine]:
+    """An engine with a scheduler in this process and one worker process, which is started again whenever it ends.
+
+    Args:
+        data: the data folder; the scheduler's address and the worker's words go there.
+        mrbench: the command line.
+    """
+    async with local_scheduler(data) as address:
+        command = [*mrbench, "worker", "--scheduler", address]
+        keeping = asyncio.create_task(_keep_alive(command, data / "worker.log"))
+        try:
+            yield DaskEngine(address)
+        finally:
+            keeping.cancel()
+            with contextlib.suppress(asyncio.CancelledError):
+                await keeping
+
+
+@contextlib.asynccontextmanager
+async def engine_at(address: str) -> AsyncIterator[DaskEngine]:
+    """An engine whose scheduler and workers somebody else has started."""
+    yield DaskEngine(address)
+
+
+async def _keep_alive(command: Sequence[str], log: Path) -> None:
+    pause = 1.0
+    while True:
+        began = time.monotonic()
+        process = await asyncio.to_thread(_start, command, log)
+        _LOG.info("worker_started", extra={"pid": process.pid})
+        try:
+            status = await asyncio.to_thread(process.wait)
+        finally:
+            # Cancelled: the thread that waits ends as soon as the process does.
+            await asyncio.shield(asyncio.to_thread(_end, process))
+        _LOG.warning("worker_ended", extra={"pid": process.pid, "status": status, "log": str(log)})
+        pause = 1.0 if time.monotonic() - began > LONGEST_PAUSE else min(2.0 * pause, LONGEST_PAUSE)
+        await asyncio.sleep(pause)
+
+
+def _start(command: Sequence[str], log: Path) -> "subprocess.Popen[bytes]":
+    """Start a process in a session of its own, so that a Ctrl-C meant for the service does not reach it."""
+    with log.open("ab") as words:
+        return subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=words, stderr=words, start_new_session=True
+        )
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.terminate()
+    try:
+        process.wait(_TERM_WITHIN)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def answers(link: AgentLink, timeout: float = 1.0) -> bool:
+    """Whether an agent is there.
+
+    Args:
+        link: the way to it.
+        timeout: [s]
+    """
+    try:
+        return link.send(StatusCommand(), timeout).ok
+    except AgentUnreachable:
+        return False
+
+
+def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str] = MRBENCH) -> None:
+    """Start a rig agent that goes on when the service ends; returns once it answers.
+
+    Args:
+        config: ``bench.toml``.
+        link: the way to it.
+        data: its words go there, into ``agent.log``.
+        mrbench: the command line.
+
+    Raises:
+        ServiceError: it ends, or does not answer in time.
+    """
+    log = data / "agent.log"
+    process = _start([*mrbench, "rig", "--config", str(config)], log)
+    deadline = time.monotonic() + AGENT_WITHIN
+    while not answers(link):
+        if process.poll() is not None:
+            raise ServiceError(f"the rig agent ended at once: {_last_line(log)}")
+        if time.monotonic() > deadline:
+            _end(process)
+            raise ServiceError(f"the rig agent did not answer within {AGENT_WITHIN:g} s; see {log}")
+    _LOG.info("agent_started", extra={"pid": process.pid, "log": str(log)})
+
+
+def leave_agent(link: AgentLink) -> str:
+    """End an agent if nothing goes on there.
+
+    Returns:
+        What became of it, for a person.
+    """
+    try:
+        status = link.send(StatusCommand(), 2.0).status
+        if status is None or status.state != "idle":
+            state = status.state if status else "of unknown state"
+            return f"the rig agent is {state} and goes on; `mrbench serve` finds it again"
+        link.send(ShutDownCommand(), 10.0)
+    except AgentUnreachable as error:
+        return f"the rig agent does not answer: {error}"
+    return "the rig agent was idle and has ended"
+
+
+def _last_line(log: Path) -> str:
+    lines = log.read_text("utf-8", errors="replace").strip().splitlines()
+    return lines[-1].removeprefix("mrbench: ") if lines else f"see {log}"

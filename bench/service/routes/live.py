@@ -1,0 +1,40 @@
+"""The websocket that tells what happens as it happens."""
+
+import asyncio
+
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+
+from bench.service.desk import AtDesk
+from bench.service.live import Mailbox
+
+router = APIRouter()
+_REFUSED = 4401
+"""Close code for a token that is missing or wrong."""
+
+
+@router.websocket("/live")
+async def live(websocket: WebSocket, desk: AtDesk, token: str = "") -> None:
+    """Messages `{"topic": ..., "data": ...}` of status, samples, event, job and run, until either side ends it."""
+    await websocket.accept()
+    if not desk.access.allows(token):
+        await websocket.close(_REFUSED, "the token is missing or wrong")
+        return
+    with desk.live.listener() as mailbox:
+        sending = asyncio.create_task(_send(websocket, mailbox))
+        try:
+            while True:
+                await websocket.receive_text()
+        except (WebSocketDisconnect, KeyError):
+            pass
+        finally:
+            sending.cancel()
+
+
+async def _send(websocket: WebSocket, mailbox: Mailbox) -> None:
+    try:
+        while True:
+            for text in await mailbox.take():
+                await websocket.send_text(text)
+    except (WebSocketDisconnect, RuntimeError):
+        # Gone while something was on its way; the receiving side sees it, too, and ends this.
+        return

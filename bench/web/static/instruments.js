@@ -1,0 +1,68 @@
+// The instruments and their wires, the agent's warnings, and what happened.
+
+import { byId, clock, element, fixed, shortTime, write } from "./format.js";
+
+const EVENTS_KEPT = 12;
+const rows = new Map();
+
+/** Writes the table; rows stay where they are, only what changed is written. */
+export function showInstruments(instruments) {
+  const body = byId("instruments");
+  const names = new Set(instruments.map((instrument) => instrument.name));
+  for (const [name, row] of rows) {
+    if (!names.has(name)) {
+      row.remove();
+      rows.delete(name);
+    }
+  }
+  for (const instrument of instruments) {
+    if (!rows.has(instrument.name)) {
+      rows.set(instrument.name, emptyRow());
+      body.append(rows.get(instrument.name));
+    }
+    fill(rows.get(instrument.name), instrument);
+  }
+}
+
+function emptyRow() {
+  const name = element("th", { scope: "row" }, element("span"), element("small"));
+  const connection = element("td", {}, element("span", { className: "mark" }), element("small"));
+  const numbers = Array.from({ length: 6 }, () => element("td", { className: "number right" }));
+  return element("tr", {}, name, connection, ...numbers);
+}
+
+function fill(row, instrument) {
+  const [name, connection, ...numbers] = row.children;
+  write(name.firstChild, instrument.name);
+  write(name.lastChild, `${instrument.driver}, ${instrument.address}`);
+  const well = instrument.connected && !instrument.words;
+  connection.firstChild.className = `mark ${well ? "good" : instrument.connected ? "fair" : "bad"}`;
+  write(connection.firstChild, instrument.connected ? "connected" : "not connected");
+  write(connection.lastChild, instrument.words);
+  const { age_s, received, lost, corrupted, resynchronised, skew_s } = instrument;
+  const skew = skew_s === null ? "no clock" : `± ${shortTime(skew_s)}`;
+  const texts = [shortTime(age_s), count(received), count(lost), count(corrupted), count(resynchronised), skew];
+  texts.forEach((text, k) => write(numbers[k], text));
+  [lost, corrupted, resynchronised].forEach((number, k) => numbers[k + 2].classList.toggle("worth-a-look", number > 0));
+}
+
+/** A count with thin spaces between thousands. */
+const count = (number) => fixed(number, 0).replace(/\B(?=(\d{3})+$)/g, "\u202f");
+
+/** Shows the agent's standing warnings. */
+export function showWarnings(warnings) {
+  const list = byId("warnings");
+  if (list.dataset.shown === JSON.stringify(warnings)) return;
+  list.dataset.shown = JSON.stringify(warnings);
+  list.replaceChildren(...warnings.map((text) => element("li", {}, text)));
+}
+
+/** Adds an event, newest first. */
+export function showEvent({ kind, text }) {
+  const list = byId("events");
+  if (!list.dataset.used) list.replaceChildren();
+  list.dataset.used = "yes";
+  list.prepend(element("li", { className: kind === "trip" || kind === "alarm" ? "worth-a-look" : "" },
+    element("time", { className: "number" }, clock(new Date())), ` ${kind.replaceAll("_", " ")}: ${text}`));
+  while (list.children.length > EVENTS_KEPT) list.lastChild.remove();
+}

@@ -1,0 +1,200 @@
+// Live plots on uPlot: strips over the last ten seconds, and force against displacement.
+
+import uPlot from "./vendor/uPlot.esm.js";
+import { element } from "./format.js";
+import { envelope } from "./ring.js";
+
+export const STRIP_SECONDS = 10;
+const LOOP_SECONDS = 2;
+const LOOP_PIECES = 12;
+const SHRINK_AFTER_MS = 2_000;
+
+/** Bounds of an axis that grow at once and shrink late, so that a plot can be read while it moves. */
+class CalmRange {
+  constructor(least) {
+    this.least = least;
+    this.held = [-least / 2, least / 2];
+    this.filledAt = 0;
+  }
+
+  /** Bounds for values from `low` to `high`. */
+  hold(low, high) {
+    if (!Number.isFinite(low) || !Number.isFinite(high)) return this.held;
+    const [bottom, top] = this.held;
+    const now = performance.now();
+    const fills = high - low > 0.4 * (top - bottom) || top - bottom <= this.least * 1.5;
+    if (fills) this.filledAt = now;
+    if (low < bottom || high > top || now - this.filledAt > SHRINK_AFTER_MS) {
+      this.held = this.around(low, high);
+      this.filledAt = now;
+    }
+    return this.held;
+  }
+
+  around(low, high) {
+    const span = Math.max((high - low) * 1.15, this.least);
+    const middle = (low + high) / 2;
+    const step = roundStep(span / 6);
+    return [Math.floor((middle - span / 2) / step) * step, Math.ceil((middle + span / 2) / step) * step];
+  }
+}
+
+/** The next of 1, 2, 5 times a power of ten that is not smaller. */
+function roundStep(size) {
+  const power = 10 ** Math.floor(Math.log10(size));
+  return power * [1, 2, 5, 10].find((digit) => digit * power >= size * (1 - 1e-9));
+}
+
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const FONT = "11px system-ui, 'Segoe UI', Roboto, sans-serif";
+
+function axis(more) {
+  return {
+    stroke: () => colour("--soft"), font: FONT, gap: 4,
+    grid: { stroke: () => colour("--line"), width: 1 }, ticks: { show: false }, ...more,
+  };
+}
+
+const signed = (u, splits) => splits.map((value) => String(value).replace("-", "−"));
+const secondsAgo = (u, splits) => splits.map((s) => (s === -STRIP_SECONDS ? "" : `${s} s`.replace("-", "−")));
+const unlabelled = (u, splits) => splits.map(() => "");
+const QUIET = { cursor: { show: false }, legend: { show: false }, select: { show: false } };
+
+/** A uPlot that fills its place and follows it. */
+function fitted(place, options, data, afterwards) {
+  const size = () => ({ width: Math.max(120, place.clientWidth), height: Math.max(60, place.clientHeight) });
+  const plot = new uPlot({ ...QUIET, ...options, ...size() }, data, place);
+  new ResizeObserver(() => {
+    plot.setSize(size());
+    afterwards();
+  }).observe(place);
+  return plot;
+}
+
+/** One quantity over the last ten seconds. */
+class Strip {
+  constructor(ring, quantity, { place, caption, last, redraw }) {
+    Object.assign(this, { ring, quantity, caption });
+    this.data = [[], []];
+    const range = new CalmRange(quantity.least);
+    this.plot = fitted(place, {
+      padding: [8, 12, last ? 0 : 8, 0],
+      scales: { x: { time: false, range: () => [-STRIP_SECONDS, 0] }, y: { range: (u, low, high) => range.hold(low, high) } },
+      axes: [
+        axis({ size: last ? 22 : 0, space: 60, values: last ? secondsAgo : unlabelled }),
+        axis({ size: 52, space: 16, values: signed }),
+      ],
+      series: [{}, { stroke: () => colour(quantity.colour), width: 1.25, pxAlign: 0, points: { show: false } }],
+    }, this.data, redraw);
+  }
+
+  draw() {
+    const buckets = Math.max(100, Math.round(this.plot.width));
+    this.plot.setData(envelope(this.ring, this.quantity, STRIP_SECONDS, buckets, this.data));
+  }
+}
+
+/** Force against displacement, older pieces fading. uPlot holds the axes; the loop itself is not a function of x. */
+class Loop {
+  constructor(ring, across, up, place, redraw) {
+    Object.assign(this, { ring, across, up });
+    const ranges = [new CalmRange(across.least), new CalmRange(up.least)];
+    const scale = (range) => ({ time: false, range: (u, low, high) => range.hold(low, high) });
+    this.plot = fitted(place, {
+      padding: [10, 14, 0, 0],
+      scales: { x: scale(ranges[0]), y: scale(ranges[1]) },
+      axes: [axis({ size: 24, space: 50, values: signed }), axis({ size: 52, space: 34, values: signed })],
+      series: [{}, { paths: () => null, points: { show: false } }],
+      hooks: { draw: [(u) => this.trace(u)] },
+    }, [[-across.least / 2, across.least / 2], [null, null]], redraw);
+  }
+
+  draw() {
+    const { ring, across, up } = this;
+    const x = ring.recent(across.field, LOOP_SECONDS);
+    const y = ring.recent(up.field, LOOP_SECONDS);
+    this.plot.setData([[x.low * across.scale, x.high * across.scale], [y.low * up.scale, y.high * up.scale]]);
+  }
+
+  trace(u) {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.strokeStyle = ctx.fillStyle = colour(this.up.colour);
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    const first = this.ring.firstSince(this.ring.newest - LOOP_SECONDS);
+    const piece = Math.ceil((this.ring.written - first) / LOOP_PIECES);
+    for (let k = 0; k < LOOP_PIECES; k++) {
+      ctx.globalAlpha = 0.12 + 0.88 * ((k + 1) / LOOP_PIECES) ** 2;
+      this.stroke(u, first + k * piece, Math.min(first + (k + 1) * piece + 1, this.ring.written));
+    }
+    this.dot(u);
+    ctx.restore();
+  }
+
+  stroke(u, from, to) {
+    u.ctx.beginPath();
+    for (let n = from; n < to; n++) {
+      const [x, y] = this.position(u, n % this.ring.capacity);
+      u.ctx.lineTo(x, y); // a canvas leaves out what is not a number
+    }
+    u.ctx.stroke();
+  }
+
+  dot(u) {
+    if (!this.ring.written) return;
+    const [x, y] = this.position(u, (this.ring.written - 1) % this.ring.capacity);
+    u.ctx.beginPath();
+    u.ctx.arc(x, y, 4 * devicePixelRatio, 0, 2 * Math.PI);
+    u.ctx.fill();
+  }
+
+  position(u, at) {
+    const { across, up, ring } = this;
+    return [
+      u.valToPos(ring.values[across.field][at] * across.scale, "x", true),
+      u.valToPos(ring.values[up.field][at] * up.scale, "y", true),
+    ];
+  }
+}
+
+/** All live plots of the page; they are drawn when the browser draws, and only after new samples. */
+export class LivePlots {
+  constructor(ring, quantities, { loop, strips }) {
+    this.ring = ring;
+    this.drawn = -1;
+    const redraw = () => { this.drawn = -1; };
+    this.plots = [new Loop(ring, quantities.displacement, quantities.force, loop, redraw)];
+    const shown = [quantities.force, quantities.displacement, quantities.drive, quantities.temperature];
+    shown.forEach((quantity, k) => this.plots.push(strip(ring, quantity, strips, k === shown.length - 1, redraw)));
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      for (const { plot } of this.plots) plot.redraw(false, true);
+    });
+    const onFrame = () => {
+      this.draw();
+      requestAnimationFrame(onFrame);
+    };
+    requestAnimationFrame(onFrame);
+  }
+
+  draw() {
+    if (!this.ring.written || this.drawn === this.ring.written) return;
+    this.drawn = this.ring.written;
+    for (const plot of this.plots) plot.draw();
+  }
+
+  /** The unit of the drive is known only once the agent has said it. */
+  nameDrive(words) {
+    for (const { caption, quantity } of this.plots) if (quantity?.field === "coil_drive") caption.textContent = words;
+  }
+}
+
+function strip(ring, quantity, strips, last, redraw) {
+  const words = `${quantity.label} [${quantity.unit}]`;
+  const caption = element("figcaption", {}, words);
+  const place = element("div", { className: "plot", role: "img", "aria-label": `${words}, last ${STRIP_SECONDS} seconds` });
+  strips.append(element("figure", { className: last ? "strip last" : "strip" }, caption, place));
+  return new Strip(ring, quantity, { place, caption, last, redraw });
+}

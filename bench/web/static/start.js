@@ -1,0 +1,86 @@
+// The form that starts a run: which method, on which specimen, by whom.
+
+import { get, post } from "./api.js";
+import { byId, driveWords, duration, element, write } from "./format.js";
+
+const OPERATOR = "mrbench.operator";
+
+/** Why nothing can be started in a state of the bench; empty where it can. */
+const OBSTACLES = {
+  idle: "",
+  unknown: "The bench does not answer.",
+  preparing: "A run is being prepared.",
+  running: "A run goes on.",
+  stopping: "The run is being stopped.",
+  tripped: "The bench has tripped: reset it first.",
+};
+
+export class StartForm {
+  constructor({ onStarted }) {
+    this.onStarted = onStarted;
+    this.problem = "";
+    this.busy = false;
+    this.state = "unknown";
+    byId("operator").value = localStorage.getItem(OPERATOR) ?? "";
+    byId("start-form").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.start();
+    });
+    byId("start-form").addEventListener("input", () => this.show({ problem: "" }));
+  }
+
+  /** Loads the methods; what was chosen stays chosen. */
+  async load() {
+    try {
+      const methods = await get("methods");
+      const chosen = this.method() ?? methods[0]?.name;
+      byId("methods").replaceChildren(...methods.map((method) => choice(method, method.name === chosen)));
+    } catch (problem) {
+      byId("methods").replaceChildren(element("p", { className: "problem" }, problem.after("The methods cannot be listed")));
+    }
+  }
+
+  method() {
+    return document.querySelector("#methods input:checked")?.value;
+  }
+
+  suggestSpecimens(names) {
+    byId("known-specimens").replaceChildren(...names.map((value) => element("option", { value })));
+  }
+
+  /** Shows the state of the bench, or a problem of the last attempt, beside the button. */
+  show({ state = this.state, problem = this.problem }) {
+    // What was refused in one state says nothing about the next one.
+    this.problem = state === this.state ? problem : "";
+    this.state = state;
+    const obstacle = OBSTACLES[state] ?? "";
+    byId("start").disabled = this.busy || obstacle !== "";
+    write(byId("start-note"), this.problem || obstacle);
+    byId("start-note").classList.toggle("problem", this.problem !== "");
+  }
+
+  async start() {
+    const [method, specimen, operator] = [this.method(), byId("specimen").value.trim(), byId("operator").value.trim()];
+    if (!method) return this.show({ problem: "Choose a method." });
+    this.busy = true;
+    this.show({ problem: "" });
+    try {
+      const run = await post("runs", { method, specimen, operator }); // answered once the run has begun
+      localStorage.setItem(OPERATOR, operator);
+      this.onStarted(run);
+    } catch (problem) {
+      this.problem = problem.after("Not started");
+    } finally {
+      this.busy = false;
+      this.show({});
+    }
+  }
+}
+
+function choice(method, checked) {
+  const facts = [duration(method.duration_s), driveWords(method.drive_kind)].filter(Boolean).join(", ");
+  return element("label", { className: "choice" },
+    element("input", { type: "radio", name: "method", value: method.name, checked, required: true }),
+    element("span", {}, element("strong", {}, method.title || method.name),
+      element("span", { className: "soft" }, `${method.name}, ${facts}`)));
+}

@@ -1,0 +1,36 @@
+"""A coil whose field comes later or more slowly than one first-order lag: eddy currents, a driver's own delay."""
+
+from typing import Any
+
+from identification.damper.effects.effect import Effect, Form
+from identification.damper.parameters import Quantity
+
+
+def slow(lag: Any) -> Any:
+    """Dead time [s] and time constant of a second lag [s]."""
+    return 0.0 * lag, lag
+
+
+def late(delay: Any) -> Any:
+    """The same for a dead time alone."""
+    return delay, 0.0 * delay
+
+
+def late_and_slow(delay: Any, lag: Any) -> Any:
+    """The same for both."""
+    return delay, lag
+
+
+_DELAY = Quantity("delay", "s", 0.0, 0.2, 5e-3, "dead time between drive and field")
+_LAG = Quantity("lag", "s", 0.0, 1.0, 5e-3, "time constant of a second lag")
+
+COIL_LAG = Effect(
+    name="coil_lag",
+    stage="coil",
+    meaning="the field follows the drive later or more slowly than one simple lag",
+    forms=(
+        Form("second_lag", "drive_delay", (_LAG,), ((2e-3,), (1.5e-2,)), slow),
+        Form("dead_time", "drive_delay", (_DELAY,), ((0.0,), (1e-2,)), late),
+        Form("late_and_slow", "drive_delay", (_DELAY, _LAG), ((2e-3, 4e-3), (1e-2, 1.5e-2)), late_and_slow),
+    ),
+)

@@ -1,0 +1,27 @@
+"""Mass that moves between load cell and damper: rod, clevis, adapter. The cell carries its inertia."""
+
+from typing import Any
+
+from identification.damper.effects.effect import Effect, Form
+from identification.damper.parameters import Quantity
+
+
+def inertia(acceleration: Any, mass: Any) -> Any:
+    """Force [N] on the load cell at the actuator's acceleration [m/s^2]."""
+    return mass * acceleration
+
+
+MOVING_MASS = Effect(
+    name="moving_mass",
+    stage="mounting",
+    meaning="the load cell also accelerates the mass between it and the damper",
+    forms=(
+        Form(
+            "rigid",
+            "inertia",
+            (Quantity("mass", "kg", 0.0, 200.0, 2.0, "mass between load cell and damper"),),
+            ((0.0,),),
+            inertia,
+        ),
+    ),
+)

@@ -1,0 +1,91 @@
+"""What a model leaves of the force, on the strokes that its fit saw and on those kept out of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.assemble import Assembled
+from identification.gap.held_out import Shrinkage, held_out_cycles, shrinkage
+from identification.gap.residual import Cycles, cut_cycles
+from identification.gap.where import Left
+from identification.problem import Piece
+
+
+@dataclass(frozen=True)
+class Judge:
+    """The recordings, cut into cycles that are fitted and cycles that are not."""
+
+    pieces: tuple[Piece, ...]
+    """With all samples that may be fitted or judged marked."""
+    cycles: Cycles
+    held: BoolArray
+    """(cycles,) kept out of every fit."""
+    start: Array
+    """(N,) [s] of each sample since the first."""
+
+    @staticmethod
+    def of(assembled: Assembled) -> "Judge":
+        """The judge of some recordings."""
+        cycles = cut_cycles(assembled.stretches, assembled.pieces)
+        first = assembled.stretches[0].time[0]
+        time = np.concatenate([s.time - first for s in assembled.stretches])
+        return Judge(assembled.pieces, cycles, held_out_cycles(cycles), time)
+
+    @cached_property
+    def usable(self) -> BoolArray:
+        """(N,) samples that are fitted or judged."""
+        return np.concatenate([p.train for p in self.pieces]) > 0
+
+    @cached_property
+    def unseen(self) -> BoolArray:
+        """(N,) samples kept out of every fit."""
+        return np.asarray(self.usable & (self.cycles.cycle >= 0) & self.held[self.cycles.cycle])
+
+    @cached_property
+    def seen(self) -> BoolArray:
+        """(N,) samples that are fitted."""
+        return np.asarray(self.usable & ~self.unseen)
+
+    @cached_property
+    def force(self) -> Array:
+        """(N,) recorded force [N]."""
+        return np.concatenate([p.force for p in self.pieces])
+
+    def masks(self) -> list[Array]:
+        """(N,) of each piece: 1.0 where a sample is fitted."""
+        edges = np.cumsum([len(p.force) for p in self.pieces])[:-1]
+        return [part.astype(float) for part in np.split(self.seen, edges)]
+
+    def fitted_pieces(self) -> tuple[Piece, ...]:
+        """The pieces with what is kept out of every fit unmarked."""
+        return tuple(replace(p, train=m) for p, m in zip(self.pieces, self.masks(), strict=True))
+
+    def left(self, forces: Sequence[Array]) -> Left:
+        """What simulated forces, (N,) of each piece, leave."""
+        simulated = np.concatenate(forces)
+        return Left(
+            self.force - simulated,
+            simulated,
+            np.concatenate([p.stroke.drive for p in self.pieces]),
+            self.start,
+            self.usable,
+            tuple((len(p.force), p.stroke.rate) for p in self.pieces),
+        )
+
+    def rmse(self, left: Left) -> tuple[float, float]:
+        """RMSE [N] on seen and on unseen strokes."""
+        return _rms(left.residual[self.seen]), _rms(left.residual[self.unseen])
+
+    def shrunk(self, before: Left, after: Left, floor: float) -> Shrinkage:
+        """How far the gap shrinks on the unseen strokes; ``floor`` [N]."""
+        sums = [self.cycles.sums(left.residual**2, self.unseen) for left in (before, after)]
+        counts = self.cycles.sums(np.ones(len(self.force)), self.unseen)
+        there = counts > 0
+        return shrinkage(sums[0][there], sums[1][there], counts[there], floor)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,109 @@
+"""What stands between the damper's own force and the recorded one: forces beside the law, inertia, the channel."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy import signal
+
+from identification.arrays import Array
+from identification.damper.effects import Form
+from identification.simulate.curves import over_number, over_parameters
+from identification.simulate.motion import Motion
+from identification.simulate.setting import Setting, Stroke
+
+_DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-8, 1e-7
+"""[m], [m/s] of differences of forces beside the law."""
+_ACCELERATION_STEP = 1e-3
+"""[m/s^2] of differences of inertia."""
+_AT_ONCE = 1e-6
+"""[s] a lag below which the channel passes the force as it is."""
+_LAG_STEP = 1e-7
+"""[s] of differences of the channel's lag."""
+
+
+def beside(setting: Setting, motion: Motion) -> Array:
+    """(N,) sum of the forces beside the law [N]."""
+    total = np.zeros(len(motion.x))
+    for _, form, values in setting.acting("parallel_force"):
+        total += form.act(motion.x, motion.v, *values)
+    return total
+
+
+def beside_slopes(setting: Setting, motion: Motion) -> tuple[Array, list[tuple[int, Array]]]:
+    """Slopes of ``beside`` over the motion's unknowns (M, N), and over parameters by their columns."""
+    moving, own = np.zeros_like(motion.dx), []
+    for at, form, values in setting.acting("parallel_force"):
+        over_x, over_v = _over_motion(form, values, motion)
+        moving += over_x * motion.dx + over_v * motion.dv
+        rows = over_parameters(partial(form.act, motion.x, motion.v), values, form.parameters)
+        own += [(at + k, np.broadcast_to(row, len(motion.x))) for k, row in enumerate(rows)]
+    return moving, own
+
+
+def _over_motion(form: Form, values: tuple[float, ...], motion: Motion) -> tuple[Array, Array]:
+    over_x = over_number(lambda x: form.act(x, motion.v, *values), motion.x, _DISPLACEMENT_STEP)
+    over_v = over_number(lambda v: form.act(motion.x, v, *values), motion.v, _VELOCITY_STEP)
+    return over_x, over_v
+
+
+def recorded(
+    setting: Setting, stroke: Stroke, motion: Motion, force: Array, J: Array | None, first: int, delays: list[int]
+) -> Array:
+    """The force as the channel sees it; its slopes are moved along in place.
+
+    Args:
+        setting, stroke, motion: as in the trajectory.
+        force: (N,) of the damper on its mounting [N].
+        J: (N, U) its slopes; None where they are not asked for.
+        first: column of the effects' first parameter.
+        delays: columns that the delay of the motion moves.
+
+    Returns:
+        (N,) [N].
+    """
+    for at, form, values in setting.acting("inertia"):
+        force = force + form.act(motion.a, *values)
+        if J is not None:
+            _add_columns(J, first + at, partial(form.act, motion.a), form, values)
+            steepness = _over_acceleration(form, values, motion)
+            J[:, delays] += (steepness * motion.da)[:, None]
+            for early, _, _ in setting.acting("displacement_shift"):
+                J[:, first + early] -= steepness * motion.da
+    for at, form, values in setting.acting("added_force"):
+        force = force + form.act(stroke.time, stroke.drive_seen, *values)
+        if J is not None:
+            _add_columns(J, first + at, partial(form.act, stroke.time, stroke.drive_seen), form, values)
+    for at, _, values in setting.acting("force_lag"):
+        force = _lagged_with_slopes(force, values[0], 1.0 / stroke.rate, J, first + at)
+    return force
+
+
+def _over_acceleration(form: Form, values: tuple[float, ...], motion: Motion) -> Array:
+    return np.asarray(over_number(lambda a: form.act(a, *values), motion.a, _ACCELERATION_STEP))
+
+
+def _add_columns(J: Array, at: int, function: Any, form: Form, values: tuple[float, ...]) -> None:
+    for k, row in enumerate(over_parameters(function, values, form.parameters)):
+        J[:, at + k] += row
+
+
+def _lagged_with_slopes(force: Array, lag: float, h: float, J: Array | None, at: int) -> Array:
+    """The force behind a first-order lag; slopes J are lagged in place."""
+    found = _lagged(force, lag, h)
+    if J is not None:
+        J[:] = _lagged(J, lag, h)
+        lower = max(lag - _LAG_STEP, 0.0)
+        J[:, at] = (_lagged(force, lag + _LAG_STEP, h) - _lagged(force, lower, h)) / (lag + _LAG_STEP - lower)
+    return found
+
+
+def _lagged(values: Array, lag: float, h: float) -> Array:
+    """Values (N, ...) behind a first-order lag [s], exact for what goes straight from sample to sample."""
+    if lag < _AT_ONCE:
+        return values - lag * np.gradient(values, h, axis=0)
+    fade = float(np.exp(-h / lag))
+    new = 1.0 - lag / h * (1.0 - fade)
+    old = 1.0 - fade - new
+    start = values[:1] * (fade + old)
+    return np.asarray(signal.lfilter([new, old], [1.0, -fade], values, axis=0, zi=start)[0])

@@ -1,0 +1,1 @@
+"""The product's own blind trial: sealed scenarios, recorded, diagnosed, unsealed, scored."""

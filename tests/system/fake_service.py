@@ -1,0 +1,267 @@
+"""A service that looks like ours from the page's side, with a bench that moves on paper only."""
+
+import asyncio
+import contextlib
+import math
+import socket
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from fastapi import APIRouter, FastAPI, Request, WebSocket, WebSocketDisconnect
+from fastapi.responses import JSONResponse
+from fastapi.staticfiles import StaticFiles
+
+STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
+TOKEN = "a-token"
+SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
+REFUSAL = "lvdt: not connected for 3.2 s; plug it in and start again"
+RATE = 1000
+BATCH = 40
+TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
+METHODS = [
+    {"name": name, "title": title, "duration_s": duration, "drive_kind": "coil_v"}
+    for name, title, duration in (
+        ("identification", "Strokes for an identification", 162.0),
+        ("paper_sines", "Six voltages on a 10 mm sine at 1 Hz", 602.5),
+        ("quick", "Short look: three voltages", 14.0),
+    )
+]
+
+
+def instrument(name: str, driver: str, address: str, **more: Any) -> dict[str, Any]:
+    """One instrument's status."""
+    well = {
+        "connected": True, "received": 1_234_567, "lost": 0, "corrupted": 0, "resynchronised": 0, "age_s": 0.0021,
+        "skew_s": 1.8e-5, "words": "",
+    }  # fmt: skip
+    return {"name": name, "driver": driver, "address": address} | well | more
+
+
+INSTRUMENTS = [
+    instrument("actuator", "canopen", "socketcand://127.0.0.1:29536/can0 node 5", age_s=0.004),
+    instrument("load_cell", "serial", "/dev/pts/3", lost=12, corrupted=2, resynchronised=1),
+    instrument("lvdt", "serial", "/dev/pts/4"),
+    instrument("coil_amplifier", "modbus_tcp", "127.0.0.1:1502 unit 1", received=40_211, skew_s=None),
+    instrument("thermometer", "modbus_rtu", "/dev/pts/5 unit 2", connected=False, age_s=83.0, skew_s=None,
+               words="no reply for 83 s; is it powered?"),
+]  # fmt: skip
+
+
+def fit_job(run_id: str, state: str, **more: Any) -> dict[str, Any]:
+    """A job of a run."""
+    return {
+        "id": f"job-{run_id}", "run": run_id, "kind": "identify", "state": state, "doing": "", "attempts": 1,
+        "error": "", "settings": {}, "created": "2025-03-04T09:20:00Z", "started": None, "finished": None,
+        "rmse_n": None, "noise_floor_n": None, "result": "",
+    } | more  # fmt: skip
+
+
+def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
+    """A run of the list."""
+    return {
+        "id": f"run-{number}", "method": "quick", "specimen": "MR-0042", "operator": "A. Meyer",
+        "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
+        "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None, "noise_floor_n": None,
+        "result": "", "jobs": [],
+    } | more  # fmt: skip
+
+
+class FakeBench:
+    """State of the bench on paper; every request that changes something is kept in `posted`."""
+
+    def __init__(self) -> None:
+        self.posted: list[tuple[str, Any]] = []
+        self.state = "idle"
+        self.trip = ""
+        self.run: dict[str, Any] | None = None
+        self.refusals = 1
+        self.silent = False
+        self.over = False
+        found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
+        self.runs = {
+            "run-3": run(3, "lossy", reason="12 samples of force were lost"),
+            "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", doing="identify: refine, start 3 of 8")]),
+            "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
+            "run-0": run(0, None, state="cut_off", duration_s=None, reason="the log has no end"),
+        }  # fmt: skip
+        self.began = time.monotonic()
+
+    def status(self) -> dict[str, Any]:
+        """The agent's status as published."""
+        return {
+            "state": self.state, "trip": self.trip, "run": self.run, "finished": [], "instruments": INSTRUMENTS,
+            "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
+            "drive_kind": "coil_v", "drive_unit": "V",
+        }  # fmt: skip
+
+    def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
+        """A run that goes on."""
+        known = {"id": "run-4", "started": "2025-03-04T09:30:00Z", **wanted}
+        self.run = known | {
+            "log": "run-4.mcap", "duration_s": 14.0, "elapsed_s": 5.0, "segment": "sine_10mm_1Hz", "outcome": None,
+            "reason": "", "lost": {},
+        }  # fmt: skip
+        self.state = "running"
+        self.runs["run-4"] = run(4, None, state="running", **known)
+        return self.runs["run-4"]
+
+    def samples(self, first: int) -> dict[str, Any]:
+        """A batch: a sine of 10 mm at 1.5 Hz, and a force with a loop."""
+        times = [(first + k) / RATE for k in range(BATCH)]
+        omega = 2 * math.pi * 1.5
+        displacement = [0.01 * math.sin(omega * t) for t in times]
+        velocity = [0.01 * omega * math.cos(omega * t) for t in times]
+        drive = [0.1 * (int(t / 4) % 6) for t in times]
+        force = [
+            (60 + 900 * u) * math.tanh((v + 8 * x) / 0.02) + (900 + 2000 * u) * v
+            for x, v, u in zip(displacement, velocity, drive, strict=True)
+        ]
+        values = {"displacement": displacement, "velocity": velocity, "force": force, "coil_drive": drive}
+        values["coil_current"] = [u / 5 for u in drive]
+        # A slow instrument has a value in some samples only.
+        values["temperature"] = [24 + 0.05 * t if not k % BATCH else None for k, t in enumerate(times)]
+        return {"time_ns": [round(t * 1e9) for t in times], "values": values, "segment": "sine_10mm_1Hz"}
+
+
+def problem(status: int, title: str, detail: str) -> JSONResponse:
+    """An error as the service words it."""
+    content = {"type": "about:blank", "title": title, "status": status, "detail": detail}
+    return JSONResponse(content, status_code=status, media_type="application/problem+json")
+
+
+def application(bench: FakeBench) -> FastAPI:
+    """The routes that the page uses."""
+    app = FastAPI()
+
+    @app.middleware("http")
+    async def let_in(request: Request, call_next: Any) -> Any:
+        allowed = request.headers.get("authorization") == f"Bearer {TOKEN}"
+        if request.url.path.startswith("/api/") and not allowed:
+            return problem(401, "Not allowed", "the token is missing or wrong")
+        if request.method == "POST":
+            body = await request.body()
+            bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
+        return await call_next(request)
+
+    for routes in (rig_routes, run_routes, live_routes):
+        app.include_router(routes(bench), prefix="/api/v1")
+    app.mount("/", StaticFiles(directory=STATIC, html=True))
+    return app
+
+
+def rig_routes(bench: FakeBench) -> APIRouter:
+    """The agent and its methods; `silence` is the tests' own, and cuts the agent off."""
+    router = APIRouter()
+
+    @router.get("/agent")
+    async def agent() -> Any:
+        return problem(503, "The rig agent does not answer", SILENCE) if bench.silent else bench.status()
+
+    @router.get("/methods")
+    async def methods() -> Any:
+        return METHODS
+
+    @router.post("/agent/reset")
+    async def reset() -> Any:
+        bench.state, bench.trip = "idle", ""
+        return bench.status()
+
+    @router.post("/silence")
+    async def fall_silent() -> Any:
+        bench.silent = True
+
+    return router
+
+
+def run_routes(bench: FakeBench) -> APIRouter:
+    """Runs and jobs."""
+    router = APIRouter()
+
+    @router.get("/runs")
+    async def runs() -> Any:
+        return {"items": sorted(bench.runs.values(), key=lambda one: one["started"], reverse=True), "next": None}
+
+    @router.get("/runs/{run_id}")
+    async def one_run(run_id: str) -> Any:
+        return bench.runs[run_id]
+
+    @router.post("/runs", status_code=201)
+    async def start(wanted: dict[str, Any]) -> Any:
+        if bench.refusals:
+            bench.refusals -= 1
+            return problem(409, "Not possible", REFUSAL)
+        return bench.begin(wanted)
+
+    @router.post("/runs/{run_id}/stop")
+    async def stop(run_id: str) -> Any:
+        bench.state, bench.trip, bench.run = "tripped", TRIP, None
+        bench.runs[run_id] |= {"state": "ended", "outcome": "incomplete", "reason": TRIP}
+        return bench.runs[run_id]
+
+    @router.post("/jobs/{job_id}/cancel")
+    async def cancel(job_id: str) -> Any:
+        job = bench.runs["run-2"]["jobs"][0]
+        job |= {"state": "cancelled"}
+        return job
+
+    return router
+
+
+def live_routes(bench: FakeBench) -> APIRouter:
+    """The websocket."""
+    router = APIRouter()
+
+    @router.websocket("/live")
+    async def live(websocket: WebSocket, token: str = "") -> None:
+        await websocket.accept()
+        if token != TOKEN:
+            await websocket.close(4401)
+            return
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await publish(websocket, bench)
+
+    return router
+
+
+async def publish(socket: WebSocket, bench: FakeBench) -> None:
+    """Sends what a bench of this rate would, late batches together."""
+    await socket.send_json(
+        {"topic": "event", "data": {"time_ns": 0, "kind": "state", "text": "the agent is ready"}}
+    )
+    sent = round((time.monotonic() - bench.began) * RATE)
+    turn = 0
+    while not bench.over:
+        turn += 1
+        if not bench.silent:
+            while sent + BATCH < (time.monotonic() - bench.began) * RATE:
+                await socket.send_json({"topic": "samples", "data": bench.samples(sent)})
+                sent += BATCH
+            if turn % 3 == 0:
+                await socket.send_json({"topic": "status", "data": bench.status()})
+        await asyncio.sleep(BATCH / RATE)
+
+
+@contextlib.contextmanager
+def served(bench: FakeBench) -> Any:
+    """Runs the service on a free port of the loopback; gives its address."""
+    listener = socket.create_server(("127.0.0.1", 0))
+    server = uvicorn.Server(uvicorn.Config(application(bench), log_level="warning", timeout_graceful_shutdown=1))
+    thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+    finally:
+        bench.over = server.should_exit = True
+        thread.join()
+        listener.close()
+
+
+if __name__ == "__main__":
+    with served(FakeBench()) as address:
+        sys.stdout.write(f"{address}/#token={TOKEN}\n")
+        sys.stdout.flush()
+        threading.Event().wait()

@@ -1,0 +1,137 @@
+// Uses the service's page as a technician would, against the fake service of the tests, and prints what it saw as JSON:
+//   node look_at_page.mjs URL TOKEN CHROMIUM
+// Every wait has playwright's deadline, and its error says what was awaited.
+
+import { openPage } from "./browser.mjs";
+
+const [url, token, chromium] = process.argv.slice(2);
+const { page, close } = await openPage(chromium);
+const seen = { errors: [] };
+page.on("pageerror", (error) => seen.errors.push(String(error)));
+await page.addInitScript(() => {
+  window.shifts = [];
+  new PerformanceObserver((list) => {
+    for (const entry of list.getEntries()) {
+      const of = entry.sources.map(({ node }) => node?.id || node?.className);
+      if (!entry.hadRecentInput) window.shifts.push({ value: entry.value, of });
+    }
+  }).observe({ type: "layout-shift", buffered: true });
+});
+
+const text = (selector) => page.locator(selector).innerText();
+const until = (check, argument) => page.waitForFunction(check, argument);
+const hasText = (selector, words) =>
+  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas")].map((canvas) => canvas.toDataURL()));
+const posted = (path) => page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith(path));
+
+async function letIn() {
+  await page.goto(`${url}/#token=wrong`);
+  await hasText("#token-reason", "does not take");
+  await page.fill("#token", token);
+  await page.keyboard.press("Enter");
+  await hasText("#state-word", "Idle");
+  seen.address = page.url();
+}
+
+async function watch() {
+  await hasText("#readings", "−10.00 … 10.00"); // a whole stroke has come, in millimetres
+  const before = await canvases();
+  await until(
+    (old) => [...document.querySelectorAll("canvas")].every((canvas, k) => canvas.toDataURL() !== old[k]), before);
+  seen.canvases = before.length;
+  seen.readings = await page.locator("#readings > div").allInnerTexts();
+  seen.instruments = await page.locator("#instruments tr").allInnerTexts();
+  seen.runs = await page.locator("#runs tr").allInnerTexts();
+  seen.shifts = await page.evaluate(() => window.shifts);
+}
+
+async function start() {
+  await page.check("input[value=quick]");
+  await page.fill("#specimen", "MR-0042");
+  await page.fill("#operator", "A. Meyer");
+  await page.click("#start");
+  await hasText("#start-note", "Not started");
+  seen.refusal = await text("#start-note");
+  await page.click("#start");
+  await hasText("#state-word", "Running");
+  seen.focused = await page.evaluate(() => document.activeElement.id);
+  seen.progress = [await text("#segment"), await text("#time-left"), await page.locator("#progress").evaluate((bar) => bar.value)];
+  seen.startWhileRunning = await page.locator("#start").isDisabled();
+}
+
+async function stop() {
+  await page.focus("#specimen");
+  await page.keyboard.press("Space");
+  seen.specimen = await page.inputValue("#specimen");
+  seen.stateAfterSpaceInField = await text("#state-word");
+  const request = posted("/stop");
+  await page.keyboard.press("Escape");
+  seen.stopped = new URL((await request).url()).pathname;
+  await hasText("#state-word", "Tripped");
+  seen.trip = await text("#bar-line");
+}
+
+async function reset() {
+  await page.click("#reset");
+  await page.click("#reset-dialog button[value=cancel]");
+  seen.stateAfterKeeping = await text("#state-word");
+  await page.click("#reset");
+  const request = posted("/agent/reset");
+  await page.click("#reset-dialog button[value=reset]");
+  await request;
+  await hasText("#state-word", "Idle");
+}
+
+async function cancelJob() {
+  const row = page.locator("#runs tr", { hasText: "start 3 of 8" });
+  await row.getByRole("button", { name: /Cancel/ }).click();
+  await hasText("#runs", "cancelled");
+}
+
+async function loseConnection() {
+  await page.evaluate((known) => {
+    fetch("/api/v1/silence", { method: "POST", headers: { Authorization: `Bearer ${known}` } });
+  }, token);
+  await hasText("#state-word", "No connection");
+  await hasText("#bar-line", "did not answer within");
+  await page.click("#stop");
+  await hasText("#bar-detail", "not confirmed");
+  seen.lost = [await text("#bar-line"), await text("#bar-detail")];
+  seen.greyed = await page.locator("#live").evaluate((live) => live.classList.contains("stale"));
+}
+
+async function measureWidths() {
+  seen.overflow = {};
+  for (const width of [1280, 768]) {
+    await page.setViewportSize({ width, height: 800 });
+    await until((wanted) => innerWidth === wanted, width);
+    seen.overflow[width] = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  }
+}
+
+/** The thinned trace of a known signal with one spike and one hole, beside the signal. */
+async function thin() {
+  return page.evaluate(async () => {
+    const { SampleRing, envelope } = await import("./ring.js");
+    const ring = new SampleRing(["force"], 8192);
+    const given = Array.from({ length: 20_000 }, (_, k) => (k === 15_123 ? 50 : Math.sin(k / 300)));
+    for (let k = 17_000; k < 18_000; k++) given[k] = null;
+    for (let k = 0; k < given.length; k += 50) {
+      const numbers = Array.from({ length: 50 }, (_, j) => k + j);
+      ring.push({ time_ns: numbers.map((n) => n * 1e6), values: { force: numbers.map((n) => given[n]) } });
+    }
+    const [times, values] = envelope(ring, { field: "force", scale: 2, hole: 0.25 }, 6, 300, [[], []]);
+    const recent = ring.recent("force", 6);
+    ring.push({ time_ns: [5], values: { force: [7] } });
+    return { given, times, values, recent, afterRestart: ring.count };
+  });
+}
+
+try {
+  for (const step of [letIn, watch, start, stop, reset, cancelJob, loseConnection, measureWidths]) await step();
+  seen.thinned = await thin();
+  console.log(JSON.stringify(seen));
+} finally {
+  await close();
+}

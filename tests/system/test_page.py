@@ -1,0 +1,172 @@
+"""The service's page in a real browser, against a service that plays canned answers and moving samples."""
+
+import json
+import re
+import shutil
+import subprocess
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from fake_service import REFUSAL, SILENCE, STATIC, TOKEN, TRIP, FakeBench, served
+
+FOLDER = Path(__file__).with_name("javascript")
+NODE = shutil.which("node")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+
+needs_browser = [
+    pytest.mark.skipif(NODE is None, reason="Node is not installed; it drives the browser"),
+    pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed; `apt-get install chromium` brings it"),
+    pytest.mark.skipif(
+        not (FOLDER / "node_modules" / "playwright-core").is_dir(),
+        reason="playwright-core is not installed; run `npm ci --prefix tests/system/javascript`",
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return FakeBench()
+
+
+@pytest.fixture(scope="module")
+def seen(bench):
+    """What a technician sees who lets himself in, starts a run, stops it, resets the trip and loses the agent."""
+    with served(bench) as address:
+        command = [str(NODE), str(FOLDER / "look_at_page.mjs"), address, TOKEN, str(CHROMIUM)]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
+    assert result.returncode == 0, result.stderr
+    return json.loads(result.stdout)
+
+
+def browser_test(function):
+    for mark in needs_browser:
+        function = mark(function)
+    return function
+
+
+@browser_test
+def test_token_is_asked_for_and_leaves_the_address(seen):
+    assert "token" not in seen["address"]
+    assert seen["errors"] == []
+
+
+@browser_test
+def test_every_plot_moves_and_every_reading_has_its_unit(seen):
+    assert seen["canvases"] == 5
+    units = {"Force": "N", "Displacement": "mm", "Velocity": "mm/s", "Coil voltage": "V", "Coil current": "A",
+             "Temperature": "°C"}  # fmt: skip
+    lines = [reading.splitlines() for reading in seen["readings"]]
+    assert {line[0]: line[1].split()[-1] for line in lines} == units
+    assert {line[0]: line[2] for line in lines}["Displacement"] == "−10.00 … 10.00"
+
+
+@browser_test
+def test_runs_and_instruments_say_what_is_wrong(seen):
+    lossy, identified, done, cut_off = seen["runs"]
+    assert "12 samples of force were lost" in lossy
+    assert "refine, start 3 of 8" in identified
+    assert "1.31\u00a0N / 1.26\u00a0N" in done
+    assert "1.04 times the floor" in done
+    assert "the log has no end" in cut_off
+    assert "no reply for 83 s" in seen["instruments"][-1]
+    assert "1 min 23 s" in seen["instruments"][-1]
+
+
+@browser_test
+def test_refusal_stands_beside_the_start_button(seen):
+    assert seen["refusal"] == f"Not started: {REFUSAL}."
+
+
+@browser_test
+def test_run_shows_its_progress_and_hands_the_focus_to_stop(seen, bench):
+    assert seen["progress"] == ["sine_10mm_1Hz", "9 s left of 14 s", pytest.approx(5 / 14)]
+    assert seen["focused"] == "stop"
+    assert seen["startWhileRunning"]
+    wanted = {"method": "quick", "specimen": "MR-0042", "operator": "A. Meyer"}
+    assert [json.loads(body) for path, body in bench.posted if path == "runs"] == [wanted, wanted]
+
+
+@browser_test
+def test_escape_stops_from_a_field_where_space_only_types(seen, bench):
+    assert seen["stateAfterSpaceInField"] == "Running"
+    assert seen["specimen"].endswith(" ")
+    assert seen["stopped"] == "/api/v1/runs/run-4/stop"
+    assert [path for path, _ in bench.posted].count("runs/run-4/stop") == 1
+    assert seen["trip"] == TRIP
+
+
+@browser_test
+def test_reset_asks_first(seen, bench):
+    assert seen["stateAfterKeeping"] == "Tripped"
+    assert [path for path, _ in bench.posted].count("agent/reset") == 1
+    assert ("jobs/job-run-2/cancel", "") in bench.posted
+
+
+@browser_test
+def test_lost_connection_greys_the_values_and_says_why(seen):
+    words, stopped = seen["lost"]
+    assert re.fullmatch(r"No data for \d+ s\. Trying again: " + re.escape(SILENCE) + r"\.", words)
+    assert stopped == f"Stop was not confirmed, use the emergency stop of the hardware: {SILENCE}."
+    assert seen["greyed"]
+
+
+@browser_test
+def test_page_fits_a_tablet(seen):
+    assert seen["overflow"] == {"1280": 0, "768": 0}
+
+
+@browser_test
+def test_nothing_shifts_while_the_page_fills(seen):
+    assert sum(shift["value"] for shift in seen["shifts"]) < 0.01, seen["shifts"]
+
+
+@browser_test
+def test_thinned_trace_keeps_every_extreme_and_shows_holes(seen):
+    thinned = seen["thinned"]
+    given, times, values = thinned["given"], thinned["times"], thinned["values"]
+    newest = len(given) - 1
+
+    assert all(before <= after for before, after in pairwise(times))
+    assert len(values) <= 2 * 302
+    numbers = [newest + round(time * 1000) for time in times]
+    at = {k: value for k, value in zip(numbers, values, strict=True) if value is not None}
+    assert all(value == pytest.approx(2 * given[k], rel=1e-6, abs=1e-6) for k, value in at.items())
+    assert at[15_123] == 100
+    assert values.count(None) == 1
+    assert -3 < times[values.index(None)] < -2
+    for first in range(14_000, 16_900, 20):
+        near = [value for k, value in at.items() if first - 20 <= k < first + 40]
+        assert max(near) >= 2 * max(given[first : first + 20]) - 1e-6
+        assert min(near) <= 2 * min(given[first : first + 20]) + 1e-6
+    assert thinned["recent"]["high"] == 50
+    assert thinned["afterRestart"] == 1
+
+
+def schemes():
+    """The style sheet's colours: of the light scheme, and of the dark one over it."""
+    blocks = re.findall(r":root \{(.*?)\n *\}", (STATIC / "style.css").read_text("utf-8"), re.DOTALL)
+    light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", block)) for block in blocks)
+    return {"light": light, "dark": light | dark}
+
+
+def luminance(colour):
+    channels = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one, other):
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_contrast_meets_wcag_aa(scheme):
+    colours = schemes()[scheme]
+    texts = [(name, back) for name in ("ink", "soft", "good", "fair", "bad") for back in ("card", "page", "mark")]
+    texts += [("on-accent", "accent"), ("on-stop", "stop")]
+    lines = [(name, "card") for name in ("edge", "accent", "force", "displacement", "drive", "temperature")]
+
+    assert [pair for pair in texts if contrast(*(colours[name] for name in pair)) < 4.5] == []
+    assert [pair for pair in lines if contrast(*(colours[name] for name in pair)) < 3] == []

@@ -1,0 +1,202 @@
+"""The rig agent on the wires of the simulated rig: it runs, stops, trips, and dies."""
+
+import json
+import signal
+import subprocess
+import threading
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+from live_bench import COMMAND, DEADLINE, ended, live_bench, method, until
+
+from bench.agent.agent import Agent
+from bench.agent.link import AgentClient
+from bench.agent.messages import AgentEvent, AgentStatus, RunCommand, Samples, ShutDownCommand, StatusCommand
+from bench.recorder.reader import read_log
+from bench.rig.config import load_config
+from sim_rig.faults import WireFault
+
+pytestmark = [pytest.mark.wire, pytest.mark.timeout(240)]
+
+
+@pytest.fixture
+def bench(tmp_path):
+    with live_bench(tmp_path) as bench:
+        yield bench
+
+
+def finished(process):
+    """What a run said, its exit status first."""
+    _, said = process.communicate(timeout=DEADLINE)
+    return process.returncode, said
+
+
+def kinds(log, kind):
+    return [event["text"] for event in log.events if event["kind"] == kind]
+
+
+def test_a_run_is_recorded_as_it_was_commanded(bench):
+    with ended(bench.run("--specimen", "D1")) as process:
+        code, said = finished(process)
+    assert code == 0, said
+    log = read_log(bench.log)
+    samples = log.samples
+    assert log.outcome == "clean", log.metadata["outcome"]
+    assert log.metadata["run"]["specimen"] == "D1"
+    assert [segment.name for segment in log.segments] == ["a", "b"]
+    assert [(segment.stop - segment.start) / 1000 for segment in log.segments] == pytest.approx(
+        [1.5, 2.0], abs=0.01
+    )
+    assert kinds(log, "checkpoint") == ["after segment a"]
+    for name in ("displacement", "force", "coil_drive", "actuator_position", "coil_current", "temperature"):
+        assert np.isfinite(samples[name]).mean() > 0.99, name
+    segment, command = log.segments[1], samples["displacement_command"]
+    inside = slice(segment.start, segment.stop)
+    # The servo is some 12 ms behind at 0.1 m/s.
+    assert np.max(np.abs(samples["displacement"][inside] - command[inside])) < 3e-3
+    assert np.ptp(samples["displacement"][inside]) == pytest.approx(0.016, rel=0.1)
+    assert np.median(samples["coil_drive"][inside]) == pytest.approx(0.4, abs=2e-3)
+    assert {"method.json", "bench.toml", "instruments.json"} <= log.attachments.keys()
+    channels = json.loads(log.metadata["channels"]["force"])
+    assert channels["filter"] == {"kind": "butterworth", "order": 2, "cutoff_hz": 300.0}
+    until(bench.rests)
+
+
+def test_drive_and_motion_begin_together_and_marks_stand_where_they_belong(bench):
+    with ended(bench.run()) as process:
+        code, said = finished(process)
+    assert code == 0, said
+    samples = read_log(bench.log).samples
+    asked = np.flatnonzero(np.diff(samples["coil_drive_command"]) > 0.1)
+    measured = np.flatnonzero((samples["coil_drive"][1:] > 0.1) & (samples["coil_drive"][:-1] < 0.1))
+    assert len(asked) >= 1
+    assert abs(int(asked[0]) - int(measured[0])) < 20
+    segment = samples["segment"]
+    at_a = np.flatnonzero(segment == 0)
+    assert samples["displacement_command"][at_a[0]] == pytest.approx(0.0, abs=2e-4)
+
+
+def test_a_limit_trips_and_stays(tmp_path):
+    """The force of the damper passes a fixture limit in the middle of a stroke."""
+    with (
+        live_bench(tmp_path, limits="force = { trip = 150.0 }") as bench,
+        Agent(load_config(bench.toml), bench.toml) as agent,
+    ):
+        answer = agent.run(RunCommand(method=method(), log=str(bench.log)))
+        assert answer.ok, answer.error
+        until(lambda: agent.wait(0.05))
+        status = agent.status()
+        assert status.state == "tripped"
+        assert "exceeds the limit of 150 N" in status.trip
+        assert (status.run.outcome, status.run.reason) == ("incomplete", status.trip)
+        until(bench.rests)
+        refused = agent.run(RunCommand(method=method(), log=str(bench.log)))
+        assert not refused.ok
+        assert "then reset" in refused.error
+        assert agent.reset().ok
+        assert agent.status().state == "idle"
+    log = read_log(bench.log)
+    assert log.outcome == "incomplete"
+    assert len(kinds(log, "trip")) == 1
+    assert np.max(np.abs(log.samples["force"])) > 150.0
+
+
+def test_a_stop_ends_in_good_order_and_the_run_goes_on_after_its_checkpoint(bench):
+    with Agent(load_config(bench.toml), bench.toml) as agent:
+        assert agent.run(RunCommand(method=method(), log=str(bench.log))).ok
+        until(lambda: (run := agent.status().run) is not None and run.segment == "b")
+        agent.stop()
+        until(lambda: agent.wait(0.05))
+        status = agent.status()
+        assert (status.state, status.run.outcome, status.run.reason) == (
+            "idle",
+            "incomplete",
+            "stopped on request",
+        )
+        until(bench.rests)
+        stopped = read_log(bench.log)
+        assert kinds(stopped, "checkpoint") == ["after segment a"]
+        assert not kinds(stopped, "trip")
+        samples = stopped.samples
+        assert np.nanmax(np.abs(np.diff(samples["displacement_command"], 2))) * 1e6 <= 9.0
+        again = RunCommand(method=method(), log=str(bench.log), resume_after="a")
+        assert agent.run(again).ok
+        until(lambda: agent.wait(0.05))
+        assert agent.status().run.outcome == "clean", agent.status().run
+        assert len(agent.status().finished) == 2
+    assert [segment.name for segment in read_log(bench.log).segments] == ["b"]
+
+
+def test_ctrl_c_ends_a_run_in_good_order(bench):
+    with ended(bench.run()) as process:
+        until(bench.strokes)
+        process.send_signal(signal.SIGINT)
+        code, said = finished(process)
+    assert code == 1
+    assert len(said.strip().splitlines()) == 1
+    assert "stopped on request" in said
+    assert read_log(bench.log).outcome == "incomplete"
+    assert bench.rests()
+
+
+def test_a_killed_agent_leaves_all_at_rest_and_its_log_can_be_mended(bench):
+    with ended(bench.run()) as process:
+        until(bench.strokes)
+        process.kill()
+        killed = datetime.now(UTC)
+        process.communicate(timeout=DEADLINE)
+    until(bench.rests, 10.0)
+    mended = subprocess.run([COMMAND, "salvage", bench.log], capture_output=True, text=True, timeout=DEADLINE)
+    assert mended.returncode == 0, mended.stderr
+    log = read_log(bench.log)
+    zero = datetime.fromisoformat(log.metadata["run"]["utc_offset"])
+    kept = (killed - zero).total_seconds() - log.samples["time_ns"][-1] * 1e-9
+    assert kept <= 0.5
+
+
+def test_a_load_cell_that_falls_silent_trips_and_the_log_is_closed(tmp_path):
+    cut = WireFault(kind="stuck", start=8.0, duration=100.0)
+    with live_bench(tmp_path, faults={"load_cell": (cut,)}) as bench:
+        cycles = [{**segment, "cycles": 40} for segment in method()["segments"]]
+        with ended(bench.run(segments=cycles)) as process:
+            code, said = finished(process)
+        until(bench.rests)
+    assert code == 1
+    assert "force age" in said
+    log = read_log(bench.log)
+    assert log.outcome == "incomplete"
+    assert "force age" in log.metadata["outcome"]["reason"]
+
+
+def test_the_agent_as_a_process_is_led_over_its_sockets(bench):
+    words = ("rig", "--config", bench.toml, "--commands", "tcp://127.0.0.1:*", "--samples", "tcp://127.0.0.1:*")
+    process = subprocess.Popen([COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    with ended(process):
+        line = process.stdout.readline()
+        commands, samples = (word.rstrip(",") for word in line.split() if word.startswith("tcp://"))
+        agent, stopping = AgentClient(commands, samples), threading.Event()
+        assert agent.send(RunCommand(method=method(), log=str(bench.log))).ok
+        again = agent.send(RunCommand(method=method()))
+        assert (again.ok, "nothing was started" in again.error) == (False, True)
+        seen = []
+        for message in agent.subscribe(stopping):
+            seen.append(message)
+            if isinstance(message, AgentEvent) and message.kind == "run_finished":
+                stopping.set()
+        live = [message for message in seen if isinstance(message, Samples)]
+        assert {"force", "displacement", "displacement_command"} <= live[-1].values.keys()
+        assert all(len(column) == len(one.time_ns) for one in live for column in one.values.values())
+        assert "running" in {message.state for message in seen if isinstance(message, AgentStatus)}
+        assert agent.send(StatusCommand()).status.run.outcome == "clean"
+        agent.send(ShutDownCommand())
+        assert process.wait(DEADLINE) == 0
+    assert bench.rests()
+
+
+def test_what_this_bench_cannot_run_is_refused_in_one_line(bench):
+    with ended(bench.run(drive_kind="coil_a")) as process:
+        code, said = finished(process)
+    assert (code, len(said.strip().splitlines())) == (1, 1)
+    assert "drives by coil_a, this bench by coil_v" in said
+    assert not bench.log.exists()

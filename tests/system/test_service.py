@@ -1,0 +1,211 @@
+"""The service as a user starts it, with its worker; either is killed while a job runs."""
+
+import contextlib
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.request import Request, urlopen
+
+import pytest
+
+MRBENCH = (sys.executable, "-m", "bench.cli")
+PATIENCE = 200.0
+"""[s] for a job on a machine that has other work."""
+PROMPT = os.environ | {"MRBENCH_NICE": "0"}
+"""At the lowest priority a worker would wait for all other tests."""
+TINY = {
+    "schema": "mrbench.method/1",
+    "name": "tiny",
+    "title": "Four cycles",
+    "description": "As short as a fit bears.",
+    "rate_hz": 500,
+    "drive_kind": "coil_v",
+    "limits": {"stroke_m": 0.02, "velocity_mps": 0.3, "acceleration_mps2": 6, "force_n": 1500, "drive": 0.5},
+    "segments": [
+        {
+            "name": "10mm_2Hz",
+            "motion": {"kind": "sine", "amplitude_m": 0.01, "frequency_hz": 2},
+            "cycles": 4,
+            "drive": {"kind": "constant", "value": 0.2},
+        }
+    ],
+}
+
+
+class Served:
+    """A service process on a data folder."""
+
+    def __init__(self, data, token=None):
+        self.log = data.parent / "service.log"
+        self.log.unlink(missing_ok=True)
+        command = [*MRBENCH, "serve", "--port", "0", "--data", str(data)]
+        with self.log.open("w") as log:
+            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, env=PROMPT)
+        line = self.process.stdout.readline()
+        found = re.match(r"(http://127\.0\.0\.1:\d+/)(?:#token=(\S+))?", line)
+        if not found:
+            self.kill()
+            pytest.fail(f"no address but {line!r}: {self.log.read_text()}")
+        self.address, self.token = found[1], found[2] or token
+
+    def call(self, path, method="GET"):
+        headers = {"Authorization": f"Bearer {self.token}"}
+        with urlopen(
+            Request(f"{self.address}api/v1/{path}", method=method, headers=headers), timeout=30
+        ) as answer:
+            return json.load(answer)
+
+    def the_job(self, wanted):
+        """The only job, once it is as wanted."""
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            with contextlib.suppress(OSError):
+                jobs = self.call("jobs")["items"]
+                if jobs and wanted(jobs[0]):
+                    assert len(jobs) == 1
+                    return jobs[0]
+            assert time.monotonic() < deadline, self.log.read_text()
+            time.sleep(0.02)
+
+    def worker(self):
+        """Number of the worker process that was started last."""
+        return int(re.findall(r"worker_started pid=(\d+)", self.log.read_text())[-1])
+
+    def end(self):
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(60)
+        self.process.stdout.close()
+        return self.process.returncode
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+        self.process.stdout.close()
+
+
+def runs(pid):
+    """Whether a process is there and has not ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def working_on(data):
+    """Processes that a job has started on the logs of a folder."""
+    found = []
+    for process in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            words = (process / "cmdline").read_bytes().split(b"\0")
+            if any(word.startswith(bytes(data)) for word in words) and b"serve" not in words:
+                found.append(int(process.name))
+    return [pid for pid in found if runs(pid)]
+
+
+def gone(condition, what):
+    deadline = time.monotonic() + PATIENCE
+    while condition():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.02)
+
+
+def identifies(job):
+    return job["state"] == "running" and job["doing"] == "identify"
+
+
+def ended(job):
+    return job["state"] in ("done", "failed", "cancelled")
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tiny")
+    method, made = folder / "tiny.json", folder / "tiny.mcap"
+    method.write_text(json.dumps(TINY))
+    command = [*MRBENCH, "run", str(method), "--scenario", "default", "--seed", "3", "--out", str(made)]
+    subprocess.run(command, check=True, capture_output=True, timeout=120)
+    return made
+
+
+@pytest.fixture
+def data(log, tmp_path):
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    shutil.copy(log, folder)
+    return folder
+
+
+@pytest.fixture
+def served(data):
+    service = Served(data)
+    yield service
+    if service.process.poll() is None:
+        service.end()
+
+
+def check_results(service, data):
+    (run,) = service.call("runs")["items"]
+    assert run["outcome"] == "clean"
+    assert run["rmse_n"] < 2 * run["noise_floor_n"]
+    assert service.call(f"runs/{run['id']}/fit")["schema"] == "mrbench.fit/1"
+    (results,) = data.glob("*.fit-*")
+    assert sorted(path.name for path in results.iterdir()) == ["fit.json", "report.html"]
+    assert not list(data.glob(".*.fit-*")), "an attempt has left its folder"
+
+
+def test_a_job_ends_though_its_worker_is_killed(served, data):
+    served.the_job(identifies)
+    worker, commands = served.worker(), working_on(data)
+    assert commands
+    os.kill(worker, signal.SIGKILL)
+    gone(lambda: any(map(runs, commands)), "the killed worker's commands go on")
+    job = served.the_job(ended)
+    assert (job["state"], job["attempts"]) == ("done", 2), job["error"]
+    assert served.worker() != worker
+    check_results(served, data)
+
+
+def test_a_job_ends_though_the_service_is_killed(served, data):
+    job = served.the_job(identifies)
+    worker, commands = served.worker(), working_on(data)
+    served.kill()
+    gone(lambda: any(map(runs, [worker, *commands])), "what the killed service has started goes on")
+    again = Served(data, served.token)
+    try:
+        found = again.the_job(ended)
+        assert (found["id"], found["state"], found["attempts"]) == (job["id"], "done", 2), found["error"]
+        check_results(again, data)
+    finally:
+        again.end()
+
+
+def test_cancel_stops_the_process_and_leaves_nothing(served, data):
+    job = served.the_job(identifies)
+    commands = working_on(data)
+    assert commands
+    served.call(f"jobs/{job['id']}/cancel", "POST")
+    assert served.the_job(ended)["state"] == "cancelled"
+    gone(lambda: any(map(runs, commands)), "a cancelled command goes on")
+    assert not list(data.glob("*fit-*"))
+    assert served.call("health")["worker"] == "ok"
+
+
+def test_an_interrupt_ends_the_service_and_its_worker(served, data):
+    served.the_job(identifies)
+    worker, commands = served.worker(), working_on(data)
+    assert served.end() == 0
+    gone(lambda: any(map(runs, [worker, *commands])), "what the service has started goes on")
+
+
+def test_two_services_never_share_a_folder(served, data):
+    command = [*MRBENCH, "serve", "--port", "0", "--data", str(data)]
+    second = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert second.returncode == 1
+    assert "another service works on" in second.stderr
+    assert served.call("health")["worker"] == "ok"

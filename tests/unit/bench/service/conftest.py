@@ -1,0 +1,77 @@
+"""A service with a rig agent and an engine that the test plays itself."""
+
+import time
+from contextlib import asynccontextmanager
+
+import pytest
+from fake_surroundings import FakeAgent, FakeEngine
+from fastapi.testclient import TestClient
+
+from bench.service.access import open_access
+from bench.service.application import Surroundings, create_app
+
+PATIENCE = 20.0
+"""[s] for what happens in another thread."""
+
+
+class Service:
+    """A service that can be started and ended again and again on one data folder."""
+
+    def __init__(self, data):
+        self.data = data
+        self.agent = FakeAgent()
+        self.engine = FakeEngine()
+        self.access, self.token = open_access(data)
+        self.client = None
+
+    def start(self, **changes):
+        self.end()
+        self.engine = FakeEngine()
+        given = {"data": self.data, "access": self.access, "link": self.agent, "engine": self._engine}
+        app = create_app(Surroundings(**{**given, **changes}))
+        self.client = TestClient(app, base_url="http://127.0.0.1:8600", raise_server_exceptions=False)
+        self.client.headers["Authorization"] = f"Bearer {self.token}"
+        return self.client.__enter__()
+
+    def end(self):
+        if self.client is not None:
+            self.client.__exit__(None, None, None)
+            self.client = None
+
+    def get(self, path):
+        answer = self.client.get(f"/api/v1{path}")
+        assert answer.status_code == 200, answer.text
+        return answer.json()
+
+    def post(self, path, body=None, status=200):
+        answer = self.client.post(f"/api/v1{path}", json=body)
+        assert answer.status_code == status, answer.text
+        return answer.json()
+
+    def await_(self, path, wanted):
+        """What a path answers, once it is as wanted."""
+        deadline = time.monotonic() + PATIENCE
+        while not wanted(found := self.get(path)):
+            assert time.monotonic() < deadline, found
+        return found
+
+    def tell(self, what, *given):
+        """Have the engine say what became of a job, on the service's own loop."""
+        self.client.portal.call(getattr(self.engine.listener, what), *given)
+
+    @asynccontextmanager
+    async def _engine(self):
+        yield self.engine
+
+
+@pytest.fixture
+def service(tmp_path):
+    made = Service(tmp_path)
+    made.start()
+    yield made
+    made.end()
+
+
+@pytest.fixture
+def client(service):
+    return service.client

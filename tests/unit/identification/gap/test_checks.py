@@ -1,0 +1,90 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.random import default_rng
+
+from identification.errors import NothingToFit
+from identification.gap.checks import blind_spots, enough_cycles, one_specimen, without_clipping
+from identification.gap.floor import Floor
+from identification.gap.residual import Condition, Cycles
+from identification.recordings import Recording, Stretch
+
+FLOOR = Floor(2.0, 2.0, 2.0, "cycle to cycle")
+
+
+def recording(force, specimen="LAB-001"):
+    count = len(force)
+    stretch = Stretch(
+        name="run",
+        time=np.arange(count) / 1e3,
+        rate=1e3,
+        displacement=np.zeros(count),
+        force=force,
+        drive=np.zeros(count),
+        velocity=None,
+        segments=(),
+        force_filter=None,
+        displacement_filter=None,
+        force_delay=0.0,
+        displacement_delay=0.0,
+        drive_delay=0.0,
+        measured=np.ones(count, bool),
+    )
+    return Recording(Path("run.mcap"), "0" * 64, "coil_v", "V", (stretch,), {"run": {"specimen": specimen}})
+
+
+def cycles(count, *conditions):
+    return Cycles(np.zeros(10, int), np.zeros(10), np.zeros(count, int), conditions)
+
+
+def loop():
+    return 300.0 * np.sin(np.arange(4000) / 100.0) + 2.0 * default_rng(0).standard_normal(4000)
+
+
+def test_different_specimens_are_refused_by_name():
+    with pytest.raises(NothingToFit, match="LAB-001, LAB-002"):
+        one_specimen([recording(loop()), recording(loop(), "LAB-002")])
+
+
+def test_a_force_that_is_not_clipped_stays():
+    given = recording(np.round(loop(), 2))
+    cleaned, notes = without_clipping([given])
+    assert notes == []
+    assert cleaned[0].stretches[0].measured.all()
+
+
+def test_clipped_samples_are_left_out_and_it_is_said():
+    cleaned, notes = without_clipping([recording(np.clip(loop(), -295.0, 295.0))])
+    measured = cleaned[0].stretches[0].measured
+    assert 0.02 < np.mean(~measured) < 0.2
+    assert "clipped at 295 N" in notes[0]
+
+
+def test_a_force_that_is_mostly_clipped_is_refused_with_the_limit():
+    with pytest.raises(NothingToFit, match="100 N"):
+        without_clipping([recording(np.clip(loop(), -100.0, 100.0))])
+
+
+def test_one_cycle_is_refused_in_words():
+    with pytest.raises(NothingToFit, match="holds 1 cycle of"):
+        enough_cycles(cycles(1))
+    enough_cycles(cycles(4))
+
+
+def test_what_poor_strokes_cannot_show_is_said():
+    poor = cycles(6, Condition(0.0, 0.01, 1.0))
+    notes = " ".join(blind_spots(poor, FLOOR))
+    assert "one drive" in notes
+    assert "one frequency" in notes
+    assert "one amplitude" in notes
+    rich = cycles(6, Condition(0.0, 0.01, 1.0), Condition(0.2, 0.005, 3.0))
+    notes = " ".join(blind_spots(rich, FLOOR))
+    assert "one " not in notes
+    assert "calibration" in notes
+
+
+def test_no_repeats_are_said():
+    notes = blind_spots(cycles(6, Condition(0.0, 0.01, 0.0)), replace(FLOOR, cycle_to_cycle=None, how="no cycles"))
+    assert any("high frequencies alone" in note for note in notes)

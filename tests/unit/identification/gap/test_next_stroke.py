@@ -1,0 +1,39 @@
+import numpy as np
+
+from bench.methods.document import Segment
+from identification.damper.coordinates import to_coordinates
+from identification.damper.effects import EFFECTS
+from identification.damper.parameter_sets import PARAMETER_SETS
+from identification.gap.next_stroke import Limits, Rival, best_segment
+from identification.simulate import ActiveEffect
+
+POINT = to_coordinates(PARAMETER_SETS["laboratory"].parameters)
+LIMITS = Limits(amplitude=0.015, centre=0.0, velocity=0.2, frequency=3.0, drives=(0.0, 0.5))
+
+
+def rival(name, *values):
+    active = ActiveEffect(EFFECTS[name], values)
+    return Rival((name,), POINT, (active,), 0.5, np.diag(np.full(13, 1e-6)))
+
+
+def test_one_set_leaves_nothing_open():
+    assert best_segment([rival("moving_mass", 2.0)], LIMITS, 2.0) is None
+
+
+def test_delay_and_mass_are_separated_inside_the_limits():
+    found = best_segment([rival("moving_mass", 2.0), rival("force_delay", 1e-3)], LIMITS, 2.0)
+    segment = Segment.model_validate(found.segment)
+    motion = segment.motion
+    assert motion.amplitude_m <= LIMITS.amplitude * 1.001
+    assert 2 * np.pi * motion.amplitude_m * motion.frequency_hz <= LIMITS.velocity * 1.01
+    assert found.separates == [["moving_mass"], ["force_delay"]]
+    assert found.detectability > 10.0
+
+
+def test_what_a_refit_takes_away_does_not_count():
+    loose = rival("moving_mass", 0.05)
+    tight = loose.__class__(loose.names, loose.point, loose.effects, 0.5, np.diag(np.full(13, 1e12)))
+    other = rival("force_delay", 2e-4)
+    free = best_segment([loose, other], LIMITS, 2.0)
+    held = best_segment([tight, other], LIMITS, 2.0)
+    assert held.detectability >= free.detectability

@@ -1,0 +1,59 @@
+import pytest
+
+from identification.gap.posterior import Candidate, odds, stage_odds
+
+SAMPLES = 70_000
+
+
+def candidates(**left):
+    return [
+        Candidate(frozenset(filter(None, key.split("__"))) if key != "none" else frozenset(), value)
+        for key, value in left.items()
+    ]
+
+
+def test_probabilities_add_to_one():
+    found = odds(candidates(none=8.0, gas_spring=0.3, end_stop=1.0), SAMPLES)
+    assert sum(found.sets.values()) + found.unknown == pytest.approx(1.0)
+
+
+def test_an_effect_that_takes_nearly_all_of_a_large_gap_is_nearly_certain():
+    found = odds(candidates(none=8.0, gas_spring=0.05, end_stop=1.0, seal_friction=5.0), SAMPLES)
+    assert found.ranked()[0][0] == frozenset({"gas_spring"})
+    assert found.of_effect("gas_spring") > 0.9
+
+
+def test_a_recording_at_the_floor_has_no_effect():
+    found = odds(candidates(none=0.006, gas_spring=0.005, end_stop=0.005, moving_mass=0.006), SAMPLES)
+    assert found.ranked()[0][0] == frozenset()
+    assert found.unknown < 0.1
+
+
+def test_a_second_effect_that_only_mends_the_first_ones_form_is_not_named():
+    found = odds(candidates(none=30.0, end_stop=0.7, end_stop__gas_spring=0.4), SAMPLES)
+    assert found.ranked()[0][0] == frozenset({"end_stop"})
+    assert found.of_effect("gas_spring") < 0.5
+
+
+def test_a_real_second_effect_is_named():
+    found = odds(candidates(none=30.0, end_stop=4.0, end_stop__gas_spring=0.1), SAMPLES)
+    assert found.ranked()[0][0] == frozenset({"end_stop", "gas_spring"})
+    assert found.of_effect("gas_spring") > 0.9
+
+
+def test_two_that_fit_alike_share_the_odds():
+    found = odds(candidates(none=2.0, force_delay=0.010, moving_mass=0.010), SAMPLES)
+    assert found.of_effect("force_delay") == pytest.approx(found.of_effect("moving_mass"))
+    assert found.of_effect("force_delay") > 0.3
+
+
+def test_what_no_effect_explains_is_unknown():
+    found = odds(candidates(none=8.0, gas_spring=5.0, end_stop=6.0), SAMPLES)
+    assert found.unknown > 0.8
+
+
+def test_stages_follow_the_effects():
+    found = odds(candidates(none=8.0, gas_spring=0.05, force_delay=2.0), SAMPLES)
+    stages = stage_odds(found, ("coil", "damper", "mounting", "force_channel", "displacement_channel"))
+    assert max(stages, key=stages.get) == "damper"
+    assert all(0.0 <= share <= 1.0 for share in stages.values())

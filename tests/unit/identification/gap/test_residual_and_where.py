@@ -1,0 +1,117 @@
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.random import default_rng
+
+from identification.gap.held_out import held_out_cycles, shrinkage
+from identification.gap.residual import cut_cycles
+from identification.gap.where import Left, drift, gap_map, harmonics
+from identification.recordings import Segment, Stretch
+
+RATE = 500.0
+NOISE = 2.0
+
+
+def recording(segments=12, cycles=4, frequency=2.0):
+    length = round(cycles * RATE / frequency)
+    time = np.arange(segments * length) / RATE
+    x = 0.01 * np.sin(2 * np.pi * frequency * time)
+    drive = np.repeat(np.arange(segments) % 3 * 0.2, length)
+    parts = tuple(
+        Segment(k, f"s{k}", k * length, (k + 1) * length, "sine", 0.01, frequency, float(drive[k * length]))
+        for k in range(segments)
+    )
+    everywhere = np.ones(len(x), bool)
+    stretch = Stretch("made up", time, RATE, x, 0 * x, drive, None, parts, None, None, 0.0, 0.0, 0.0, everywhere)
+    piece = SimpleNamespace(stroke=SimpleNamespace(displacement=x, drive=drive, rate=RATE))
+    return stretch, cut_cycles([stretch], [piece])
+
+
+def left(stretch, residual, simulated=None):
+    count = len(residual)
+    return Left(
+        residual,
+        np.sin(np.arange(count)) if simulated is None else simulated,
+        stretch.drive,
+        stretch.time,
+        np.ones(count, bool),
+        ((count, stretch.rate),),
+    )
+
+
+def test_every_cycle_of_every_segment_is_one():
+    stretch, cycles = recording()
+    assert cycles.count == 12 * 4
+    assert len(cycles.conditions) == 12
+    counts = np.bincount(cycles.cycle)
+    assert counts.min() >= 0.9 * RATE / 2.0
+    assert counts.sum() == len(stretch.time)
+
+
+def test_phase_is_a_quarter_at_the_extended_end():
+    stretch, cycles = recording()
+    assert cycles.phase[np.argmax(stretch.displacement)] == pytest.approx(0.25, abs=0.01)
+
+
+def test_whole_segments_are_held_out_and_of_few_segments_cycles():
+    _, many = recording(segments=12)
+    held = held_out_cycles(many)
+    per_segment = [set(held[many.segment == k]) for k in range(12)]
+    assert all(len(states) == 1 for states in per_segment)
+    assert 0.2 < held.mean() < 0.3
+    _, few = recording(segments=3, cycles=6)
+    held = held_out_cycles(few)
+    assert all({True, False} == set(held[few.segment == k]) for k in range(3))
+
+
+def test_the_map_names_drive_and_phase_of_the_gap_and_takes_the_noise_off():
+    stretch, cycles = recording()
+    bump = 10.0 * ((stretch.drive > 0.3) & (np.abs(cycles.phase - 0.25) < 0.06))
+    residual = bump + NOISE * default_rng(0).standard_normal(len(bump))
+    found = gap_map(left(stretch, residual), cycles, NOISE)
+    assert found[0].drive == pytest.approx(0.4)
+    assert abs(found[0].phase - 0.25) < 0.1
+    assert found[0].gap_n > 5.0
+    assert all(place.gap_n < 1.0 for place in found if place.drive < 0.3)
+
+
+def test_harmonics_of_the_stroke_are_told_by_their_order():
+    stretch, cycles = recording()
+    residual = 4.0 * np.sqrt(2.0) * np.cos(3 * 2 * np.pi * cycles.phase)
+    lines = {line.order: line.rms_n for line in harmonics(left(stretch, residual), cycles)}
+    assert lines[3] == pytest.approx(4.0, rel=0.02)
+    assert lines[2] < 0.1
+
+
+def test_drift_of_mean_and_size_and_a_free_line_are_told_apart():
+    stretch, cycles = recording(segments=20)
+    noise = NOISE * default_rng(1).standard_normal(len(stretch.time))
+    rising = drift(left(stretch, 0.5 * stretch.time + noise), cycles)
+    assert rising.slope_n_per_s == pytest.approx(0.5, rel=0.05)
+    assert rising.line_hz is None
+    force = 300.0 * np.sin(2 * np.pi * 2.0 * stretch.time)
+    fading = drift(left(stretch, -0.1 * force * stretch.time / stretch.time[-1] + noise, force), cycles)
+    assert fading.size_change == pytest.approx(-0.1, rel=0.1)
+    humming = drift(left(stretch, 3.0 * np.sin(2 * np.pi * 50.3 * stretch.time) + noise), cycles)
+    assert humming.line_hz == pytest.approx(50.3, abs=0.1)
+    assert humming.line_n == pytest.approx(3.0, rel=0.1)
+
+
+def test_shrinkage_has_an_interval_that_holds_it():
+    random = default_rng(2)
+    counts = np.full(30, 500.0)
+    before = counts * (NOISE**2 + 9.0 * random.uniform(0.5, 1.5, 30))
+    after = counts * (NOISE**2 + 0.9 * random.uniform(0.5, 1.5, 30))
+    found = shrinkage(before, after, counts, NOISE)
+    assert found.value == pytest.approx(0.9, abs=0.03)
+    low, high = found.ci95
+    assert low < found.value < high
+    assert high - low < 0.1
+
+
+def test_at_the_floor_there_is_nothing_to_shrink():
+    counts = np.full(30, 500.0)
+    found = shrinkage(counts * NOISE**2 * 1.02, counts * NOISE**2, counts, NOISE)
+    assert found.value is None
+    assert found.ci95 is None

@@ -62,7 +62,7 @@ def identify(
 
 
 def predict(
-    model: Annotated[Path, typer.Argument(metavar="MODEL.json", help="A fit made by `identify`.")],
+    model: Annotated[Path, typer.Argument(metavar="MODEL.json", help="A fit, a twin or a scenario.")],
     log: Annotated[Path, typer.Argument(metavar="LOG", help="A log that the model never saw.")],
     out: Out,
     series: Annotated[
@@ -70,17 +70,17 @@ def predict(
     ] = None,
     free: Annotated[str, typer.Option(metavar="offset", help="What else to estimate on this log: `offset`.")] = "",
 ) -> None:
-    """Simulate a fit on a log; only the inner displacement at the start of each stretch is freed."""
+    """Simulate a fit or a twin on a log; only the inner displacement at the start of each stretch is freed."""
     from identification.errors import IdentificationError
+    from identification.gap.model import read_fit_or_model
     from identification.predict import predict_log
     from identification.recordings import load
-    from identification.results import read_fit
     from identification.series import write_series
 
     if free not in ("", "offset"):
         raise IdentificationError(f"--free {free}: only a force offset can be freed; say `--free offset`")
     _check_place(out)
-    prediction, found = predict_log(read_fit(model), load(log), free_offset=free == "offset")
+    prediction, found = predict_log(read_fit_or_model(model), load(log), free_offset=free == "offset")
     if series is not None:
         write_series(series, found)
     _write(out, prediction)

@@ -65,7 +65,7 @@ def identify(
     """
     assembled = assemble(recordings, request.hold_out)
     began = time.process_time()
-    problem = _problem(assembled, request)
+    problem = fit_problem(assembled, request.delay_prior)
     stretches = [s for s, p in zip(assembled.stretches, assembled.pieces, strict=True) if p.train.any()]
     minimum = refine(problem.quicker(), request.settings, progress)
     polish = replace(request.settings, restarts=0)
@@ -94,10 +94,16 @@ def _smoother_motion(problem: Problem, stretches: Sequence[Stretch], minimum: Mi
     return replace(problem, pieces=tuple(pieces))
 
 
-def _problem(assembled: Assembled, request: Request) -> Problem:
+def fit_problem(assembled: Assembled, delay_prior: float | None = None) -> Problem:
+    """What a fit of some recordings minimises.
+
+    Args:
+        assembled: the recordings.
+        delay_prior: deviation of the channel delays beyond what the log reports [s]; None takes its clocks.
+    """
     fitted = [p.stroke.drive[p.train > 0] for p in assembled.pieces]
     drives = np.concatenate(fitted)
-    prior = assembled.delay_prior if request.delay_prior is None else request.delay_prior
+    prior = assembled.delay_prior if delay_prior is None else delay_prior
     pieces = tuple(p for p in assembled.pieces if p.train.any())
     space = SearchSpace(*_range(drives), lowest_k0=_lowest_k0(pieces))
     return Problem(pieces, space, assembled.floor.noise, max(prior, 1e-9))

@@ -80,11 +80,21 @@ class DriveError(Document):
 class Stage(Document):
     """One stage of the fit."""
 
-    name: str = Field(description="refine; later also pinn")
+    name: str = Field(description="pinn or refine")
     seconds: float = Field(description="processor time in s")
-    rmse_n: float = Field(description="force error on the fitted samples after it, in N")
+    rmse_n: float = Field(description="error of the simulated force on the fitted samples after it, in N")
     iterations: int = Field(description="steps of the last descent")
     note: str = Field(default="", description="what a person should know about it")
+    simulated_n: Errors | None = Field(
+        default=None,
+        description="pinn: error in N of the law simulated with the parameters found; the honest figure",
+    )
+    reconstructed_n: Errors | None = Field(
+        default=None, description="pinn: error in N of the network's own force; says little of the parameters"
+    )
+    coordinates: dict[str, Estimate] | None = Field(
+        default=None, description="what this stage found, where the fit as a whole rests on another"
+    )
 
 
 class Provenance(Document):
@@ -116,6 +126,10 @@ class Fit(Document):
     agreement: str | None = Field(
         description="whether the stages agree within their intervals; null for one stage"
     )
+    agreement_deviations: dict[str, float] | None = Field(
+        default=None,
+        description="difference of the stages in each coordinate, over the larger of their standard deviations",
+    )
     result: str = Field(description="`converged`, or why not")
     correlations: dict[str, float] = Field(
         description="pairs of coordinates correlated beyond 0.9, `a,b` -> value"
@@ -138,6 +152,10 @@ class Prediction(Document):
     per_drive: list[DriveError]
     samples: int = Field(description="how many samples")
     freed: list[str] = Field(description="what was estimated on this very log")
+    before_n: float | None = Field(default=None, description="of a twin: that of its fit without effects, in N")
+    shrinkage: float | None = Field(
+        default=None, description="of a twin: 1 - (after² - floor²)/(before² - floor²); null near the floor"
+    )
     provenance: Provenance
 
 

@@ -202,6 +202,8 @@ def test_noise_of_the_measured_drive_adds_to_the_uncertainty_of_the_yield_force(
     assert scatter[1][0, 0] > 1.5 * scatter[0][0, 0]
 
 
-def test_a_piece_without_a_filter_is_its_own_quicker_self():
+def test_a_piece_without_a_filter_is_quicker_by_its_play_alone():
     piece = Piece("p", Stroke(RATE, *(np.zeros(3),) * 4), np.zeros(3), np.ones(3))
-    assert piece.quicker() is piece
+    assert piece.quicker().low_pass is None
+    assert piece.quicker().finer_for_play == 1
+    assert piece.quicker().stroke is piece.stroke

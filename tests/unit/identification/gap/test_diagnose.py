@@ -3,6 +3,7 @@ import json
 import jsonschema
 import numpy as np
 import pytest
+from made_up_runs import NOISE, run
 
 from identification import schemas
 from identification.errors import NothingToFit
@@ -10,8 +11,6 @@ from identification.gap.diagnose import diagnose
 from identification.gap.documents import STAGES
 from identification.gap.model import read_model
 from sim_rig.scenario import parse_scenario
-
-from .made_up_runs import NOISE, run
 
 
 def stiffening(x, v):

@@ -21,7 +21,7 @@ DEADLINE = 90.0
 
 
 TCP = Choices(load_cell="tcp")
-_PATIENT = "clamped = true\nstale_after = 0.3"
+_PATIENT = "stale_after = 0.3"
 _LIMITS = """
 [limits]
 actuator_velocity = { trip = 2.0 }
@@ -126,7 +126,7 @@ def live_bench(folder, choices=TCP, faults=None, limits=""):
         until(lambda: len(served.rig.truth().truth.output) > 500)
         write_bench_toml(folder / "bench.toml", served.wires, scenario)
         bench = Bench(served, folder)
-        text = bench.toml.read_text().replace("clamped = true", _PATIENT)
+        text = bench.toml.read_text().replace("stale_after = 0.2", _PATIENT)
         bench.toml.write_text(f"{text}{_LIMITS}{limits}\n")
         yield bench
 

@@ -65,6 +65,7 @@ class Actuator:
         self._mounting = cia402.found(clamped, referenced=False)
         self._clamped = clamped
         self._origin = 0.0
+        self._channels = self._described()
         self._samples = self.decoder(0.0, 1.0)
         self._bus.listen(lambda frame: self._samples.take(frame))
         self._leading = threading.RLock()
@@ -82,6 +83,10 @@ class Actuator:
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Position, velocity and torque."""
+        return self._channels
+
+    def _described(self) -> tuple[Channel, ...]:
+        """The channels, as wide as travel, origin and rated torque make them."""
         low, high = (limit - self._origin for limit in self.settings.travel)
         speed, torque = 4 * self.settings.top_speed, 4 * self._drive.rated_torque
         return (
@@ -131,6 +136,7 @@ class Actuator:
         self._boots = self._node.boots
         if not referenced or self._mounting not in (Mounting.MOUNTED, Mounting.CENTRED):
             self._mounting, self._origin = cia402.found(self._clamped, referenced), 0.0
+        self._channels = self._described()
         self._samples = self.decoder(self._origin, self._drive.rated_torque)
 
     def close(self) -> None:
@@ -323,6 +329,7 @@ class Actuator:
 
     def _set_origin(self, origin: float) -> None:
         self._origin = self._samples.origin = origin
+        self._channels = self._described()
 
     def _disarm(self) -> None:
         with self._leading:

@@ -230,17 +230,20 @@ class CanopenActuator:
         self._limited = saturated
         target = self.demand.position if saturated else self._zero + wanted * _COUNT
         self.demand.advance(now_ns)
-        self.demand.follow(
+        self._push(now_ns)
+        leg = self.demand.follow(
             target,
+            now_ns,
             self.objects.number(0x60C2, 1) * _MILLISECOND,
             self.objects.number(0x607F) * _COUNT,
             self.objects.number(0x6085) * _COUNT,
         )
-        self._lag(self._zero + wanted * _COUNT, now_ns)
+        self._signals.lead(leg.target, leg.end_ns, leg.begin_ns)
+        self._lag(now_ns)
 
-    def _lag(self, wanted: float, now_ns: int) -> None:
-        """Following error, once it has lasted."""
-        if abs(wanted - self._rig_position()[1]) <= self.objects.number(0x6065) * _COUNT:
+    def _lag(self, now_ns: int) -> None:
+        """Following error, that of the demand and not of setpoints still to be reached, once it has lasted."""
+        if abs(self.demand.position - self._rig_position()[1]) <= self.objects.number(0x6065) * _COUNT:
             self._away_ns = None
         elif self._away_ns is None:
             self._away_ns = now_ns
@@ -277,7 +280,7 @@ class CanopenActuator:
         self._homing, self._homed, self.referenced = False, True, True
 
     def _push(self, now_ns: int) -> None:
-        if self.demand.position != self._pushed:
+        if self.demand.motion is not Motion.FOLLOW and self.demand.position != self._pushed:
             self._pushed = self.demand.position
             self._signals.command("displacement", self.demand.position, now_ns)
 

@@ -14,6 +14,9 @@ class Clock(Protocol):
     def now_ns(self) -> int:
         """Since the clock began [ns]."""
 
+    def before_ns(self, age_ns: int) -> int:
+        """What it showed when ``age_ns`` [ns] of real time less had gone by [ns]."""
+
     def wait_until(self, instant_ns: int, patience: float = _LONGEST_NAP) -> bool:
         """Wait for an instant [ns].
 
@@ -42,7 +45,11 @@ class RunningClock:
 
     def now_ns(self) -> int:
         """Since the clock began [ns]."""
-        return int((time.monotonic_ns() - self._began) * self.speed)
+        return self.before_ns(0)
+
+    def before_ns(self, age_ns: int) -> int:
+        """What it showed ``age_ns`` [ns] of real time ago [ns]."""
+        return int((time.monotonic_ns() - age_ns - self._began) * self.speed)
 
     def wait_until(self, instant_ns: int, patience: float = _LONGEST_NAP) -> bool:
         """Wait for an instant [ns], at most ``patience`` [s] of real time; whether it has come."""
@@ -61,6 +68,10 @@ class SteppedClock:
 
     def now_ns(self) -> int:
         """Since the clock began [ns]."""
+        return self._now
+
+    def before_ns(self, age_ns: int) -> int:
+        """The same: real time does not move it."""
         return self._now
 
     def advance(self, by_ns: int) -> None:

@@ -38,7 +38,7 @@ class JoinedTrack:
 
     A command of instant t is reached at t + take_up, on a line that begins where the one before it was reached, or
     at t if that is later. So commands that come often enough are followed as they were meant, only later, and none
-    is followed before it came.
+    is followed before it came. A way that is known beforehand is commanded beforehand, and may be taken back.
     """
 
     def __init__(self, value: float, take_up_ns: int) -> None:
@@ -46,14 +46,22 @@ class JoinedTrack:
         self._take_up = take_up_ns
         self._vertices: deque[tuple[int, float]] = deque([(-(2**62), value)])
 
-    def add(self, at_ns: int, value: float) -> None:
-        """A command at an instant [ns], not before the last one."""
-        reached, last = self._vertices[-1]
-        if at_ns + self._take_up == reached:
+    def add(self, at_ns: int, value: float, since_ns: int | None = None) -> None:
+        """A command at an instant [ns]; those of later instants are taken back.
+
+        Args:
+            at_ns: on the rig's clock [ns].
+            value: to be reached.
+            since_ns: from when on [ns] the way leads straight there; none where none was known before ``at_ns``.
+        """
+        end = at_ns + self._take_up
+        while len(self._vertices) > 1 and self._vertices[-1][0] >= end:
             self._vertices.pop()
-        elif at_ns > reached:
-            self._vertices.append((at_ns, last))
-        self._vertices.append((at_ns + self._take_up, value))
+        reached, last = self._vertices[-1]
+        begin = at_ns if since_ns is None else since_ns + self._take_up
+        if begin > reached:
+            self._vertices.append((begin, last))
+        self._vertices.append((max(end, reached + 1), value))
 
     def at(self, instants: Instants) -> Array:
         """(N,) where the demand is at increasing instants [ns]; what came before the last of them is forgotten."""

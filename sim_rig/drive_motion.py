@@ -1,26 +1,27 @@
 """Where a servo drive wants the rod to be: setpoints interpolated, run on for a moment, then braked.
 
 Setpoints come once an interpolation period, as punctually as their host is. A drive that is locked to SYNC does
-not pass that jitter on to its machine: its own grid of periods follows the usual place of the SYNCs, and the
-demand goes straight from one to the next, each reached three periods after its place on the grid. One that is late
-by more than two is bridged at the pace of the last two for two further periods; then the drive brakes.
-Positions are in metres, times in nanoseconds, and nothing here knows a bus.
+not pass that jitter on to its machine: a host can be late but never early, so the drive's own grid of periods
+follows the earliest SYNCs, one place for each, and the demand goes straight from one setpoint to the next, reached
+four periods after its place. One that is late by more than three is bridged at the pace of the last two for two
+further periods; then the drive brakes. Positions are in metres, times in ns, and nothing here knows a bus.
 """
 
 from collections import deque
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 _BRIDGED = 2
 """Periods for which the pace of the setpoints is kept after the last one was reached."""
-_BEHIND = 3
-"""Periods from a setpoint's place on the grid until it is reached: one to go there, two to come late."""
-_PULL = 1 / 32
-"""Share of a SYNC's lateness by which the grid follows it; more at first: it begins at the mean of many."""
-_PUNCTUAL = 1 / 20
-"""Of a period: what is later or earlier pulls no more than that, or a host that stumbles moves the machine."""
+_BEHIND = 4
+"""Periods from a setpoint's place on the grid until it is reached: one to go there, three to come late."""
+_REMEMBERED = 128
+"""SYNCs of which the earliest tells where the grid stands."""
+_PULL = 1 / 16
+"""Share of what is missing to it by which the grid moves with each SYNC."""
 _MISSED = 4
-"""Periods of silence after which the grid begins anew."""
+"""Periods that a SYNC may be late; with one that is later the grid begins anew."""
 
 
 class Motion(Enum):
@@ -31,6 +32,33 @@ class Motion(Enum):
     BRIDGE = "bridge"
     BRAKE = "brake"
     TRAVEL = "travel"
+
+
+class Leg(NamedTuple):
+    """A straight piece of the way."""
+
+    begin_ns: int
+    """When it begins, where the one before it ends [ns]."""
+    end_ns: int
+    """[ns]"""
+    target: float
+    """Where it ends [m]."""
+
+
+class _Grid:
+    """Places of the SYNCs, a period apart, where the earliest of the last ones came."""
+
+    def __init__(self, came_ns: int, period_ns: int) -> None:
+        self._period_ns, self._count, self._origin_ns = period_ns, 0, came_ns
+        self._origins = deque([came_ns], _REMEMBERED)
+
+    def place(self, came_ns: int) -> int:
+        """Of the next SYNC [ns], which came at ``came_ns`` [ns]."""
+        self._count += 1
+        since_ns = self._count * self._period_ns
+        self._origins.append(came_ns - since_ns)
+        self._origin_ns += round((min(self._origins) - self._origin_ns) * _PULL)
+        return self._origin_ns + since_ns
 
 
 @dataclass
@@ -46,8 +74,7 @@ class Demand:
     _before: tuple[int, float] = (0, 0.0)
     _last: tuple[int, float] = (0, 0.0)
     """Places on the grid [ns] of the last two setpoints, and these [m]."""
-    _heard: int = 0
-    """SYNCs since the grid began."""
+    _grid: _Grid = field(default_factory=lambda: _Grid(0, 1))
     _bridged_ns: int = 0
     _target: float = 0.0
     _pace: float = 0.0
@@ -55,49 +82,40 @@ class Demand:
     _ahead: deque[tuple[int, float]] = field(default_factory=deque)
     """When each setpoint is to be reached [ns], and the setpoint [m]."""
 
-    def follow(self, target: float, period_ns: int, top_speed: float, deceleration: float) -> None:
-        """Take a setpoint [m] that has come now, to be approached at no more than ``top_speed`` [m/s]."""
-        if self.motion not in (Motion.FOLLOW, Motion.BRIDGE) or self._is_lost(period_ns):
+    def follow(self, target: float, came_ns: int, period_ns: int, top_speed: float, deceleration: float) -> Leg:
+        """Take a setpoint.
+
+        Args:
+            target: [m]
+            came_ns: when its SYNC passed [ns]; may lie before the instant to which the demand has moved.
+            period_ns: between setpoints [ns].
+            top_speed: [m/s] at which it is approached at most.
+            deceleration: [m/s²] for braking, should no other follow.
+
+        Returns:
+            The way on which it is reached.
+        """
+        if self.motion not in (Motion.FOLLOW, Motion.BRIDGE) or self._is_lost(came_ns, period_ns):
             self._ahead.clear()
-            self._before = self._now_ns - period_ns, self.position
-            self._last, self._heard = (self._now_ns, target), 1
+            self._before = came_ns - period_ns, self.position
+            self._grid = _Grid(came_ns, period_ns)
+            self._last = came_ns, target
         else:
-            self._place(target, period_ns)
+            self._before, self._last = self._last, (self._grid.place(came_ns), target)
         (began, before), (place, _) = self._before, self._last
         span = (place - began) / 1e9
         self._pace = min(max((target - before) / span, -top_speed), top_speed)
         reached = max(place + _BEHIND * period_ns, self._now_ns + period_ns // 4)
+        begin = self._ahead[-1][0] if self._ahead else self._now_ns
         self._ahead.append((reached, before + self._pace * span))
         self.motion, self._deceleration = Motion.FOLLOW, deceleration
         self._bridged_ns = reached + _BRIDGED * period_ns
         self._head_on()
+        return Leg(begin, *self._ahead[-1])
 
-    def _is_lost(self, period_ns: int) -> bool:
+    def _is_lost(self, came_ns: int, period_ns: int) -> bool:
         """Whether the grid has to begin anew with this SYNC."""
-        return not 0 <= self._now_ns - self._last[0] <= _MISSED * period_ns
-
-    def _place(self, target: float, period_ns: int) -> None:
-        """Give a setpoint its place on the grid, and pull the grid a little towards its SYNC.
-
-        One that comes soon after a late one, which was taken for it, tells that the late one belonged before.
-        """
-        place, last = self._last
-        periods = round((self._now_ns - place) / period_ns)
-        if periods:
-            self._before = place, last
-        elif self._ahead:
-            reached, wrongly_placed = self._ahead.pop()
-            if reached - period_ns > self._now_ns:
-                self._ahead.append((reached - period_ns, wrongly_placed))
-            self._before = place - period_ns, last
-        place += periods * period_ns
-        self._last = place + self._pull(self._now_ns - place, period_ns), target
-
-    def _pull(self, late_ns: int, period_ns: int) -> int:
-        """By how much a SYNC that is late moves the grid [ns]."""
-        self._heard += 1
-        most = period_ns * (_PUNCTUAL if self._heard * _PULL > 1 else 1)
-        return round(max(min(late_ns, most), -most) * max(1 / self._heard, _PULL))
+        return not -period_ns <= came_ns - self._last[0] - period_ns <= _MISSED * period_ns
 
     def _head_on(self) -> None:
         """The velocity towards the next setpoint."""

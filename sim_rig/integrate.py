@@ -16,6 +16,7 @@ import numba
 import numpy as np
 
 from identification.damper import law
+from identification.damper.effects import connection
 from sim_rig.compiled import OF_TWO, SCALES, Array, OfTwo, Scales, compiled
 
 STATES = 11
@@ -24,7 +25,7 @@ STATES = 11
 the damper behind a fixture that gives way [m]."""
 COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND = range(STATES)
 
-CONSTANTS = 18
+CONSTANTS = 20
 """Rates and weights of everything but the law, in the order of the names below."""
 (
     LAG,  # [1/s] rate of the command's lag
@@ -45,6 +46,8 @@ CONSTANTS = 18
     DEAD_TIME,  # [s] between output and field
     COOLING,  # [1/s] rate with which the energy leaves the damper
     MEMORY,  # 1 where the iron remembers, else 0
+    GAP,  # [m] of the connection between load cell and damper
+    HARDENING,  # [1/m²] of the same
 ) = range(CONSTANTS)
 
 STABLE = 0.8
@@ -73,6 +76,8 @@ field_rate = compiled(law.field_rate)
 inner_velocity = compiled(law.inner_velocity)
 hysteresis_rate = compiled(law.hysteresis_rate)
 damper_force = compiled(law.force)
+carried = compiled(connection.carried)
+steepness = compiled(connection.steepness)
 
 
 @compiled
@@ -156,7 +161,7 @@ def rates(
         command: [m] commanded displacement now.
         drive: [V or A] commanded drive.
         late: [V or A] output as it reaches the coil after its dead time.
-        k: (18,) constants of actuator, amplifier, heat and mounting.
+        k: (20,) constants of actuator, amplifier, heat and mounting.
         p: (14,) the parameters of the law in the paper's order.
         follow: displacement of the damper over (held, actuator) [m].
         parallel: force beside the law [N] over (displacement [m], velocity [m/s]).
@@ -170,11 +175,11 @@ def rates(
     x, v = _damper_motion(s[POSITION], s[SPEED], held, k[PLAY], follow)
     u = seen(s[FIELD], remembered)
     if k[GIVE] > 0.0:
-        load, x_pin = (x - s[BEHIND]) / k[GIVE], x
+        load = carried(x - s[BEHIND], k[GIVE], k[GAP], k[HARDENING])
         x = s[BEHIND]
         v = _balanced_velocity(s, load, v, u, p, parallel, scales)
         force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
-        force = (x_pin - x) / k[GIVE]
+        force = load
     else:
         force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
     slip = v - y_rate
@@ -208,7 +213,8 @@ def _stiffness(s: Array, slip: float, drive: float, k: Array, p: Array) -> float
     moving = s[OUTPUT] != drive
     if k[GIVE] > 0.0:
         c0, c1 = abs(at_field(p[6], p[7], s[FIELD])), abs(at_field(p[8], p[9], s[FIELD]))
-        inner += (tangent + 1.0 / k[GIVE]) / c0 + 1.0 / (k[GIVE] * c1)
+        stiff = steepness(s[POSITION] - s[BEHIND], k[GIVE], 0.0, k[HARDENING])
+        inner += (tangent + stiff) / c0 + stiff / c1
     return float(hysteresis + inner + servo + k[EVER_PRESENT] + (k[AMPLIFIER] if moving else 0.0))
 
 

@@ -103,6 +103,12 @@ class LiveRig:
         with self._lock:
             return self._channels[channel].recent.latest(count, before_ns)
 
+    def lead(self, position: float, at_ns: int, since_ns: int) -> None:
+        """Command a displacement [m] for an instant [ns] to come, straight from where it is to be ``since_ns``."""
+        self._commanded_ns = self._clock.now_ns()
+        with self._lock:
+            self._displacement.add(at_ns, position, since_ns)
+
     def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
         """Command ``displacement`` [m] or ``drive`` [V or A] from an instant [ns] on, now if none is given.
 

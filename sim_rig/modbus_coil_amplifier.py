@@ -89,10 +89,10 @@ class CoilAmplifierDevice:
                 self._signals.command("drive", level)
             return level
 
-    def trigger(self) -> None:
-        """The SYNC input has moved: an armed table starts now."""
+    def trigger(self, at_ns: int) -> None:
+        """The SYNC input has moved, at ``at_ns`` [ns]: an armed table starts then."""
         with self._lock:
-            self.output.trigger(self._signals.now_ns())
+            self.output.trigger(at_ns)
             self.advance()
 
     def fail(self, fault: FaultName) -> None:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.damper.effects import EFFECTS, Action, Form
+from identification.damper.effects.connection import stretched
 from sim_rig import integrate
 from sim_rig.compiled import (
     Array,
@@ -81,6 +82,12 @@ class Effects:
     def total(self, acts: Action) -> float:
         """Sum of what those give that are a single number: a delay [s], a lag [s], a give [m/N]."""
         return float(sum(form.act(*values) for form, values in self.that(acts)))
+
+    def connection(self) -> tuple[float, float, float]:
+        """Give [m/N], gap [m] and hardening [1/m²] of what carries the damper."""
+        parts = [form.act(*values) for form, values in self.that("connection")]
+        give, gap, hardening = (float(sum(part[k] for part in parts)) for k in range(3))
+        return give, gap, hardening
 
     def parallel(self) -> OfTwo:
         """Force beside the law [N] over displacement [m] and velocity [m/s]."""
@@ -200,7 +207,8 @@ class Plant:
         if not math.isfinite(place):
             raise PlantError(f"the specimen has no finite force at rest at {displacement:.4g} m")
         states = np.zeros(integrate.STATES)
-        behind = place - self._constants[integrate.GIVE] * load
+        carrying = self._constants[[integrate.GIVE, integrate.GAP, integrate.HARDENING]]
+        behind = place - stretched(load, *carrying) if carrying[0] > 0.0 else place
         states[[integrate.COMMAND, integrate.POSITION, integrate.Y]] = displacement, place, behind
         states[integrate.BEHIND] = behind
         states[[integrate.FIELD, integrate.OUTPUT, integrate.LAGGED]] = drive
@@ -259,7 +267,7 @@ def _constants(scenario: Scenario, law: Array, effects: Effects) -> Array:
     k[integrate.DEAD_TIME] = dead
     k[integrate.EVER_PRESENT] += k[integrate.SECOND_LAG]
     k[integrate.PLAY] = bool(effects.that("displacement_follower"))
-    k[integrate.GIVE] = effects.total("compliance")
+    k[integrate.GIVE], k[integrate.GAP], k[integrate.HARDENING] = effects.connection()
     k[integrate.MASS] = sum(form.act(1.0, *values) for form, values in effects.that("inertia"))
     k[integrate.COOLING] = effects.cooling()
     k[integrate.MEMORY] = bool(effects.that("field_memory"))

@@ -64,7 +64,7 @@ class Wire(NamedTuple):
 class SyncLine:
     """The line by which the SYNC of the bus starts the amplifier's table; a `sim_rig.socketcand_server.Node`."""
 
-    def __init__(self, trigger: Callable[[], object]) -> None:
+    def __init__(self, trigger: Callable[[int], object]) -> None:
         self._trigger = trigger
 
     def join(self, send: Callable[[int, bytes, int], None], now_ns: int) -> None:
@@ -73,7 +73,7 @@ class SyncLine:
     def take(self, identifier: int, data: bytes, now_ns: int) -> None:
         """A frame has passed."""
         if identifier == _SYNC:
-            self._trigger()
+            self._trigger(now_ns)
 
     def tick(self, now_ns: int) -> None:
         """Nothing happens by itself."""
@@ -188,7 +188,7 @@ class ServedRig:
         clock = self._clock_of("actuator")
         machine = Machine(ppm=clock.ppm, clock_offset_ns=clock.offset_ns)
         drive = CanopenActuator(self.rig, referenced=True, machine=machine)
-        server = SocketcandServer([drive, SyncLine(amplifier.trigger)], self.rig.now_ns)
+        server = SocketcandServer([drive, SyncLine(amplifier.trigger)], self._clock)
         self._open.enter_context(server)
         host, port = self._behind_faults("actuator", f"tcp://127.0.0.1:{server.port}").split("/")[2].split(":")
         settings: Section = {"interface": "socketcand", "host": host, "port": int(port), "channel": "can0"}

@@ -27,6 +27,15 @@ class Signals(Protocol):
             sensor has none; K is less than ``count`` where so many are not there or no longer kept.
         """
 
+    def lead(self, position: float, at_ns: int, since_ns: int) -> None:
+        """Command where the actuator is to be at an instant to come; a command for an earlier one replaces it.
+
+        Args:
+            position: [m]
+            at_ns: [ns] on the rig's clock.
+            since_ns: from when on [ns] it goes straight there.
+        """
+
     def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
         """Command ``displacement`` [m] of the actuator or ``drive`` [V or A] of the amplifier.
 

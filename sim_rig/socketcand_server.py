@@ -8,6 +8,7 @@ a frame is delivered when its last bit has passed. One thread serves everything,
 import contextlib
 import select
 import socket
+import struct
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -15,6 +16,7 @@ from functools import partial
 from typing import Protocol
 
 from sim_rig.can_bus import BusTiming, CanFrame
+from sim_rig.clock import Clock
 
 _QUIET = 0.02
 """[s] after the last greeting: clients compare it with all that one read brings, so no frame may follow yet."""
@@ -22,6 +24,9 @@ _BACKLOG = 1 << 20
 """[bytes] a client may leave unread before it is dropped."""
 _LINE_LIMIT = 200
 """[bytes] of one command."""
+_STAMPED = 35
+"""SO_TIMESTAMPNS, which Python does not name: Linux tells when data came, as two 64 bit numbers."""
+_STAMP = struct.Struct("=qq")
 _TURN = 1e-3
 """[s] between looks at clock and nodes when nothing else happens."""
 
@@ -62,7 +67,7 @@ class SocketcandServer:
     def __init__(
         self,
         nodes: Sequence[Node],
-        now_ns: Callable[[], int],
+        clock: Clock,
         *,
         host: str = "127.0.0.1",
         port: int = 0,
@@ -73,12 +78,12 @@ class SocketcandServer:
         self.dropped_clients = 0
         """Clients that did not read what they were sent."""
         self._nodes = list(nodes)
-        self._now_ns = now_ns
+        self._now_ns, self._clock = clock.now_ns, clock
         self._bus_name = bus_name
         self._clients: list[_Client] = []
         self._listener = socket.create_server((host, port))
         self._listener.setblocking(False)
-        self._started_ns = now_ns()
+        self._started_ns = clock.now_ns()
         self._running = True
         for node in self._nodes:
             node.join(self._sender_for(node), self._started_ns)
@@ -167,23 +172,33 @@ class SocketcandServer:
         with contextlib.suppress(OSError):
             connection, _ = self._listener.accept()
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            connection.setsockopt(socket.SOL_SOCKET, _STAMPED, 1)
             connection.setblocking(False)
             client = _Client(connection)
             client.unsent = b"< hi >"
             self._clients.append(client)
 
     def _receive(self, client: _Client) -> None:
-        data = client.socket.recv(4096)
+        data, came_ns = self._read(client.socket)
         if not data:
             raise ConnectionResetError
         client.received += data
         while b">" in client.received:
             command, client.received = client.received.split(b">", 1)
-            self._obey(client, command.decode("ascii", "replace").strip().removeprefix("<").split())
+            self._obey(client, command.decode("ascii", "replace").strip().removeprefix("<").split(), came_ns)
         if len(client.received) > _LINE_LIMIT:
             raise ConnectionResetError
 
-    def _obey(self, client: _Client, words: list[str]) -> None:
+    def _read(self, connection: socket.socket) -> tuple[bytes, int]:
+        """What a client has sent, and when it came [ns]: however late this thread is, the bus is not."""
+        data, notes, _, _ = connection.recvmsg(4096, socket.CMSG_SPACE(_STAMP.size))
+        for level, kind, note in notes:
+            if (level, kind) == (socket.SOL_SOCKET, _STAMPED):
+                seconds, rest = _STAMP.unpack(note)
+                return data, self._clock.before_ns(time.time_ns() - seconds * 1_000_000_000 - rest)
+        return data, self._now_ns()
+
+    def _obey(self, client: _Client, words: list[str], came_ns: int) -> None:
         if words[:1] == ["open"] and words[1:] == [self._bus_name]:
             client.opened = True
             client.unsent += b"< ok >"
@@ -192,13 +207,13 @@ class SocketcandServer:
             client.flush()
             client.raw, client.quiet_until = True, time.monotonic() + _QUIET
         elif words[:1] == ["send"] and client.raw:
-            self._send(client, words[1:])
+            self._send(client, words[1:], came_ns)
         elif words == ["echo"]:
             client.unsent += b"< echo >"
         else:
             client.unsent += b"< error unknown command >"
 
-    def _send(self, client: _Client, words: list[str]) -> None:
+    def _send(self, client: _Client, words: list[str], came_ns: int) -> None:
         try:
             identifier, size = int(words[0], 16), int(words[1])
             data = bytes(int(word, 16) for word in words[2:])
@@ -207,4 +222,4 @@ class SocketcandServer:
         if len(data) != size or size > 8 or not 0 <= identifier <= 0x7FF:
             client.unsent += b"< error in frame >"
             return
-        self.timing.offer(CanFrame(identifier, data, client), self._now_ns())
+        self.timing.offer(CanFrame(identifier, data, client), came_ns)

@@ -18,7 +18,7 @@ from bench.errors import LogError
 from bench.rig.acquisition import Batch
 from bench.rig.alignment import AlignedSamples, Aligner
 
-PERIOD = 0.05
+PERIOD = 0.1
 """[s] between two turns."""
 LIVE_PERIOD = 0.1
 """[s] between two messages of samples."""

@@ -23,7 +23,7 @@ from bench.recorder.readings import Clocks, frames_message, readings_messages
 from bench.recorder.writer import LogWriter
 from drivers.channel import Block, Frame
 
-PERIOD = 0.05
+PERIOD = 0.1
 """[s] between two turns of the writing thread."""
 ROOM = 20_000
 """Things that wait to be written at most; a rig of five instruments makes some 2000 in a second."""

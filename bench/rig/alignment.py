@@ -109,25 +109,34 @@ class Aligner:
     # What comes in
 
     def _take_waiting(self) -> None:
+        stamped: dict[tuple[str, str], list[Block]] = {}
         for _ in range(len(self._waiting)):
             batch = self._waiting.popleft()
             for block in batch.blocks:
-                if block.channel == "force" or block.channel in LONGEST_GAP_NS:
-                    self._take(batch.instrument, block)
+                if self._counts(batch.instrument, block):
+                    stamped.setdefault((batch.instrument, block.channel), []).append(block)
+        for (instrument, channel), blocks in stamped.items():
+            self._add(instrument, channel, blocks)
 
-    def _take(self, instrument: str, block: Block) -> None:
-        if self._source.setdefault(block.channel, instrument) != instrument:
-            return
+    def _counts(self, instrument: str, block: Block) -> bool:
+        """Whether a block's samples are wanted and have a clock; those that have none are taken at once."""
+        wanted = block.channel == "force" or block.channel in LONGEST_GAP_NS
+        if not wanted or self._source.setdefault(block.channel, instrument) != instrument:
+            return False
         if block.channel == "force":
             self._count(block)
         track = self._tracks.setdefault(block.channel, Track())
-        clock = self._maps.get(instrument)
-        if block.quality == "bad":
-            return
-        if block.device_ns is None:
+        if block.quality != "bad" and block.device_ns is None:
             track.add(track.spread(block.received_ns, len(block.values)), block.values)
-        elif clock is not None and clock.known:
-            track.add(clock.bench_ns(block.device_ns), block.values)
+        return block.quality != "bad" and block.device_ns is not None
+
+    def _add(self, instrument: str, channel: str, blocks: list[Block]) -> None:
+        """Samples by the instrument's own clock, all of a turn at once: most blocks hold but one or two."""
+        clock = self._maps.get(instrument)
+        if clock is not None and clock.known:
+            device_ns = np.concatenate([block.device_ns for block in blocks if block.device_ns is not None])
+            values = np.concatenate([block.values for block in blocks])
+            self._tracks[channel].add(clock.bench_ns(device_ns), values)
 
     def _count(self, block: Block) -> None:
         """Force samples that never came, or came to nothing, since the first bench sample."""

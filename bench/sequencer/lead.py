@@ -19,6 +19,8 @@ from drivers.errors import DriverError
 
 _PAUSE = 0.6
 """Share of the time after which the drive stops by itself that setpoints may be withheld."""
+_LEFT_OUT = 4
+"""Cycles by which the thread may be late and still make up for the setpoints that it owes."""
 _JOIN = 2.0
 """[s] for the thread to end."""
 
@@ -169,9 +171,10 @@ class LeadThread:
                 time.sleep(max(due - self._clock(), 0) * 1e-9)
                 now = self._clock()
                 self._note(now, (now - due) * 1e-9)
-                due += (now - due) // cycle * cycle
-                # The setpoint of its place on the grid of cycles: a drive that is locked to SYNC reaches it there,
-                # however late this thread was.
+                if now - due > _LEFT_OUT * cycle:
+                    due += (now - due) // cycle * cycle
+                # Every place on the grid of cycles gets its setpoint, for a drive that is locked to SYNC counts
+                # them, and reaches each at its place however late this thread was.
                 self._lead.step(due)
         except Exception as error:  # a thread that died in silence would leave the rod without anybody who knows
             expected = isinstance(error, DriverError | RunError)

@@ -13,6 +13,7 @@ from drivers.actuator import Actuator
 from drivers.can_bus import CanAddress
 from drivers.servo_drive import ActuatorSettings
 from sim_rig.canopen_actuator import CanopenActuator
+from sim_rig.clock import RunningClock
 from sim_rig.socketcand_server import SocketcandServer
 
 STEP_NS = 1_000_000
@@ -32,19 +33,27 @@ class MadeUpRod:
     def __init__(self) -> None:
         self.force = 120.0
         self.stuck = False
-        self._start = time.monotonic_ns()
+        self.clock = RunningClock()
         self._lock = threading.Lock()
         self._times, self._targets = [-10 * STEP_NS], [0.0]
 
     def now_ns(self) -> int:
-        return time.monotonic_ns() - self._start
+        return self.clock.now_ns()
 
     def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
         assert channel == "displacement"
-        if not self.stuck:
-            with self._lock:
-                self._times.append(self.now_ns())
-                self._targets.append(value)
+        self._add(self.now_ns(), value)
+
+    def lead(self, position: float, at_ns: int, since_ns: int) -> None:
+        self._add(at_ns, position)
+
+    def _add(self, at_ns: int, position: float) -> None:
+        with self._lock:
+            while len(self._times) > 1 and self._times[-1] >= at_ns:
+                self._times.pop(), self._targets.pop()
+            if not self.stuck:
+                self._times.append(at_ns)
+                self._targets.append(position)
 
     def latest(self, channel: str, count: int, before_ns: int):
         last = before_ns // STEP_NS
@@ -67,7 +76,7 @@ class CanRig:
     def __init__(self, **drive) -> None:
         self.rod = MadeUpRod()
         self.drive = CanopenActuator(self.rod, **drive)
-        self.server = SocketcandServer([self.drive], self.rod.now_ns).start()
+        self.server = SocketcandServer([self.drive], self.rod.clock).start()
 
     @property
     def injection(self):

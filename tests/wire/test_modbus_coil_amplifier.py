@@ -96,7 +96,7 @@ def test_a_step_table_runs_exactly_by_the_amplifiers_own_clock(every_wire):
     assert bench.driver.table().state is TableState.ARMED
     bench.step(50)
     assert bench.output == 0.0
-    bench.device.trigger()
+    bench.device.trigger(bench.signals.now_ns())
     begun = bench.signals.now_ns()
     assert bench.driver.table() == (TableState.RUNNING, CLOCK.ns(begun) // 1000 * 1000)
     for place in range(150):
@@ -208,7 +208,7 @@ def test_when_nobody_speaks_the_output_ramps_to_zero_by_itself(every_wire):
 def test_the_watchdog_stops_a_running_table(bench):
     bench.driver.upload(np.array([0.0, 5.0]), np.array([1.0, 2.0]))
     bench.driver.arm()
-    bench.device.trigger()
+    bench.device.trigger(bench.signals.now_ns())
     bench.signals.step(1000)
     assert bench.device.advance() == 0.0
     bench.signals.step(6000)
@@ -228,7 +228,7 @@ def test_safe_is_zero_even_out_of_a_running_table(every_wire):
     bench = every_wire
     bench.driver.upload(np.array([0.0, 1.0]), np.array([0.5, 2.0]))
     bench.driver.arm()
-    bench.device.trigger()
+    bench.device.trigger(bench.signals.now_ns())
     bench.server.inject(WireFault("drop"))
     bench.driver.make_safe()
     bench.step(300)

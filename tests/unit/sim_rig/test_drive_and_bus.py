@@ -9,14 +9,14 @@ from sim_rig.drive_motion import Demand, Motion
 MILLISECOND = 1_000_000
 
 
-def test_setpoint_is_reached_in_a_straight_line_three_periods_after_it_came():
+def test_setpoint_is_reached_in_a_straight_line_four_periods_after_it_came():
     demand = Demand()
-    demand.follow(12e-4, 4 * MILLISECOND, 1.0, 10.0)
+    demand.follow(12e-4, 0, 4 * MILLISECOND, 1.0, 10.0)
     places = []
-    for k in range(13):
+    for k in range(17):
         demand.advance(k * MILLISECOND)
         places.append(demand.position)
-    assert places == pytest.approx([k * 1e-4 for k in range(13)])
+    assert places == pytest.approx([k * 0.75e-4 for k in range(17)])
 
 
 def test_setpoints_that_come_unpunctually_are_followed_at_a_steady_pace():
@@ -28,7 +28,7 @@ def test_setpoints_that_come_unpunctually_are_followed_at_a_steady_pace():
         while coming and coming[0][0] <= now:
             at, target = coming.pop(0)
             demand.advance(at)
-            demand.follow(target, period, 1.0, 10.0)
+            demand.follow(target, at, period, 1.0, 10.0)
         demand.advance(now)
         places.append(demand.position)
     velocity = np.diff(places)[2000:] / 0.25e-3
@@ -38,10 +38,10 @@ def test_setpoints_that_come_unpunctually_are_followed_at_a_steady_pace():
 
 def test_late_setpoint_is_bridged_and_then_the_rod_brakes_by_itself():
     demand = Demand()
-    demand.follow(4e-4, 4 * MILLISECOND, 1.0, 10.0)
-    demand.advance(20 * MILLISECOND)
+    demand.follow(4e-4, 0, 4 * MILLISECOND, 1.0, 10.0)
+    demand.advance(24 * MILLISECOND)
     assert demand.position == pytest.approx(12e-4)
-    demand.advance(22 * MILLISECOND)
+    demand.advance(26 * MILLISECOND)
     assert demand.motion is Motion.BRAKE
     demand.advance(100 * MILLISECOND)
     assert demand.motion is Motion.REST
@@ -51,16 +51,32 @@ def test_late_setpoint_is_bridged_and_then_the_rod_brakes_by_itself():
 def test_of_setpoints_that_come_in_a_heap_the_last_counts():
     demand = Demand()
     for k in range(1, 6):
-        demand.follow(k * 1e-4, 4 * MILLISECOND, 1.0, 10.0)
-    demand.advance(12 * MILLISECOND)
+        demand.follow(k * 1e-4, 0, 4 * MILLISECOND, 1.0, 10.0)
+    demand.advance(16 * MILLISECOND)
     assert demand.position == pytest.approx(5e-4)
 
 
 def test_speed_is_limited():
     demand = Demand()
-    demand.follow(1.0, 4 * MILLISECOND, 0.5, 10.0)
-    demand.advance(12 * MILLISECOND)
+    demand.follow(1.0, 0, 4 * MILLISECOND, 0.5, 10.0)
+    demand.advance(16 * MILLISECOND)
     assert demand.position == pytest.approx(0.002)
+
+
+def test_the_legs_that_setpoints_give_join_and_are_what_the_demand_follows():
+    demand, period = Demand(), 4 * MILLISECOND
+    legs = []
+    for k in range(50):
+        demand.advance(k * period)
+        legs.append(demand.follow(1e-3 * np.sin(k / 5), k * period, period, 1.0, 10.0))
+    assert [leg.begin_ns for leg in legs[1:]] == [leg.end_ns for leg in legs[:-1]]
+    times = np.arange(49 * period, 52 * period, MILLISECOND)
+    followed = []
+    for now in times:
+        demand.advance(int(now))
+        followed.append(demand.position)
+    way = np.interp(times, [leg.end_ns for leg in legs], [leg.target for leg in legs])
+    assert followed == pytest.approx(way, abs=1e-9)
 
 
 def test_a_setpoint_that_is_nearly_a_period_late_leaves_the_grid_where_it_was():
@@ -69,9 +85,21 @@ def test_a_setpoint_that_is_nearly_a_period_late_leaves_the_grid_where_it_was():
     for k in range(60):
         for demand, delay in ((late, 3_700_000 if k == 20 else 0), (punctual, 0)):
             demand.advance(k * period + delay)
-            demand.follow(k * k * 1e-6, period, 1.0, 10.0)
+            demand.follow(k * k * 1e-6, k * period + delay, period, 1.0, 10.0)
         apart.append(abs(late.position - punctual.position) if k != 20 else 0.0)
     assert max(apart[25:]) < 2e-6
+
+
+def test_the_grid_follows_the_earliest_setpoints_however_the_lateness_of_most_changes():
+    demand, random, period = Demand(), np.random.default_rng(3), 4 * MILLISECOND
+    apart = []
+    for k in range(3000):
+        most = 2_900_000 if k // 500 % 2 else 400_000
+        at = k * period + (int(random.integers(most)) if k % 20 else 0)
+        demand.follow(k * 4e-4, at, period, 1.0, 10.0)
+        demand.advance((k + 1) * period)
+        apart.append(demand.position - (k - 2) * 4e-4)
+    assert np.ptp(apart[200:]) < 0.1 * 80e-6
 
 
 @pytest.mark.parametrize("target", [0.01, -0.01])

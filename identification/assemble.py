@@ -1,7 +1,7 @@
 """From recordings to the pieces that a fit or a prediction works on: smooth motion, known delays, masks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 
 import numpy as np
@@ -112,15 +112,16 @@ def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> 
     stretches = [s for r in recordings for s in r.stretches]
     held = [hold_out.mask(s) for s in stretches]
     starts = [s.time[0] - r.stretches[0].time[0] for r in recordings for s in r.stretches]
+    logs = [k for k, r in enumerate(recordings) for _ in r.stretches]
     pieces, floors = [], []
-    for stretch, out, start in zip(stretches, held, starts, strict=True):
+    for stretch, out, start, log in zip(stretches, held, starts, logs, strict=True):
         motion = estimate_motion(stretch)
-        floors.append(measure_floor(stretch, motion))
-        fitted = stretch.measured & ~out
+        floors.append(measure_floor(replace(stretch, measured=stretch.counts), motion))
+        fitted = stretch.counts & ~out
         fitted[: round(_SKIPPED * stretch.rate)] = False
         power = np.abs(stretch.force * motion.velocity)
         stroke = Stroke(stretch.rate, *motion[:3], steady_levels(stretch.drive), start=float(start), power=power)
-        pieces.append(_piece(stretch, stroke, fitted))
+        pieces.append(replace(_piece(stretch, stroke, fitted), log=log))
     _check(hold_out, held, pieces)
     floor = combine_floors(stretches, floors)
     return Assembled(tuple(pieces), tuple(held), tuple(stretches), floor, tuple(recordings))

@@ -17,7 +17,15 @@ Out = Annotated[Path, typer.Option("--out", help="Where the document goes; `-` p
 def identify(
     logs: Logs,
     out: Out,
-    stages: Annotated[str, typer.Option(help="Stages of the fit, by comma; so far there is `refine`.")] = "refine",
+    stages: Annotated[
+        str,
+        typer.Option(
+            help="Stages of the fit, by comma: `pinn` trains a network, `refine` fits the simulated force."
+        ),
+    ] = "pinn,refine",
+    preset: Annotated[
+        str, typer.Option(help="How the network is trained: `local`, `global`, `paper`, or a settings file.")
+    ] = "local",
     hold_out: Annotated[
         str,
         typer.Option(metavar="PATTERN,...", help="Stretches or segments kept out of the fit, such as `5mm_4Hz*`."),
@@ -34,9 +42,16 @@ def identify(
         ),
     ] = None,
     budget: Annotated[
-        float | None, typer.Option(metavar="SECONDS", min=0.1, help="Stop trying further starts after this long.")
+        float | None, typer.Option(metavar="SECONDS", min=0.1, help="Processor time, shared by the stages.")
     ] = None,
-    seed: Annotated[int, typer.Option(help="Of the scattered starts.")] = 1,
+    seed: Annotated[int, typer.Option(help="Of everything that chance decides.")] = 1,
+    free: Annotated[
+        str,
+        typer.Option(metavar="NAME,...", help="What each further log has of its own: `offset`, `viscosity`."),
+    ] = "",
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Also intervals by profile likelihood; takes several times as long.")
+    ] = False,
 ) -> None:
     """Find the damper's parameters in recordings, each with an interval and what it means."""
     from identification.assemble import HoldOut
@@ -47,26 +62,35 @@ def identify(
     from identification.recordings import load
     from identification.refine import Settings
 
-    if unknown := set(stages.split(",")) - {"refine"}:
-        raise IdentificationError(f"no stage {', '.join(sorted(unknown))}; there is refine")
+    asked = _words(stages)
+    if unknown := set(asked) - {"pinn", "refine"}:
+        raise IdentificationError(f"no stage {', '.join(sorted(unknown))}; there are pinn and refine")
+    if not asked:
+        raise IdentificationError("no stage was asked for; there are pinn and refine")
+    own = _own(free)
     _check_place(out)
     held = HoldOut(_words(hold_out), hold_out_after)
     with progress_on_terminal("identify") as progress:
         found = fit(
             [load(log) for log in logs],
-            Request(held, delay_prior, Settings(seed=seed, budget=budget)),
+            Request(held, delay_prior, Settings(seed=seed, budget=budget), asked, preset, own, profile),
             progress,
         )
     _write(out, found)
-    _say(out, found.rmse_n.train, found.nrmse.train, found.noise_floor_n, found.result)
+    said = "; ".join(words for words in (found.result, found.agreement, *found.notes) if words)
+    _say(out, found.rmse_n.train, found.nrmse.train, found.noise_floor_n, said)
 
 
 def predict(
     model: Annotated[Path, typer.Argument(metavar="MODEL.json", help="A fit, a twin or a scenario.")],
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="A log that the model never saw.")],
+    log: Annotated[
+        str,
+        typer.Argument(metavar="LOG", help="A log that the model never saw, or a method that is only planned."),
+    ],
     out: Out,
     series: Annotated[
-        Path | None, typer.Option(help="Also write recorded and simulated force, as .npz or .csv.")
+        Path | None,
+        typer.Option(help="Also write recorded and simulated force and its 95 % band, as .npz or .csv."),
     ] = None,
     free: Annotated[str, typer.Option(metavar="offset", help="What else to estimate on this log: `offset`.")] = "",
 ) -> None:
@@ -80,13 +104,63 @@ def predict(
     if free not in ("", "offset"):
         raise IdentificationError(f"--free {free}: only a force offset can be freed; say `--free offset`")
     _check_place(out)
-    prediction, found = predict_log(read_fit_or_model(model), load(log), free_offset=free == "offset")
+    if not _is_log(log):
+        return _forecast(model, log, out, series, free)
+    prediction, found = predict_log(read_fit_or_model(model), load(Path(log)), free_offset=free == "offset")
     if series is not None:
         write_series(series, found)
     _write(out, prediction)
-    _say(
-        out, prediction.rmse_n, prediction.nrmse, prediction.noise_floor_n, f"freed: {', '.join(prediction.freed)}"
+    said = f"freed: {', '.join(prediction.freed)}"
+    if prediction.band is not None and prediction.band.inside is not None:
+        said += (
+            f"; {100 * prediction.band.inside:.1f} % inside the 95 % band of {prediction.band.half_width_n:.3g} N"
+        )
+    _say(out, prediction.rmse_n, prediction.nrmse, prediction.noise_floor_n, said)
+    return None
+
+
+def _is_log(name: str) -> bool:
+    """Whether a name stands for a recording; any other file, and no file, is a method to plan."""
+    return name.endswith(".mcap") or (Path(name).is_file() and Path(name).suffix not in (".json", ".npz"))
+
+
+def _forecast(model: Path, method: str, out: Path, series: Path | None, free: str) -> None:
+    """Predict strokes that are only planned."""
+    from identification.errors import IdentificationError
+    from identification.forecast import forecast, planned_strokes
+    from identification.results import read_fit
+    from identification.series import write_series
+
+    if free:
+        raise IdentificationError(f"--free {free}: nothing is recorded of {method} yet that could tell it")
+    document, found = forecast(read_fit(model), planned_strokes(method))
+    if series is not None:
+        write_series(series, found)
+    _write(out, document)
+    where = "printed" if str(out) == "-" else out
+    more = f"; {document.band.note}" if document.band.note else ""
+    typer.echo(
+        f"{where}: force up to {document.largest_force_n:.4g} N, 95 % of the samples within "
+        f"{document.band.half_width_n:.3g} N of it{more}",
+        err=True,
     )
+
+
+def _own(free: str) -> tuple[str, ...]:
+    """What each further log shall have of its own; the gauge, and what all logs share, are refused."""
+    from identification.condition import OWN
+    from identification.errors import IdentificationError
+    from identification.uncertainty import GAUGE_WORDS
+
+    names = _words(free)
+    if "A" in names:
+        raise IdentificationError(f"--free A: A is {GAUGE_WORDS}; it stays as it is")
+    if unknown := set(names) - set(OWN):
+        raise IdentificationError(
+            f"--free {', '.join(sorted(unknown))}: every parameter is free already, and all logs share it; each "
+            f"further log can have an {' or a '.join(OWN)} of its own"
+        )
+    return names
 
 
 def _words(text: str) -> tuple[str, ...]:

@@ -1,41 +1,43 @@
-"""The fit of one or several logs: assemble, refine, say how sure."""
+"""The fit of one or several logs: assemble, train, refine, compare the two, say how sure."""
 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from identification.agreement import compare
 from identification.arrays import Array
 from identification.assemble import Assembled, HoldOut, assemble
 from identification.damper.coordinates import Coordinates
+from identification.errors import IdentificationError, NothingToFit
+from identification.fit_document import MISFIT, Ending, fit_document, of_samples, simulated_errors, unseen
 from identification.motion_noise import motion_scatter, with_motion
-from identification.prediction import normalised, per_drive, predict_piece, rmse
+from identification.prediction import rmse
 from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.profile import profile_intervals
 from identification.recordings import Recording, Stretch
 from identification.refine import Minimum, Settings, refine
-from identification.results import Delay, Errors, Fit, NoiseFloor, Nuisances, Provenance, Stage
+from identification.results import Fit, Provenance, Stage
 from identification.search_space import SearchSpace
 from identification.start import sliding_damping
 from identification.uncertainty import (
     Covariance,
     coordinate_covariance,
-    coordinate_estimates,
     covariance,
-    delay_estimate,
-    parameter_estimates,
-    strong_correlations,
 )
+from identification.usable import strangers, usable
+from identification.witness import Testimony, as_minimum, deviations, stage_entry, train_stage
+
+if TYPE_CHECKING:
+    from identification.pinn.result import PinnResult
 
 _GROWTH = 3.0
 """[1] largest exponent by which the inner displacement may run away within a stretch."""
-_MORE_THAN_PRIOR = 1.01
-"""[1] information on a delay, in units of its prior's, above which the recording adds to the prior."""
 _OVERSHOOT = 0.005
 """[1] part of the samples at each end of the drive's range that may be overshoots."""
-_MISFIT = 1.2
-"""[1] force error over the floor above which the priors are weighed against the misfit, not the noise."""
 
 Progress = Callable[[str, float], None]
 
@@ -48,6 +50,14 @@ class Request:
     delay_prior: float | None = None
     """[s] standard deviation of the channel delays beyond what the log reports; None takes the log's clocks."""
     settings: Settings = field(default_factory=Settings)
+    stages: tuple[str, ...] = ("refine",)
+    """Of ``pinn`` and ``refine``; with both, the fit is refine's and pinn its independent witness."""
+    preset: str = "local"
+    """Preset of the network, or path of its settings."""
+    own: tuple[str, ...] = ()
+    """What each log behind the first has of its own: ``offset``, ``viscosity``."""
+    profile: bool = False
+    """Whether intervals by profile likelihood are wanted, too."""
 
 
 def identify(
@@ -63,14 +73,77 @@ def identify(
     Raises:
         NothingToFit: too little is left to fit.
     """
+    cleaned, notes = usable(recordings)
+    try:
+        return _identified(cleaned, notes, request, progress)
+    except (np.linalg.LinAlgError, ZeroDivisionError, FloatingPointError) as error:
+        raise NothingToFit(
+            f"these recordings determine no damper: the equations of the fit break down ({error}); record longer "
+            "strokes, or look at the channels for what no damper does"
+        ) from error
+
+
+def _identified(
+    recordings: Sequence[Recording], notes: Sequence[str], request: Request, progress: Progress
+) -> Fit:
+    """The fit of recordings that can be used."""
     assembled = assemble(recordings, request.hold_out)
-    began = time.process_time()
-    problem = fit_problem(assembled, request.delay_prior)
+    problem = replace(fit_problem(assembled, request.delay_prior), own=request.own)
     stretches = [s for s, p in zip(assembled.stretches, assembled.pieces, strict=True) if p.train.any()]
-    minimum = refine(problem.quicker(), request.settings, progress)
-    polish = replace(request.settings, restarts=0)
+    # The network knows one damper in one condition; it is no witness where each log has its own.
+    train = "pinn" in request.stages and not request.own
+    testimony = _trained(problem, stretches, request, progress) if train else None
+    if "refine" in request.stages:
+        found = _refined(assembled, problem, stretches, request, progress)
+        assembled = under_conditions(assembled, found.problem, found.minimum)
+        end = _compared(assembled, found, testimony) if testimony else found
+    else:
+        end = _network_alone(assembled, problem, testimony)
+    fit = fit_document(assembled, end, _provenance(assembled, request, problem))
+    if request.profile:
+        fit = _profiled(fit, end, progress)
+    return fit.model_copy(update={"notes": [*notes, *_strangers(assembled, fit)]})
+
+
+def _profiled(fit: Fit, end: Ending, progress: Progress) -> Fit:
+    """The fit with intervals by profile likelihood beside its own."""
+    intervals = profile_intervals(end.problem, end.minimum, end.covariance, progress)
+    coordinates = {
+        name: e.model_copy(update={"profile95": intervals.get(name)}) for name, e in fit.coordinates.items()
+    }
+    return fit.model_copy(update={"coordinates": coordinates})
+
+
+def _strangers(assembled: Assembled, fit: Fit) -> list[str]:
+    """Logs that the common damper does not fit, in words."""
+    names = [r.path.name for r in assembled.recordings for _ in r.stretches]
+    delays = (fit.nuisances.force_delay.value, fit.nuisances.drive_delay.value)
+    if len(set(names)) < 2:
+        return []
+    errors = simulated_errors(assembled, fit.point(), delays)
+    return strangers(names, errors, fit.rmse_n.train / fit.noise_floor_n)
+
+
+def _trained(problem: Problem, stretches: Sequence[Stretch], request: Request, progress: Progress) -> Testimony:
+    """The network's own answer; beside a refinement it may spend half of the budget."""
+    budget = request.settings.budget
+    if budget is not None and "refine" in request.stages:
+        budget *= 0.5
+    return train_stage(problem, stretches, request.preset, request.settings.seed, budget, progress)
+
+
+def _refined(
+    assembled: Assembled, problem: Problem, stretches: Sequence[Stretch], request: Request, progress: Progress
+) -> Ending:
+    """The output-error fit, from a start of its own."""
+    began = time.process_time()
+    budget = request.settings.budget
+    share = 0.5 if "pinn" in request.stages else 1.0
+    settings = replace(request.settings, budget=None if budget is None else share * budget)
+    minimum = refine(problem.quicker(), settings, progress)
+    polish = replace(settings, restarts=0)
     scatter = None
-    if _ratio(problem, minimum) > _MISFIT:
+    if _ratio(problem, minimum) > MISFIT:
         problem = replace(problem, noise=problem.noise * _ratio(problem, minimum))
         minimum = refine(problem, polish, progress, minimum.unknowns)
     else:
@@ -78,7 +151,65 @@ def identify(
         minimum = refine(problem, polish, progress, minimum.unknowns)
         scatter = motion_scatter(problem, stretches, minimum, request.settings.seed)
     found = covariance(problem, minimum, scatter)
-    return _document(assembled, request, problem, minimum, found, time.process_time() - began)
+    seconds = time.process_time() - began
+    error = _train_error(under_conditions(assembled, problem, minimum), problem, minimum)
+    stage = Stage(name="refine", seconds=round(seconds, 3), rmse_n=error, iterations=minimum.iterations)
+    return Ending(problem, minimum, found, (stage,))
+
+
+def _network_alone(assembled: Assembled, problem: Problem, testimony: Testimony | None) -> Ending:
+    """The fit that rests on the network.
+
+    Raises:
+        IdentificationError: it found nothing.
+    """
+    if testimony is None or testimony.found is None:
+        why = testimony.why_not if testimony else "no stage was asked for"
+        raise IdentificationError(f"pinn found nothing: {why}; raise --budget or say --stages refine")
+    minimum, found = as_minimum(problem, testimony.found)
+    why_not = "" if testimony.found.accepted else testimony.found.note
+    return Ending(problem, minimum, found, (_stage(assembled, found, testimony.found),), why_not=why_not)
+
+
+def _compared(assembled: Assembled, found: Ending, testimony: Testimony) -> Ending:
+    """The refinement's fit with the network's entry, and whether the two agree."""
+    network = testimony.found
+    if network is None:
+        return replace(found, said=f"not compared: pinn found nothing, {testimony.why_not}")
+    point = found.problem.space.to_coordinates(found.minimum.unknowns[:COORDINATE_COUNT])
+    spread = coordinate_covariance(found.problem, found.minimum, found.covariance)
+    hidden, at_bound = unseen(found.covariance)
+    agreement = compare(
+        network.coordinates, network.deviations, point, deviations(spread),
+        set(Coordinates._fields) - hidden - at_bound,
+    )  # fmt: skip
+    said = agreement.words() if network.accepted else f"{agreement.words()} (pinn: {network.note})"
+    stages = (_stage(assembled, found.covariance, network), *found.stages)
+    return replace(found, stages=stages, agreement=agreement, said=said)
+
+
+def _stage(assembled: Assembled, found: Covariance, network: "PinnResult") -> Stage:
+    errors = simulated_errors(assembled, network.coordinates, network.delays)
+    held, _ = of_samples(assembled, errors, held=True)
+    hidden, _ = unseen(found)
+    return stage_entry(network, hidden, rmse(held) if len(held) else None, assembled.drive_unit)
+
+
+def _train_error(assembled: Assembled, problem: Problem, minimum: Minimum) -> float:
+    """Simulated force error [N] on the fitted samples at the end of a descent."""
+    point = problem.space.to_coordinates(minimum.unknowns[:COORDINATE_COUNT])
+    force, drive = minimum.unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] * problem.delay_prior
+    errors = simulated_errors(assembled, point, (float(force), float(drive)))
+    return rmse(of_samples(assembled, errors, held=False)[0])
+
+
+def under_conditions(assembled: Assembled, problem: Problem, minimum: Minimum) -> Assembled:
+    """The pieces under what each log was found to have of its own."""
+    if not problem.own:
+        return assembled
+    found = {p.log: problem.piece(minimum.unknowns, i).condition for i, p in enumerate(problem.pieces)}
+    pieces = tuple(replace(p, condition=found.get(p.log, p.condition)) for p in assembled.pieces)
+    return replace(assembled, pieces=pieces)
 
 
 def _smoother_motion(problem: Problem, stretches: Sequence[Stretch], minimum: Minimum) -> Problem:
@@ -129,106 +260,18 @@ def _ratio(problem: Problem, minimum: Minimum) -> float:
     return float(np.sqrt(minimum.evaluation.cost / problem.samples))
 
 
-def _document(
-    assembled: Assembled, request: Request, problem: Problem, minimum: Minimum, found: Covariance, seconds: float
-) -> Fit:
-    spread = coordinate_covariance(problem, minimum, found)
-    point = problem.space.to_coordinates(minimum.unknowns[:COORDINATE_COUNT])
-    unit = assembled.drive_unit
-    hidden, at_bound = _unseen(found)
-    coordinates = coordinate_estimates(point, spread, hidden, at_bound, unit)
-    nuisances = _nuisances(problem, minimum, found)
-    errors = _errors(assembled, point, (nuisances.force_delay.value, nuisances.drive_delay.value))
-    train = _split(assembled, errors, held=False)
-    held = _split(assembled, errors, held=True)
-    floor = assembled.floor
-    return Fit(
-        specimen=assembled.recordings[0].metadata["run"].get("specimen", ""),
-        drive_kind=assembled.recordings[0].drive_kind,
-        drive_unit=unit,
-        drive_range=(problem.space.lowest_drive, problem.space.highest_drive),
-        parameters=parameter_estimates(point, spread, coordinates, unit),
-        coordinates=coordinates,
-        nuisances=nuisances,
-        noise_floor_n=floor.noise,
-        floor=NoiseFloor(cycle_to_cycle=floor.cycle_to_cycle, high_frequency=floor.high_frequency, how=floor.how),
-        rmse_n=Errors(train=rmse(train[0]), validation=None, held_out=rmse(held[0]) if len(held[0]) else None),
-        nrmse=Errors(
-            train=normalised(*train), validation=None, held_out=normalised(*held) if len(held[0]) else None
-        ),
-        per_drive=per_drive(
-            [p.stroke.drive for p in assembled.pieces], errors, [p.force for p in assembled.pieces], unit
-        ),
-        stages=[
-            Stage(name="refine", seconds=round(seconds, 3), rmse_n=rmse(train[0]), iterations=minimum.iterations)
-        ],
-        agreement=None,
-        result=_result(minimum, rmse(train[0]) / floor.noise, nuisances.force_delay),
-        correlations=strong_correlations(spread),
-        provenance=Provenance(
-            logs={r.path.name: r.sha256 for r in assembled.recordings},
-            version=version("mrbench"),
-            seed=request.settings.seed,
-            settings={
-                "stages": "refine",
-                "hold_out": ",".join(request.hold_out.patterns) or None,
-                "hold_out_after": request.hold_out.after,
-                "delay_prior_s": problem.delay_prior,
-                "restarts": request.settings.restarts,
-            },
-        ),
+def _provenance(assembled: Assembled, request: Request, problem: Problem) -> Provenance:
+    return Provenance(
+        logs={r.path.name: r.sha256 for r in assembled.recordings},
+        version=version("mrbench"),
+        seed=request.settings.seed,
+        settings={
+            "stages": ",".join(request.stages),
+            "preset": request.preset if "pinn" in request.stages else None,
+            "hold_out": ",".join(request.hold_out.patterns) or None,
+            "hold_out_after": request.hold_out.after,
+            "delay_prior_s": problem.delay_prior,
+            "free": ",".join(request.own) or None,
+            "restarts": request.settings.restarts,
+        },
     )
-
-
-def _nuisances(problem: Problem, minimum: Minimum, found: Covariance) -> Nuisances:
-    delays = slice(COORDINATE_COUNT, COORDINATE_COUNT + 2)
-    prior = problem.delay_prior
-    values = minimum.unknowns[delays] * prior
-    sd = np.sqrt(np.diag(found.unknowns)[delays]) * prior
-    seen = np.diag(minimum.evaluation.hessian)[delays] > _MORE_THAN_PRIOR
-    force, drive = (
-        delay_estimate(float(v), float(s), prior, seen=bool(by_data))
-        for v, s, by_data in zip(values, sd, seen, strict=True)
-    )
-    starts = {p.name: problem.setting(minimum.unknowns, i).y0 for i, p in enumerate(problem.pieces)}
-    return Nuisances(y0=starts, force_delay=force, drive_delay=drive)
-
-
-def _unseen(found: Covariance) -> tuple[set[str], set[str]]:
-    """Coordinates that these strokes cannot show, and those that stand at a bound."""
-    names = np.array(Coordinates._fields)
-    seen, inside = found.seen[:COORDINATE_COUNT], found.inside[:COORDINATE_COUNT]
-    return set(names[~seen]), set(names[seen & ~inside])
-
-
-def _errors(assembled: Assembled, point: Coordinates, delays: tuple[float, float]) -> list[Array]:
-    """Simulated minus recorded force [N] of every stretch, y(0) from its fitted samples, or all if none is."""
-    return [predict_piece(p, point, delays).force - p.force for p in assembled.pieces]
-
-
-def _split(assembled: Assembled, errors: Sequence[Array], *, held: bool) -> tuple[Array, Array]:
-    """Errors and recorded forces [N] of all samples fitted, or of all held out."""
-    chosen = [
-        out & s.measured if held else p.train > 0
-        for p, out, s in zip(assembled.pieces, assembled.held_out, assembled.stretches, strict=True)
-    ]
-    return (
-        np.concatenate([e[c] for e, c in zip(errors, chosen, strict=True)]),
-        np.concatenate([p.force[c] for p, c in zip(assembled.pieces, chosen, strict=True)]),
-    )
-
-
-def _result(minimum: Minimum, ratio: float, delay: Delay) -> str:
-    """How the fit ended, in a line."""
-    if not minimum.converged:
-        return f"not converged: stopped after {minimum.iterations} steps; raise the budget or hold less out"
-    words = ["converged"]
-    if ratio > _MISFIT:
-        words.append(f"the law leaves {ratio:.3g} times the noise floor: something real is missing from it")
-    if delay.outside_prior:
-        side = "behind" if delay.value > 0 else "ahead of"
-        words.append(
-            f"the force stands {1e3 * abs(delay.value):.2g} ms {side} the displacement, more than their clocks "
-            f"explain ({1e3 * delay.prior_sd:.2g} ms): a filter, or phase that the law lacks"
-        )
-    return "; ".join(words)

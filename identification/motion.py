@@ -5,10 +5,11 @@ difference of 2 µm noise at 1 kHz is 2.8 mm/s, at 2000 N s/m some 6 N. What is 
 
 1. The actuator gives way under the load. What the displacement follows of the recorded force is regressed on
    the force at lags of -6 to 45 ms, if it is there at all.
-2. A periodic segment repeats: its harmonics are fitted (harmonics.py).
+2. A periodic stroke repeats: its harmonics are fitted (harmonics.py), over all segments that it goes on through.
 3. The rest is smoothed (smoother.py): the third differences of the motion are expected to be those of 1 and 2.
-   How stiffly is chosen place by place (each periodic segment, the joints, everything else) where the estimated
-   error of the *velocity* is least (Mallows' Cp of the first differences).
+   How stiffly is chosen place by place (each periodic segment, each stretch between them, the joints) where the
+   estimated error of the *velocity* is least (Mallows' Cp of the first differences). A fade, a move and a hold
+   are not alike: one stiffness for all of them bends the fades by micrometres, and k0 and k1 with them.
 """
 
 from typing import NamedTuple
@@ -18,13 +19,17 @@ import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
 from identification.harmonics import Harmonics, fit_harmonics
-from identification.recordings import Stretch
+from identification.recordings import Segment, Stretch
 from identification.smoother import derivative, kept_noise, smoothed, stiffness
 
 Indices = npt.NDArray[np.intp]
 
 _PERIODIC = ("sine", "triangle")
-_JOINT = 0.06
+_LONGEST_RUN = 30.0
+"""[s] Segments of one stroke are fitted together up to this length; longer ones average enough by themselves."""
+_WHOLE_RUN = 0.9
+"""[1] share of a run that must be steady, else its segments are fitted one by one."""
+_JOINT = 0.03
 """[s] Around the ends of what is known of the motion, transients are left room."""
 _CUTOFF_RATIO = 1.35
 _LOWEST, _HIGHEST = 0.003, 0.25
@@ -35,6 +40,10 @@ _END = 2.0
 """How much looser the smoother is at an end of the stretch."""
 _LAGS = np.arange(-0.006, 0.0451, 0.003)
 """[s] At which the displacement may follow the force."""
+_MOST_GIVE = 0.03
+"""[1] of the stroke: an actuator that gave way more would not be one."""
+_KNOCK = 4.0
+"""[1] What stands out so many times over most is a knock of the actuator and follows no force."""
 _CHANCE = 4.0
 """The force explains the displacement if it does so this many times better than chance."""
 
@@ -64,7 +73,7 @@ def estimate_motion(stretch: Stretch) -> Motion:
         The motion on the stretch's own time base.
     """
     weights = stretch.measured.astype(float)
-    noise = displacement_noise(stretch.displacement, stretch.measured)
+    noise = recorded_noise(stretch)
     give = _give_under_load(stretch, weights, noise)
     waves = _periodic_parts(stretch, weights, give, noise)
     regions = _regions(len(weights), waves, stretch.rate, bool(np.any(give)))
@@ -79,17 +88,29 @@ def estimate_motion(stretch: Stretch) -> Motion:
         velocity,
         derivative(velocity, stretch.rate),
         float(np.std(rest)),
-        _in_words(stretch, waves, cutoffs, bool(np.any(give)), from_record),
+        _in_words(stretch, waves, cutoffs, regions, bool(np.any(give)), from_record),
     )
 
 
-def displacement_noise(displacement: Array, measured: BoolArray) -> float:
+def recorded_noise(stretch: Stretch) -> float:
+    """Standard deviation [m] of white noise or quantisation in the displacement of a stretch.
+
+    Half-way between two samples a cubic passes nothing of the fastest noise: the differences of neighbours would
+    show a tenth of it, those of every other sample show nearly all.
+    """
+    return displacement_noise(stretch.displacement, stretch.measured, 2 if stretch.interpolated else 1)
+
+
+def displacement_noise(displacement: Array, measured: BoolArray, stride: int = 1) -> float:
     """Standard deviation [m] of white noise or quantisation in a displacement (N,), by its fourth differences.
 
-    The largest hundredth of them (knocks) is left out, and put back as a Gaussian would have it.
+    The largest hundredth of them (knocks) is left out, and put back as a Gaussian would have it. They are taken
+    over samples that lie ``stride`` apart.
     """
-    whole = np.convolve(measured, np.ones(5), "valid") > 4.5
-    squares = np.diff(displacement, 4)[whole] ** 2 / 70.0
+    apart = [slice(k * stride, len(displacement) - (4 - k) * stride) for k in range(5)]
+    whole = np.all([measured[part] for part in apart], axis=0)
+    fourth = np.sum([c * displacement[part] for c, part in zip((1, -4, 6, -4, 1), apart, strict=True)], axis=0)
+    squares = fourth[whole] ** 2 / 70.0
     usual = squares[squares <= np.quantile(squares, 0.99)]
     return float(np.sqrt(np.mean(usual) / 0.92476))
 
@@ -109,16 +130,20 @@ def _give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
     swift = (x - smoothed(x, weights, penalty, nothing[3:])) * weights
     driver = force - smoothed(force, np.ones(len(x)), penalty, nothing[3:])
     rows = np.arange(reach, len(x) - reach, max(1, len(x) // 100_000))
+    rows = rows[np.abs(swift[rows]) < _KNOCK * np.quantile(np.abs(swift[rows]), 0.95)]
     lagged = np.stack([driver[rows - shift] for shift in shifts])
     normal, right = lagged @ lagged.T, lagged @ swift[rows]
     gains = np.linalg.lstsq(normal, right, rcond=1e-10)[0]
     explained, left = float(gains @ right), float(np.sum(swift[rows] ** 2))
     if explained < _CHANCE * len(shifts) * left / len(rows):
         return nothing
-    padded = np.pad(force, reach, "edge")
     kernel = np.zeros(2 * reach + 1)
     kernel[reach + shifts] = gains
-    return np.convolve(padded, kernel, "valid")
+    give = np.convolve(np.pad(force, reach, "edge"), kernel, "valid")
+    if np.std(give) < _MOST_GIVE * np.std(x):
+        return give
+    # Of the slow part of the force too little was learnt; the smoother follows what it does.
+    return np.convolve(np.pad(driver, reach, "edge"), kernel, "valid")
 
 
 def _blurred(values: Array, width: int) -> Array:
@@ -129,27 +154,71 @@ def _blurred(values: Array, width: int) -> Array:
 
 def _periodic_parts(stretch: Stretch, weights: Array, give: Array, noise: float) -> list[Harmonics]:
     """The harmonics of every segment that repeats, with their places in the stretch."""
+    left = stretch.displacement - give
     parts = []
-    for segment in stretch.segments:
-        if segment.motion not in _PERIODIC or not segment.frequency:
-            continue
-        part = slice(segment.start, segment.stop)
-        left = stretch.displacement[part] - give[part]
-        wave = fit_harmonics(left, weights[part], stretch.rate, segment.frequency, noise)
-        if wave is not None:
-            parts.append(wave._replace(start=wave.start + segment.start, stop=wave.stop + segment.start))
+    for run in _runs(stretch):
+        whole = _wave(left, weights, stretch.rate, run, noise)
+        if len(run) > 1 and whole is not None and _length(whole) > _WHOLE_RUN * (run[-1].stop - run[0].start):
+            parts += [_cut(whole, segment) for segment in run if _overlap(whole, segment) > 0]
+        else:
+            waves = [whole] if len(run) == 1 else [_wave(left, weights, stretch.rate, (s,), noise) for s in run]
+            parts += [wave for wave in waves if wave is not None]
     return parts
 
 
+def _runs(stretch: Stretch) -> list[tuple[Segment, ...]]:
+    """Periodic segments through which one stroke goes on without a stop, while the drive changes."""
+    runs: list[tuple[Segment, ...]] = []
+    for segment in stretch.segments:
+        if segment.motion not in _PERIODIC or not segment.frequency:
+            continue
+        if runs and _goes_on(runs[-1], segment, stretch.rate):
+            runs[-1] = (*runs[-1], segment)
+        else:
+            runs.append((segment,))
+    return runs
+
+
+def _goes_on(run: tuple[Segment, ...], segment: Segment, rate: float) -> bool:
+    last = run[-1]
+    same = (last.motion, last.amplitude, last.frequency) == (segment.motion, segment.amplitude, segment.frequency)
+    return same and segment.start - last.stop <= 1 and segment.stop - run[0].start <= _LONGEST_RUN * rate
+
+
+def _wave(values: Array, weights: Array, rate: float, run: tuple[Segment, ...], noise: float) -> Harmonics | None:
+    """The harmonics of a run, with their place in the stretch; None where too little of it is steady."""
+    start, part = run[0].start, slice(run[0].start, run[-1].stop)
+    wave = fit_harmonics(values[part], weights[part], rate, run[0].frequency or 0.0, noise)
+    return wave and wave._replace(start=wave.start + start, stop=wave.stop + start)
+
+
+def _length(wave: Harmonics) -> int:
+    return wave.stop - wave.start
+
+
+def _overlap(wave: Harmonics, segment: Segment) -> int:
+    return min(wave.stop, segment.stop) - max(wave.start, segment.start)
+
+
+def _cut(wave: Harmonics, segment: Segment) -> Harmonics:
+    """The part of a run's harmonics that lies in one of its segments."""
+    start, stop = max(wave.start, segment.start), min(wave.stop, segment.stop)
+    return wave._replace(start=start, stop=stop, values=wave.values[start - wave.start : stop - wave.start])
+
+
 def _regions(count: int, waves: list[Harmonics], rate: float, gives: bool) -> Indices:
-    """(N,) what each sample belongs to: 0 nothing known, 1 joint, 2 and on a periodic part."""
-    regions = np.zeros(count, int)
+    """(N,) what each sample belongs to: 0 a joint, 1 and on a periodic part, then what lies between them."""
+    regions = np.full(count, -1)
     reach = int(_JOINT * rate) + 1
     for k, wave in enumerate(waves):
-        regions[wave.start : wave.stop] = 2 + k
+        regions[wave.start : wave.stop] = 1 + k
     edges = {edge for wave in waves for edge in (wave.start, wave.stop)} - {0, count}
     for edge in edges | ({0, count} if gives else set()):
-        regions[max(edge - reach, 0) : edge + reach] = 1
+        regions[max(edge - reach, 0) : edge + reach] = 0
+    unknown = np.flatnonzero(regions < 0)
+    between = np.split(unknown, np.flatnonzero(np.diff(unknown) > 1) + 1)
+    for k, part in enumerate(between):
+        regions[part] = 1 + len(waves) + k
     return regions
 
 
@@ -165,15 +234,17 @@ def _expected(give: Array, waves: list[Harmonics], unknown: int) -> Array:
 def _cutoffs(values: Array, weights: Array, expected: Array, regions: Indices, rate: float, noise: float) -> Array:
     """The cutoff [Hz] for each region that makes the estimated error of the velocity least."""
     highest = max(min(_HIGHEST * rate, _STROKE_BAND), 2.0 * _LOWEST * rate)
-    count = int(np.log(highest / (_LOWEST * rate)) / np.log(_CUTOFF_RATIO)) + 1
-    trials = np.geomspace(highest, _LOWEST * rate, count + 1)[::-1]
+    steps = int(np.log(highest / (_LOWEST * rate)) / np.log(_CUTOFF_RATIO)) + 1
+    trials = np.geomspace(highest, _LOWEST * rate, steps + 1)[::-1]
     both = weights[1:] * weights[:-1]
-    sizes = np.bincount(regions[1:], both)
-    costs = np.empty((len(trials), len(sizes)))
+    count = int(regions.max()) + 1
+    sizes = np.bincount(regions[1:], both, count)
+    costs = np.empty((len(trials), count))
     for cost, cutoff in zip(costs, trials, strict=True):
         penalty = np.full(len(expected), float(stiffness(cutoff, rate)))
         left = np.diff(values - smoothed(values, weights, penalty, expected)) ** 2
-        cost[:] = np.bincount(regions[1:], both * left) + 2.0 * noise**2 * sizes * kept_noise(cutoff, rate)
+        cost[:] = np.bincount(regions[1:], both * left, count)
+        cost += 2.0 * noise**2 * sizes * kept_noise(cutoff, rate)
     return np.asarray(trials[np.argmin(costs, axis=0)])
 
 
@@ -217,12 +288,11 @@ def _unexplained(stretch: Stretch, displacement: Array, velocity: Array) -> floa
 
 
 def _in_words(
-    stretch: Stretch, waves: list[Harmonics], cutoffs: Array, gives: bool, from_record: bool
+    stretch: Stretch, waves: list[Harmonics], cutoffs: Array, regions: Indices, gives: bool, from_record: bool
 ) -> tuple[str, ...]:
     """How the motion of each segment was got."""
     load = ", what follows the force" if gives else ""
     load += "; velocity as recorded" if from_record else ""
-    rest = f"smoothed below {cutoffs[0]:.3g} Hz{load}"
     words = []
     for segment in stretch.segments:
         mine = [k for k, wave in enumerate(waves) if segment.start <= wave.start < segment.stop]
@@ -230,8 +300,9 @@ def _in_words(
             orders = ", ".join(str(order) for order in waves[k].orders)
             words.append(
                 f"{waves[k].frequency:.5g} Hz with harmonics {orders}{load}, "
-                f"the rest below {cutoffs[2 + k]:.3g} Hz"
+                f"the rest below {cutoffs[1 + k]:.3g} Hz"
             )
         if not mine:
-            words.append(rest)
-    return tuple(words) or (rest,)
+            middle = regions[(segment.start + segment.stop) // 2]
+            words.append(f"smoothed below {cutoffs[middle]:.3g} Hz{load}")
+    return tuple(words) or (f"smoothed below {cutoffs[regions[len(regions) // 2]]:.3g} Hz{load}",)

@@ -1,14 +1,17 @@
 """A fit, a twin or a scenario on another log: how well does it repeat the force there?"""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.assemble import Assembled, HoldOut, assemble
+from identification.bands import Spread, band, force_spread, limits, record_noise, shown_but_unseen
 from identification.gap.model import Model, model_of_fit
-from identification.prediction import normalised, per_drive, rmse
+from identification.prediction import Predicted, normalised, per_drive, rmse
 from identification.recordings import Recording
-from identification.results import Fit, Prediction, Provenance
+from identification.results import Band, Fit, Prediction, Provenance
 from identification.series import Series
 
 _NEAR_FLOOR = 1.02
@@ -30,13 +33,14 @@ def predict_log(fit: Fit | Model, recording: Recording, *, free_offset: bool = F
     seen = isinstance(fit, Fit) and recording.sha256 in fit.provenance.logs.values()
     assembled = assemble([recording], _held_out_in(fit) if seen and isinstance(fit, Fit) else HoldOut())
     found = [model.on(p, free_offset=free_offset) for p in assembled.pieces]
-    measured = [s.measured for s in assembled.stretches]
+    measured = [s.counts for s in assembled.stretches]
     errors = [(f.force - p.force)[m] for f, p, m in zip(found, assembled.pieces, measured, strict=True)]
     forces = [p.force[m] for p, m in zip(assembled.pieces, measured, strict=True)]
     drives = [p.stroke.drive[m] for p, m in zip(assembled.pieces, measured, strict=True)]
     error, force = np.concatenate(errors), np.concatenate(forces)
     before = _before(model, assembled, free_offset)
     floor = assembled.floor.noise
+    spreads = _spreads(fit, model, assembled, found) if isinstance(fit, Fit) else None
     prediction = Prediction(
         rmse_n=rmse(error),
         nrmse=normalised(error, force),
@@ -47,6 +51,7 @@ def predict_log(fit: Fit | Model, recording: Recording, *, free_offset: bool = F
         freed=["y0 of each stretch"] + (["force offset of each stretch"] if free_offset else []),
         before_n=before,
         shrinkage=None if before is None else _shrinkage(before, rmse(error), floor),
+        band=_band(fit, model, assembled, found, spreads) if isinstance(fit, Fit) and spreads else None,
         provenance=Provenance(
             logs={recording.path.name: recording.sha256},
             version=version("mrbench"),
@@ -66,8 +71,31 @@ def predict_log(fit: Fit | Model, recording: Recording, *, free_offset: bool = F
         held_out=np.concatenate(held),
         names=tuple(p.name for p in assembled.pieces),
         drive_unit=assembled.drive_unit,
+        band=_ends(found, spreads) if spreads else None,
     )
     return prediction, series
+
+
+def _spreads(fit: Fit, model: Model, assembled: Assembled, found: Sequence[Predicted]) -> list[Spread]:
+    noise = record_noise(fit, assembled.floor.noise)
+    return [force_spread(fit, model, p, f, noise) for p, f in zip(assembled.pieces, found, strict=True)]
+
+
+def _band(
+    fit: Fit, model: Model, assembled: Assembled, found: Sequence[Predicted], spreads: Sequence[Spread]
+) -> Band:
+    """The band in short, with the share of the measured samples that lie inside."""
+    at = [s.counts for s in assembled.stretches]
+    pieces = assembled.pieces
+    parts = [Spread(s.parameters[m], s.noise) for s, m in zip(spreads, at, strict=True)]
+    errors = [(f.force - p.force)[m] for f, p, m in zip(found, pieces, at, strict=True)]
+    unseen = [shown_but_unseen(fit, model, p, f, parts[0].noise) for p, f in zip(pieces, found, strict=True)]
+    return band(fit, parts, errors, [p.stroke.drive for p in pieces], set().union(*unseen))
+
+
+def _ends(found: Sequence[Predicted], spreads: Sequence[Spread]) -> tuple[Array, Array]:
+    ends = [limits(f.force, s) for f, s in zip(found, spreads, strict=True)]
+    return np.concatenate([low for low, _ in ends]), np.concatenate([high for _, high in ends])
 
 
 def _before(model: Model, assembled: Assembled, free_offset: bool) -> float | None:
@@ -76,7 +104,7 @@ def _before(model: Model, assembled: Assembled, free_offset: bool) -> float | No
         return None
     plain = model_of_fit(model.baseline)
     errors = [
-        (plain.on(p, free_offset=free_offset).force - p.force)[s.measured]
+        (plain.on(p, free_offset=free_offset).force - p.force)[s.counts]
         for p, s in zip(assembled.pieces, assembled.stretches, strict=True)
     ]
     return rmse(np.concatenate(errors))

@@ -53,18 +53,19 @@ def predict_piece(
     quick = piece.quicker()
     weight = piece.train if piece.train.any() else np.ones(len(piece.force))
     for _ in range(_ROUNDS):
-        force, slopes = quick.recorded(_setting(piece, point, delays, y0, effects), slopes=True)
+        force, slopes = quick.recorded(piece_setting(piece, point, delays, y0, effects), slopes=True)
         J = np.column_stack([slopes[:, _Y0]] + ([np.ones(len(force))] if free_offset else []))
         step = np.linalg.lstsq(J * weight[:, None], (piece.force - force - offset) * weight, rcond=None)[0]
         y0 += float(step[0])
         offset += float(step[1]) if free_offset else 0.0
-    force, _ = piece.recorded(_setting(piece, point, delays, y0, effects))
+    force, _ = piece.recorded(piece_setting(piece, point, delays, y0, effects))
     return Predicted(force + offset, y0, offset)
 
 
-def _setting(
+def piece_setting(
     piece: Piece, point: Coordinates, delays: tuple[float, float], y0: float, effects: tuple[ActiveEffect, ...]
 ) -> Setting:
+    """What a stretch is simulated with: the delays [s] come on top of those that its instruments report."""
     return Setting(point, y0, piece.force_delay + delays[0], piece.drive_delay + delays[1], effects)
 
 

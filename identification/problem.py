@@ -3,7 +3,8 @@
 The unknowns are the search numbers, one inner displacement y(0) a stretch, and a small delay of the force and
 of the drive channel against the displacement. Priors hold the delays, by what is known of the clocks, and y(0),
 which cannot have been far outside the stroke: with a weak k0 it would else run off and carry a force offset.
-Effects beside the law bring their parameters as further unknowns, behind all others.
+Effects beside the law bring their parameters as further unknowns, behind all others; behind these stands what
+each further log has of its own, where that is asked for.
 """
 
 from collections.abc import Sequence
@@ -13,9 +14,10 @@ from functools import cached_property
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.condition import OWN, SAME, Condition
 from identification.damper.coordinates import Coordinates
 from identification.effect_choice import EffectChoice
-from identification.force_channel import LowPass
+from identification.force_channel import LowPass, filter_lag
 from identification.search_space import SearchSpace
 from identification.simulate import UNKNOWNS, ActiveEffect, Setting, Stroke, simulate
 
@@ -26,6 +28,8 @@ _Y0_STROKES = 1.0
 """[1] standard deviation of y(0) about the middle of the motion, in half strokes."""
 _SHARED = COORDINATE_COUNT + 2
 """Unknowns that all pieces share: the search numbers and the two delays."""
+_MOST_FOR_PLAY = 8
+"""Times a thinned rate at which play is still looked at."""
 _FAR = 10.0
 """[1] change of an effect's size, in its usual unit, that counts like one of a search number."""
 
@@ -48,9 +52,17 @@ class Piece:
     """What the force channel does to the force, beside delaying it."""
     finer_for_play: int = 4
     """Times the rate at which play in the mounting is looked at."""
+    log: int = 0
+    """Which of the logs it comes from."""
+    condition: Condition = SAME
+    """What that log has of its own."""
 
     def recorded(self, setting: Setting, *, slopes: bool = False) -> tuple[Array, Array]:
         """Force [N] (N,) as the channel would record it, and its slopes (N, unknowns) if asked for."""
+        force, J = self._recorded(replace(setting, coordinates=self.condition.of(setting.coordinates)), slopes)
+        return force, self.condition.chained(J) if slopes else J
+
+    def _recorded(self, setting: Setting, slopes: bool) -> tuple[Array, Array]:
         if self.low_pass is not None:
             found = simulate(setting, self._finer(self.low_pass.finer), slopes=slopes)
             passed = self.low_pass.apply(found.force)
@@ -66,12 +78,18 @@ class Piece:
         return replace(self, low_pass=low_pass, finer_for_play=1)
 
     def coarser(self, times: int) -> "Piece":
-        """The same at every so many samples; a filter keeps its own rate no longer, so it only comes near."""
+        """The same at every so many samples: too few for a filter, of which only the delay remains."""
         stroke = self.stroke.coarser(times)
         thin = slice(0, len(stroke.displacement) * times, times)
-        low_pass = self.low_pass and replace(self.low_pass, rate=stroke.rate, finer=1)
+        late = self.force_delay + filter_lag(self.low_pass.reported if self.low_pass else None)
         return replace(
-            self.quicker(), stroke=stroke, force=self.force[thin], train=self.train[thin], low_pass=low_pass
+            self,
+            stroke=stroke,
+            force=self.force[thin],
+            train=self.train[thin],
+            low_pass=None,
+            force_delay=late,
+            finer_for_play=min(times * self.finer_for_play, _MOST_FOR_PLAY),
         )
 
     def _finer(self, times: int) -> Stroke:
@@ -109,6 +127,10 @@ class Problem:
     """[s] standard deviation of each delay beyond what is known."""
     effects: tuple[EffectChoice, ...] = ()
     """What is fitted along with the law."""
+    own: tuple[str, ...] = ()
+    """What each log behind the first has of its own, of ``OWN``."""
+    delay_limit: float = np.inf
+    """[1] of ``delay_prior`` beyond which no delay may go: what is later is for an effect to explain."""
 
     @property
     def samples(self) -> int:
@@ -119,12 +141,23 @@ class Problem:
     def free(self) -> BoolArray:
         """(U,) True where an unknown is free."""
         delays = [True, not self.space.one_drive]
-        return np.concatenate([self.space.free, delays, np.ones(len(self.pieces) + self.effect_count, bool)])
+        rest = len(self.pieces) + self.effect_count + self.own_count
+        return np.concatenate([self.space.free, delays, np.ones(rest, bool)])
 
     @property
     def effect_count(self) -> int:
         """Parameters of the effects."""
         return sum(len(e.quantities) for e in self.effects)
+
+    @property
+    def own_count(self) -> int:
+        """Unknowns that belong to one log each."""
+        return len(self.own) * max((p.log for p in self.pieces), default=0)
+
+    @property
+    def first_own(self) -> int:
+        """Place of the first unknown that belongs to one log."""
+        return self.first_effect + self.effect_count
 
     @property
     def first_effect(self) -> int:
@@ -134,27 +167,29 @@ class Problem:
     @property
     def delays(self) -> BoolArray:
         """(U,) True for the two delays."""
-        mask = np.zeros(self.first_effect + self.effect_count, bool)
+        mask = np.zeros(self.first_own + self.own_count, bool)
         mask[COORDINATE_COUNT:_SHARED] = True
         return mask
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest unknowns, (U,) each."""
         low, high = self.space.bounds()
-        rest = np.full(2 + len(self.pieces), np.inf)
+        rest = np.concatenate([np.full(2, self.delay_limit), np.full(len(self.pieces), np.inf)])
         own = [e.bounds() for e in self.effects]
         lows, highs = [b[0] for b in own], [b[1] for b in own]
-        return np.concatenate([low, -rest, *lows]), np.concatenate([high, rest, *highs])
+        wide = np.full(self.own_count, np.inf)
+        return np.concatenate([low, -rest, *lows, -wide]), np.concatenate([high, rest, *highs, wide])
 
     def start(self, coordinates: Coordinates) -> Array:
         """(U,) unknowns at a point, delays as known, y(0) where the inner displacement would come to rest."""
         y0 = [p.stroke.displacement.mean() / _Y0_SCALE for p in self.pieces]
         own = [e.to_search(e.form.starts[0]) for e in self.effects]
-        return np.concatenate([self.space.to_search(coordinates), np.zeros(2), y0, *own])
+        alike = np.zeros(self.own_count)
+        return np.concatenate([self.space.to_search(coordinates), np.zeros(2), y0, *own, alike])
 
     def step_length(self, step: Array) -> float:
         """Largest change in a step (U,), in units of a search number; delays and y(0) do not count."""
-        own = np.abs(step[self.first_effect :])
+        own = np.abs(step[self.first_effect : self.first_own])
         if not len(own):
             return float(np.abs(step[:COORDINATE_COUNT]).max())
         logarithmic = np.concatenate([e.logarithmic for e in self.effects])
@@ -182,32 +217,46 @@ class Problem:
 
     def simulate(self, unknowns: Array) -> list[Array]:
         """The force [N] of every piece as it would be recorded, (N,) each."""
-        return [p.recorded(self.setting(unknowns, i))[0] for i, p in enumerate(self.pieces)]
+        return [self.piece(unknowns, i).recorded(self.setting(unknowns, i))[0] for i in range(len(self.pieces))]
+
+    def piece(self, unknowns: Array, piece: int) -> Piece:
+        """A piece under the condition of its log at a point."""
+        p = self.pieces[piece]
+        places = self._own_places(p)
+        if not places:
+            return p
+        return replace(p, condition=Condition.at(dict(zip(self.own, unknowns[places], strict=True))))
+
+    def _own_places(self, piece: Piece) -> list[int]:
+        """Places of the unknowns that belong to a piece's log."""
+        first = self.first_own + (piece.log - 1) * len(self.own)
+        return list(range(first, first + len(self.own))) if self.own and piece.log > 0 else []
 
     def columns(self, piece: int) -> list[int]:
-        """Places of the unknowns that a piece depends on: q, the two delays, its own y(0), effects."""
+        """Places of the unknowns that a piece depends on: q, the two delays, its own y(0), effects, its log's."""
         effects = range(self.first_effect, self.first_effect + self.effect_count)
-        return [*range(_SHARED), _SHARED + piece, *effects]
+        return [*range(_SHARED), _SHARED + piece, *effects, *self._own_places(self.pieces[piece])]
 
     def residuals(self, unknowns: Array, piece: int) -> tuple[Array, Array]:
         """Residuals (N,) of a piece and their slopes (N, 16 + P) over its ``columns``; zero where not fitted."""
         weight, r, J = self._raw(unknowns, piece)
-        return r * weight, (J * weight[:, None]) @ self._scales(unknowns)
+        return r * weight, (J * weight[:, None]) @ self._scales(unknowns, piece)
 
     def evaluate(self, unknowns: Array) -> Evaluation:
         """Cost, J'J and J'r at a point; an unstable point costs infinity."""
         centre, weight = self._priors()
         pulled = weight * (unknowns - centre)
         hessian, gradient, cost = np.diag(weight**2), weight * pulled, float(pulled @ pulled)
-        D = self._scales(unknowns)
         for i in range(len(self.pieces)):
+            D = self._scales(unknowns, i)
             weight, r, J = self._raw(unknowns, i)
-            J *= weight[:, None]
-            r *= weight
             columns = self.columns(i)
-            hessian[np.ix_(columns, columns)] += D.T @ (J.T @ J) @ D
-            gradient[columns] += D.T @ (J.T @ r)
-            cost += float(r @ r)
+            with np.errstate(over="ignore", invalid="ignore"):  # of an unstable point
+                J *= weight[:, None]
+                r *= weight
+                hessian[np.ix_(columns, columns)] += D.T @ (J.T @ J) @ D
+                gradient[columns] += D.T @ (J.T @ r)
+                cost += float(r @ r)
         return Evaluation(cost if np.isfinite(cost) else np.inf, hessian, gradient)
 
     def cost(self, unknowns: Array) -> float:
@@ -225,17 +274,18 @@ class Problem:
         rest, own = np.zeros(COORDINATE_COUNT), np.zeros(self.effect_count)
         centre = np.concatenate([rest, [0.0, 0.0], means / _Y0_SCALE, own])
         held = np.full(len(means), _Y0_SCALE / (_Y0_STROKES * stroke))
-        return centre, np.concatenate([rest, [1.0, 1.0], held, own])
+        alike = np.zeros(self.own_count)
+        return np.concatenate([centre, alike]), np.concatenate([rest, [1.0, 1.0], held, own, alike + 1.0])
 
     def _raw(self, unknowns: Array, piece: int) -> tuple[Array, Array, Array]:
         """Weights [1/N], force errors [N] and their slopes (N, 16 + P) over what ``UNKNOWNS`` says and effects."""
-        p = self.pieces[piece]
+        p = self.piece(unknowns, piece)
         force, slopes = p.recorded(self.setting(unknowns, piece), slopes=True)
         return p.train / self.noise, force - p.force, slopes
 
-    def _scales(self, unknowns: Array) -> Array:
-        """(16 + P, 16 + P) derivative of coordinates, y(0), delays and effects over a piece's unknowns."""
-        D = np.zeros((len(UNKNOWNS) + self.effect_count, _SHARED + 1 + self.effect_count))
+    def _scales(self, unknowns: Array, piece: int) -> Array:
+        """(16 + P, columns) derivative of coordinates, y(0), delays and effects over a piece's unknowns."""
+        D = np.zeros((len(UNKNOWNS) + self.effect_count, len(self.columns(piece))))
         D[:COORDINATE_COUNT, :COORDINATE_COUNT] = self.space.slopes(unknowns[:COORDINATE_COUNT])
         D[UNKNOWNS.index("force_delay"), COORDINATE_COUNT] = self.delay_prior
         D[UNKNOWNS.index("drive_delay"), COORDINATE_COUNT + 1] = self.delay_prior
@@ -245,6 +295,9 @@ class Problem:
             own = np.arange(at, at + len(e.quantities)) - self.first_effect
             D[len(UNKNOWNS) + own, _SHARED + 1 + own] = e.slopes(unknowns[at : at + len(own)])
             at += len(own)
+        for k in range(len(self._own_places(self.pieces[piece]))):
+            shared = self.space.to_coordinates(unknowns[:COORDINATE_COUNT])
+            D[:COORDINATE_COUNT, _SHARED + 1 + self.effect_count + k] = OWN[self.own[k]].slopes(shared)
         return D
 
     def quicker(self) -> "Problem":

@@ -93,6 +93,15 @@ class Stretch:
     """[s]"""
     measured: BoolArray
     """False where a lost sample was interpolated."""
+    force_valid: BoolArray | None = None
+    """False where the force alone is broken and was bridged; None where all of it counts."""
+    interpolated: bool = False
+    """Whether the displacement was brought here from other instants: its fastest noise was lost on the way."""
+
+    @property
+    def counts(self) -> BoolArray:
+        """(N,) True where the sample may be fitted and scored."""
+        return self.measured if self.force_valid is None else self.measured & self.force_valid
 
 
 @dataclass(frozen=True)
@@ -132,6 +141,7 @@ def load(path: Path) -> Recording:
     for k, name in enumerate(names):
         stretches += _continuous(raw, said, name, np.flatnonzero(owner == k))
     if not stretches:
+        _some_numbers(path, raw)
         raise LogUnreadable(f"{path}: no {_FEWEST} samples without a break; record longer")
     kind = raw.metadata["run"].get("drive_kind") or f"coil_{drive_unit.lower()}"
     return Recording(Path(path), sha256, kind, drive_unit, tuple(stretches), raw.metadata)
@@ -151,12 +161,23 @@ def _checked_units(path: Path, raw: RawLog) -> str:
     return units["coil_drive"]
 
 
+def _some_numbers(path: Path, raw: RawLog) -> None:
+    """Refuse a log in which one channel holds no number at all, by its name."""
+    for name in _UNITS:
+        values = raw.samples[name]
+        if not np.isfinite(values).any():
+            raise LogUnreadable(
+                f"{path}: channel '{name}' holds no number in any of its {len(values)} samples; check its sensor"
+            )
+
+
 class _Said(NamedTuple):
     """What the log says of its channels."""
 
     filters: dict[str, ChannelFilter | None]
     delays: dict[str, float]
     velocity_measured: bool
+    interpolated: bool
 
     @staticmethod
     def of(path: Path, raw: RawLog) -> "_Said":
@@ -178,7 +199,7 @@ class _Said(NamedTuple):
                     "a filter needs kind, order and cutoff_hz, a delay delay_s"
                 ) from error
         measured = raw.metadata["units"].get("velocity_from") == "measured" and "velocity" in raw.samples
-        return _Said(filters, delays, measured)
+        return _Said(filters, delays, measured, bool(raw.metadata["units"].get("resampled")))
 
 
 def _names(raw: RawLog) -> tuple[list[str], npt.NDArray[np.int64]]:
@@ -244,6 +265,7 @@ def _stretch(raw: RawLog, said: _Said, name: str, rows: npt.NDArray[np.int64]) -
         displacement_delay=said.delays["displacement"],
         drive_delay=said.delays["coil_drive"],
         measured=measured,
+        interpolated=said.interpolated,
     )
 
 

@@ -28,6 +28,9 @@ class Estimate(Document):
     unit: str = Field(description="SI unit")
     ci95: tuple[float, float] | None = Field(description="95 % interval, in `unit`; null where nothing bounds it")
     ci99: tuple[float, float] | None = Field(default=None, description="99 % interval, in `unit`")
+    profile95: tuple[float, float] | None = Field(
+        default=None, description="95 % interval by profile likelihood, in `unit`, where it was asked for"
+    )
     identifiable: bool = Field(description="whether these strokes fix it to better than half its size")
     note: str = Field(default="", description="what a person should know about it")
 
@@ -49,6 +52,9 @@ class Nuisances(Document):
     y0: dict[str, float] = Field(description="inner displacement at the start of each stretch, in m")
     force_delay: Delay = Field(description="lag of the force channel behind the displacement channel")
     drive_delay: Delay = Field(description="further lag of the force channel behind the drive channel")
+    each_log: dict[str, dict[str, Estimate]] = Field(
+        default_factory=dict, description="what each log behind the first has of its own, where that was asked for"
+    )
 
 
 class NoiseFloor(Document):
@@ -134,11 +140,31 @@ class Fit(Document):
     correlations: dict[str, float] = Field(
         description="pairs of coordinates correlated beyond 0.9, `a,b` -> value"
     )
+    notes: list[str] = Field(
+        default_factory=list, description="what was left out of the recordings, and what they cannot show"
+    )
+    covariance: list[list[float]] | None = Field(
+        default=None, description="of the coordinates in their order, in their units; zero where nothing was seen"
+    )
     provenance: Provenance
 
     def point(self) -> Coordinates:
         """The coordinates as numbers."""
         return Coordinates(**{name: e.value for name, e in self.coordinates.items()})
+
+
+class Band(Document):
+    """How far a predicted force may be off: a band of so many deviations about it."""
+
+    level: float = Field(description="share of samples that are to lie inside, 0.95")
+    half_width_n: float = Field(description="median half width in N")
+    widest_n: float = Field(description="largest half width in N")
+    noise_n: float = Field(description="standard deviation in N of the record's noise, and of what the fit left")
+    parameters_n: float = Field(description="root mean square deviation in N that the uncertain parameters cause")
+    inside: float | None = Field(description="share of the recorded samples inside; null where none was recorded")
+    note: str = Field(
+        description="where the band cannot be trusted, and why; empty where nothing is known against"
+    )
 
 
 class Prediction(Document):
@@ -156,6 +182,20 @@ class Prediction(Document):
     shrinkage: float | None = Field(
         default=None, description="of a twin: 1 - (after² - floor²)/(before² - floor²); null near the floor"
     )
+    band: Band | None = Field(
+        default=None, description="95 % band of the force; null for a model without intervals"
+    )
+    provenance: Provenance
+
+
+class Forecast(Document):
+    """A fit on planned strokes, before anything is recorded."""
+
+    schema_: Literal["mrbench.forecast/1"] = Field(default="mrbench.forecast/1", alias="schema")
+    method: str = Field(description="the planned strokes")
+    samples: int = Field(description="how many samples")
+    largest_force_n: float = Field(description="largest magnitude of the force in N")
+    band: Band = Field(description="95 % band of the force")
     provenance: Provenance
 
 

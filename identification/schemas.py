@@ -7,10 +7,17 @@ import json
 import sys
 from pathlib import Path
 
+from identification.foresight.documents import Foresight
 from identification.gap.documents import Diagnosis
-from identification.results import Document, Fit, Prediction
+from identification.results import Document, Fit, Forecast, Prediction
 
-DOCUMENTS: dict[str, type[Document]] = {"diagnosis": Diagnosis, "fit": Fit, "prediction": Prediction}
+DOCUMENTS: dict[str, type[Document]] = {
+    "diagnosis": Diagnosis,
+    "fit": Fit,
+    "forecast": Forecast,
+    "foresight": Foresight,
+    "prediction": Prediction,
+}
 """Type of each document, by the name of its schema's file."""
 FOLDER = Path(__file__).parent.parent / "docs" / "reference" / "schemas"
 """Where the schemas are kept."""

@@ -33,6 +33,8 @@ class Series:
     """True where the fit did not see the sample."""
     names: tuple[str, ...]
     drive_unit: str
+    band: tuple[Array, Array] | None = None
+    """[N] lower and upper end of the 95 % band of the recorded force, where it is known."""
 
 
 _COLUMNS = {
@@ -64,12 +66,17 @@ def write_series(path: Path, series: Series) -> None:
 def _write_arrays(path: Path, series: Series) -> None:
     info = json.dumps({"stretches": list(series.names), "drive_unit": series.drive_unit})
     names = ("time", "displacement", "velocity", "drive", "force", "simulated", "stretch", "held_out")
-    np.savez_compressed(path, info=np.array(info), **{name: getattr(series, name) for name in names})
+    arrays = {name: getattr(series, name) for name in names}
+    if series.band is not None:
+        arrays |= {"lower": series.band[0], "upper": series.band[1]}
+    np.savez_compressed(path, info=np.array(info), **arrays)
 
 
 def _write_table(path: Path, series: Series) -> None:
     drive = "voltage_v" if series.drive_unit == "V" else "current_a"
     columns = {header: getattr(series, name) for name, header in _COLUMNS.items()} | {drive: series.drive}
+    if series.band is not None:
+        columns |= {"lower_force_n": series.band[0], "upper_force_n": series.band[1]}
     np.savetxt(
         path,
         np.column_stack(list(columns.values())),

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.condition import Own
 from identification.damper.coordinates import COORDINATES, Coordinates, to_parameters
 from identification.damper.parameters import GAUGE, PARAMETERS, Parameters, Quantity
 from identification.problem import COORDINATE_COUNT, Problem
@@ -138,15 +139,15 @@ _BEHIND = {
 """Coordinates that a parameter stands on; one that is named like a coordinate stands on that."""
 
 
+GAUGE_WORDS = (
+    "a gauge, fixed: (alpha_a, alpha_b, beta, gamma, A) -> (s alpha_a, s alpha_b, s^(n-1) beta, "
+    "s^(n-1) gamma, A/s) leaves every force as it is, so no recording reveals it"
+)
+"""The direction that no force reveals."""
+
+
 def _gauge() -> Estimate:
-    return Estimate(
-        value=GAUGE,
-        unit="1",
-        ci95=None,
-        identifiable=False,
-        note="a gauge, fixed: (alpha_a, alpha_b, beta, gamma, A) -> (s alpha_a, s alpha_b, s^(n-1) beta, "
-        "s^(n-1) gamma, A/s) leaves every force as it is, so no recording reveals it",
-    )
+    return Estimate(value=GAUGE, unit="1", ci95=None, identifiable=False, note=GAUGE_WORDS)
 
 
 def _slopes(function: Callable[[Array], Parameters], point: Coordinates) -> Array:
@@ -212,6 +213,19 @@ def delay_estimate(value: float, sd: float, prior: float, *, seen: bool) -> Dela
         prior_sd=prior,
         outside_prior=abs(value) > 3.0 * prior,
         note="" if seen else "cannot be seen: these strokes show no change that it would delay",
+    )
+
+
+def own_estimate(own: Own, unknown: float, sd: float) -> Estimate:
+    """What a log has of its own, from an unknown of the search and its standard deviation."""
+    value, deviation = own.value(unknown, sd)
+    return Estimate(
+        value=value,
+        unit=own.unit,
+        ci95=_interval(value, deviation, _Z95, False),
+        ci99=_interval(value, deviation, _Z99, False),
+        identifiable=sd < _KNOWN,
+        note=own.meaning,
     )
 
 

@@ -231,14 +231,15 @@ class CanopenActuator:
         target = self.demand.position if saturated else self._zero + wanted * _COUNT
         self.demand.advance(now_ns)
         self._push(now_ns)
-        leg = self.demand.follow(
+        legs = self.demand.follow(
             target,
             now_ns,
             self.objects.number(0x60C2, 1) * _MILLISECOND,
             self.objects.number(0x607F) * _COUNT,
             self.objects.number(0x6085) * _COUNT,
         )
-        self._signals.lead(leg.target, leg.end_ns, leg.begin_ns)
+        for leg in legs:
+            self._signals.lead(leg.target, leg.end_ns, leg.begin_ns)
         self._lag(now_ns)
 
     def _lag(self, now_ns: int) -> None:

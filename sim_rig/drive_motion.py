@@ -4,7 +4,8 @@ Setpoints come once an interpolation period, as punctually as their host is. A d
 not pass that jitter on to its machine: a host can be late but never early, so the drive's own grid of periods
 follows the earliest SYNCs, one place for each, and the demand goes straight from one setpoint to the next, reached
 four periods after its place. One that is late by more than three is bridged at the pace of the last two for two
-further periods; then the drive brakes. Positions are in metres, times in ns, and nothing here knows a bus.
+further periods; then the drive brakes. Once the setpoint behind a leg is known, the leg is bent into a cubic: with
+corners every 4 ms the rod would shake at 250 Hz. Positions are in metres, times in ns; nothing here knows a bus.
 """
 
 from collections import deque
@@ -20,8 +21,14 @@ _REMEMBERED = 128
 """SYNCs of which the earliest tells where the grid stands."""
 _PULL = 1 / 16
 """Share of what is missing to it by which the grid moves with each SYNC."""
+_PARTS = 4
+"""Straight parts that a bent leg is cut into."""
+_EVEN = 0.1
+"""Share of a leg by which the ones beside it may be longer or shorter for it to be bent."""
 _MISSED = 4
 """Periods that a SYNC may be late; with one that is later the grid begins anew."""
+_SILENT = 0.5
+"""The same while the rod stands, when nothing is lost by it: a host that was silent for a period is not late."""
 
 
 class Motion(Enum):
@@ -81,8 +88,12 @@ class Demand:
     _deceleration: float = 1.0
     _ahead: deque[tuple[int, float]] = field(default_factory=deque)
     """When each setpoint is to be reached [ns], and the setpoint [m]."""
+    _way: deque[tuple[int, float]] = field(default_factory=lambda: deque(maxlen=4))
+    """The same of the last four, reached or not."""
 
-    def follow(self, target: float, came_ns: int, period_ns: int, top_speed: float, deceleration: float) -> Leg:
+    def follow(
+        self, target: float, came_ns: int, period_ns: int, top_speed: float, deceleration: float
+    ) -> list[Leg]:
         """Take a setpoint.
 
         Args:
@@ -93,10 +104,11 @@ class Demand:
             deceleration: [m/s²] for braking, should no other follow.
 
         Returns:
-            The way on which it is reached.
+            The way on which it is reached, and before it the leg before anew, where that is bent.
         """
         if self.motion not in (Motion.FOLLOW, Motion.BRIDGE) or self._is_lost(came_ns, period_ns):
             self._ahead.clear()
+            self._way.clear()
             self._before = came_ns - period_ns, self.position
             self._grid = _Grid(came_ns, period_ns)
             self._last = came_ns, target
@@ -111,11 +123,30 @@ class Demand:
         self.motion, self._deceleration = Motion.FOLLOW, deceleration
         self._bridged_ns = reached + _BRIDGED * period_ns
         self._head_on()
-        return Leg(begin, *self._ahead[-1])
+        self._way.append(self._ahead[-1])
+        return [*self._bent(), Leg(begin, *self._ahead[-1])]
+
+    def _bent(self) -> list[Leg]:
+        """The last leg but one through the setpoints around it (Catmull and Rom), if the rod is not yet on it."""
+        if len(self._way) < 4 or self._way[1][0] < self._now_ns:
+            return []
+        times, (a, b, c, d) = [at for at, _ in self._way], [position for _, position in self._way]
+        begin, length = times[1], times[2] - times[1]
+        if max(abs(times[1] - times[0] - length), abs(times[3] - times[2] - length)) > _EVEN * length:
+            return []
+        legs, last = [], begin
+        for part in range(1, _PARTS + 1):
+            u = part / _PARTS
+            bent = b + u * ((c - a) / 2 + u * (a - 2.5 * b + 2 * c - d / 2 + u * (1.5 * (b - c) + (d - a) / 2)))
+            end = begin + round(u * length)
+            legs.append(Leg(last, end, bent))
+            last = end
+        return legs
 
     def _is_lost(self, came_ns: int, period_ns: int) -> bool:
         """Whether the grid has to begin anew with this SYNC."""
-        return not -period_ns <= came_ns - self._last[0] - period_ns <= _MISSED * period_ns
+        patience = _MISSED if self._pace else _SILENT
+        return not -period_ns <= came_ns - self._last[0] - period_ns <= patience * period_ns
 
     def _head_on(self) -> None:
         """The velocity towards the next setpoint."""

@@ -13,7 +13,16 @@ def run(
     ] = None,
     config: Annotated[Path | None, typer.Option(help="bench.toml: runs on the instruments that it names.")] = None,
     out: Annotated[str, typer.Option(help="The log; with --dry-run, - prints JSON.")] = "run.mcap",
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what the method will ask for.")] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only say what the method will ask for, and what it can tell.")
+    ] = False,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="FIT", help="With --dry-run: a fit, twin or scenario of the damper to expect."),
+    ] = None,
+    planned: Annotated[
+        Path | None, typer.Option(metavar="FILE.npz", help="With --dry-run: write the exact samples there.")
+    ] = None,
     specimen: Annotated[str, typer.Option(help="Name of the damper under test.")] = "",
     operator: Annotated[str, typer.Option(help="Who runs it.")] = "",
     seed: Annotated[
@@ -21,8 +30,12 @@ def run(
     ] = None,
 ) -> None:
     """Run a method once and record it; with --scenario from the simulated plant, faster than real time."""
+    if dry_run and planned is not None:
+        return _write_samples(method, planned)
     if dry_run:
-        return _show_envelope(method, as_json=out == "-")
+        return _show_envelope(method, model, as_json=out == "-")
+    if model is not None or planned is not None:
+        raise typer.BadParameter("--model and --planned are for strokes that are only planned: with --dry-run")
     if (scenario is None) == (config is None):
         raise typer.BadParameter(
             "say what to run it on: --config bench.toml, --scenario NAME or FILE, or --dry-run"
@@ -36,15 +49,33 @@ def run(
     return _record(method, str(scenario), Path(out), specimen, operator, seed)
 
 
-def _show_envelope(name: str, *, as_json: bool) -> None:
+def _show_envelope(name: str, model: Path | None, *, as_json: bool) -> None:
+    from bench.errors import RunError
+    from bench.foresee import foreseen
     from bench.methods import compile_method, load_method
     from bench.methods.envelope import envelope, envelope_lines
 
-    found = envelope(compile_method(load_method(name)))
+    programme = compile_method(load_method(name))
+    found = envelope(programme)
+    try:
+        found = found.model_copy(update={"foreseen": foreseen(programme, model)})
+    except RunError as error:
+        if model is not None:
+            raise
+        # A bench without the identification still tells what the machine will be asked.
+        typer.echo(f"mrbench: {error}", err=True)
     if as_json:
         typer.echo(found.model_dump_json(by_alias=True, indent=2))
     else:
-        typer.echo("\n".join(envelope_lines(found)))
+        typer.echo("\n".join([*envelope_lines(found), *(found.foreseen or {}).get("words", ())]))
+
+
+def _write_samples(name: str, path: Path) -> None:
+    from bench.foresee import write_planned
+    from bench.methods import compile_method, load_method
+
+    write_planned(path, compile_method(load_method(name)))
+    typer.echo(f"{path}: planned strokes", err=True)
 
 
 def _record(name: str, scenario: str, out: Path, specimen: str, operator: str, seed: int | None) -> None:

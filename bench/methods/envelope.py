@@ -8,7 +8,7 @@ the modified Bouc-Wen law with the hysteretic element fully yielded and the fiel
 It overshoots what a damper gives at rest or just after a step of the drive, and knows nothing of end stops.
 """
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -54,6 +54,10 @@ class Envelope(Frozen):
     limits: Limits = Field(description="The method's own limits.")
     verdict: Literal["within limits", "force limit exceeded"] = Field(
         description="Whether the expected force stays below its limit; all else was checked in compiling."
+    )
+    foreseen: dict[str, Any] | None = Field(
+        default=None,
+        description="What these strokes can tell of a damper, as mrbench.foresight/1; null where unknown.",
     )
 
 

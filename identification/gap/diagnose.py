@@ -25,8 +25,10 @@ from identification.problem import COORDINATE_COUNT, Problem
 from identification.recordings import Recording
 from identification.results import Provenance
 
-_CLOCKS = 5e-6
-"""[s] to which the channels' clocks are trusted: what is later than that is an effect."""
+_CLOCKS = 5e-5
+"""[s] to which the channels' clocks and filters are known."""
+_LATEST = 3.0
+"""[1] of that, beyond which what is later is an effect."""
 _REPEATS = 1.1
 """[1] ratio of cycle-to-cycle over high-frequency floor above which something does not repeat."""
 _TIED = 0.05
@@ -94,7 +96,7 @@ def white_floor(floor: Floor) -> float:
 
 def _problem(assembled: Assembled, judge: Judge) -> Problem:
     problem = fit_problem(assembled, _CLOCKS)
-    return replace(problem, pieces=judge.fitted_pieces(), noise=white_floor(assembled.floor))
+    return replace(problem, pieces=judge.fitted_pieces(), noise=white_floor(assembled.floor), delay_limit=_LATEST)
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class _Report:
         plain = self.search.found[frozenset()]
         likeliest = self.odds.ranked()[0][0]
         named = self.search.found[likeliest]
-        floor = self._floor(plain, named)
+        floor = self.search.floor
         verdict = verdict_on(plain.unseen, named.unseen, floor, self.odds, likeliest)
         if verdict in ("no_gap", "unexplained"):
             named, likeliest = plain, frozenset()
@@ -141,13 +143,6 @@ class _Report:
         baseline = baseline_fit(self.assembled, self.judge, plain, floor, provenance)
         specimen = baseline.specimen
         return Answer(diagnosis, twin_of(self.assembled, named, baseline, floor, specimen, provenance))
-
-    def _floor(self, plain: Contender, named: Contender) -> float:
-        """The floor [N]: what does not repeat is noise after all where no model has found anything in it."""
-        floor, repeated = self.search.floor, self.assembled.floor.cycle_to_cycle
-        if repeated is not None and repeated > _REPEATS * floor and plain.unseen < 1.02 * repeated:
-            return repeated if named.unseen > 0.98 * plain.unseen else floor
-        return floor
 
     def _gap(self, plain: Contender, named: Contender, floor: float) -> Gap:
         shrunk = self.judge.shrunk(plain.left, named.left, floor)

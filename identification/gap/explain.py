@@ -27,6 +27,8 @@ _CUTS = (1.0, 0.5, 0.2, 0.05)
 """[1] parts of a joint step that are tried."""
 _DAMPING = 1e-4
 """[1] of the joint step, over the information on each unknown."""
+_SETTLING = 1e-3
+"""[1] damping of a step of the law alone."""
 _AS_PROMISED = 0.7
 """[1] part of the promised fall after which no shorter step is tried."""
 _PLAY_THIN = 2
@@ -49,6 +51,8 @@ class Effort:
     """Most steps of one descent."""
     default_start: bool = True
     """Whether the regression's coordinates are a start too."""
+    settling: int = 0
+    """Steps of the law alone beside an effect that stays as it starts, before both move together."""
     polish: bool = True
     """Whether the end is refined on all samples; without, figures are those of the thinned problem."""
 
@@ -170,7 +174,10 @@ def fit_with(
     """
     joint = problem.with_effects(effects)
     play = any(e.form.acts == "displacement_follower" for e in effects)
-    quick = joint.quicker().coarser(min(effort.thin, _PLAY_THIN) if play else effort.thin)
+    # Without a polish the problem is taken as it comes: it has been made quick already.
+    quick = (
+        joint.quicker().coarser(min(effort.thin, _PLAY_THIN) if play else effort.thin) if effort.polish else joint
+    )
     with threadpool_limits(1, "blas"):
         starts = sorted(_starts(quick, start, effort, further), key=lambda s: s.cost)
         ends: list[Minimum] = []
@@ -196,9 +203,9 @@ def _starts(
 ) -> Iterator[Start]:
     """Every start that is worth a look, each after its joint step."""
     for unknowns in further:
-        yield joint_step(problem, unknowns)[0]
+        yield joint_step(problem, _settled(problem, unknowns, effort.settling))[0]
     base = [] if start is None else [start.minimum.unknowns if isinstance(start, JointFit) else start]
-    if start is None or effort.default_start:
+    if effort.starts and (start is None or effort.default_start):
         plain = problem.with_effects(())
         base.append(starting_points(plain)[0])
     known = start if isinstance(start, JointFit) else None
@@ -209,6 +216,26 @@ def _starts(
                 return
             count += 1
             yield joint_step(problem, np.concatenate([unknowns[: problem.first_effect], values]))[0]
+
+
+def _settled(problem: Problem, unknowns: Array, steps: int) -> Array:
+    """Unknowns (U,) after some steps of the law alone.
+
+    A play or a soft fixture is soon lost where the law still has a wrong yield displacement.
+    """
+    free = problem.free & ~problem.delays
+    free[problem.first_effect :] = False
+    for _ in range(steps):
+        here = problem.evaluate(unknowns)
+        if not np.isfinite(here.cost):
+            break
+        scale = np.diag(here.hessian)
+        step = bounded_step(problem, here, free, _SETTLING * np.maximum(scale, 1e-9 * scale.max()), unknowns)
+        cut = next((c for c in _CUTS if problem.cost(unknowns + c * step) < here.cost), None)
+        if cut is None:
+            break
+        unknowns = unknowns + cut * step
+    return unknowns
 
 
 def _combinations(effects: tuple[EffectChoice, ...], known: JointFit | None) -> Iterator[Array]:
@@ -228,11 +255,7 @@ def joint_step(problem: Problem, unknowns: Array) -> tuple[Start, Evaluation, fl
     here = problem.evaluate(unknowns)
     if not np.isfinite(here.cost):
         return Start(unknowns), here, np.inf
-    free = problem.free & ~problem.delays
-    scale = np.diag(here.hessian)
-    damping = _DAMPING * np.maximum(scale, 1e-9 * scale.max())
-    step = bounded_step(problem, here, free, damping, unknowns)
-    promised = here.cost + 2.0 * float(here.gradient @ step) + float(step @ here.hessian @ step)
+    step, promised = promised_step(problem, here, unknowns)
     best = Start(unknowns, here.cost)
     for cut in _CUTS:
         there = Start(unknowns + cut * step, problem.cost(unknowns + cut * step))
@@ -243,3 +266,12 @@ def joint_step(problem: Problem, unknowns: Array) -> tuple[Start, Evaluation, fl
         elif best.cost < here.cost:
             break
     return best, here, promised
+
+
+def promised_step(problem: Problem, here: Evaluation, unknowns: Array) -> tuple[Array, float]:
+    """The Gauss-Newton step (U,) inside the bounds, and the cost that it promises; delays stay where they are."""
+    free = problem.free & ~problem.delays
+    scale = np.diag(here.hessian)
+    damping = _DAMPING * np.maximum(scale, 1e-9 * scale.max())
+    step = bounded_step(problem, here, free, damping, unknowns)
+    return step, here.cost + 2.0 * float(here.gradient @ step) + float(step @ here.hessian @ step)

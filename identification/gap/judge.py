@@ -13,6 +13,9 @@ from identification.gap.residual import Cycles, cut_cycles
 from identification.gap.where import Left
 from identification.problem import Piece
 
+_MOVED = 0.1
+"""[1] of the half stroke that the damper has to move before its force is looked at."""
+
 
 @dataclass(frozen=True)
 class Judge:
@@ -32,7 +35,7 @@ class Judge:
         cycles = cut_cycles(assembled.stretches, assembled.pieces)
         first = assembled.stretches[0].time[0]
         time = np.concatenate([s.time - first for s in assembled.stretches])
-        return Judge(assembled.pieces, cycles, held_out_cycles(cycles), time)
+        return Judge(tuple(map(_once_moved, assembled.pieces)), cycles, held_out_cycles(cycles), time)
 
     @cached_property
     def usable(self) -> BoolArray:
@@ -85,6 +88,14 @@ class Judge:
         counts = self.cycles.sums(np.ones(len(self.force)), self.unseen)
         there = counts > 0
         return shrinkage(sums[0][there], sums[1][there], counts[there], floor)
+
+
+def _once_moved(piece: Piece) -> Piece:
+    """The piece without its first instants: what the hysteresis held before nobody has recorded."""
+    x = piece.stroke.displacement
+    away = np.abs(x - x[0]) > _MOVED * 0.5 * np.ptp(x)
+    count = int(np.argmax(away)) if away.any() else 0
+    return replace(piece, train=np.where(np.arange(len(x)) < count, 0.0, piece.train))
 
 
 def _rms(values: Array) -> float:

@@ -7,7 +7,7 @@ from identification.simulate import ActiveEffect
 
 _ABSURD = 0.03
 """[1] weight of an effect whose size no bench has shown."""
-_BENT = 0.05
+_BENT = 0.1
 """[1] of the stroke that a displacement channel may be off its line."""
 _NEAR = 1e-3
 """[1] of a bound's size."""

@@ -38,6 +38,8 @@ _UNKNOWN = 3.0
 """[1] odds beforehand of something else over the likeliest set, where both leave as much."""
 _OCCAM = 0.1
 """[1] price of each effect for the freedom of its parameters."""
+_DOUBT = 0.04
+"""[1] probability that what fits is not the cause: as often as that where the cause was known."""
 _RARE = 0.3
 """[1] weight of an effect of the second list."""
 
@@ -91,7 +93,9 @@ def odds(candidates: Sequence[Candidate], samples: int) -> Odds:
     # An unknown effect is a rival only as far as the known ones leave something that the floor cannot explain.
     weight = _logistic(likeliest.left - unsure, 0.25 * unsure)
     shares = _normalised(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
-    return Odds(dict(zip(scores, map(float, shares[:-1]), strict=True)), float(shares[-1]))
+    doubt = _DOUBT * (1.0 - float(shares[list(scores).index(frozenset())]))
+    known = (1.0 - doubt) * shares[:-1]
+    return Odds(dict(zip(scores, map(float, known), strict=True)), 1.0 - float(known.sum()))
 
 
 def _log_prior(names: frozenset[str]) -> float:

@@ -2,7 +2,9 @@
 
 Each form is put beside the baseline at its starts (none of it, but with several lengths, speeds or times; or a
 little of it, where none would show nothing). One Gauss-Newton step moves the law's coordinates and the effect
-together, inside their bounds, so that what the coordinates could have done alone does not count.
+together, inside their bounds, so that what the coordinates could have done alone does not count. The slopes over
+the law are those of the baseline, and those over an effect are differences of two simulations: the exact ones, and
+the step itself with a line search, are kept for the effects that promise most.
 """
 
 from collections.abc import Sequence
@@ -14,14 +16,18 @@ from threadpoolctl import threadpool_limits
 from identification.arrays import Array
 from identification.damper.effects import EFFECTS, USUAL
 from identification.effect_choice import EffectChoice
-from identification.gap.explain import JointFit, joint_step
-from identification.gap.hum import strongest_line
-from identification.problem import Problem
+from identification.gap.explain import JointFit, joint_step, promised_step
+from identification.gap.hum import MAINS
+from identification.problem import Evaluation, Problem
 
 THIN = 4
 """Every so many samples that a screening looks at."""
 ALWAYS = ("clevis_backlash", "fixture_compliance")
 """Effects whose gain is not linear in their size: a refit says more than this look."""
+_TRIED = 10
+"""Forms whose step is really taken."""
+_SIZE_STEP, _LENGTH_STEP = 0.05, 0.03
+"""[1] steps of the differences in search numbers: of sizes, and of logarithms."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,7 @@ class Gain:
     gain: float
     """[1] part of the baseline's excess cost that the linear step takes away; at most one."""
     achieved: float
-    """[1] part of it that the step really takes away, after a line search."""
+    """[1] part of it that the step really takes away, after a line search; the promise where it was not taken."""
     unknowns: Array
     """(U,) of the joint problem, where that was: a start of the refit."""
 
@@ -48,7 +54,11 @@ def every_choice(names: Sequence[str] = USUAL) -> tuple[EffectChoice, ...]:
 
 
 def screen(
-    problem: Problem, baseline: JointFit, effects: Sequence[EffectChoice] = (), thin: int = THIN
+    problem: Problem,
+    baseline: JointFit,
+    effects: Sequence[EffectChoice] = (),
+    thin: int = THIN,
+    line: float = MAINS,
 ) -> list[Gain]:
     """The gain of every effect beside a baseline fit, the largest first.
 
@@ -57,30 +67,110 @@ def screen(
         baseline: the fit so far, with or without effects.
         effects: forms to look at; every form of the usual effects if none is given.
         thin: looks at every so many samples.
+        line: frequency of a hum [Hz], as ``strongest_line`` finds it.
     """
-    quick = problem.with_effects(baseline.effects).quicker().coarser(thin)
-    known = {choice.name for choice in baseline.effects}
-    chosen = [c for c in (effects or every_choice()) if c.name not in known]
+    chosen = effects or every_choice()
+    quick = problem.with_effects(baseline.effects).coarser(thin)
     with threadpool_limits(1, "blas"):
+        # The baseline was fitted on more samples: its own step here is no merit of an effect.
         first, _, _ = joint_step(quick, baseline.minimum.unknowns)
-        found = [_best(quick, first.unknowns, first.cost, choice) for choice in chosen]
+        frame = _Frame.at(quick, first.unknowns, line)
+        looks = sorted((frame.best(choice) for choice in chosen), key=lambda g: -g.gain)
+        found = [frame.taken(look) for look in looks[:_TRIED]] + looks[_TRIED:]
     return sorted(found, key=lambda g: -max(g.gain, g.achieved))
 
 
-def _best(problem: Problem, unknowns: Array, cost: float, choice: EffectChoice) -> Gain:
-    """The best of a form's starts."""
-    excess = max(cost - problem.samples, 1.0)
-    joint = problem.with_effects((*problem.effects, choice))
-    gains = []
-    for values in _starting_values(problem, unknowns, choice):
-        point, _, promised = joint_step(joint, np.concatenate([unknowns, choice.to_search(values)]))
-        gain = min((cost - promised) / excess, 1.0)
-        gains.append(Gain(choice, gain, (cost - point.cost) / excess, point.unknowns))
-    return max(gains, key=lambda g: (max(g.achieved, 0.0), g.gain))
+@dataclass(frozen=True)
+class _Frame:
+    """The baseline with its slopes, beside which every effect is put."""
+
+    problem: Problem
+    unknowns: Array
+    """(U,)"""
+    here: Evaluation
+    residuals: tuple[Array, ...]
+    """(N,) of each piece, in units of the noise."""
+    slopes: tuple[Array, ...]
+    """(N, C) of each piece over its columns."""
+    line: float
+    """[Hz] at which a hum is looked for."""
+
+    @staticmethod
+    def at(problem: Problem, unknowns: Array, line: float) -> "_Frame":
+        """The frame at a point."""
+        both = [problem.residuals(unknowns, i) for i in range(len(problem.pieces))]
+        here = problem.evaluate(unknowns)
+        return _Frame(problem, unknowns, here, tuple(r for r, _ in both), tuple(J for _, J in both), line)
+
+    @property
+    def excess(self) -> float:
+        """What the baseline leaves beyond the noise [1]."""
+        return max(self.here.cost - self.problem.samples, 1.0)
+
+    def best(self, choice: EffectChoice) -> Gain:
+        """The most promising of a form's starts."""
+        return max((self._promise(choice, values) for values in self._starts(choice)), key=lambda g: g.gain)
+
+    def taken(self, look: Gain) -> Gain:
+        """The step from there, really taken."""
+        joint = self.problem.with_effects((*self.problem.effects, look.choice))
+        point, _, promised = joint_step(joint, look.unknowns)
+        gain = min((self.here.cost - promised) / self.excess, 1.0)
+        return Gain(look.choice, gain, (self.here.cost - point.cost) / self.excess, point.unknowns)
+
+    def _starts(self, choice: EffectChoice) -> Sequence[tuple[float, ...]]:
+        """The form's own starts; a hum is looked for at one frequency."""
+        if choice.name != "mains_hum":
+            return choice.form.starts
+        return [(*choice.form.starts[0][:-1], self.line)]
+
+    def _promise(self, choice: EffectChoice, values: tuple[float, ...]) -> Gain:
+        """What the linear step from a start takes away."""
+        joint = self.problem.with_effects((*self.problem.effects, choice))
+        begin = np.concatenate([self.unknowns, choice.to_search(values)])
+        here = self._beside(joint, begin, choice, values)
+        promised = promised_step(joint, here, begin)[1]
+        gain = min((self.here.cost - promised) / self.excess, 1.0)
+        return Gain(choice, gain, gain, begin)
+
+    def _beside(self, joint: Problem, begin: Array, choice: EffectChoice, values: tuple[float, ...]) -> Evaluation:
+        """Cost, J'J and J'r of the joint problem at a start, the effect's slopes by differences."""
+        count, own = len(self.unknowns), len(choice.quantities)
+        absent = not any(v for v, q in zip(values, choice.quantities, strict=True) if q.low <= 0.0)
+        moved = [self._weighed(joint, begin) if not absent else self.residuals]
+        steps = [_step(joint, begin, count + k, absent) for k in range(own)]
+        moved += [self._weighed(joint, begin + s) if s.any() else moved[0] for s in steps]
+        hessian, gradient = np.zeros((count + own, count + own)), np.zeros(count + own)
+        hessian[:count, :count], gradient[:count] = self.here.hessian, self.here.gradient
+        cost = self.here.cost
+        for i, (r, J) in enumerate(zip(self.residuals, self.slopes, strict=True)):
+            columns, there = self.problem.columns(i), moved[0][i]
+            E = np.column_stack(
+                [(m[i] - there) / max(s.sum(), 1e-12) for m, s in zip(moved[1:], steps, strict=True)]
+            )
+            cross = J.T @ E
+            hessian[np.ix_(columns, range(count, count + own))] += cross
+            hessian[np.ix_(range(count, count + own), columns)] += cross.T
+            hessian[count:, count:] += E.T @ E
+            gradient[columns] += J.T @ (there - r)
+            gradient[count:] += E.T @ there
+            cost += float(there @ there - r @ r)
+        return Evaluation(cost if np.isfinite(cost) else np.inf, hessian, gradient)
+
+    def _weighed(self, joint: Problem, unknowns: Array) -> tuple[Array, ...]:
+        """(N,) residuals of each piece, in units of the noise."""
+        forces = joint.simulate(unknowns)
+        return tuple(
+            p.train / joint.noise * (force - p.force) for p, force in zip(joint.pieces, forces, strict=True)
+        )
 
 
-def _starting_values(problem: Problem, unknowns: Array, choice: EffectChoice) -> Sequence[tuple[float, ...]]:
-    """The form's own starts; a hum's frequency is that of the strongest line in what the baseline leaves."""
-    if choice.name != "mains_hum":
-        return choice.form.starts
-    return [(*choice.form.starts[0][:-1], strongest_line(problem, unknowns))]
+def _step(joint: Problem, begin: Array, place: int, absent: bool) -> Array:
+    """(U,) step of a difference over one parameter; none over a length of an effect that is not there."""
+    step = np.zeros(len(begin))
+    logarithmic = np.concatenate([e.logarithmic for e in joint.effects])[place - joint.first_effect]
+    if logarithmic and absent:
+        return step
+    size = _LENGTH_STEP if logarithmic else _SIZE_STEP
+    step[place] = size if begin[place] + size <= joint.bounds()[1][place] else -size
+    return step

@@ -6,30 +6,43 @@ stands beside all those it grew from. All of it on thinned data; the odds decide
 """
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.damper.effects import EFFECTS
 from identification.effect_choice import EffectChoice
+from identification.gap.colour import floor_under
 from identification.gap.explain import Effort, JointFit, fit_with
+from identification.gap.hum import strongest_line
 from identification.gap.judge import Judge
 from identification.gap.plausible import plausibility
 from identification.gap.posterior import Candidate
 from identification.gap.screen import ALWAYS, Gain, every_choice, screen
 from identification.gap.where import Left
 from identification.problem import Problem
+from identification.start import starting_points
 
 _THIN_RATE = 250.0
 """[Hz] below which recordings are not thinned."""
 _SCREEN_RATE = 125.0
-"""[Hz] of the first look."""
-_SWIFT = ("mains_hum",)
-"""Effects that the rate of the first look would not carry."""
+"""[Hz] of the first look, and of long recordings."""
+_MANY = 15_000
+"""[samples] above which a recording is thinned further."""
+_NOTHING = 1.008
+"""[1] RMSE over the floor up to which nothing is looked for."""
 _FITTED = (6, 4, 2)
 """Effects fitted beside none, one and two others."""
+_LARGE, _MORE = 2.0, 10
+"""[1] excess from which on a step from the law's own fit tells little, and effects fitted beside none then."""
+_PATIENCE = 60.0
+"""[s] of processor time after which no further set is begun."""
+_SLIGHT = 0.02
+"""[1] excess below which no play is looked for beside other effects."""
 _BEAM = (2, 1)
 """Sets that are taken further, of one and of two effects."""
 _OPEN = 1.1
@@ -46,12 +59,15 @@ _ENOUGH = 0.004
 """[1] excess over the floor's variance at which nothing is left to look for."""
 _ENOUGH_OF_WHOLE = 0.004
 """[1] the same as a part of the whole gap."""
+_COLOURED = 1.02
+"""[1] noise over the floor so far from which on it is coloured."""
 _FORMS_TIED = 0.7
 """[1] part of the best form's promise from which on another form of the same effect is fitted too."""
 
 Progress = Callable[[str, float], None]
-_QUICK = Effort(thin=1, starts=4, descents=1, iterations=25, polish=False)
-_SLOW = Effort(thin=1, starts=6, descents=2, iterations=40, polish=False)
+_STAGED = Effort(thin=1, starts=0, descents=2, iterations=25, default_start=False, settling=5, polish=False)
+_PLAIN = Effort(thin=1, starts=1, descents=1, iterations=40, polish=False)
+_QUICK = Effort(thin=1, starts=0, descents=1, iterations=25, default_start=False, polish=False)
 
 
 @dataclass(frozen=True)
@@ -96,30 +112,50 @@ class Search:
     """All samples that may be fitted."""
     judge: Judge
     floor: float
-    """[N]"""
+    """[N] what counts as noise: the white one, or a coloured one once a residual has shown it."""
     progress: Progress = lambda what, error: None
     found: dict[frozenset[str], Contender] = field(default_factory=dict)
     complete: set[frozenset[str]] = field(default_factory=set)
     """Sets that were fitted on all samples."""
+    began: float = field(default_factory=time.process_time)
+    """[s] of processor time."""
 
     def run(self) -> None:
         """Fit what is worth it; ``found`` holds the best of each set."""
-        none = self.fit(())
-        if self.at_floor(none):
+        none = self.fit((), effort=_PLAIN)
+        self._hear(none)
+        if self.at_floor(none) or max(none.seen, none.unseen) < _NOTHING * self.floor:
             return
         beam = [none]
         for size, count in enumerate(_FITTED, 1):
-            if self.at_floor(beam[0]):
+            if self._late or self.at_floor(beam[0]):
                 break
             for parent in beam:
                 self._grow(parent, count)
             grown = sorted((c for n, c in self.found.items() if len(n) == size), key=self.left_of)
-            if not grown or size > len(_BEAM) or self.left_of(grown[0]) > _WORTH * self.left_of(beam[0]):
+            if not grown or size > len(_BEAM) or not self._worth_it(grown[0], beam[0]):
                 break
+            self._hear(grown[0])
             limit = _RIVAL * max(self.left_of(grown[0]), _ENOUGH)
             near = [c for c in grown if self.left_of(c) < limit]
             beam = near[: _BEAM[size - 1]]
         self._back()
+
+    @property
+    def _late(self) -> bool:
+        """Whether enough time has been spent."""
+        return time.process_time() - self.began > _PATIENCE
+
+    def _worth_it(self, best: Contender, parent: Contender) -> bool:
+        """Whether a set is worth taking further; where the gap is large, one effect alone may show little."""
+        left = self.left_of(best)
+        return left < _WORTH * self.left_of(parent) or (not parent.names and left > _LARGE)
+
+    def _hear(self, contender: Contender) -> None:
+        """Raise the floor to what a set leaves, as far as that is noise though not white."""
+        heard = floor_under(contender.left, self.judge.cycles)
+        if heard is not None and heard > _COLOURED * self.floor:
+            self.floor = heard
 
     def left_of(self, contender: Contender) -> float:
         """Its excess over the floor [1]."""
@@ -168,29 +204,54 @@ class Search:
 
     def _polished(self, contender: Contender) -> Contender:
         """The same set, fitted on all samples."""
-        effort = Effort(thin=1, starts=1, descents=1, iterations=15, default_start=False)
+        effort = Effort(thin=1, starts=0, descents=1, iterations=15, default_start=False)
         return self.judged(
             fit_with(self.full, contender.fit.effects, None, effort, [contender.fit.minimum.unknowns])
         )
 
-    @property
+    @cached_property
     def _thin(self) -> Problem:
         rate = max(p.stroke.rate for p in self.full.pieces)
-        return self.full.quicker().coarser(max(1, round(rate / _THIN_RATE)))
+        samples = sum(len(p.force) for p in self.full.pieces)
+        times = min(max(rate / _THIN_RATE, samples / _MANY), rate / _SCREEN_RATE)
+        return self.full.quicker().coarser(max(1, round(times)))
 
     def _grow(self, parent: Contender, count: int) -> None:
         """Fit a set with each of the most promising further effects."""
         thin = self._thin
         rate = max(p.stroke.rate for p in thin.pieces)
-        names = [n for n in EFFECTS if n not in parent.names]
-        slow = [c for c in every_choice(names) if c.name not in _SWIFT]
-        swift = [c for c in every_choice(names) if c.name in _SWIFT]
-        gains = screen(thin, parent.fit, slow, thin=max(1, round(rate / _SCREEN_RATE)))
-        gains += screen(thin, parent.fit, swift, thin=1) if swift else []
-        always = () if parent.names else ALWAYS
-        for gain in _worth_fitting(gains, count, always):
-            effects = (*parent.fit.effects, gain.choice)
-            self.fit(effects, parent.fit, [gain.unknowns])
+        choices = every_choice([n for n in EFFECTS if n not in parent.names])
+        gains = screen(thin, parent.fit, choices, max(1, round(rate / _SCREEN_RATE)), self._line(parent))
+        if not parent.names and self.left_of(parent) > _LARGE:
+            count = _MORE
+        for gain in _worth_fitting(gains, count):
+            self._fit_beside(parent, gain, [])
+        for gain in (g for g in gains if g.choice.name in ALWAYS):
+            if self._late or self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
+                return
+            self._fit_beside(parent, gain, gain.choice.form.starts)
+
+    def _fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> None:
+        """Fit a set with a further effect, from its screening's end and with further values of it."""
+        # Under a wrong law the coordinates have moved to where they hide an effect: begin elsewhere, too.
+        elsewhere = np.concatenate([self._regression, gain.unknowns[len(self._regression) :]])
+        others = elsewhere[: len(elsewhere) - len(gain.choice.quantities)]
+        starts = [np.concatenate([others, gain.choice.to_search(v)]) for v in values]
+        effort = _STAGED if values else _QUICK
+        self.fit((*parent.fit.effects, gain.choice), None, [gain.unknowns, elsewhere, *starts], effort)
+
+    @cached_property
+    def _regression(self) -> Array:
+        """(U,) unknowns of the plain law that the regression gives."""
+        return starting_points(self._thin)[0]
+
+    def _line(self, parent: Contender) -> float:
+        """Frequency [Hz] of a hum in what a set leaves of the longest stretch."""
+        counts = [len(p.force) for p in self.full.pieces]
+        longest = counts.index(max(counts))
+        part = slice(sum(counts[:longest]), sum(counts[: longest + 1]))
+        error = np.where(parent.left.valid, parent.left.residual, 0.0)[part]
+        return strongest_line(error, self.full.pieces[longest].stroke.rate)
 
     def _back(self) -> None:
         """The best sets with each of their effects left out, begun where the whole set ended.
@@ -220,7 +281,7 @@ def _without(fit: JointFit, left_out: EffectChoice) -> Array:
     return np.concatenate(kept)
 
 
-def _worth_fitting(gains: Sequence[Gain], count: int, always: Sequence[str]) -> list[Gain]:
+def _worth_fitting(gains: Sequence[Gain], count: int) -> list[Gain]:
     """The most promising effects, each in its best form and in forms that promise nearly as much."""
     best: dict[str, list[Gain]] = {}
     for gain in gains:
@@ -231,7 +292,6 @@ def _worth_fitting(gains: Sequence[Gain], count: int, always: Sequence[str]) -> 
 
     ranked = sorted(best, key=lambda name: -promise(best[name][0]))
     chosen = [n for n in ranked[:count] if promise(best[n][0]) > _PROMISING]
-    chosen += [n for n in always if n in best and n not in chosen]
     return [
         gain
         for name in chosen

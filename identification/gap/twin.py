@@ -11,7 +11,7 @@ from identification.gap.documents import DriveKind, Twin, TwinEffect
 from identification.gap.judge import Judge
 from identification.gap.model import named_effects
 from identification.gap.search import Contender
-from identification.motion import displacement_noise
+from identification.motion import recorded_noise
 from identification.prediction import normalised, per_drive, rmse
 from identification.problem import COORDINATE_COUNT
 from identification.refine import Minimum
@@ -42,7 +42,7 @@ def twin_of(
         specimen: name of the damper.
         provenance: of the diagnosis.
     """
-    noise = float(np.median([displacement_noise(s.displacement, s.measured) for s in assembled.stretches]))
+    noise = float(np.median([recorded_noise(s) for s in assembled.stretches]))
     effects = [TwinEffect.model_validate(e) for e in named_effects(named.fit.active)]
     with_ = ", ".join(e.name for e in effects) or "no effect"
     point = named.fit.coordinates

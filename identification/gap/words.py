@@ -89,11 +89,11 @@ def _sizes(effect: NamedEffect) -> str:
 
 
 def _shrunk(gap: Gap, count: int) -> str:
-    makes = "brings" if count == 1 else "together bring"
+    makes, closes = ("brings", "closes") if count == 1 else ("together bring", "close")
     if gap.shrinkage is None:
         return f"{makes} it to {gap.after_n:.3g} N"
     closed = min(gap.shrinkage, 1.0)
-    return f"{makes} it to {gap.after_n:.3g} N and closes {100 * closed:.0f} % of the gap"
+    return f"{makes} it to {gap.after_n:.3g} N and {closes} {100 * closed:.0f} % of the gap"
 
 
 def _next(verdict: Verdict, effects: Sequence[NamedEffect], alternatives: Sequence[EffectSet], rest: str) -> str:

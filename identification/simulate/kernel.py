@@ -33,6 +33,8 @@ Plan = npt.NDArray[np.uint8]
 
 _MOST_STEPS = 64
 _STEPS_AT_TURN = 4
+_FADED = 1e-200
+"""[1] slope of zeta below which it counts as none."""
 _FIELD_JUMP = 0.05
 """[1] relative change of the yield force in one sample above which the field counts as turning."""
 
@@ -312,7 +314,9 @@ def _solve(weight: float, over_y: Array, over_zeta: Array, Sy: Array, Sz: Array)
     for j in range(len(Sy)):
         first, second = Sy[j], Sz[j]
         Sy[j] = (d * first - b * second) * inverse
-        Sz[j] = (a * second - c * first) * inverse
+        steep = (a * second - c * first) * inverse
+        # In saturation slopes fade away; the last digits before zero would be a hundred times slower to carry on.
+        Sz[j] = steep if abs(steep) > _FADED else 0.0
 
 
 @compiled

@@ -15,6 +15,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.simulate import channel, inputs, yielding
+from identification.simulate.curves import over_parameters
 from identification.simulate.kernel import Derivatives, Plan, march, march_with_slopes
 from identification.simulate.motion import Motion, damper_motion
 from identification.simulate.scaling import Factors, factors
@@ -50,9 +51,9 @@ def simulate(
     field = inputs.damper_field(setting, stroke, slopes)
     scales = factors(setting, stroke, motion, slopes)
     chain = _Chain(setting, stroke, motion, field, scales)
-    give = sum(values[0] for _, _, values in setting.acting("compliance"))
-    if give > 0.0:
-        found, J = chain.yielding(plan, give, fineness, slopes)
+    carrying = connection_of(setting)
+    if carrying[0] > 0.0:
+        found, J = chain.yielding(plan, carrying, fineness, slopes)
     else:
         found, J = chain.rigid(plan, fineness, slopes)
     delays = [_FORCE_DELAY, *(len(UNKNOWNS) + at for at, _, _ in setting.acting("time_shift"))]
@@ -61,6 +62,12 @@ def simulate(
         return replace(found, force=force)
     names = [f"{e.effect.name}.{q.symbol}" for e in setting.effects for q in e.form.parameters]
     return replace(found, force=force, slopes=J, columns=(*UNKNOWNS, *names))
+
+
+def connection_of(setting: Setting) -> Array:
+    """(3,) give [m/N], gap [m] and hardening [1/m²] of what carries the damper; zero where it is rigid."""
+    parts = [form.act(*values) for _, form, values in setting.acting("connection")]
+    return np.asarray(np.sum(np.array(parts, float).reshape(-1, 3), axis=0))
 
 
 class _Chain:
@@ -116,11 +123,13 @@ class _Chain:
             J[:, len(UNKNOWNS) + at] = J[:, _FORCE_DELAY]
         return J
 
-    def yielding(self, plan: Plan, give: float, fineness: float, slopes: bool) -> tuple[Trajectory, Array | None]:
-        """Trajectory and slopes (N, U) behind a fixture with a give [m/N]."""
+    def yielding(
+        self, plan: Plan, carrying: Array, fineness: float, slopes: bool
+    ) -> tuple[Trajectory, Array | None]:
+        """Trajectory and slopes (N, U) behind a connection: its give, gap and hardening (3,)."""
         c, h = self._setting.coordinates, 1.0 / self._stroke.rate
         g = yielding.inputs_of(self._motion, self._field, self._scales, self._beside, h)
-        fixed = np.array([*self._s, c.k1, c.f0, give])
+        fixed = np.array([*self._s, c.k1, c.f0, *carrying])
         start = np.array([self._setting.y0, self._zeta0, self._motion.v[0]])
         if not slopes:
             y, zeta, force = yielding.march(fixed, *g, h, start, fineness, plan)
@@ -131,9 +140,10 @@ class _Chain:
         J = np.zeros((len(partial), len(UNKNOWNS) + sum(len(e.values) for e in self._setting.effects)))
         J[:, _STRUCTURAL_COLUMNS] = partial[:, :STRUCTURAL]
         J[:, [_K1, _F0]] = partial[:, STRUCTURAL : STRUCTURAL + 2]
-        for at, _, _ in self._setting.acting("compliance"):
-            J[:, len(UNKNOWNS) + at] = partial[:, STRUCTURAL + 2]
-        J[:, _Y0] = partial[:, STRUCTURAL + 3]
+        for at, form, values in self._setting.acting("connection"):
+            for k, row in enumerate(over_parameters(form.act, values, form.parameters)):
+                J[:, len(UNKNOWNS) + at + k] += partial[:, STRUCTURAL + 2 : STRUCTURAL + 5] @ row
+        J[:, _Y0] = partial[:, STRUCTURAL + 5]
         columns = [*self._columns, *(len(UNKNOWNS) + at for at, _ in own)]
-        J[:, columns] = partial[:, STRUCTURAL + 4 :]
+        J[:, columns] = partial[:, STRUCTURAL + 6 :]
         return Trajectory(force, y, zeta, self._field.u, plan), self._with_shifts(J)

@@ -1,15 +1,16 @@
 """The march where the fixture gives way: the damper's displacement is a third state.
 
-With R = (x - X) / give - k1 X + f0 - p the force that is left for the dashpot c1 (X where the damper stands, x
+With R = carried(x - X) - k1 X + f0 - p the force that is left for the dashpot c1 (X where the damper stands, x
 where the actuator does, p the force beside the law), the law reads
 
     y' = R / c1      X' = slip + y'      slip = (R - F zeta - k0 (X - y)) / c0      zeta' = g(slip, zeta)
 
-so that each implicit stage is linear in y and X and leaves one scalar equation in zeta, as on a rigid fixture.
-The force on the cell is (x - X) / give. Forces beside the law are taken at the actuator's motion.
+so that each implicit stage of a linear spring is linear in y and X and leaves one scalar equation in zeta, as on a
+rigid fixture; one with a gap, or one that hardens, is taken straight about where it stands until it stands there.
+The force on the cell is what the connection carries. Forces beside the law are taken at the actuator's motion.
 
-``p`` below holds 13 fixed numbers: the ten structural coordinates, k1, f0 and the give; ``g`` the six inputs at
-one instant: x, u, factors of alpha, c0, c1, and the force beside the law.
+``p`` below holds 15 fixed numbers: the ten structural coordinates, k1, f0, and give, gap and hardening of the
+connection; ``g`` the six inputs at one instant: x, u, factors of alpha, c0, c1, and the force beside the law.
 """
 
 import math
@@ -18,6 +19,7 @@ import numpy as np
 
 from identification.arrays import Array, compiled
 from identification.damper import law
+from identification.damper.effects import connection
 from identification.simulate.curves import half_way
 from identification.simulate.inputs import Field
 from identification.simulate.kernel import Plan, choose_steps
@@ -37,8 +39,18 @@ from identification.simulate.step import (
     through_middle,
 )
 
-_FIXED, _INPUTS = 13, 6
-_K1, _F0, _GIVE = 10, 11, 12
+_FIXED, _INPUTS = 15, 6
+_K1, _F0, _GIVE, _GAP, _HARDENING = 10, 11, 12, 13, 14
+_MOST_MOVES = 12
+"""Times that a connection is taken straight anew in one stage."""
+_NEAR = 1e-8
+"""[1] relative error of what it carries at which it stands there."""
+_BEYOND = 1e-12
+"""[m] past the edge of its gap, from where it is taken straight on the other side."""
+
+_carried = compiled(connection.carried)
+_steepness = compiled(connection.steepness)
+_stretched = compiled(connection.stretched)
 
 
 def inputs_of(motion: Motion, field: Field, scales: Factors, beside: Array, h: float) -> tuple[Array, Array]:
@@ -88,7 +100,7 @@ def _law(p: Array, g: Array) -> tuple[float, float, float]:
 def _rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple[float, float, float]:
     """Rates of y, zeta and X."""
     F, c0, c1 = _law(p, g)
-    R = (g[0] - X) / p[_GIVE] - p[_K1] * X + p[_F0] - g[5]
+    R = _carried(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING]) - p[_K1] * X + p[_F0] - g[5]
     y_rate = R / c1
     slip = (R - F * zeta - p[9] * (X - y)) / c0
     beta = p[3] / p[2]
@@ -97,12 +109,44 @@ def _rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple[float, 
 
 @compiled
 def _solve_stage(
-    p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float
+    p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, X: float
 ) -> tuple[float, float, float]:
-    """State at the end of a stage: state = known + w * rates(state), by Newton from ``zeta``."""
+    """State at the end of a stage: state = known + w * rates(state), by Newton from ``zeta`` and ``X``."""
+    give, gap, hardening = p[_GIVE], p[_GAP], p[_HARDENING]
+    stretch, y = g[0] - X, yk
+    for _ in range(_MOST_MOVES):
+        force, steep = _carried(stretch, give, gap, hardening), _steepness(stretch, give, gap, hardening)
+        y, zeta, X = _solve_straight(p, g, yk, zk, Xk, w, zeta, force - steep * stretch, steep)
+        if gap == 0.0 and hardening == 0.0:
+            break
+        moved = g[0] - X
+        straight = force + steep * (moved - stretch)
+        if abs(_carried(moved, give, gap, hardening) - straight) < _NEAR * (1.0 + abs(straight)):
+            break
+        stretch = _next_stretch(stretch, moved, 0.5 * gap)
+    return y, zeta, X
+
+
+@compiled
+def _next_stretch(stretch: float, moved: float, half: float) -> float:
+    """Where to take the connection straight next: at most on the other side of the next edge of its gap."""
+    if stretch <= -half < moved:
+        return -half + _BEYOND
+    if stretch >= half > moved:
+        return half - _BEYOND
+    if abs(stretch) < half <= abs(moved):
+        return half + _BEYOND if moved > 0.0 else -half - _BEYOND
+    return moved
+
+
+@compiled
+def _solve_straight(
+    p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, force: float, steep: float
+) -> tuple[float, float, float]:
+    """The same where the connection carries ``force + steep * stretch``."""
     F, c0, c1 = _law(p, g)
-    k0, k1, give = p[9], p[_K1], p[_GIVE]
-    rho, stiffness = g[0] / give + p[_F0] - g[5], 1.0 / give + k1
+    k0, k1 = p[9], p[_K1]
+    rho, stiffness = force + steep * g[0] + p[_F0] - g[5], steep + k1
     q = 1.0 + c0 / c1 + k0 * w / c1
     inverse = 1.0 / (c0 / w + k0 + stiffness * q)
     constant, slope = (c0 * Xk / w + k0 * yk + rho * q) * inverse, -F * inverse
@@ -128,7 +172,10 @@ def _start(p: Array, g: Array, y0: float, zeta0: float, v0: float) -> float:
     """Where the damper stands at first: the fixture loaded as by the saturated law."""
     F, c0, _ = _law(p, g)
     load = F * zeta0 + c0 * v0 + g[5] - p[_F0]
-    return float((g[0] - p[_GIVE] * load) / (1.0 + p[_GIVE] * p[_K1]))
+    X = g[0]
+    for _ in range(_MOST_MOVES):
+        X = g[0] - _stretched(load + p[_K1] * X, p[_GIVE], p[_GAP], p[_HARDENING])
+    return float(X)
 
 
 @compiled
@@ -138,7 +185,7 @@ def march(
     """States and force along a recording.
 
     Args:
-        p: (13,) fixed numbers.
+        p: (15,) fixed numbers.
         at, middle: (6, N) and (6, N-1) inputs.
         h: [s] time between samples.
         start: y [m], zeta [1] and velocity of the actuator [m/s] at the first sample.
@@ -154,7 +201,8 @@ def march(
     X = _start(p, g, y, zeta, start[2])
     y_rate, zeta_rate, X_rate = _rates(p, g, y, zeta, X)
     for i in range(count):
-        ys[i], zetas[i], forces[i] = y, zeta, (at[0, i] - X) / p[_GIVE]
+        ys[i], zetas[i] = y, zeta
+        forces[i] = _carried(at[0, i] - X, p[_GIVE], p[_GAP], p[_HARDENING])
         if i == count - 1:
             break
         if plan[i] == 0:
@@ -162,9 +210,9 @@ def march(
         w = HALF * h / plan[i]
         for k in range(plan[i]):
             _fill(g, at, middle, i, (k + GAMMA) / plan[i])
-            y1, z1, X1 = _solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta)
+            y1, z1, X1 = _solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta, X)
             _fill(g, at, middle, i, (k + 1.0) / plan[i])
-            y, zeta, X = _solve_stage(p, g, _backward(y1, y), _backward(z1, zeta), _backward(X1, X), w, z1)
+            y, zeta, X = _solve_stage(p, g, _backward(y1, y), _backward(z1, zeta), _backward(X1, X), w, z1, X1)
             y_rate, zeta_rate, X_rate = _rates(p, g, y, zeta, X)
     return ys, zetas, forces
 
@@ -210,7 +258,7 @@ def march_with_slopes(
         over, over_middle: (E, 6, N) and (E, 6, N-1) derivatives of the inputs over further unknowns.
 
     Returns:
-        y [m], zeta [1], force [N], each (N,), and slopes (N, 13 + 1 + E): the fixed numbers, y0, the further ones.
+        y [m], zeta [1], force [N], each (N,), and slopes (N, 15 + 1 + E): the fixed numbers, y0, the further ones.
     """
     count, extra = at.shape[1], len(over)
     columns = _FIXED + 1 + extra
@@ -223,10 +271,10 @@ def march_with_slopes(
     X = _start(p, g, y, zeta, start[2])
     _start_slopes(p, g, zeta, start[2], X, over, S)
     y_rate, zeta_rate, X_rate = _slopes(p, g, y, zeta, X, over, over_middle, 0, 0.0, J, f)
-    give = p[_GIVE]
     for i in range(count):
-        ys[i], zetas[i], forces[i] = y, zeta, (at[0, i] - X) / give
-        _record(slopes[i], S, over[:, 0, i], forces[i], give)
+        ys[i], zetas[i] = y, zeta
+        forces[i] = _carried(at[0, i] - X, p[_GIVE], p[_GAP], p[_HARDENING])
+        _record(slopes[i], S, over[:, 0, i], at[0, i] - X, p)
         if i == count - 1:
             break
         if plan[i] == 0:
@@ -235,13 +283,13 @@ def march_with_slopes(
         for k in range(plan[i]):
             t = (k + GAMMA) / plan[i]
             _fill(g, at, middle, i, t)
-            y1, z1, X1 = _solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta)
+            y1, z1, X1 = _solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta, X)
             _slopes(p, g, y1, z1, X1, over, over_middle, i, t, J1, f1)
             _known_slopes(w, J, S, f, f1, S1)
             _solve(w, J1, S1)
             t = (k + 1.0) / plan[i]
             _fill(g, at, middle, i, t)
-            y, zeta, X = _solve_stage(p, g, _backward(y1, y), _backward(z1, zeta), _backward(X1, X), w, z1)
+            y, zeta, X = _solve_stage(p, g, _backward(y1, y), _backward(z1, zeta), _backward(X1, X), w, z1, X1)
             y_rate, zeta_rate, X_rate = _slopes(p, g, y, zeta, X, over, over_middle, i, t, J, f)
             _backward_slopes(w, f, S1, S)
             _solve(w, J, S)
@@ -249,13 +297,31 @@ def march_with_slopes(
 
 
 @compiled
-def _record(row: Array, S: Array, dx: Array, force: float, give: float) -> None:
+def _record(row: Array, S: Array, dx: Array, stretch: float, p: Array) -> None:
     """Write the slopes of the force at one sample into its row."""
+    steep = _steepness(stretch, p[_GIVE], p[_GAP], p[_HARDENING])
     for j in range(len(row)):
-        row[j] = -S[2, j] / give
+        row[j] = -S[2, j] * steep
     for e in range(len(dx)):
-        row[_FIXED + 1 + e] += dx[e] / give
-    row[_GIVE] -= force / give
+        row[_FIXED + 1 + e] += dx[e] * steep
+    over_give, over_gap, over_hardening = _over_connection(stretch, p)
+    row[_GIVE] += over_give
+    row[_GAP] += over_gap
+    row[_HARDENING] += over_hardening
+
+
+@compiled
+def _over_connection(stretch: float, p: Array) -> tuple[float, float, float]:
+    """Slopes of what the connection carries over its give, gap and hardening."""
+    give, gap, hardening = p[_GIVE], p[_GAP], p[_HARDENING]
+    half = 0.5 * gap
+    bent = stretch - min(max(stretch, -half), half)
+    over_give = -_carried(stretch, give, gap, hardening) / give
+    if bent == 0.0:
+        return over_give, 0.0, 0.0
+    side = 0.5 if bent > 0.0 else -0.5
+    over_gap = side * (connection.FILM / give - _steepness(stretch, give, gap, hardening))
+    return over_give, over_gap, bent**3 / give
 
 
 @compiled
@@ -278,13 +344,16 @@ def _backward_slopes(w: float, f: Array, S1: Array, S: Array) -> None:
 @compiled
 def _start_slopes(p: Array, g: Array, zeta0: float, v0: float, X: float, over: Array, S: Array) -> None:
     """Slopes of where the damper stands at first, written into S."""
-    F, c0, _ = _law(p, g)
-    stiff, give, u = 1.0 + p[_GIVE] * p[_K1], p[_GIVE], g[1]
-    load = F * zeta0 + c0 * v0 + g[5] - p[_F0]
+    u = g[1]
+    give = 1.0 / _steepness(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING])
+    stiff = 1.0 + give * p[_K1]
     S[2, 0], S[2, 1] = -give * g[2] * zeta0 / stiff, -give * u * g[2] * zeta0 / stiff
     S[2, 5], S[2, 6] = -give * g[3] * v0 / stiff, -give * u * g[3] * v0 / stiff
     S[2, _K1], S[2, _F0] = -give * X / stiff, give / stiff
-    S[2, _GIVE] = (-load - p[_K1] * X) / stiff
+    over_give, over_gap, over_hardening = _over_connection(g[0] - X, p)
+    S[2, _GIVE] = give * over_give / stiff
+    S[2, _GAP] = give * over_gap / stiff
+    S[2, _HARDENING] = give * over_hardening / stiff
     for e in range(len(over)):
         d = over[e, :, 0]
         change = (g[2] * p[1] * zeta0 + g[3] * p[6] * v0) * d[1] + d[5]
@@ -308,19 +377,20 @@ def _slopes(
 ) -> tuple[float, float, float]:
     """Rates of y, zeta and X; their slopes over the state into J (3, 3), over all else into f (3, columns)."""
     F, c0, c1 = _law(p, g)
-    k0, give = p[9], p[_GIVE]
-    R = (g[0] - X) / give - p[_K1] * X + p[_F0] - g[5]
+    k0 = p[9]
+    steep = _steepness(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING])
+    R = _carried(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING]) - p[_K1] * X + p[_F0] - g[5]
     y_rate, slip = R / c1, (R - F * zeta - k0 * (X - y)) / c0
     A = 1.0 / p[2]
     beta = p[3] * A
     rate = hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
     over_slip, over_zeta = hysteresis_slopes(slip, zeta, A, beta, A - beta, p[4])
-    stiffness = 1.0 / give + p[_K1]
+    stiffness = steep + p[_K1]
     J[0, 0] = J[0, 1] = 0.0
     J[0, 2] = -stiffness / c1
     J[1, 0], J[1, 1], J[1, 2] = k0 / c0, -F / c0, -(stiffness + k0) / c0
     # Row 1 of J and f holds slopes of the slip until the end, where they become those of zeta' and X'.
-    _over_fixed(p, g, X - y, zeta, R, y_rate, slip, c0, c1, f)
+    _over_fixed(p, g, X, y, zeta, y_rate, slip, c0, c1, f)
     for e in range(len(over)):
         f[0, _FIXED + 1 + e] = f[1, _FIXED + 1 + e] = 0.0
         for k in range(_INPUTS):
@@ -328,7 +398,7 @@ def _slopes(
             if t > 0.0:
                 d = through_middle(d, over_middle[e, k, i], over[e, k, i + 1], t)
             if d != 0.0:
-                over_y, over_s = _over_input(p, g, k, zeta, y_rate, slip, c0, c1)
+                over_y, over_s = _over_input(p, g, k, steep, zeta, y_rate, slip, c0, c1)
                 f[0, _FIXED + 1 + e] += over_y * d
                 f[1, _FIXED + 1 + e] += over_s * d
     for j in range(f.shape[1]):
@@ -349,12 +419,12 @@ def _slopes(
 
 @compiled
 def _over_input(
-    p: Array, g: Array, k: int, zeta: float, y_rate: float, slip: float, c0: float, c1: float
+    p: Array, g: Array, k: int, steep: float, zeta: float, y_rate: float, slip: float, c0: float, c1: float
 ) -> tuple[float, float]:
     """Slopes of y' and of the slip over the k-th input."""
     u = g[1]
     if k == 0:
-        return 1.0 / (p[_GIVE] * c1), 1.0 / (p[_GIVE] * c0)
+        return steep / c1, steep / c0
     if k == 1:
         return -y_rate * g[4] * p[8] / c1, -(g[2] * p[1] * zeta + slip * g[3] * p[6]) / c0
     if k == 2:
@@ -370,9 +440,9 @@ def _over_input(
 def _over_fixed(
     p: Array,
     g: Array,
-    stretch: float,
+    X: float,
+    y: float,
     zeta: float,
-    R: float,
     y_rate: float,
     slip: float,
     c0: float,
@@ -380,18 +450,19 @@ def _over_fixed(
     f: Array,
 ) -> None:
     """Slopes of y' (row 0) and of the slip (row 1) over the fixed numbers and y0."""
-    give, u = p[_GIVE], g[1]
-    X = (g[0] / give + p[_F0] - g[5] - R) / (1.0 / give + p[_K1])
+    u = g[1]
     for j in range(_FIXED + 1):
         f[0, j] = f[1, j] = 0.0
     f[1, 0], f[1, 1] = -g[2] * zeta / c0, -u * g[2] * zeta / c0
     f[1, 5], f[1, 6] = -slip * g[3] / c0, -u * slip * g[3] / c0
     f[0, 7], f[0, 8] = -y_rate * g[4] / c1, -u * y_rate * g[4] / c1
-    f[1, 9] = -stretch / c0
+    f[1, 9] = -(X - y) / c0
     f[0, _K1], f[1, _K1] = -X / c1, -X / c0
     f[0, _F0], f[1, _F0] = 1.0 / c1, 1.0 / c0
-    loaded = -(g[0] - X) / (give * give)
-    f[0, _GIVE], f[1, _GIVE] = loaded / c1, loaded / c0
+    over_give, over_gap, over_hardening = _over_connection(g[0] - X, p)
+    f[0, _GIVE], f[1, _GIVE] = over_give / c1, over_give / c0
+    f[0, _GAP], f[1, _GAP] = over_gap / c1, over_gap / c0
+    f[0, _HARDENING], f[1, _HARDENING] = over_hardening / c1, over_hardening / c0
 
 
 @compiled

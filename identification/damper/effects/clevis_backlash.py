@@ -1,7 +1,8 @@
 """Play in the clevis: the pin crosses a gap before the damper moves.
 
-The damper is held where it is while the actuator crosses the gap (the play operator): at the end of each
-sample it stands within half a gap of the actuator.
+Either the damper is held where it is while the actuator crosses the gap, as dry friction holds it (the play
+operator): at the end of each sample it stands within half a gap of the actuator. Or the pin lies free in the gap
+and carries nothing there: the damper unloads first, and the gap opens where the force changes its sign.
 """
 
 from typing import Any
@@ -15,6 +16,11 @@ def follow(held: Any, x: Any, gap: Any) -> Any:
     return min(max(held, x - gap / 2), x + gap / 2)
 
 
+def pin(gap: Any, softness: Any) -> Any:
+    """Give [m/N], gap [m] and hardening [1/m²] of the connection."""
+    return softness * gap, gap, 0.0
+
+
 CLEVIS_BACKLASH = Effect(
     name="clevis_backlash",
     stage="mounting",
@@ -26,6 +32,16 @@ CLEVIS_BACKLASH = Effect(
             (Quantity("gap", "m", 0.0, 2e-3, 1e-4, "free travel of the pin from side to side"),),
             ((3e-5,), (1e-4,), (3e-4,)),
             follow,
+        ),
+        Form(
+            "free_pin",
+            "connection",
+            (
+                Quantity("gap", "m", 0.0, 2e-3, 1e-4, "free travel of the pin from side to side"),
+                Quantity("softness", "1/N", 1e-6, 1e-2, 1e-4, "give of pin and eye in contact, over the gap"),
+            ),
+            ((3e-5, 2e-4), (1e-4, 1e-4), (3e-4, 3e-5)),
+            pin,
         ),
     ),
 )

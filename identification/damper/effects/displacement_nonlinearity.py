@@ -1,7 +1,8 @@
 """A displacement channel that is not straight: what it adds to the true displacement.
 
-A gain is visible to calibration alone, so both parts have none at the middle: a bow, even in x, and a curve, odd
-in x. Both are bounded, so that strokes beyond those recorded are not distorted without limit.
+A gain is visible to calibration alone, so bow (even in x) and curve (odd in x) have none at the middle. They level
+off far from it, or follow powers as a polynomial calibration would leave them; or the error is a wave, as uneven
+windings or the pitch of a scale make it.
 """
 
 from typing import Any
@@ -19,6 +20,21 @@ def bent(x: Any, bow: Any, curve: Any, reach: Any) -> Any:
     return bow * even + curve * even * part / np.sqrt(1.0 + part * part)
 
 
+def powers(x: Any, bow: Any, curve: Any) -> Any:
+    """The same by powers of x: bow and curve are what the channel adds at ``_ARM`` [m]."""
+    part = x / _ARM
+    return part * part * (bow + curve * part)
+
+
+def wave(x: Any, cosine: Any, sine: Any, pitch: Any) -> Any:
+    """The same as a wave along the stroke, zero at the middle."""
+    angle = 2.0 * np.pi * x / pitch
+    return cosine * (1.0 - np.cos(angle)) + sine * np.sin(angle)
+
+
+_ARM = 0.01
+"""[m] from the middle at which the coefficients of the powers are told."""
+
 DISPLACEMENT_NONLINEARITY = Effect(
     name="displacement_nonlinearity",
     stage="displacement_channel",
@@ -34,6 +50,27 @@ DISPLACEMENT_NONLINEARITY = Effect(
             ),
             ((0.0, 0.0, 0.01), (0.0, 0.0, 0.03)),
             bent,
+        ),
+        Form(
+            "powers",
+            "displacement_map",
+            (
+                Quantity("bow", "m", -5e-3, 5e-3, 5e-5, "even part, 10 mm from the middle"),
+                Quantity("curve", "m", -5e-3, 5e-3, 5e-5, "odd part, 10 mm from the middle"),
+            ),
+            ((0.0, 0.0),),
+            powers,
+        ),
+        Form(
+            "wave",
+            "displacement_map",
+            (
+                Quantity("cosine", "m", -5e-3, 5e-3, 5e-5, "even part of the wave"),
+                Quantity("sine", "m", -5e-3, 5e-3, 5e-5, "odd part of the wave"),
+                Quantity("pitch", "m", 4e-3, 0.08, 0.02, "length of the wave"),
+            ),
+            ((0.0, 0.0, 0.01), (0.0, 0.0, 0.02), (0.0, 0.0, 0.04)),
+            wave,
         ),
     ),
 )

@@ -23,7 +23,7 @@ Action = Literal[
     "softening",
     "parallel_force",
     "displacement_follower",
-    "compliance",
+    "connection",
     "inertia",
     "time_shift",
     "force_lag",
@@ -42,7 +42,8 @@ Action = Literal[
   not yet given away: it leaves with the time constant ``recovery`` among the parameters [s].
 - ``parallel_force``: displacement, velocity of the damper -> force beside the law [N].
 - ``displacement_follower``: where the damper stood, where the actuator is [m] -> where the damper stands [m].
-- ``compliance``: () -> give of the fixture [m/N].
+- ``connection``: () -> give [m/N], gap [m] and hardening [1/m²] of what carries the damper; those of several add
+  up.
 - ``inertia``: acceleration of the actuator [m/s^2] -> force between load cell and damper [N].
 - ``time_shift``: () -> time by which the force channel is late [s].
 - ``force_lag``: () -> time constant of a lag in the force channel [s].

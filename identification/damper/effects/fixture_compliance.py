@@ -1,7 +1,8 @@
 """A fixture that gives way: a spring between load cell and damper, in series with it.
 
-The damper stands at x - compliance * force, and its force depends on where and how fast it moves: the two are
-solved together. Give in front of the load cell is no effect: the displacement is measured behind it.
+The damper stands behind by the stretch of the spring, and its force depends on where and how fast it moves: the
+two are solved together. A spring of screws and plates hardens as its gaps close. Give in front of the load cell is
+no effect: the displacement is measured behind it.
 """
 
 from typing import Any
@@ -10,9 +11,14 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def give(compliance: Any) -> Any:
-    """Give of the fixture [m/N]."""
-    return compliance
+def linear(compliance: Any) -> Any:
+    """Give [m/N], gap [m] and hardening [1/m²] of the connection."""
+    return compliance, 0.0, 0.0
+
+
+def hardening(compliance: Any, hardening: Any) -> Any:
+    """The same of a spring that hardens."""
+    return compliance, 0.0, hardening
 
 
 FIXTURE_COMPLIANCE = Effect(
@@ -22,10 +28,20 @@ FIXTURE_COMPLIANCE = Effect(
     forms=(
         Form(
             "linear",
-            "compliance",
+            "connection",
             (Quantity("compliance", "m/N", 0.0, 1e-4, 1e-6, "give of the fixture under load"),),
-            ((3e-7,), (2e-6,)),
-            give,
+            ((5e-8,), (3e-7,), (2e-6,)),
+            linear,
+        ),
+        Form(
+            "hardening",
+            "connection",
+            (
+                Quantity("compliance", "m/N", 0.0, 1e-4, 1e-6, "give of the fixture under a small load"),
+                Quantity("hardening", "1/m²", 0.0, 1e12, 1e7, "growth of its stiffness over the squared stretch"),
+            ),
+            ((1e-7, 1e7), (4e-7, 1e7)),
+            hardening,
         ),
     ),
 )

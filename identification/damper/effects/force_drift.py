@@ -1,6 +1,7 @@
 """A force channel whose zero wanders: warming electronics, a cell that creeps.
 
-Either the zero settles towards another value, or it swings slowly. Both stay bounded for all time.
+Either the zero settles towards another value, or it swings slowly, or it wanders: a wave with two overtones. All
+stay bounded for all time.
 """
 
 from typing import Any
@@ -21,6 +22,20 @@ def swinging(time: Any, drive: Any, cosine: Any, sine: Any, period: Any) -> Any:
     angle = 2.0 * np.pi * time / period
     return cosine * np.cos(angle) + sine * np.sin(angle) + 0.0 * drive
 
+
+def wandering(time: Any, drive: Any, c1: Any, s1: Any, c2: Any, s2: Any, c3: Any, s3: Any, period: Any) -> Any:
+    """The same as a slow wave with two overtones."""
+    angle = 2.0 * np.pi * time / period
+    wave = c1 * np.cos(angle) + s1 * np.sin(angle)
+    wave = wave + c2 * np.cos(2.0 * angle) + s2 * np.sin(2.0 * angle)
+    return wave + c3 * np.cos(3.0 * angle) + s3 * np.sin(3.0 * angle) + 0.0 * drive
+
+
+_PARTS = tuple(
+    Quantity(f"{part}_{order}", "N", -1e4, 1e4, 5.0, f"{part} of the wave at {order} times its frequency")
+    for order in (1, 2, 3)
+    for part in ("cosine", "sine")
+)
 
 FORCE_DRIFT = Effect(
     name="force_drift",
@@ -47,6 +62,13 @@ FORCE_DRIFT = Effect(
             ),
             ((0.0, 0.0, 25.0), (0.0, 0.0, 50.0), (0.0, 0.0, 100.0), (0.0, 0.0, 250.0)),
             swinging,
+        ),
+        Form(
+            "wandering",
+            "added_force",
+            (*_PARTS, Quantity("period", "s", 30.0, 3000.0, 100.0, "period of the slowest wave")),
+            ((0.0,) * 6 + (60.0,), (0.0,) * 6 + (120.0,)),
+            wandering,
         ),
     ),
 )

@@ -25,6 +25,17 @@ def followed(remembered: Any, change: Any, residue: Any, width: Any) -> Any:
     return target + (remembered - target) * np.exp(-abs(change) / max(width, _NARROWEST))
 
 
+def closing(field: Any, remembered: Any, residue: Any, width: Any, tip: Any) -> Any:
+    """The same of a loop whose branches meet again far beyond a field [V or A]."""
+    return field + residue * remembered / (1.0 + (field / tip) ** 2)
+
+
+def followed_closing(remembered: Any, change: Any, residue: Any, width: Any, tip: Any) -> Any:
+    """Share [1] of the residue after a change of the field [V or A] in one sense."""
+    target = -1.0 if change > 0.0 else 1.0
+    return target + (remembered - target) * np.exp(-abs(change) / max(width, _NARROWEST))
+
+
 def held_back(field: Any, remembered: Any, residue: Any) -> Any:
     """Field that the damper sees [V or A]; what is remembered is its distance from the coil's own."""
     return field + remembered
@@ -50,6 +61,18 @@ MAGNETIC_REMANENCE = Effect(
             ((0.0, 0.05), (0.0, 0.3)),
             lifted,
             followed,
+        ),
+        Form(
+            "closing",
+            "field_memory",
+            (
+                Quantity("residue", "{drive}", 0.0, 1.0, 0.02, "distance that remains after a long way"),
+                Quantity("width", "{drive}", 5e-3, 5.0, 0.1, "change of drive over which it turns"),
+                Quantity("tip", "{drive}", 0.02, 20.0, 0.5, "field at which half of the distance is left"),
+            ),
+            ((0.0, 0.05, 0.4), (0.0, 0.15, 0.4), (0.0, 0.3, 1.5)),
+            closing,
+            followed_closing,
         ),
         Form(
             "play",

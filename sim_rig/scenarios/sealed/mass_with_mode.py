@@ -32,7 +32,7 @@ MASS_WITH_MODE = Form(
     stage="mounting",
     place=Place.CELL,
     parameters=(
-        Quantity("mass", "kg", 0.0, 500.0, 1.5, "mass between load cell and damper"),
+        Quantity("mass", "kg", 0.0, 40.0, 1.5, "mass between load cell and damper"),
         Quantity("frequency", "Hz", 5.0, 300.0, 45.0, "at which the bracket rings"),
     ),
     meaning="the load cell carries mass of the fixture",

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from sim_rig.can_bus import BusTiming, CanFrame, frame_bits
+from sim_rig.command_track import JoinedTrack
 from sim_rig.drive_motion import Demand, Motion
 
 MILLISECOND = 1_000_000
@@ -63,20 +64,37 @@ def test_speed_is_limited():
     assert demand.position == pytest.approx(0.002)
 
 
-def test_the_legs_that_setpoints_give_join_and_are_what_the_demand_follows():
-    demand, period = Demand(), 4 * MILLISECOND
-    legs = []
-    for k in range(50):
+def test_legs_join_and_lead_along_a_smooth_curve_through_the_setpoints():
+    demand, track, period = Demand(), JoinedTrack(0.0, 1), 4 * MILLISECOND
+    newest = []
+    for k in range(100):
         demand.advance(k * period)
-        legs.append(demand.follow(1e-3 * np.sin(k / 5), k * period, period, 1.0, 10.0))
-    assert [leg.begin_ns for leg in legs[1:]] == [leg.end_ns for leg in legs[:-1]]
-    times = np.arange(49 * period, 52 * period, MILLISECOND)
-    followed = []
-    for now in times:
-        demand.advance(int(now))
-        followed.append(demand.position)
-    way = np.interp(times, [leg.end_ns for leg in legs], [leg.target for leg in legs])
-    assert followed == pytest.approx(way, abs=1e-9)
+        legs = demand.follow(5e-3 * np.sin(k / 16), k * period, period, 1.0, 10.0)
+        newest.append(legs[-1])
+        for leg in legs:
+            track.add(leg.end_ns - 1, leg.target, leg.begin_ns - 1)
+    assert [leg.begin_ns for leg in newest[1:]] == [leg.end_ns for leg in newest[:-1]]
+    times = np.arange(20 * period, 90 * period, MILLISECOND)
+    assert track.at(times) == pytest.approx(5e-3 * np.sin((times / period - 4) / 16), abs=1e-7)
+
+
+def test_a_host_that_was_silent_for_a_period_before_it_set_out_is_not_taken_for_late():
+    demand, period = Demand(), 4 * MILLISECOND
+    for k in range(200):
+        at = k * period + (period if k > 50 else 0)
+        demand.advance(at)
+        demand.follow(max(k - 50, 0) * 1e-4, at, period, 1.0, 10.0)
+    demand.advance(204 * period)
+    assert demand.position == pytest.approx(149e-4)
+
+
+def test_a_leg_that_the_rod_is_already_on_is_not_bent_any_more():
+    demand, period = Demand(), 4 * MILLISECOND
+    for k in range(6):
+        demand.advance(k * period)
+        demand.follow(k * k * 1e-5, k * period, period, 1.0, 10.0)
+    demand.advance(10 * period)
+    assert len(demand.follow(36e-5, 6 * period, period, 1.0, 10.0)) == 1
 
 
 def test_a_setpoint_that_is_nearly_a_period_late_leaves_the_grid_where_it_was():

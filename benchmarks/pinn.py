@@ -1,0 +1,143 @@
+"""The networks against known truth: unseen force, parameters in Cramér-Rao deviations, time.
+
+    python -m benchmarks pinn                     all parts; takes hours on a busy machine
+    python -m benchmarks.pinn local dampers       some of them
+
+`MRBENCH_SHARED` names the folder with the recordings of real dampers; without it that part is left out.
+"""
+
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from benchmarks.desk import Desk
+from benchmarks.fitting import random_damper
+from benchmarks.pinn_cases import LABORATORY, Score, random_strokes, try_out
+from benchmarks.timing import line
+from identification.assemble import assemble
+from identification.identify import Request, identify
+from identification.prediction import predict_piece, rmse
+from identification.refine import Settings
+
+SEEDS, DAMPERS = 10, 100
+_ROW = "  {:>6} {:>10.4f} {:>10.2f} {:>9.1f} {:>9} {:>12.3f} {:>12.3f}"
+_HEAD = "  {:>6} {:>10} {:>10} {:>9} {:>9} {:>12} {:>12}".format(
+    "seed", "unseen", "pooled", "s", "accepted", "own force", "simulated"
+)
+
+
+def _table(title: str, scores: dict[int, Score]) -> list[Score]:
+    print(f"{title}\n{_HEAD}")
+    for seed, s in scores.items():
+        word = "yes" if s.accepted else "no"
+        print(_ROW.format(seed, s.ratio, s.pooled, s.seconds, word, s.reconstruction, s.simulation), flush=True)
+    return list(scores.values())
+
+
+def _summary(scores: list[Score], ratio: float, pooled: float, seconds: float) -> None:
+    """How many of the scores keep within the bars."""
+    of = f"of {len(scores)}"
+    line(f"unseen at most {ratio}", sum(s.ratio <= ratio for s in scores), of, "")
+    line(f"pooled at most {pooled}", sum(s.pooled <= pooled for s in scores), of, "")
+    line(f"at most {seconds} s", sum(s.seconds <= seconds for s in scores), of, "")
+    line("worst unseen, worst pooled", max(s.ratio for s in scores), f"{max(s.pooled for s in scores):.2f}", "")
+    line("median and longest time", float(np.median([s.seconds for s in scores])), "s",
+         f"{max(s.seconds for s in scores):.1f} s")  # fmt: skip
+
+
+def local() -> None:
+    """Preset local, six voltages."""
+    scores = {seed: try_out("local", LABORATORY, seed) for seed in range(SEEDS)}
+    _summary(_table("local, six voltages (12 s)", scores), 1.005, 1.5, 5.0)
+
+
+def pairs() -> None:
+    """Preset local, four pairs of amplitude and frequency."""
+    scores = {seed: try_out("local", LABORATORY, seed, pairs=True) for seed in range(SEEDS)}
+    _summary(_table("local, four pairs (56 s)", scores), 1.005, 1.5, 30.0)
+
+
+def dampers() -> None:
+    """Preset local, random dampers."""
+    scores = {seed: try_out("local", random_damper(seed), seed) for seed in range(DAMPERS)}
+    found = _table("local, random dampers, six voltages", scores)
+    _summary(found, 1.02, 2.5, 30.0)
+    taken = [s for s in found if s.accepted]
+    line("accepted by the network's own judgement", len(taken), f"of {len(found)}", "")
+    line("of these, unseen at most 1.02", sum(s.ratio <= 1.02 for s in taken), f"of {len(taken)}", "")
+
+
+def globally() -> None:
+    """Preset global, six voltages."""
+    scores = {seed: try_out("global", LABORATORY, seed) for seed in range(SEEDS)}
+    _summary(_table("global, six voltages (12 s)", scores), 1.03, 4.0, 120.0)
+
+
+def paper() -> None:
+    """Preset paper, six voltages."""
+    scores = {seed: try_out("paper", LABORATORY, seed) for seed in range(2)}
+    _table("paper, six voltages (12 s)", scores)
+
+
+def displacement() -> None:
+    """A random displacement with noise: pinn beside refine, on another recording."""
+    print("random displacement, 5 µm of noise: unseen error of pinn over that of refine")
+    for seed in range(3):
+        fits = [
+            identify([random_strokes(seed)], Request(settings=Settings(seed=seed), stages=(stage,)))
+            for stage in ("pinn", "refine")
+        ]
+        pieces = assemble([random_strokes(seed + 100)]).pieces
+        errors = [
+            rmse(np.concatenate([predict_piece(p, fit.point()).force - p.force for p in pieces])) for fit in fits
+        ]
+        line(f"seed {seed}, {fits[0].stages[0].seconds:.0f} s", errors[0] / errors[1], "x", "at most 1.05")
+
+
+_REAL = {
+    "utfsm": (
+        "utfsm_sine/*.csv.gz",
+        "--drive-kind coil_a",
+        "--hold-out '5mm_4Hz*,25mm_0.5Hz*' --delay-prior 0.01",
+    ),
+    "nees": ("nees_dyke/ranran_50.csv.gz", "--drive-kind driver_command_v", "--hold-out-after 0.6"),
+}
+
+
+def real() -> None:
+    """Two real dampers: pinn beside refine on what both did not see."""
+    shared = os.environ.get("MRBENCH_SHARED")
+    if not shared:
+        print("real dampers: left out, MRBENCH_SHARED names no folder")
+        return
+    with TemporaryDirectory() as folder:
+        desk = Desk(Path(folder))
+        for name, (files, how, options) in _REAL.items():
+            desk.type(f"mrbench import {shared}/data/{files} --out {name}.mcap {how}")
+            errors = []
+            for stage in ("pinn", "refine"):
+                desk.type(f"mrbench identify {name}.mcap {options} --stages {stage} --out {name}.json")
+                fit = desk.document(name)
+                errors.append(fit["rmse_n"]["held_out"])
+                print(f"  {name} {stage}: {fit['stages'][0]['seconds']:.0f} s, {fit['result']}")
+            line(f"{name}: held-out error of pinn over that of refine", errors[0] / errors[1], "x", "at most 1.05")
+
+
+PARTS: dict[str, Callable[[], None]] = {
+    "local": local, "pairs": pairs, "dampers": dampers, "global": globally, "paper": paper,
+    "displacement": displacement, "real": real,
+}  # fmt: skip
+
+
+def run(names: tuple[str, ...] = tuple(PARTS)) -> None:
+    """Print the parts asked for."""
+    for name in names:
+        PARTS[name]()
+
+
+if __name__ == "__main__":
+    run(tuple(sys.argv[1:]) or tuple(PARTS))

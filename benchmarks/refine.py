@@ -1,0 +1,167 @@
+"""Output-error refinement: a hundred random dampers, errors against the Cramér-Rao bound, and scipy as baseline.
+
+The baseline is what a careful person would write first: `scipy.optimize.least_squares` with differences for
+slopes, the law in Python under `solve_ivp`, method LSODA. It gets the same start, the same search numbers and the
+same data, and is timed to the same final cost.
+
+    python -m benchmarks.refine dampers [FIRST LAST FILE]
+    python -m benchmarks.refine baseline
+"""
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+from benchmarks.fitting import RISING, SHUFFLED, TRAINING, UNSEEN, random_damper, recorded, stroke
+from benchmarks.timing import cpu_seconds, line, reference_seconds
+from identification.damper import law
+from identification.damper.coordinates import Coordinates, to_coordinates
+from identification.damper.parameter_sets import parameter_set
+from identification.foresight.information import sizes
+from identification.prediction import predict_piece, rmse
+from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.refine import refine
+from identification.search_space import SearchSpace
+from identification.start import starting_points
+from identification.uncertainty import coordinate_covariance, covariance
+
+DAMPERS = 100
+EQUAL = 1.001
+"""[1] ratio of two costs that count as equal."""
+FEW = (0.0, 0.5, 0.2)
+"""[V] drives of the baseline's recording, two seconds each: its slowness asks for a short one."""
+
+
+def problem_of(
+    c: Coordinates,
+    seed: int,
+    training: tuple[tuple[float, float], ...] = TRAINING,
+    levels: tuple[float, ...] = SHUFFLED,
+) -> Problem:
+    """Strokes of a damper with noise of one per cent of the force."""
+    strokes = [stroke(a, f, levels) for a, f in training]
+    forces, noise = recorded(c, strokes, seed)
+    pieces = tuple(
+        Piece(str(i), s, f, np.ones(len(f))) for i, (s, f) in enumerate(zip(strokes, forces, strict=True))
+    )
+    return Problem(pieces, SearchSpace(0.0, 0.5), noise, 20e-6)
+
+
+def fitted(c: Coordinates, seed: int) -> dict[str, Any]:
+    """Time [s], unseen error over the true damper's, and errors in Cramér-Rao deviations of one fit."""
+    problem = problem_of(c, seed)
+    began = time.process_time()
+    minimum = refine(problem)
+    spent = time.process_time() - began
+    found = problem.space.to_coordinates(minimum.unknowns[:COORDINATE_COUNT])
+    deviation = np.sqrt(np.diag(coordinate_covariance(problem, minimum, covariance(problem, minimum))))
+    strokes = [stroke(a, f, RISING) for a, f in UNSEEN]
+    forces, _ = recorded(c, strokes, seed + 500)
+    pieces = tuple(Piece("unseen", s, f, np.ones(len(f))) for s, f in zip(strokes, forces, strict=True))
+    errors = [np.concatenate([predict_piece(p, d).force - p.force for p in pieces]) for d in (found, c)]
+    return {
+        "seed": seed,
+        "seconds": spent,
+        "unseen": rmse(errors[0]) / rmse(errors[1]),
+        "errors": list((np.array(found) - np.array(c)) / np.maximum(deviation, 1e-12 * sizes(c))),
+    }
+
+
+def dampers(first: int = 0, last: int = DAMPERS, results: Path | None = None) -> None:
+    """Fit random dampers; with a file, results are kept a line each and the table is of all in it."""
+    done = [json.loads(text) for text in results.read_text().splitlines()] if results and results.exists() else []
+    fitted(to_coordinates(parameter_set("laboratory").parameters), 0)
+    for seed in sorted(set(range(first, last)) - {row["seed"] for row in done}):
+        done.append(fitted(random_damper(seed), seed))
+        if results:
+            with results.open("a") as file:
+                file.write(json.dumps(done[-1]) + "\n")
+    _table(done)
+
+
+def _table(done: list[dict[str, Any]]) -> None:
+    unseen, seconds = (np.array([row[key] for row in done]) for key in ("unseen", "seconds"))
+    errors = np.array([row["errors"] for row in done])
+    print(
+        f"refine: {len(done)} random dampers, 56 000 samples each, no guess; reference {reference_seconds():.4f} s"
+    )
+    line("unseen force error at most 1.01 of the true damper's", float((unseen <= 1.01).sum()), "", "all")
+    line("the worst of them", unseen.max(), "x", "at most 1.01")
+    line("median time", float(np.median(seconds)), "s", "at most 0.3 s")
+    line("longest time", seconds.max(), "s", "")
+    pooled = float(np.sqrt(np.mean(errors**2)))
+    line("errors in Cramér-Rao deviations, root mean square", pooled, "", "0.9 to 1.1")
+    for name, column in zip(Coordinates._fields, errors.T, strict=True):
+        line(f"  {name}", float(np.sqrt(np.mean(column**2))), "", f"mean {column.mean():+.2f}")
+
+
+def scipy_force(c: Coordinates, y0: float, piece: Piece, amplitude: float, frequency: float) -> np.ndarray:
+    """Force [N] (N,) by solve_ivp, LSODA, the law in Python; states y, zeta and the field."""
+    w, levels, duration = 2 * np.pi * frequency, FEW, 2.0
+    shape = (1 / c.D_y, c.rho / c.D_y, (1 - c.rho) / c.D_y, c.n)
+
+    def inner(t: float, y: float, zeta: float, u: float) -> float:
+        x, v = amplitude * np.sin(w * t), amplitude * w * np.cos(w * t)
+        alpha, c0, c1 = c.F_a + c.F_b * u, c.c0_a + c.c0_b * u, c.c1_a + c.c1_b * u
+        return float(law.inner_velocity(x, v, y, zeta, alpha, c0, c1, c.k0))
+
+    def rates(t: float, state: np.ndarray) -> tuple[float, float, float]:
+        y, zeta, u = state
+        y_rate = inner(t, y, zeta, u)
+        slip = amplitude * w * np.cos(w * t) - y_rate
+        drive = levels[min(int((t + 1e-9) / duration), len(levels) - 1)]
+        return y_rate, law.hysteresis_rate(slip, zeta, *shape), law.field_rate(u, drive, c.eta)
+
+    t = np.arange(len(piece.force)) / piece.stroke.rate
+    v0 = amplitude * w
+    start = [y0, v0 / (v0 + 1e-3), levels[0]]
+    y, zeta, u = solve_ivp(rates, (0, t[-1]), start, "LSODA", t, rtol=1e-6, atol=1e-8, max_step=1e-2).y
+    y_rate = np.array([inner(*values) for values in zip(t, y, zeta, u, strict=True)])
+    x = amplitude * np.sin(w * t)
+    return np.asarray((c.c1_a + c.c1_b * u) * y_rate + c.k1 * x - c.f0)
+
+
+def baseline() -> None:
+    """Time scipy's own way to the cost that ours ends at, on one stroke of 6 000 samples."""
+    amplitude, frequency = TRAINING[1]
+    default = to_coordinates(parameter_set("laboratory").parameters)
+    problem = problem_of(default, 0, ((amplitude, frequency),), FEW)
+    piece, start = problem.pieces[0], starting_points(problem)[0]
+    moving = np.flatnonzero(problem.free & ~problem.delays)
+    low, high = (bound[moving] for bound in problem.bounds())
+
+    def residuals(values: np.ndarray) -> np.ndarray:
+        unknowns = start.copy()
+        unknowns[moving] = values
+        setting = problem.setting(unknowns, 0)
+        force = scipy_force(setting.coordinates, setting.y0, piece, amplitude, frequency)
+        return np.nan_to_num((force - piece.force) / problem.noise, nan=1e3)
+
+    ours = refine(problem)
+    spent = cpu_seconds(lambda: refine(problem), 5)
+    began = time.process_time()
+    theirs = least_squares(
+        residuals, start[moving], bounds=(low, high), diff_step=1e-4, x_scale="jac", max_nfev=60
+    )
+    needed = time.process_time() - began
+    cost = 2.0 * theirs.cost / ours.evaluation.cost
+    print(f"baseline: 6 000 samples, the same start; reference {reference_seconds():.4f} s")
+    line("ours, least of five", spent, "s", "")
+    line("scipy: least_squares with solve_ivp LSODA", needed, "s", f"{theirs.nfev} steps, {theirs.message}")
+    line("its final cost over ours", cost, "", f"equal below {EQUAL}")
+    line("time over ours", needed / spent, "x", "at least 200")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == ["baseline"]:
+        baseline()
+    elif len(sys.argv) > 4:
+        dampers(int(sys.argv[2]), int(sys.argv[3]), Path(sys.argv[4]))
+    else:
+        dampers()

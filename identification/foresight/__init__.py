@@ -1,0 +1,1 @@
+"""What planned strokes can tell of a damper, before anything moves."""

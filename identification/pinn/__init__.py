@@ -1,0 +1,1 @@
+"""The physics-informed network: finds the damper's parameters by training, never by fitting a simulation."""

@@ -1,0 +1,110 @@
+"""Training of a chosen network on a problem, and the two figures that it is judged by."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from identification.arrays import Array
+from identification.damper.coordinates import Coordinates
+from identification.pinn.local_runs import train_local
+from identification.pinn.result import Errors, Outcome, PinnResult
+from identification.pinn.settings import GlobalSettings, LocalSettings, PaperSettings
+from identification.pinn.split import validation_masks
+from identification.pinn.supervision import Supervision
+from identification.prediction import predict_piece, rmse
+from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.recordings import Stretch
+
+
+def train(
+    problem: Problem,
+    settings: LocalSettings | GlobalSettings | PaperSettings,
+    supervision: Supervision | None = None,
+    stretches: Sequence[Stretch] | None = None,
+) -> PinnResult:
+    """Train a network and judge what it found.
+
+    No simulation enters the training; one is run afterwards, to judge.
+
+    Args:
+        problem: recordings, noise, bounds.
+        settings: which network, and how.
+        supervision: progress, stop and budget.
+        stretches: the recordings behind the pieces, where the motion may be estimated again.
+
+    Raises:
+        Stopped: before anything was found.
+    """
+    supervision = supervision or Supervision()
+    held = validation_masks(problem.pieces, settings.validation_share, settings.seed)
+    with threadpool_limits(1, "blas"):
+        outcome, blind = _network(settings)(problem, held, settings, supervision, stretches)
+    seconds = supervision.seconds
+    return _judged(problem, held, settings.network, outcome, blind, seconds)
+
+
+def _network(settings: LocalSettings | GlobalSettings | PaperSettings) -> Callable[..., tuple[Outcome, Outcome]]:
+    """The training of a kind of network; the others stay unloaded, and torch with them."""
+    if isinstance(settings, LocalSettings):
+        return train_local
+    import torch
+
+    torch.set_num_threads(1)
+    if isinstance(settings, GlobalSettings):
+        from identification.pinn.global_runs import train_global
+
+        return train_global
+    from identification.pinn.paper_runs import train_paper
+
+    return train_paper
+
+
+def _judged(
+    problem: Problem, held: Sequence[Array], network: str, outcome: Outcome, blind: Outcome, seconds: float
+) -> PinnResult:
+    """The outcome with its errors; ``blind`` is the one that had not seen the blocks set aside."""
+    # y(0) is a parameter too: it must not be fitted to the blocks that judge it.
+    seen = problem.with_training([p.train - aside for p, aside in zip(problem.pieces, held, strict=True)])
+    point, delays = _resolved(problem, outcome)
+    simulated, judged = (
+        tuple(predict_piece(p, *_resolved(problem, one)).force for p in seen.pieces) for one in (outcome, blind)
+    )
+    q, covariance = outcome.unknowns[:COORDINATE_COUNT], None
+    if outcome.covariance is not None:
+        D = problem.space.slopes(q)
+        covariance = D @ outcome.covariance[:COORDINATE_COUNT, :COORDINATE_COUNT] @ D.T
+    return PinnResult(
+        network=network,
+        coordinates=point,
+        covariance=outcome.covariance,
+        coordinate_covariance=covariance,
+        delays=delays,
+        reconstruction=_errors(problem.pieces, held, outcome.forces, blind.forces),
+        simulation=_errors(problem.pieces, held, simulated, judged),
+        reconstructed=outcome.forces,
+        simulated=simulated,
+        accepted=outcome.accepted,
+        note=outcome.note,
+        steps=outcome.steps,
+        seconds=seconds,
+        history=outcome.history,
+    )
+
+
+def _resolved(problem: Problem, outcome: Outcome) -> tuple[Coordinates, tuple[float, float]]:
+    point = problem.space.to_coordinates(outcome.unknowns[:COORDINATE_COUNT])
+    force, drive = outcome.unknowns[COORDINATE_COUNT:] * problem.delay_prior
+    return point, (float(force), float(drive))
+
+
+def _errors(
+    pieces: Sequence[Piece], held: Sequence[Array], forces: Sequence[Array], blind: Sequence[Array]
+) -> Errors:
+    """Errors of the final forces on training samples, and of the blind ones on validation samples."""
+    train, validation = [], []
+    for piece, aside, final, unseen in zip(pieces, held, forces, blind, strict=True):
+        train.append((final - piece.force)[np.isfinite(final) & (piece.train > 0) & (aside == 0)])
+        validation.append((unseen - piece.force)[np.isfinite(unseen) & (aside > 0)])
+    joined = np.concatenate(validation)
+    return Errors(rmse(np.concatenate(train)), rmse(joined) if len(joined) else None)

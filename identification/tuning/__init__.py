@@ -1,0 +1,1 @@
+"""Bayesian optimisation of how the networks are trained."""

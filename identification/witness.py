@@ -1,0 +1,116 @@
+"""The network as a stage of the fit: a second witness that never sees the first.
+
+Nothing of the refinement enters the training and nothing of the training the refinement; only their answers are
+compared. The networks are loaded here and only when the stage runs; the local one needs no torch.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import IdentificationError
+from identification.prediction import predict_piece
+from identification.problem import COORDINATE_COUNT, Problem
+from identification.recordings import Stretch
+from identification.refine import Minimum
+from identification.results import Errors, Stage
+from identification.uncertainty import Covariance, coordinate_estimates
+
+if TYPE_CHECKING:
+    from identification.pinn.result import PinnResult
+
+_BOUND = 1e-9
+_SEEN = 1e-2
+"""[1] least information on an unknown of order one, as for the refinement."""
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Testimony:
+    """What the network's training came to."""
+
+    found: "PinnResult | None"
+    why_not: str
+    """Why nothing was found; empty where something was."""
+
+
+def train_stage(
+    problem: Problem,
+    stretches: Sequence[Stretch],
+    preset: str,
+    seed: int,
+    budget: float | None,
+    progress: Progress,
+) -> Testimony:
+    """Train the network of a preset.
+
+    Args:
+        problem: what is fitted.
+        stretches: the recordings behind its pieces.
+        preset: name of a preset, or path of a settings file.
+        seed: of everything that chance decides.
+        budget: [s] of processor time; None for as long as it takes.
+        progress: told of every step.
+
+    Raises:
+        IdentificationError: there is no such preset, or its network needs torch, which is not installed.
+    """
+    from identification.pinn.settings import read_settings
+    from identification.pinn.supervision import Stopped, Supervision
+    from identification.pinn.train import train
+
+    settings = read_settings(preset).model_copy(update={"seed": seed})
+    if settings.network != "local" and find_spec("torch") is None:
+        raise IdentificationError(
+            f"the {settings.network} network needs torch, which is missing; install mrbench[identification] or "
+            "say --preset local"
+        )
+    try:
+        return Testimony(train(problem, settings, Supervision(progress, budget=budget), stretches), "")
+    except Stopped as stopped:
+        return Testimony(None, str(stopped))
+
+
+def as_minimum(problem: Problem, found: "PinnResult") -> tuple[Minimum, Covariance]:
+    """The network's parameters in the form of a descent's end, for a fit that rests on the network alone."""
+    y0 = [predict_piece(p, found.coordinates, found.delays).y0 for p in problem.pieces]
+    unknowns = problem.start(found.coordinates)
+    unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] = np.array(found.delays) / problem.delay_prior
+    unknowns[COORDINATE_COUNT + 2 : COORDINATE_COUNT + 2 + len(y0)] = np.array(y0) / 1e-3
+    minimum = Minimum(unknowns, problem.evaluate(unknowns), found.steps, converged=found.accepted)
+    low, high = problem.bounds()
+    free = problem.free
+    spread = np.zeros((len(unknowns), len(unknowns)))
+    if found.covariance is not None:
+        spread[: len(found.covariance), : len(found.covariance)] = found.covariance
+    seen = free & (np.diag(minimum.evaluation.hessian) > _SEEN)
+    inside = seen & (unknowns > low + _BOUND) & (unknowns < high - _BOUND)
+    return minimum, Covariance(spread, seen, inside, coloured=False)
+
+
+def stage_entry(found: "PinnResult", hidden: set[str], held_out: float | None, unit: str) -> Stage:
+    """The stage's line in the fit document, with its own coordinates."""
+    spread = found.coordinate_covariance
+    unknown = np.full((COORDINATE_COUNT, COORDINATE_COUNT), np.nan)
+    estimates = coordinate_estimates(found.coordinates, unknown if spread is None else spread, hidden, set(), unit)
+    simulated, own = found.simulation, found.reconstruction
+    return Stage(
+        name="pinn",
+        seconds=round(found.seconds, 3),
+        rmse_n=simulated.train,
+        iterations=found.steps,
+        note=found.note,
+        simulated_n=Errors(train=simulated.train, validation=simulated.validation, held_out=held_out),
+        reconstructed_n=Errors(train=own.train, validation=own.validation, held_out=None),
+        coordinates=estimates,
+    )
+
+
+def deviations(spread: Array) -> Array:
+    """(13,) standard deviations from a covariance (13, 13)."""
+    return np.sqrt(np.maximum(np.diag(spread), 0.0))

@@ -1,0 +1,53 @@
+"""Whether two witnesses agree, in numbers and in words."""
+
+import numpy as np
+import pytest
+
+from identification.agreement import Agreement, compare
+from identification.damper.coordinates import Coordinates, to_coordinates
+from identification.damper.parameter_sets import parameter_set
+
+LABORATORY = to_coordinates(parameter_set("laboratory").parameters)
+KNOWN = set(Coordinates._fields)
+SPREAD = 0.01 * np.abs(np.array(LABORATORY))
+
+
+def moved(**deviations) -> Coordinates:
+    """The laboratory damper with some coordinates so many deviations off."""
+    return LABORATORY._replace(
+        **{
+            name: getattr(LABORATORY, name) + by * SPREAD[Coordinates._fields.index(name)]
+            for name, by in deviations.items()
+        }
+    )
+
+
+def test_two_estimates_within_two_deviations_agree():
+    found = compare(moved(D_y=1.9, k0=-1.0), SPREAD, LABORATORY, SPREAD, KNOWN)
+    assert found.agrees
+    assert found.worst == "D_y"
+    assert found.deviations["D_y"] == pytest.approx(1.9)
+    assert found.words() == "agree: pinn and refine differ most in D_y by 1.9 deviations"
+
+
+def test_a_coordinate_beyond_its_interval_is_named_among_all_that_are():
+    found = compare(moved(D_y=2.1, k1=-30.0, n=1.0), SPREAD, LABORATORY, SPREAD, KNOWN)
+    assert not found.agrees
+    assert found.words().startswith("disagree in D_y, k1, most in k1 by 30 deviations:")
+
+
+def test_the_wider_of_two_intervals_counts_and_an_unknown_one_does_not():
+    wide, unknown = 4.0 * SPREAD, np.full(13, np.nan)
+    assert compare(moved(n=4.0), SPREAD, LABORATORY, wide, KNOWN).deviations["n"] == pytest.approx(1.0)
+    assert compare(moved(n=4.0), unknown, LABORATORY, SPREAD, KNOWN).deviations["n"] == pytest.approx(4.0)
+    assert compare(moved(n=4.0), unknown, LABORATORY, unknown, KNOWN).deviations == {}
+
+
+def test_what_the_strokes_do_not_show_is_not_compared():
+    found = compare(moved(c1_b=50.0, n=0.5), SPREAD, LABORATORY, SPREAD, {"n", "rho"})
+    assert set(found.deviations) == {"n", "rho"}
+    assert found.agrees
+
+
+def test_nothing_to_compare_is_said():
+    assert Agreement({}).words() == "nothing to compare: no coordinate is known to both stages"

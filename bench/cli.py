@@ -4,6 +4,7 @@ Each room declares its commands in the entry-point group ``mrbench.commands``; a
 when it is called or listed, so no room is loaded for another's sake.
 """
 
+import os
 import sys
 from importlib.metadata import EntryPoints, entry_points, version
 from typing import Annotated
@@ -55,6 +56,8 @@ def main(arguments: list[str] | None = None) -> None:
 
     A room's own errors carry ``exit_code``; anything else is a defect and keeps its traceback.
     """
+    # The matrices here are small: a second thread of the BLAS library spins more than it multiplies.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     words = sys.argv[1:] if arguments is None else arguments
     commands = entry_points(group=GROUP)
     called = commands.select(name=words[0]) if words else commands

@@ -5,7 +5,7 @@ import sys
 
 from benchmarks.timing import reference_seconds
 
-NAMES = ("simulation", "fitting", "logs", "coverage")
+NAMES = ("simulation", "fitting", "logs", "coverage", "soak")
 
 
 def main() -> None:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bench.agent.link import AgentClient
-from bench.agent.messages import ShutDownCommand
+from bench.agent.messages import ShutDownCommand, StatusCommand
 from bench.demo.folder import DemoFolder
 from bench.errors import AgentUnreachable, RunError
 from bench.rig.config import load_config
@@ -17,6 +17,8 @@ from bench.rig.config import load_config
 MRBENCH = (sys.executable, "-m", "bench.cli")
 _UP_WITHIN = 120.0
 """[s] for a process to be ready; the rig compiles at its first start."""
+_THERE_WITHIN = 2.0
+"""[s] for an agent to say that it is there."""
 _DOWN_WITHIN = 30.0
 """[s] for a process to end in good order."""
 _LOOK = 0.1
@@ -91,7 +93,9 @@ def _await(process: "subprocess.Popen[bytes]", said: Path, ready: Callable[[], b
 
 
 def _end_agent(config: Path) -> None:
-    """End the agent, which outlives the service that has started it."""
+    """End the agent, which outlives a service that was killed; one that ended in good order has ended it."""
     agent = load_config(config).agent
+    client = AgentClient(agent.commands, agent.samples)
     with contextlib.suppress(AgentUnreachable):
-        AgentClient(agent.commands, agent.samples).send(ShutDownCommand(), _DOWN_WITHIN)
+        client.send(StatusCommand(), _THERE_WITHIN)
+        client.send(ShutDownCommand(), _DOWN_WITHIN)

@@ -1,6 +1,7 @@
 """The report's pictures, each as a figure of its own; nothing is kept between them."""
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 
@@ -122,10 +123,13 @@ def by_drive(errors: Sequence[DriveError], floor: float, recording: Recording) -
     return figure
 
 
+@lru_cache(maxsize=16)
 def png(figure: Figure, dpi: int = 160) -> bytes:
-    """A figure as PNG, fine enough for a dense screen."""
+    """A figure as PNG, fine enough for a dense screen; drawn once for the page and for the file."""
     buffer = BytesIO()
     figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": "mrbench"})
+    # Finding the layout takes as long as drawing, and it is the same for the SVG.
+    figure.set_layout_engine("none")
     return buffer.getvalue()
 
 

@@ -39,7 +39,7 @@ _FITTED = (6, 4, 2)
 """Effects fitted beside none, one and two others."""
 _LARGE, _MORE = 2.0, 10
 """[1] excess from which on a step from the law's own fit tells little, and effects fitted beside none then."""
-_PATIENCE = 60.0
+_PATIENCE = 90.0
 """[s] of processor time after which no further set is begun."""
 _SLIGHT = 0.02
 """[1] excess below which no play is looked for beside other effects."""
@@ -225,8 +225,12 @@ class Search:
         if not parent.names and self.left_of(parent) > _LARGE:
             count = _MORE
         for gain in _worth_fitting(gains, count):
+            if self._late:
+                return
             self._fit_beside(parent, gain, [])
         for gain in (g for g in gains if g.choice.name in ALWAYS):
+            if parent.names and gain.choice.form.acts == "displacement_follower":
+                continue  # its contacts ask for a high rate, and a free pin shows beside others as well
             if self._late or self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
                 return
             self._fit_beside(parent, gain, gain.choice.form.starts)

@@ -29,8 +29,9 @@ class Errors(NamedTuple):
     """Root mean square force errors [N]."""
 
     train: float
+    """In the end, on what was never set aside."""
     validation: float | None
-    """On the blocks set aside; None where there are none."""
+    """On the blocks set aside, before they were taken back; None where there are none."""
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,10 @@ help:
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --editable '.[dev]'
+	@echo "trying it out: the first run and fit compile the simulation, once"
+	@rm -rf build/first && mkdir -p build/first
+	@$(BIN)/mrbench run quick --scenario default --out build/first/quick.mcap
+	@$(BIN)/mrbench identify build/first/quick.mcap --out build/first/fit.json
 	touch $@
 
 install: $(READY)

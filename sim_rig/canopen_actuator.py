@@ -240,11 +240,12 @@ class CanopenActuator:
         )
         for leg in legs:
             self._signals.lead(leg.target, leg.end_ns, leg.begin_ns)
-        self._lag(now_ns)
+        # Without the limit of torque, the demand would follow the setpoint.
+        self._lag(self._zero + wanted * _COUNT if saturated else self.demand.position, now_ns)
 
-    def _lag(self, now_ns: int) -> None:
-        """Following error, that of the demand and not of setpoints still to be reached, once it has lasted."""
-        if abs(self.demand.position - self._rig_position()[1]) <= self.objects.number(0x6065) * _COUNT:
+    def _lag(self, demanded: float, now_ns: int) -> None:
+        """Following error, that of the demand [m] and not of setpoints still to be reached, once it has lasted."""
+        if abs(demanded - self._rig_position()[1]) <= self.objects.number(0x6065) * _COUNT:
             self._away_ns = None
         elif self._away_ns is None:
             self._away_ns = now_ns

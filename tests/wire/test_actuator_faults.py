@@ -101,7 +101,7 @@ def test_server_that_goes_away_is_not_connected_and_comes_back(rig):
             wait_until(lambda: actuator.acquire(0.01) is None)
         assert not actuator.health().connected
         actuator.make_safe()
-        rig.server = type(rig.server)([rig.drive], rig.rod.now_ns, port=port).start()
+        rig.server = type(rig.server)([rig.drive], rig.rod.clock, port=port).start()
         actuator.connect()
         assert actuator.read("actuator_torque").raw == 75
 

@@ -23,6 +23,8 @@ _EDS = Path(__file__).parents[1] / "drivers" / "wire" / "actuator.eds"
 _COUNT = 1e-7
 """[m] of one count, also [m/s] and [m/s²]."""
 _MILLISECOND = 1_000_000
+_BEHIND_NS = 15_000_000
+"""[ns] Age of the newest position beyond which the simulation is behind, not the rod."""
 _HOMING, _CYCLIC_POSITION = 6, 8
 
 
@@ -245,7 +247,10 @@ class CanopenActuator:
 
     def _lag(self, demanded: float, now_ns: int) -> None:
         """Following error, that of the demand [m] and not of setpoints still to be reached, once it has lasted."""
-        if abs(demanded - self._rig_position()[1]) <= self.objects.number(0x6065) * _COUNT:
+        seen_ns, position = self._rig_position()
+        if now_ns - seen_ns > _BEHIND_NS:
+            return
+        if abs(demanded - position) <= self.objects.number(0x6065) * _COUNT:
             self._away_ns = None
         elif self._away_ns is None:
             self._away_ns = now_ns

@@ -146,7 +146,7 @@ class Demand:
     def _is_lost(self, came_ns: int, period_ns: int) -> bool:
         """Whether the grid has to begin anew with this SYNC."""
         patience = _MISSED if self._pace else _SILENT
-        return not -period_ns <= came_ns - self._last[0] - period_ns <= patience * period_ns
+        return came_ns - self._last[0] - period_ns > patience * period_ns
 
     def _head_on(self) -> None:
         """The velocity towards the next setpoint."""

@@ -49,12 +49,17 @@ def test_late_setpoint_is_bridged_and_then_the_rod_brakes_by_itself():
     assert demand.position == pytest.approx(12e-4 + 0.1**2 / 2 / 10)
 
 
-def test_of_setpoints_that_come_in_a_heap_the_last_counts():
+def test_setpoints_that_come_in_a_heap_are_reached_one_after_the_other():
     demand = Demand()
     for k in range(1, 6):
         demand.follow(k * 1e-4, 0, 4 * MILLISECOND, 1.0, 10.0)
-    demand.advance(16 * MILLISECOND)
-    assert demand.position == pytest.approx(5e-4)
+    places = []
+    for now in range(33):
+        demand.advance(now * MILLISECOND)
+        places.append(demand.position)
+    assert places[16] == pytest.approx(1e-4, rel=0.05)
+    assert np.all(np.diff(places) > 0)
+    assert places[31] == pytest.approx(5e-4, rel=0.1)
 
 
 def test_speed_is_limited():

@@ -15,7 +15,7 @@ class IdentifySettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     stages: tuple[Literal["pinn", "refine"], ...] = Field(
-        default=("refine",), min_length=1, description="stages of the fit"
+        default=("pinn", "refine"), min_length=1, description="stages of the fit"
     )
     hold_out: tuple[str, ...] = Field(default=(), description="stretches or segments kept out, such as `5mm_4Hz*`")
     hold_out_after: float | None = Field(

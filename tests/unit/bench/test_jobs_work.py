@@ -92,7 +92,7 @@ def test_fit_and_report_appear_together_beside_the_log(bench):
     assert summary["result"] == "converged"
     assert summary["rmse_n"] == json.loads((result / FIT).read_text())["rmse_n"]["train"]
     assert [call[1] for call in bench.calls()] == ["identify", "report"]
-    assert bench.calls()[0][-1] == "--stages=refine"
+    assert bench.calls()[0][-1] == "--stages=pinn,refine"
     assert bench.said == ["identify", "identify: half way", "report", "report: half way"]
     assert bench.left == [result.name]
 
@@ -138,7 +138,7 @@ def test_a_worker_that_cannot_see_the_log_says_so(bench):
 
 def test_the_key_is_of_the_content():
     settings = IdentifySettings()
-    assert content_key("a", settings) == content_key("a", IdentifySettings(stages=("refine",)))
+    assert content_key("a", settings) == content_key("a", IdentifySettings(stages=("pinn", "refine")))
     assert content_key("a", settings) != content_key("b", settings)
     assert content_key("a", settings) != content_key("a", IdentifySettings(hold_out=("5mm*",)))
 

@@ -34,7 +34,7 @@ FIXTURE_COMPLIANCE = Effect(
             linear,
         ),
         Form(
-            "hardening",
+            "stiffening",
             "connection",
             (
                 Quantity("compliance", "m/N", 0.0, 1e-4, 1e-6, "give of the fixture under a small load"),

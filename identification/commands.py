@@ -1,12 +1,9 @@
 """The commands of this room: `mrbench identify` and `mrbench predict`."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
-
-if TYPE_CHECKING:
-    from identification.results import Document
 
 Logs = Annotated[
     list[Path], typer.Argument(metavar="LOG...", help="Logs of one specimen, as recorded or imported.")
@@ -55,6 +52,7 @@ def identify(
 ) -> None:
     """Find the damper's parameters in recordings, each with an interval and what it means."""
     from identification.assemble import HoldOut
+    from identification.document_file import check_place, write_document
     from identification.errors import IdentificationError
     from identification.identify import Request
     from identification.identify import identify as fit
@@ -68,7 +66,7 @@ def identify(
     if not asked:
         raise IdentificationError("no stage was asked for; there are pinn and refine")
     own = _own(free)
-    _check_place(out)
+    check_place(out)
     held = HoldOut(_words(hold_out), hold_out_after)
     with progress_on_terminal("identify") as progress:
         found = fit(
@@ -76,7 +74,7 @@ def identify(
             Request(held, delay_prior, Settings(seed=seed, budget=budget), asked, preset, own, profile),
             progress,
         )
-    _write(out, found)
+    write_document(out, found)
     said = "; ".join(words for words in (found.result, found.agreement, *found.notes) if words)
     _say(out, found.rmse_n.train, found.nrmse.train, found.noise_floor_n, said)
 
@@ -95,6 +93,7 @@ def predict(
     free: Annotated[str, typer.Option(metavar="offset", help="What else to estimate on this log: `offset`.")] = "",
 ) -> None:
     """Simulate a fit or a twin on a log; only the inner displacement at the start of each stretch is freed."""
+    from identification.document_file import check_place, write_document
     from identification.errors import IdentificationError
     from identification.gap.model import read_fit_or_model
     from identification.predict import predict_log
@@ -103,13 +102,13 @@ def predict(
 
     if free not in ("", "offset"):
         raise IdentificationError(f"--free {free}: only a force offset can be freed; say `--free offset`")
-    _check_place(out)
+    check_place(out)
     if not _is_log(log):
         return _forecast(model, log, out, series, free)
     prediction, found = predict_log(read_fit_or_model(model), load(Path(log)), free_offset=free == "offset")
     if series is not None:
         write_series(series, found)
-    _write(out, prediction)
+    write_document(out, prediction)
     said = f"freed: {', '.join(prediction.freed)}"
     if prediction.band is not None and prediction.band.inside is not None:
         said += (
@@ -126,6 +125,7 @@ def _is_log(name: str) -> bool:
 
 def _forecast(model: Path, method: str, out: Path, series: Path | None, free: str) -> None:
     """Predict strokes that are only planned."""
+    from identification.document_file import write_document
     from identification.errors import IdentificationError
     from identification.forecast import forecast, planned_strokes
     from identification.results import read_fit
@@ -136,7 +136,7 @@ def _forecast(model: Path, method: str, out: Path, series: Path | None, free: st
     document, found = forecast(read_fit(model), planned_strokes(method))
     if series is not None:
         write_series(series, found)
-    _write(out, document)
+    write_document(out, document)
     where = "printed" if str(out) == "-" else out
     more = f"; {document.band.note}" if document.band.note else ""
     typer.echo(
@@ -172,27 +172,3 @@ def _say(out: Path, error: float, relative: float, floor: float, more: str) -> N
     where = "printed" if str(out) == "-" else out
     share = f"{100 * relative:.2g} % of the force's deviation"
     typer.echo(f"{where}: force error {error:.3g} N ({share}), noise floor {floor:.3g} N; {more}", err=True)
-
-
-def _check_place(out: Path) -> None:
-    """Refuse before the work what could not be written after it."""
-    from identification.errors import IdentificationError
-
-    if str(out) != "-" and not out.parent.is_dir():
-        raise IdentificationError(f"{out}: there is no folder {out.parent}; choose another place")
-
-
-def _write(out: Path, document: "Document") -> None:
-    """The document to a file, whole or not at all, or to standard output for `-`."""
-    from identification.errors import IdentificationError
-
-    text = document.model_dump_json(by_alias=True, indent=2) + "\n"
-    if str(out) == "-":
-        typer.echo(text, nl=False)
-        return
-    partial = out.with_name(out.name + ".partial")
-    try:
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(out)
-    except OSError as error:
-        raise IdentificationError(f"{out}: cannot be written ({error.strerror}); choose another place") from error

@@ -95,8 +95,8 @@ def estimate_motion(stretch: Stretch) -> Motion:
 def recorded_noise(stretch: Stretch) -> float:
     """Standard deviation [m] of white noise or quantisation in the displacement of a stretch.
 
-    Half-way between two samples a cubic passes nothing of the fastest noise: the differences of neighbours would
-    show a tenth of it, those of every other sample show nearly all.
+    Half-way between two samples a cubic passes nothing of the fastest noise: the differences of neighbours show
+    less than half of white noise there (0.44), those of every other sample nearly all (0.87).
     """
     return displacement_noise(stretch.displacement, stretch.measured, 2 if stretch.interpolated else 1)
 

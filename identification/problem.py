@@ -312,6 +312,10 @@ class Problem:
         """The same problem with other effects beside the law."""
         return replace(self, effects=effects)
 
+    def without(self, aside: Sequence[Array]) -> "Problem":
+        """The same problem with further samples set aside; one mask (N,) a piece, of samples fitted now."""
+        return self.with_training([p.train - mask for p, mask in zip(self.pieces, aside, strict=True)])
+
     def with_training(self, train: Sequence[Array]) -> "Problem":
         """The same problem with other samples fitted; one mask (N,) a piece."""
         pieces = tuple(replace(p, train=t) for p, t in zip(self.pieces, train, strict=True))

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim_rig.canopen_slave import CanopenSlave, Send
+from sim_rig.device_clock import DeviceClock
 from sim_rig.drive_motion import Demand, Motion
 from sim_rig.object_dictionary import ObjectDictionary
 from sim_rig.signals import Signals
@@ -295,8 +296,8 @@ class CanopenActuator:
 
     def _micros(self, rig_ns: int) -> int:
         """What its clock shows at an instant of the rig's [us], wrapped."""
-        own = self._machine.clock_offset_ns + round(rig_ns * (1 + self._machine.ppm * 1e-6))
-        return own // 1000 % 2**32
+        clock = DeviceClock(self._machine.clock_offset_ns, self._machine.ppm)
+        return clock.ns(rig_ns) // 1000 % 2**32
 
     def _rig_position(self) -> tuple[int, float]:
         times, values = self._signals.latest("actuator_position", 1, self._signals.now_ns())

@@ -15,9 +15,9 @@ import math
 import numba
 import numpy as np
 
-from identification.damper import law
 from identification.damper.effects import connection
 from sim_rig.compiled import OF_TWO, SCALES, Array, OfTwo, Scales, compiled
+from sim_rig.compiled_law import at_field, damper_force, field_rate, hysteresis_rate, inner_velocity
 
 STATES = 11
 """Command behind the lag [m], actuator position [m] and velocity [m/s], y [m], z [m], field u, amplifier output
@@ -71,11 +71,6 @@ _BALANCED = 1e-9
 _AHEAD = 1e-6
 """[s] how far the mounting looks ahead to tell whether it carries the damper along."""
 
-at_field = compiled(law.at_field)
-field_rate = compiled(law.field_rate)
-inner_velocity = compiled(law.inner_velocity)
-hysteresis_rate = compiled(law.hysteresis_rate)
-damper_force = compiled(law.force)
 carried = compiled(connection.carried)
 steepness = compiled(connection.steepness)
 

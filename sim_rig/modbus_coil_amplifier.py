@@ -10,9 +10,8 @@ import threading
 from typing import Any, Literal
 
 from sim_rig.coil_output import CoilOutput, Table
+from sim_rig.device_clock import TRUE_CLOCK, DeviceClock
 from sim_rig.modbus_device import (
-    TRUE_CLOCK,
-    DeviceClock,
     RegisterBank,
     SampleRing,
     Section,

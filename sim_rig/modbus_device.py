@@ -9,10 +9,11 @@ import tomllib
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from sim_rig.device_clock import DeviceClock
 from sim_rig.modbus_server import Illegal
 from sim_rig.signals import Signals
 
@@ -21,22 +22,6 @@ _WORD = 65536
 
 Get = Callable[[], float]
 Put = Callable[[float], None]
-
-
-class DeviceClock(NamedTuple):
-    """An instrument's own clock."""
-
-    offset_ns: int = 0
-    """What it read when the rig's clock read zero [ns]."""
-    ppm: float = 0.0
-    """How much too fast it runs [ppm]."""
-
-    def ns(self, rig_ns: int) -> int:
-        """What it reads [ns] when the rig's clock reads ``rig_ns`` [ns]."""
-        return self.offset_ns + round(rig_ns * (1 + self.ppm * 1e-6))
-
-
-TRUE_CLOCK = DeviceClock()
 
 
 def wire_file(instrument: str) -> dict[str, Any]:

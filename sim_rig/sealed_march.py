@@ -12,8 +12,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from identification.damper import law
 from sim_rig.compiled import Array, compiled
+from sim_rig.compiled_law import at_field, damper_force, field_rate, hysteresis_rate, inner_velocity
 from sim_rig.scenarios.sealed import form
 from sim_rig.scenarios.sealed.form import MEMORY, Place
 from sim_rig.sealed_states import (
@@ -68,12 +68,6 @@ ACT_SIGNATURE = _NUMBER(_ROW, _ROW, _ROW, _ROW)
 """Of every form's function."""
 _ACT = numba.types.FunctionType(ACT_SIGNATURE)
 
-_at_field = compiled(law.at_field)
-_field_rate = compiled(law.field_rate)
-_inner_velocity = compiled(law.inner_velocity)
-_hysteresis_rate = compiled(law.hysteresis_rate)
-_force = compiled(law.force)
-
 
 @compiled
 def _call(i: int, s: Array, now: Array, forms: Any, rate: Array) -> float:
@@ -87,7 +81,7 @@ def _damper_force(v: float, s: Array, now: Array, forms: Any, p: Array, rate: Ar
     """Force [N] and inner velocity [m/s] of the damper at a velocity [m/s], forms beside the law included."""
     x, u = now[_X], now[_FIELD]
     now[_V] = v
-    alpha, c0, c1 = _at_field(p[0], p[1], u), _at_field(p[6], p[7], u), _at_field(p[8], p[9], u)
+    alpha, c0, c1 = at_field(p[0], p[1], u), at_field(p[6], p[7], u), at_field(p[8], p[9], u)
     beside = 0.0
     for i in range(MOST_FORMS):
         if forms[1][i] == _SCALE:
@@ -95,8 +89,8 @@ def _damper_force(v: float, s: Array, now: Array, forms: Any, p: Array, rate: Ar
             alpha, c0, c1 = alpha * factor ** weights[0], c0 * factor ** weights[1], c1 * factor ** weights[2]
         elif forms[1][i] == _PARALLEL:
             beside += _call(i, s, now, forms, rate)
-    y_rate = _inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
-    return float(_force(y_rate, x, c1, p[11], p[13]) + beside), float(y_rate)
+    y_rate = inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
+    return float(damper_force(y_rate, x, c1, p[11], p[13]) + beside), float(y_rate)
 
 
 @compiled
@@ -144,7 +138,7 @@ def rates(
         Force that the channel passes on [N] and slip velocity [m/s].
     """
     now[_TIME], now[_OUTPUT], now[_PATH] = time, s[OUTPUT], s[PATH]
-    rate[FIELD] = _field_rate(s[FIELD], s[OUTPUT], p[4])
+    rate[FIELD] = field_rate(s[FIELD], s[OUTPUT], p[4])
     now[_FIELD], now[_FIELD_RATE] = s[FIELD], rate[FIELD]
     for i in range(MOST_FORMS):
         if forms[1][i] == _COIL:
@@ -158,7 +152,7 @@ def rates(
     now[_POWER] = abs(force * v)
     _servo(s, command, force, k, rate)
     rate[Y], rate[PATH], rate[DAMPER] = y_rate, abs(v), v
-    rate[Z] = _hysteresis_rate(v - y_rate, s[Z], p[5], p[2], p[3], p[12])
+    rate[Z] = hysteresis_rate(v - y_rate, s[Z], p[5], p[2], p[3], p[12])
     rate[OUTPUT] = k[AMPLIFIER] * (drive - s[OUTPUT])
     heat = now[_POWER] + k[COIL] * s[OUTPUT] * s[OUTPUT]
     rate[TEMPERATURE] = (heat - k[HEAT_LOSS] * (s[TEMPERATURE] - k[AMBIENT])) / k[HEAT_CAPACITY]
@@ -193,8 +187,8 @@ def _steps_for(s: Array, rate: Array, slip: float, drive: float, h: float, k: Ar
     """Steps that a block of h [s] needs for stability, and for accuracy where the loop turns."""
     turn = 2.0 * abs(rate[SPEED]) * h + 1e-3 * k[CONNECTED]
     fastest = abs(slip) + turn
-    c0, c1 = abs(_at_field(p[6], p[7], s[FIELD])), abs(_at_field(p[8], p[9], s[FIELD]))
-    tangent = 2.0 * abs(_at_field(p[0], p[1], s[FIELD])) * p[5] + abs(p[10])
+    c0, c1 = abs(at_field(p[6], p[7], s[FIELD])), abs(at_field(p[8], p[9], s[FIELD]))
+    tangent = 2.0 * abs(at_field(p[0], p[1], s[FIELD])) * p[5] + abs(p[10])
     stiff = p[12] * fastest * p[5] / k[SATURATED] + tangent / (c0 + c1) + k[FASTEST]
     stiff += k[SERVO] * math.sqrt(k[COMPLIANCE] * (tangent + abs(p[11])))
     stiff += k[CONNECTED] * max(tangent * (c0 + c1) / (c0 * c1), k[CONTACT])

@@ -9,8 +9,9 @@ import struct
 import tomllib
 from collections import deque
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
+from sim_rig.device_clock import TRUE_CLOCK, DeviceClock
 from sim_rig.serial_port import SerialAdapter, SerialPort
 from sim_rig.signals import Signals
 
@@ -25,23 +26,6 @@ _CODES, _FRAMES = CONTRACT["codes"], CONTRACT["frames"]
 _FULL_SCALE: float = _INSTRUMENT["full_scale_n"]
 _COUNTS: int = _INSTRUMENT["counts_per_newton"]
 _HEADER = bytes(CONTRACT["framing"]["sync"])
-
-
-class DeviceClock(NamedTuple):
-    """The instrument's own clock."""
-
-    offset_ns: int = 0
-    """What it shows when the rig's shows zero [ns]."""
-    ppm: float = 0.0
-    """How much too fast it runs [ppm]."""
-
-    def at(self, rig_ns: int) -> int:
-        """What it shows [ns] at ``rig_ns`` of the rig's clock."""
-        return self.offset_ns + round(rig_ns * (1 + self.ppm * 1e-6))
-
-
-TRUE_CLOCK = DeviceClock()
-"""One that shows the rig's own time."""
 
 
 def _crc_table(polynomial: int) -> list[int]:
@@ -150,7 +134,7 @@ class LoadCellDevice:
         if not (self._running and due):
             return []
         status |= _STATUS["tared"] * (self._tare is not None) | _STATUS["stable"] * self._stable()
-        micros = self._clock.at(at_ns) // 1000 % (1 << 32)
+        micros = self._clock.ns(at_ns) // 1000 % (1 << 32)
         frame = framed("sample", self._sequence, micros, self._counts, self._tare or 0, status)
         self._sequence = (self._sequence + 1) % 65536
         return [frame]
@@ -190,7 +174,7 @@ class LoadCellDevice:
 
     def _micros(self, now_ns: int) -> int:
         """All 32 bits of its clock [us], as the signed number that the answer has room for."""
-        micros = self._clock.at(now_ns) // 1000 % (1 << 32)
+        micros = self._clock.ns(now_ns) // 1000 % (1 << 32)
         return micros - (1 << 32) if micros >= 1 << 31 else micros
 
     def _set_rate(self, rate: int) -> tuple[str, int]:

@@ -11,11 +11,12 @@ import numpy as np
 
 from sim_rig.canopen_actuator import CanopenActuator, Machine
 from sim_rig.clock import Clock
+from sim_rig.device_clock import DeviceClock
 from sim_rig.errors import WireError
 from sim_rig.faults import FaultProxy, WireFault
 from sim_rig.live_rig import LiveRig
 from sim_rig.modbus_coil_amplifier import CoilAmplifierDevice
-from sim_rig.modbus_device import DeviceClock, wire_file
+from sim_rig.modbus_device import wire_file
 from sim_rig.modbus_frames import MBAP
 from sim_rig.modbus_lvdt import LvdtDevice
 from sim_rig.modbus_server import Device, ModbusServer
@@ -23,7 +24,6 @@ from sim_rig.modbus_thermometer import ThermometerDevice
 from sim_rig.scenario import Scenario
 from sim_rig.sensors import CHANNELS
 from sim_rig.serial_ascii_load_cell import serial_ascii_load_cell
-from sim_rig.serial_load_cell import DeviceClock as SerialClock
 from sim_rig.serial_load_cell import serial_load_cell
 from sim_rig.settings import Sensor
 from sim_rig.socketcand_server import SocketcandServer
@@ -175,7 +175,7 @@ class ServedRig:
             adapter, _ = serial_ascii_load_cell(self.rig, address)
             driver, baud = "ascii_load_cell", wire_file("ascii_load_cell")["line"]["baud"]
         else:
-            adapter, _ = serial_load_cell(self.rig, address, SerialClock(*clock))
+            adapter, _ = serial_load_cell(self.rig, address, clock)
             driver, baud = "load_cell", wire_file("load_cell")["line"]["baud"]
         self._open.enter_context(adapter)
         url = self._behind_faults("load_cell", adapter.address)

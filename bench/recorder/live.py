@@ -11,16 +11,16 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self, TypeAlias
+from typing import Any, Literal, Self, TypeAlias, Unpack
 
 import numpy as np
 import numpy.typing as npt
 
 from bench.errors import LogError
 from bench.recorder.header import RunHeader
-from bench.recorder.messages import INSTRUMENT, WIRE, Outcome, Phase
+from bench.recorder.messages import INSTRUMENT, WIRE, Outcome
 from bench.recorder.readings import Clocks, frames_message, readings_messages
-from bench.recorder.writer import LogWriter
+from bench.recorder.writer import LogWriter, SegmentEnd
 from drivers.channel import Block, Frame
 
 PERIOD = 0.1
@@ -115,27 +115,9 @@ class LiveRecorder:
         if self._has_room("frames", f"{WIRE}{name}", 1):
             self._queue.append((f"{WIRE}{name}", frame))
 
-    def segment(
-        self,
-        time_ns: int,
-        *,
-        phase: Phase,
-        index: int,
-        name: str,
-        stretch: str,
-        motion: str,
-        drive: str,
-        amplitude: float | None = None,
-        frequency: float | None = None,
-        drive_value: float | None = None,
-    ) -> None:
+    def segment(self, time_ns: int, **end: Unpack[SegmentEnd]) -> None:
         """Mark one end of a segment, as `LogWriter.segment` does."""
-        self._do(
-            lambda log: log.segment(
-                time_ns, phase=phase, index=index, name=name, stretch=stretch, motion=motion, drive=drive,
-                amplitude=amplitude, frequency=frequency, drive_value=drive_value,
-            )
-        )  # fmt: skip
+        self._do(lambda log: log.segment(time_ns, **end))
 
     def event(self, time_ns: int, kind: str, text: str, **more: Any) -> None:
         """Record an event, as `LogWriter.event` does."""

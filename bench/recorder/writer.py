@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -55,6 +55,27 @@ Messages are JSON; the schema beside each topic says the unit of every field. Th
 Log time and publish time are the bench clock. Positive displacement extends the damper; positive force is
 tension.
 """
+
+
+class SegmentEnd(TypedDict):
+    """What a log says where a segment starts, and again where it ends."""
+
+    phase: Phase
+    index: int
+    """Place of the segment in the log, from 0."""
+    name: str
+    stretch: str
+    """Name of the continuous recording that it stands in."""
+    motion: str
+    """Kind of motion."""
+    drive: str
+    """Kind of drive programme."""
+    amplitude: float | None
+    """[m]; none where the motion has none."""
+    frequency: float | None
+    """[Hz]; none where the motion has none."""
+    drive_value: float | None
+    """[V or A]; none where the drive varies."""
 
 
 class LogWriter:
@@ -143,38 +164,9 @@ class LogWriter:
             for moment, message in messages:
                 self._put_sample(moment, message)
 
-    def segment(
-        self,
-        time_ns: int,
-        *,
-        phase: Phase,
-        index: int,
-        name: str,
-        stretch: str,
-        motion: str,
-        drive: str,
-        amplitude: float | None = None,
-        frequency: float | None = None,
-        drive_value: float | None = None,
-    ) -> None:
-        """Mark one end of a segment.
-
-        Args:
-            time_ns: bench clock [ns] of the segment's first sample, or of its last.
-            phase: start or end.
-            index: place of the segment in the log, from 0.
-            name: name of the segment.
-            stretch: name of the continuous recording that it stands in.
-            motion: kind of motion.
-            drive: kind of drive programme.
-            amplitude: [m], none where the motion has none.
-            frequency: [Hz], none where the motion has none.
-            drive_value: [V or A], none where the drive varies.
-        """
-        mark = Segment(
-            timestamp=Timestamp(**_clock_fields(time_ns)), phase=phase, index=index, name=name, stretch=stretch,
-            motion=motion, amplitude=amplitude, frequency=frequency, drive=drive, drive_value=drive_value,
-        )  # fmt: skip
+    def segment(self, time_ns: int, **end: Unpack[SegmentEnd]) -> None:
+        """Mark one end of a segment; ``time_ns`` is the bench clock [ns] of its first sample, or of its last."""
+        mark = Segment(timestamp=Timestamp(**_clock_fields(time_ns)), **end)
         with file_errors(self.path):
             self._put(SEGMENT, time_ns, mark.model_dump_json().encode())
 

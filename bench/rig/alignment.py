@@ -113,12 +113,12 @@ class Aligner:
         for _ in range(len(self._waiting)):
             batch = self._waiting.popleft()
             for block in batch.blocks:
-                if self._counts(batch.instrument, block):
+                if self._has_clock(batch.instrument, block):
                     stamped.setdefault((batch.instrument, block.channel), []).append(block)
         for (instrument, channel), blocks in stamped.items():
             self._add(instrument, channel, blocks)
 
-    def _counts(self, instrument: str, block: Block) -> bool:
+    def _has_clock(self, instrument: str, block: Block) -> bool:
         """Whether a block's samples are wanted and have a clock; those that have none are taken at once."""
         wanted = block.channel == "force" or block.channel in LONGEST_GAP_NS
         if not wanted or self._source.setdefault(block.channel, instrument) != instrument:

@@ -236,7 +236,7 @@ def train_global(
     stretches: Sequence[Stretch] | None,
 ) -> tuple[Outcome, Outcome]:
     """One training: three quarters on what is not set aside, the rest on everything."""
-    split = problem.with_training([p.train - aside for p, aside in zip(problem.pieces, held, strict=True)])
+    split = problem.without(held)
     training = GlobalTraining(coarse(split), settings, supervision)
     blind, said = None, ""
     try:

@@ -55,7 +55,7 @@ def train_local(
     stretches: Sequence[Stretch] | None,
 ) -> tuple[Outcome, Outcome]:
     """The best of some starts, and the same before the blocks set aside were taken back."""
-    split = problem.with_training([p.train - aside for p, aside in zip(problem.pieces, held, strict=True)])
+    split = problem.without(held)
     opening = _opening(split)
     best = _best(opening, settings, supervision)
     blind = _outcome(opening, best)

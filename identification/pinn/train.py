@@ -65,7 +65,7 @@ def _judged(
 ) -> PinnResult:
     """The outcome with its errors; ``blind`` is the one that had not seen the blocks set aside."""
     # y(0) is a parameter too: it must not be fitted to the blocks that judge it.
-    seen = problem.with_training([p.train - aside for p, aside in zip(problem.pieces, held, strict=True)])
+    seen = problem.without(held)
     point, delays = _resolved(problem, outcome)
     simulated, judged = (
         tuple(predict_piece(p, *_resolved(problem, one)).force for p in seen.pieces) for one in (outcome, blind)

@@ -22,7 +22,8 @@ from serial_examples import (
 from drivers.errors import BadReply, DriverError, NoReply, NotConnected, OutOfRange, Refused
 from drivers.load_cell import LoadCell
 from drivers.load_cell_stream import SampleStream
-from sim_rig.serial_load_cell import DeviceClock, framed, serial_load_cell
+from sim_rig.device_clock import DeviceClock
+from sim_rig.serial_load_cell import framed, serial_load_cell
 from sim_rig.serial_port import SerialPort, corrupted, cut, lost, with_garbage
 
 TCP = "127.0.0.1:0"
@@ -94,7 +95,7 @@ def test_the_instruments_own_clock_is_reported(streaming):
     _, _, driver = streaming(clock=clock)
     times = joined(collected(driver, 200), "device_ns")
     ticks = np.rint((times - 5_000_000_000) / 1.0002e6).astype(int)
-    assert all(abs(clock.at(int(tick) * 1_000_000) - at) < 1000 for tick, at in zip(ticks, times, strict=True))
+    assert all(abs(clock.ns(int(tick) * 1_000_000) - at) < 1000 for tick, at in zip(ticks, times, strict=True))
 
 
 def test_taring_keeps_the_untared_force(streaming):

@@ -10,8 +10,8 @@ from modbus_bench import MS, TIMEOUT, UNITS, WIRES, FakeSignals, served, truth, 
 from drivers.coil_amplifier import CoilAmplifier, CoilFault, CoilState
 from drivers.coil_table import TableState
 from drivers.errors import BadReply, DriverError, NoReply, NotConnected, OutOfRange, Refused
+from sim_rig.device_clock import DeviceClock
 from sim_rig.modbus_coil_amplifier import CoilAmplifierDevice
-from sim_rig.modbus_device import DeviceClock
 from sim_rig.modbus_server import WireFault
 
 pytestmark = pytest.mark.timeout(60)

@@ -9,7 +9,7 @@ from modbus_bench import MS, TIMEOUT, UNITS, WIRES, FakeSignals, served, truth, 
 from drivers.errors import BadReply, DriverError, NotConnected, OutOfRange
 from drivers.lvdt import Lvdt
 from drivers.modbus_address import ModbusAddress
-from sim_rig.modbus_device import DeviceClock
+from sim_rig.device_clock import DeviceClock
 from sim_rig.modbus_lvdt import LvdtDevice
 from sim_rig.modbus_server import WireFault
 from sim_rig.modbus_thermometer import ThermometerDevice

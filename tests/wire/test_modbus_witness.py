@@ -8,8 +8,8 @@ from modbus_bench import MS, FakeSignals, served, truth
 from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
+from sim_rig.device_clock import DeviceClock
 from sim_rig.modbus_coil_amplifier import CoilAmplifierDevice
-from sim_rig.modbus_device import DeviceClock
 from sim_rig.modbus_lvdt import LvdtDevice
 from sim_rig.modbus_server import WireFault
 from sim_rig.modbus_thermometer import ThermometerDevice

@@ -55,7 +55,18 @@ def test_segment_covers_its_samples(whole):
 
 def test_segment_without_an_end_reaches_to_the_last_sample(tmp_path):
     with LogWriter(tmp_path / "run.mcap", header()) as log:
-        log.segment(0, phase="start", index=0, name="a", stretch="s", motion="hold", drive="constant")
+        log.segment(
+            0,
+            phase="start",
+            index=0,
+            name="a",
+            stretch="s",
+            motion="hold",
+            drive="constant",
+            amplitude=None,
+            frequency=None,
+            drive_value=None,
+        )
         log.samples(times(10), values(10))
 
     assert read_log(tmp_path / "run.mcap").segments[0].stop == 10

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_strokes import stretch
 
 from identification.damper.coordinates import to_coordinates
 from identification.damper.parameter_sets import parameter_set
 from identification.errors import IdentificationError
 from identification.identify import Request, identify
-from identification.recordings import Recording, Segment, Stretch
+from identification.recordings import Recording, Segment
 from identification.refine import Settings
 from identification.results import Fit
 from identification.simulate import Setting, Stroke, simulate
@@ -34,11 +35,7 @@ def recording() -> Recording:
         Segment(i, f"{level}V", int(edges[i]), int(edges[i + 1]), "sine", 0.010, 1.5, level)
         for i, level in enumerate(LEVELS)
     )
-    made = Stretch(
-        name="sine", time=t, rate=RATE, displacement=x, force=force, drive=drive, velocity=None, segments=segments,
-        force_filter=None, displacement_filter=None, force_delay=0.0, displacement_delay=0.0, drive_delay=0.0,
-        measured=np.ones(count, bool),
-    )  # fmt: skip
+    made = stretch(x, force, drive, segments, rate=RATE)
     metadata = {"run": {"specimen": "made up", "source": "run"}}
     return Recording(Path("made-up.mcap"), "0" * 64, "coil_v", "V", (made,), metadata)
 

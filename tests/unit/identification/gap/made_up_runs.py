@@ -4,12 +4,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from made_up_strokes import stretch
 from numpy.random import default_rng
 
 from identification.arrays import Array
 from identification.damper.coordinates import to_coordinates
 from identification.damper.parameter_sets import PARAMETER_SETS
-from identification.recordings import Recording, Segment, Stretch
+from identification.recordings import Recording, Segment
 from identification.simulate import Setting, Stroke, simulate
 
 RATE = 500.0
@@ -31,25 +32,10 @@ def run(
     point = to_coordinates(PARAMETER_SETS["laboratory"].parameters)
     force = simulate(Setting(point), stroke).force + (0.0 if beside is None else beside(x, v))
     random = default_rng(seed)
-    count = len(x)
-    stretch = Stretch(
-        name="made up",
-        time=np.arange(count) / RATE,
-        rate=RATE,
-        displacement=x + 2e-6 * random.standard_normal(count),
-        force=force + NOISE * random.standard_normal(count),
-        drive=drive,
-        velocity=None,
-        segments=segments,
-        force_filter=None,
-        displacement_filter=None,
-        force_delay=0.0,
-        displacement_delay=0.0,
-        drive_delay=0.0,
-        measured=np.ones(count, bool),
-    )
+    recorded = x + 2e-6 * random.standard_normal(len(x))
+    made = stretch(recorded, force + NOISE * random.standard_normal(len(x)), drive, segments, rate=RATE)
     metadata = {"run": {"source": "import", "specimen": specimen}}
-    return Recording(Path("made_up.mcap"), "0" * 64, "coil_v", "V", (stretch,), metadata)
+    return Recording(Path("made_up.mcap"), "0" * 64, "coil_v", "V", (made,), metadata)
 
 
 def _plan() -> tuple[Array, Array, Array, tuple[Segment, ...]]:

@@ -3,36 +3,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_strokes import stretch
 from numpy.random import default_rng
 
 from identification.errors import NothingToFit
 from identification.gap.checks import blind_spots, enough_cycles, one_specimen, without_clipping
 from identification.gap.floor import Floor
 from identification.gap.residual import Condition, Cycles
-from identification.recordings import Recording, Stretch
+from identification.recordings import Recording
 
 FLOOR = Floor(2.0, 2.0, 2.0, "cycle to cycle")
 
 
 def recording(force, specimen="LAB-001"):
-    count = len(force)
-    stretch = Stretch(
-        name="run",
-        time=np.arange(count) / 1e3,
-        rate=1e3,
-        displacement=np.zeros(count),
-        force=force,
-        drive=np.zeros(count),
-        velocity=None,
-        segments=(),
-        force_filter=None,
-        displacement_filter=None,
-        force_delay=0.0,
-        displacement_delay=0.0,
-        drive_delay=0.0,
-        measured=np.ones(count, bool),
-    )
-    return Recording(Path("run.mcap"), "0" * 64, "coil_v", "V", (stretch,), {"run": {"specimen": specimen}})
+    made = stretch(np.zeros(len(force)), force)
+    return Recording(Path("run.mcap"), "0" * 64, "coil_v", "V", (made,), {"run": {"specimen": specimen}})
 
 
 def cycles(count, *conditions):

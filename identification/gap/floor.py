@@ -27,6 +27,12 @@ _AGREE = 1.1
 """[1] ratio of the two witnesses up to which they are said to agree."""
 _FEWEST = 200
 """[samples] of repeated cycles needed to speak of a floor."""
+_FEWEST_ALIKE = 50
+"""[samples] of two like cycles needed to compare them."""
+_ALIKE = 2.0
+"""[1] how much more than the best quarter of the cycles' motions may differ, and two still be said to repeat."""
+_SAME = 2e-4
+"""[1] of the displacement's deviation: what differs by less is the same motion."""
 _CARRIES = 6.0
 """[1] multiple of the stroke's frequency up to which its motion may differ from cycle to cycle."""
 _PERIODIC = ("sine", "triangle")
@@ -44,6 +50,23 @@ class Floor:
     """[N] from fourth differences."""
     how: str
     """How it was got, or why not otherwise, in words."""
+
+
+class _Pairs(NamedTuple):
+    """Samples (n,) of cycles, each less the one a cycle before."""
+
+    force: Array
+    """[N]"""
+    motion: Array
+    """(3, n) displacement [m], velocity [m/s] and acceleration [m/s²]."""
+    velocity: Array
+    """[m/s] itself, not its difference."""
+    cycle: npt.NDArray[np.intp]
+    """Which cycle each sample stands in."""
+    other: Array
+    """(cycles,) [m] by which the displacement of each differs from that of the one before."""
+    share: float
+    """[1] variance of a difference for white noise of variance 1."""
 
 
 class _Repeats(NamedTuple):
@@ -67,7 +90,9 @@ def measure_floor(stretch: Stretch, motion: Motion) -> Floor:
         The floor and how it was got. Noise of the displacement is no part of it.
     """
     swift = high_frequency_noise(stretch.force)
-    repeats = [_repeats(stretch, motion, s) for s in stretch.segments if s.motion in _PERIODIC and s.frequency]
+    pairs = [_pairs(stretch, motion, s) for s in stretch.segments if s.motion in _PERIODIC and s.frequency]
+    limit = max(_as_alike_as(pairs), _SAME * float(np.std(stretch.displacement)))
+    repeats = [_repeats(p, limit) for p in pairs if p is not None]
     freedom = sum(r.freedom for r in repeats)
     if freedom < _FEWEST:
         return Floor(swift, None, swift, f"high frequency: {_why_not(stretch, freedom)}")
@@ -151,26 +176,45 @@ def _mean(noise: Array, counts: Array) -> float:
     return float(np.sqrt(np.sum(noise**2 * counts) / np.sum(counts)))
 
 
-def _repeats(stretch: Stretch, motion: Motion, segment: Segment) -> _Repeats:
-    """How far the force of each cycle of a segment differs from that of the cycle before."""
+def _pairs(stretch: Stretch, motion: Motion, segment: Segment) -> _Pairs | None:
+    """Each cycle of a segment beside the one before; none where the motion or the drive is never the same."""
     part = slice(segment.start, segment.stop)
     weights = stretch.measured[part].astype(float)
     frequency = segment.frequency or 0.0
     wave = fit_harmonics(motion.displacement[part], weights, stretch.rate, frequency, motion.noise)
     if wave is None:
-        return _Repeats(0.0, 0.0, 0)
+        return None
     steady = slice(segment.start + wave.start, segment.start + wave.stop)
     lag = stretch.rate / wave.frequency
     difference, share = _cycle_difference(stretch.force[steady], lag)
     achieved = _achieved(stretch, steady, wave.frequency)
-    explained = [_cycle_difference(x, lag)[0] for x in achieved]
+    explained = np.stack([_cycle_difference(x, lag)[0] for x in achieved])
     alike = _alike(stretch.drive[steady], stretch.measured[steady], lag, stretch.rate)
-    cycle = (np.arange(len(difference)) / lag).astype(int)[alike]
-    if len(np.unique(cycle)) < 1 or np.count_nonzero(alike) < 50:
+    if np.count_nonzero(alike) < _FEWEST_ALIKE:
+        return None
+    cycle = np.unique((np.arange(len(difference)) / lag).astype(int)[alike], return_inverse=True)[1]
+    other = np.sqrt(np.bincount(cycle, explained[0, alike] ** 2) / np.bincount(cycle))
+    velocity = achieved[1][-len(difference) :]
+    return _Pairs(difference[alike], explained[:, alike], velocity[alike], cycle, other, share)
+
+
+def _as_alike_as(pairs: Sequence[_Pairs | None]) -> float:
+    """[m] by which the motion of two cycles may differ: where the rod stumbled once, force differs with it.
+
+    A force that is steep over some micrometres is not explained by terms that are linear in the difference.
+    """
+    others = [p.other for p in pairs if p is not None]
+    return _ALIKE * float(np.quantile(np.concatenate(others), 0.25)) if others else 0.0
+
+
+def _repeats(pairs: _Pairs, limit: float) -> _Repeats:
+    """What differs between the cycles whose motion differs by at most a limit [m]."""
+    kept = (pairs.other <= limit)[pairs.cycle]
+    if np.count_nonzero(kept) < _FEWEST_ALIKE:
         return _Repeats(0.0, 0.0, 0)
-    terms = _loads(np.stack(explained)[:, alike], achieved[1][-len(difference) :][alike])
-    rest, freedom = _left_over(difference[alike], terms, cycle)
-    return _Repeats(float(rest @ rest) / share, freedom, len(np.unique(cycle)))
+    cycle = pairs.cycle[kept]
+    rest, freedom = _left_over(pairs.force[kept], _loads(pairs.motion[:, kept], pairs.velocity[kept]), cycle)
+    return _Repeats(float(rest @ rest) / pairs.share, freedom, len(np.unique(cycle)))
 
 
 def _achieved(stretch: Stretch, steady: slice, frequency: float) -> tuple[Array, Array, Array]:

@@ -16,6 +16,9 @@ from bench.safety.limits import Action, Verdict
 from bench.safety.trip import DEADLINE, bring_to_rest
 from bench.sequencer.plan import RunPlan
 
+_TOLD_CYCLES = 2
+"""Cycles of lateness beyond which the log says so; a drive bridges less."""
+
 Stop = Callable[[str, bool], None]
 """Ends the run in good order: why, and whether the rod is held."""
 
@@ -63,7 +66,9 @@ class Warden:
             self._act_on(verdict)
 
     def late(self, now_ns: int, late: float) -> None:
-        """A setpoint left late [s]."""
+        """A setpoint left late [s]; the log says when, for then the rod may not have moved as it should."""
+        if late * 1e9 > _TOLD_CYCLES * self._cycle_ns:
+            self._tell("late", f"a setpoint left {1e3 * late:.1f} ms late")
         for verdict in self._interlocks.check_value("setpoint_lateness", late, now_ns):
             self._act_on(verdict)
 

@@ -68,7 +68,7 @@ class Demo:
     def _recorded(self, rest: Rest, method: str) -> str:
         self._announce(f"record {method} over the wires")
         with progress_bar(method) as progress:
-            return record(rest, method, progress)
+            return record(rest, method, progress, lambda text: self._says.print(text, highlight=False))
 
     def _report(self) -> None:
         folder = self._folder

@@ -13,23 +13,42 @@ _SPARE = 60.0
 """[s] that a run may take beyond its plan."""
 _IDENTIFIED_WITHIN = 900.0
 """[s]"""
+_ATTEMPTS = 3
+"""Runs of a method: where a busy machine holds up rig or bench for too long, the interlocks rightly end one."""
 _OVER = ("done", "failed", "cancelled")
 
 
-def record(rest: Rest, method: str, progress: Callable[[float], None]) -> str:
-    """Run a method.
+class RunSpoiledError(RunError):
+    """A run has ended, but not cleanly."""
+
+
+def record(
+    rest: Rest, method: str, progress: Callable[[float], None], tell: Callable[[str], None] = lambda text: None
+) -> str:
+    """Run a method, once more where the run was spoiled.
 
     Args:
         rest: the service.
         method: a shipped one.
         progress: told the share done, 0 to 1.
+        tell: told why it is run once more.
 
     Returns:
         Id of the run.
 
     Raises:
-        RunError: it could not be started, was not recorded cleanly, or does not end.
+        RunError: it could not be started, was never recorded cleanly, or does not end.
     """
+    for attempt in range(1, _ATTEMPTS):
+        try:
+            return _run(rest, method, progress)
+        except RunSpoiledError as spoiled:
+            tell(f"{spoiled}; once more ({attempt + 1} of {_ATTEMPTS})")
+            rest.post("/agent/reset", {})
+    return _run(rest, method, progress)
+
+
+def _run(rest: Rest, method: str, progress: Callable[[float], None]) -> str:
     run = rest.post("/runs", {"method": method, "operator": "demo"})
     deadline = time.monotonic() + (run["duration_s"] or 0.0) + _SPARE
     while run["state"] == "running":
@@ -40,7 +59,7 @@ def record(rest: Rest, method: str, progress: Callable[[float], None]) -> str:
         time.sleep(_LOOK)
         run = rest.get(f"/runs/{run['id']}")
     if run["outcome"] != "clean":
-        raise RunError(f"the run of {method} is {run['outcome'] or run['state']}: {run['reason']}")
+        raise RunSpoiledError(f"the run of {method} is {run['outcome'] or run['state']}: {run['reason']}")
     return str(run["id"])
 
 

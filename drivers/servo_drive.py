@@ -216,6 +216,8 @@ class ServoDrive:
 
     def _homed(self) -> bool:
         self.check_no_fault()
+        if (state := self.state()) is not DriveState.ENABLED:
+            raise Refused(f"{self._name}: homing was broken off, the drive is {state.value}; home again")
         word = self._node.number(0x6041)
         if word & cia402.HOMING_ERROR:
             raise Refused(f"{self._name}: homing ended in an error (statusword {word:04X}h); see the limit switch")

@@ -22,10 +22,12 @@ from bench.agent.messages import (
     AgentStatus,
     Answer,
     InstrumentStatus,
+    PrepareCommand,
     RunCommand,
     RunStatus,
     Samples,
 )
+from bench.agent.preparation import Preparation
 from bench.agent.run import Run, order
 from bench.agent.warden import Warden
 from bench.errors import BenchError, LogError
@@ -46,6 +48,7 @@ from bench.rig.priority import (
 )
 from bench.safety.interlocks import Interlocks
 from bench.safety.limits import Action, specimen_matrix, stricter
+from bench.sequencer.move_rod import move_rod
 from bench.sequencer.plan import RunPlan
 from bench.sequencer.sequencer import Sequencer
 from drivers.channel import Frame
@@ -112,6 +115,7 @@ class Agent:
         self._bench = BenchThread(aligner, force_rate(config), publish, self._beat, self._log_failed)
         self._lock = threading.RLock()
         self._state: AgentState = "idle"
+        self._preparation = Preparation(self._rig, self._move, self._tell, self._prepared)
         self._run: Run | None = None
         self._thread: threading.Thread | None = None
         self._finished: list[RunStatus] = []
@@ -159,6 +163,8 @@ class Agent:
         return AgentStatus(
             state=state,
             trip=self._interlocks.tripped,
+            mounting=self._rig.actuator.mounting.value,
+            step=self._preparation.status,
             run=self.run_status(),
             finished=finished,
             instruments=tuple(self._instrument_status(one) for one in self._rig.named),
@@ -185,9 +191,31 @@ class Agent:
             return Answer(ok=False, error=str(found), status=self.status())
         return Answer(ok=True, status=self.status())
 
+    def prepare(self, command: PrepareCommand) -> Answer:
+        """Carry out one step before a run; answered when it is done, or after a moment while it goes on."""
+        with self._lock:
+            if error := self._not_ready():
+                return Answer(ok=False, error=error, status=self.status())
+            self._set_state("preparing")
+        if command.step == "home":  # the reference stands beyond where a specimen may be taken; force is watched
+            matrix = self._config.limits.matrix()
+            self._interlocks.matrix = {name: steps for name, steps in matrix.items() if name != "displacement"}
+        begun = self._preparation.begin(command.step, command.position_m)
+        failed = begun.outcome == "failed"
+        return Answer(ok=not failed, error=begun.words if failed else "", status=self.status())
+
+    def _move(self, target: float, ending: threading.Event) -> None:
+        """Lead the rod to a place [m] where no run does."""
+        move_rod(self._rig.actuator, self._interlocks.permit, self._clock, self._set_led, target, ending)
+
+    def _prepared(self) -> None:
+        self._interlocks.matrix = self._config.limits.matrix()
+        self._set_state("idle", instead_of=("preparing",))
+
     def stop(self) -> Answer:
-        """End the run in good order; harmless when nothing runs."""
+        """End the run, or a step before one, in good order; harmless when nothing runs."""
         self._tell("command", "stop")
+        self._preparation.stop()
         self._stop_run("stopped on request", False)
         return Answer(ok=True, status=self.status())
 

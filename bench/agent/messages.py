@@ -14,6 +14,8 @@ STATUS, SAMPLES, EVENT = b"status", b"samples", b"event"
 
 AgentState: TypeAlias = Literal["idle", "preparing", "running", "stopping", "tripped"]
 """tripped: a limit was exceeded or an instrument failed; everything is at rest, and stays there until a reset."""
+Step: TypeAlias = Literal["home", "move", "mount", "centre", "unmount", "tare", "clear-tare"]
+"""What can be done before a run."""
 RunOutcome: TypeAlias = Literal["clean", "lossy", "incomplete"]
 
 
@@ -56,6 +58,24 @@ class ResetCommand(Message):
     command: Literal["reset"] = "reset"
 
 
+class PrepareCommand(Message):
+    """One step before a run; refused unless the agent is idle. Answered when it is done, or soon while it goes on.
+
+    ``home`` and ``move`` move the rod, the first is refused with a specimen clamped; a stop ends both.
+    """
+
+    command: Literal["prepare"] = "prepare"
+    step: Step = Field(
+        description="home: seek the reference; move: go to `position_m`; mount, unmount: a specimen has been "
+        "clamped, unclamped; centre: the rod stands at the specimen's middle; tare, clear-tare: the present force "
+        "is zero, or no more"
+    )
+    position_m: float = Field(
+        default=0.0,
+        description="[m] from the specimen's middle, or from home before there is one; where `move` goes",
+    )
+
+
 class ShutDownCommand(Message):
     """Bring everything to rest and end the agent."""
 
@@ -63,7 +83,8 @@ class ShutDownCommand(Message):
 
 
 Command: TypeAlias = Annotated[
-    StatusCommand | RunCommand | StopCommand | ResetCommand | ShutDownCommand, Field(discriminator="command")
+    StatusCommand | RunCommand | StopCommand | ResetCommand | PrepareCommand | ShutDownCommand,
+    Field(discriminator="command"),
 ]
 
 
@@ -82,6 +103,14 @@ class RunStatus(Message):
     outcome: RunOutcome | None = Field(default=None, description="null while it goes on")
     reason: str = Field(default="", description="why it is not clean, in words")
     lost: dict[str, int] = Field(default_factory=dict, description="samples lost by channel")
+
+
+class StepStatus(Message):
+    """A step before a run that goes on, or that has ended."""
+
+    step: Step
+    outcome: Literal["going", "done", "failed"]
+    words: str = Field(description="what is so now, or why it failed")
 
 
 class InstrumentStatus(Message):
@@ -107,6 +136,8 @@ class AgentStatus(Message):
 
     state: AgentState
     trip: str = Field(default="", description="why it tripped")
+    mounting: str = Field(default="", description="unmounted, homed, mounted, centred or stranded")
+    step: StepStatus | None = Field(default=None, description="the last step before a run; null before the first")
     run: RunStatus | None = Field(default=None, description="the run that goes on, or the last one")
     finished: tuple[RunStatus, ...] = Field(
         default=(), description="runs that ended since the agent started, newest last"

@@ -10,6 +10,7 @@ from bench.agent.link import CommandServer, Publisher
 from bench.agent.messages import (
     Answer,
     Command,
+    PrepareCommand,
     ResetCommand,
     RunCommand,
     ShutDownCommand,
@@ -77,6 +78,8 @@ def answered(agent: Agent, command: Command, stopping: threading.Event) -> Answe
             return agent.stop()
         case ResetCommand():
             return agent.reset()
+        case PrepareCommand():
+            return agent.prepare(command)
         case ShutDownCommand():
             stopping.set()
             return Answer(ok=True, status=agent.status())

@@ -5,7 +5,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from bench.agent.messages import AgentStatus
+from bench.agent.messages import AgentStatus, Step
 from bench.catalogue.models import JobRow, JobState, RunOutcome, RunRow, RunState
 from bench.methods.document import DriveKind
 
@@ -22,6 +22,13 @@ class Health(View):
     version: str
     agent: str = Field(description="`ok`, or what is missing")
     worker: str = Field(description="`ok`, or what is missing")
+
+
+class Preparation(View):
+    """A step before a run."""
+
+    step: Step = Field(description="home, move, mount, centre, unmount, tare or clear-tare")
+    position_m: float = Field(default=0.0, description="[m] where `move` goes, from the middle or from home")
 
 
 class MethodSummary(View):

@@ -5,10 +5,10 @@ from importlib.metadata import version
 
 from fastapi import APIRouter
 
-from bench.agent.messages import AgentStatus, InstrumentStatus
+from bench.agent.messages import AgentStatus, InstrumentStatus, PrepareCommand, StopCommand
 from bench.errors import BenchError
 from bench.service.desk import AtDesk
-from bench.service.views import Health
+from bench.service.views import Health, Preparation
 
 open_to_all = APIRouter(tags=["service"])
 router = APIRouter(tags=["rig"])
@@ -39,6 +39,18 @@ def agent(desk: AtDesk) -> AgentStatus:
 def reset(desk: AtDesk) -> AgentStatus:
     """Take back a trip whose cause has gone; nothing moves."""
     return desk.watch.reset()
+
+
+@router.post("/agent/stop")
+def stop(desk: AtDesk) -> AgentStatus:
+    """End whatever goes on in good order: a run, or a step before one. Harmless when nothing moves."""
+    return desk.watch.command(StopCommand())
+
+
+@router.post("/agent/prepare")
+def prepare(desk: AtDesk, wanted: Preparation) -> AgentStatus:
+    """One step before a run; where the answer's state is `preparing`, it goes on."""
+    return desk.watch.command(PrepareCommand(step=wanted.step, position_m=wanted.position_m))
 
 
 @router.get("/instruments")

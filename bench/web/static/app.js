@@ -5,6 +5,7 @@ import { byId, fixed, write } from "./format.js";
 import { showEvent, showInstruments, showWarnings } from "./instruments.js";
 import { FIELDS, LiveLink, QUANTITIES, Readings, withDriveNamed } from "./live.js";
 import { LivePlots, STRIP_SECONDS } from "./plots.js";
+import { Preparation } from "./prepare.js";
 import { SampleRing } from "./ring.js";
 import { RunList } from "./runs.js";
 import { StartForm } from "./start.js";
@@ -24,6 +25,7 @@ const form = new StartForm({
   },
 });
 const bar = new TopBar({ onState: (state) => form.show({ state }) });
+const preparation = new Preparation();
 new Readings(ring, byId("readings"), STRIP_SECONDS);
 const plots = new LivePlots(ring, QUANTITIES, { loop: byId("plot-loop"), strips: byId("strips") });
 
@@ -39,6 +41,7 @@ const TAKE = {
     if (status.drive_unit) plots.nameDrive(`Drive [${status.drive_unit}]`);
     showInstruments(status.instruments);
     showWarnings(status.warnings);
+    preparation.take(status);
   },
   samples(samples) {
     if (!samples.time_ns.length) return;

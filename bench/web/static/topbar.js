@@ -53,6 +53,12 @@ export class TopBar {
     return this.age > STALE_S;
   }
 
+  /** The run that goes on; none while only a step before a run does. */
+  get run() {
+    const run = this.status?.run;
+    return run && !run.outcome ? run : null;
+  }
+
   /** True if, as far as is known, something may move. */
   get moving() {
     return MOVING.includes(this.status?.state);
@@ -81,7 +87,8 @@ export class TopBar {
     const { run, trip } = this.status ?? {};
     if (state === "unknown") return this.stale ? `No data for ${fixed(this.age, 0)} s. ${this.silence}` : "";
     if (state === "tripped") return trip;
-    if (!run) return "Ready for a run.";
+    if (state === "preparing" && !this.run) return this.status.step?.words ?? "";
+    if (!run) return this.status?.step?.words ?? "Ready for a run.";
     const what = `${run.method} on ${run.specimen || "an unnamed specimen"}`;
     if (state === "idle") return `Last run: ${what}: ${[run.outcome, run.reason].filter(Boolean).join(", ")}.`;
     const by = run.operator ? ` by ${run.operator}` : "";
@@ -89,7 +96,7 @@ export class TopBar {
   }
 
   showProgress(state) {
-    const run = MOVING.includes(state) ? this.status.run : null;
+    const run = MOVING.includes(state) ? this.run : null;
     const bar = byId("progress");
     bar.value = run ? Math.min(1, run.elapsed_s / run.duration_s) : 0;
     write(byId("segment"), run ? run.segment || "Between segments" : "No run");
@@ -119,7 +126,8 @@ export class TopBar {
       // What was last heard may be old: another page may have started something since.
       if (this.stale && !this.moving) this.take(await get("agent", STOP_PATIENCE_MS));
       if (!this.moving) return this.say("Nothing runs that could be stopped.");
-      await post(`runs/${encodeURIComponent(this.status.run.id)}/stop`, undefined, STOP_PATIENCE_MS);
+      const what = this.run ? `runs/${encodeURIComponent(this.run.id)}` : "agent";
+      await post(`${what}/stop`, undefined, STOP_PATIENCE_MS);
       if (this.state === "running") this.say("Stop is taken: the motion fades out.");
     } catch (problem) {
       this.say(problem.after("Stop was not confirmed, use the emergency stop of the hardware"), true);

@@ -1,0 +1,28 @@
+"""``mrbench prepare``: what a technician does before a run."""
+
+from pathlib import Path
+from typing import Annotated, get_args
+
+import typer
+
+from bench.agent.messages import Step
+
+_STEPS = ", ".join(get_args(Step))
+
+
+def prepare(
+    step: Annotated[str, typer.Argument(help=f"One of: {_STEPS}.")],
+    to: Annotated[
+        float, typer.Option("--to", metavar="METRES", help="Where `move` goes, from the middle or from home.")
+    ] = 0.0,
+    config: Annotated[Path, typer.Option(help="The bench whose agent is asked.")] = Path("bench.toml"),
+) -> None:
+    """Home the rod, move it, say that a specimen is clamped or not, find its middle, tare: by the agent that runs.
+
+    home seeks the reference and goes to the middle of the travel; it is refused with a specimen clamped. move goes
+    where --to says. mount and unmount say that a specimen has been clamped or unclamped. centre makes the place
+    where the rod stands the zero of positions. tare takes the present force off, clear-tare does so no more.
+    """
+    from bench.agent.prepare import prepare_through_agent
+
+    typer.echo(prepare_through_agent(config, step, to))

@@ -1,0 +1,38 @@
+// What is done before a run: home, move, clamp, centre, tare. Homing and moving lead the rod; homing asks first.
+
+import { post } from "./api.js";
+import { byId, write } from "./format.js";
+
+export class Preparation {
+  constructor() {
+    for (const button of byId("prepare").querySelectorAll("button")) {
+      button.addEventListener("click", () => this.ask(button.dataset.step));
+    }
+    const dialog = byId("home-dialog");
+    dialog.addEventListener("close", () => dialog.returnValue === "home" && this.carryOut("home"));
+  }
+
+  /** Takes a status of the agent. */
+  take({ state, mounting, step }) {
+    write(byId("mounting"), mounting || "unknown");
+    if (step && JSON.stringify(step) !== this.shown) {
+      this.shown = JSON.stringify(step);
+      write(byId("prepare-note"), step.words);
+    }
+    for (const button of byId("prepare").querySelectorAll("button")) button.disabled = state !== "idle";
+  }
+
+  ask(step) {
+    if (step !== "home") return this.carryOut(step);
+    byId("home-dialog").returnValue = "";
+    byId("home-dialog").showModal();
+  }
+
+  async carryOut(step) {
+    try {
+      this.take(await post("agent/prepare", { step, position_m: byId("move-to").valueAsNumber / 1000 || 0 }));
+    } catch (problem) {
+      write(byId("prepare-note"), problem.after("Nothing was done"));
+    }
+  }
+}

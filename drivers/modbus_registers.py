@@ -168,6 +168,19 @@ class Registers:
             OutOfRange: nothing was sent.
             NotConnected, NoReply, BadReply, Refused: it was not confirmed.
         """
+        self.line.write(*self._encoded(name, value))
+
+    def write_and_read(self, name: str, value: float, address: int, count: int) -> Answer:
+        """Set one value, then read holding registers, in one exchange.
+
+        Raises:
+            OutOfRange: nothing was sent.
+            NotConnected, NoReply, BadReply, Refused: no registers came.
+        """
+        return self.line.write_and_read(*self._encoded(name, value), address, count)
+
+    def _encoded(self, name: str, value: float) -> tuple[int, list[int]]:
+        """Where a value goes, and its words."""
         register = self.map.registers[name]
         number = register.channel().checked(value) / register.scale
-        self.line.write(register.address, encode(round(number), register.type, self.map.order))
+        return register.address, list(encode(round(number), register.type, self.map.order))

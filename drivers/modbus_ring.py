@@ -125,8 +125,9 @@ class Ring:
     def _take(self, blocks: list[Block]) -> bool:
         """Read the next block; whether more samples stand behind it."""
         self._next = time.monotonic() + self._every
-        self._registers.write("wanted", self.decoder.wanted)
-        answer = self._registers.line.read("input", self.layout.address, self.layout.length)
+        answer = self._registers.write_and_read(
+            "wanted", self.decoder.wanted, self.layout.address, self.layout.length
+        )
         taken = self._accepted(answer)
         self._failing_since, self._words = None, ""
         self.stamp = Stamp(taken.now_ns, answer.sent_ns, answer.received_ns)

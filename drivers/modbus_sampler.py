@@ -32,7 +32,7 @@ def check_rate(name: str, address: ModbusAddress, map_: RegisterMap) -> float:
         raise OutOfRange(f"{name}: {address.url} is a serial line; say its baud rate")
     layout, serial = Layout(map_), map_.document["serial"]
     made = map_.document["ring"]["rate"]
-    exchanges = [(13, 8), (8, 5 + 2 * layout.length)]  # where to begin, then the block
+    exchanges = [(17, 5 + 2 * layout.length)]  # where to begin, answered by the block
     rate = layout.capacity * carried(address, exchanges, serial["reply_delay"])
     if rate < _SPARE * made:
         raise OutOfRange(

@@ -92,6 +92,10 @@ class _Drive:
         return self._samples.blocks()
 
 
+_BLOCK = (4, 23)
+"""Functions whose answer is the block: reading alone, and saying where it begins at the same time."""
+
+
 class _Ring:
     """Answers to the question for a block of the ring; all other questions are passed over."""
 
@@ -101,7 +105,7 @@ class _Ring:
         self._decoder = RingDecoder(description["instrument"], layout)
         self._decoder.resume(description["state"])
         self._rtu = bool(description["rtu"])
-        self._wanted = struct.pack(">BHH", 4, layout.address, layout.length)
+        self._asked = {struct.pack(">BHH", function, layout.address, layout.length) for function in _BLOCK}
         self._length = 2 * layout.length
         self._question = b""
 
@@ -122,7 +126,8 @@ class _Ring:
         question, self._question = self._question, b""
         head, tail = (1, 2) if self._rtu else (7, 0)
         answer = heard[-(head + 2 + self._length + tail) :]
-        if question[head : head + 5] != self._wanted or answer[head : head + 2] != bytes((4, self._length)):
+        asked = question[head : head + 5]
+        if asked not in self._asked or answer[head : head + 2] != bytes((asked[0], self._length)):
             return None
         same = answer[0] == question[0] and _crc(answer) == 0 if self._rtu else answer[:2] == question[:2]
         return struct.unpack_from(f">{self._length // 2}H", answer, head + 2) if same else None

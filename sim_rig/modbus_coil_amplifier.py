@@ -169,7 +169,7 @@ class CoilAmplifierDevice:
 
     def _sections(self) -> list[Section]:
         address, length = self._document["table"]["address"], len(self._table)
-        return [self.ring.section(), Section(3, address, length, lambda: self._table, self._write_table)]
+        return [self.ring.section(), Section((3,), address, length, lambda: self._table, self._write_table)]
 
     def _table_state(self) -> int:
         self.output.settle(self._signals.now_ns())

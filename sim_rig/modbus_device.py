@@ -57,8 +57,8 @@ def from_words(words: list[int], type_: str, scale: float, low_first: bool) -> f
 class Section:
     """Registers that are not single values: read or written as a whole or in part."""
 
-    function: int
-    """3 for holding registers, 4 for input registers."""
+    functions: tuple[int, ...]
+    """3 where it is found among holding registers, 4 among input registers."""
     address: int
     length: int
     read: Callable[[], list[int]]
@@ -83,7 +83,7 @@ class RegisterBank:
         """
         for section in self.sections:
             start = address - section.address
-            if section.function == function and start >= 0 and start + count <= section.length:
+            if function in section.functions and start >= 0 and start + count <= section.length:
                 return section.read()[start : start + count]
         found: dict[int, int] = {}
         for entry in self._entries(function):
@@ -103,7 +103,7 @@ class RegisterBank:
         """
         for section in self.sections:
             start = address - section.address
-            if section.write and section.function == 3 and start >= 0 and start + len(words) <= section.length:
+            if section.write and start >= 0 and start + len(words) <= section.length:
                 section.write(start, words)
                 return
         for entry, value in self._meant(address, words):
@@ -187,7 +187,7 @@ class SampleRing:
 
     def section(self) -> Section:
         """The block as registers."""
-        return Section(4, self._ring["address"], self._ring["length"], self.block)
+        return Section((3, 4), self._ring["address"], self._ring["length"], self.block)
 
     def newest(self, channel: str) -> tuple[int, float]:
         """Instant [ns] of the rig's clock and value of the newest sample; NaN before the first."""

@@ -53,7 +53,7 @@ class _Rtu:
     def take(self, heard: bytes) -> tuple[Request | None, bytes]:
         if len(heard) < 8:
             return None, heard
-        length = 9 + heard[6] if heard[1] == 16 else 8
+        length = _length(heard)
         if len(heard) < length:
             return None, heard
         frame, rest = heard[:length], heard[length:]
@@ -67,6 +67,15 @@ class _Rtu:
 
     def corrupt(self, frame: bytes) -> bytes:
         return frame[:-1] + bytes([frame[-1] ^ 1])
+
+
+def _length(heard: bytes) -> int:
+    """[bytes] of a request of which eight or more have come; 11 where that is told by what has not come yet."""
+    if heard[1] == 16:
+        return 9 + heard[6]
+    if heard[1] == 23:
+        return 13 + heard[10] if len(heard) > 10 else 11
+    return 8
 
 
 def crc(data: bytes) -> bytes:

@@ -100,6 +100,8 @@ def answer(device: Device, pdu: bytes) -> bytes:
 def _content(device: Device, function: int, body: bytes) -> bytes:
     if function == 8 and body[:2] == b"\0\0":
         return body
+    if function == 23:
+        return _written_and_read(device, body)
     if function not in {3, 4, 6, 16}:
         raise Illegal(1)
     address, number = struct.unpack_from(">HH", body)
@@ -114,6 +116,15 @@ def _content(device: Device, function: int, body: bytes) -> bytes:
     else:
         device.write(address, [number])
     return body[:4]
+
+
+def _written_and_read(device: Device, body: bytes) -> bytes:
+    """Write, then read: the order of function 23."""
+    read_at, wanted, write_at, number, size = struct.unpack_from(">HHHHB", body)
+    if not (1 <= wanted <= 125 and 1 <= number <= 121 and size == 2 * number == len(body) - 9):
+        raise Illegal(3)
+    device.write(write_at, list(struct.unpack_from(f">{number}H", body, 9)))
+    return struct.pack(f">B{wanted}H", 2 * wanted, *device.read(3, read_at, wanted))
 
 
 @dataclass

@@ -82,11 +82,11 @@ FAULTS = [
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.kind)
 def test_a_block_that_did_not_come_is_read_again_without_loss(bench, fault):
     bench.signals.step(40)
-    bench.server.inject(fault, function=4)
-    bench.server.inject(fault, function=16)
+    bench.server.inject(fault, times=2, function=23)
     blocks = bench.collect(40)
     bench.signals.step(40)
     assert_true(blocks + bench.collect(40))
+    assert bench.server.pending_faults == 0
     assert bench.driver.health().lost == 0
     assert bench.driver.health().words == ""
 
@@ -95,7 +95,7 @@ def test_a_repeated_old_block_is_not_taken_for_the_one_wanted(bench):
     bench.signals.step(30)
     blocks = bench.collect(30)
     bench.signals.step(30)
-    bench.server.inject(WireFault("stale"), function=4)
+    bench.server.inject(WireFault("stale"), function=23)
     assert_true(blocks + bench.collect(30))
     assert bench.server.pending_faults == 0
     assert bench.driver.health().lost == 0

@@ -29,9 +29,10 @@ def test_temperatures_come_ten_times_a_second(bench, fault):
     signals, server, driver = bench
     signals.step(2_000)
     if fault:
-        server.inject(fault, function=4)
+        server.inject(fault, function=23)
     blocks = []
     until(lambda: blocks.extend(driver.acquire(0.05)) or sum(len(b.values) for b in blocks) >= 20)
+    assert server.pending_faults == 0
     times = np.concatenate([block.device_ns for block in blocks])
     values = np.concatenate([block.values for block in blocks])
     assert np.all(np.diff(times) == 100_000_000)

@@ -66,6 +66,17 @@ def test_a_plain_client_reads_the_ring_again_and_again(lvdt):
     assert again[:5] + again[9:] == block[:5] + block[9:]
 
 
+def test_a_plain_client_says_where_the_block_begins_and_reads_it_in_one_exchange(lvdt):
+    client, _, _ = lvdt
+    where = client.convert_to_registers(4010, client.DATATYPE.UINT32)
+    block = client.readwrite_registers(read_address=100, read_count=125, write_address=0, values=where).registers
+    assert number(client, block[1:3], "UINT32") == 4010
+    assert block == client.read_holding_registers(100, count=125).registers
+    assert block == client.read_input_registers(100, count=125).registers
+    refused = client.readwrite_registers(read_address=100, read_count=125, write_address=500, values=[1])
+    assert refused.exception_code == 2
+
+
 def test_what_does_not_exist_is_refused_with_the_right_code(lvdt):
     client, _, _ = lvdt
     assert client.read_input_registers(60, count=2).exception_code == 2

@@ -14,14 +14,15 @@ from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
+from bench.agent.bench_clock import BenchClock
 from bench.agent.bench_thread import BenchThread
 from bench.agent.header import LogFacts, clock_words, decoders, documents, force_rate, run_header
+from bench.agent.instrument_status import instrument_status
 from bench.agent.messages import (
     AgentEvent,
     AgentState,
     AgentStatus,
     Answer,
-    InstrumentStatus,
     PrepareCommand,
     RunCommand,
     RunStatus,
@@ -37,14 +38,16 @@ from bench.recorder.live import LiveRecorder
 from bench.rig.acquisition import Acquisition, Batch
 from bench.rig.alignment import Aligner
 from bench.rig.config import BenchConfig
-from bench.rig.instruments import Named, build_rig
+from bench.rig.instruments import build_rig
 from bench.rig.priority import (
     HASTE,
     freeze_memory,
     ordinary_priority,
     pause_collection,
+    priority_refused,
     raise_priority,
     resume_collection,
+    with_priority,
 )
 from bench.safety.interlocks import Interlocks
 from bench.safety.limits import Action, specimen_matrix, stricter
@@ -70,17 +73,6 @@ _REMEMBERED = 100
 """Ended runs that the status lists."""
 
 
-class BenchClock:
-    """The bench clock [ns]: monotonic, zero when the agent starts."""
-
-    def __init__(self) -> None:
-        self._began = time.monotonic_ns()
-
-    def __call__(self) -> int:
-        """Now."""
-        return time.monotonic_ns() - self._began
-
-
 class Agent:
     """The agent; a context manager that holds all wires open.
 
@@ -100,7 +92,7 @@ class Agent:
         """
         self._config, self._source, self._publish = config, source, publish
         self._clock = BenchClock()
-        self._no_priority = _no_priority()
+        self._no_priority = priority_refused()
         self._rig = build_rig(config, self._clock, prompt=not self._no_priority)
         self._interlocks = Interlocks(config.limits.matrix(), self._rig.drive_channel)
         self._warden = Warden(self._rig, self._interlocks, self._clock, self._tell, self._stop_run)
@@ -167,7 +159,7 @@ class Agent:
             step=self._preparation.status,
             run=self.run_status(),
             finished=finished,
-            instruments=tuple(self._instrument_status(one) for one in self._rig.named),
+            instruments=tuple(instrument_status(one, self._acquisition, self._clock) for one in self._rig.named),
             warnings=self._warnings(),
             drive_kind=self._rig.drive_kind,
             drive_unit=self._rig.drive_unit,
@@ -413,52 +405,6 @@ class Agent:
             found[f"{self._no_priority}; the drive stops by itself {stale:g} s after the last setpoint"] = None
         return tuple(found)
 
-    def _instrument_status(self, one: Named) -> InstrumentStatus:
-        health, clock = one.instrument.health(), self._acquisition.maps[one.name]
-        down = one.name in self._acquisition.down
-        return InstrumentStatus(
-            name=one.name,
-            driver=one.driver,
-            address=one.address,
-            connected=health.connected and not down,
-            received=health.received,
-            lost=health.lost,
-            corrupted=health.corrupted,
-            resynchronised=health.resynchronised,
-            age_s=None if health.last_ns is None else (self._clock() - health.last_ns) * 1e-9,
-            skew_s=clock.skew() if clock.known else None,
-            words=health.words or ("does not answer" if down else ""),
-        )
-
     def _folder(self) -> Path:
         base = Path() if self._source is None else self._source.parent
         return base / self._config.rig.folder
-
-
-def _no_priority() -> str:
-    """Why threads of this process get no real-time priority; empty where they do."""
-    said: list[str] = []
-    with_priority(lambda: said.append(raise_priority()))
-    return said[0]
-
-
-def with_priority(work: Callable[[], None]) -> None:
-    """Do something in a thread of real-time priority, which all threads that it starts inherit.
-
-    Every thread of the agent needs it: one that holds the interpreter and is put aside for another process would
-    hold up the setpoints, too. The calling thread stays as it is.
-    """
-    failures: list[BaseException] = []
-
-    def run() -> None:
-        raise_priority(-HASTE)
-        try:
-            work()
-        except BaseException as error:
-            failures.append(error)
-
-    thread = threading.Thread(target=run)
-    thread.start()
-    thread.join()
-    if failures:
-        raise failures[0]

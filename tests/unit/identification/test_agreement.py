@@ -22,7 +22,7 @@ def moved(**deviations) -> Coordinates:
     )
 
 
-def test_two_estimates_within_two_deviations_agree():
+def test_two_estimates_as_far_apart_as_chance_puts_them_agree():
     found = compare(moved(D_y=1.9, k0=-1.0), SPREAD, LABORATORY, SPREAD, KNOWN)
     assert found.agrees
     assert found.worst == "D_y"
@@ -31,7 +31,7 @@ def test_two_estimates_within_two_deviations_agree():
 
 
 def test_a_coordinate_beyond_its_interval_is_named_among_all_that_are():
-    found = compare(moved(D_y=2.1, k1=-30.0, n=1.0), SPREAD, LABORATORY, SPREAD, KNOWN)
+    found = compare(moved(D_y=3.1, k1=-30.0, n=2.1), SPREAD, LABORATORY, SPREAD, KNOWN)
     assert not found.agrees
     assert found.words().startswith("disagree in D_y, k1, most in k1 by 30 deviations:")
 

@@ -12,6 +12,9 @@ def report(
     fit: Annotated[
         Path | None, typer.Option(help="A fit made by `identify`; without it the recording alone is shown.")
     ] = None,
+    diagnosis: Annotated[
+        Path | None, typer.Option(help="A diagnosis made by `diagnose`: what is missing in the simulation.")
+    ] = None,
     plots: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the plots there, as SVG and PNG.")
     ] = None,
@@ -26,9 +29,10 @@ def report(
 
     if str(out) == "-":
         raise typer.BadParameter("a page goes to a file: --out report.html")
-    words = ["mrbench", "report", str(log), *(["--fit", str(fit)] if fit else []), "--out", str(out)]
+    words = ["mrbench", "report", str(log), *(["--fit", str(fit)] if fit else [])]
+    words += [*(["--diagnosis", str(diagnosis)] if diagnosis else []), "--out", str(out)]
     words += ["--plots", str(plots)] if plots else []
-    found = gather(log, fit)
+    found = gather(log, fit, diagnosis)
     drawn = figures(found)
     page = render(found, drawn, shlex.join(words), datetime.now(UTC))
     if plots is not None:

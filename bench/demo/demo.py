@@ -26,7 +26,7 @@ class Demo:
 
     def __init__(self, folder: DemoFolder, says: Console) -> None:
         self._folder, self._says = folder, says
-        self._step, self._steps = 0, 4 if folder.unseen is None else 6
+        self._step, self._steps = 0, 5 if folder.unseen is None else 7
 
     def carry_out(self, console: Console, *, serve: bool) -> None:
         """Do everything, and say in short what came out.
@@ -44,6 +44,8 @@ class Demo:
         with _ended_in_order(), processes(self._folder) as page:
             rest = Rest(page)
             self._stroke(rest)
+            self._announce("look for what the simulation lacks")
+            _mrbench("diagnose", self._folder.log, "--out", self._folder.diagnosis)
             self._announce("write the report")
             self._report()
             summarise(self._folder, console)
@@ -73,7 +75,8 @@ class Demo:
     def _report(self) -> None:
         folder = self._folder
         _mrbench(
-            "report", folder.log, "--fit", folder.fit, "--out", folder.report, "--plots", folder.plots
+            "report", folder.log, "--fit", folder.fit, "--diagnosis", folder.diagnosis,
+            "--out", folder.report, "--plots", folder.plots,
         )  # fmt: skip
 
     def _make_folder(self) -> None:

@@ -35,6 +35,11 @@ class DemoFolder:
         return self.path / "prediction.json"
 
     @property
+    def diagnosis(self) -> Path:
+        """What is missing in the simulation."""
+        return self.path / "diagnosis.json"
+
+    @property
     def report(self) -> Path:
         """The page."""
         return self.path / "report.html"

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bench.demo.folder import DemoFolder
+from bench.report.diagnosis import VERDICTS, read_diagnosis
 from bench.report.documents import Fit, Prediction, read_fit, read_prediction
 from bench.report.values import newton, quantity, times
 
@@ -22,6 +23,8 @@ def summarise(demo: DemoFolder, console: Console) -> None:
     prediction = read_prediction(demo.prediction) if demo.unseen is not None else None
     for table in (_error_table(fit, prediction), _parameter_table(fit)):
         console.print(table)
+    diagnosis = read_diagnosis(demo.diagnosis)
+    console.print(f"{VERDICTS[diagnosis.verdict]} {diagnosis.explanation}\n", highlight=False)
     for name, path, how in _files(demo):
         console.print(f"  {name:<15} {path}  {how}".rstrip(), highlight=False, soft_wrap=True)
 
@@ -56,6 +59,7 @@ def _files(demo: DemoFolder) -> list[tuple[str, Path, str]]:
         ("report", demo.report, "(open in a browser)"),
         ("plots", demo.plots, "(SVG and PNG)"),
         ("fit", demo.fit, "(the paper's fourteen parameters are in it, too)"),
+        ("diagnosis", demo.diagnosis, ""),
         ("recording", demo.log, "(open in Foxglove, Lichtblick or PlotJuggler; plot /bench/sample)"),
     ]
     if demo.unseen_log is not None:

@@ -137,7 +137,7 @@ def read_fit(path: Path) -> Fit:
     Raises:
         ReportError: there is no such file, or it is no fit.
     """
-    return _read(path, Fit, "a fit made by `mrbench identify`")
+    return read_document(path, Fit, "a fit made by `mrbench identify`")
 
 
 def read_prediction(path: Path) -> Prediction:
@@ -146,10 +146,20 @@ def read_prediction(path: Path) -> Prediction:
     Raises:
         ReportError: there is no such file, or it is no prediction.
     """
-    return _read(path, Prediction, "a prediction made by `mrbench predict`")
+    return read_document(path, Prediction, "a prediction made by `mrbench predict`")
 
 
-def _read(path: Path, kind: type[Document], wanted: str) -> Document:
+def read_document(path: Path, kind: type[Document], wanted: str) -> Document:
+    """A document of one kind from its file.
+
+    Args:
+        path: of the file.
+        kind: its type.
+        wanted: what should have been given, for a person.
+
+    Raises:
+        ReportError: there is no such file, or it is something else.
+    """
     try:
         return kind.model_validate_json(path.read_bytes())
     except OSError as error:

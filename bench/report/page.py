@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from bench.errors import ReportError
 from bench.recorder.reader import Log, read_log
-from bench.report import content, plots
+from bench.report import content, diagnosis, diagnosis_plots, plots
+from bench.report.diagnosis import Diagnosis, read_diagnosis
 from bench.report.documents import Fit, Prediction, read_fit
 from bench.report.recording import Recording, recording_from
 from bench.report.series import predict
@@ -32,6 +33,14 @@ CAPTIONS = {
         "time. Noise alone, too, reaches a little beyond twice its floor.",
     ),
     "drives": ("Force error by drive", "Root mean square over all samples at that drive, beside the noise floor."),
+    "gap": (
+        "How far it shrinks, and where it comes from",
+        "Left: force error on strokes that no fit saw. Right: stages of the chain from the coil to the record.",
+    ),
+    "where": (
+        "Where it shows",
+        "What the refitted law leaves beyond the noise, by condition and phase of the stroke.",
+    ),
     "whole": (
         "The whole recording",
         "Displacement, drive and force; colours by drive as everywhere on this page.",
@@ -58,6 +67,7 @@ class Report:
     fit: Fit | None
     prediction: Prediction | None
     recording: Recording
+    diagnosis: Diagnosis | None = None
 
     @property
     def seen(self) -> bool:
@@ -65,19 +75,20 @@ class Report:
         return self.fit is not None and self.fit.saw(self.sha256)
 
 
-def gather(log: Path, fit: Path | None) -> Report:
-    """Read a log and a fit, and simulate the one on the other.
+def gather(log: Path, fit: Path | None, diagnosed: Path | None = None) -> Report:
+    """Read a log, a fit and a diagnosis, and simulate the fit on the log.
 
     Raises:
-        ReportError: the fit is none, or cannot be simulated on this log.
+        ReportError: the fit or the diagnosis is none, or the fit cannot be simulated on this log.
         LogError: the log cannot be read.
     """
     known = None if fit is None else read_fit(fit)
+    answer = None if diagnosed is None else read_diagnosis(diagnosed)
     recorded = read_log(log)
     prediction, series = (None, None) if fit is None else predict(fit, log)
     with log.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return Report(recorded, digest, known, prediction, recording_from(recorded, series))
+    return Report(recorded, digest, known, prediction, recording_from(recorded, series), answer)
 
 
 def figures(report: Report) -> dict[str, Figure]:
@@ -87,6 +98,10 @@ def figures(report: Report) -> dict[str, Figure]:
         floor = report.prediction.noise_floor_n
         found["residual"] = plots.residual(report.recording, floor)
         found["drives"] = plots.by_drive(report.prediction.per_drive, floor, report.recording)
+    if report.diagnosis is not None:
+        found["gap"] = diagnosis_plots.shrinkage(report.diagnosis)
+        if (where := diagnosis_plots.place(report.diagnosis)) is not None:
+            found["where"] = where
     return {**found, "whole": plots.whole(report.recording)}
 
 
@@ -117,6 +132,7 @@ def render(report: Report, drawn: dict[str, Figure], command: str, made: datetim
         pictures=pictures,
         outcome=content.outcome_facts(report.log),
         channels=content.channel_rows(report.log),
+        diagnosis=None if report.diagnosis is None else diagnosis.context(report.diagnosis),
         fit=None if report.fit is None else _fit_context(report),
         made=f"{made:%Y-%m-%d %H:%M} UTC",
         version=version("mrbench"),

@@ -19,6 +19,7 @@ STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 TOKEN = "a-token"
 SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
 REFUSAL = "lvdt: not connected for 3.2 s; plug it in and start again"
+CLAMPED = "a specimen is clamped, and homing would drive it into its ends; unclamp it and call unmount first"
 RATE = 1000
 BATCH = 40
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
@@ -78,6 +79,8 @@ class FakeBench:
         self.state = "idle"
         self.trip = ""
         self.run: dict[str, Any] | None = None
+        self.mounting = "homed"
+        self.step: dict[str, Any] | None = None
         self.refusals = 1
         self.silent = False
         self.over = False
@@ -95,7 +98,7 @@ class FakeBench:
         return {
             "state": self.state, "trip": self.trip, "run": self.run, "finished": [], "instruments": INSTRUMENTS,
             "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
-            "drive_kind": "coil_v", "drive_unit": "V",
+            "drive_kind": "coil_v", "drive_unit": "V", "mounting": self.mounting, "step": self.step,
         }  # fmt: skip
 
     def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
@@ -168,6 +171,14 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     @router.post("/agent/reset")
     async def reset() -> Any:
         bench.state, bench.trip = "idle", ""
+        return bench.status()
+
+    @router.post("/agent/prepare")
+    async def prepare(wanted: dict[str, Any]) -> Any:
+        if wanted["step"] == "home" and bench.mounting == "mounted":
+            return problem(409, "Not possible", CLAMPED)
+        bench.mounting = {"mount": "mounted"}.get(wanted["step"], bench.mounting)
+        bench.step = {"step": wanted["step"], "outcome": "done", "words": f"{wanted['step']} is done"}
         return bench.status()
 
     @router.post("/silence")

@@ -8,7 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from fake_service import REFUSAL, SILENCE, STATIC, TOKEN, TRIP, FakeBench, served
+from fake_service import CLAMPED, REFUSAL, SILENCE, STATIC, TOKEN, TRIP, FakeBench, served
 
 FOLDER = Path(__file__).with_name("javascript")
 NODE = shutil.which("node")
@@ -101,6 +101,18 @@ def test_reset_asks_first(seen, bench):
     assert seen["stateAfterKeeping"] == "Tripped"
     assert [path for path, _ in bench.posted].count("agent/reset") == 1
     assert ("jobs/job-run-2/cancel", "") in bench.posted
+
+
+@browser_test
+def test_what_comes_before_a_run_is_asked_of_the_agent_and_homing_asks_first(seen, bench):
+    asked = [json.loads(body) for path, body in bench.posted if path == "agent/prepare"]
+    assert asked == [
+        {"step": "move", "position_m": pytest.approx(0.0125)},
+        {"step": "mount", "position_m": pytest.approx(0.0125)},
+        {"step": "home", "position_m": pytest.approx(0.0125)},
+    ]
+    assert seen["homing"] == f"Nothing was done: {CLAMPED}."
+    assert seen["prepareWhileRunning"]
 
 
 @browser_test

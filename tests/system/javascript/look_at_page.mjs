@@ -57,6 +57,7 @@ async function start() {
   await hasText("#state-word", "Running");
   seen.focused = await page.evaluate(() => document.activeElement.id);
   seen.progress = [await text("#segment"), await text("#time-left"), await page.locator("#progress").evaluate((bar) => bar.value)];
+  seen.prepareWhileRunning = await page.locator("#prepare button").evaluateAll((all) => all.every((one) => one.disabled));
   seen.startWhileRunning = await page.locator("#start").isDisabled();
 }
 
@@ -81,6 +82,20 @@ async function reset() {
   await page.click("#reset-dialog button[value=reset]");
   await request;
   await hasText("#state-word", "Idle");
+}
+
+async function prepare() {
+  await page.fill("#move-to", "12.5");
+  await page.click("#prepare button[data-step=move]");
+  await hasText("#prepare-note", "move is done");
+  await page.click("#prepare button[data-step=mount]");
+  await hasText("#mounting", "mounted");
+  await page.click("#prepare button[data-step=home]");
+  await page.click("#home-dialog button[value=cancel]");
+  await page.click("#prepare button[data-step=home]");
+  await page.click("#home-dialog button[value=home]");
+  await hasText("#prepare-note", "clamped");
+  seen.homing = await text("#prepare-note");
 }
 
 async function cancelJob() {
@@ -129,7 +144,7 @@ async function thin() {
 }
 
 try {
-  for (const step of [letIn, watch, start, stop, reset, cancelJob, loseConnection, measureWidths]) await step();
+  for (const step of [letIn, watch, start, stop, reset, prepare, cancelJob, loseConnection, measureWidths]) await step();
   seen.thinned = await thin();
   console.log(JSON.stringify(seen));
 } finally {

@@ -1,16 +1,17 @@
 """The evidence page of a blind trial: `python -m benchmarks.trial trial.json`, after `mrbench trial`.
 
 A trial that was stopped counts as far as it went: cases that have not been diagnosed are left out, and the page
-says how many there were to be.
+says how many there were to be. Strokes made by `benchmarks.trial_next` have their line once they are there.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from sim_rig.trial.answer import CaseAnswer, Trial
+from benchmarks.trial_next import open_cases, second_answer
+from sim_rig.trial.answer import CaseAnswer, Scores, Share, Trial
 from sim_rig.trial.folder import TrialFolder
-from sim_rig.trial.run import DIAGNOSE, Plan
+from sim_rig.trial.run import DIAGNOSE, WIRES, Plan
 from sim_rig.trial.score import scores, share
 from sim_rig.trial.table import table
 from sim_rig.trial.whole import answer
@@ -23,62 +24,118 @@ _WITHIN = 0.05
 _PAGE = """# The diagnosis on sealed scenarios
 
 {run} of {drawn} cases. Truth drawn and sealed before anything was recorded, in forms of their own; each case
-diagnosed from its log alone, then unsealed. [How it works](../explanation/blind-trial.md). Made by
+diagnosed from its log alone, then unsealed. [How it works](../explanation/blind-trial.md). Sealed truth: SHA-256
+`{seal}`. Made by
 
 ```
 {command}
+python -m benchmarks.trial_next trial.json
 python -m benchmarks.trial trial.json
 ```
 
-Claimed shrinkage within {within:.0f} points of that of a run which the diagnosis never saw, refitted law above
-{clear} times the floor: {shrinkage}.
+| asked | wanted | found |
+| --- | --- | --- |
+{bars}
+
+Sizes are first-order figures; what the refitted law really left stands in the last table ("before", over the floor
+on strokes that no fit saw), and so does what was left with the named effects ("after").
 
 ```
 {table}```
 
 ## Case by case
 
-| case | kind | strokes | noise | truth (first-order ratio) | verdict | named | truth had | before | after | s |
-| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
+The named set is in bold where it is the true one. "Shrinkage" is claimed / that on the run never seen.
+
+| case | kind | strokes | noise | truth (ratio) | verdict | named | truth had | before | after | shrinkage | s |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}
 """
 
 
-def page(whole: Trial, drawn: int) -> str:
+def page(whole: Trial, drawn: int, next_strokes: Share) -> str:
     """The page of the cases that have been diagnosed."""
     honest = [case for case in whole.cases if case.verdict or "not been diagnosed" not in (case.failure or "")]
     told = whole.model_copy(update={"cases": tuple(honest), "scores": scores(honest)})
     grid = " --grid" if whole.draw == "grid" else ""
     return _PAGE.format(
-        run=len(honest),
+        run=len([case for case in honest if not case.over_wires]),
         drawn=drawn,
-        command=f"mrbench trial --cases {drawn} --seed {whole.seed}{grid} --out trial.json",
-        within=100 * _WITHIN,
-        clear=_CLEAR,
-        shrinkage=_shrinkage(honest),
+        seal=whole.sealed_sha256,
+        command=f"mrbench trial --cases {drawn} --seed {whole.seed}{grid} --over-wires 10 --out trial.json",
+        bars="\n".join(f"| {' | '.join(line)} |" for line in _bars(told.scores, honest, next_strokes)),
         table=table(told),
         rows="\n".join(map(_row, honest)),
     )
 
 
-def _shrinkage(cases: Sequence[CaseAnswer]) -> str:
+def _bars(found: Scores, cases: Sequence[CaseAnswer], next_strokes: Share) -> Iterable[tuple[str, str, str]]:
+    """What is asked of the diagnosis, what is wanted, and what was found."""
+    known = [case for case in cases if case.kind not in ("nothing", "unknown")]
+    yield "right set named first, large, rich methods", "97 %", _said(found.named_first["large rich"])
+    yield "right set named first, small, rich methods", "85 %", _said(found.named_first["small rich"])
+    rich = share(case.among for case in known if case.method == "rich")
+    yield "truth among the named and three alternatives, rich methods", "98 %", _said(rich)
+    yield "truth among the named and three alternatives, all methods", "98 %", _said(found.among["all"])
+    yield "effects named where nothing is", "at most 2 in 100", _said(found.false_alarms)
+    yield "unknown effects blamed on no known one", "27 of 30", _said(found.unknown_left_unknown)
+    for method in ("rich", "poor"):
+        yield (
+            f"claimed shrinkage within {100 * _WITHIN:.0f} points, {method}",
+            "95 %",
+            _said(_close(cases, method)),
+        )
+    yield "truth named after the proposed stroke was made, poor methods", "90 %", _said(next_strokes)
+    yield "same answer over the wires", "10 of 10", _said(_same_over_wires(cases))
+
+
+def _said(found: Share) -> str:
+    if found.share is None or found.ci95 is None:
+        return "not measured"
+    low, high = found.ci95
+    return f"{found.count} of {found.of} = {100 * found.share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def _close(cases: Sequence[CaseAnswer], method: str) -> Share:
+    """Claimed shrinkages that came true on the run never seen, of cases with a clear gap and named effects."""
     pairs = [
         (case.claimed_shrinkage, case.true_shrinkage)
         for case in cases
-        if (case.before_over_floor or 0.0) > _CLEAR and case.named and case.named.effects
+        if (case.before_over_floor or 0.0) > _CLEAR and case.named and case.named.effects and case.method == method
     ]
-    found = share(abs(c - t) <= _WITHIN for c, t in pairs if c is not None and t is not None)
-    return f"{found.count} of {found.of}"
+    return share(abs(c - t) <= _WITHIN for c, t in pairs if c is not None and t is not None)
+
+
+def _same_over_wires(cases: Sequence[CaseAnswer]) -> Share:
+    """Cases whose diagnosis over the wires named what that in accelerated time did."""
+    by_name = {case.id: case for case in cases}
+    twice = [(case, by_name[case.id.removesuffix(WIRES)]) for case in cases if case.over_wires]
+    return share(_answer(one) == _answer(other) for one, other in twice)
+
+
+def _answer(case: CaseAnswer) -> tuple[str | None, tuple[str, ...]]:
+    return case.verdict, case.named.effects if case.named else ()
+
+
+def _came_true(folder: TrialFolder) -> Share:
+    """Cases with open sets in which the proposed stroke brought the truth to the top."""
+    answers = [(case, second_answer(folder, case)) for case, _ in open_cases(folder)]
+    return share(
+        found == tuple(sorted(effect.name for effect in case.effects))
+        for case, found in answers
+        if found is not None
+    )
 
 
 def _row(case: CaseAnswer) -> str:
     truth = ", ".join(f"{name} ({case.ratios[name]:.2f})" for name in case.truth) or "–"
     named = ", ".join(case.named.effects) if case.named and case.named.effects else "–"
     figures = ["–" if f is None else f"{f:.3f}" for f in (case.before_over_floor, case.after_over_floor)]
+    shrunk = ["–" if f is None else f"{f:.2f}" for f in (case.claimed_shrinkage, case.true_shrinkage)]
     cells = [
         *(case.id, f"{case.kind} {case.magnitude or ''}".strip(), case.method, case.noise, truth),
         *(case.verdict or "none", named if not case.right else f"**{named}**"),
-        *(f"{case.probability_of_truth:.2f}", *figures, f"{case.seconds:.0f}"),
+        *(f"{case.probability_of_truth:.2f}", *figures, " / ".join(shrunk), f"{case.seconds:.0f}"),
     ]
     return f"| {' | '.join(cells)} |"
 
@@ -93,8 +150,10 @@ def main() -> None:
     seal = folder.seal()
     if seal is None:
         raise SystemExit(f"{asked.trial}: no trial has been sealed there; run `mrbench trial` first")
-    plan = Plan(seal.cases, seal.seed, seal.draw, 1, 0, DIAGNOSE)
-    asked.page.write_text(page(answer(folder, plan), seal.cases), encoding="utf-8")
+    twice = [path.name for path in (folder.root / "diagnoses").glob(f"*{WIRES}.outcome.json")]
+    wires = max((int(name.split("_")[1]) + 1 for name in twice), default=0)
+    plan = Plan(seal.cases, seal.seed, seal.draw, 1, wires, DIAGNOSE)
+    asked.page.write_text(page(answer(folder, plan), seal.cases, _came_true(folder)), encoding="utf-8")
 
 
 if __name__ == "__main__":

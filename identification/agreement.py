@@ -1,8 +1,8 @@
 """Do two stages that know nothing of each other find the same damper?
 
-Both look at the same samples, so two good estimates differ by less than either misses the truth. A dozen coordinates
-are compared, so the largest of their differences is judged: one in twenty beyond two deviations would be an alarm on
-every other run.
+Both look at the same samples, so two good estimates differ by less than either misses the truth. A dozen
+coordinates are compared, so the largest of their differences is judged: one in twenty beyond two deviations
+would be an alarm on every other run.
 """
 
 from dataclasses import dataclass

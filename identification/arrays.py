@@ -45,3 +45,11 @@ numba.config.CACHE_DIR = str(  # type: ignore[attr-defined]  # made by numba whe
 def compiled(function: Function) -> Function:
     """The function as machine code, kept on disk between processes; it releases the interpreter's lock."""
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
+
+
+def compiled_anew(function: Function) -> Function:
+    """The same for a function that takes another one, made anew in every process.
+
+    The compiler cannot keep such a function on disk: once two arguments were met, it fails on one that is gone.
+    """
+    return cast(Function, numba.njit(nogil=True, error_model="numpy")(function))

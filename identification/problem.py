@@ -305,8 +305,11 @@ class Problem:
         return replace(self, pieces=tuple(p.quicker() for p in self.pieces))
 
     def coarser(self, times: int) -> "Problem":
-        """The same problem on every so many samples, for a first look."""
-        return replace(self, pieces=tuple(p.coarser(times) for p in self.pieces)) if times > 1 else self
+        """The same problem on every so many samples, for a first look; of slower recordings fewer are left out."""
+        highest = max(p.stroke.rate for p in self.pieces)
+        each = [max(1, round(times * p.stroke.rate / highest)) for p in self.pieces]
+        pieces = (p.coarser(k) if k > 1 else p for p, k in zip(self.pieces, each, strict=True))
+        return replace(self, pieces=tuple(pieces))
 
     def with_effects(self, effects: tuple[EffectChoice, ...]) -> "Problem":
         """The same problem with other effects beside the law."""

@@ -4,8 +4,9 @@ Steps are shrunk whole, never element by element, and unknowns that would leave 
 while the others are solved again. If the best point stays above the noise floor, scattered starts are tried.
 """
 
+import itertools
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array, BoolArray
 from identification.problem import Evaluation, Problem
-from identification.start import scattered, starting_points
+from identification.start import further_points, scattered, starting_points
 
 _LARGEST_STEP = 1.5
 """[1] largest change of a search number in one step: a factor 4.5 for the logarithmic ones."""
@@ -26,6 +27,8 @@ _AGREED = 2
 _SCATTER = 3.0
 _NO_GAIN = 0.02
 """[1] expected fall of the cost, in its own noise units, below which a descent ends: a seventh of a deviation."""
+_LOOK_RATE, _LOOK_SAMPLES = 250.0, 10_000
+"""[Hz] and samples that a first look keeps: it finds the way, and a step on all samples costs several of its."""
 _NEAR = 0.1
 """[1] expected relative fall of the cost below which the delays are freed too."""
 
@@ -79,22 +82,41 @@ def refine(
 
 def _search(problem: Problem, settings: Settings, progress: Progress, start: Array | None) -> Minimum:
     began = time.process_time()
-    starts = starting_points(problem) if start is None else [start]
-    best = descend(problem, starts[0], settings.iterations, progress)
-    agreed = 0
-    for attempt in range(settings.restarts):
+    look = _first_look(problem)
+    starts = starting_points(look) if start is None else [start]
+    first = starts[0]
+    if start is None and look is not problem:
+        first = descend(look, first, settings.iterations, progress).unknowns
+    best = descend(problem, first, settings.iterations, progress)
+    others, agreed = _others(look, starts, settings.seed), 0
+    for _ in range(settings.restarts):
         late = settings.budget is not None and time.process_time() - began > settings.budget
         if late or agreed >= _AGREED or best.evaluation.cost / problem.samples < _FLOOR_RATIO:
             break
-        further = starts[attempt + 1] if attempt + 1 < len(starts) else None
-        if further is None:
-            further = scattered(problem, starts[0], _SCATTER, settings.seed + attempt)
-        other = descend(problem, further, settings.iterations, progress)
+        other = descend(problem, next(others), settings.iterations, progress)
         change = other.evaluation.cost / best.evaluation.cost - 1.0
         agreed += abs(change) < _SAME_COST
         if change < 0.0:
             best = other
     return best
+
+
+def _others(problem: Problem, starts: list[Array], seed: int) -> Iterator[Array]:
+    """Further starts: of the other kind and of the same by turns, then scattered ones."""
+    if len(starts) > 1:
+        further = further_points(problem)
+        yield further[0]
+        for pair in zip(starts[1:], further[1:], strict=True):
+            yield from pair
+    for number in itertools.count(seed):
+        yield scattered(problem, starts[0], _SCATTER, number)
+
+
+def _first_look(problem: Problem) -> Problem:
+    """The problem on fewer samples; itself where it has few."""
+    rate = max(p.stroke.rate for p in problem.pieces)
+    times = int(min(rate / _LOOK_RATE, problem.samples / _LOOK_SAMPLES))
+    return problem.coarser(times) if times > 1 else problem
 
 
 def descend(problem: Problem, start: Array, iterations: int, progress: Progress) -> Minimum:

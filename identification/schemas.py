@@ -9,6 +9,7 @@ from pathlib import Path
 
 from identification.foresight.documents import Foresight
 from identification.gap.documents import Diagnosis
+from identification.gap.trend_documents import Trend
 from identification.results import Document, Fit, Forecast, Prediction
 
 DOCUMENTS: dict[str, type[Document]] = {
@@ -17,6 +18,7 @@ DOCUMENTS: dict[str, type[Document]] = {
     "forecast": Forecast,
     "foresight": Foresight,
     "prediction": Prediction,
+    "trend": Trend,
 }
 """Type of each document, by the name of its schema's file."""
 FOLDER = Path(__file__).parent.parent / "docs" / "reference" / "schemas"

@@ -2,7 +2,8 @@
 
 Away from reversals the hysteretic variable is saturated and the inner displacement barely moves, so the force is
 linear in what remains: (F_a + F_b u) sgn v + (c0_a + c0_b u) v + (k0 + k1) x - f0. One linear regression gives
-these; the yield displacement is tried at a few fractions of the stroke.
+these; the yield displacement is tried at a few fractions of the stroke. Of a damper that hardly breaks through,
+most of what this calls viscous is c1: where the first starts fail, the same largest forces are shared out so.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,14 +21,25 @@ _YIELD_FRACTIONS = (0.002, 0.008, 0.04)
 _SHAPE, _SHARPNESS, _ETA = 0.5, 1.7, 80.0
 _DASHPOT_RATIO = 12.0
 """[1] c1 over c0, of the order found in published dampers."""
+_HELD_YIELD, _HELD_VISCOUS, _HELD_DASHPOT = 0.8, 0.2, 1.2
+"""[1] yield force, c0 and c1 at the largest velocity, over the largest force: of a damper that hardly breaks
+through."""
 _ACCUMULATOR_SHARE = 0.3
 """[1] part of the sliding stiffness that is taken for k1."""
 
 
 def starting_points(problem: Problem) -> list[Array]:
     """Unknowns (U,) to start from, the most promising first."""
-    points = [problem.start(c) for c in _coordinates(problem.pieces)]
-    return sorted(points, key=lambda unknowns: _plain_cost(problem, unknowns))
+    return _sorted(problem, _coordinates(problem.pieces))
+
+
+def further_points(problem: Problem) -> list[Array]:
+    """The same for a damper that hardly breaks through."""
+    return _sorted(problem, _hardly_yielding(problem.pieces))
+
+
+def _sorted(problem: Problem, points: Iterator[Coordinates]) -> list[Array]:
+    return sorted((problem.start(c) for c in points), key=lambda unknowns: _plain_cost(problem, unknowns))
 
 
 def scattered(problem: Problem, unknowns: Array, factor: float, seed: int) -> Array:
@@ -63,6 +75,18 @@ def _coordinates(pieces: Sequence[Piece]) -> Iterator[Coordinates]:
             k1=_ACCUMULATOR_SHARE * stiffness,
             f0=-offset,
         )
+
+
+def _hardly_yielding(pieces: Sequence[Piece]) -> Iterator[Coordinates]:
+    """The same largest forces, as a damper makes them whose dashpot c1 carries most of the motion."""
+    v = max(float(np.abs(p.stroke.velocity).max()) for p in pieces)
+    for c in _coordinates(pieces):
+        a, b = c.F_a + c.c0_a * v, c.F_b + c.c0_b * v
+        yield c._replace(
+            F_a=_HELD_YIELD * a, F_b=_HELD_YIELD * b,
+            c0_a=_HELD_VISCOUS * a / v, c0_b=_HELD_VISCOUS * b / v,
+            c1_a=_HELD_DASHPOT * a / v, c1_b=_HELD_DASHPOT * b / v,
+        )  # fmt: skip
 
 
 def _regression(pieces: Sequence[Piece]) -> Array:

@@ -64,6 +64,20 @@ def usable(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]
     return cleaned, [*notes, *_blind_spots(stretches)]
 
 
+def refuse_useless(recordings: Sequence[Recording]) -> None:
+    """Refuse recordings that cannot tell of a damper, whatever is left out of them.
+
+    Raises:
+        NothingToFit: samples are no numbers, nothing moves, no force changes or resists, or the samples are too
+            far apart.
+    """
+    _numbers(recordings)
+    stretches = [s for r in recordings for s in r.stretches]
+    _moving(stretches)
+    _forceful(stretches)
+    _passive(stretches)
+
+
 def _one_specimen(recordings: Sequence[Recording]) -> None:
     names = {r.metadata["run"].get("specimen", "") for r in recordings}
     if len(names) > 1:

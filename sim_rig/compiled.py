@@ -34,6 +34,9 @@ Array: TypeAlias = npt.NDArray[np.float64]
 OfTwo: TypeAlias = Callable[[float, float], float]
 """A compiled function of two numbers that the plant takes as an argument."""
 
+OfThree: TypeAlias = Callable[[float, float, float], float]
+"""The same of three numbers."""
+
 Scales: TypeAlias = Callable[[float, float, float], tuple[float, float, float]]
 """A compiled function of displacement [m], velocity [m/s] and energy [J]: factors of alpha, c0 and c1."""
 
@@ -42,6 +45,9 @@ Function = TypeVar("Function", bound=Callable[..., object])
 _OF_TWO = numba.float64(numba.float64, numba.float64)
 OF_TWO = numba.types.FunctionType(_OF_TWO)
 """The type of ``OfTwo`` in explicit signatures: one compiled plant then takes any of them."""
+_OF_THREE = numba.float64(numba.float64, numba.float64, numba.float64)
+OF_THREE = numba.types.FunctionType(_OF_THREE)
+"""The type of ``OfThree``."""
 _THREE = numba.types.UniTuple(numba.float64, 3)  # type: ignore[no-untyped-call]
 _SCALES = _THREE(numba.float64, numba.float64, numba.float64)
 SCALES = numba.types.FunctionType(_SCALES)
@@ -75,6 +81,26 @@ def of_first(act: Callable[..., Any], values: Sequence[float]) -> OfTwo:
         return float(form(first, *fixed))
 
     return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(acts))
+
+
+def of_first_two(act: Callable[..., Any], values: Sequence[float]) -> OfThree:
+    """A form of two numbers with its parameters fixed, as a compiled function that leaves its third argument."""
+    form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
+
+    def acts(one: float, two: float, three: float) -> float:
+        return float(form(one, two, *fixed))
+
+    return cast(OfThree, numba.njit(_OF_THREE, nogil=True, error_model="numpy")(acts))
+
+
+def of_all_three(act: Callable[..., Any], values: Sequence[float]) -> OfThree:
+    """A form of three numbers with its parameters fixed, as a compiled function."""
+    form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
+
+    def acts(one: float, two: float, three: float) -> float:
+        return float(form(one, two, three, *fixed))
+
+    return cast(OfThree, numba.njit(_OF_THREE, nogil=True, error_model="numpy")(acts))
 
 
 def of_energy(act: Callable[..., Any], values: Sequence[float]) -> Scales:
@@ -125,19 +151,23 @@ def _after(one: OfTwo, other: OfTwo) -> OfTwo:
     return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(chained))
 
 
-def sum_of(functions: Sequence[OfTwo]) -> OfTwo:
-    """The sum of compiled functions of the same two arguments; nothing adds up to zero."""
-    return reduce(_plus, functions) if functions else nothing
+def sum_of(functions: Sequence[OfThree]) -> OfThree:
+    """The sum of compiled functions of the same three arguments; nothing adds up to zero."""
+    return reduce(_plus, functions) if functions else no_force
 
 
-def _plus(one: OfTwo, other: OfTwo) -> OfTwo:
-    def both(first: float, second: float) -> float:
-        return one(first, second) + other(first, second)
+def _plus(one: OfThree, other: OfThree) -> OfThree:
+    def both(first: float, second: float, third: float) -> float:
+        return one(first, second, third) + other(first, second, third)
 
-    return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(both))
+    return cast(OfThree, numba.njit(_OF_THREE, nogil=True, error_model="numpy")(both))
 
 
 def _nothing(first: float, second: float) -> float:
+    return 0.0
+
+
+def _no_force(x: float, velocity: float, bent: float) -> float:
     return 0.0
 
 
@@ -154,6 +184,8 @@ def _second(first: float, second: float) -> float:
 
 
 nothing: OfTwo = compiled(_nothing, _OF_TWO)
+"""Iron that remembers nothing."""
+no_force: OfThree = compiled(_no_force, _OF_THREE)
 """No force beside the law."""
 rigid: OfTwo = compiled(_second, _OF_TWO)
 """A mounting without play: the damper is where the actuator is."""

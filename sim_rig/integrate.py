@@ -16,16 +16,16 @@ import numba
 import numpy as np
 
 from identification.damper.effects import connection
-from sim_rig.compiled import OF_TWO, SCALES, Array, OfTwo, Scales, compiled
+from sim_rig.compiled import OF_THREE, OF_TWO, SCALES, Array, OfThree, OfTwo, Scales, compiled
 from sim_rig.compiled_law import at_field, damper_force, field_rate, hysteresis_rate, inner_velocity
 
-STATES = 11
+STATES = 12
 """Command behind the lag [m], actuator position [m] and velocity [m/s], y [m], z [m], field u, amplifier output
 [both V or A], temperature [degC], drive behind a second lag [V or A], energy in the damper [J], displacement of
-the damper behind a fixture that gives way [m]."""
-COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND = range(STATES)
+the damper behind a fixture that gives way [m], bend of a seal's lip [1]."""
+COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND, BENT = range(STATES)
 
-CONSTANTS = 20
+CONSTANTS = 23
 """Rates and weights of everything but the law, in the order of the names below."""
 (
     LAG,  # [1/s] rate of the command's lag
@@ -43,11 +43,14 @@ CONSTANTS = 20
     GIVE,  # [m/N] of the fixture between load cell and damper
     MASS,  # [kg] between load cell and damper
     SECOND_LAG,  # [1/s] rate of the coil's second lag, 0 without one
+    SLOW_PART,  # [1] of the field behind that lag
     DEAD_TIME,  # [s] between output and field
     COOLING,  # [1/s] rate with which the energy leaves the damper
     MEMORY,  # 1 where the iron remembers, else 0
     GAP,  # [m] of the connection between load cell and damper
     HARDENING,  # [1/m²] of the same
+    FILM,  # [N s/m] in that gap
+    BRISTLES,  # [1/m] rate over the way with which a seal's lip bends, 0 without one
 ) = range(CONSTANTS)
 
 STABLE = 0.8
@@ -86,38 +89,38 @@ def _damper_motion(position: float, speed: float, held: float, play: float, foll
 
 @compiled
 def _damper_force(
-    s: Array, x: float, v: float, u: float, p: Array, parallel: OfTwo, scales: Scales
+    s: Array, x: float, v: float, u: float, p: Array, parallel: OfThree, scales: Scales
 ) -> tuple[float, float]:
     """Force of the damper [N] and y' [m/s] at displacement x [m], velocity v [m/s] and the field seen."""
     a, b, c = scales(x, v, s[ENERGY])
     alpha, c0, c1 = a * at_field(p[0], p[1], u), b * at_field(p[6], p[7], u), c * at_field(p[8], p[9], u)
     y_rate = inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
-    return damper_force(y_rate, x, c1, p[11], p[13]) + parallel(x, v), y_rate
+    return damper_force(y_rate, x, c1, p[11], p[13]) + parallel(x, v, s[BENT]), y_rate
 
 
 @compiled
 def _balanced_velocity(
-    s: Array, load: float, guess: float, u: float, p: Array, parallel: OfTwo, scales: Scales
+    s: Array, load: float, film: float, guess: float, u: float, p: Array, parallel: OfThree, scales: Scales
 ) -> float:
-    """Velocity [m/s] at which the damper resists with the load [N] of its fixture, by bracketing and secants."""
+    """Velocity [m/s] at which damper and film resist with the load [N] of the fixture, by brackets and secants."""
     x, width = s[BEHIND], 1e-3
     low, high = guess - width, guess + width
-    below = _damper_force(s, x, low, u, p, parallel, scales)[0] - load
-    above = _damper_force(s, x, high, u, p, parallel, scales)[0] - load
+    below = _damper_force(s, x, low, u, p, parallel, scales)[0] + film * low - load
+    above = _damper_force(s, x, high, u, p, parallel, scales)[0] + film * high - load
     for _ in range(60):
         if below <= 0.0 <= above:
             break
         width *= 2.0
         if below > 0.0:
             high, above, low = low, below, low - width
-            below = _damper_force(s, x, low, u, p, parallel, scales)[0] - load
+            below = _damper_force(s, x, low, u, p, parallel, scales)[0] + film * low - load
         else:
             low, below, high = high, above, high + width
-            above = _damper_force(s, x, high, u, p, parallel, scales)[0] - load
+            above = _damper_force(s, x, high, u, p, parallel, scales)[0] + film * high - load
     side = 0
     for _ in range(60):
         v = high - above * (high - low) / (above - below) if above != below else 0.5 * (low + high)
-        rest = _damper_force(s, x, v, u, p, parallel, scales)[0] - load
+        rest = _damper_force(s, x, v, u, p, parallel, scales)[0] + film * v - load
         if high - low < _BALANCED or abs(rest) < 1e-9:
             break
         if rest > 0.0:
@@ -142,7 +145,7 @@ def rates(
     k: Array,
     p: Array,
     follow: OfTwo,
-    parallel: OfTwo,
+    parallel: OfThree,
     seen: OfTwo,
     scales: Scales,
     rate: Array,
@@ -150,19 +153,19 @@ def rates(
     """Rates of all states, written to ``rate``.
 
     Args:
-        s: (11,) the states.
+        s: (12,) the states.
         held: [m] where the damper stood when the step began.
         remembered: what the iron remembered then.
         command: [m] commanded displacement now.
         drive: [V or A] commanded drive.
         late: [V or A] output as it reaches the coil after its dead time.
-        k: (20,) constants of actuator, amplifier, heat and mounting.
+        k: (23,) constants of actuator, amplifier, heat and mounting.
         p: (14,) the parameters of the law in the paper's order.
         follow: displacement of the damper over (held, actuator) [m].
-        parallel: force beside the law [N] over (displacement [m], velocity [m/s]).
+        parallel: force beside the law [N] over (displacement [m], velocity [m/s], bend of a lip [1]).
         seen: field that the damper sees over (field, remembered) [V or A].
         scales: factors of alpha, c0 and c1 over displacement, velocity and energy.
-        rate: (11,) the answer.
+        rate: (12,) the answer.
 
     Returns:
         Force on the load cell [N], displacement [m], velocity [m/s] and slip velocity [m/s] of the damper.
@@ -171,10 +174,10 @@ def rates(
     u = seen(s[FIELD], remembered)
     if k[GIVE] > 0.0:
         load = carried(x - s[BEHIND], k[GIVE], k[GAP], k[HARDENING])
-        x = s[BEHIND]
-        v = _balanced_velocity(s, load, v, u, p, parallel, scales)
+        x, load, film = s[BEHIND], load + k[FILM] * v, k[FILM]
+        v = _balanced_velocity(s, load, film, v, u, p, parallel, scales)
         force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
-        force = load
+        force = load - film * v
     else:
         force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
     slip = v - y_rate
@@ -185,10 +188,12 @@ def rates(
     wanted = k[SERVO] * (k[SERVO] * error - 2.0 * k[DAMPING] * s[SPEED])
     rate[SPEED] = wanted / (1.0 + k[SERVO] * k[SERVO] * k[COMPLIANCE] * k[MASS])
     rate[Y] = y_rate
+    rate[BENT] = k[BRISTLES] * (v - abs(v) * s[BENT])
     rate[Z] = hysteresis_rate(slip, s[Z], p[5], p[2], p[3], p[12])
     source = late if k[DEAD_TIME] > 0.0 else s[OUTPUT]
     rate[LAGGED] = k[SECOND_LAG] * (source - s[LAGGED])
-    rate[FIELD] = field_rate(s[FIELD], s[LAGGED] if k[SECOND_LAG] > 0.0 else source, p[4])
+    slow = k[SLOW_PART] if k[SECOND_LAG] > 0.0 else 0.0
+    rate[FIELD] = field_rate(s[FIELD], source + slow * (s[LAGGED] - source), p[4])
     rate[OUTPUT] = k[AMPLIFIER] * (drive - s[OUTPUT])
     warmth = abs(force * v)
     rate[ENERGY] = warmth - k[COOLING] * s[ENERGY]
@@ -252,7 +257,7 @@ def _step(
     k: Array,
     p: Array,
     follow: OfTwo,
-    parallel: OfTwo,
+    parallel: OfThree,
     seen: OfTwo,
     memory: OfTwo,
     scales: Scales,
@@ -305,7 +310,7 @@ def _march(
     k: Array,
     p: Array,
     follow: OfTwo,
-    parallel: OfTwo,
+    parallel: OfThree,
     seen: OfTwo,
     memory: OfTwo,
     scales: Scales,
@@ -318,7 +323,7 @@ def _march(
     """Move the states on through M command samples, in place.
 
     Args:
-        s: (11,) states at the first instant.
+        s: (12,) states at the first instant.
         held: [m] where the damper stands.
         remembered: what the iron remembers.
         past: ring of the amplifier's outputs at the start of each block, long enough for the dead time.
@@ -372,7 +377,7 @@ def _march(
 _ROW, _TABLE, _NUMBER = numba.float64[::1], numba.float64[:, ::1], numba.float64
 _SIGNATURE = (
     *(_ROW, _NUMBER, _NUMBER, _ROW, numba.int64, _ROW, _ROW, _NUMBER, numba.int64, _ROW, _ROW),
-    *(OF_TWO, OF_TWO, OF_TWO, OF_TWO, SCALES, _ROW, _ROW, _ROW, _TABLE, _TABLE),
+    *(OF_TWO, OF_THREE, OF_TWO, OF_TWO, SCALES, _ROW, _ROW, _ROW, _TABLE, _TABLE),
 )
 march = compiled(_march, _SIGNATURE)
 """``_march`` compiled when first imported, once for every kind of effect."""

@@ -16,12 +16,15 @@ from identification.damper.effects.connection import stretched
 from sim_rig import integrate
 from sim_rig.compiled import (
     Array,
+    OfThree,
     OfTwo,
     Scales,
     chain_of,
     nothing,
+    of_all_three,
     of_energy,
     of_first,
+    of_first_two,
     of_motion,
     product_of,
     rigid,
@@ -37,6 +40,8 @@ _SHORTEST_BLOCK = 2.5e-5
 """[s] of the fastest sampling that the rig plays: what a dead time has to be kept for."""
 _NO_LAG = 2e-5
 """[s] a second lag of the coil below which there is none."""
+_SWIFT = 0.5
+"""[m/s] up to which the bend of a lip is followed."""
 
 
 class Truth(NamedTuple):
@@ -83,15 +88,22 @@ class Effects:
         """Sum of what those give that are a single number: a delay [s], a lag [s], a give [m/N]."""
         return float(sum(form.act(*values) for form, values in self.that(acts)))
 
-    def connection(self) -> tuple[float, float, float]:
-        """Give [m/N], gap [m] and hardening [1/m²] of what carries the damper."""
+    def connection(self) -> tuple[float, float, float, float]:
+        """Give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper."""
         parts = [form.act(*values) for form, values in self.that("connection")]
-        give, gap, hardening = (float(sum(part[k] for part in parts)) for k in range(3))
-        return give, gap, hardening
+        give, gap, hardening, film = (float(sum(part[k] for part in parts)) for k in range(4))
+        return give, gap, hardening, film
 
-    def parallel(self) -> OfTwo:
-        """Force beside the law [N] over displacement [m] and velocity [m/s]."""
-        return sum_of([with_values(form.act, values) for form, values in self.that("parallel_force")])
+    def parallel(self) -> OfThree:
+        """Force beside the law [N] over displacement [m], velocity [m/s] and the bend of a seal's lip [1]."""
+        plain = [of_first_two(form.act, values) for form, values in self.that("parallel_force")]
+        return sum_of(plain + [of_all_three(form.act, values) for form, values in self.that("dragging_force")])
+
+    def bristles(self) -> float:
+        """Rate [1/m] over the way with which a seal's lip bends."""
+        for form, values in self.that("dragging_force"):
+            return 1.0 / values[[q.symbol for q in form.parameters].index("bend")]
+        return 0.0
 
     def follow(self) -> OfTwo:
         """Where the damper stands [m] over where it stood and where the actuator is."""
@@ -202,7 +214,7 @@ class Plant:
         stiffness, rest = self._law[11], self._law[13]
         place = displacement
         for _ in range(3):
-            load = stiffness * (place - rest) + self._parallel(place, 0.0)
+            load = stiffness * (place - rest) + self._parallel(place, 0.0, 0.0)
             place = displacement - self._constants[integrate.COMPLIANCE] * load
         if not math.isfinite(place):
             raise PlantError(f"the specimen has no finite force at rest at {displacement:.4g} m")
@@ -262,25 +274,30 @@ def _constants(scenario: Scenario, law: Array, effects: Effects) -> Array:
     k[integrate.EVER_PRESENT] = (
         max(k[integrate.LAG], 2 * servo * max(actuator.damping, 1)) + (steep + viscous) / mass
     )
-    dead, lag = _coil(effects)
+    dead, lag, k[integrate.SLOW_PART] = _coil(effects)
     k[integrate.SECOND_LAG] = 1.0 / lag if lag > _NO_LAG else 0.0
     k[integrate.DEAD_TIME] = dead
     k[integrate.EVER_PRESENT] += k[integrate.SECOND_LAG]
+    k[integrate.BRISTLES] = effects.bristles()
+    k[integrate.EVER_PRESENT] += _SWIFT * k[integrate.BRISTLES]
     k[integrate.PLAY] = bool(effects.that("displacement_follower"))
-    k[integrate.GIVE], k[integrate.GAP], k[integrate.HARDENING] = effects.connection()
+    k[[integrate.GIVE, integrate.GAP, integrate.HARDENING, integrate.FILM]] = effects.connection()
     k[integrate.MASS] = sum(form.act(1.0, *values) for form, values in effects.that("inertia"))
     k[integrate.COOLING] = effects.cooling()
     k[integrate.MEMORY] = bool(effects.that("field_memory"))
     return k
 
 
-def _coil(effects: Effects) -> tuple[float, float]:
-    """Dead time [s] and second lag [s] between the amplifier's output and the field."""
-    parts = [form.act(*values) for form, values in effects.that("drive_delay")]
-    return float(sum(part[0] for part in parts)), float(sum(part[1] for part in parts))
+def _coil(effects: Effects) -> tuple[float, float, float]:
+    """Dead time [s] and second lag [s] between output and field, and the part of the field behind the lag [1]."""
+    acting = [form.act(*values) for form, values in effects.that("drive_delay")]
+    dead, lag, part = acting[0] if acting else (0.0, 0.0, 1.0)
+    return float(dead), float(lag), float(part)
 
 
-def _steepest(parallel: OfTwo) -> float:
+def _steepest(parallel: OfThree) -> float:
     """Largest slope of the forces beside the law over the velocity [N s/m], near rest."""
     speeds = np.geomspace(1e-5, 1.0, 60)
-    return max(float(abs(parallel(0.0, v * 1.01) - parallel(0.0, v * 0.99)) / (0.02 * v)) for v in speeds)
+    return max(
+        float(abs(parallel(0.0, v * 1.01, 1.0) - parallel(0.0, v * 0.99, 1.0)) / (0.02 * v)) for v in speeds
+    )

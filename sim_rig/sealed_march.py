@@ -52,7 +52,7 @@ _POWER, _PATH, _STRETCH, _STRETCH_RATE = form.POWER, form.PATH, form.STRETCH, fo
 
 STABLE = 1.2
 """[1] largest product of rate and step; the method is stable up to 2.78."""
-CORNER_STEPS = 24
+CORNER_STEPS = 10
 """Steps in a block in which the slip velocity may change its sign."""
 MOST_STEPS = 20_000
 """Steps in a block beyond which the motion is taken for lost."""
@@ -185,7 +185,7 @@ def _passed_on(force: float, s: Array, now: Array, forms: Any, rate: Array) -> f
 @compiled
 def _steps_for(s: Array, rate: Array, slip: float, drive: float, h: float, k: Array, p: Array) -> float:
     """Steps that a block of h [s] needs for stability, and for accuracy where the loop turns."""
-    turn = 2.0 * abs(rate[SPEED]) * h + 1e-3 * k[CONNECTED]
+    turn = 2.0 * abs(rate[SPEED]) * h + 2e-4 * k[CONNECTED]
     fastest = abs(slip) + turn
     c0, c1 = abs(at_field(p[6], p[7], s[FIELD])), abs(at_field(p[8], p[9], s[FIELD]))
     tangent = 2.0 * abs(at_field(p[0], p[1], s[FIELD])) * p[5] + abs(p[10])

@@ -13,6 +13,7 @@ from sim_rig.channel import ChannelStream, Drawn, View, drawn_for
 from sim_rig.compiled import Array
 from sim_rig.plant import Effects, Truth, blocks_in
 from sim_rig.scenario import Scenario
+from sim_rig.sealed_plant import displacement_read
 from sim_rig.settings import Fault, Sensor
 
 CHANNELS: dict[str, tuple[str, str]] = {
@@ -92,7 +93,7 @@ def looked_at(scenario: Scenario, truth: Truth, start: float, step: float) -> di
     by_current = scenario.drive_unit == "A"
     effects = Effects(scenario)
     return {
-        "displacement": _bent(effects, truth),
+        "displacement": _bent(effects, displacement_read(scenario, truth.position)),
         "force": truth.force + _added(effects, truth, start, step),
         "coil_drive": drive,
         "actuator_position": truth.position,
@@ -102,10 +103,10 @@ def looked_at(scenario: Scenario, truth: Truth, start: float, step: float) -> di
     }
 
 
-def _bent(effects: Effects, truth: Truth) -> Array:
+def _bent(effects: Effects, position: Array) -> Array:
     """The actuator's position [m] with what the displacement channel adds to it."""
     bends = effects.that("displacement_map")
-    return np.asarray(truth.position + sum(form.act(truth.position, *values) for form, values in bends))
+    return np.asarray(position + sum(form.act(position, *values) for form, values in bends))
 
 
 def _added(effects: Effects, truth: Truth, start: float, step: float) -> Array:

@@ -9,6 +9,7 @@ from identification.arrays import Array, BoolArray
 from identification.errors import NothingToFit
 from identification.gap.floor import Floor
 from identification.gap.residual import Cycles
+from identification.problem import Piece
 from identification.recordings import Recording, Stretch
 
 _FEWEST_CYCLES = 4
@@ -17,6 +18,8 @@ _CLIPPED = 5
 """[samples] in a row at the very extreme of the force that count as clipped."""
 _MOST_CLIPPED = 0.2
 """[1] part of the samples that may be clipped."""
+_FAST = 0.5
+"""[1] of a stroke's largest speed, above which a damper slides."""
 
 
 def one_specimen(recordings: Sequence[Recording]) -> None:
@@ -33,7 +36,7 @@ def one_specimen(recordings: Sequence[Recording]) -> None:
 
 
 def without_clipping(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """The recordings with clipped force marked as not measured, and what to say of it.
+    """The recordings with clipped force marked as not valid, and what to say of it.
 
     Raises:
         NothingToFit: most of the force is clipped.
@@ -51,7 +54,8 @@ def without_clipping(recordings: Sequence[Recording]) -> tuple[list[Recording], 
                 )
             if share > 0:
                 notes.append(_said(stretch, clipped))
-                stretch = replace(stretch, measured=stretch.measured & ~clipped)
+                valid = ~clipped if stretch.force_valid is None else stretch.force_valid & ~clipped
+                stretch = replace(stretch, force_valid=valid)
             stretches.append(stretch)
         cleaned.append(replace(recording, stretches=tuple(stretches)))
     return cleaned, notes
@@ -75,6 +79,20 @@ def _said(stretch: Stretch, clipped: BoolArray) -> str:
     return (
         f"{stretch.name}: the force is clipped at {limit:.4g} N in {np.mean(clipped):.1%} of the samples; left out"
     )
+
+
+def sliding_recorded(pieces: Sequence[Piece]) -> None:
+    """Refuse recordings whose force was measured in slow motion alone: nothing tells what the damper resists.
+
+    Raises:
+        NothingToFit: no sample at speed is measured.
+    """
+    speeds = [np.abs(p.stroke.velocity) for p in pieces]
+    if not any(((v > _FAST * v.max()) & (p.train > 0)).any() for v, p in zip(speeds, pieces, strict=True)):
+        raise NothingToFit(
+            f"above {_FAST * max(v.max() for v in speeds):.2g} m/s no force was recorded that counts (clipped or "
+            "not measured), so that nothing tells what the damper resists there; record again with a larger range"
+        )
 
 
 def enough_cycles(cycles: Cycles) -> None:

@@ -1,4 +1,4 @@
-"""The command of this package: `mrbench diagnose`."""
+"""The commands of this package: `mrbench diagnose` and `mrbench trend`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -41,3 +41,23 @@ def diagnose(
     if twin is not None:
         write_document(twin, found.twin)
     typer.echo(f"{'printed' if str(out) == '-' else out}: {summary(found.diagnosis)}", err=True)
+
+
+def trend(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs of one specimen, one a run, in the order of time.")
+    ],
+    out: Annotated[Path, typer.Option("--out", help="Where the document goes; `-` prints it.")],
+    seed: Annotated[int, typer.Option(help="Of the scattered starts.")] = 1,
+) -> None:
+    """Say what grows or falls over the runs of one specimen, by how much a run, and since which."""
+    from identification.document_file import check_place, write_document
+    from identification.gap.trend import trend as answer
+    from identification.progress import progress_on_terminal
+    from identification.recordings import load
+
+    check_place(out)
+    with progress_on_terminal("trend") as progress:
+        found = answer([load(log) for log in logs], seed=seed, progress=progress)
+    write_document(out, found)
+    typer.echo(f"{'printed' if str(out) == '-' else out}: {found.explanation}", err=True)

@@ -8,22 +8,30 @@ import numpy as np
 
 from identification.assemble import Assembled, assemble
 from identification.gap.black_box import explainable, history
-from identification.gap.checks import blind_spots, enough_cycles, one_specimen, without_clipping
-from identification.gap.documents import STAGES, Diagnosis, Gap, NextStroke, Twin, Where
+from identification.gap.checks import (
+    blind_spots,
+    enough_cycles,
+    one_specimen,
+    sliding_recorded,
+    without_clipping,
+)
+from identification.gap.contender import Contender
+from identification.gap.documents import STAGES, Diagnosis, Gap, NextStroke, Twin, Verdict, Where
 from identification.gap.floor import Floor
 from identification.gap.judge import Judge
 from identification.gap.model import Model
 from identification.gap.next_stroke import Limits, Rival, best_segment
 from identification.gap.posterior import Odds, odds, stage_odds
-from identification.gap.search import Contender, Search
+from identification.gap.search import Search
 from identification.gap.twin import baseline_fit, twin_of
 from identification.gap.verdict import alternatives, named_effects, shares, verdict_on
 from identification.gap.where import drift, gap_map, harmonics
-from identification.gap.words import explanation
+from identification.gap.words import explanation, nearest
 from identification.identify import fit_problem
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.recordings import Recording
 from identification.results import Provenance
+from identification.usable import refuse_useless
 
 _CLOCKS = 5e-5
 """[s] to which the channels' clocks and filters are known."""
@@ -34,6 +42,8 @@ _REPEATS = 1.1
 _TIED = 0.05
 """[1] probability of a set from which on it is worth telling it apart."""
 _MOST_TIED = 3
+_NEARER = 0.95
+"""[1] part of the error that known effects may leave at most to be spoken of where none is named."""
 
 Progress = Callable[[str, float], None]
 
@@ -62,14 +72,17 @@ def diagnose(
         progress: told what is fitted and the force error on unseen strokes so far [N].
 
     Raises:
-        NothingToFit: too little, clipped, or of different specimens.
+        NothingToFit: too little, clipped, of different specimens, or no damper's force and motion.
     """
     one_specimen(recordings)
+    refuse_useless(recordings)
     cleaned, notes = without_clipping(recordings)
     assembled = assemble(cleaned)
     judge = Judge.of(assembled)
     enough_cycles(judge.cycles)
-    search = Search(_problem(assembled, judge), judge, white_floor(assembled.floor), progress)
+    sliding_recorded(judge.fitted_pieces())
+    problem = diagnosed_problem(assembled, judge.fitted_pieces())
+    search = Search(problem, judge, white_floor(assembled.floor), progress)
     search.run()
     return _Report(assembled, judge, search, _final_odds(search), model, notes, seed).answer()
 
@@ -94,9 +107,10 @@ def white_floor(floor: Floor) -> float:
     return floor.noise
 
 
-def _problem(assembled: Assembled, judge: Judge) -> Problem:
+def diagnosed_problem(assembled: Assembled, pieces: tuple[Piece, ...]) -> Problem:
+    """The fit of some recordings as a diagnosis takes it: its own floor, and no delay beyond the clocks'."""
     problem = fit_problem(assembled, _CLOCKS)
-    return replace(problem, pieces=judge.fitted_pieces(), noise=white_floor(assembled.floor), delay_limit=_LATEST)
+    return replace(problem, pieces=pieces, noise=white_floor(assembled.floor), delay_limit=_LATEST)
 
 
 @dataclass(frozen=True)
@@ -121,6 +135,8 @@ class _Report:
         if verdict in ("no_gap", "unexplained"):
             named, likeliest = plain, frozenset()
         gap = self._gap(plain, named, floor)
+        if verdict == "no_gap":
+            gap = gap.model_copy(update={"shrinkage": None, "shrinkage_ci95": None})
         where = self._where(plain, floor)
         parts = shares(self.search.found, likeliest, sorted(likeliest))
         effects = named_effects(named, self.odds, parts, self.assembled.drive_unit)
@@ -137,12 +153,23 @@ class _Report:
             where=where,
             next_stroke=self._next_stroke(floor),
             explanation=explanation(verdict, gap, effects, others, rest),
-            notes=[*self.notes, *blind_spots(self.judge.cycles, self.assembled.floor)],
+            notes=[
+                *self.notes,
+                *self._nearest(verdict, plain),
+                *blind_spots(self.judge.cycles, self.assembled.floor),
+            ],
             provenance=provenance,
         )
         baseline = baseline_fit(self.assembled, self.judge, plain, floor, provenance)
         specimen = baseline.specimen
         return Answer(diagnosis, twin_of(self.assembled, named, baseline, floor, specimen, provenance))
+
+    def _nearest(self, verdict: Verdict, plain: Contender) -> list[str]:
+        """What known effects come nearest where none is named, in words."""
+        best = min(self.search.found.values(), key=lambda c: c.unseen)
+        if verdict != "unexplained" or best.unseen > _NEARER * plain.unseen:
+            return []
+        return [nearest(sorted(best.names), plain.unseen, best.unseen, self.search.floor)]
 
     def _gap(self, plain: Contender, named: Contender, floor: float) -> Gap:
         shrunk = self.judge.shrunk(plain.left, named.left, floor)

@@ -17,6 +17,7 @@ from identification.simulate import UNKNOWNS, ActiveEffect, Setting, Stroke, sim
 
 _RATE = 1000.0
 _SECONDS = 6.0
+"""[s] about as long as a segment is to be."""
 _FADE = 0.5
 _COLUMNS = [*range(13), UNKNOWNS.index("y0")]
 
@@ -72,7 +73,7 @@ def best_segment(rivals: Sequence[Rival], limits: Limits, noise: float) -> Choic
     """
     pairs = [(a, b) for i, a in enumerate(rivals) for b in rivals[:i]]
     best: Choice | None = None
-    for segment, stroke in _trials(limits) if pairs else ():
+    for segment, stroke in trials(limits) if pairs else ():
         forces = {r.names: _answer(r, stroke, limits.centre) for r in rivals}
         scores = [_separation(forces[a.names], forces[b.names], a, noise) for a, b in pairs]
         weights = np.array([a.probability * b.probability for a, b in pairs])
@@ -105,7 +106,7 @@ def _separation(
     return float(np.sqrt(left)), noise * float(np.sqrt(np.mean(difference**2)))
 
 
-def _trials(limits: Limits) -> Iterator[tuple[dict[str, Any], Stroke]]:
+def trials(limits: Limits) -> Iterator[tuple[dict[str, Any], Stroke]]:
     """Segments of a method with the strokes they make."""
     low, high = limits.drives
     levels = sorted({low, 0.5 * (low + high), high})
@@ -115,15 +116,21 @@ def _trials(limits: Limits) -> Iterator[tuple[dict[str, Any], Stroke]]:
         drives.append({"kind": "staircase", "levels": up})
     for motion in _motions(limits):
         for drive in drives:
+            cycles = _cycles(motion["frequency_hz"], len(drive.get("levels", [0])))
             segment = {
                 "name": _name(motion, drive),
                 "motion": motion,
                 "centre_m": round(limits.centre, 5),
                 "fade_s": _FADE,
-                "duration_s": _SECONDS,
+                "cycles": cycles,
                 "drive": drive,
             }
-            yield segment, _stroke(motion, drive, limits.centre)
+            yield segment, _stroke(motion, drive, limits.centre, cycles)
+
+
+def _cycles(frequency: float, levels: int) -> int:
+    """Cycles that last about six seconds, as many at every level of the drive."""
+    return levels * max(1, round(_SECONDS * frequency / levels))
 
 
 def _motions(limits: Limits) -> Iterator[dict[str, Any]]:
@@ -153,9 +160,10 @@ def _name(motion: dict[str, Any], drive: dict[str, Any]) -> str:
     return f"next_{motion['kind']}_{size}_{level}"
 
 
-def _stroke(motion: dict[str, Any], drive: dict[str, Any], centre: float) -> Stroke:
+def _stroke(motion: dict[str, Any], drive: dict[str, Any], centre: float, cycles: int) -> Stroke:
     """The segment as samples, without its fades."""
-    time = np.arange(round(_SECONDS * _RATE)) / _RATE
+    seconds = cycles / motion["frequency_hz"]
+    time = np.arange(round(seconds * _RATE)) / _RATE
     amplitude, omega = motion["amplitude_m"], 2 * np.pi * motion["frequency_hz"]
     if motion["kind"] == "sine":
         x, v = amplitude * np.sin(omega * time), amplitude * omega * np.cos(omega * time)
@@ -167,5 +175,5 @@ def _stroke(motion: dict[str, Any], drive: dict[str, Any], centre: float) -> Str
         v = np.gradient(x, time)
         a = np.gradient(v, time)
     levels = drive.get("levels") or [drive["value"]]
-    steps = np.asarray(levels)[np.minimum((time / _SECONDS * len(levels)).astype(int), len(levels) - 1)]
+    steps = np.asarray(levels)[np.minimum((time / seconds * len(levels)).astype(int), len(levels) - 1)]
     return Stroke(_RATE, centre + x, v, a, steps.astype(float))

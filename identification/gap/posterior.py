@@ -26,9 +26,9 @@ _SAMPLES = 10.0
 """[samples] the grain of a short recording: this over its length."""
 _FORM = 0.01
 """[1] part of the whole gap that the right effect leaves because its form is not exact."""
-_UNKNOWN_FORM = 0.1
+_UNKNOWN_FORM = 0.2
 """[1] part of the whole gap that known effects leave of an unknown one, at best."""
-_UNSURE_FLOOR = 0.02
+_UNSURE_FLOOR = 0.03
 """[1] excess over the floor's variance that noise of the motion explains."""
 _UNSURE = 3.0
 """[1] standard deviations of the floor's variance that its own error explains."""
@@ -38,8 +38,8 @@ _UNKNOWN = 3.0
 """[1] odds beforehand of something else over the likeliest set, where both leave as much."""
 _OCCAM = 0.1
 """[1] price of each effect for the freedom of its parameters."""
-_DOUBT = 0.04
-"""[1] probability that what fits is not the cause: as often as that where the cause was known."""
+_DOUBT, _DOUBT_OF_REST = 0.02, 0.4
+"""[1] probability that what fits is not the cause: where nothing is left, and more for each part of the gap."""
 _RARE = 0.3
 """[1] weight of an effect of the second list."""
 
@@ -93,7 +93,8 @@ def odds(candidates: Sequence[Candidate], samples: int) -> Odds:
     # An unknown effect is a rival only as far as the known ones leave something that the floor cannot explain.
     weight = _logistic(likeliest.left - unsure, 0.25 * unsure)
     shares = _normalised(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
-    doubt = _DOUBT * (1.0 - float(shares[list(scores).index(frozenset())]))
+    rest = (max(likeliest.left, 0.0) + grain) / (whole + grain)
+    doubt = (_DOUBT + _DOUBT_OF_REST * rest) * (1.0 - float(shares[list(scores).index(frozenset())]))
     known = (1.0 - doubt) * shares[:-1]
     return Odds(dict(zip(scores, map(float, known), strict=True)), 1.0 - float(known.sum()))
 

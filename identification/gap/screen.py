@@ -26,6 +26,10 @@ ALWAYS = ("clevis_backlash", "fixture_compliance")
 """Effects whose gain is not linear in their size: a refit says more than this look."""
 _TRIED = 10
 """Forms whose step is really taken."""
+_PROMISING = 0.02
+"""[1] part of the excess that a screening must promise."""
+_FORMS_TIED = 0.7
+"""[1] part of the best form's promise from which on another form of the same effect is fitted too."""
 _SIZE_STEP, _LENGTH_STEP = 0.05, 0.03
 """[1] steps of the differences in search numbers: of sizes, and of logarithms."""
 
@@ -78,6 +82,27 @@ def screen(
         looks = sorted((frame.best(choice) for choice in chosen), key=lambda g: -g.gain)
         found = [frame.taken(look) for look in looks[:_TRIED]] + looks[_TRIED:]
     return sorted(found, key=lambda g: -max(g.gain, g.achieved))
+
+
+def worth_fitting(gains: Sequence[Gain], count: int) -> list[Gain]:
+    """The most promising effects, each in its best form and in forms that promise nearly as much."""
+    best: dict[str, list[Gain]] = {}
+    for gain in gains:
+        best.setdefault(gain.choice.name, []).append(gain)
+
+    ranked = sorted(best, key=lambda name: -promise(best[name][0]))
+    chosen = [n for n in ranked[:count] if promise(best[n][0]) > _PROMISING]
+    return [
+        gain
+        for name in chosen
+        for gain in best[name]
+        if gain is best[name][0] or promise(gain) > _FORMS_TIED * promise(best[name][0])
+    ]
+
+
+def promise(gain: Gain) -> float:
+    """Part of the excess that a screening holds possible [1]."""
+    return max(gain.gain, gain.achieved)
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ stands beside all those it grew from. All of it on thinned data; the odds decide
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -17,13 +17,13 @@ from identification.arrays import Array
 from identification.damper.effects import EFFECTS
 from identification.effect_choice import EffectChoice
 from identification.gap.colour import floor_under
+from identification.gap.contender import Contender
 from identification.gap.explain import Effort, JointFit, fit_with
 from identification.gap.hum import strongest_line
 from identification.gap.judge import Judge
 from identification.gap.plausible import plausibility
 from identification.gap.posterior import Candidate
-from identification.gap.screen import ALWAYS, Gain, every_choice, screen
-from identification.gap.where import Left
+from identification.gap.screen import ALWAYS, Gain, every_choice, promise, screen, worth_fitting
 from identification.problem import Problem
 from identification.start import starting_points
 
@@ -39,69 +39,34 @@ _FITTED = (6, 4, 2)
 """Effects fitted beside none, one and two others."""
 _LARGE, _MORE = 2.0, 10
 """[1] excess from which on a step from the law's own fit tells little, and effects fitted beside none then."""
-_PATIENCE = 90.0
+_PATIENCE = 60.0
 """[s] of processor time after which no further set is begun."""
 _SLIGHT = 0.02
 """[1] excess below which no play is looked for beside other effects."""
 _BEAM = (2, 1)
 """Sets that are taken further, of one and of two effects."""
-_OPEN = 1.1
-"""[1] RMSE over the floor from which on the gap on one side is large enough to speak of shares of it."""
 _WORTH = 0.9
 """[1] part of the excess that may remain for a set to be worth taking further."""
 _RIVAL = 3.0
 """[1] multiple of what the best set leaves up to which another is taken further too."""
 _TAKEN_BACK = 2
 """Sets of several effects that are fitted again with each one left out."""
-_PROMISING = 0.02
-"""[1] part of the excess that a screening must promise."""
-_ENOUGH = 0.004
+_ENOUGH = 0.005
 """[1] excess over the floor's variance at which nothing is left to look for."""
-_ENOUGH_OF_WHOLE = 0.004
-"""[1] the same as a part of the whole gap."""
+_ENOUGH_OF_WHOLE = 0.012
+"""[1] the same as a part of the whole gap: a further effect could not pay for its freedom in the odds."""
+_SMALL = 0.05
+"""[1] excess up to which an effect has to promise a fair part of it, to be worth a fit."""
+_FAIR = 0.15
+"""[1] that part."""
+_SHOWN = 0.8
+"""[1] part of the excess that the simplest form of play or give may leave, for richer ones to be tried."""
 _COLOURED = 1.02
 """[1] noise over the floor so far from which on it is coloured."""
-_FORMS_TIED = 0.7
-"""[1] part of the best form's promise from which on another form of the same effect is fitted too."""
-
 Progress = Callable[[str, float], None]
 _STAGED = Effort(thin=1, starts=0, descents=2, iterations=25, default_start=False, settling=5, polish=False)
 _PLAIN = Effort(thin=1, starts=1, descents=1, iterations=40, polish=False)
 _QUICK = Effort(thin=1, starts=0, descents=1, iterations=25, default_start=False, polish=False)
-
-
-@dataclass(frozen=True)
-class Contender:
-    """A set of effects, fitted."""
-
-    fit: JointFit
-    left: Left
-    """What it leaves of the force, on all samples."""
-    seen: float
-    """[N] RMSE on the fitted strokes."""
-    unseen: float
-    """[N] on those kept out."""
-    chance: float
-    """[1] excess on those kept out that chance may show."""
-
-    @property
-    def names(self) -> frozenset[str]:
-        """Of its effects."""
-        return frozenset(choice.name for choice in self.fit.effects)
-
-    def share_of(self, none: "Contender", floor: float) -> float:
-        """Its excess [1], as the worse share of the gap on seen and on unseen strokes.
-
-        The gap itself may be larger on one side; a set that hides it on seen strokes alone must not gain by it.
-        """
-        whole = none.excess(floor)
-        sides = [(self.seen, none.seen), (self.unseen, none.unseen)]
-        shares = [(rms**2 - floor**2) / (plain**2 - floor**2) for rms, plain in sides if plain > _OPEN * floor]
-        return max(shares) * whole if len(shares) == len(sides) else self.excess(floor)
-
-    def excess(self, floor: float) -> float:
-        """What it leaves beyond the floor's variance [1], the worse of seen and unseen strokes beyond chance."""
-        return max((self.seen / floor) ** 2, (self.unseen / floor) ** 2 - self.chance) - 1.0
 
 
 @dataclass
@@ -172,7 +137,8 @@ class Search:
 
     def candidates(self) -> list[Candidate]:
         """Every set with what it leaves, against a floor that no set undercuts."""
-        lowest = min(min(c.seen, c.unseen) for c in self.found.values())
+        part = float(np.mean(self.judge.unseen[self.judge.usable]))
+        lowest = min(math.sqrt((1.0 - part) * c.seen**2 + part * c.unseen**2) for c in self.found.values())
         floor, none = min(self.floor, lowest), self.found[frozenset()]
         x = np.concatenate([p.stroke.displacement for p in self.full.pieces])
         return [
@@ -224,25 +190,35 @@ class Search:
         gains = screen(thin, parent.fit, choices, max(1, round(rate / _SCREEN_RATE)), self._line(parent))
         if not parent.names and self.left_of(parent) > _LARGE:
             count = _MORE
-        for gain in _worth_fitting(gains, count):
+        if self.left_of(parent) < _SMALL and promise(gains[0]) < _FAIR:
+            return
+        for gain in worth_fitting(gains, count):
             if self._late:
                 return
             self._fit_beside(parent, gain, [])
-        for gain in (g for g in gains if g.choice.name in ALWAYS):
+        for name in ALWAYS:
+            mine = [g for g in gains if g.choice.name == name]
+            self._try_always(parent, sorted(mine, key=lambda g: len(g.choice.quantities)))
+
+    def _try_always(self, parent: Contender, gains: Sequence[Gain]) -> None:
+        """Fit a set with an effect whose promise says little, with its richer forms where the first has shown."""
+        for gain in gains:
             if parent.names and gain.choice.form.acts == "displacement_follower":
                 continue  # its contacts ask for a high rate, and a free pin shows beside others as well
             if self._late or self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
                 return
-            self._fit_beside(parent, gain, gain.choice.form.starts)
+            with_it = self._fit_beside(parent, gain, gain.choice.form.starts)
+            if self.left_of(with_it) > _SHOWN * self.left_of(parent):
+                return
 
-    def _fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> None:
-        """Fit a set with a further effect, from its screening's end and with further values of it."""
+    def _fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> Contender:
+        """A set with a further effect, fitted from its screening's end and with further values of it."""
         # Under a wrong law the coordinates have moved to where they hide an effect: begin elsewhere, too.
         elsewhere = np.concatenate([self._regression, gain.unknowns[len(self._regression) :]])
         others = elsewhere[: len(elsewhere) - len(gain.choice.quantities)]
         starts = [np.concatenate([others, gain.choice.to_search(v)]) for v in values]
         effort = _STAGED if values else _QUICK
-        self.fit((*parent.fit.effects, gain.choice), None, [gain.unknowns, elsewhere, *starts], effort)
+        return self.fit((*parent.fit.effects, gain.choice), None, [gain.unknowns, elsewhere, *starts], effort)
 
     @cached_property
     def _regression(self) -> Array:
@@ -283,27 +259,3 @@ def _without(fit: JointFit, left_out: EffectChoice) -> Array:
             kept.append(fit.minimum.unknowns[at : at + len(choice.quantities)])
         at += len(choice.quantities)
     return np.concatenate(kept)
-
-
-def _worth_fitting(gains: Sequence[Gain], count: int) -> list[Gain]:
-    """The most promising effects, each in its best form and in forms that promise nearly as much."""
-    best: dict[str, list[Gain]] = {}
-    for gain in gains:
-        best.setdefault(gain.choice.name, []).append(gain)
-
-    def promise(gain: Gain) -> float:
-        return max(gain.gain, gain.achieved)
-
-    ranked = sorted(best, key=lambda name: -promise(best[name][0]))
-    chosen = [n for n in ranked[:count] if promise(best[n][0]) > _PROMISING]
-    return [
-        gain
-        for name in chosen
-        for gain in best[name]
-        if gain is best[name][0] or promise(gain) > _FORMS_TIED * promise(best[name][0])
-    ]
-
-
-def fitted_problem(problem: Problem, judge: Judge) -> Problem:
-    """The problem with what is kept out of every fit unmarked."""
-    return replace(problem, pieces=judge.fitted_pieces())

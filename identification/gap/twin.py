@@ -7,10 +7,10 @@ import numpy as np
 
 from identification.assemble import Assembled
 from identification.damper.coordinates import to_parameters
+from identification.gap.contender import Contender
 from identification.gap.documents import DriveKind, Twin, TwinEffect
 from identification.gap.judge import Judge
 from identification.gap.model import named_effects
-from identification.gap.search import Contender
 from identification.motion import recorded_noise
 from identification.prediction import normalised, per_drive, rmse
 from identification.problem import COORDINATE_COUNT

@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from identification.gap.contender import Contender
 from identification.gap.documents import EffectSet, EffectValue, NamedEffect, Verdict
 from identification.gap.posterior import Odds
-from identification.gap.search import Contender
 
 _NO_GAP = 1.008
 """[1] RMSE over the floor below which nothing is asked for, whatever fits a little better."""

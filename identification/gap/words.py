@@ -76,6 +76,21 @@ def explanation(
     return f"{start}; {_said(effects)} {_shrunk(gap, len(effects))}. {_next(verdict, effects, alternatives, rest)}"
 
 
+def nearest(names: Sequence[str], before: float, after: float, floor: float) -> str:
+    """What known effects would take away where none is named.
+
+    Args:
+        names: of the effects that come nearest, together.
+        before: error on unseen strokes of the refitted law [N].
+        after: the same with them [N].
+        floor: noise of the force [N].
+    """
+    return (
+        f"nearest of what is known: {' with '.join(names)} would bring the error on unseen strokes from "
+        f"{before:.3g} to {after:.3g} N, {after / floor:.3g} times the noise floor; too far from it to be named"
+    )
+
+
 def _said(effects: Sequence[NamedEffect]) -> str:
     """The named effects with their sizes."""
     return " and ".join(f"{e.name} ({_sizes(e)})" for e in effects)

@@ -24,6 +24,8 @@ _ALIKE = 1.35
 """[1] ratio of sample counts up to which elements share a batch."""
 _LARGEST = 12_000
 """Points in a batch: its tensors stay below what the system's allocator gives back at once, page by page."""
+_LOOSE = 0.1
+"""[1] weight of the one test that the heads cannot meet beside all others."""
 _TAIL = 1e-7
 """[1] of an impulse response that is left off."""
 
@@ -94,7 +96,8 @@ class Batch:
     slopes: Array
     """(K, M, rank) their slopes over time [1/s]."""
     tests: Array
-    """(M, rank) orthonormal combinations of the functions, weighed by the quadrature."""
+    """(M, rank) orthonormal combinations of the functions' slopes and, last, of the functions; weighed by the
+    quadrature."""
     share: Array
     """(K, M) root of the samples that each point stands for."""
     slip_velocity: Array
@@ -115,6 +118,11 @@ class Batch:
     """(K, S) recorded [N]."""
     counts: Array
     """(K, S) weight of each sample [1]; 0 where it is not fitted."""
+
+    @cached_property
+    def asked(self) -> Array:
+        """(M, rank) the tests as they are asked, the last one lightly."""
+        return np.hstack([self.tests[:, :-1], _LOOSE * self.tests[:, -1:]])
 
 
 def make_batches(pieces: Sequence[Learned], network: LocalNetwork, force_delay: float, points: int) -> list[Batch]:
@@ -165,7 +173,7 @@ def _batch(source: Learned, network: LocalNetwork, numbers: Indices, force_delay
         time=time,
         values=values,
         slopes=network.layer.slopes(nodes) * rate[..., None],
-        tests=np.linalg.qr(values * np.sqrt(quadrature)[:, None])[0],
+        tests=_tests(values, network.layer.slopes(nodes), np.sqrt(quadrature)[:, None]),
         share=np.sqrt(quadrature * np.maximum(lengths, 1.0)[:, None]),
         slip_velocity=np.array([e.slip_velocity for e in elements]),
         motion=source.inputs.motion(time),
@@ -177,6 +185,17 @@ def _batch(source: Learned, network: LocalNetwork, numbers: Indices, force_delay
         force=source.piece.force[np.clip(samples, 0, len(source.piece.force) - 1)],
         counts=_counts(source, elements, samples, late),
     )
+
+
+def _tests(values: Array, slopes: Array, weight: Array) -> Array:
+    """What the law's residual is weighed with in an element: a test for each of its own heads, and one more.
+
+    Elements share a node, so that each has one head fewer than functions; the functions' slopes are as many, for
+    the constant has none (Petrov and Galerkin). The last test keeps residuals from swinging between these.
+    """
+    met = np.linalg.svd(weight * slopes, full_matrices=False)[0][:, :-1]
+    beyond = weight * values - met @ (met.T @ (weight * values))
+    return np.hstack([met, np.linalg.svd(beyond, full_matrices=False)[0][:, :1]])
 
 
 def _at_samples(

@@ -12,6 +12,7 @@ from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.pinn import law_rows
 from identification.pinn.batches import Learned
+from identification.pinn.levenberg import gram
 from identification.pinn.mesh import Y_UNIT, Indices
 from identification.pinn.mlp import Network
 from identification.problem import COORDINATE_COUNT, Problem
@@ -119,7 +120,7 @@ class GlobalLoss:
         """(13, 13) of the search numbers, the weights marginalised; samples count as many as there are."""
         _, J = self.linearised(s, weights, q, physics)
         # The weights are many for what they say; a slight pull keeps those that say nothing from being infinite.
-        H = J.T @ J
+        H = gram(J)
         H.diagonal().add_(_PULL * float(torch.diag(H).max()))
         inverse = torch.linalg.inv(H)[-COORDINATE_COUNT:, -COORDINATE_COUNT:].cpu().numpy()
         return np.asarray(inverse * len(s.x) / self.problem.samples)

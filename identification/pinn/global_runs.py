@@ -31,9 +31,9 @@ from identification.recordings import Stretch
 
 _PRETRAINING, _REFRESH = 25, 6
 """Steps on the first states; steps between two refreshments of inputs and batch."""
-_WEIGHED, _FREED, _FIXED = (0.2, 0.6), (0.06, 0.25), 0.6
-"""[1] of the steps: while the law's weight rises; from where coordinates move, at first without the shape; from
-where inputs and batch stand."""
+_WEIGHED, _FREED, _FIXED = (0.2, 0.6), (0.12, 0.3), 0.6
+"""[1] of the steps: while the law's weight rises; from where coordinates move, at first without the shape (sooner,
+while the network's force is still far off, they run away for good); from where inputs and batch stand."""
 _TAKEN_BACK = 0.75
 """[1] of the steps, after which the blocks set aside are fitted too."""
 _LATE = ("rho", "n", "c1_b")

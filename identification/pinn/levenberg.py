@@ -37,7 +37,7 @@ class Levenberg:
             held: (U,) further damping of each unknown.
             moved: takes a proposal into its bounds; that point and the sum of squares there.
         """
-        H, gradient, now = slopes.T @ slopes, slopes.T @ rows, float(rows @ rows)
+        H, gradient, now = gram(slopes), slopes.T @ rows, float(rows @ rows)
         diagonal = torch.diag(H)
         scale = torch.clamp(diagonal, min=_FLAT * float(diagonal.max()))
         always = held + _ROUNDING * scale.max()
@@ -49,3 +49,11 @@ class Levenberg:
                 return there
             self.damping *= _HARDER
         return point
+
+
+def gram(slopes: Tensor) -> Tensor:
+    """(U, U) products of all columns with each other; on the processor by numpy, which makes only half of them."""
+    if slopes.is_cuda:
+        return slopes.T @ slopes
+    table = slopes.numpy()
+    return torch.from_numpy(table.T @ table)

@@ -31,6 +31,8 @@ _FINE = 1e-3
 """[s] between points of the slip velocity, at most."""
 _SAME = 0.3
 """[1] deviations by which the shared unknowns move on a new mesh, below which another one brings nothing."""
+_WAITING, _WAITING_AGAIN = 3, 1
+"""Steps of the multipliers for which the shared unknowns wait, before they move at all and later on."""
 _FINISHING, _FINISHING_ANEW = 2, 4
 """Most meshes of the last descent, which begins close to its end; where the states begin anew."""
 
@@ -155,14 +157,20 @@ class LocalTraining:
         return moved < _SAME**2
 
     def _multiply(self, physics: float) -> None:
-        """The law as a constraint: residuals that stay are added to what is asked for (multipliers)."""
+        """The law as a constraint: residuals that stay are added to what is asked for (multipliers).
+
+        The shared unknowns wait until the states keep the law. Moving at once, they would slide along what its
+        finite weight still allows, and where the strokes hardly show the shape of the loop they would not return.
+        """
         self.phase = "multipliers"
         pieces = learned(self.problem)
         loss, weights = self._loss(self.problem, pieces), Weights(physics, self.noise)
         free = self._free(self.settings.levels[-1], 1, 1)
         pull = None
-        for _ in range(self.settings.multipliers):
-            pull = loss.rows(self.unknowns, self.network.heads, weights, pull, slopes=False)
+        for number in range(self.settings.multipliers):
+            for _ in range(_WAITING_AGAIN if number else _WAITING):
+                pull = loss.rows(self.unknowns, self.network.heads, weights, pull, slopes=False)
+                self._descend(loss, weights, np.zeros(UNKNOWNS, bool), 2, 0.0, pull)
             self._descend(loss, weights, free, 4, 0.0, pull)
         self.information = self._factorised(loss, weights, pull)[0].information()
 

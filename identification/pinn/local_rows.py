@@ -55,8 +55,11 @@ class Rows:
         return np.concatenate([self.hysteresis, self.balance, self.misfit], 1)
 
     def pulled(self, pull: "Rows") -> "Rows":
-        """With the residuals of the law that multipliers add."""
-        return replace(self, hysteresis=self.hysteresis + pull.hysteresis, balance=self.balance + pull.balance)
+        """With the residuals of the law that multipliers add; without end, were the last test among them."""
+        hysteresis, balance = self.hysteresis.copy(), self.balance.copy()
+        hysteresis[:, :-1] += pull.hysteresis[:, :-1]
+        balance[:, :-1] += pull.balance[:, :-1]
+        return replace(self, hysteresis=hysteresis, balance=balance)
 
 
 class _Point(NamedTuple):
@@ -131,8 +134,8 @@ class LocalLoss:
             b.counts / weights.noise,
         )
         found = Rows(
-            (hysteresis.value * scales[0]) @ b.tests,
-            (balance.value * scales[1]) @ b.tests,
+            (hysteresis.value * scales[0]) @ b.asked,
+            (balance.value * scales[1]) @ b.asked,
             (force.value - b.force) * scales[2],
         )
         if slopes:
@@ -197,7 +200,7 @@ class LocalLoss:
         samples[..., y] = Y_UNIT * force["y_rate"][..., None] * rate
         for table, over, part in zip((*law, samples), (hysteresis, balance, force), parts, strict=True):
             table[..., 2 * rank :] = self._shared(over, part.field, point)
-        return np.concatenate([*(b.tests.T @ law), samples], 1)
+        return np.concatenate([*(b.asked.T @ law), samples], 1)
 
     def _shared(self, over: dict[str, Array], field: Field, point: _Point) -> Array:
         """(K, M, 15) slopes over the unknowns that all elements share."""

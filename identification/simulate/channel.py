@@ -9,7 +9,8 @@ from scipy import signal
 from identification.arrays import Array
 from identification.damper.effects import Form
 from identification.simulate.curves import over_number, over_parameters
-from identification.simulate.motion import Motion
+from identification.simulate.inputs import remembered
+from identification.simulate.motion import Motion, machine
 from identification.simulate.setting import Setting, Stroke
 
 _DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-8, 1e-7
@@ -27,7 +28,14 @@ def beside(setting: Setting, motion: Motion) -> Array:
     total = np.zeros(len(motion.x))
     for _, form, values in setting.acting("parallel_force"):
         total += form.act(motion.x, motion.v, *values)
+    for _, form, values in setting.acting("dragging_force"):
+        total += _dragging(form, motion.x, motion.v, *values)
     return total
+
+
+def _dragging(form: Form, x: Array, v: Array, *values: float) -> Array:
+    """(N,) force [N] beside the law of a form that remembers the way."""
+    return np.asarray(form.act(x, v, remembered(machine(form.memory), x, *values), *values))
 
 
 def beside_slopes(setting: Setting, motion: Motion) -> tuple[Array, list[tuple[int, Array]]]:
@@ -38,7 +46,20 @@ def beside_slopes(setting: Setting, motion: Motion) -> tuple[Array, list[tuple[i
         moving += over_x * motion.dx + over_v * motion.dv
         rows = over_parameters(partial(form.act, motion.x, motion.v), values, form.parameters)
         own += [(at + k, np.broadcast_to(row, len(motion.x))) for k, row in enumerate(rows)]
+    for at, form, values in setting.acting("dragging_force"):
+        moving += np.stack(
+            [_along(form, values, motion, dx, dv) for dx, dv in zip(motion.dx, motion.dv, strict=True)]
+        )
+        whole = partial(_dragging, form, motion.x, motion.v)
+        own += [(at + k, row) for k, row in enumerate(over_parameters(whole, values, form.parameters))]
     return moving, own
+
+
+def _along(form: Form, values: tuple[float, ...], motion: Motion, dx: Array, dv: Array) -> Array:
+    """(N,) slope of a force that remembers the way, over an unknown that moves the motion by dx and dv."""
+    step = _DISPLACEMENT_STEP / max(float(np.abs(dx).max()), 1e-9)
+    ahead, back = (_dragging(form, motion.x + s * dx, motion.v + s * dv, *values) for s in (step, -step))
+    return np.asarray((ahead - back) / (2.0 * step))
 
 
 def _over_motion(form: Form, values: tuple[float, ...], motion: Motion) -> tuple[Array, Array]:

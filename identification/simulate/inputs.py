@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array, compiled
+from identification.arrays import Array, compiled, compiled_anew
 from identification.damper.parameters import Quantity
 from identification.simulate.curves import over_parameters
 from identification.simulate.motion import machine
@@ -76,28 +76,30 @@ def _thinned(at: Array, middle: Array, finer: int) -> tuple[Array, Array]:
 
 def _through(coil: Any, parameters: tuple[float, ...], drive: Array, h: float) -> Array:
     """(2N-1,) field on the grid of half samples, through every effect of the coil in the order of the chain."""
-    eta, delay, lag, at = parameters[0], parameters[1], 0.0, 2
+    eta, delay, lag, part, at = parameters[0], parameters[1], 0.0, 1.0, 2
     maps = []
     for _, form, some in coil:
         own = parameters[at : at + len(some)]
         at += len(some)
         if form.acts == "drive_delay":
-            further, slower = form.act(*own)
+            further, slower, part = form.act(*own)
             delay, lag = delay + further, lag + slower
         else:
             maps.append((form, own))
     u = twice_lagged(drive, eta, lag, delay, h)
+    if part < 1.0:
+        u = part * u + (1.0 - part) * twice_lagged(drive, eta, 0.0, delay, h)
     for form, own in maps:
         if form.acts == "field":
             u = form.act(u, *own)
         else:
-            u = form.act(u, _remembered(machine(form.memory), u, *own), *own)
+            u = form.act(u, remembered(machine(form.memory), u, *own), *own)
     return np.asarray(u)
 
 
-@compiled
-def _remembered(memory: Any, u: Array, *values: float) -> Array:
-    """What a form with memory remembers along a field (N,); nothing at its start."""
+@compiled_anew
+def remembered(memory: Any, u: Array, *values: float) -> Array:
+    """What a form with memory remembers along a field or a displacement (N,); nothing at its start."""
     found = np.zeros(len(u))
     for i in range(1, len(u)):
         change = u[i] - u[i - 1]

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array, compiled
+from identification.arrays import Array, compiled, compiled_anew
 from identification.damper.effects import Form
 from identification.simulate.curves import hermite, over_parameters
 from identification.simulate.setting import Setting, Stroke
@@ -109,7 +109,7 @@ def machine(function: Any) -> Any:
     return _MACHINE[function]
 
 
-@compiled
+@compiled_anew
 def _follow(act: Any, x: Array, v: Array, dx: Array, dv: Array, value: float) -> tuple[Array, Array, Array, Array]:
     """Run a follower of one parameter along a motion; its derivative becomes the last row."""
     count, extra, e = len(x), len(dx), _CONTACT

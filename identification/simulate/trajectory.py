@@ -65,9 +65,9 @@ def simulate(
 
 
 def connection_of(setting: Setting) -> Array:
-    """(3,) give [m/N], gap [m] and hardening [1/m²] of what carries the damper; zero where it is rigid."""
+    """(4,) give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper; zero where rigid."""
     parts = [form.act(*values) for _, form, values in setting.acting("connection")]
-    return np.asarray(np.sum(np.array(parts, float).reshape(-1, 3), axis=0))
+    return np.asarray(np.sum(np.array(parts, float).reshape(-1, 4), axis=0))
 
 
 class _Chain:
@@ -126,7 +126,7 @@ class _Chain:
     def yielding(
         self, plan: Plan, carrying: Array, fineness: float, slopes: bool
     ) -> tuple[Trajectory, Array | None]:
-        """Trajectory and slopes (N, U) behind a connection: its give, gap and hardening (3,)."""
+        """Trajectory and slopes (N, U) behind a connection: its give, gap, hardening and film (4,)."""
         c, h = self._setting.coordinates, 1.0 / self._stroke.rate
         g = yielding.inputs_of(self._motion, self._field, self._scales, self._beside, h)
         fixed = np.array([*self._s, c.k1, c.f0, *carrying])
@@ -142,8 +142,8 @@ class _Chain:
         J[:, [_K1, _F0]] = partial[:, STRUCTURAL : STRUCTURAL + 2]
         for at, form, values in self._setting.acting("connection"):
             for k, row in enumerate(over_parameters(form.act, values, form.parameters)):
-                J[:, len(UNKNOWNS) + at + k] += partial[:, STRUCTURAL + 2 : STRUCTURAL + 5] @ row
-        J[:, _Y0] = partial[:, STRUCTURAL + 5]
+                J[:, len(UNKNOWNS) + at + k] += partial[:, STRUCTURAL + 2 : STRUCTURAL + 6] @ row
+        J[:, _Y0] = partial[:, STRUCTURAL + 6]
         columns = [*self._columns, *(len(UNKNOWNS) + at for at, _ in own)]
-        J[:, columns] = partial[:, STRUCTURAL + 6 :]
+        J[:, columns] = partial[:, STRUCTURAL + 7 :]
         return Trajectory(force, y, zeta, self._field.u, plan), self._with_shifts(J)

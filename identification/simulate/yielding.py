@@ -1,7 +1,7 @@
 """The march where the fixture gives way: the damper's displacement is a third state.
 
-With R = carried(x - X) - k1 X + f0 - p the force that is left for the dashpot c1 (X where the damper stands, x
-where the actuator does, p the force beside the law), the law reads
+With R = carried(x - X) + d (x' - X') - k1 X + f0 - p the force that is left for the dashpot c1 (X where the damper
+stands, x where the actuator does, d the film of the connection, p the force beside the law), the law reads
 
     y' = R / c1      X' = slip + y'      slip = (R - F zeta - k0 (X - y)) / c0      zeta' = g(slip, zeta)
 
@@ -9,8 +9,8 @@ so that each implicit stage of a linear spring is linear in y and X and leaves o
 rigid fixture; one with a gap, or one that hardens, is taken straight about where it stands until it stands there.
 The force on the cell is what the connection carries. Forces beside the law are taken at the actuator's motion.
 
-``p`` below holds 15 fixed numbers: the ten structural coordinates, k1, f0, and give, gap and hardening of the
-connection; ``g`` the six inputs at one instant: x, u, factors of alpha, c0, c1, and the force beside the law.
+``p`` below holds 16 fixed numbers: the ten structural coordinates, k1, f0, and give, gap, hardening and film of
+the connection; ``g`` the seven inputs at one instant: x, u, factors of alpha, c0, c1, force beside the law, x'.
 """
 
 import math
@@ -39,8 +39,8 @@ from identification.simulate.step import (
     through_middle,
 )
 
-_FIXED, _INPUTS = 15, 6
-_K1, _F0, _GIVE, _GAP, _HARDENING = 10, 11, 12, 13, 14
+_FIXED, _INPUTS = 16, 7
+_K1, _F0, _GIVE, _GAP, _HARDENING, _FILM = 10, 11, 12, 13, 14, 15
 _MOST_MOVES = 12
 """Times that a connection is taken straight anew in one stage."""
 _NEAR = 1e-8
@@ -54,25 +54,28 @@ _stretched = compiled(connection.stretched)
 
 
 def inputs_of(motion: Motion, field: Field, scales: Factors, beside: Array, h: float) -> tuple[Array, Array]:
-    """The six inputs at the samples (6, N) and half way between them (6, N-1)."""
-    x, _ = half_way(motion.x, motion.v, h)
+    """The seven inputs at the samples (7, N) and half way between them (7, N-1)."""
+    x, v = half_way(motion.x, motion.v, h)
     ones, middles = np.ones((3, len(motion.x))), np.ones((3, len(x)))
     scaled = scales.at.shape[1] > 0
-    at = np.vstack([motion.x, field.u, scales.at if scaled else ones, beside])
-    middle = np.vstack([x, field.middle, scales.middle if scaled else middles, 0.5 * (beside[1:] + beside[:-1])])
+    between = 0.5 * (beside[1:] + beside[:-1])
+    at = np.vstack([motion.x, field.u, scales.at if scaled else ones, beside, motion.v])
+    middle = np.vstack([x, field.middle, scales.middle if scaled else middles, between, v])
     return np.ascontiguousarray(at), np.ascontiguousarray(middle)
 
 
 def derivatives_of(
     motion: Motion, field: Field, scales: Factors, over_motion: Array, own: list[tuple[int, Array]], h: float
 ) -> tuple[Array, Array]:
-    """Their derivatives (E, 6, N) and (E, 6, N-1): unknowns of field, motion and factors, then of forces."""
+    """Their derivatives (E, 7, N) and (E, 7, N-1): unknowns of field, motion and factors, then of forces."""
     first, count = len(field.du) - 1, len(motion.x)
     inner = first + max(1 + len(motion.columns), len(scales.over))
-    at, middle = np.zeros((inner + len(own), 6, count)), np.zeros((inner + len(own), 6, count - 1))
+    at = np.zeros((inner + len(own), _INPUTS, count))
+    middle = np.zeros((inner + len(own), _INPUTS, count - 1))
     at[: first + 1, 1], middle[: first + 1, 1] = field.du, field.dmiddle
     moving = slice(first, first + len(motion.dx))
-    at[moving, 0], middle[moving, 0] = motion.dx, half_way(motion.dx, motion.dv, h)[0]
+    at[moving, 0], at[moving, 6] = motion.dx, motion.dv
+    middle[moving, 0], middle[moving, 6] = half_way(motion.dx, motion.dv, h)
     scaling = slice(first, first + len(scales.over))
     if len(scales.over):
         at[scaling, 2:5], middle[scaling, 2:5] = scales.over, scales.over_middle
@@ -100,11 +103,20 @@ def _law(p: Array, g: Array) -> tuple[float, float, float]:
 def _rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple[float, float, float]:
     """Rates of y, zeta and X."""
     F, c0, c1 = _law(p, g)
-    R = _carried(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING]) - p[_K1] * X + p[_F0] - g[5]
+    held = F * zeta + p[9] * (X - y)
+    R = _left(p, g, X, held, c0, c1)
     y_rate = R / c1
-    slip = (R - F * zeta - p[9] * (X - y)) / c0
+    slip = (R - held) / c0
     beta = p[3] / p[2]
     return y_rate, hysteresis_rate(slip, zeta, 1.0 / p[2], beta, 1.0 / p[2] - beta, p[4]), slip + y_rate
+
+
+@compiled
+def _left(p: Array, g: Array, X: float, held: float, c0: float, c1: float) -> float:
+    """The force R that is left for the dashpot c1; ``held`` is what hysteresis and k0 hold of it."""
+    spring = _carried(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING]) - p[_K1] * X + p[_F0] - g[5]
+    film = p[_FILM]
+    return float((spring + film * (g[6] + held / c0)) / (1.0 + film * (1.0 / c0 + 1.0 / c1)))
 
 
 @compiled
@@ -146,7 +158,9 @@ def _solve_straight(
     """The same where the connection carries ``force + steep * stretch``."""
     F, c0, c1 = _law(p, g)
     k0, k1 = p[9], p[_K1]
-    rho, stiffness = force + steep * g[0] + p[_F0] - g[5], steep + k1
+    # The film's force d (x' - X') is one more spring over this stage: X' = (X - known) / w there.
+    rho = force + steep * g[0] + p[_F0] - g[5] + p[_FILM] * (g[6] + Xk / w)
+    stiffness = steep + k1 + p[_FILM] / w
     q = 1.0 + c0 / c1 + k0 * w / c1
     inverse = 1.0 / (c0 / w + k0 + stiffness * q)
     constant, slope = (c0 * Xk / w + k0 * yk + rho * q) * inverse, -F * inverse
@@ -185,8 +199,8 @@ def march(
     """States and force along a recording.
 
     Args:
-        p: (15,) fixed numbers.
-        at, middle: (6, N) and (6, N-1) inputs.
+        p: (16,) fixed numbers.
+        at, middle: (7, N) and (7, N-1) inputs.
         h: [s] time between samples.
         start: y [m], zeta [1] and velocity of the actuator [m/s] at the first sample.
         fineness, plan: as on a rigid fixture.
@@ -202,7 +216,7 @@ def march(
     y_rate, zeta_rate, X_rate = _rates(p, g, y, zeta, X)
     for i in range(count):
         ys[i], zetas[i] = y, zeta
-        forces[i] = _carried(at[0, i] - X, p[_GIVE], p[_GAP], p[_HARDENING])
+        forces[i] = _on_cell(p, at[:, i], X, X_rate)
         if i == count - 1:
             break
         if plan[i] == 0:
@@ -255,10 +269,10 @@ def march_with_slopes(
 
     Args:
         p, at, middle, h, start, fineness, plan: as in ``march``.
-        over, over_middle: (E, 6, N) and (E, 6, N-1) derivatives of the inputs over further unknowns.
+        over, over_middle: (E, 7, N) and (E, 7, N-1) derivatives of the inputs over further unknowns.
 
     Returns:
-        y [m], zeta [1], force [N], each (N,), and slopes (N, 15 + 1 + E): the fixed numbers, y0, the further ones.
+        y [m], zeta [1], force [N], each (N,), and slopes (N, 16 + 1 + E): the fixed numbers, y0, the further ones.
     """
     count, extra = at.shape[1], len(over)
     columns = _FIXED + 1 + extra
@@ -273,8 +287,8 @@ def march_with_slopes(
     y_rate, zeta_rate, X_rate = _slopes(p, g, y, zeta, X, over, over_middle, 0, 0.0, J, f)
     for i in range(count):
         ys[i], zetas[i] = y, zeta
-        forces[i] = _carried(at[0, i] - X, p[_GIVE], p[_GAP], p[_HARDENING])
-        _record(slopes[i], S, over[:, 0, i], at[0, i] - X, p)
+        forces[i] = _on_cell(p, at[:, i], X, X_rate)
+        _record(slopes[i], S, J, f, over[:, :, i], at[0, i] - X, at[6, i] - X_rate, p)
         if i == count - 1:
             break
         if plan[i] == 0:
@@ -297,13 +311,23 @@ def march_with_slopes(
 
 
 @compiled
-def _record(row: Array, S: Array, dx: Array, stretch: float, p: Array) -> None:
+def _on_cell(p: Array, g: Array, X: float, X_rate: float) -> float:
+    """What the connection carries [N]."""
+    return float(_carried(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING]) + p[_FILM] * (g[6] - X_rate))
+
+
+@compiled
+def _record(
+    row: Array, S: Array, J: Array, f: Array, over: Array, stretch: float, stretching: float, p: Array
+) -> None:
     """Write the slopes of the force at one sample into its row."""
-    steep = _steepness(stretch, p[_GIVE], p[_GAP], p[_HARDENING])
+    steep, film = _steepness(stretch, p[_GIVE], p[_GAP], p[_HARDENING]), p[_FILM]
     for j in range(len(row)):
-        row[j] = -S[2, j] * steep
-    for e in range(len(dx)):
-        row[_FIXED + 1 + e] += dx[e] * steep
+        X_rate = J[2, 0] * S[0, j] + J[2, 1] * S[1, j] + J[2, 2] * S[2, j] + f[2, j]
+        row[j] = -S[2, j] * steep - film * X_rate
+    for e in range(len(over)):
+        row[_FIXED + 1 + e] += over[e, 0] * steep + film * over[e, 6]
+    row[_FILM] += stretching
     over_give, over_gap, over_hardening = _over_connection(stretch, p)
     row[_GIVE] += over_give
     row[_GAP] += over_gap
@@ -379,8 +403,9 @@ def _slopes(
     F, c0, c1 = _law(p, g)
     k0 = p[9]
     steep = _steepness(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING])
-    R = _carried(g[0] - X, p[_GIVE], p[_GAP], p[_HARDENING]) - p[_K1] * X + p[_F0] - g[5]
-    y_rate, slip = R / c1, (R - F * zeta - k0 * (X - y)) / c0
+    held = F * zeta + k0 * (X - y)
+    R = _left(p, g, X, held, c0, c1)
+    y_rate, slip = R / c1, (R - held) / c0
     A = 1.0 / p[2]
     beta = p[3] * A
     rate = hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
@@ -401,12 +426,8 @@ def _slopes(
                 over_y, over_s = _over_input(p, g, k, steep, zeta, y_rate, slip, c0, c1)
                 f[0, _FIXED + 1 + e] += over_y * d
                 f[1, _FIXED + 1 + e] += over_s * d
-    for j in range(f.shape[1]):
-        f[2, j] = f[1, j] + f[0, j]
-        f[1, j] = over_slip * f[1, j]
-    for a in range(3):
-        J[2, a] = J[1, a] + J[0, a]
-        J[1, a] = over_slip * J[1, a]
+    _through_film(p[_FILM], c0, c1, over_slip, f)
+    _through_film(p[_FILM], c0, c1, over_slip, J)
     J[1, 1] += over_zeta
     size = abs(zeta)
     power = (size + law.Z_GUARD) ** (p[4] - 1.0)
@@ -415,6 +436,17 @@ def _slopes(
     turned = (A - beta) * abs(slip) * zeta + beta * slip * size
     f[1, 4] -= turned * power * math.log(size + law.Z_GUARD)
     return y_rate, rate, slip + y_rate
+
+
+@compiled
+def _through_film(film: float, c0: float, c1: float, over_slip: float, rows: Array) -> None:
+    """Slopes of y' and of the slip at a fixed X' become those of y', zeta' and X': the film feels X', too."""
+    weaker = 1.0 / (1.0 + film * (1.0 / c0 + 1.0 / c1))
+    for j in range(rows.shape[1]):
+        X_rate = weaker * (rows[0, j] + rows[1, j])
+        rows[0, j] -= film / c1 * X_rate
+        rows[1, j] = over_slip * (rows[1, j] - film / c0 * X_rate)
+        rows[2, j] = X_rate
 
 
 @compiled
@@ -433,7 +465,9 @@ def _over_input(
         return 0.0, -slip * at_field(p[5], p[6], u) / c0
     if k == 4:
         return -y_rate * at_field(p[7], p[8], u) / c1, 0.0
-    return -1.0 / c1, -1.0 / c0
+    if k == 5:
+        return -1.0 / c1, -1.0 / c0
+    return p[_FILM] / c1, p[_FILM] / c0
 
 
 @compiled
@@ -463,6 +497,8 @@ def _over_fixed(
     f[0, _GIVE], f[1, _GIVE] = over_give / c1, over_give / c0
     f[0, _GAP], f[1, _GAP] = over_gap / c1, over_gap / c0
     f[0, _HARDENING], f[1, _HARDENING] = over_hardening / c1, over_hardening / c0
+    stretching = g[6] - slip - y_rate
+    f[0, _FILM], f[1, _FILM] = stretching / c1, stretching / c0
 
 
 @compiled

@@ -14,12 +14,15 @@ from sim_rig.trial.strokes import VARIANTS, duration, strokes
 from sim_rig.trial.truth import CaseKind, Magnitude, MethodKind, TrueCase, TrueEffect
 from sim_rig.trial.values import drawn_values, measures
 
-SHARES: dict[CaseKind, float] = {"pair": 1 / 3, "single": 1 / 3, "triple": 0.06, "nothing": 0.14, "unknown": 0.134}
-"""[1] part of the cases of each kind."""
+SHARES: dict[CaseKind, int] = {"single": 58, "nothing": 100, "pair": 33, "unknown": 30, "triple": 9}
+"""Cases of each kind among 230."""
 RATIOS: dict[Magnitude, tuple[float, float]] = {"small": (1.05, 1.5), "large": (1.7, 5.0)}
 """[1] refitted law over the noise floor, effect by effect, to first order; a whole refit leaves rather less."""
-POOR = 1 / 3
-"""[1] part of the cases with one amplitude at one frequency."""
+TURNS: tuple[tuple[Magnitude, MethodKind], ...] = (
+    *(("small", "rich"), ("large", "rich"), ("small", "poor")),
+    *(("large", "rich"), ("small", "rich"), ("large", "poor")),
+)
+"""Sizes and methods that the cases of a kind take in turn; poor methods have one amplitude at one frequency."""
 GRID = (1.02, 1.05, 1.1, 1.2, 1.4, 1.8, 3.0)
 """[1] ratios of a detection curve."""
 REACHED = 0.75
@@ -45,14 +48,14 @@ class Drawn(NamedTuple):
 
 
 def draw(cases: int, seed: int) -> list[Drawn]:
-    """The blind mixture: every kind in its share, effects in turn, large and small alike."""
+    """The blind mixture: kinds, sizes, methods and effects in turn, so that its beginning is a fair sample too."""
     chance = np.random.default_rng([seed, 1])
-    kinds = _shared(SHARES, cases, chance)
-    magnitudes = _alternating(["small", "large"], cases, chance)
-    methods = _shared({"poor": POOR, "rich": 1 - POOR}, cases, chance)
     known, unknown = _in_turn(KNOWN, chance), _in_turn(UNKNOWN, chance)
+    turns = {kind: int(chance.integers(len(TURNS))) for kind in SHARES}
     drawn = []
-    for number, (kind, magnitude, method) in enumerate(zip(kinds, magnitudes, methods, strict=True)):
+    for number, kind in enumerate(_spread(SHARES, cases)):
+        magnitude, method = TURNS[turns[kind] % len(TURNS)]
+        turns[kind] += 1
         forms = _together(known if kind != "unknown" else unknown, COUNT[kind])
         ratios = tuple(float(chance.uniform(*RATIOS[magnitude])) for _ in forms)
         drawn.append(_case(number, kind, magnitude if forms else None, method, forms, ratios, chance))
@@ -163,19 +166,14 @@ def _case(
     return Drawn(number, kind, magnitude, method, variant, damper, noise, forms, ratios, seed)
 
 
-def _shared(shares: dict[Any, float], count: int, chance: np.random.Generator) -> list[Any]:
-    """``count`` names in these shares, by largest remainders, shuffled."""
-    exact = {name: share / sum(shares.values()) * count for name, share in shares.items()}
-    whole = {name: int(number) for name, number in exact.items()}
-    by_rest = sorted(shares, key=lambda name: whole[name] - exact[name])
-    for name in by_rest[: count - sum(whole.values())]:
-        whole[name] += 1
-    names = [name for name, number in whole.items() for _ in range(number)]
-    return [names[place] for place in chance.permutation(count)]
-
-
-def _alternating(names: list[Any], count: int, chance: np.random.Generator) -> list[Any]:
-    return [names[place % len(names)] for place in chance.permutation(count)]
+def _spread(shares: dict[CaseKind, int], count: int) -> Iterator[CaseKind]:
+    """``count`` names in these shares, each spread evenly: the one that is most behind its share is next."""
+    taken = dict.fromkeys(shares, 0)
+    whole = sum(shares.values())
+    for place in range(1, count + 1):
+        name = max(shares, key=lambda kind: shares[kind] / whole * place - taken[kind])
+        taken[name] += 1
+        yield name
 
 
 def _in_turn(forms: Sequence[str], chance: np.random.Generator) -> Iterator[str]:

@@ -1,5 +1,8 @@
 """The folder of a trial: what is sealed, what a diagnosis may see, what it said; a killed trial goes on here."""
 
+import fcntl
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -97,6 +100,18 @@ class TrialFolder:
         """How a diagnosis went, or nothing if it has not ended."""
         path = self.files(case).outcome
         return Outcome.model_validate_json(path.read_bytes()) if path.exists() else None
+
+    @contextmanager
+    def claim(self, case: str) -> Iterator[bool]:
+        """Hold a case, so that several processes can share a trial; False where another one holds it."""
+        path = self.root / "diagnoses" / f"{case}.claim"
+        with path.open("w") as held:
+            try:
+                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                yield False
+            else:
+                yield True
 
     def put(self, path: Path, text: str) -> None:
         """Write a file whole or not at all."""

@@ -20,8 +20,8 @@ class CommandFailedError(TrialError):
     """A command of the product ended without an answer."""
 
 
-def call(words: Sequence[str | Path]) -> None:
-    """Run a command to its end, with the lowest priority and in an empty folder.
+def call(words: Sequence[str | Path], *, in_real_time: bool = False) -> None:
+    """Run a command to its end, in an empty folder, with the lowest priority unless it has to keep time.
 
     Raises:
         CommandFailedError: it could not be started, failed, or took too long; the message is its complaint.
@@ -30,7 +30,7 @@ def call(words: Sequence[str | Path]) -> None:
     with TemporaryDirectory(prefix="mrbench-trial-") as elsewhere:
         try:
             ended = subprocess.run(
-                [*_nicely(), *command],
+                command if in_real_time else [*_nicely(), *command],
                 cwd=elsewhere,
                 env=environment(),
                 stdin=subprocess.DEVNULL,

@@ -78,10 +78,15 @@ def run_cases(folder: TrialFolder, truth: Truth, plan: Plan, progress: Progress)
 
 
 def _run_case(folder: TrialFolder, case: TrueCase, name: str, diagnose: Sequence[str]) -> None:
+    """Record and diagnose a case, unless that is done, or another process of this trial is about it."""
+    with folder.claim(name) as mine:
+        done = folder.outcome(name)
+        if mine and (done is None or done.failure is not None or not folder.files(name).diagnosis.exists()):
+            _record_and_diagnose(folder, case, name, diagnose)
+
+
+def _record_and_diagnose(folder: TrialFolder, case: TrueCase, name: str, diagnose: Sequence[str]) -> None:
     files = folder.files(name)
-    done = folder.outcome(name)
-    if done is not None and (done.failure is None and files.diagnosis.exists()):
-        return
     folder.put(files.scenario, orjson.dumps(case.scenario).decode())
     _record(folder, case, files.scenario, files.log, over_wires=name.endswith(WIRES))
     started = time.monotonic()
@@ -134,7 +139,8 @@ def _predict(folder: TrialFolder, case: TrueCase, name: str) -> None:
         _record_from_plant(method, files.scenario, case.seed + UNSEEN_SEED, partial)
         partial.replace(files.unseen)
     try:
-        call([*MRBENCH, "predict", files.twin, files.unseen, "--out", files.prediction])
+        # The load cell has another zero in every run: that is nothing that a diagnosis can know.
+        call([*MRBENCH, "predict", files.twin, files.unseen, "--free", "offset", "--out", files.prediction])
     except CommandFailedError as error:
         files.prediction.with_suffix(".failure.txt").write_text(f"{error}\n", encoding="utf-8")
 

@@ -6,6 +6,7 @@ from typing import Any
 import orjson
 
 from sim_rig.trial.answer import CaseAnswer, NamedSet
+from sim_rig.trial.calibrate import floor
 from sim_rig.trial.folder import Outcome, TrialFolder
 from sim_rig.trial.run import WIRES
 from sim_rig.trial.truth import TrueCase
@@ -50,15 +51,14 @@ def judged(
         failure = outcome.failure or "its diagnosis cannot be read"
         return CaseAnswer(**base, failure=failure, right=False, among=False, probability_of_truth=LEAST)
     said = _said(diagnosis)
-    return CaseAnswer(
-        **base, **said, failure=None, true_shrinkage=true_shrinkage(prediction), **_verdict_on(case, said)
-    )
+    shrunk = None if prediction is None else true_shrinkage(prediction, _noise(case))
+    return CaseAnswer(**base, **said, failure=None, true_shrinkage=shrunk, **_verdict_on(case, said))
 
 
 def _said(diagnosis: dict[str, Any]) -> dict[str, Any]:
     effects, gap = diagnosis["effects"], diagnosis["gap"]
     named = NamedSet(effects=tuple(sorted(e["name"] for e in effects)), probability=diagnosis["probability"])
-    floor, interval = gap["noise_floor_n"], gap.get("shrinkage_ci95")
+    noise, interval = gap["noise_floor_n"], gap.get("shrinkage_ci95")
     return {
         "verdict": diagnosis["verdict"],
         "named": named,
@@ -69,8 +69,8 @@ def _said(diagnosis: dict[str, Any]) -> dict[str, Any]:
         "unknown_probability": diagnosis["unknown_probability"],
         "odds": {effect["name"]: effect["probability"] for effect in effects},
         "stage": diagnosis["where"]["stage"],
-        "before_over_floor": gap["before_n"] / floor,
-        "after_over_floor": gap["after_n"] / floor,
+        "before_over_floor": gap["before_n"] / noise,
+        "after_over_floor": gap["after_n"] / noise,
         "claimed_shrinkage": gap["shrinkage"],
         "claimed_ci95": tuple(interval) if interval else None,
     }
@@ -94,14 +94,24 @@ def _verdict_on(case: TrueCase, said: dict[str, Any]) -> dict[str, Any]:
     return {"right": right, "among": right or bool(fitting), "probability_of_truth": max(given, LEAST)}
 
 
-def true_shrinkage(prediction: dict[str, Any] | None) -> float | None:
-    """Shrinkage [1] of a twin on a run that nobody saw; None where its baseline stands at the floor there."""
-    if prediction is None or prediction.get("before_n") is None:
+def true_shrinkage(prediction: dict[str, Any], noise: float) -> float | None:
+    """Shrinkage [1] of a twin on a run that nobody saw; None where its baseline stands at the floor there.
+
+    Args:
+        prediction: the document `mrbench.prediction/1`.
+        noise: of the force, as the rig really has it [N].
+    """
+    if prediction.get("before_n") is None:
         return None
-    floor, before, after = prediction["noise_floor_n"], prediction["before_n"], prediction["rmse_n"]
-    if before < 1.02 * floor:
+    before, after = prediction["before_n"], prediction["rmse_n"]
+    if before < 1.02 * noise:
         return None
-    return float(1 - (after**2 - floor**2) / (before**2 - floor**2))
+    return float(1 - (after**2 - noise**2) / (before**2 - noise**2))
+
+
+def _noise(case: TrueCase) -> float:
+    """Noise of the recorded force [N], white and coloured."""
+    return floor(case.damper, case.scenario["sensors"]["force"])
 
 
 def _read(path: Path) -> dict[str, Any] | None:

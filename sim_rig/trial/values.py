@@ -16,6 +16,8 @@ class Range(NamedTuple):
     high: float
     measure: str = "one"
     """``one`` (SI), ``drive``, ``stroke``, ``duration`` or ``power`` of the case."""
+    either: bool = False
+    """Whether it may be negative, too."""
 
 
 RANGES: dict[str, dict[str, Range]] = {
@@ -25,15 +27,18 @@ RANGES: dict[str, dict[str, Range]] = {
     "reynolds_transition": {"transition": Range(0.03, 0.07)},
     "two_valves": {"opens": Range(2e-3, 8e-3), "softness": Range(5e-3, 0.025)},
     "arrhenius_two_nodes": {"capacity": Range(2.0, 5.0, "power"), "exchange": Range(6.0, 25.0)},
-    "relaxing_rubber": {"gap": Range(0.6, 0.75, "stroke"), "sense": Range(1.0, 1.0)},
+    "relaxing_rubber": {"gap": Range(0.6, 0.75, "stroke"), "sense": Range(1.0, 1.0, either=True)},
     "squeeze_film": {"film": Range(20.0, 120.0)},
-    "hardening": {"hardens": Range(4e-5, 2e-4)},
+    "closing_joint": {"closes": Range(4e-5, 2e-4)},
     "mass_with_bracket": {"frequency": Range(30.0, 70.0)},
     "warm_up_and_walk": {"time": Range(0.15, 0.6, "duration"), "phase": Range(0.1, 6.2)},
     "swelling_harmonics": {"frequency": Range(49.97, 50.03), "phase": Range(0.1, 6.2)},
-    "pitch_error": {"pitch": Range(1.6, 2.6, "stroke")},
+    "uneven_winding": {
+        "place": Range(0.2, 0.6, "stroke", either=True),
+        "width": Range(0.5, 0.9, "stroke"),
+    },
     "every_nth_stroke": {"path": Range(9.0, 15.0, "stroke")},
-    "position_dahl": {"reach": Range(1.1, 2.0, "stroke"), "bend": Range(1e-3, 5e-3)},
+    "hangs_at_random": {"phase": Range(0.1, 6.2)},
     "folded_beat": {"beat": Range(7.0, 40.0)},
     "opens_at_random": {"phase": Range(0.1, 6.2)},
     "on_and_off": {
@@ -67,10 +72,9 @@ def drawn_values(form: str, chance: np.random.Generator, measured: Mapping[str, 
         span = ranges.get(quantity.symbol)
         value = quantity.scale if span is None else _drawn(span, chance) * measured[span.measure]
         values[quantity.symbol] = float(min(max(value, quantity.low), quantity.high))
-    if form == "relaxing_rubber":
-        values["sense"] = float(chance.choice([-1.0, 1.0]))
     return values
 
 
 def _drawn(span: Range, chance: np.random.Generator) -> float:
-    return float(np.exp(chance.uniform(np.log(span.low), np.log(span.high))))
+    size = float(np.exp(chance.uniform(np.log(span.low), np.log(span.high))))
+    return size * float(chance.choice([-1.0, 1.0])) if span.either else size

@@ -28,7 +28,7 @@ def record_over_wires(method: Path, scenario: Path, log: Path) -> None:
             )
         try:
             _wait_for(config, rig, complaints)
-            call([*MRBENCH, "run", method, "--config", config, "--out", log])
+            call([*MRBENCH, "run", method, "--config", config, "--out", log], in_real_time=True)
         finally:
             rig.terminate()
             try:

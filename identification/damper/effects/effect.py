@@ -22,6 +22,7 @@ Action = Literal[
     "scaling",
     "softening",
     "parallel_force",
+    "dragging_force",
     "displacement_follower",
     "connection",
     "inertia",
@@ -33,7 +34,7 @@ Action = Literal[
 ]
 """How a form acts, and what its function takes before the values of the parameters, and gives:
 
-- ``drive_delay``: () -> dead time of the drive [s] and time constant of a second lag [s].
+- ``drive_delay``: () -> dead time [s], time constant of a second lag [s], part of the field behind that lag [1].
 - ``field``: field [drive] -> field that the damper sees [drive].
 - ``field_memory``: field, remembered [drive] -> field that the damper sees; with ``memory`` over (remembered,
   change of the field), which never depends on how a change in one sense is cut.
@@ -41,9 +42,11 @@ Action = Literal[
 - ``softening``: energy [J] -> factors of alpha, c0, c1. The energy is that which the damper has dissipated and
   not yet given away: it leaves with the time constant ``recovery`` among the parameters [s].
 - ``parallel_force``: displacement, velocity of the damper -> force beside the law [N].
+- ``dragging_force``: displacement, velocity of the damper, remembered [1] -> force beside the law [N]; with
+  ``memory`` over (remembered, change of the displacement), which never depends on how a change is cut.
 - ``displacement_follower``: where the damper stood, where the actuator is [m] -> where the damper stands [m].
-- ``connection``: () -> give [m/N], gap [m] and hardening [1/m²] of what carries the damper; those of several add
-  up.
+- ``connection``: () -> give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper; those of
+  several add up.
 - ``inertia``: acceleration of the actuator [m/s^2] -> force between load cell and damper [N].
 - ``time_shift``: () -> time by which the force channel is late [s].
 - ``force_lag``: () -> time constant of a lag in the force channel [s].

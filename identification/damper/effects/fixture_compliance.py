@@ -12,13 +12,13 @@ from identification.damper.parameters import Quantity
 
 
 def linear(compliance: Any) -> Any:
-    """Give [m/N], gap [m] and hardening [1/m²] of the connection."""
-    return compliance, 0.0, 0.0
+    """Give [m/N], gap [m], hardening [1/m²] and film [N s/m] of the connection."""
+    return compliance, 0.0, 0.0, 0.0
 
 
 def hardening(compliance: Any, hardening: Any) -> Any:
     """The same of a spring that hardens."""
-    return compliance, 0.0, hardening
+    return compliance, 0.0, hardening, 0.0
 
 
 FIXTURE_COMPLIANCE = Effect(

@@ -1,6 +1,6 @@
 """A force channel whose zero wanders: warming electronics, a cell that creeps.
 
-Either the zero settles towards another value, or it swings slowly, or it wanders: a wave with two overtones. All
+Either the zero settles towards another value, or it swings slowly, or it wanders: a wave with five overtones. All
 stay bounded for all time.
 """
 
@@ -23,17 +23,36 @@ def swinging(time: Any, drive: Any, cosine: Any, sine: Any, period: Any) -> Any:
     return cosine * np.cos(angle) + sine * np.sin(angle) + 0.0 * drive
 
 
-def wandering(time: Any, drive: Any, c1: Any, s1: Any, c2: Any, s2: Any, c3: Any, s3: Any, period: Any) -> Any:
-    """The same as a slow wave with two overtones."""
+def wandering(
+    time: Any,
+    drive: Any,
+    c1: Any,
+    s1: Any,
+    c2: Any,
+    s2: Any,
+    c3: Any,
+    s3: Any,
+    c4: Any,
+    s4: Any,
+    c5: Any,
+    s5: Any,
+    c6: Any,
+    s6: Any,
+    period: Any,
+) -> Any:
+    """The same as a slow wave with five overtones."""
     angle = 2.0 * np.pi * time / period
-    wave = c1 * np.cos(angle) + s1 * np.sin(angle)
+    wave = c1 * np.cos(angle) + s1 * np.sin(angle) + 0.0 * drive
     wave = wave + c2 * np.cos(2.0 * angle) + s2 * np.sin(2.0 * angle)
-    return wave + c3 * np.cos(3.0 * angle) + s3 * np.sin(3.0 * angle) + 0.0 * drive
+    wave = wave + c3 * np.cos(3.0 * angle) + s3 * np.sin(3.0 * angle)
+    wave = wave + c4 * np.cos(4.0 * angle) + s4 * np.sin(4.0 * angle)
+    wave = wave + c5 * np.cos(5.0 * angle) + s5 * np.sin(5.0 * angle)
+    return wave + c6 * np.cos(6.0 * angle) + s6 * np.sin(6.0 * angle)
 
 
 _PARTS = tuple(
     Quantity(f"{part}_{order}", "N", -1e4, 1e4, 5.0, f"{part} of the wave at {order} times its frequency")
-    for order in (1, 2, 3)
+    for order in range(1, 7)
     for part in ("cosine", "sine")
 )
 
@@ -66,8 +85,8 @@ FORCE_DRIFT = Effect(
         Form(
             "wandering",
             "added_force",
-            (*_PARTS, Quantity("period", "s", 30.0, 3000.0, 100.0, "period of the slowest wave")),
-            ((0.0,) * 6 + (60.0,), (0.0,) * 6 + (120.0,)),
+            (*_PARTS, Quantity("period", "s", 60.0, 3000.0, 100.0, "period of the slowest wave")),
+            ((0.0,) * 12 + (70.0,), (0.0,) * 12 + (140.0,)),
             wandering,
         ),
     ),

@@ -6,17 +6,16 @@ Nothing that identifies or diagnoses may import this package.
 from sim_rig.scenarios.sealed.arctan_saturation import ARCTAN_SATURATION
 from sim_rig.scenarios.sealed.arrhenius_heating import ARRHENIUS_HEATING
 from sim_rig.scenarios.sealed.bessel_delay import BESSEL_DELAY
-from sim_rig.scenarios.sealed.cable_rub import CABLE_RUB
+from sim_rig.scenarios.sealed.closing_joint import CLOSING_JOINT
 from sim_rig.scenarios.sealed.coercive_remanence import COERCIVE_REMANENCE
 from sim_rig.scenarios.sealed.eddy_ladder import EDDY_LADDER
 from sim_rig.scenarios.sealed.fan_step import FAN_STEP
 from sim_rig.scenarios.sealed.floor_vibration import FLOOR_VIBRATION
 from sim_rig.scenarios.sealed.form import Form, Place
-from sim_rig.scenarios.sealed.hardening_fixture import HARDENING_FIXTURE
+from sim_rig.scenarios.sealed.hanging_valve import HANGING_VALVE
 from sim_rig.scenarios.sealed.loose_bolt import LOOSE_BOLT
 from sim_rig.scenarios.sealed.lugre_friction import LUGRE_FRICTION
 from sim_rig.scenarios.sealed.mass_with_mode import MASS_WITH_MODE
-from sim_rig.scenarios.sealed.pitch_error import PITCH_ERROR
 from sim_rig.scenarios.sealed.rubber_stop import RUBBER_STOP
 from sim_rig.scenarios.sealed.squeeze_film_play import SQUEEZE_FILM_PLAY
 from sim_rig.scenarios.sealed.sticking_seal import STICKING_SEAL
@@ -24,6 +23,7 @@ from sim_rig.scenarios.sealed.swelling_hum import SWELLING_HUM
 from sim_rig.scenarios.sealed.switching_pickup import SWITCHING_PICKUP
 from sim_rig.scenarios.sealed.thermal_gas import THERMAL_GAS
 from sim_rig.scenarios.sealed.transition_orifice import TRANSITION_ORIFICE
+from sim_rig.scenarios.sealed.uneven_winding import UNEVEN_WINDING
 from sim_rig.scenarios.sealed.valve_areas import VALVE_AREAS
 from sim_rig.scenarios.sealed.wandering_drift import WANDERING_DRIFT
 
@@ -40,14 +40,14 @@ FORMS: dict[str, Form] = {
         ARRHENIUS_HEATING,
         RUBBER_STOP,
         SQUEEZE_FILM_PLAY,
-        HARDENING_FIXTURE,
+        CLOSING_JOINT,
         MASS_WITH_MODE,
         BESSEL_DELAY,
         WANDERING_DRIFT,
         SWELLING_HUM,
-        PITCH_ERROR,
+        UNEVEN_WINDING,
         STICKING_SEAL,
-        CABLE_RUB,
+        HANGING_VALVE,
         SWITCHING_PICKUP,
         LOOSE_BOLT,
         FAN_STEP,

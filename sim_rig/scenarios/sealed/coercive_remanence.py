@@ -4,21 +4,21 @@ What the iron is behind obeys dq/du = -1 - sign(du) (q / width)^3, so that a sma
 a large field the two branches meet again, as those of a real loop do.
 """
 
+import math
 from typing import Any
 
 from identification.damper.parameters import Quantity
 from sim_rig.scenarios.sealed.form import FIELD, FIELD_RATE, Form, Place
 
 CLOSING = 5.0
-"""[1] field over the coercive width at which the branches have halved their distance."""
+"""[1] field over the coercive width at which a third of the branches' distance has gone."""
 
 
 def felt(now: Any, memory: Any, values: Any, rate: Any) -> float:
     """Field [drive] that the fluid feels; the memory is how far the iron is ahead [drive]."""
     edge = memory[0] / values[1]
     rate[0] = -now[FIELD_RATE] - abs(now[FIELD_RATE]) * edge**3
-    tip = now[FIELD] / (CLOSING * values[1])
-    return float(now[FIELD] + values[0] * memory[0] / (1.0 + tip * tip))
+    return float(now[FIELD] + values[0] * memory[0] / math.cosh(now[FIELD] / (CLOSING * values[1])))
 
 
 def fastest(share: float, width: float) -> float:

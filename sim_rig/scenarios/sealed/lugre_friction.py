@@ -1,6 +1,5 @@
-"""Friction of the seal by bristles that bend before they slip (LuGre), with a static peak."""
+"""Friction of the seal by bristles that bend before they slip (LuGre); its peak falls after Hess and Soom."""
 
-import math
 from typing import Any
 
 from identification.damper.parameters import Quantity
@@ -13,7 +12,7 @@ STIR = 2e-5
 def force(now: Any, memory: Any, values: Any, rate: Any) -> float:
     """Force [N]; the memory is the bend of the bristles over the pre-sliding distance [1]."""
     v, bend = now[V], values[2]
-    strength = 1.0 + values[1] * math.exp(-((v / values[3]) ** 2))
+    strength = 1.0 + values[1] / (1.0 + (v / values[3]) ** 2)
     rate[0] = (v - abs(v) * memory[0] / strength) / bend
     return float(values[0] * (memory[0] + STIR * rate[0]))
 

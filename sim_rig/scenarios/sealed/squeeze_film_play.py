@@ -1,29 +1,31 @@
-"""Play in the clevis with grease in it: the film drags while the pin crosses, and the contact is elastic."""
+"""Play in the clevis with grease in it: the film drags more as it thins, and pin and eye press after Hertz."""
 
 from typing import Any
 
 from identification.damper.parameters import Quantity
 from sim_rig.scenarios.sealed.form import STRETCH, STRETCH_RATE, Form, Place
 
-STIFFNESS = 1e8
-"""[N/m] of the pin in contact."""
-DAMPING = 1e4
-"""[N s/m] of the contact."""
+STIFFNESS, DENT = 5e7, 5e-6
+"""[N/m] of pin on eye at a dent [m]."""
+LOSS = 30.0
+"""[s/m] damping of the contact over its force."""
+THIN = 0.05
+"""[1] film that remains between pin and eye, over half the gap: bounds its drag."""
 
 
 def force(now: Any, memory: Any, values: Any, rate: Any) -> float:
     """Force [N] that the pin carries."""
     half = 0.5 * values[0]
-    pressed = now[STRETCH] - min(max(now[STRETCH], -half), half)
-    carried = values[1] * now[STRETCH_RATE]
-    if pressed != 0.0 or half == 0.0:
-        carried += STIFFNESS * pressed + DAMPING * now[STRETCH_RATE]
-    return float(carried)
+    inside = min(max(now[STRETCH], -half), half)
+    dent, squeezed = now[STRETCH] - inside, (inside / half) ** 2 if half > 0.0 else 1.0
+    carried = values[1] * now[STRETCH_RATE] / (1.0 + THIN - squeezed)
+    pressing = 1.0 + LOSS * (now[STRETCH_RATE] if dent > 0.0 else -now[STRETCH_RATE])
+    return float(carried + STIFFNESS * dent * (abs(dent) / DENT) ** 0.5 * max(pressing, 0.0))
 
 
 def fastest(gap: float, film: float) -> float:
-    """Fastest rate [1/s]: the contact's own."""
-    return STIFFNESS / DAMPING
+    """Fastest rate [1/s]: of the contact, which the damper itself damps."""
+    return 2e4
 
 
 SQUEEZE_FILM_PLAY = Form(

@@ -1,4 +1,4 @@
-"""A zero that warms up and then wanders: an exponential, and a walk of sines that never repeat."""
+"""A zero that warms up as heat soaks in, by a root of time, and wanders: a walk of sines that never repeat."""
 
 import math
 from typing import Any
@@ -20,7 +20,7 @@ def shift(now: Any, memory: Any, values: Any, rate: Any) -> float:
     for k in range(1, STEPS + 1):
         pulse = 2.0 * math.pi * SLOWEST * k**1.07
         walk += (math.sin(pulse * now[TIME] + values[2] * k * k) - math.sin(values[2] * k * k)) / k
-    return float(values[0] * (1.0 - math.exp(-max(now[TIME], 0.0) / values[1]) + RESTLESS * walk))
+    return float(values[0] * (1.0 - (1.0 + max(now[TIME], 0.0) / values[1]) ** -0.5 + RESTLESS * walk))
 
 
 WANDERING_DRIFT = Form(
@@ -30,7 +30,7 @@ WANDERING_DRIFT = Form(
     place=Place.CELL,
     parameters=(
         Quantity("warm_up", "N", -2000.0, 2000.0, 10.0, "by which the zero moves while the channel warms"),
-        Quantity("time", "s", 1.0, 1000.0, 20.0, "time constant of the warm-up"),
+        Quantity("time", "s", 1.0, 1000.0, 10.0, "time after which three tenths of the warm-up are done"),
         Quantity("phase", "rad", 0.0, 7.0, 1.0, "at which the walk begins"),
     ),
     meaning="the zero of the load cell wanders",

@@ -12,7 +12,7 @@ from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.refine import Settings, descend, refine
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, Stroke, simulate
-from identification.start import scattered, sliding_damping, starting_points
+from identification.start import further_points, scattered, sliding_damping, starting_points
 from identification.uncertainty import (
     coordinate_covariance,
     coordinate_estimates,
@@ -135,6 +135,29 @@ def test_a_fit_of_the_first_half_also_reaches_the_noise(fitted):
     half = refine(problem.with_training(masks))
     assert half.converged
     assert half.evaluation.cost / problem.with_training(masks).samples == pytest.approx(1.0, abs=0.06)
+
+
+def test_a_damper_that_hardly_breaks_through_is_found_from_the_second_kind_of_start():
+    stiff = Coordinates(
+        F_a=93.4, F_b=2030.0, D_y=16.2e-6, rho=0.44, n=1.35, eta=140.0, c0_a=1100.0, c0_b=5880.0,
+        c1_a=6960.0, c1_b=25500.0, k0=1540.0, k1=1000.0, f0=5.9,
+    )  # fmt: skip
+    problem = problem_of(stiff, [sine(0.010, 1.0, 12.0, (0.0, 0.1, 0.2, 0.3, 0.4, 0.5))])
+    cost = {
+        kind: descend(problem, points(problem)[0], 60, lambda what, error: None).evaluation.cost / problem.samples
+        for kind, points in (("breaks through", starting_points), ("hardly", further_points))
+    }
+    assert cost["breaks through"] > 10.0, "or this damper asks for no other start"
+    assert cost["hardly"] == pytest.approx(1.0, abs=0.04)
+    assert refine(problem).evaluation.cost == pytest.approx(cost["hardly"] * problem.samples, rel=1e-3)
+
+
+def test_a_first_look_at_fewer_samples_ends_in_the_minimum_of_all():
+    problem = problem_of(LABORATORY, [sine(0.010, 1.0, 30.0), sine(0.015, 2.0, 30.0)])
+    found = refine(problem)
+    plain = descend(problem, starting_points(problem)[0], 60, lambda what, error: None)
+    assert found.evaluation.cost == pytest.approx(plain.evaluation.cost, abs=0.1)
+    assert found.iterations < plain.iterations
 
 
 def test_a_channel_delay_beyond_its_prior_is_found():

@@ -1,11 +1,14 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_up_strokes import RATE, hysteresis, random_motion, recorded, sine, sine_segment, stretch
 from numpy.random import default_rng
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, lfilter
 
 from identification.harmonics import fit_harmonics
-from identification.motion import displacement_noise, estimate_motion
+from identification.motion import displacement_noise, estimate_motion, recorded_noise
 from identification.smoother import derivative, kept_noise, smoothed, stiffness
 
 DAMPING = 2000.0
@@ -42,12 +45,12 @@ def test_the_ends_of_a_random_stroke_show_no_artefact():
     assert np.max(np.abs(force_error(motion.velocity, velocity)[ends])) < 3.0
 
 
-def yielding_actuator(seconds=8.0):
-    """A stroke whose actuator gives way under the load by some 20 µm, at a drive that steps each 2 s."""
+def yielding_actuator(seconds=8.0, stiffness=2e7):
+    """A stroke whose actuator gives way under the load, by some 20 µm as it is; at a drive that steps each 2 s."""
     command, velocity = sine(10e-3, 1.5, seconds)
     level = np.repeat([0.2, 1.0, 0.4, 0.7], round(seconds * RATE) // 4)
     force = hysteresis(velocity, level)
-    displacement = command - lfilter(*butter(2, 40.0, fs=RATE), force) / 2e7
+    displacement = command - lfilter(*butter(2, 40.0, fs=RATE), force) / stiffness
     return displacement, force, level
 
 
@@ -59,6 +62,18 @@ def test_what_gives_way_under_the_load_is_followed_through_drive_steps():
     error = force_error(motion.velocity, derivative(displacement, RATE))[100:-100]
     assert rms(error) < 0.25
     assert "what follows the force" in motion.method[0]
+
+
+def test_of_a_soft_actuator_what_is_swift_is_followed():
+    displacement, force, level = yielding_actuator(stiffness=1e6)
+    assert np.std(force / 1e6) > 0.03 * np.std(displacement), "softer than an actuator can be"
+    noisy = force + 2.5 * default_rng(3).standard_normal(len(force))
+    deaf, motion = (estimate_motion(stretch(recorded(displacement, 2e-6), f, level)) for f in (0.0 * force, noisy))
+    deaf_error, error = (
+        rms(force_error(m.velocity, derivative(displacement, RATE))[100:-100]) for m in (deaf, motion)
+    )
+    assert "what follows the force" in motion.method[0]
+    assert error < 0.95 * deaf_error
 
 
 def test_a_force_that_the_displacement_does_not_follow_is_left_alone():
@@ -136,6 +151,27 @@ def test_the_achieved_frequency_is_found():
     assert fit is not None
     assert fit.frequency == pytest.approx(4.0687, rel=1e-5)
     assert fit.orders[0] == 1
+
+
+def test_knocks_in_some_cycles_leave_no_echo_in_the_others():
+    displacement, _ = sine(5e-3, 2.0)
+    knocked = recorded(displacement, 2e-6)
+    for cycle in (2, 5, 6, 9, 13):
+        knocked[500 * cycle + 100 : 500 * cycle + 108] += 25e-6
+    fit = fit_harmonics(knocked, np.ones(len(knocked)), RATE, 2.0, 2e-6)
+    assert fit is not None
+    assert (fit.start, fit.stop, fit.orders) == (0, len(knocked), (1,))
+    assert rms(fit.values - displacement) < 0.15e-6
+
+
+def test_noise_between_the_samples_of_another_clock_is_not_underrated():
+    displacement, _ = sine(10e-3, 1.0)
+    measured = recorded(displacement, 4e-6, digit=1e-9)
+    half_way = CubicSpline(np.arange(len(measured)), measured)(np.arange(len(measured) - 1) + 0.5)
+    moved = replace(stretch(half_way), interpolated=True)
+    passed = rms(half_way - CubicSpline(np.arange(len(measured)), displacement)(np.arange(len(half_way)) + 0.5))
+    assert recorded_noise(moved) == pytest.approx(passed, rel=0.1)
+    assert displacement_noise(half_way, moved.measured) < 0.7 * passed
 
 
 def test_fewer_than_two_cycles_have_no_harmonics():

@@ -4,7 +4,7 @@ from scipy.integrate import solve_ivp
 
 from identification.damper.coordinates import COORDINATES, Coordinates, to_parameters
 from sim_rig import integrate
-from sim_rig.compiled import first, nothing, rigid, unscaled
+from sim_rig.compiled import first, no_force, rigid, unscaled
 from sim_rig.errors import PlantError
 from sim_rig.plant import Plant
 
@@ -12,7 +12,7 @@ from sim_rig.plant import Plant
 def reference_force(plant: Plant, dt: float, command, drive):
     """Force at the samples by a variable-order solver of tight tolerance, restarted at each command sample."""
     k, law, states, forces = plant._constants, plant._law, plant._states.copy(), []
-    effects = (k, law, rigid, nothing, first, unscaled)
+    effects = (k, law, rigid, no_force, first, unscaled)
     for i in range(len(drive)):
 
         def rate(t, s, i=i):

@@ -13,9 +13,18 @@ RATE = 1000.0
 MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
     "field_saturation": {"tanh": (1.5,), "knee": (1.8, 3.0)},
     "magnetic_remanence": {"exponential": (0.03, 0.1), "closing": (0.03, 0.1, 0.3), "play": (0.03,)},
-    "coil_lag": {"second_lag": (0.008,), "dead_time": (0.0061,), "late_and_slow": (0.0047, 0.006)},
+    "coil_lag": {
+        "second_lag": (0.008,),
+        "dead_time": (0.0061,),
+        "late_and_slow": (0.0047, 0.006),
+        "partly_slow": (0.03, 0.4),
+    },
     "gas_spring": {"polytropic": (90.0, 0.05), "polytropic_turned": (90.0, 0.05)},
-    "seal_friction": {"stribeck": (20.0, 10.0, 0.015), "stribeck_gentle": (20.0, 10.0, 0.015)},
+    "seal_friction": {
+        "stribeck": (20.0, 10.0, 0.015),
+        "stribeck_gentle": (20.0, 10.0, 0.015),
+        "bending_lip": (20.0, 10.0, 0.015, 6e-5),
+    },
     "orifice_turbulence": {"quadratic": (1500.0,), "power": (15.0, 1.7)},
     "direction_asymmetry": {"shares": (0.08, 0.15, 0.012), "one_way": (120.0, 8.0, 0.01)},
     "viscous_heating": {"viscosity": (2e-3, 40.0), "whole": (5e-4, 40.0)},
@@ -24,14 +33,14 @@ MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
         "extended_end": (2e4, 0.01, 1e-3),
         "compressed_end": (2e4, 0.01, 1e-3),
     },
-    "clevis_backlash": {"play": (2e-4,), "free_pin": (1e-4, 2e-4)},
+    "clevis_backlash": {"play": (2e-4,), "free_pin": (1e-4, 2e-4), "greased_pin": (2e-4, 1e-4, 5e3)},
     "fixture_compliance": {"linear": (1e-6,), "stiffening": (1e-6, 3e6)},
     "moving_mass": {"rigid": (4.0,)},
     "force_delay": {"pure_delay": (0.0021,)},
     "force_drift": {
         "settling": (12.0, 20.0),
         "swinging": (8.0, -4.0, 60.0),
-        "wandering": (8.0, -4.0, 3.0, 2.0, -2.0, 1.0, 60.0),
+        "wandering": (8.0, -4.0, 3.0, 2.0, -2.0, 1.0, 1.0, -1.0, 0.5, 1.0, -0.5, 0.5, 70.0),
     },
     "mains_hum": {"line": (4.0, 3.0, 50.02), "with_third": (4.0, 3.0, 1.0, -2.0, 50.02)},
     "displacement_nonlinearity": {

@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from effect_examples import LABORATORY, MEDIUM, active
+from made_up_runs import run
 
+from identification.assemble import assemble
 from identification.effect_choice import EffectChoice
 from identification.gap.explain import Effort, fit_with
 from identification.gap.screen import every_choice, screen
+from identification.identify import fit_problem
 from identification.problem import Piece, Problem
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, Stroke, simulate
@@ -107,3 +110,11 @@ def test_the_fit_keeps_effects_inside_their_bounds():
     pieces = tuple(replace(p, force=p.force - 3.0 * p.stroke.acceleration) for p in plain.pieces)
     joint = fit_with(replace(plain, pieces=pieces), (EffectChoice.of("moving_mass"),), effort=Effort(thin=2))
     assert joint.values["moving_mass"]["mass"] == 0.0
+
+
+def test_a_first_look_leaves_out_fewer_samples_of_a_slower_recording():
+    problem = fit_problem(assemble([run()]))
+    fast = problem.pieces[0]
+    both = replace(problem, pieces=(fast, fast.coarser(5)))
+    assert [p.stroke.rate for p in both.coarser(4).pieces] == [125.0, 100.0]
+    assert [p.stroke.rate for p in problem.coarser(4).pieces] == [125.0]

@@ -1,10 +1,11 @@
 import numpy as np
 
-from bench.methods.document import Segment
+from bench.methods.compile import compile_method
+from bench.methods.document import Method, Segment
 from identification.damper.coordinates import to_coordinates
 from identification.damper.effects import EFFECTS
 from identification.damper.parameter_sets import PARAMETER_SETS
-from identification.gap.next_stroke import Limits, Rival, best_segment
+from identification.gap.next_stroke import Limits, Rival, best_segment, trials
 from identification.simulate import ActiveEffect
 
 POINT = to_coordinates(PARAMETER_SETS["laboratory"].parameters)
@@ -37,3 +38,25 @@ def test_what_a_refit_takes_away_does_not_count():
     free = best_segment([loose, other], LIMITS, 2.0)
     held = best_segment([tight, other], LIMITS, 2.0)
     assert held.detectability >= free.detectability
+
+
+def test_the_bench_compiles_every_segment_that_may_be_proposed():
+    for segment, stroke in trials(LIMITS):
+        document = {
+            "schema": "mrbench.method/1",
+            "name": "next",
+            "title": "Proposed",
+            "description": "One segment.",
+            "rate_hz": 1000.0,
+            "drive_kind": "coil_v",
+            "limits": {
+                "stroke_m": 0.05,
+                "velocity_mps": 1.0,
+                "acceleration_mps2": 30.0,
+                "force_n": 5000.0,
+                "drive": 0.5,
+            },
+            "segments": [segment],
+        }
+        programme = compile_method(Method.model_validate(document))
+        assert len(programme.displacement) >= len(stroke.displacement)

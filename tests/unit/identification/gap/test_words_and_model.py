@@ -11,7 +11,7 @@ from identification.gap.black_box import explainable
 from identification.gap.documents import EffectSet, EffectValue, Gap, NamedEffect
 from identification.gap.model import named_effects, read_model
 from identification.gap.plausible import plausibility
-from identification.gap.words import advice, explanation
+from identification.gap.words import advice, explanation, nearest
 from identification.simulate import ActiveEffect
 
 GAP = Gap(
@@ -106,3 +106,9 @@ def test_absurd_sizes_count_for_little():
     drift = EFFECTS["force_drift"]
     assert plausibility(ActiveEffect(drift, (5.0, 60.0)), x) == 1.0
     assert plausibility(ActiveEffect(drift, (5.0, 3.0)), x) < 0.1
+
+
+def test_what_comes_nearest_is_said_with_what_it_leaves():
+    words = nearest(["clevis_backlash", "shear_thinning"], 67.3, 52.7, 3.1)
+    assert "clevis_backlash with shear_thinning" in words
+    assert "from 67.3 to 52.7 N, 17 times the noise floor" in words

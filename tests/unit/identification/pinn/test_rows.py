@@ -9,7 +9,7 @@ from made_up_problem import TRUTH, network_on, problem
 from numpy.random import default_rng
 
 from identification.pinn import law_rows
-from identification.pinn.batches import learned
+from identification.pinn.batches import gauss_points, learned
 from identification.pinn.elimination import NodePrior, factorise
 from identification.pinn.global_loss import GlobalLoss, Samples
 from identification.pinn.local_rows import UNKNOWNS, LocalLoss, Weights
@@ -59,9 +59,27 @@ def test_multipliers_add_the_residuals_of_the_law_and_leave_the_force_alone():
     unknowns, weights = shared_unknowns(given), Weights(7.0, given.noise)
     plain = loss.rows(unknowns, network.heads, weights, slopes=False)
     pulled = loss.rows(unknowns, network.heads, weights, plain, slopes=False)
-    assert np.array_equal(pulled[0].hysteresis, 2 * plain[0].hysteresis)
-    assert np.array_equal(pulled[0].balance, 2 * plain[0].balance)
+    for name in ("hysteresis", "balance"):
+        before, after = getattr(plain[0], name), getattr(pulled[0], name)
+        assert np.array_equal(after[:, :-1], 2 * before[:, :-1])
+        assert np.array_equal(after[:, -1], before[:, -1]), "a test that no head is left for"
     assert np.array_equal(pulled[0].misfit, plain[0].misfit)
+
+
+def test_the_law_is_asked_for_in_as_many_ways_as_an_element_has_heads_of_its_own():
+    network, loss = network_on(problem((0.0, 0.4), 0.8))
+    batch = loss.batches[0]
+    rank = batch.values.shape[1]
+    weight = np.sqrt(gauss_points(len(batch.values))[1])[:, None]
+    slopes = weight * network.layer.slopes(gauss_points(len(batch.values))[0])
+    met = batch.tests[:, :-1]
+    assert met.shape[1] == rank - 1
+    assert met.T @ met == pytest.approx(np.eye(rank - 1), abs=1e-9)
+    unasked = np.linalg.norm(slopes - met @ (met.T @ slopes), 2)
+    assert unasked <= 1.001 * np.linalg.svd(slopes)[1][-1], "only the least of the slopes is left out"
+    assert met.T @ batch.tests[:, -1] == pytest.approx(np.zeros(rank - 1), abs=1e-9)
+    assert np.linalg.norm(batch.asked[:, -1]) < 0.2
+    assert np.array_equal(batch.asked[:, :-1], met)
 
 
 def whole_system(rows, batches, network, priors):

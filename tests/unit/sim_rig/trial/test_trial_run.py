@@ -149,7 +149,7 @@ def test_the_twin_predicts_a_run_that_the_diagnosis_never_saw(folder, three, tmp
     def listening(words):
         if "predict" in words:
             asked.append([str(word) for word in words])
-            Path(words[-1]).write_text(json.dumps({"noise_floor_n": 2.0, "before_n": 4.0, "rmse_n": 2.0}))
+            Path(words[-1]).write_text(json.dumps({"noise_floor_n": 2.0, "before_n": 4.0, "rmse_n": 2.5}))
         else:
             call(words)
 
@@ -157,7 +157,8 @@ def test_the_twin_predicts_a_run_that_the_diagnosis_never_saw(folder, three, tmp
     plan = Plan(3, 1, diagnose=script)
     _, sealed = sealed_truth(folder, plan, silent)
     run_cases(folder, sealed, plan, silent)
-    assert [Path(words[-3]).parent.name for words in asked] == ["unseen", "unseen"]
+    assert [words[-4:-2] for words in asked] == [["--free", "offset"]] * 2
+    assert {Path(words[-5]).parent.name for words in asked} == {"unseen"}
     first = answer(folder, plan).cases[0]
     assert first.true_shrinkage == 1.0
     assert folder.files("case_000").unseen.read_text().startswith("unseen_small_0.json case_000.json")
@@ -204,3 +205,15 @@ def test_the_command_writes_the_answer_and_shows_it(three, tmp_path):
 
 def test_the_committed_schema_is_that_of_the_type():
     assert SCHEMA.read_text() == trial_schema()
+
+
+def test_a_case_that_another_process_holds_is_left_to_it(folder, three, tmp_path):
+    command, heard = always(tmp_path, said("no_gap"))
+    plan = Plan(3, 1, diagnose=command)
+    _, found = sealed_truth(folder, plan, silent)
+    with folder.claim("case_001") as mine:
+        assert mine
+        run_cases(folder, found, plan, silent)
+    assert heard.read_text().split() == ["case_000.mcap", "case_002.mcap"]
+    run_cases(folder, found, plan, silent)
+    assert heard.read_text().split()[2:] == ["case_001.mcap"]

@@ -39,7 +39,7 @@ def test_nothing_is_right_where_nothing_is():
 
 
 def test_an_unknown_effect_wants_a_gap_without_a_name():
-    unknown = truth("cable_rub", kind="unknown")
+    unknown = truth("hanging_valve", kind="unknown")
     assert judge(unknown, said("unexplained", unknown_probability=0.6)).right
     assert judge(unknown, said("unexplained", unknown_probability=0.6)).probability_of_truth == 0.6
     assert not judge(unknown, said("partly_explained", "seal_friction")).right
@@ -66,8 +66,8 @@ def test_groups_false_alarms_and_unknown_ones():
         judge(truth("gas_spring", "end_stop"), said("explained", "gas_spring", "end_stop")),
         judge(truth(magnitude=None), said("explained", "end_stop")),
         judge(truth(magnitude=None), said("no_gap")),
-        judge(truth("cable_rub", kind="unknown"), said("unexplained")),
-        judge(truth("cable_rub", kind="unknown"), said("explained", "end_stop")),
+        judge(truth("hanging_valve", kind="unknown"), said("unexplained")),
+        judge(truth("hanging_valve", kind="unknown"), said("explained", "end_stop")),
     ]
     found = scores(cases)
     first = {name: (group.count, group.of) for name, group in found.named_first.items()}
@@ -78,7 +78,7 @@ def test_groups_false_alarms_and_unknown_ones():
     assert first["triple"] == (0, 0)
     assert (found.false_alarms.count, found.false_alarms.of) == (1, 2)
     assert (found.no_gap_on_nothing.count, found.unknown_left_unknown.count) == (1, 1)
-    assert found.confusion[f"cable_rub {UNKNOWN}"] == {UNKNOWN: 1, "end_stop": 1}
+    assert found.confusion[f"hanging_valve {UNKNOWN}"] == {UNKNOWN: 1, "end_stop": 1}
     assert found.confusion[NOTHING] == {NOTHING: 1, "end_stop": 1}
     assert found.confusion["gas_spring"] == {"gas_spring": 1, "end_stop": 1}
     assert (found.effects["gas_spring"].cases, found.effects["gas_spring"].found) == (3, 2)
@@ -104,11 +104,11 @@ def test_a_calibration_curve_puts_claims_beside_what_came_true():
 
 
 def test_unexplained_makes_no_claim_of_a_set():
-    assert scores([judge(truth("cable_rub", kind="unknown"), said("unexplained"))]).calibration == ()
+    assert scores([judge(truth("hanging_valve", kind="unknown"), said("unexplained"))]).calibration == ()
 
 
 def test_a_blamed_unknown_effect_is_a_claim_that_did_not_come_true():
-    (only,) = scores([judge(truth("cable_rub", kind="unknown"), said("explained", "end_stop"))]).calibration
+    (only,) = scores([judge(truth("hanging_valve", kind="unknown"), said("explained", "end_stop"))]).calibration
     assert only.came_true == 0.0
 
 
@@ -121,10 +121,10 @@ def test_shares_have_wilsons_interval():
 
 def test_true_shrinkage_is_that_of_excess_variance():
     prediction = {"noise_floor_n": 2.0, "before_n": 4.0, "rmse_n": 3.0}
-    assert true_shrinkage(prediction) == pytest.approx(1 - 5 / 12)
-    assert true_shrinkage({**prediction, "before_n": 2.02}) is None
-    assert true_shrinkage({**prediction, "before_n": None}) is None
-    assert true_shrinkage(None) is None
+    assert true_shrinkage(prediction, 2.0) == pytest.approx(1 - 5 / 12)
+    assert true_shrinkage(prediction, 1.0) == pytest.approx(1 - 8 / 15)
+    assert true_shrinkage({**prediction, "before_n": 2.02}, 2.0) is None
+    assert true_shrinkage({**prediction, "before_n": None}, 2.0) is None
 
 
 def test_claimed_and_true_shrinkage_are_compared_where_something_was_named():

@@ -21,7 +21,7 @@ def truth(*names: str, kind: str = "", ratio: float = 2.0, **more: Any) -> TrueC
             **given,
             "variant": 0,
             "seed": 1,
-            "scenario": {},
+            "scenario": {"sensors": {"force": {"noise": 2.5}}},
             "kind": kind or kinds[len(names)],
             "effects": effects,
             **more,

@@ -61,7 +61,10 @@ REFUSED = {
     "no loop": ({"damper": {**LABORATORY, "beta": 0.0, "gamma": 0.0}}, "beta \\+ gamma is 0"),
     "missing parameter": ({"damper": {"n": 2.0}}, "alpha_a: Field required"),
     "unknown effect": ({"effects": [{"name": "ghost", "parameters": {}}]}, "no effect 'ghost'; there are"),
-    "unknown form": ({"effects": [{**BACKLASH, "form": "cubic"}]}, "has the form free_pin, greased_pin, play, not cubic"),
+    "unknown form": (
+        {"effects": [{**BACKLASH, "form": "cubic"}]},
+        "has the form free_pin, greased_pin, play, not cubic",
+    ),
     "unknown value": ({"effects": [{**BACKLASH, "parameters": {"width": 1.0}}]}, "takes gap, not width"),
     "effect out of bounds": (
         {"effects": [{**BACKLASH, "parameters": {"gap": 0.1}}]},

@@ -5,8 +5,9 @@ import typing
 import pytest
 from pydantic import BaseModel
 
-from bench.report import documents
+from bench.report import diagnosis, documents
 from identification import results
+from identification.gap import documents as gap_documents
 
 
 def part_of(annotation):
@@ -25,3 +26,7 @@ def assert_within(read, written):
 @pytest.mark.parametrize("name", ["Fit", "Prediction"])
 def test_every_key_that_a_report_reads_is_one_that_is_written(name):
     assert_within(getattr(documents, name), getattr(results, name))
+
+
+def test_every_key_of_a_diagnosis_that_a_report_reads_is_one_that_is_written():
+    assert_within(diagnosis.Diagnosis, gap_documents.Diagnosis)

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypedDict, Unpack
+from typing import Any, NotRequired, Self, TypedDict, Unpack
 
 import numpy as np
 import numpy.typing as npt
@@ -57,6 +57,10 @@ tension.
 """
 
 
+_WITHOUT_SIZE: dict[str, Any] = {"amplitude": None, "frequency": None, "drive_value": None}
+"""Of a segment whose motion or drive varies."""
+
+
 class SegmentEnd(TypedDict):
     """What a log says where a segment starts, and again where it ends."""
 
@@ -70,11 +74,11 @@ class SegmentEnd(TypedDict):
     """Kind of motion."""
     drive: str
     """Kind of drive programme."""
-    amplitude: float | None
+    amplitude: NotRequired[float | None]
     """[m]; none where the motion has none."""
-    frequency: float | None
+    frequency: NotRequired[float | None]
     """[Hz]; none where the motion has none."""
-    drive_value: float | None
+    drive_value: NotRequired[float | None]
     """[V or A]; none where the drive varies."""
 
 
@@ -166,7 +170,7 @@ class LogWriter:
 
     def segment(self, time_ns: int, **end: Unpack[SegmentEnd]) -> None:
         """Mark one end of a segment; ``time_ns`` is the bench clock [ns] of its first sample, or of its last."""
-        mark = Segment(timestamp=Timestamp(**_clock_fields(time_ns)), **end)
+        mark = Segment(timestamp=Timestamp(**_clock_fields(time_ns)), **{**_WITHOUT_SIZE, **end})
         with file_errors(self.path):
             self._put(SEGMENT, time_ns, mark.model_dump_json().encode())
 

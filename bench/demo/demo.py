@@ -26,7 +26,7 @@ class Demo:
 
     def __init__(self, folder: DemoFolder, says: Console) -> None:
         self._folder, self._says = folder, says
-        self._step, self._steps = 0, 5 if folder.unseen is None else 7
+        self._step, self._steps = 0, 4 if folder.unseen is None else 7
 
     def carry_out(self, console: Console, *, serve: bool) -> None:
         """Do everything, and say in short what came out.
@@ -44,8 +44,9 @@ class Demo:
         with _ended_in_order(), processes(self._folder) as page:
             rest = Rest(page)
             self._stroke(rest)
-            self._announce("look for what the simulation lacks")
-            _mrbench("diagnose", self._folder.log, "--out", self._folder.diagnosis)
+            if self._folder.diagnosis is not None:
+                self._announce("look for what the simulation lacks")
+                _mrbench("diagnose", self._folder.log, "--out", self._folder.diagnosis)
             self._announce("write the report")
             self._report()
             summarise(self._folder, console)
@@ -74,10 +75,10 @@ class Demo:
 
     def _report(self) -> None:
         folder = self._folder
+        diagnosed = () if folder.diagnosis is None else ("--diagnosis", folder.diagnosis)
         _mrbench(
-            "report", folder.log, "--fit", folder.fit, "--diagnosis", folder.diagnosis,
-            "--out", folder.report, "--plots", folder.plots,
-        )  # fmt: skip
+            "report", folder.log, "--fit", folder.fit, *diagnosed, "--out", folder.report, "--plots", folder.plots
+        )
 
     def _make_folder(self) -> None:
         try:

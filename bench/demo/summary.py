@@ -23,8 +23,9 @@ def summarise(demo: DemoFolder, console: Console) -> None:
     prediction = read_prediction(demo.prediction) if demo.unseen is not None else None
     for table in (_error_table(fit, prediction), _parameter_table(fit)):
         console.print(table)
-    diagnosis = read_diagnosis(demo.diagnosis)
-    console.print(f"{VERDICTS[diagnosis.verdict]} {diagnosis.explanation}\n", highlight=False)
+    if demo.diagnosis is not None:
+        diagnosis = read_diagnosis(demo.diagnosis)
+        console.print(f"{VERDICTS[diagnosis.verdict]} {diagnosis.explanation}\n", highlight=False)
     for name, path, how in _files(demo):
         console.print(f"  {name:<15} {path}  {how}".rstrip(), highlight=False, soft_wrap=True)
 
@@ -59,9 +60,10 @@ def _files(demo: DemoFolder) -> list[tuple[str, Path, str]]:
         ("report", demo.report, "(open in a browser)"),
         ("plots", demo.plots, "(SVG and PNG)"),
         ("fit", demo.fit, "(the paper's fourteen parameters are in it, too)"),
-        ("diagnosis", demo.diagnosis, ""),
         ("recording", demo.log, "(open in Foxglove, Lichtblick or PlotJuggler; plot /bench/sample)"),
     ]
+    if demo.diagnosis is not None:
+        files.append(("diagnosis", demo.diagnosis, ""))
     if demo.unseen_log is not None:
         files += [("unseen strokes", demo.unseen_log, ""), ("prediction", demo.prediction, "")]
     return files

@@ -6,10 +6,13 @@ many as stay unanswered for a while, beyond what the drive's clock shows to be m
 running number leaps over them.
 """
 
+import contextlib
+import queue
 import threading
+import time
 from collections import deque
-from collections.abc import Mapping
-from itertools import takewhile
+from collections.abc import Iterator, Mapping
+from itertools import groupby, takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -152,8 +155,9 @@ class ActuatorSamples:
         self._answers = _Answers(cycle)
         self._seen_ns = 0
         self._clock: tuple[int, int] | None = None
-        self._batches: list[list[_Sample]] = []
-        self._ready = threading.Condition()
+        self._passed: queue.SimpleQueue[Frame] = queue.SimpleQueue()
+        self._ready: list[_Sample] = []
+        self._decoding = threading.Lock()
 
     @property
     def lost(self) -> int:
@@ -161,25 +165,16 @@ class ActuatorSamples:
         return self._answers.lost
 
     def take(self, frame: Frame) -> None:
-        """A frame has passed, sent or received."""
-        identifier, data = unpack_frame(frame.data)
-        with self._ready:
-            self._seen_ns = frame.received_ns
-            if identifier == 0x80:
-                self._number += self._answers.asked(frame.received_ns)
-            elif identifier in self._layouts and not frame.sent:
-                self._part(identifier, data, frame.received_ns)
-            elif identifier == self._asks and data[:4] == _CLOCK_WANTED:
-                self._asked_ns = frame.received_ns
-            elif identifier == self._answers_with and data[:4] == _CLOCK_COMES:
-                self._stamped(int.from_bytes(data[4:8], "little"), frame.received_ns)
-            elif identifier == self._boot and data == b"\x00":
-                self._clock = None
-                self._answers.restarted()
+        """A frame has passed, sent or received; it is decoded when samples are asked for.
+
+        Whoever sends or receives it is in more of a hurry than whoever wants its samples.
+        """
+        self._passed.put(frame)
 
     def state(self) -> dict[str, Any]:
         """Where it stands: what `resume` needs to go on with the frames after ``at_ns`` as this one does."""
-        with self._ready:
+        with self._decoding:
+            self._decode_passed()
             return {
                 "at_ns": self._seen_ns, "number": self._number, "due": self._due, "clock": self._clock,
                 "parts": {str(entry): value for entry, value in self._parts.items()},
@@ -195,10 +190,33 @@ class ActuatorSamples:
 
     def blocks(self, timeout: float = 0.0) -> list[Block]:
         """The samples since the last call, waiting up to ``timeout`` [s] for the first."""
-        with self._ready:
-            self._ready.wait_for(lambda: bool(self._batches), timeout)
-            batches, self._batches = self._batches, []
-        return [block for batch in batches for block in self._blocks_of(batch)]
+        deadline = time.monotonic() + timeout
+        with self._decoding, contextlib.suppress(queue.Empty):
+            self._decode_passed()
+            while not self._ready:
+                self._decode(self._passed.get(timeout=max(deadline - time.monotonic(), 0.0)))
+        with self._decoding:
+            samples, self._ready = self._ready, []
+        return list(self._blocks_of(samples))
+
+    def _decode_passed(self) -> None:
+        for _ in range(self._passed.qsize()):
+            self._decode(self._passed.get())
+
+    def _decode(self, frame: Frame) -> None:
+        identifier, data = unpack_frame(frame.data)
+        self._seen_ns = frame.received_ns
+        if identifier == 0x80:
+            self._number += self._answers.asked(frame.received_ns)
+        elif identifier in self._layouts and not frame.sent:
+            self._part(identifier, data, frame.received_ns)
+        elif identifier == self._asks and data[:4] == _CLOCK_WANTED:
+            self._asked_ns = frame.received_ns
+        elif identifier == self._answers_with and data[:4] == _CLOCK_COMES:
+            self._stamped(int.from_bytes(data[4:8], "little"), frame.received_ns)
+        elif identifier == self._boot and data == b"\x00":
+            self._clock = None
+            self._answers.restarted()
 
     def _part(self, identifier: int, data: bytes, now_ns: int) -> None:
         """One of the frames that make a sample; out of turn, it belongs to none."""
@@ -224,10 +242,9 @@ class ActuatorSamples:
             return
         self.statusword, self.last_ns = raw.get(STATUSWORD), now_ns
         device_ns = self._clock[1] * _MICROSECOND if self._clock is not None else None
-        self._keep(_Sample(self._number, device_ns, now_ns, raw))
+        self._ready.append(_Sample(self._number, device_ns, now_ns, raw))
         self.received += 1
         self._number += 1 + self._answers.answered(device_ns, now_ns)
-        self._ready.notify_all()
 
     def _stamped(self, clock: int, now_ns: int) -> None:
         """Its clock was read between question and answer; a sample's stamp is of its position, which is older."""
@@ -250,31 +267,28 @@ class ActuatorSamples:
         self._clock = stamp, total + step
         return True
 
-    def _keep(self, sample: _Sample) -> None:
-        """A batch has no gaps."""
-        last = self._batches[-1][-1] if self._batches else None
-        if last is not None and last.number == sample.number - 1:
-            self._batches[-1].append(sample)
-        else:
-            self._batches.append([sample])
+    def _blocks_of(self, samples: list[_Sample]) -> Iterator[Block]:
+        """The three channels of every stretch without gap."""
+        for _, group in groupby(enumerate(samples), lambda it: it[1].number - it[0]):
+            stretch = [sample for _, sample in group]
+            stamped = [sample.device_ns for sample in stretch if sample.device_ns is not None]
+            device_ns = np.array(stamped, dtype=np.int64) if stamped else None
+            for channel, entry, count, zero in self._measured():
+                raw = np.array([sample.raw[entry] for sample in stretch], dtype=np.float64)
+                yield Block(
+                    channel=channel,
+                    first=stretch[0].number,
+                    device_ns=device_ns,
+                    received_ns=stretch[-1].received_ns,
+                    values=raw * count - zero,
+                    raw=raw,
+                    quality="good" if stamped else "uncertain",
+                )
 
-    def _blocks_of(self, batch: list[_Sample]) -> list[Block]:
-        scale = self._scale
-        return [
-            self._block("actuator_position", POSITION, scale.position, self.origin, batch),
-            self._block("actuator_velocity", VELOCITY, scale.velocity, 0.0, batch),
-            self._block("actuator_torque", TORQUE, scale.torque, 0.0, batch),
-        ]
-
-    def _block(self, channel: str, index: int, count: float, zero: float, batch: list[_Sample]) -> Block:
-        raw = np.array([sample.raw[index] for sample in batch], dtype=np.float64)
-        stamped = [sample.device_ns for sample in batch if sample.device_ns is not None]
-        return Block(
-            channel=channel,
-            first=batch[0].number,
-            device_ns=np.array(stamped, dtype=np.int64) if stamped else None,
-            received_ns=batch[-1].received_ns,
-            values=raw * count - zero,
-            raw=raw,
-            quality="good" if stamped else "uncertain",
+    def _measured(self) -> tuple[tuple[str, int, float, float], ...]:
+        """Channel, object, size of a count and zero of each quantity [m, m/s, N m]."""
+        return (
+            ("actuator_position", POSITION, self._scale.position, self.origin),
+            ("actuator_velocity", VELOCITY, self._scale.velocity, 0.0),
+            ("actuator_torque", TORQUE, self._scale.torque, 0.0),
         )

@@ -10,7 +10,7 @@ import logging
 import queue
 import struct
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -31,6 +31,7 @@ _LAST_SYNCHRONOUS = 240
 """Largest transmission type that answers SYNC."""
 _KEPT = 1000
 """Emergencies remembered."""
+_SYNC = (0x80, b"")
 
 
 _Answer = TypeVar("_Answer")
@@ -59,14 +60,25 @@ class Field(NamedTuple):
 
 
 class PdoLayout(NamedTuple):
-    """A process data frame that the node sends."""
+    """A process data frame that the node sends or takes."""
 
     identifier: int
     size: int
     """[bytes]"""
     on_sync: bool
-    """Sent in answer to each SYNC."""
+    """Sent in answer to each SYNC, or taken at one."""
     fields: tuple[Field, ...]
+
+    def packed(self, values: Mapping[int, int]) -> bytes:
+        """The frame's data from values by index; zero where none is given.
+
+        Raises:
+            OverflowError: a value does not fit its object.
+        """
+        data = bytearray(self.size)
+        for entry, start, size, signed in self.fields:
+            data[start : start + size] = values.get(entry, 0).to_bytes(size, "little", signed=signed)
+        return bytes(data)
 
 
 class _Network(canopen.Network):
@@ -121,6 +133,8 @@ class CanopenNode:
         maps.read(from_od=True)
         self.layouts = tuple(_layout(pdo) for pdo in self._node.tpdo.values())
         """The frames that the node sends, as its data sheet maps them."""
+        self._demanded = _layout(self._node.rpdo[1])
+        self._demands: dict[int, int] = {}
         self._access = threading.Lock()
         self._beat = threading.Condition()
         self._state: int | None = None
@@ -223,16 +237,17 @@ class CanopenNode:
 
         self._asked("setting up process data", write)
 
-    def send_process_data(self, values: dict[int, int]) -> None:
-        """Send receive-PDO 1 with these objects by index; what is not named keeps its last value."""
-        pdo = self._node.rpdo[1]
-        for index, value in values.items():
-            pdo[index].raw = value
-        pdo.transmit()
+    def lead(self, values: dict[int, int]) -> None:
+        """Send receive-PDO 1 with these objects by index and the SYNC by which they count, as one.
+
+        What is not named keeps its last value.
+        """
+        self._demands.update(values)
+        self._bus.send_together((self._demanded.identifier, self._demanded.packed(self._demands)), _SYNC)
 
     def send_sync(self) -> None:
         """Send a SYNC."""
-        self._bus.send(0x80, b"")
+        self._bus.send(*_SYNC)
 
     def send_heartbeat(self, master_id: int) -> None:
         """Send the heartbeat of the master, operational."""

@@ -59,6 +59,13 @@ class ClockReader:
         """[s] until there is something to ask, at least."""
         return max(self._moment() - self._clock(), 0) * 1e-9
 
+    def idle(self) -> float:
+        """[s] for which the line need not be read at once: no answer is due, and no beat before a question."""
+        if not self._known:
+            return float("inf")
+        waiting = self._token is not None and self._clock() - self._sent_ns < _REPLY_NS
+        return 0.0 if waiting else max(self._due_ns - _BEAT_NS - self._clock(), 0) * 1e-9
+
     def attend(self, token: Callable[[], int], write: Callable[[bytes], None]) -> None:
         """Take an answer that has come; ask again when it is time.
 

@@ -108,4 +108,4 @@ class Warden:
         positions = [block for block in batch.blocks if block.channel == "actuator_position"]
         values = np.concatenate([block.values for block in positions])
         ages = np.arange(len(values))[::-1] * self._cycle_ns
-        return following_error(values, positions[-1].received_ns - ages, plan.positions)
+        return following_error(values, positions[-1].received_ns - ages, plan.position)

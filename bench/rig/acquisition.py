@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 from bench.rig.clock_map import ClockMap
 from bench.rig.priority import raise_priority
-from drivers.channel import Block
+from drivers.channel import Block, Stamp
 from drivers.errors import DriverError
 from drivers.instrument import Instrument
 
@@ -132,6 +132,7 @@ class _Wire:
         self._instrument, self._idle, self._owner = instrument, idle, owner
         self._sink, self._failed = sink, failed
         self._due = 0.0
+        self._stamp: Stamp | None = None
 
     def ended(self, deadline: float) -> bool:
         """Whether the thread has ended by the deadline, on the monotonic clock [s]."""
@@ -154,8 +155,11 @@ class _Wire:
     def _turn(self) -> None:
         blocks = self._instrument.acquire(self._patience())
         stamp = getattr(self._instrument, "stamp", None)
-        if stamp is not None:
+        if stamp is not None and stamp is not self._stamp:
+            self._stamp = stamp
             self._owner.maps[self.name].feed(stamp)
+        if blocks and (device_ns := blocks[-1].device_ns) is not None:
+            self._owner.maps[self.name].feed_sample(int(device_ns[-1]), blocks[-1].received_ns)
         if blocks:
             self._sink(Batch(self.name, tuple(blocks)))
 

@@ -52,8 +52,10 @@ _KNOTS = 48
 """Bends of the mapping that are remembered, two of them in half a second; samples come sooner than that."""
 _RATES = 65
 """Rates tried at a time."""
-_MODEST_NS = 1e8
-"""[ns] by which the bounds must be further apart for a rate of one: where stamps tell little, clocks are alike."""
+_USUAL_RATE = 1e-4
+"""Share by which clocks differ, as a rule: where stamps tell little, they are taken to be alike."""
+_SHORTEST_NS = 20_000.0
+"""[ns] below which a typical delay is not believed."""
 _ZOOMS = 4
 """Times that the rates tried are spread anew over those that are possible."""
 
@@ -102,11 +104,11 @@ class _Corridor(NamedTuple):
     fastest: float
     """Largest rate of the offset possible."""
     line: float
-    """Least offset [ns] by the likeliest rate: that which leaves the bounds furthest apart."""
+    """Least offset [ns] by the likeliest rate."""
     gap: float
     """[ns] that it leaves between the bounds."""
     rate: float
-    """The likeliest rate of the offset."""
+    """The likeliest rate of the offset: that by which questions and answers were least late."""
 
     def likeliest(self, at: int) -> float:
         """The likeliest offset [ns]."""
@@ -139,6 +141,7 @@ class ClockMap:
         self._contradictions = 0
         self._corridor: _Corridor | None = None
         self._knots: deque[_Knot] = deque(maxlen=_KNOTS)
+        self._arrays: tuple[Instants, Instants, _Numbers] | None = None
         self._handed: int | None = None
         self._solved = 0
 
@@ -165,6 +168,17 @@ class ClockMap:
                 return
             self._fed = stamp
             self._take(low, high)
+
+    def feed_sample(self, device_ns: int, received_ns: int) -> None:
+        """Take a sample's stamp: it had been taken before it came, which bounds the offset from above.
+
+        Answers to questions may wait for an adapter; of hundreds of samples a second some just catch it.
+        """
+        high = _Bound(device_ns, received_ns - device_ns)
+        with self._lock:
+            corridor = self._corridor
+            if corridor is not None and high.offset >= corridor.possible(device_ns)[0]:
+                _keep(self._highs, high, early=False, sign=-1)
 
     def bench_ns(self, device_ns: npt.ArrayLike) -> Instants:
         """The bench clock at instants of the device's.
@@ -256,6 +270,7 @@ class ClockMap:
 
     def _bend(self, corridor: _Corridor, at: int) -> None:
         """Let the mapping approach the estimate from here on; what has been handed out stays as it is."""
+        self._arrays = None
         rate = 1 + corridor.rate
         if self._handed is None or not self._knots:
             self._knots.clear()
@@ -278,11 +293,16 @@ class ClockMap:
         last = self._knots[-1]
         if asked.size and asked.min() >= last.at:
             return np.asarray(round(last.bench) + np.rint((asked - last.at) * last.slope).astype(np.int64))
-        starts = np.array([knot.at for knot in self._knots])
+        starts, begins, slopes = self._table()
         place = np.clip(np.searchsorted(starts, asked, side="right") - 1, 0, None)
-        slopes = np.array([knot.slope for knot in self._knots])[place]
-        begins = np.array([round(knot.bench) for knot in self._knots])[place]
-        return np.asarray(begins + np.rint((asked - starts[place]) * slopes).astype(np.int64))
+        return np.asarray(begins[place] + np.rint((asked - starts[place]) * slopes[place]).astype(np.int64))
+
+    def _table(self) -> tuple[Instants, Instants, _Numbers]:
+        """The knots as arrays: device clock [ns], bench clock [ns], slope; asked far more often than bent."""
+        if self._arrays is None:
+            at, bench, slope = zip(*self._knots, strict=True)
+            self._arrays = np.array(at), np.array([round(place) for place in bench]), np.array(slope)
+        return self._arrays
 
 
 def _keep(bounds: deque[_Bound], bound: _Bound, *, early: bool, sign: int) -> None:
@@ -310,7 +330,9 @@ def _corridor(lows: deque[_Bound], highs: deque[_Bound], at: int) -> _Corridor |
         if possible.size:
             edges = least[possible].min(), most[possible].max(), rates[first], rates[last]
             gap = most - least
-            best = possible[np.argmax((gap - _MODEST_NS * np.abs(rates))[possible])]
+            late = _lateness(least - (low_y.mean() - low_x.mean() * rates), len(low_y))
+            late += _lateness((high_y.mean() - high_x.mean() * rates) - most, len(high_y))
+            best = possible[np.argmin((late + np.abs(rates) / _USUAL_RATE)[possible])]
             low, high, slowest, fastest = (float(edge) for edge in edges)
             line = origin + float(least[best])
             found = _Corridor(
@@ -318,6 +340,15 @@ def _corridor(lows: deque[_Bound], highs: deque[_Bound], at: int) -> _Corridor |
             )
         rates = np.linspace(rates[max(first - 1, 0)], rates[min(last + 1, _RATES - 1)], _RATES)
     return found
+
+
+def _lateness(mean: _Numbers, count: int) -> _Numbers:
+    """How unlikely one side's lateness is by each rate, as its share of what it is at best.
+
+    Delays are taken to be exponential. The side whose delays are short then says what the rate is; the other's may
+    scatter as an adapter likes.
+    """
+    return count * mean / max(float(mean.min()), _SHORTEST_NS)
 
 
 def _arrays(bounds: deque[_Bound], at: int, origin: int) -> tuple[_Numbers, _Numbers]:

@@ -117,7 +117,7 @@ class Interlocks:
         quantity = _WATCHED.get(block.channel)
         if quantity is None or not len(block.values):
             return
-        worst = _largest(block.values)
+        worst = _largest(block.values.tolist())
         expected = self._force_ns is not None
         if expected and block.channel == "force" and block.quality != "bad" and not math.isnan(worst):
             self._force_ns = block.received_ns
@@ -138,22 +138,20 @@ class Interlocks:
         return fresh
 
 
-def _largest(values: Array) -> float:
-    """The value of largest magnitude that is a number, with its sign."""
-    if len(values) == 1:  # as most blocks are
-        return float(values[0])
-    sound = values[~np.isnan(values)]
-    return float(sound[np.argmax(np.abs(sound))]) if len(sound) else math.nan
+def _largest(values: Iterable[float]) -> float:
+    """The value of largest magnitude that is a number, with its sign; NaN where none is."""
+    return max((value for value in values if value == value), key=abs, default=math.nan)
 
 
-def following_error(
-    position: Array, time_ns: npt.NDArray[np.int64], command: Callable[[npt.NDArray[np.int64]], Array]
-) -> float:
+def following_error(position: Array, time_ns: npt.NDArray[np.int64], command: Callable[[int], float]) -> float:
     """How far the rod is from where it was sent, at worst.
 
     Args:
         position: (samples,) [m] by the drive's encoder.
         time_ns: (samples,) bench clock of these samples [ns].
-        command: where the rod was sent at instants of the bench clock [m].
+        command: where the rod was sent at an instant of the bench clock [ns]: [m].
     """
-    return _largest(position - command(time_ns))
+    # A batch is a sample or two, for which arrays are the slower way.
+    return _largest(
+        place - command(instant) for place, instant in zip(position.tolist(), time_ns.tolist(), strict=True)
+    )

@@ -86,11 +86,8 @@ class RunPlan:
                 return last >= sample
         return False
 
-    def positions(self, time_ns: Times) -> Array:
-        """Where the rod was sent at a few late instants of the bench clock [m]; NaN before the first."""
-        return np.array([self._position(int(instant)) for instant in time_ns])
-
-    def _position(self, time_ns: int) -> float:
+    def position(self, time_ns: int) -> float:
+        """Where the rod was sent at an instant of the bench clock [ns]: [m]; NaN before the first setpoint."""
         for entry in reversed(self.entries):
             if entry.playing.begin_ns <= time_ns:
                 return entry.playing.position(time_ns)

@@ -22,7 +22,7 @@ from drivers.coil_amplifier import CoilAmplifier
 from drivers.coil_table import TableState
 from drivers.errors import DriverError
 
-_LOOK = 0.01
+_LOOK = 0.02
 """[s] between two looks while waiting."""
 _SPARE = 1.0
 """[s] beyond what a motion is to take."""

@@ -124,3 +124,31 @@ def test_the_same_instant_is_always_mapped_to_the_same():
     for k in range(100):
         clock.feed(wire.stamp(BENCH + (5_000 + 50 * k) * MS))
     assert clock.bench_ns([asked]) == before
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_slow_answers_do_not_bend_what_quick_questions_know(seed):
+    """An adapter holds answers back for milliseconds; a few seconds have to do before a run begins."""
+    wire = Wire(60, lambda r: 3e-5 + r.exponential(1e-4), lambda r: 1e-3 + r.uniform(0, 5e-3), seed)
+    errors = played(wire, 8, 0.1)[0]
+    assert np.percentile(np.abs(errors[3000:]), 95) < 0.15e6
+
+
+def test_a_sample_had_been_taken_before_it_came():
+    wire = Wire(0, lambda r: 1e-4, lambda r: 8e-3)
+    clock = played(wire, 3)[3]
+    loose = clock.skew()
+    for k in range(3000, 4000):
+        clock.feed_sample(wire.device(BENCH + k * MS), BENCH + k * MS + 300_000)
+        if k % 50 == 0:
+            clock.feed(wire.stamp(BENCH + k * MS))
+    assert clock.skew() < loose / 4
+
+
+def test_a_sample_from_before_its_time_tells_nothing():
+    wire = Wire(0, lambda r: 1e-4, lambda r: 1e-4)
+    clock = played(wire, 3)[3]
+    clock.feed_sample(wire.device(BENCH + 4000 * MS), BENCH + 3000 * MS)
+    clock.feed(wire.stamp(BENCH + 4000 * MS))
+    asked = wire.device(BENCH + 4010 * MS)
+    assert abs(clock.bench_ns([asked])[0] - wire.true(asked)) < 0.1e6

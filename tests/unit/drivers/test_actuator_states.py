@@ -200,6 +200,8 @@ def test_late_answers_are_not_lost():
             wire.answer(at, k, 4000 * k)
         else:
             wire.sync(at)
+    blocks = wire.positions()
+    assert sum(len(block.values) for block in blocks) == 300
     assert wire.samples.lost == 0
     assert wire.samples.received == 300
 
@@ -221,3 +223,12 @@ def test_restarted_drive_begins_its_clock_anew():
     wire.answer(6000, 1, 10)
     blocks = wire.positions()
     assert blocks[-1].device_ns[-1] == 10_000
+
+
+def test_demanded_frame_holds_its_objects_and_zero_for_the_rest():
+    layout = PdoLayout(
+        0x205, 7, True, (Field(0x6040, 0, 2, False), Field(0x6060, 2, 1, True), Field(0x607A, 3, 4, True))
+    )
+    assert layout.packed({0x6040: 0x1F, 0x607A: -2}) == b"\x1f\x00" + b"\x00" + b"\xfe\xff\xff\xff"
+    with pytest.raises(OverflowError):
+        layout.packed({0x6040: 1 << 16})

@@ -38,6 +38,24 @@ def test_frames_pass_and_the_tap_sees_both_directions_in_order(pair):
     assert frames[0].received_ns < frames[1].received_ns
 
 
+def test_frames_sent_together_keep_their_order_and_their_moment(pair):
+    one, other = pair
+    heard, both = [], threading.Event()
+    shown = []
+
+    def hear(now: int, identifier: int, data: bytes) -> None:
+        heard.append((identifier, data))
+        if len(heard) == 2:
+            both.set()
+
+    other.subscribe(hear)
+    one.listen(shown.append)
+    one.send_together((0x205, b"\x01"), (0x80, b""))
+    assert both.wait(WITHIN)
+    assert heard == [(0x205, b"\x01"), (0x80, b"")]
+    assert shown[0].received_ns == shown[1].received_ns
+
+
 def test_listener_that_cannot_read_a_frame_is_counted_and_the_next_is_heard(pair):
     one, other = pair
     came = threading.Event()

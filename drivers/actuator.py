@@ -76,6 +76,7 @@ class Actuator:
         self._boots = 0
         self._last_ns = self._beat_ns = self._clock_asked_ns = self._due_ns = 0
         self._turn_ns = round(_TOGETHER * settings.cycle * 1e9)
+        self._stale_ns = 2 * self._turn_ns
         self._last = 0.0
         self._words = ""
 
@@ -152,6 +153,7 @@ class Actuator:
     def health(self) -> Health:
         """Counts of samples, and the state in words."""
         samples = self._samples
+        samples.catch_up()
         corrupted = samples.corrupted + self._bus.corrupted
         words = "; ".join(filter(None, [self._words, *map(str, self.faults)]))
         return Health(self._bus.is_open, samples.received, samples.lost, corrupted, 0, samples.last_ns, words)
@@ -361,6 +363,8 @@ class Actuator:
         if self.faults:
             return "; ".join(map(str, self.faults))
         samples = self._samples
+        if self._clock() - (samples.last_ns or 0) > self._stale_ns:  # nobody asks for samples
+            samples.catch_up()
         if samples.last_ns is None or samples.last_ns < armed_ns or samples.statusword is None:
             return ""
         state = cia402.drive_state(samples.statusword)

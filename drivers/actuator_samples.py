@@ -199,6 +199,11 @@ class ActuatorSamples:
             samples, self._ready = self._ready, []
         return list(self._blocks_of(samples))
 
+    def catch_up(self) -> None:
+        """Decode what has passed, for whoever wants to know how things stand and not the samples."""
+        with self._decoding:
+            self._decode_passed()
+
     def _decode_passed(self) -> None:
         for _ in range(self._passed.qsize()):
             self._decode(self._passed.get())

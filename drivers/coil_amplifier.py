@@ -9,14 +9,14 @@ ramps its output to zero by itself. `make_safe` is the faster way there, never t
 import time
 from dataclasses import replace
 from enum import IntEnum, IntFlag
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-from drivers.channel import Block, Channel, Numbers, Reading, Stamp
+from drivers.channel import Channel, Numbers, Reading
 from drivers.coil_table import StepTable, TableProgress
 from drivers.errors import DriverError, OutOfRange, Refused
-from drivers.instrument import Clock, Health, Tap
+from drivers.instrument import Clock, Health
 from drivers.modbus_address import ModbusAddress
-from drivers.modbus_sampler import Sampler
+from drivers.modbus_instrument import ModbusInstrument
 
 Mode = Literal["voltage", "current"]
 _LONGEST_RAMP = 3.0
@@ -67,7 +67,7 @@ class Condition(NamedTuple):
         return ", ".join(name.lower().replace("_", " ") for name in names)
 
 
-class CoilAmplifier:
+class CoilAmplifier(ModbusInstrument):
     """One amplifier on its wire."""
 
     def __init__(
@@ -97,42 +97,32 @@ class CoilAmplifier:
         Raises:
             OutOfRange: the serial line does not carry its samples, or a setting is out of its range.
         """
-        self._sampler = Sampler(name, "coil_amplifier", address, clock, unit, timeout)
-        registers = self._sampler.registers.map.registers
+        super().__init__(name, "coil_amplifier", address, clock, unit, timeout)
+        registers = self._registers.map.registers
         self._mode: Mode = mode
         self._settings = {
             "ramp": registers["ramp"].channel().checked(ramp),
             "watchdog": registers["watchdog"].channel().checked(watchdog),
         }
-        limit = float(self._sampler.registers.map.document["limits"][mode])
+        limit = float(self._registers.map.document["limits"][mode])
         drive = replace(registers["setpoint"], low=-limit, high=limit).channel()
         self._drive = replace(drive, name="coil_drive", unit=DRIVE_UNITS[mode])
-        self._table = StepTable(self._sampler.registers, self._drive)
-
-    @property
-    def name(self) -> str:
-        """Name in configuration, logs and messages."""
-        return self._sampler.line.name
+        self._table = StepTable(self._registers, self._drive)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
         """Voltage and current as measured, and the drive that is asked for."""
-        return (*self._sampler.channels(), self._drive)
-
-    @property
-    def stamp(self) -> Stamp | None:
-        """Its clock beside the bench's, from the newest block."""
-        return self._sampler.ring.stamp
+        return (*super().channels, self._drive)
 
     @property
     def faults(self) -> CoilFault:
         """Its faults, from the newest block; `condition` asks anew."""
-        return CoilFault(self._sampler.ring.status & 0xFF)
+        return CoilFault(self._ring.status & 0xFF)
 
     @property
     def state(self) -> CoilState:
         """What it is doing, from the newest block; `condition` asks anew."""
-        return CoilState(self._sampler.ring.status >> 8)
+        return CoilState(self._ring.status >> 8)
 
     def connect(self) -> None:
         """Open the wire, check who answers, bring the output to zero, set mode, ramp and watchdog.
@@ -142,30 +132,18 @@ class CoilAmplifier:
             NoReply, BadReply: it opens, but no coil amplifier answers.
             Refused: it is in a fault that does not go away, or does not take a setting.
         """
-        self._sampler.connect()
+        super().connect()
         try:
             self._configure()
         except DriverError:
-            self._sampler.line.close()
+            super().close()
             raise
 
     def close(self) -> None:
         """Bring the output to zero where that can still be done, and close the wire."""
-        if self._sampler.line.connected:
+        if self._line.connected:
             self.make_safe()
-        self._sampler.line.close()
-
-    def acquire(self, timeout: float) -> list[Block]:
-        """Samples of voltage and current since the last call, waiting up to ``timeout`` [s] for the first.
-
-        Raises:
-            NotConnected: the wire has gone, or the amplifier has restarted.
-        """
-        return self._sampler.ring.acquire(timeout)
-
-    def age(self) -> float | None:
-        """[s] since the newest sample that came was made; none before the first."""
-        return self._sampler.ring.age()
+        super().close()
 
     def read(self, channel: str) -> Reading:
         """The newest measured sample, or for ``coil_drive`` what the output is set to at this moment.
@@ -175,8 +153,8 @@ class CoilAmplifier:
             NotConnected, NoReply, BadReply, Refused: it did not come.
         """
         if channel != self._drive.name:
-            return self._sampler.read(channel)
-        found, answer = self._sampler.registers.read_together("output")
+            return super().read(channel)
+        found, answer = self._registers.read_together("output")
         value, raw = found["output"]
         return Reading(value, answer.received_ns, None, raw, "good")
 
@@ -191,7 +169,7 @@ class CoilAmplifier:
         if channel != self._drive.name:
             raise OutOfRange(f"{self.name}: {channel} is measured and cannot be set; coil_drive can")
         try:
-            self._sampler.registers.write("setpoint", self._drive.checked(value))
+            self._registers.write("setpoint", self._drive.checked(value))
         except Refused as error:
             words = self.condition().words or f"its table is {self._table.progress().state.name.lower()}"
             raise Refused(f"{error}; {words}; reset it, or abort the table") from error
@@ -202,7 +180,7 @@ class CoilAmplifier:
         Raises:
             NotConnected, NoReply, BadReply, Refused: they did not come.
         """
-        found, _ = self._sampler.registers.read_together("fault", "state", "output")
+        found, _ = self._registers.read_together("fault", "state", "output")
         return Condition(CoilFault(found["fault"].raw), CoilState(found["state"].raw), found["output"].value)
 
     def reset(self) -> None:
@@ -212,7 +190,7 @@ class CoilAmplifier:
             NotConnected, NoReply, BadReply: not confirmed.
             Refused: a fault is still there.
         """
-        self._sampler.registers.write("reset", 1)
+        self._registers.write("reset", 1)
         if words := self.condition().words:
             raise Refused(f"{self.name}: after a reset still: {words}; find the cause")
 
@@ -265,30 +243,22 @@ class CoilAmplifier:
         Raises:
             NotConnected, NoReply, BadReply, Refused: it did not say.
         """
-        return self._table.progress(self._sampler.ring.device_ns)
-
-    def describe(self) -> dict[str, Any]:
-        """What a replay needs beside the frames from now on, see `drivers.replay`."""
-        return self._sampler.describe()
+        return self._table.progress(self._ring.device_ns)
 
     def make_safe(self) -> None:
         """Bring the output to zero by its ramp; where the wire is dead, the amplifier's watchdog does it."""
         for _ in range(2):
             try:
                 self._table.command("abort")
-                self._sampler.registers.write("setpoint", 0.0)
+                self._registers.write("setpoint", 0.0)
             except DriverError:  # refused in a fault or after its watchdog: it is at zero or on its way
                 continue
             return
 
     def health(self) -> Health:
         """Counts and state, faults included."""
-        health = self._sampler.ring.health()
+        health = super().health()
         return replace(health, words=health.words or Condition(self.faults, self.state, 0.0).words)
-
-    def listen(self, tap: Tap) -> None:
-        """Tell ``tap`` of every frame from now on."""
-        self._sampler.line.listen(tap)
 
     def _wait_for_zero(self) -> None:
         deadline = time.monotonic() + _LONGEST_RAMP
@@ -301,7 +271,7 @@ class CoilAmplifier:
             time.sleep(0.01)
 
     def _configure(self) -> None:
-        registers = self._sampler.registers
+        registers = self._registers
         registers.write("table_command", registers.map.document["codes"]["table_command"]["abort"])
         self.reset()
         registers.write("setpoint", 0.0)

@@ -13,7 +13,8 @@ from drivers.can_bus import CanAddress, pack_frame, unpack_frame
 from drivers.cia402 import FaultKind, Mounting
 from drivers.errors import NoReply, OutOfRange, Refused
 from drivers.servo_drive import ActuatorSettings
-from sim_rig.canopen_actuator import Machine, State
+from sim_rig.canopen_actuator import Machine
+from sim_rig.drive_states import State
 
 pytestmark = pytest.mark.timeout(60)
 

@@ -10,7 +10,7 @@ from can_rig import CanRig, Leader, connected, positions, sine, wait_until
 from drivers.actuator import Actuator
 from drivers.can_bus import CanAddress
 from drivers.errors import BadReply, DriverError, NoReply, NotConnected, Refused
-from sim_rig.canopen_actuator import State
+from sim_rig.drive_states import State
 
 pytestmark = pytest.mark.timeout(60)
 

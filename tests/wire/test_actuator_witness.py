@@ -9,7 +9,7 @@ import pytest
 from can_rig import CanRig, wait_until
 
 import drivers
-from sim_rig.canopen_actuator import State
+from sim_rig.drive_states import State
 
 EDS = str(Path(drivers.__file__).parent / "wire" / "actuator.eds")
 pytestmark = pytest.mark.timeout(60)

@@ -176,7 +176,7 @@ def test_faults_are_read_from_a_file_by_instrument(tmp_path):
     ("text", "message"),
     [
         ('{"lvdt": [{"kind": "lost", "duration": 2}]}', "lvdt.0.kind: Input should be 'late'"),
-        ('{"lvdt": [{"kind": "late"}]}', "lvdt.0.duration: Field required"),
+        ('{"lvdt": [{"kind": "late"}]}', "lvdt.0.duration: is missing"),
         ("[]", "document: Input should be"),
     ],
 )

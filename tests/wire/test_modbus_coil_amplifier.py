@@ -263,7 +263,7 @@ def test_a_drive_out_of_range_is_not_sent(bench):
 @pytest.mark.parametrize("setting", [{"ramp": 0.0}, {"watchdog": 0.01}, {"watchdog": 60.0}])
 def test_a_setting_out_of_range_is_refused_before_anything_is_opened(bench, setting):
     with pytest.raises(OutOfRange, match=next(iter(setting))):
-        CoilAmplifier("amplifier", bench.driver._sampler.line.address, time.monotonic_ns, **setting)
+        CoilAmplifier("amplifier", bench.driver.address, time.monotonic_ns, **setting)
 
 
 def test_channels_have_the_unit_of_the_mode(bench):
@@ -272,7 +272,7 @@ def test_channels_have_the_unit_of_the_mode(bench):
         ("coil_current", "A", "read"),
         ("coil_drive", "V", "read_write"),
     ]
-    current = amplifier(bench.driver._sampler.line.address, mode="current")
+    current = amplifier(bench.driver.address, mode="current")
     assert (current.channels[2].unit, current.channels[2].high) == ("A", 3.0)
 
 
@@ -287,7 +287,7 @@ def test_a_mode_that_it_does_not_have_is_refused_at_once():
 def test_connecting_brings_an_output_that_was_left_on_to_zero(bench):
     bench.driver.write("coil_drive", 2.0)
     bench.step(300)
-    other = amplifier(bench.driver._sampler.line.address)
+    other = amplifier(bench.driver.address)
     moving = threading.Event()
 
     def pass_time():

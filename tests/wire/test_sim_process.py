@@ -204,7 +204,7 @@ FAULTS = '{"load_cell": [{"kind": "late", "duration": 1}]}'
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--scenario", "nowhere"), "scenario nowhere: cannot be read"),
+        (("--scenario", "nowhere"), "no scenario nowhere: neither a file nor one of"),
         (("--out", "no/such/place/bench.toml"), "bench.toml: cannot be written"),
         (("--faults", "none.json"), "none.json: cannot be read"),
         (("--faults", "faults.json"), "wire faults stand for load_cell: no instrument of that name"),

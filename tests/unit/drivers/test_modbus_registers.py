@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from drivers.errors import OutOfRange
 from drivers.modbus_address import ModbusAddress
+from drivers.modbus_instrument import check_rate
 from drivers.modbus_registers import Type, decode, encode, load_map, value_of, words_in
 from drivers.modbus_ring import Layout
-from drivers.modbus_sampler import check_rate
 from sim_rig.modbus_device import from_words, to_words
 
 RANGES: dict[Type, tuple[int, int]] = {

@@ -1,13 +1,13 @@
-"""What the Modbus instruments have in common: a line, named registers, a ring of samples."""
+"""What the Modbus instruments have in common: a line, named registers, samples that stand in a ring."""
 
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from drivers.channel import Channel, Quality, Reading
+from drivers.channel import Block, Channel, Quality, Reading, Stamp
 from drivers.errors import OutOfRange
-from drivers.instrument import Clock
+from drivers.instrument import Clock, Health, Tap
 from drivers.modbus_address import ModbusAddress, carried
 from drivers.modbus_line import ModbusLine
 from drivers.modbus_registers import RegisterMap, Registers, load_map
@@ -42,13 +42,13 @@ def check_rate(name: str, address: ModbusAddress, map_: RegisterMap) -> float:
     return rate
 
 
-class Sampler:
-    """One instrument that keeps its samples in a ring."""
+class ModbusInstrument:
+    """One instrument that keeps its samples in a ring; what it is beside that, its own class says."""
 
     def __init__(
         self,
         name: str,
-        instrument: str,
+        kind: str,
         address: ModbusAddress,
         clock: Clock,
         unit: int | None,
@@ -58,7 +58,7 @@ class Sampler:
 
         Args:
             name: in configuration, logs and messages.
-            instrument: name of its wire file.
+            kind: name of its wire file.
             address: of its wire; a baud rate that is left out is that of the wire file.
             clock: the bench clock.
             unit: its Modbus number; the wire file's if none.
@@ -67,19 +67,37 @@ class Sampler:
         Raises:
             OutOfRange: the serial line does not carry the samples that it makes.
         """
-        map_ = load_map(instrument)
+        map_ = load_map(kind)
         address = replace(address, baud=address.baud or map_.document["serial"]["baud"])
         self.rate = check_rate(name, address, map_)
-        self.line = ModbusLine(name, address, unit or map_.unit, clock, timeout)
-        self.registers = Registers(self.line, map_)
+        """Samples a second that the wire carries [Hz]."""
+        self._line = ModbusLine(name, address, unit or map_.unit, clock, timeout)
+        self._registers = Registers(self._line, map_)
         layout = Layout(map_)
         interval = layout.interval_ns * 1e-9
         every = max(min(_FULL * layout.capacity * interval, _EVERY), interval)
-        self.ring = Ring(self.registers, clock, every=every)
+        self._ring = Ring(self._registers, clock, every=every)
 
+    @property
+    def name(self) -> str:
+        """Name in configuration, logs and messages."""
+        return self._line.name
+
+    @property
+    def address(self) -> ModbusAddress:
+        """Of its wire."""
+        return self._line.address
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
-        """The channels of its samples."""
-        return tuple(self.registers.map.registers[column.name].channel() for column in self.ring.layout.columns)
+        """What it measures."""
+        registers = self._registers.map.registers
+        return tuple(registers[column.name].channel() for column in self._ring.layout.columns)
+
+    @property
+    def stamp(self) -> Stamp | None:
+        """Its clock beside the bench's, from the newest block."""
+        return self._ring.stamp
 
     def connect(self) -> None:
         """Open the wire, check who answers, and begin with the next sample.
@@ -88,21 +106,28 @@ class Sampler:
             NotConnected: the wire cannot be opened.
             NoReply, BadReply, Refused: it opens, but the instrument does not answer as itself.
         """
-        self.line.open()
+        self._line.open()
         try:
-            self.ring.start()
+            self._ring.start()
         except Exception:
-            self.line.close()
+            self._line.close()
             raise
 
-    def describe(self) -> dict[str, Any]:
-        """What `drivers.replay.decoder` needs beside the frames from now on."""
-        return {
-            "decoder": "modbus_ring",
-            "instrument": self.registers.map.instrument,
-            "rtu": self.line.address.rtu,
-            "state": self.ring.state(),
-        }
+    def close(self) -> None:
+        """Close the wire."""
+        self._line.close()
+
+    def acquire(self, timeout: float) -> list[Block]:
+        """Samples since the last call, waiting up to ``timeout`` [s] for the first; empty if none.
+
+        Raises:
+            NotConnected: the wire has gone, or the instrument has restarted.
+        """
+        return self._ring.acquire(timeout)
+
+    def age(self) -> float | None:
+        """[s] since the newest sample that came was made; none before the first."""
+        return self._ring.age()
 
     def read(self, channel: str) -> Reading:
         """Its newest sample of a channel, asked for now.
@@ -111,18 +136,31 @@ class Sampler:
             OutOfRange: it has no such channel.
             NotConnected, NoReply, BadReply, Refused: it did not come.
         """
-        names = [column.name for column in self.ring.layout.columns]
+        layout = self._ring.layout
+        names = [column.name for column in layout.columns]
         if channel not in names:
-            raise OutOfRange(f"{self.line.name}: no channel {channel!r}; it measures {', '.join(names)}")
-        doubt = ["status"] if self.ring.layout.uncertain else []
-        found, answer = self.registers.read_together(channel, "sampled", *doubt)
-        doubtful = any(found[name].raw & self.ring.layout.uncertain for name in doubt)
+            raise OutOfRange(f"{self.name}: no channel {channel!r}; it measures {', '.join(names)}")
+        doubt = ["status"] if layout.uncertain else []
+        found, answer = self._registers.read_together(channel, "sampled", *doubt)
+        doubtful = any(found[name].raw & layout.uncertain for name in doubt)
         quality: Quality = "uncertain" if doubtful else "good"
         value, raw = found[channel]
-        return Reading(
-            value,
-            answer.received_ns,
-            self.ring.device_ns(found["sampled"].raw),
-            raw,
-            "bad" if np.isnan(value) else quality,
-        )
+        device_ns = self._ring.device_ns(found["sampled"].raw)
+        return Reading(value, answer.received_ns, device_ns, raw, "bad" if np.isnan(value) else quality)
+
+    def describe(self) -> dict[str, Any]:
+        """What a replay needs beside the frames from now on, see `drivers.replay`."""
+        return {
+            "decoder": "modbus_ring",
+            "instrument": self._registers.map.instrument,
+            "rtu": self.address.rtu,
+            "state": self._ring.state(),
+        }
+
+    def health(self) -> Health:
+        """Counts and state."""
+        return self._ring.health()
+
+    def listen(self, tap: Tap) -> None:
+        """Tell ``tap`` of every frame from now on."""
+        self._line.listen(tap)

@@ -67,7 +67,7 @@ def _joins(one: Block, other: Block) -> bool:
 
 def _readings_message(blocks: Sequence[Block], clock: Clocks | None) -> tuple[int, bytes]:
     values = np.concatenate([block.values for block in blocks])
-    received = np.concatenate([np.full(len(block.values), block.received_ns) for block in blocks])
+    received = np.repeat([block.received_ns for block in blocks], [len(block.values) for block in blocks])
     stamps = [block.device_ns for block in blocks if block.device_ns is not None]
     device = np.concatenate(stamps) if stamps else np.empty(0, np.int64)
     mapped = clock.bench_ns(device) if clock is not None and clock.known and len(device) else received

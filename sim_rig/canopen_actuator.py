@@ -7,8 +7,6 @@ then its position is only relative to where it was switched on.
 """
 
 import math
-from collections.abc import Callable
-from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +15,7 @@ import numpy as np
 from sim_rig.canopen_slave import CanopenSlave, Send
 from sim_rig.device_clock import DeviceClock
 from sim_rig.drive_motion import Demand, Motion
+from sim_rig.drive_states import State, next_state
 from sim_rig.object_dictionary import ObjectDictionary
 from sim_rig.signals import Signals
 
@@ -27,18 +26,6 @@ _MILLISECOND = 1_000_000
 _BEHIND_NS = 15_000_000
 """[ns] Age of the newest position beyond which the simulation is behind, not the rod."""
 _HOMING, _CYCLIC_POSITION = 6, 8
-
-
-class State(Enum):
-    """Drive states; the value is the low byte of the statusword."""
-
-    SWITCH_ON_DISABLED = 0x40
-    READY = 0x21
-    SWITCHED_ON = 0x23
-    ENABLED = 0x27
-    QUICK_STOP = 0x07
-    FAULT_REACTION = 0x0F
-    FAULT = 0x08
 
 
 class Machine(NamedTuple):
@@ -172,7 +159,7 @@ class CanopenActuator:
             if word & ~before & 0x80:
                 self._clear(now_ns)
         elif self.state is not State.FAULT_REACTION:
-            self._go(_next(self.state, word, self._latched), now_ns)
+            self._go(next_state(self.state, word, self._latched), now_ns)
         starts = word & 0x10 and not before & 0x10
         if starts and self.state is State.ENABLED and self.objects.number(0x6060) == _HOMING:
             self._start_homing()
@@ -324,35 +311,3 @@ class CanopenActuator:
 def _counts(value: float) -> int:
     """[0.1 um], within what 32 bits hold."""
     return max(min(round(value / _COUNT), 2**31 - 1), -(2**31))
-
-
-_COMMANDS: tuple[tuple[Callable[[int], bool], dict[State, State]], ...] = (
-    (lambda word: not word & 0x02, dict.fromkeys(State, State.SWITCH_ON_DISABLED)),
-    (
-        lambda word: not word & 0x04,
-        {
-            State.READY: State.SWITCH_ON_DISABLED,
-            State.SWITCHED_ON: State.SWITCH_ON_DISABLED,
-            State.ENABLED: State.QUICK_STOP,
-        },
-    ),
-    (
-        lambda word: not word & 0x01,
-        {State.SWITCH_ON_DISABLED: State.READY, State.SWITCHED_ON: State.READY, State.ENABLED: State.READY},
-    ),
-    (lambda word: not word & 0x08, {State.READY: State.SWITCHED_ON, State.ENABLED: State.SWITCHED_ON}),
-    (
-        lambda word: True,
-        {State.READY: State.ENABLED, State.SWITCHED_ON: State.ENABLED, State.QUICK_STOP: State.ENABLED},
-    ),
-)
-"""What the controlword asks for, the first that holds: disable voltage, quick stop, shut down, switch on, go."""
-
-
-def _next(state: State, word: int, latched: bool) -> State:
-    """Where a controlword leads; a latched stop is left by disabling the voltage alone."""
-    for asks, ways in _COMMANDS:
-        if asks(word):
-            to = ways.get(state, state)
-            return state if latched and to is not State.SWITCH_ON_DISABLED else to
-    return state

@@ -7,17 +7,23 @@ import typer
 
 
 def sim(
-    scenario: Annotated[str, typer.Option(help="Name of a shipped scenario, or a file.")] = "default",
-    out: Annotated[Path, typer.Option(help="Where to write the configuration that reaches the rig.")] = Path(
-        "bench.toml"
-    ),
-    speed: Annotated[float, typer.Option(min=0.01, max=50.0, help="How fast the rig's time runs.")] = 1.0,
+    scenario: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="Name of a shipped scenario, or a file.")
+    ] = "default",
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="Where to write the configuration that reaches the rig.")
+    ] = Path("bench.toml"),
+    speed: Annotated[
+        float, typer.Option(min=0.01, max=50.0, help="How many times as fast as real time the rig runs.")
+    ] = 1.0,
     lvdt: Annotated[Literal["tcp", "rtu"], typer.Option(help="Modbus TCP, or RTU on a pty.")] = "tcp",
     load_cell: Annotated[
         Literal["pty", "tcp", "ascii"],
         typer.Option(help="Framed stream on a pty or a TCP socket, or lines of text on a pty."),
     ] = "pty",
-    faults: Annotated[Path | None, typer.Option(help="Faults on the wires: JSON, by instrument.")] = None,
+    faults: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Faults on the wires: JSON, by instrument.")
+    ] = None,
 ) -> None:
     """Run the simulated rig, every instrument on its own wire, until Ctrl-C or SIGTERM."""
     from sim_rig.faults import load_wire_faults

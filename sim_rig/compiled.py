@@ -62,6 +62,11 @@ def compiled(function: Function, signature: Any = None) -> Function:
     return cast(Function, numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function))
 
 
+def inlined(function: Function) -> Function:
+    """The same of a small function that is set into its callers: handing arrays on costs more than it computes."""
+    return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
+
+
 def with_values(act: Callable[..., Any], values: Sequence[float]) -> OfTwo:
     """An effect's form with its parameters fixed, as a compiled function of its first two arguments."""
     form = numba.njit(nogil=True, error_model="numpy")(act)

@@ -16,7 +16,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from sim_rig.clock import Clock
 from sim_rig.errors import ScenarioError
-from sim_rig.settings import NotNegative, Positive, Setting
+from sim_rig.settings import NotNegative, Positive, Setting, first_fault
 
 _LOOK = 0.01
 """[s] between two looks at the schedule while no bytes come."""
@@ -51,12 +51,12 @@ def load_wire_faults(path: Path) -> dict[str, tuple[WireFault, ...]]:
     """
     try:
         return WIRE_FAULTS.validate_json(path.read_text("utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"wire faults {path}: cannot be read ({error})") from error
+    except OSError as error:
+        raise ScenarioError(f"wire faults {path}: cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"wire faults {path}: no text: {error}") from error
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"]) or "document"
-        raise ScenarioError(f"wire faults {path}: {place}: {first['msg']}") from error
+        raise ScenarioError(f"wire faults {path}: {first_fault(error)}") from error
 
 
 class FaultProxy:

@@ -1,13 +1,9 @@
 """The motion of actuator and specimen: explicit Runge-Kutta steps, as many as the stiffness asks for.
 
-The law is that of ``identification.damper.law``, compiled here; the integrator is deliberately another one than
-the implicit step that identification uses. Each command sample is cut into blocks of at most an eighth of a
-millisecond, each block into equal fourth-order steps. At a reversal the hysteretic variable relaxes at some
-2e4 1/s and the law has a corner where the slip velocity changes sign, so blocks near one get more steps.
-
-The actuator is a servo: a first-order lag of the command, then a second-order loop about it which the force on
-the rod deflects by force / stiffness. It is integrated in the same steps, so that displacement, velocity and
-acceleration are continuous between command samples.
+The integrator is deliberately another one than the implicit step that identification uses. Each command sample is
+cut into blocks of at most an eighth of a millisecond, each block into equal fourth-order steps. At a reversal the
+hysteretic variable relaxes at some 2e4 1/s and the law has a corner where the slip velocity changes sign, so
+blocks near one get more steps.
 """
 
 import math
@@ -17,41 +13,27 @@ import numpy as np
 
 from identification.damper.effects import connection
 from sim_rig.compiled import OF_THREE, OF_TWO, SCALES, Array, OfThree, OfTwo, Scales, compiled
-from sim_rig.compiled_law import at_field, damper_force, field_rate, hysteresis_rate, inner_velocity
-
-STATES = 12
-"""Command behind the lag [m], actuator position [m] and velocity [m/s], y [m], z [m], field u, amplifier output
-[both V or A], temperature [degC], drive behind a second lag [V or A], energy in the damper [J], displacement of
-the damper behind a fixture that gives way [m], bend of a seal's lip [1]."""
-COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND, BENT = range(STATES)
-
-CONSTANTS = 23
-"""Rates and weights of everything but the law, in the order of the names below."""
-(
-    LAG,  # [1/s] rate of the command's lag
-    SERVO,  # [rad/s] bandwidth of the servo
-    DAMPING,  # [1] damping ratio of the servo
-    COMPLIANCE,  # [m/N] deflection of the actuator under load
-    AMPLIFIER,  # [1/s] rate of the drive amplifier
-    HEAT_CAPACITY,  # [J/K]
-    HEAT_LOSS,  # [W/K]
-    AMBIENT,  # [degC]
-    COIL,  # [W per squared drive] heat of the coil
-    SATURATED,  # [m] z_ss, where z settles in long motion
-    EVER_PRESENT,  # [1/s] fastest rate beside that of the law
-    PLAY,  # 1 where the mounting holds the damper back, else 0
-    GIVE,  # [m/N] of the fixture between load cell and damper
-    MASS,  # [kg] between load cell and damper
-    SECOND_LAG,  # [1/s] rate of the coil's second lag, 0 without one
-    SLOW_PART,  # [1] of the field behind that lag
-    DEAD_TIME,  # [s] between output and field
-    COOLING,  # [1/s] rate with which the energy leaves the damper
-    MEMORY,  # 1 where the iron remembers, else 0
-    GAP,  # [m] of the connection between load cell and damper
-    HARDENING,  # [1/m²] of the same
-    FILM,  # [N s/m] in that gap
-    BRISTLES,  # [1/m] rate over the way with which a seal's lip bends, 0 without one
-) = range(CONSTANTS)
+from sim_rig.compiled_law import at_field
+from sim_rig.rates import AHEAD, rates
+from sim_rig.states import (
+    AMPLIFIER,
+    BEHIND,
+    COMPLIANCE,
+    DEAD_TIME,
+    EVER_PRESENT,
+    FIELD,
+    GIVE,
+    HARDENING,
+    MEMORY,
+    OUTPUT,
+    PLAY,
+    POSITION,
+    SATURATED,
+    SERVO,
+    SPEED,
+    STATES,
+    Z,
+)
 
 STABLE = 0.8
 """[1] largest product of rate and step; the method is stable up to 2.78."""
@@ -69,137 +51,8 @@ _SETTLED = 1e-7
 """[1] part of the drive within which the amplifier's output counts as settled and costs no more steps."""
 _YIELDING_STEPS = 8.0
 """Least steps in a block where the fixture gives way: the damper's velocity is then not the actuator's."""
-_BALANCED = 1e-9
-"""[m/s] to which the velocity of the damper behind its fixture is found."""
-_AHEAD = 1e-6
-"""[s] how far the mounting looks ahead to tell whether it carries the damper along."""
 
-carried = compiled(connection.carried)
 steepness = compiled(connection.steepness)
-
-
-@compiled
-def _damper_motion(position: float, speed: float, held: float, play: float, follow: OfTwo) -> tuple[float, float]:
-    """Displacement [m] and velocity [m/s] of the damper behind its mounting; it stood at ``held`` [m]."""
-    if play == 0.0:
-        return position, speed
-    x = follow(held, position)
-    return x, (follow(x, position + speed * _AHEAD) - x) / _AHEAD
-
-
-@compiled
-def _damper_force(
-    s: Array, x: float, v: float, u: float, p: Array, parallel: OfThree, scales: Scales
-) -> tuple[float, float]:
-    """Force of the damper [N] and y' [m/s] at displacement x [m], velocity v [m/s] and the field seen."""
-    a, b, c = scales(x, v, s[ENERGY])
-    alpha, c0, c1 = a * at_field(p[0], p[1], u), b * at_field(p[6], p[7], u), c * at_field(p[8], p[9], u)
-    y_rate = inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
-    return damper_force(y_rate, x, c1, p[11], p[13]) + parallel(x, v, s[BENT]), y_rate
-
-
-@compiled
-def _balanced_velocity(
-    s: Array, load: float, film: float, guess: float, u: float, p: Array, parallel: OfThree, scales: Scales
-) -> float:
-    """Velocity [m/s] at which damper and film resist with the load [N] of the fixture, by brackets and secants."""
-    x, width = s[BEHIND], 1e-3
-    low, high = guess - width, guess + width
-    below = _damper_force(s, x, low, u, p, parallel, scales)[0] + film * low - load
-    above = _damper_force(s, x, high, u, p, parallel, scales)[0] + film * high - load
-    for _ in range(60):
-        if below <= 0.0 <= above:
-            break
-        width *= 2.0
-        if below > 0.0:
-            high, above, low = low, below, low - width
-            below = _damper_force(s, x, low, u, p, parallel, scales)[0] + film * low - load
-        else:
-            low, below, high = high, above, high + width
-            above = _damper_force(s, x, high, u, p, parallel, scales)[0] + film * high - load
-    side = 0
-    for _ in range(60):
-        v = high - above * (high - low) / (above - below) if above != below else 0.5 * (low + high)
-        rest = _damper_force(s, x, v, u, p, parallel, scales)[0] + film * v - load
-        if high - low < _BALANCED or abs(rest) < 1e-9:
-            break
-        if rest > 0.0:
-            high, above = v, rest
-            below = 0.5 * below if side == 1 else below
-            side = 1
-        else:
-            low, below = v, rest
-            above = 0.5 * above if side == -1 else above
-            side = -1
-    return v
-
-
-@compiled
-def rates(
-    s: Array,
-    held: float,
-    remembered: float,
-    command: float,
-    drive: float,
-    late: float,
-    k: Array,
-    p: Array,
-    follow: OfTwo,
-    parallel: OfThree,
-    seen: OfTwo,
-    scales: Scales,
-    rate: Array,
-) -> tuple[float, float, float, float]:
-    """Rates of all states, written to ``rate``.
-
-    Args:
-        s: (12,) the states.
-        held: [m] where the damper stood when the step began.
-        remembered: what the iron remembered then.
-        command: [m] commanded displacement now.
-        drive: [V or A] commanded drive.
-        late: [V or A] output as it reaches the coil after its dead time.
-        k: (23,) constants of actuator, amplifier, heat and mounting.
-        p: (14,) the parameters of the law in the paper's order.
-        follow: displacement of the damper over (held, actuator) [m].
-        parallel: force beside the law [N] over (displacement [m], velocity [m/s], bend of a lip [1]).
-        seen: field that the damper sees over (field, remembered) [V or A].
-        scales: factors of alpha, c0 and c1 over displacement, velocity and energy.
-        rate: (12,) the answer.
-
-    Returns:
-        Force on the load cell [N], displacement [m], velocity [m/s] and slip velocity [m/s] of the damper.
-    """
-    x, v = _damper_motion(s[POSITION], s[SPEED], held, k[PLAY], follow)
-    u = seen(s[FIELD], remembered)
-    if k[GIVE] > 0.0:
-        load = carried(x - s[BEHIND], k[GIVE], k[GAP], k[HARDENING])
-        x, load, film = s[BEHIND], load + k[FILM] * v, k[FILM]
-        v = _balanced_velocity(s, load, film, v, u, p, parallel, scales)
-        force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
-        force = load - film * v
-    else:
-        force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)
-    slip = v - y_rate
-    rate[BEHIND] = v
-    rate[COMMAND] = k[LAG] * (command - s[COMMAND])
-    rate[POSITION] = s[SPEED]
-    error = s[COMMAND] - s[POSITION] - k[COMPLIANCE] * force
-    wanted = k[SERVO] * (k[SERVO] * error - 2.0 * k[DAMPING] * s[SPEED])
-    rate[SPEED] = wanted / (1.0 + k[SERVO] * k[SERVO] * k[COMPLIANCE] * k[MASS])
-    rate[Y] = y_rate
-    rate[BENT] = k[BRISTLES] * (v - abs(v) * s[BENT])
-    rate[Z] = hysteresis_rate(slip, s[Z], p[5], p[2], p[3], p[12])
-    source = late if k[DEAD_TIME] > 0.0 else s[OUTPUT]
-    rate[LAGGED] = k[SECOND_LAG] * (source - s[LAGGED])
-    slow = k[SLOW_PART] if k[SECOND_LAG] > 0.0 else 0.0
-    rate[FIELD] = field_rate(s[FIELD], source + slow * (s[LAGGED] - source), p[4])
-    rate[OUTPUT] = k[AMPLIFIER] * (drive - s[OUTPUT])
-    warmth = abs(force * v)
-    rate[ENERGY] = warmth - k[COOLING] * s[ENERGY]
-    heat = warmth + k[COIL] * s[OUTPUT] * s[OUTPUT]
-    rate[TEMPERATURE] = (heat - k[HEAT_LOSS] * (s[TEMPERATURE] - k[AMBIENT])) / k[HEAT_CAPACITY]
-    return force + k[MASS] * rate[SPEED], x, v, slip
 
 
 @compiled
@@ -227,7 +80,7 @@ def steps_for(
     fastest = abs(slip) + turn
     steps = 1.0
     if k[PLAY] != 0.0:
-        carried = follow(x, s[POSITION] + s[SPEED] * _AHEAD) != x
+        carried = follow(x, s[POSITION] + s[SPEED] * AHEAD) != x
         carried_later = follow(x, s[POSITION] + s[SPEED] * h) != x
         if carried != carried_later:
             steps = CONTACT_STEPS
@@ -337,7 +190,7 @@ def _march(
             start of each block.
         outputs: (M,) filled with the amplifier's output half way through each sample.
         damper: (M, 2) filled with displacement [m] and velocity [m/s] of the damper at each sample.
-        states: (M, 11) filled with the states at each sample.
+        states: (M, 12) filled with the states at each sample.
 
     Returns:
         Where the damper stands [m], what the iron remembers, and the sample in which the motion was lost, or M.

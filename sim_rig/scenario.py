@@ -28,6 +28,7 @@ from sim_rig.settings import (
     Setting,
     Specimen,
     Thermal,
+    first_fault,
 )
 
 
@@ -116,10 +117,12 @@ def load_scenario(name_or_path: str | Path) -> Scenario:
     path = Path(name_or_path)
     try:
         text = shipped.read_text() if str(name_or_path) in shipped_scenarios() else path.read_text()
-    except (OSError, UnicodeDecodeError) as error:
+    except FileNotFoundError:
         raise ScenarioError(
-            f"scenario {name_or_path}: cannot be read ({error}); shipped are {_listed(shipped_scenarios())}"
-        ) from error
+            f"no scenario {name_or_path}: neither a file nor one of {_listed(shipped_scenarios())}"
+        ) from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"scenario {name_or_path}: cannot be read: {error}") from error
     return parse_scenario(text, str(name_or_path))
 
 
@@ -132,10 +135,7 @@ def parse_scenario(text: str, origin: str) -> Scenario:
     try:
         return Scenario.model_validate_json(text)
     except ValidationError as error:
-        faults = error.errors()
-        first = next((fault for fault in faults if fault["type"] != "string_type"), faults[0])
-        place = ".".join(str(part) for part in first["loc"]) or "document"
-        raise ScenarioError(f"scenario {origin}: {place}: {first['msg']}") from error
+        raise ScenarioError(f"scenario {origin}: {first_fault(error)}") from error
 
 
 def shipped_scenarios() -> list[str]:
@@ -167,9 +167,9 @@ def _within(quantities: Iterable[Quantity], values: dict[str, float], prefix: st
     for q in quantities:
         value, rounding = values[q.symbol], 1e-9 * (abs(q.low) + abs(q.high))
         if not q.low - rounding <= value <= q.high + rounding:
+            unit = "" if q.unit == "1" else f" {q.unit_for('drive')}"
             raise ValueError(
-                f"{prefix}{q.symbol} ({q.meaning}) is {value:g} {q.unit_for('drive')}, "
-                f"outside {q.low:g} to {q.high:g}"
+                f"{prefix}{q.symbol} ({q.meaning}) is {value:g}{unit}, outside {q.low:g} to {q.high:g}{unit}"
             )
 
 

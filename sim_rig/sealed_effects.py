@@ -44,4 +44,5 @@ def _check(effect: EffectInPlay) -> None:
     for q in form.parameters:
         value = effect.parameters[q.symbol]
         if not q.low <= value <= q.high:
-            raise ValueError(f"{form.form}.{q.symbol} is {value:g} {q.unit}, outside {q.low:g} to {q.high:g}")
+            unit = "" if q.unit == "1" else f" {q.unit}"
+            raise ValueError(f"{form.form}.{q.symbol} is {value:g}{unit}, outside {q.low:g} to {q.high:g}{unit}")

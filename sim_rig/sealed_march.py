@@ -17,32 +17,34 @@ from sim_rig.compiled_law import at_field, damper_force, field_rate, hysteresis_
 from sim_rig.scenarios.sealed import form
 from sim_rig.scenarios.sealed.form import MEMORY, Place
 from sim_rig.sealed_states import (
-    AMBIENT,
-    AMPLIFIER,
-    COIL,
     COMMAND,
-    COMPLIANCE,
     CONNECTED,
     CONTACT,
     DAMPER,
-    DAMPING,
     FASTEST,
     FIELD,
-    HEAT_CAPACITY,
-    HEAT_LOSS,
-    LAG,
     MOST_FORMS,
     OUTPUT,
     PATH,
     POSITION,
-    SATURATED,
-    SERVO,
     SPEED,
     STATES,
     TEMPERATURE,
     Y,
     Z,
-)  # fmt: skip
+)
+from sim_rig.states import (
+    AMBIENT,
+    AMPLIFIER,
+    COIL,
+    COMPLIANCE,
+    DAMPING,
+    HEAT_CAPACITY,
+    HEAT_LOSS,
+    LAG,
+    SATURATED,
+    SERVO,
+)
 
 _COIL, _SCALE, _PARALLEL = int(Place.COIL), int(Place.SCALE), int(Place.PARALLEL)
 _CONNECTION, _CELL, _CHANNEL = int(Place.CONNECTION), int(Place.CELL), int(Place.CHANNEL)

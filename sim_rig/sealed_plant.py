@@ -1,6 +1,5 @@
 """A specimen with sealed forms on its actuator: a `Plant` that the rest of the rig cannot tell from the other."""
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -9,12 +8,14 @@ import numpy as np
 from sim_rig import sealed_march as march
 from sim_rig import sealed_states as at
 from sim_rig.compiled import Array, compiled
+from sim_rig.constants import fastest_of_the_rig, of_the_rig
 from sim_rig.errors import PlantError
 from sim_rig.plant import Plant, Truth, blocks_in
 from sim_rig.scenario import Scenario
 from sim_rig.scenarios.sealed.form import MEMORY, NOW, VALUES, Form, Place, X
 from sim_rig.sealed_effects import form_of, size
 from sim_rig.settings import EffectInPlay
+from sim_rig.states import AMBIENT, COMPLIANCE, SATURATED
 
 _STANDING = 0.2
 """[s] for which the specimen has stood when a run begins: filters are settled."""
@@ -133,17 +134,9 @@ def _as_played(forms: Sequence[Form], effects: Sequence[EffectInPlay]) -> _Forms
 
 
 def _constants(scenario: Scenario, law: Array, forms: Sequence[Form], effects: Sequence[EffectInPlay]) -> Array:
-    actuator, amplifier, thermal = scenario.actuator, scenario.amplifier, scenario.thermal
-    servo, resistance = 2 * math.pi * actuator.bandwidth, amplifier.resistance
     k = np.zeros(at.CONSTANTS)
-    k[at.LAG] = 1 / actuator.command_lag
-    k[at.SERVO], k[at.DAMPING], k[at.COMPLIANCE] = servo, actuator.damping, 1 / actuator.stiffness
-    k[at.AMPLIFIER] = 2 * math.pi * amplifier.bandwidth
-    k[at.HEAT_CAPACITY], k[at.HEAT_LOSS], k[at.AMBIENT] = thermal.capacity, thermal.loss, thermal.ambient
-    k[at.COIL] = resistance if scenario.drive_unit == "A" else 1 / resistance
-    k[at.SATURATED] = (law[5] / (law[2] + law[3])) ** (1 / law[12])
-    viscous = min(abs(law[6]) + 2 * abs(law[7]), 1e6) * servo**2 / actuator.stiffness
-    k[at.FASTEST] = max(k[at.LAG], 2 * servo * max(actuator.damping, 1)) + viscous
+    k[: SATURATED + 1] = of_the_rig(scenario, law)
+    k[at.FASTEST] = fastest_of_the_rig(scenario, law)
     for form, effect in zip(forms, effects, strict=True):
         connects = form.place is Place.CONNECTION
         k[at.CONTACT if connects else at.FASTEST] += form.fastest(*effect.parameters.values())
@@ -153,8 +146,8 @@ def _constants(scenario: Scenario, law: Array, forms: Sequence[Form], effects: S
 
 def _at_rest(law: Array, k: Array, displacement: float, drive: float) -> Array:
     states = np.zeros(at.STATES)
-    place = displacement - k[at.COMPLIANCE] * law[11] * (displacement - law[13])
+    place = displacement - k[COMPLIANCE] * law[11] * (displacement - law[13])
     states[[at.COMMAND, at.POSITION, at.Y, at.DAMPER]] = displacement, place, place, place
     states[[at.FIELD, at.OUTPUT]] = drive
-    states[at.TEMPERATURE] = k[at.AMBIENT]
+    states[at.TEMPERATURE] = k[AMBIENT]
     return states

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from sim_rig.acting import Effects
 from sim_rig.channel import ChannelStream, Drawn, View, drawn_for
 from sim_rig.compiled import Array
-from sim_rig.plant import Effects, Truth, blocks_in
+from sim_rig.plant import Truth, blocks_in
 from sim_rig.scenario import Scenario
 from sim_rig.sealed_plant import displacement_read
 from sim_rig.settings import Fault, Sensor

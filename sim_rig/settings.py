@@ -6,7 +6,7 @@ what differs. A sensor that is named replaces the default one whole, and what it
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
@@ -217,3 +217,15 @@ class NamedDamper(Setting):
         if self.beta + self.gamma <= 0:
             raise ValueError(f"beta + gamma is {self.beta + self.gamma:g}; the loop needs a positive sum")
         return self
+
+
+_PLAINLY = {"missing": "is missing", "extra_forbidden": "there is no such key"}
+
+
+def first_fault(error: ValidationError) -> str:
+    """Where a document is wrong first, and what is wrong there, in words for the person who wrote it."""
+    faults = error.errors(include_url=False)
+    # Where a name or an object may stand, a fault inside the object says more than that it is no name.
+    first = next((fault for fault in faults if fault["type"] != "string_type"), faults[0])
+    place = ".".join(str(part) for part in first["loc"]) or "document"
+    return f"{place}: {_PLAINLY.get(first['type'], first['msg'].removeprefix('Value error, '))}"

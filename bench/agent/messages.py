@@ -9,13 +9,13 @@ from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from bench.agent.steps import Step
+
 STATUS, SAMPLES, EVENT = b"status", b"samples", b"event"
 """Topics that the agent publishes."""
 
 AgentState: TypeAlias = Literal["idle", "preparing", "running", "stopping", "tripped"]
 """tripped: a limit was exceeded or an instrument failed; everything is at rest, and stays there until a reset."""
-Step: TypeAlias = Literal["home", "move", "mount", "centre", "unmount", "tare", "clear-tare"]
-"""What can be done before a run."""
 RunOutcome: TypeAlias = Literal["clean", "lossy", "incomplete"]
 
 

@@ -8,7 +8,8 @@ import threading
 from collections.abc import Callable
 from typing import TypeAlias
 
-from bench.agent.messages import Step, StepStatus
+from bench.agent.messages import StepStatus
+from bench.agent.steps import Step
 from bench.errors import RunError
 from bench.rig.instruments import Rig
 from drivers.errors import DriverError

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import cast, get_args
 
 from bench.agent.link import AgentClient
-from bench.agent.messages import AgentStatus, PrepareCommand, StatusCommand, Step
+from bench.agent.messages import AgentStatus, PrepareCommand, StatusCommand
+from bench.agent.steps import Step
 from bench.errors import RunError
 from bench.rig.config import load_config
 

@@ -7,10 +7,13 @@ import typer
 
 
 def export(
-    log: Annotated[Path, typer.Argument(help="The log.")],
-    format_: Annotated[str, typer.Option("--format", help="csv, parquet or mat.", metavar="FORMAT")],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="A recording.")],
+    format_: Annotated[
+        str, typer.Option("--format", metavar="FORMAT", help="csv, parquet (wants the extra `export`) or mat.")
+    ],
     out: Annotated[
-        Path | None, typer.Option(help="The file to write; by default beside the log, under its name.")
+        Path | None,
+        typer.Option(metavar="FILE", help="The file to write; by default beside the log, under its name."),
     ] = None,
 ) -> None:
     """Write the samples of a log for other tools, with the unit in every column's name.

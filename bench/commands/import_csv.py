@@ -7,17 +7,21 @@ import typer
 
 
 def import_csv(
-    files: Annotated[list[Path], typer.Argument(help="CSV files, plain or .gz; each is a stretch of its own.")],
-    out: Annotated[Path, typer.Option(help="The log to write.")],
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILE", help="CSV files, plain or .gz; each is a stretch of its own.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="LOG", help="The log to write.")],
     column: Annotated[
         list[str] | None,
-        typer.Option(help="NAME=HEADER: the file's own header for one of our columns.", metavar="NAME=HEADER"),
+        typer.Option(metavar="NAME=HEADER", help="The file's own header for one of our columns; once for each."),
     ] = None,
     drive_kind: Annotated[
         str | None,
-        typer.Option(help="driver_command_v (taken for volts), coil_v or coil_a (taken for ampere)."),
+        typer.Option(
+            metavar="KIND", help="driver_command_v (taken for volts), coil_v or coil_a (taken for ampere)."
+        ),
     ] = None,
-    specimen: Annotated[str, typer.Option(help="The damper, with its serial number.")] = "unknown",
+    specimen: Annotated[str, typer.Option(metavar="NAME", help="The damper, with its serial number.")] = "unknown",
 ) -> None:
     """Turn recordings made elsewhere into a log.
 

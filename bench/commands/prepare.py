@@ -5,17 +5,24 @@ from typing import Annotated, get_args
 
 import typer
 
-from bench.agent.messages import Step
+from bench.agent.steps import Step
 
 _STEPS = ", ".join(get_args(Step))
 
 
 def prepare(
-    step: Annotated[str, typer.Argument(help=f"One of: {_STEPS}.")],
+    step: Annotated[str, typer.Argument(metavar="STEP", help=f"One of: {_STEPS}.")],
     to: Annotated[
-        float, typer.Option("--to", metavar="METRES", help="Where `move` goes, from the middle or from home.")
+        float,
+        typer.Option(
+            "--to",
+            metavar="METRES",
+            help="Where `move` goes [m], from the specimen's middle, or from home before there is one.",
+        ),
     ] = 0.0,
-    config: Annotated[Path, typer.Option(help="The bench whose agent is asked.")] = Path("bench.toml"),
+    config: Annotated[Path, typer.Option(metavar="FILE", help="The bench whose agent is asked.")] = Path(
+        "bench.toml"
+    ),
 ) -> None:
     """Home the rod, move it, say that a specimen is clamped or not, find its middle, tare: by the agent that runs.
 

@@ -8,12 +8,16 @@ import typer
 
 def report(
     log: Annotated[Path, typer.Argument(help="The recording.", metavar="LOG")],
-    out: Annotated[Path, typer.Option(help="The page to write.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")],
     fit: Annotated[
-        Path | None, typer.Option(help="A fit made by `identify`; without it the recording alone is shown.")
+        Path | None,
+        typer.Option(metavar="FIT", help="A fit made by `identify`; without it the recording alone is shown."),
     ] = None,
     diagnosis: Annotated[
-        Path | None, typer.Option(help="A diagnosis made by `diagnose`: what is missing in the simulation.")
+        Path | None,
+        typer.Option(
+            metavar="DIAGNOSIS", help="A diagnosis made by `diagnose`: what is missing in the simulation."
+        ),
     ] = None,
     plots: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the plots there, as SVG and PNG.")

@@ -7,11 +7,15 @@ import typer
 
 
 def rig(
-    config: Annotated[Path, typer.Option(help="Which instruments there are, and how they are reached.")] = Path(
-        "bench.toml"
-    ),
-    commands: Annotated[str | None, typer.Option(help="ZeroMQ address for commands, else as configured.")] = None,
-    samples: Annotated[str | None, typer.Option(help="ZeroMQ address that publishes, else as configured.")] = None,
+    config: Annotated[
+        Path, typer.Option(metavar="FILE", help="Which instruments there are, and how they are reached.")
+    ] = Path("bench.toml"),
+    commands: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="ZeroMQ address for commands, else as configured.")
+    ] = None,
+    samples: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="ZeroMQ address that publishes, else as configured.")
+    ] = None,
 ) -> None:
     """Own the instruments of a bench and run methods on them, until Ctrl-C or SIGTERM."""
     from bench.agent.serve import serve_agent

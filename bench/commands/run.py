@@ -9,10 +9,13 @@ import typer
 def run(
     method: Annotated[str, typer.Argument(help="A shipped method by its name, or a file.", metavar="METHOD")],
     scenario: Annotated[
-        str | None, typer.Option(help="What the simulated plant plays: a shipped scenario or a file.")
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="What the simulated plant plays: a shipped scenario or a file."),
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="bench.toml: runs on the instruments that it names.")] = None,
-    out: Annotated[str, typer.Option(help="The log; with --dry-run, - prints JSON.")] = "run.mcap",
+    config: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="bench.toml: runs on the instruments that it names.")
+    ] = None,
+    out: Annotated[str, typer.Option(metavar="LOG", help="The log; with --dry-run, - prints JSON.")] = "run.mcap",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only say what the method will ask for, and what it can tell.")
     ] = False,
@@ -23,8 +26,8 @@ def run(
     planned: Annotated[
         Path | None, typer.Option(metavar="FILE.npz", help="With --dry-run: write the exact samples there.")
     ] = None,
-    specimen: Annotated[str, typer.Option(help="Name of the damper under test.")] = "",
-    operator: Annotated[str, typer.Option(help="Who runs it.")] = "",
+    specimen: Annotated[str, typer.Option(metavar="NAME", help="Name of the damper under test.")] = "",
+    operator: Annotated[str, typer.Option(metavar="NAME", help="Who runs it.")] = "",
     seed: Annotated[
         int | None, typer.Option(help="Of everything that chance decides on the simulated rig.")
     ] = None,

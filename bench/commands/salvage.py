@@ -7,10 +7,13 @@ import typer
 
 
 def salvage(
-    log: Annotated[Path, typer.Argument(help="The broken log.")],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="The broken log.")],
     out: Annotated[
         Path | None,
-        typer.Option(help="Where the mended log goes; by default it replaces the broken one, kept as LOG.broken."),
+        typer.Option(
+            metavar="FILE",
+            help="Where the mended log goes; by default it replaces the broken one, kept as LOG.broken.",
+        ),
     ] = None,
 ) -> None:
     """Repair a truncated log and say what was lost.

@@ -14,7 +14,7 @@ def serve(
         ),
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Address to listen at; beyond loopback, put TLS in front.")
+        str, typer.Option(metavar="HOST", help="Address to listen at; beyond loopback, put TLS in front.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen at; 0 takes a free one.")] = 8600,
     data: Annotated[Path, typer.Option(metavar="DIR", help="Where logs, results and catalogue lie.")] = Path(

@@ -21,5 +21,7 @@ def worker(
 ) -> None:
     """Carry out identification jobs, one at a time at the lowest priority, until the scheduler goes."""
     from bench.jobs.worker import run_worker, scheduler_of
+    from bench.service.log_lines import log_to_stderr
 
+    log_to_stderr()
     run_worker(scheduler or scheduler_of(data), nice)

@@ -1,17 +1,20 @@
 """The worker process: one job at a time, at the lowest priority, until its scheduler goes."""
 
 import asyncio
+import logging
 import os
 import signal
 from pathlib import Path
 
 import dask
 from distributed import Worker
+from distributed.comm.addressing import get_address_host_port
 
 from bench.jobs.engine import scheduler_file
 from bench.jobs.errors import WorkerError
 
-_PATIENCE = "10s"
+_LOG = logging.getLogger(__name__)
+_PATIENCE = "10 s"
 
 
 def run_worker(scheduler: str, nice: int) -> None:
@@ -24,6 +27,10 @@ def run_worker(scheduler: str, nice: int) -> None:
     Raises:
         WorkerError: there is no scheduler.
     """
+    try:
+        get_address_host_port(scheduler)
+    except ValueError:
+        raise WorkerError(f"--scheduler {scheduler}: not of the form tcp://HOST:PORT") from None
     os.nice(nice)
     asyncio.run(_work(scheduler))
     # A job's thread cannot be joined; its commands hang on a pipe of this process and end with it.
@@ -55,8 +62,12 @@ async def _work(scheduler: str) -> None:
     )
     try:
         worker = await Worker(scheduler, nthreads=1, memory_limit=0, dashboard=False, death_timeout=_PATIENCE)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise WorkerError(f"no scheduler at {scheduler}: {error}") from error
+    except (OSError, TimeoutError, ValueError, RuntimeError) as error:  # dask wraps some of them in the last
+        raise WorkerError(
+            f"no scheduler answers at {scheduler} within {_PATIENCE}; "
+            "is the service up (mrbench serve), is this its address?"
+        ) from error
+    _LOG.info("worker_ready", extra={"scheduler": scheduler})
     ended = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, ended.set)

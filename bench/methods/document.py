@@ -12,6 +12,7 @@ from typing import Any, Literal, Self, TypeAlias
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from bench.errors import MethodError
+from bench.faults import first_fault
 from bench.methods.drive import Constant, Drive
 from bench.methods.frozen import Frozen
 from bench.methods.motion import Motion, Sine
@@ -144,12 +145,10 @@ def _text(name_or_path: str | Path) -> str:
 
 def _first_fault(error: ValidationError, content: Any) -> str:
     """The first fault with its place in the document, and how many more there are."""
-    faults = error.errors(include_url=False)
-    first = faults[0]
+    first, words = first_fault(error)
     place = ".".join(str(step) for step in first["loc"]) or "the document"
     named = _segment_name(first["loc"], content)
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return f"{place}{named}: {first['msg'].removeprefix('Value error, ')}{more}"
+    return f"{place}{named}: {words}"
 
 
 def _segment_name(place: tuple[int | str, ...], content: Any) -> str:

@@ -129,8 +129,8 @@ def together(effects: list[str]) -> str:
     return " and ".join(map(spelt, effects)) or "nothing beside the law"
 
 
-def context(found: Diagnosis) -> dict[str, Any]:
-    """What the page's template needs of a diagnosis."""
+def context(found: Diagnosis, drive_unit: str) -> dict[str, Any]:
+    """What the page's template needs of a diagnosis; ``drive_unit`` is V or A."""
     return {
         "verdict": VERDICTS[found.verdict],
         "mood": "good" if found.verdict in ("no_gap", "explained") else "warning",
@@ -138,7 +138,7 @@ def context(found: Diagnosis) -> dict[str, Any]:
         "gap": _gap_facts(found),
         "effects": [_effect_row(effect) for effect in found.effects],
         "sets": _set_rows(found),
-        "next": _next_words(found.next_stroke),
+        "next": _next_words(found.next_stroke, drive_unit),
         "notes": found.notes,
     }
 
@@ -181,7 +181,7 @@ def _set_rows(found: Diagnosis) -> list[tuple[str, str]]:
     return [*(named if found.verdict != "unexplained" else []), *others, unknown]
 
 
-def _next_words(stroke: NextStroke | None) -> str:
+def _next_words(stroke: NextStroke | None, drive_unit: str) -> str:
     """The stroke that would settle the doubt, in words; empty where there is none."""
     if stroke is None:
         return ""
@@ -189,7 +189,7 @@ def _next_words(stroke: NextStroke | None) -> str:
     sizes = [
         f"{significant(1e3 * motion['amplitude_m'])} mm" if "amplitude_m" in motion else "",
         f"{significant(motion['frequency_hz'])} Hz" if "frequency_hz" in motion else "",
-        f"drive {significant(drive['value'])}" if "value" in drive else str(drive.get("kind", "")),
+        f"{significant(drive['value'])} {drive_unit}" if "value" in drive else str(drive.get("kind", "")),
     ]
     apart = ", ".join(f"“{together(one)}”" for one in stroke.separates)
     return f"{motion.get('kind', 'stroke')} of {', '.join(filter(None, sizes))}: it tells apart {apart}."

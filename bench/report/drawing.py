@@ -42,6 +42,11 @@ class DriveColours:
         return cls(float(low), float(high), recording.drive_unit)
 
     @property
+    def label(self) -> str:
+        """What the colours mean, with unit."""
+        return f"drive [{self.unit}]"
+
+    @property
     def scale(self) -> ScalarMappable:
         """Drive to colour, also for a colour bar."""
         spread = max(self.high - self.low, 1e-9)
@@ -62,6 +67,16 @@ def light(colour: Colour) -> Colour:
 def new_figure(width: float, height: float) -> Figure:
     """An empty picture [inch]."""
     return Figure(figsize=(width, height), layout="constrained", facecolor="white")
+
+
+def bars(axes: Axes, rows: Sequence[tuple[str, float, str]], across: str) -> None:
+    """Lying bars in calm axes, the first on top; each with its name, length and colour."""
+    for place, (_, length, colour) in enumerate(rows):
+        axes.barh(place, length, height=0.55, color=colour)
+    axes.set_yticks(range(len(rows)), [name for name, _, _ in rows])
+    axes.invert_yaxis()
+    style(axes, across, "")
+    axes.grid(visible=False, axis="y")
 
 
 def style(axes: Axes, across: str, up: str, title: str = "") -> None:
@@ -129,10 +144,10 @@ def legend(figure: Figure, colours: DriveColours, drives: Sequence[tuple[float, 
         )
 
 
-def colour_bar(figure: Figure, axes: Sequence[Axes], colours: DriveColours) -> None:
-    """The scale of a varying drive beside its axes."""
-    bar = figure.colorbar(colours.scale, ax=list(axes), fraction=0.03, pad=0.01)
-    bar.set_label(f"drive [{colours.unit}]", color=INK, fontsize=9)
+def colour_bar(figure: Figure, axes: Sequence[Axes], scale: ScalarMappable, label: str) -> None:
+    """What the colours mean, beside the axes that show them; the label gives quantity and unit."""
+    bar = figure.colorbar(scale, ax=list(axes), fraction=0.03, pad=0.01)
+    bar.set_label(label, color=INK, fontsize=9)
     bar.ax.tick_params(colors=INK, labelsize=8, length=2)
     bar.outline.set_visible(False)
 

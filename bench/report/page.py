@@ -100,7 +100,7 @@ def figures(report: Report) -> dict[str, Figure]:
         found["drives"] = plots.by_drive(report.prediction.per_drive, floor, report.recording)
     if report.diagnosis is not None:
         found["gap"] = diagnosis_plots.shrinkage(report.diagnosis)
-        if (where := diagnosis_plots.place(report.diagnosis)) is not None:
+        if (where := diagnosis_plots.place(report.diagnosis, report.recording.drive_unit)) is not None:
             found["where"] = where
     return {**found, "whole": plots.whole(report.recording)}
 
@@ -125,6 +125,7 @@ def render(report: Report, drawn: dict[str, Figure], command: str, made: datetim
         name: Picture(*CAPTIONS[name], base64.b64encode(plots.png(figure)).decode())
         for name, figure in drawn.items()
     }
+    answer = report.diagnosis
     return environment.get_template("report.html").render(
         title=_title(report.log),
         run=content.header_facts(report.log, report.sha256),
@@ -132,7 +133,7 @@ def render(report: Report, drawn: dict[str, Figure], command: str, made: datetim
         pictures=pictures,
         outcome=content.outcome_facts(report.log),
         channels=content.channel_rows(report.log),
-        diagnosis=None if report.diagnosis is None else diagnosis.context(report.diagnosis),
+        diagnosis=None if answer is None else diagnosis.context(answer, report.recording.drive_unit),
         fit=None if report.fit is None else _fit_context(report),
         made=f"{made:%Y-%m-%d %H:%M} UTC",
         version=version("mrbench"),

@@ -71,13 +71,12 @@ def whole(recording: Recording) -> Figure:
     """Displacement, drive and force of the whole recording."""
     figure = new_figure(9.0, 4.8)
     rows = figure.subplots(3, 1, sharex=True)
-    unit = recording.drive_unit
+    colours = DriveColours.of_recording(recording)
     drawn = (
         (1e3 * recording.displacement, DISPLACEMENT),
-        (recording.drive, f"drive [{unit}]"),
+        (recording.drive, colours.label),
         (recording.force, FORCE),
     )
-    colours = DriveColours.of_recording(recording)
     for axes, (values, label) in zip(rows, drawn, strict=True):
         draw_envelope(axes, envelope(recording.time, values, recording.drive), colours)
         style(axes, "time [s]" if axes is rows[-1] else "", label)
@@ -101,7 +100,7 @@ def residual(recording: Recording, floor: float) -> Figure:
     _mark_held_out(axes, recording)
     style(axes, "time [s]", "simulated − recorded [N]")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, frameon=False, ncols=2)
-    colour_bar(figure, [axes], colours)
+    colour_bar(figure, [axes], colours.scale, colours.label)
     return figure
 
 
@@ -162,7 +161,7 @@ def _by_stroke(
     for axes, stroke in zip(grid, strokes, strict=True):
         draw(list(axes), stroke, colours)
         if stroke.varying:
-            colour_bar(figure, list(axes), colours)
+            colour_bar(figure, list(axes), colours.scale, colours.label)
     drives = sorted({trace.drive for stroke in strokes for trace in stroke.traces if trace.drive is not None})
     labels = [(drive, f"{level(drive, colours.high - colours.low)} {colours.unit}") for drive in drives]
     legend(figure, colours, labels, recording.simulated is not None)

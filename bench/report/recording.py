@@ -5,10 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from bench.errors import ReportError
 from bench.recorder.reader import Log, LoggedSegment
 from bench.report.series import Series
 
 Array = npt.NDArray[np.float64]
+
+_SHOWN = ("displacement", "velocity", "force", "coil_drive")
+"""Channels that a picture needs."""
 
 
 @dataclass(frozen=True)
@@ -41,8 +45,16 @@ def recording_from(log: Log, series: Series | None) -> Recording:
     Args:
         log: as recorded; its segments tell what to draw.
         series: recorded and simulated force of the same log, or none.
+
+    Raises:
+        ReportError: the samples lack a channel that the pictures show.
     """
     samples = log.samples
+    for name in _SHOWN:
+        if series is None and name not in samples:
+            raise ReportError(
+                f"{log.path}: no channel {name!r} in the samples; a report shows {', '.join(_SHOWN)}"
+            )
     source = samples if series is None else series.arrays
     time = np.asarray(source["time"], float)
     return Recording(

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from bench.errors import ConfigError
+from bench.faults import first_fault
 from bench.methods.frozen import Frozen
 from bench.safety.limits import Action, Matrix
 
@@ -262,8 +263,7 @@ def load_config(path: Path) -> BenchConfig:
 
 def _first_fault(error: ValidationError, content: dict[str, Any]) -> str:
     """Section, key, value and what is allowed, of the first fault; and how many more there are."""
-    faults = error.errors(include_url=False)
-    first = faults[0]
+    first, words = first_fault(error)
     # pydantic puts the driver, by which it chose the section's form, into the place.
     place = [
         step for index, step in enumerate(first["loc"]) if not (index == 2 and first["loc"][0] == "instruments")
@@ -272,5 +272,4 @@ def _first_fault(error: ValidationError, content: dict[str, Any]) -> str:
     where = f"[{section}] {place[-1]}" if place else "the document"
     given = first["input"]
     value = f" = {given!r}" if isinstance(given, str | int | float | bool) else ""
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return f"{where}{value}: {first['msg'].removeprefix('Value error, ')}{more}"
+    return f"{where}{value}: {words}"

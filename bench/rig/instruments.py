@@ -69,13 +69,26 @@ class Rig:
         """All wires open; on leaving, everything is made safe and closed.
 
         Raises:
-            DriverError: one of them does not answer as itself; those that were open are closed again.
+            DriverError: some do not answer as themselves, all of which are named; the others are closed again.
         """
         with contextlib.ExitStack() as opened:
+            faults: list[DriverError] = []
             for one in self.named:
                 opened.callback(_closed, one.instrument)
-                one.instrument.connect()
+                try:
+                    one.instrument.connect()
+                except DriverError as error:
+                    # Whoever wires a bench wants all of what is wrong at once, not one instrument a try.
+                    faults.append(error)
+            if faults:
+                raise _together(faults, len(self.named))
             yield self
+
+
+def _together(faults: list[DriverError], instruments: int) -> DriverError:
+    if len(faults) == 1:
+        return faults[0]
+    return DriverError(f"{len(faults)} of {instruments} instruments fail: {'; '.join(map(str, faults))}")
 
 
 def _closed(instrument: Instrument) -> None:

@@ -57,8 +57,8 @@ def serve(wanted: Wanted, say: Callable[[str], None]) -> None:
     """
     log_to_stderr()
     data = wanted.data.resolve()
+    link, commands = _way_to_agent(wanted)
     with _folder(data), _listening(wanted.host, wanted.port) as listener:
-        link, commands = _way_to_agent(wanted)
         started = _agent_started(wanted, link, data)
         access, token = open_access(data, new=wanted.new_token)
         loopback = wanted.host in LOOPBACK_NAMES

@@ -5,7 +5,8 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from bench.agent.messages import AgentStatus, Step
+from bench.agent.messages import AgentStatus
+from bench.agent.steps import Step
 from bench.catalogue.models import JobRow, JobState, RunOutcome, RunRow, RunState
 from bench.methods.document import DriveKind
 

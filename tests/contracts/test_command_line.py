@@ -9,6 +9,7 @@ import pytest
 
 MRBENCH = Path(sys.executable).parent / "mrbench"
 COMMANDS = sorted(entry.name for entry in entry_points(group="mrbench.commands"))
+HEAVY = ("fastapi", "matplotlib", "numba", "numpy", "pydantic", "scipy", "torch")
 
 
 def mrbench(*words, folder):
@@ -29,6 +30,19 @@ def test_all_commands_are_listed_with_what_they_do(tmp_path):
     listed = mrbench("--help", folder=tmp_path).stdout.partition("Commands:")[2].splitlines()
     assert [line.split()[0] for line in listed if line.strip()] == COMMANDS
     assert all(len(line.split()) > 3 for line in listed if line.strip())
+
+
+def test_help_waits_for_nothing_heavy():
+    words = f"""if True:
+        import contextlib, io, sys
+        from bench.cli import main
+        with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()) as told:
+            main(["--help"])
+        assert "Commands:" in told.getvalue()
+        print([name for name in {HEAVY!r} if name in sys.modules])
+    """
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=60, check=True)
+    assert done.stdout.strip() == "[]"
 
 
 def test_the_version_is_told(tmp_path):
@@ -73,7 +87,11 @@ def test_misuse_ends_with_2_and_leaves_nothing(words, tmp_path):
         (("report", "run.mcap", "--out", "report.html"), "run.mcap"),
         (("run", "nonsense", "--scenario", "default"), "nonsense"),
         (("run", "nonsense", "--dry-run"), "nonsense"),
+        (("run", "quick", "--scenario", "nonsense"), "nonsense"),
         (("salvage", "run.mcap"), "run.mcap"),
+        (("serve", "--config", "bench.toml"), "bench.toml"),
+        (("sim", "--scenario", "nonsense"), "nonsense"),
+        (("worker", "--scheduler", "nonsense"), "nonsense"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )

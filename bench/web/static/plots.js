@@ -8,6 +8,7 @@ export const STRIP_SECONDS = 10;
 const LOOP_SECONDS = 2;
 const LOOP_PIECES = 12;
 const SHRINK_AFTER_MS = 2_000;
+const MARGIN = 0.03; // part of an axis that stays free at its ends
 
 /** Bounds of an axis that grow at once and shrink late, so that a plot can be read while it moves. */
 class CalmRange {
@@ -24,7 +25,8 @@ class CalmRange {
     const now = performance.now();
     const fills = high - low > 0.4 * (top - bottom) || top - bottom <= this.least * 1.5;
     if (fills) this.filledAt = now;
-    if (low < bottom || high > top || now - this.filledAt > SHRINK_AFTER_MS) {
+    const margin = MARGIN * (top - bottom);
+    if (low < bottom + margin || high > top - margin || now - this.filledAt > SHRINK_AFTER_MS) {
       this.held = this.around(low, high);
       this.filledAt = now;
     }
@@ -34,7 +36,7 @@ class CalmRange {
   around(low, high) {
     const span = Math.max((high - low) * 1.15, this.least);
     const middle = (low + high) / 2;
-    const step = roundStep(span / 6);
+    const step = roundStep(span / 12);
     return [Math.floor((middle - span / 2) / step) * step, Math.ceil((middle + span / 2) / step) * step];
   }
 }

@@ -69,7 +69,7 @@ def test_the_page_names_the_effect_its_size_and_what_else_it_could_be(written, t
         "97 % (95 % to 99 %)",
         "coil lag and gas spring",
         "31.0 N",
-        "a sine of 3.60 mm, 7.86 Hz, drive 1.50",
+        "a sine of 3.60 mm, 7.86 Hz, 1.50 V",
         "a gain is visible to calibration only",
     ):
         assert words in text, words
@@ -77,23 +77,23 @@ def test_the_page_names_the_effect_its_size_and_what_else_it_could_be(written, t
 
 def test_without_a_gap_nothing_is_named_and_no_map_is_drawn(written):
     found = read_diagnosis(written(verdict="no_gap", effects=[], alternatives=[], next_stroke=None))
-    assert diagnosis_plots.place(found) is None
-    said = context(found)
+    assert diagnosis_plots.place(found, "V") is None
+    said = context(found, "V")
     assert (said["effects"], said["next"], said["mood"]) == ([], "", "good")
     assert ("Part of the gap that this closes", "97 % (95 % to 99 %)") not in said["gap"]
 
 
 def test_what_stays_unexplained_is_a_warning_with_its_probability(written):
-    said = context(read_diagnosis(written(verdict="unexplained", effects=[], unknown_probability=0.93)))
+    said = context(read_diagnosis(written(verdict="unexplained", effects=[], unknown_probability=0.93)), "V")
     assert said["mood"] == "warning"
     assert said["sets"][-1] == ("something that the library does not have", "93 %")
 
 
 def test_the_map_puts_each_gap_where_its_condition_and_phase_are(written):
-    figure = diagnosis_plots.place(read_diagnosis(written()))
+    figure = diagnosis_plots.place(read_diagnosis(written()), "V")
     grid = np.asarray(figure.axes[0].images[0].get_array())
     names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-    assert names == ["10.0 mm, 2.00 Hz, drive 0", "10.0 mm, 2.00 Hz, drive 0.500"]
+    assert names == ["10.0 mm, 2.00 Hz, 0 V", "10.0 mm, 2.00 Hz, 0.500 V"]
     assert (grid[0, 0], grid[1, 2], grid.sum()) == (3.0, 12.0, 15.0)
 
 

@@ -111,6 +111,12 @@ def test_there_is_no_residual_without_a_fit(log):
         plots.residual(recording_from(log, None), 1.9)
 
 
+def test_a_log_without_a_shown_channel_is_refused_by_its_name(log):
+    without = {name: values for name, values in log.samples.items() if name != "force"}
+    with pytest.raises(ReportError, match=r"run\.mcap: no channel 'force' in the samples"):
+        recording_from(dataclasses.replace(log, samples=without), None)
+
+
 def test_plots_are_saved_as_png_and_svg(recording, tmp_path):
     plots.save({"whole": plots.whole(recording)}, tmp_path / "plots")
     assert (tmp_path / "plots" / "whole.png").read_bytes().startswith(b"\x89PNG")

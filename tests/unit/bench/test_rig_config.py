@@ -73,7 +73,7 @@ def test_limits_that_are_given_take_the_place_of_the_usual_ones():
     ("change", "words"),
     [
         (("baud = 115200", "baud = -1"), r"\[instruments.lvdt\] baud = -1.*greater than 0"),
-        (("clamped = true", "clampd = true"), r"\[instruments.drive\] clampd = True.*not permitted"),
+        (("clamped = true", "clampd = true"), r"\[instruments.drive\] clampd = True.*no such key"),
         (('driver = "lvdt"', 'driver = "ldvt"'), r"\[instruments\] lvdt.*'ldvt'.*'lvdt'"),
         (('driver = "lvdt"', 'driver = "thermometer"'), "0 instruments with driver lvdt; a bench has one lvdt"),
         (("trip = 1500.0", "trip = -3.0"), r"\[limits.force\] trip = -3.0"),

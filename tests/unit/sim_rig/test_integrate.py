@@ -3,10 +3,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from identification.damper.coordinates import COORDINATES, Coordinates, to_parameters
-from sim_rig import integrate
 from sim_rig.compiled import first, no_force, rigid, unscaled
 from sim_rig.errors import PlantError
 from sim_rig.plant import Plant
+from sim_rig.rates import rates
+from sim_rig.states import STATES
 
 
 def reference_force(plant: Plant, dt: float, command, drive):
@@ -16,13 +17,13 @@ def reference_force(plant: Plant, dt: float, command, drive):
     for i in range(len(drive)):
 
         def rate(t, s, i=i):
-            out = np.empty(integrate.STATES)
+            out = np.empty(STATES)
             now = command[i] + (command[i + 1] - command[i]) * t / dt
-            integrate.rates(s, 0.0, 0.0, now, drive[i], 0.0, *effects, out)
+            rates(s, 0.0, 0.0, now, drive[i], 0.0, *effects, out)
             return out
 
-        out = np.empty(integrate.STATES)
-        forces.append(integrate.rates(states, 0.0, 0.0, command[i], drive[i], 0.0, *effects, out)[0])
+        out = np.empty(STATES)
+        forces.append(rates(states, 0.0, 0.0, command[i], drive[i], 0.0, *effects, out)[0])
         states = solve_ivp(rate, (0.0, dt), states, "LSODA", rtol=1e-10, atol=1e-13).y[:, -1]
     return np.array(forces)
 

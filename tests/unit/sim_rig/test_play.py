@@ -82,7 +82,7 @@ def test_the_seed_of_the_command_line_stands_in_place_of_the_scenarios_own(run, 
 @pytest.mark.parametrize(
     ("scenario", "commands", "message"),
     [
-        ("nowhere", "commands.npz", "scenario nowhere: cannot be read"),
+        ("nowhere", "commands.npz", "no scenario nowhere: neither a file nor one of"),
         ("default", "no.npz", "no.npz: no readable"),
     ],
 )

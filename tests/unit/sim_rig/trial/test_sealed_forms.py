@@ -251,7 +251,7 @@ REFUSED = {
     "unknown form": ([{**usual("lugre"), "form": "bristles"}], "no sealed form 'bristles' of 'seal_friction'"),
     "form of another": ([{**usual("lugre"), "name": "gas_spring"}], "no sealed form 'lugre' of 'gas_spring'"),
     "missing parameter": ([{**usual("lugre"), "parameters": {"sliding": 1.0}}], "lugre takes sliding, peak"),
-    "out of bounds": ([usual("lugre", sliding=-1.0)], "lugre.sliding is -1 N, outside 0 to 2000"),
+    "out of bounds": ([usual("lugre", sliding=-1.0)], "lugre.sliding is -1 N, outside 0 to 2000 N"),
     "twice": ([usual("lugre"), usual("lugre")], "stands twice among seal_friction"),
     "two connections": ([usual("squeeze_film"), usual("closing_joint")], "two sealed effects make one connection"),
 }

@@ -16,7 +16,7 @@ from typing import TypeAlias
 
 from bench.agent.bench_clock import BenchClock
 from bench.agent.bench_thread import BenchThread
-from bench.agent.header import LogFacts, clock_words, decoders, documents, force_rate, run_header
+from bench.agent.header import LogFacts, force_rate
 from bench.agent.instrument_status import instrument_status
 from bench.agent.messages import (
     AgentEvent,
@@ -29,10 +29,10 @@ from bench.agent.messages import (
     Samples,
 )
 from bench.agent.preparation import Preparation
-from bench.agent.run import Run, order
+from bench.agent.run import Run
+from bench.agent.runner import Runner
 from bench.agent.warden import Warden
 from bench.errors import BenchError, LogError
-from bench.methods import Method
 from bench.methods.compile import BETWEEN
 from bench.recorder.live import LiveRecorder
 from bench.rig.acquisition import Acquisition, Batch
@@ -43,17 +43,13 @@ from bench.rig.priority import (
     HASTE,
     freeze_memory,
     ordinary_priority,
-    pause_collection,
     priority_refused,
     raise_priority,
-    resume_collection,
     with_priority,
 )
 from bench.safety.interlocks import Interlocks
-from bench.safety.limits import Action, specimen_matrix, stricter
+from bench.safety.limits import Action
 from bench.sequencer.move_rod import move_rod
-from bench.sequencer.plan import RunPlan
-from bench.sequencer.sequencer import Sequencer
 from drivers.channel import Frame
 from drivers.errors import DriverError
 
@@ -65,10 +61,6 @@ _SWITCH = 2e-4
 """[s] after which a thread that computes lets another one go on: setpoints do not wait for a summary."""
 _END_WITHIN = 20.0
 """[s] for a run to end in good order when the agent is shut down."""
-_CLOCK_KNOWN = 20.0
-"""[s] after which a device's clock is known to a few parts in a million; before, it is better taken as right."""
-_CLOCKS_SETTLE = 4.0
-"""[s] from opening the wires until their clocks are mapped well enough for a log."""
 _REMEMBERED = 100
 """Ended runs that the status lists."""
 
@@ -90,7 +82,7 @@ class Agent:
         Raises:
             DriverError: a driver refuses a setting.
         """
-        self._config, self._source, self._publish = config, source, publish
+        self._config, self._publish = config, publish
         self._clock = BenchClock()
         self._no_priority = priority_refused()
         self._rig = build_rig(config, self._clock, prompt=not self._no_priority)
@@ -105,6 +97,10 @@ class Agent:
         )
         aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
         self._bench = BenchThread(aligner, force_rate(config), publish, self._beat, self._log_failed)
+        self._runner = Runner(
+            config, source, self._rig, self._interlocks, self._warden, self._acquisition, self._bench, self._clock,
+            self._tell,
+        )  # fmt: skip
         self._lock = threading.RLock()
         self._state: AgentState = "idle"
         self._preparation = Preparation(self._rig, self._move, self._tell, self._prepared)
@@ -113,7 +109,6 @@ class Agent:
         self._finished: list[RunStatus] = []
         self._told: tuple[AgentState, str] | None = None
         self._told_at = 0.0
-        self._opened_ns = 0
         self._open = contextlib.ExitStack()
         for one in self._rig.named:
             one.instrument.listen(partial(self._keep, one.name))
@@ -138,7 +133,7 @@ class Agent:
             self._acquisition.start()
             opening.enter_context(self._bench)
             self._acquisition.reconnect = True
-            self._opened_ns = self._clock()
+            self._runner.opened_ns = self._clock()
             self._open = opening.pop_all()
 
     def __exit__(self, *_: object) -> None:
@@ -198,7 +193,7 @@ class Agent:
 
     def _move(self, target: float, ending: threading.Event) -> None:
         """Lead the rod to a place [m] where no run does."""
-        move_rod(self._rig.actuator, self._interlocks.permit, self._clock, self._set_led, target, ending)
+        move_rod(self._rig.actuator, self._interlocks.permit, self._clock, self._runner.set_led, target, ending)
 
     def _prepared(self) -> None:
         self._interlocks.matrix = self._config.limits.matrix()
@@ -248,66 +243,16 @@ class Agent:
         Raises:
             MethodError, RunError: it cannot be run.
         """
-        what = order(command, self._rig, self._config.rig.specimen, self._folder())
-        plan = RunPlan()
-        sequencer = Sequencer(
-            self._rig.actuator,
-            self._rig.amplifier,
-            self._interlocks,
-            plan,
-            self._clock,
-            self._tell,
-            self._warden.late,
-            self._warden.trip,
-            self._set_led,
-            partial(self._limit_by, what.method),
-            self._amplifier_rate,
-        )
-        run = Run(what, plan, sequencer, self._bench, self._clock, self._tell)
-        kept = documents(what.method, self._config, self._rig, self._source)
-        maps, now = self._acquisition.maps, self._clock()
-        header = run_header(what.method, what.identity, self._config, self._rig, maps, now)
-        facts = LogFacts(header, kept, partial(decoders, self._rig), partial(clock_words, self._rig, maps))
+        run, facts = self._runner.made(command)
         self._run = run
         self._thread = threading.Thread(target=self._carry_out, args=(run, facts), name="run", daemon=True)
         self._thread.start()
 
     def _carry_out(self, run: Run, facts: LogFacts) -> None:
-        self._let_clocks_settle()
-        # The way to where a method begins may lie outside of where the method stays.
-        self._limit_by(run.what.method, without="displacement")
-        self._interlocks.expect_force(self._clock())
-        self._acquisition.reconnect, self._warden.plan = False, run.plan
-        raise_priority(-HASTE)
-        pause_collection()
         try:
-            run.carry_out(facts, self._warden.settled, self._acquisition.maps)
+            self._runner.carry_out(run, facts)
         finally:
-            resume_collection()
-            self._warden.plan = None
-            self._interlocks.expect_force(None)
-            self._interlocks.matrix = self._config.limits.matrix()
-            self._acquisition.reconnect = True
             self._end(run)
-
-    def _let_clocks_settle(self) -> None:
-        """Wait, right after the wires were opened, until enough answers tell where the devices' clocks stand."""
-        left = self._opened_ns + round(_CLOCKS_SETTLE * 1e9) - self._clock()
-        time.sleep(max(left * 1e-9, 0.0))
-
-    def _limit_by(self, method: Method, without: str = "") -> None:
-        """Let a method's limits hold beside the fixture's."""
-        specimen = {name: steps for name, steps in specimen_matrix(method).items() if name != without}
-        self._interlocks.matrix = stricter(self._config.limits.matrix(), specimen)
-
-    def _amplifier_rate(self) -> float:
-        """How fast the amplifier's clock is, as a share; nothing as long as it has not been watched for long."""
-        known = self._clock() - self._opened_ns >= _CLOCK_KNOWN * 1e9
-        return self._acquisition.maps[self._rig.amplifier.name].rate() if known else 0.0
-
-    def _set_led(self, led: bool) -> None:
-        """While nobody leads the rod, it has to be asked for samples."""
-        self._acquisition.led = led
 
     def _end(self, run: Run) -> None:
         with self._lock:
@@ -404,7 +349,3 @@ class Agent:
             stale = self._rig.actuator.settings.stale_after
             found[f"{self._no_priority}; the drive stops by itself {stale:g} s after the last setpoint"] = None
         return tuple(found)
-
-    def _folder(self) -> Path:
-        base = Path() if self._source is None else self._source.parent
-        return base / self._config.rig.folder

@@ -16,11 +16,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from bench.rig.corridor import WANDER, Bound, Corridor, corridor
+
 Instants = npt.NDArray[np.int64]
 _Numbers = npt.NDArray[np.float64]
 
-FASTEST = 1e-3
-"""Share by which a device's clock may be fast or slow."""
 SLEW = 5e-4
 """Share by which the mapping may run faster or slower than the clocks do, to take up a correction."""
 TAKEN_UP_NS = 1_000_000_000
@@ -29,15 +29,6 @@ HASTE = 200
 """Times as fast in the first seconds, when the first answer may have been a slow one."""
 WINDOW_NS = 30_000_000_000
 """[ns] for which a stamp counts."""
-WANDER = 5e-7
-"""Share by which a clock's rate may change within a window: an old bound is loosened by it."""
-LEAN = 0.15
-"""Share of a quick exchange that its question takes: the clock is read as soon as that is understood, while the
-answer has still to be made, collected and carried, and is longer. Measured: 0.13 on Modbus TCP and on the serial
-line, 0.22 on CANopen."""
-QUESTION_NS = 100_000
-"""[ns] that the quickest of many questions takes at most, however late the answers are: those wait for a busy
-instrument and its adapter. Measured: 0.03 ms on Modbus TCP, 0.06 ms on the serial line, 0.17 ms on CANopen."""
 RESOLUTION_NS = 1_000
 """[ns] a device's clock shows."""
 _BUCKET_NS = 500_000_000
@@ -50,14 +41,6 @@ SET_ANEW_NS = 50_000_000
 """[ns] by which a clock must have moved for the mapping to follow in one leap."""
 _KNOTS = 48
 """Bends of the mapping that are remembered, two of them in half a second; samples come sooner than that."""
-_RATES = 65
-"""Rates tried at a time."""
-_USUAL_RATE = 1e-4
-"""Share by which clocks differ, as a rule: where stamps tell little, they are taken to be alike."""
-_SHORTEST_NS = 20_000.0
-"""[ns] below which a typical delay is not believed."""
-_ZOOMS = 4
-"""Times that the rates tried are spread anew over those that are possible."""
 
 
 class Stamped(Protocol):
@@ -76,49 +59,12 @@ class Stamped(Protocol):
         """Bench clock after it was read [ns]."""
 
 
-class _Bound(NamedTuple):
-    """A bound of the offset, bench minus device [ns], at an instant of the device's clock [ns]."""
-
-    at: int
-    offset: int
-
-
 class _Knot(NamedTuple):
     """From ``at`` on, the bench clock is ``bench`` + (device - ``at``)·``slope``, until the next knot."""
 
     at: int
     bench: float
     slope: float
-
-
-class _Corridor(NamedTuple):
-    """What the bounds leave at one instant of the device's clock."""
-
-    at: int
-    low: float
-    """Least offset possible [ns]."""
-    high: float
-    """Largest offset possible [ns]."""
-    slowest: float
-    """Least rate of the offset possible."""
-    fastest: float
-    """Largest rate of the offset possible."""
-    line: float
-    """Least offset [ns] by the likeliest rate."""
-    gap: float
-    """[ns] that it leaves between the bounds."""
-    rate: float
-    """The likeliest rate of the offset: that by which questions and answers were least late."""
-
-    def likeliest(self, at: int) -> float:
-        """The likeliest offset [ns]."""
-        return self.line + min(LEAN * self.gap, QUESTION_NS) + (at - self.at) * self.rate
-
-    def possible(self, at: int) -> tuple[float, float]:
-        """Least and largest offset at an instant [ns]."""
-        ahead = at - self.at
-        rates = (ahead * self.slowest, ahead * self.fastest)
-        return self.low + min(rates), self.high + max(rates)
 
 
 class ClockMap:
@@ -135,11 +81,11 @@ class ClockMap:
         self._restart()
 
     def _restart(self) -> None:
-        self._lows: deque[_Bound] = deque()
-        self._highs: deque[_Bound] = deque()
+        self._lows: deque[Bound] = deque()
+        self._highs: deque[Bound] = deque()
         self._first: int | None = None
         self._contradictions = 0
-        self._corridor: _Corridor | None = None
+        self._corridor: Corridor | None = None
         self._knots: deque[_Knot] = deque(maxlen=_KNOTS)
         self._arrays: tuple[Instants, Instants, _Numbers] | None = None
         self._handed: int | None = None
@@ -161,8 +107,8 @@ class ClockMap:
         Args:
             stamp: the device's clock between two instants of the bench's; the same one again tells nothing.
         """
-        low = _Bound(stamp.device_ns, stamp.sent_ns - stamp.device_ns - RESOLUTION_NS)
-        high = _Bound(stamp.device_ns, stamp.received_ns - stamp.device_ns)
+        low = Bound(stamp.device_ns, stamp.sent_ns - stamp.device_ns - RESOLUTION_NS)
+        high = Bound(stamp.device_ns, stamp.received_ns - stamp.device_ns)
         with self._lock:
             if stamp == self._fed or high.offset < low.offset or not self._believed(low, high):
                 return
@@ -174,7 +120,7 @@ class ClockMap:
 
         Answers to questions may wait for an adapter; of hundreds of samples a second some just catch it.
         """
-        high = _Bound(device_ns, received_ns - device_ns)
+        high = Bound(device_ns, received_ns - device_ns)
         with self._lock:
             corridor = self._corridor
             if corridor is not None and high.offset >= corridor.possible(device_ns)[0]:
@@ -221,7 +167,7 @@ class ClockMap:
         with self._lock:
             return -self._corridor.rate if self._corridor else 0.0
 
-    def _believed(self, low: _Bound, high: _Bound) -> bool:
+    def _believed(self, low: Bound, high: Bound) -> bool:
         """Whether a stamp can be true together with those before; several that cannot speak against these."""
         corridor = self._corridor
         if corridor is None:
@@ -242,7 +188,7 @@ class ClockMap:
         self._first, self._contradictions = None, 0
         return True
 
-    def _take(self, low: _Bound, high: _Bound) -> None:
+    def _take(self, low: Bound, high: Bound) -> None:
         self._first = low.at if self._first is None else self._first
         early = self._early(low.at)
         _keep(self._lows, low, early=early, sign=1)
@@ -259,16 +205,16 @@ class ClockMap:
             self._lows.popleft()
         while len(self._highs) > 1 and self._highs[0].at < at - WINDOW_NS:
             self._highs.popleft()
-        found = _corridor(self._lows, self._highs, at)
+        found = corridor(self._lows, self._highs, at)
         while found is None:  # the rate has changed by more than it may: what is old goes first
             oldest = self._lows if self._lows[0].at <= self._highs[0].at else self._highs
             shorter = oldest if len(oldest) > 1 else self._lows if len(self._lows) > 1 else self._highs
             shorter.popleft()
-            found = _corridor(self._lows, self._highs, at)
+            found = corridor(self._lows, self._highs, at)
         self._corridor = found
         self._bend(found, at)
 
-    def _bend(self, corridor: _Corridor, at: int) -> None:
+    def _bend(self, corridor: Corridor, at: int) -> None:
         """Let the mapping approach the estimate from here on; what has been handed out stays as it is."""
         self._arrays = None
         rate = 1 + corridor.rate
@@ -305,53 +251,10 @@ class ClockMap:
         return self._arrays
 
 
-def _keep(bounds: deque[_Bound], bound: _Bound, *, early: bool, sign: int) -> None:
+def _keep(bounds: deque[Bound], bound: Bound, *, early: bool, sign: int) -> None:
     """Keep a bound; of one bucket the tightest alone, where the clocks hardly move apart."""
     same = bounds and not early and bound.at // _BUCKET_NS == bounds[-1].at // _BUCKET_NS
     if not same:
         bounds.append(bound)
     elif sign * bound.offset > sign * bounds[-1].offset:
         bounds[-1] = bound
-
-
-def _corridor(lows: deque[_Bound], highs: deque[_Bound], at: int) -> _Corridor | None:
-    """What all bounds leave at an instant [ns]; none where no line keeps to them all."""
-    origin = lows[-1].offset
-    low_x, low_y = _arrays(lows, at, origin)
-    high_x, high_y = _arrays(highs, at, origin)
-    low_y, high_y = low_y + WANDER * np.minimum(low_x, 0), high_y - WANDER * np.minimum(high_x, 0)
-    rates = np.linspace(-FASTEST, FASTEST, _RATES)
-    found: _Corridor | None = None
-    for _ in range(_ZOOMS):
-        least = (low_y[:, None] - np.outer(low_x, rates)).max(axis=0)
-        most = (high_y[:, None] - np.outer(high_x, rates)).min(axis=0)
-        possible = np.flatnonzero(most >= least)
-        first, last = possible[[0, -1]] if possible.size else [np.argmax(most - least)] * 2
-        if possible.size:
-            edges = least[possible].min(), most[possible].max(), rates[first], rates[last]
-            gap = most - least
-            late = _lateness(least - (low_y.mean() - low_x.mean() * rates), len(low_y))
-            late += _lateness((high_y.mean() - high_x.mean() * rates) - most, len(high_y))
-            best = possible[np.argmin((late + np.abs(rates) / _USUAL_RATE)[possible])]
-            low, high, slowest, fastest = (float(edge) for edge in edges)
-            line = origin + float(least[best])
-            found = _Corridor(
-                at, origin + low, origin + high, slowest, fastest, line, float(gap[best]), float(rates[best])
-            )
-        rates = np.linspace(rates[max(first - 1, 0)], rates[min(last + 1, _RATES - 1)], _RATES)
-    return found
-
-
-def _lateness(mean: _Numbers, count: int) -> _Numbers:
-    """How unlikely one side's lateness is by each rate, as its share of what it is at best.
-
-    Delays are taken to be exponential. The side whose delays are short then says what the rate is; the other's may
-    scatter as an adapter likes.
-    """
-    return count * mean / max(float(mean.min()), _SHORTEST_NS)
-
-
-def _arrays(bounds: deque[_Bound], at: int, origin: int) -> tuple[_Numbers, _Numbers]:
-    x = np.array([bound.at - at for bound in bounds], dtype=np.float64)
-    y = np.array([bound.offset - origin for bound in bounds], dtype=np.float64)
-    return x, y

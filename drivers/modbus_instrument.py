@@ -15,7 +15,9 @@ from drivers.modbus_ring import Ring
 from drivers.modbus_samples import Layout
 
 _EVERY = 0.05
-"""[s] between two readings of a ring at most, but for an instrument that is slower: it is read once a sample."""
+"""[s] between two readings of a ring at most, but for an instrument that is slower."""
+_TOGETHER = 4
+"""Samples that are read at once at least: what changes slowly may be known a little later."""
 _FULL = 0.9
 """Share of a block that is waited for: each reading costs the host as much, however little stands in it."""
 _SPARE = 1.1
@@ -75,7 +77,7 @@ class ModbusInstrument:
         self._registers = Registers(self._line, map_)
         layout = Layout(map_)
         interval = layout.interval_ns * 1e-9
-        every = max(min(_FULL * layout.capacity * interval, _EVERY), interval)
+        every = max(min(_FULL * layout.capacity * interval, _EVERY), _TOGETHER * interval)
         self._ring = Ring(self._registers, clock, every=every)
 
     @property

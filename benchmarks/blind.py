@@ -5,16 +5,14 @@
 diagnoses and twins there and takes up where an earlier call stopped.
 """
 
-import argparse
 import json
 import os
-import subprocess
 import sys
-import time
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
+from benchmarks.kept import chosen, folder, mrbench, options
+from benchmarks.timing import timed
 from identification.document_file import write_document
 from identification.gap.diagnose import diagnose
 from identification.gap.words import summary
@@ -36,27 +34,21 @@ Made by
 """
 
 
-def diagnosed(source: Path, folder: Path) -> dict[str, Any]:
+def diagnosed(source: Path, kept: Path) -> dict[str, Any]:
     """The diagnosis of one recording, made once."""
     name = source.name.removesuffix(".csv.gz")
-    out = folder / f"{name}.json"
+    out = kept / f"{name}.json"
     if not out.exists():
-        log = folder / f"{name}.mcap"
+        log = kept / f"{name}.mcap"
         if not log.exists():
-            _type("import", source, "--out", log)
-        began = time.process_time()
-        found = diagnose([load(log)])
-        write_document(folder / f"{name}.twin.json", found.twin)
+            mrbench("import", source, "--out", log)
+        found, seconds = timed(lambda: diagnose([load(log)]))
+        write_document(kept / f"{name}.twin.json", found.twin)
         write_document(out, found.diagnosis)
-        (folder / f"{name}.seconds").write_text(f"{time.process_time() - began:.1f}", encoding="utf-8")
+        (kept / f"{name}.seconds").write_text(f"{seconds:.1f}", encoding="utf-8")
         print(f"{name}: {summary(found.diagnosis)}", flush=True)
     document: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
     return document
-
-
-def _type(*words: object) -> None:
-    command = Path(sys.executable).with_name("mrbench")
-    subprocess.run([str(command), *map(str, words)], check=True)
 
 
 def row(name: str, diagnosis: dict[str, Any], seconds: str) -> str:
@@ -71,23 +63,19 @@ def row(name: str, diagnosis: dict[str, Any], seconds: str) -> str:
 
 def main() -> None:
     """Diagnose every case and write the evidence."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--only", default="", help="cases by comma")
-    options.add_argument("--keep", type=Path, default=None, help="folder for logs, diagnoses and twins")
-    asked = options.parse_args()
+    asked = options(__doc__, "logs, diagnoses and twins").parse_args()
     shared = Path(os.environ.get("MRBENCH_SHARED", "."))
-    sources = sorted(shared.glob("blind/case*.csv.gz"))
+    sources = {s.name.removesuffix(".csv.gz"): s for s in sorted(shared.glob("blind/case*.csv.gz"))}
     if not sources:
         sys.exit("MRBENCH_SHARED: names no folder with blind/caseNN.csv.gz; point it at the recordings")
-    wanted = [name for name in asked.only.split(",") if name]
-    chosen = [s for s in sources if not wanted or s.name.removesuffix(".csv.gz") in wanted]
-    with TemporaryDirectory() as scratch:
-        folder = asked.keep or Path(scratch)
-        folder.mkdir(parents=True, exist_ok=True)
-        found = {s.name.removesuffix(".csv.gz"): diagnosed(s, folder) for s in chosen}
-        seconds = {name: (folder / f"{name}.seconds").read_text(encoding="utf-8") for name in found}
-    if len(chosen) < len(sources):
-        return
+    with folder(asked.keep) as kept:
+        found = {name: diagnosed(sources[name], kept) for name in chosen(asked.only, list(sources))}
+        seconds = {name: (kept / f"{name}.seconds").read_text(encoding="utf-8") for name in found}
+    if len(found) == len(sources):
+        _write(found, seconds)
+
+
+def _write(found: dict[str, dict[str, Any]], seconds: dict[str, str]) -> None:
     EVIDENCE.mkdir(parents=True, exist_ok=True)
     text = json.dumps(found, separators=(",", ":"), ensure_ascii=False)
     (EVIDENCE / "blind-predictions.json").write_text(text + "\n", encoding="utf-8")

@@ -8,9 +8,7 @@ tables of `docs/evidence/real-damper-effects.md`.
 
 import argparse
 import gzip
-import json
 import os
-import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks.kept import figures, mrbench
 from identification.assemble import Assembled, assemble
 from identification.effect_choice import EffectChoice
 from identification.gap.diagnose import diagnosed_problem
@@ -81,11 +80,7 @@ def random_stroke(data: Path, folder: Path) -> Logs:
 
 def _import(files: Sequence[Path], log: Path) -> None:
     if not log.exists():
-        _type("import", *files, "--out", log)
-
-
-def _type(*words: object) -> None:
-    subprocess.run([str(Path(sys.executable).with_name("mrbench")), *map(str, words)], check=True)
+        mrbench("import", *files, "--out", log)
 
 
 def errors(fit: JointFit, seen: Assembled, unseen: Assembled) -> dict[str, Any]:
@@ -116,17 +111,19 @@ def errors(fit: JointFit, seen: Assembled, unseen: Assembled) -> dict[str, Any]:
 
 def fitted(logs: Logs, sets: Sequence[Names], out: Path) -> list[dict[str, Any]]:
     """The figures of every set, made once."""
-    if not out.exists():
-        seen, unseen = assemble([load(logs.fitted)]), assemble([load(logs.unseen)])
-        problem = diagnosed_problem(seen, Judge.of(seen).pieces)
-        last, found = None, []
-        for names in sets:
-            last = fit_with(problem, tuple(EffectChoice(*name) for name in names), last, _EFFORT)
-            found.append({"set": [list(name) for name in names], **errors(last, seen, unseen)})
-            print(names, found[-1]["fitted"], found[-1]["unseen"], file=sys.stderr, flush=True)
-        out.write_text(json.dumps(found), encoding="utf-8")
-    figures: list[dict[str, Any]] = json.loads(out.read_text(encoding="utf-8"))
-    return figures
+    found: list[dict[str, Any]] = figures(out, lambda: _fitted(logs, sets))
+    return found
+
+
+def _fitted(logs: Logs, sets: Sequence[Names]) -> list[dict[str, Any]]:
+    seen, unseen = assemble([load(logs.fitted)]), assemble([load(logs.unseen)])
+    problem = diagnosed_problem(seen, Judge.of(seen).pieces)
+    last, found = None, []
+    for names in sets:
+        last = fit_with(problem, tuple(EffectChoice(*name) for name in names), last, _EFFORT)
+        found.append({"set": [list(name) for name in names], **errors(last, seen, unseen)})
+        print(names, found[-1]["fitted"], found[-1]["unseen"], file=sys.stderr, flush=True)
+    return found
 
 
 def table(found: Sequence[dict[str, Any]]) -> str:
@@ -154,7 +151,7 @@ def main() -> None:
         logs = make(data, asked.keep)
         diagnosis = asked.keep / f"{name}.diagnosis.json"
         if asked.diagnose and not diagnosis.exists():
-            _type("diagnose", logs.fitted, "--out", diagnosis)
+            mrbench("diagnose", logs.fitted, "--out", diagnosis)
         found = fitted(logs, SETS[name], asked.keep / f"{name}.json")
         print(f"\n## {name}\n\n{table(found)}\n")
         print("\n".join(f"| `{file}` | {error:.3f} |" for file, error in found[-1]["by_file"].items()))

@@ -2,8 +2,11 @@
 
 import time
 from collections.abc import Callable
+from typing import TypeVar
 
 import numpy as np
+
+Result = TypeVar("Result")
 
 
 def cpu_seconds(action: Callable[[], object], repeats: int = 5) -> float:
@@ -14,6 +17,13 @@ def cpu_seconds(action: Callable[[], object], repeats: int = 5) -> float:
         action()
         best = min(best, time.process_time() - began)
     return best
+
+
+def timed(work: Callable[[], Result]) -> tuple[Result, float]:
+    """What some work gives, and the processor time [s] that it took."""
+    began = time.process_time()
+    result = work()
+    return result, time.process_time() - began
 
 
 def reference_seconds() -> float:

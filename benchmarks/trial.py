@@ -43,6 +43,10 @@ on strokes that no fit saw), and so does what was left with the named effects ("
 ```
 {table}```
 
+## Read with care
+
+{care}
+
 ## Case by case
 
 The named set is in bold where it is the true one. "Shrinkage" is claimed / that on the run never seen.
@@ -65,6 +69,7 @@ def page(whole: Trial, drawn: int, next_strokes: Share) -> str:
         command=f"mrbench trial --cases {drawn} --seed {whole.seed}{grid} --over-wires 10 --out trial.json",
         bars="\n".join(f"| {' | '.join(line)} |" for line in _bars(told.scores, honest, next_strokes)),
         table=table(told),
+        care="\n".join(f"- {line}" for line in _care(honest, drawn)),
         rows="\n".join(map(_row, honest)),
     )
 
@@ -87,6 +92,43 @@ def _bars(found: Scores, cases: Sequence[CaseAnswer], next_strokes: Share) -> It
         )
     yield "truth named after the proposed stroke was made, poor methods", "90 %", _said(next_strokes)
     yield "same answer over the wires", "10 of 10", _said(_same_over_wires(cases))
+
+
+def _care(cases: Sequence[CaseAnswer], drawn: int) -> Iterable[str]:
+    """What is behind the figures: how many there are, and every case that went wrong."""
+    once = [case for case in cases if not case.over_wires]
+    if len(once) < drawn:
+        yield (
+            f"**How much ran.** {len(once)} of the {drawn} sealed cases; kinds, sizes and methods come in turn, "
+            "so that the beginning is a fair sample. Shares stand with Wilson's 95 % interval."
+        )
+    for case in cases:
+        if not case.right:
+            yield f"**{case.id}** ({case.method}, {_words(case.truth)} at work): {_wrong(case)}."
+    far = [case for case in once if case.named and case.named.effects and _off(case) > _WITHIN]
+    if far:
+        yield f"**Shrinkage more than {100 * _WITHIN:.0f} points off**, claimed and true: " + "; ".join(
+            f"{case.id} ({case.method}) {case.claimed_shrinkage:.2f} and {case.true_shrinkage:.2f}" for case in far
+        )
+
+
+def _words(names: Sequence[str]) -> str:
+    return " and ".join(names) or "nothing"
+
+
+def _wrong(case: CaseAnswer) -> str:
+    """What was said instead of the truth."""
+    if case.failure is not None or case.named is None:
+        return f"no diagnosis, {case.failure}"
+    said = f"{case.verdict}, {_words(case.named.effects)} named with {case.named.probability:.2f}"
+    unknown, truth = case.unknown_probability, case.probability_of_truth
+    return f"{said}, {unknown:.2f} for something unknown; the truth had {truth:.2f}"
+
+
+def _off(case: CaseAnswer) -> float:
+    """[1] by which the claimed shrinkage was off; 0 where there is none."""
+    claimed, true = case.claimed_shrinkage, case.true_shrinkage
+    return 0.0 if claimed is None or true is None else abs(claimed - true)
 
 
 def _said(found: Share) -> str:

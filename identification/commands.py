@@ -125,7 +125,7 @@ def _is_log(name: str) -> bool:
 
 def _forecast(model: Path, method: str, out: Path, series: Path | None, free: str) -> None:
     """Predict strokes that are only planned."""
-    from identification.document_file import write_document
+    from identification.document_file import place_in_words, write_document
     from identification.errors import IdentificationError
     from identification.forecast import forecast, planned_strokes
     from identification.results import read_fit
@@ -137,10 +137,9 @@ def _forecast(model: Path, method: str, out: Path, series: Path | None, free: st
     if series is not None:
         write_series(series, found)
     write_document(out, document)
-    where = "printed" if str(out) == "-" else out
     more = f"; {document.band.note}" if document.band.note else ""
     typer.echo(
-        f"{where}: force up to {document.largest_force_n:.4g} N, 95 % of the samples within "
+        f"{place_in_words(out)}: force up to {document.largest_force_n:.4g} N, 95 % of the samples within "
         f"{document.band.half_width_n:.3g} N of it{more}",
         err=True,
     )
@@ -169,6 +168,9 @@ def _words(text: str) -> tuple[str, ...]:
 
 def _say(out: Path, error: float, relative: float, floor: float, more: str) -> None:
     """One line of result for a person, on standard error: force error and noise floor [N]."""
-    where = "printed" if str(out) == "-" else out
+    from identification.document_file import place_in_words
+
     share = f"{100 * relative:.2g} % of the force's deviation"
-    typer.echo(f"{where}: force error {error:.3g} N ({share}), noise floor {floor:.3g} N; {more}", err=True)
+    typer.echo(
+        f"{place_in_words(out)}: force error {error:.3g} N ({share}), noise floor {floor:.3g} N; {more}", err=True
+    )

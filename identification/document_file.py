@@ -33,3 +33,8 @@ def write_document(out: Path, document: Document) -> None:
         partial.replace(out)
     except OSError as error:
         raise IdentificationError(f"{out}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def place_in_words(out: Path) -> str:
+    """Where a document went, for the line that says what it says."""
+    return "printed" if str(out) == "-" else str(out)

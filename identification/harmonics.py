@@ -58,15 +58,31 @@ def fit_harmonics(values: Array, weights: Array, rate: float, frequency: float, 
     Returns:
         The fit, counted from the segment's first sample; None where fewer than two cycles are steady.
     """
+    steady = steady_cycles(values, weights, rate, frequency, noise)
+    if steady is None:
+        return None
+    start, stop, frequency = steady
+    part = slice(start, stop)
+    return _fit(values[part], weights[part], rate, frequency, noise)._replace(start=start, stop=stop)
+
+
+def steady_cycles(
+    values: Array, weights: Array, rate: float, frequency: float, noise: float
+) -> tuple[int, int, float] | None:
+    """The steady cycles of a segment, on thinned samples: all but the harmonics themselves.
+
+    Args:
+        values, weights, rate, frequency, noise: as ``fit_harmonics`` takes them.
+
+    Returns:
+        First sample, one past the last, and the achieved frequency [Hz]; None where fewer than two are steady.
+    """
     if len(values) * frequency < _FEWEST_CYCLES * rate:
         return None
     stride = max(1, min(len(values) // 3000, int(rate / (24.0 * frequency))))
     start, stop, frequency = _steady(values[::stride], weights[::stride], rate / stride, frequency, noise)
     start, stop = start * stride, min(stop * stride, len(values))
-    if (stop - start) * frequency < _FEWEST_CYCLES * rate - 1.0:
-        return None
-    part = slice(start, stop)
-    return _fit(values[part], weights[part], rate, frequency, noise)._replace(start=start, stop=stop)
+    return (start, stop, frequency) if (stop - start) * frequency >= _FEWEST_CYCLES * rate - 1.0 else None
 
 
 def _fit(values: Array, weights: Array, rate: float, frequency: float, noise: float) -> Harmonics:

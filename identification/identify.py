@@ -14,7 +14,7 @@ from identification.assemble import Assembled, HoldOut, assemble
 from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError, NothingToFit
 from identification.fit_document import MISFIT, Ending, fit_document, of_samples, simulated_errors, unseen
-from identification.motion_noise import motion_scatter, with_motion
+from identification.motion_noise import play_noise, with_motion, without_pull
 from identification.prediction import rmse
 from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.profile import profile_intervals
@@ -149,7 +149,8 @@ def _refined(
     else:
         problem = _smoother_motion(problem, stretches, minimum)
         minimum = refine(problem, polish, progress, minimum.unknowns)
-        scatter = motion_scatter(problem, stretches, minimum, request.settings.seed)
+        played = play_noise(problem, stretches, minimum, request.settings.seed)
+        minimum, scatter = without_pull(problem, minimum, played.pull), played.scatter
     found = covariance(problem, minimum, scatter)
     seconds = time.process_time() - began
     error = _train_error(under_conditions(assembled, problem, minimum), problem, minimum)

@@ -6,9 +6,9 @@ difference of 2 µm noise at 1 kHz is 2.8 mm/s, at 2000 N s/m some 6 N. What is 
 1. The actuator gives way under the load. What the displacement follows of the recorded force is regressed on
    the force at lags of -6 to 45 ms, if it is there at all.
 2. A periodic stroke repeats: its harmonics are fitted (harmonics.py), over all segments that it goes on through.
-3. The rest is smoothed (smoother.py): the third differences of the motion are expected to be those of 1 and 2.
-   How stiffly is chosen place by place (each periodic segment, each stretch between them, the joints) where the
-   estimated error of the *velocity* is least (Mallows' Cp of the first differences). A fade, a move and a hold
+3. The rest is smoothed twice (smoother.py): the third differences of the motion are expected to be those of 1
+   and 2. How stiffly is chosen place by place (each periodic segment, each stretch between them, the joints) where
+   the estimated error of the *velocity* is least (Mallows' Cp of the first differences). A fade, a move and a hold
    are not alike: one stiffness for all of them bends the fades by micrometres, and k0 and k1 with them.
 """
 
@@ -59,15 +59,18 @@ class Motion(NamedTuple):
     """[m/s²]"""
     noise: float
     """Standard deviation of the noise of the recorded displacement [m]."""
+    cutoff: Array
+    """Of the smoother at each sample [Hz]."""
     method: tuple[str, ...]
     """How it was got, in words, one statement a segment; one for all where there are no segments."""
 
 
-def estimate_motion(stretch: Stretch) -> Motion:
+def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
     """The motion behind the recorded displacement of a stretch.
 
     Args:
         stretch: with the segments of its method, as far as they are known.
+        cutoff: (N,) of the smoother [Hz], where it is known already.
 
     Returns:
         The motion on the stretch's own time base.
@@ -78,9 +81,11 @@ def estimate_motion(stretch: Stretch) -> Motion:
     waves = _periodic_parts(stretch, weights, give, noise)
     regions = _regions(len(weights), waves, stretch.rate, bool(np.any(give)))
     expected = _expected(give, waves, int(_LAGS[-1] * stretch.rate))
-    cutoffs = _cutoffs(stretch.displacement, weights, expected, regions, stretch.rate, noise)
-    penalty = stiffness(_looser_at_the_ends(cutoffs[regions], stretch.rate)[1:-2], stretch.rate)
-    displacement = smoothed(stretch.displacement, weights, penalty, expected)
+    if cutoff is None:
+        found = _cutoffs(stretch.displacement, weights, expected, regions, stretch.rate, noise, twice=True)
+        cutoff = found[regions]
+    penalty = stiffness(_looser_at_the_ends(cutoff, stretch.rate)[1:-2], stretch.rate)
+    displacement = smoothed(stretch.displacement, weights, penalty, expected, twice=True)
     velocity, from_record = _better_velocity(stretch, displacement)
     rest = (stretch.displacement - displacement)[stretch.measured]
     return Motion(
@@ -88,7 +93,8 @@ def estimate_motion(stretch: Stretch) -> Motion:
         velocity,
         derivative(velocity, stretch.rate),
         float(np.std(rest)),
-        _in_words(stretch, waves, cutoffs, regions, bool(np.any(give)), from_record),
+        cutoff,
+        _in_words(stretch, waves, cutoff, bool(np.any(give)), from_record),
     )
 
 
@@ -231,7 +237,16 @@ def _expected(give: Array, waves: list[Harmonics], unknown: int) -> Array:
     return expected
 
 
-def _cutoffs(values: Array, weights: Array, expected: Array, regions: Indices, rate: float, noise: float) -> Array:
+def _cutoffs(
+    values: Array,
+    weights: Array,
+    expected: Array,
+    regions: Indices,
+    rate: float,
+    noise: float,
+    *,
+    twice: bool = False,
+) -> Array:
     """The cutoff [Hz] for each region that makes the estimated error of the velocity least."""
     highest = max(min(_HIGHEST * rate, _STROKE_BAND), 2.0 * _LOWEST * rate)
     steps = int(np.log(highest / (_LOWEST * rate)) / np.log(_CUTOFF_RATIO)) + 1
@@ -242,9 +257,9 @@ def _cutoffs(values: Array, weights: Array, expected: Array, regions: Indices, r
     costs = np.empty((len(trials), count))
     for cost, cutoff in zip(costs, trials, strict=True):
         penalty = np.full(len(expected), float(stiffness(cutoff, rate)))
-        left = np.diff(values - smoothed(values, weights, penalty, expected)) ** 2
+        left = np.diff(values - smoothed(values, weights, penalty, expected, twice=twice)) ** 2
         cost[:] = np.bincount(regions[1:], both * left, count)
-        cost += 2.0 * noise**2 * sizes * kept_noise(cutoff, rate)
+        cost += 2.0 * noise**2 * sizes * kept_noise(cutoff, rate, twice=twice)
     return np.asarray(trials[np.argmin(costs, axis=0)])
 
 
@@ -288,21 +303,18 @@ def _unexplained(stretch: Stretch, displacement: Array, velocity: Array) -> floa
 
 
 def _in_words(
-    stretch: Stretch, waves: list[Harmonics], cutoffs: Array, regions: Indices, gives: bool, from_record: bool
+    stretch: Stretch, waves: list[Harmonics], cutoff: Array, gives: bool, from_record: bool
 ) -> tuple[str, ...]:
     """How the motion of each segment was got."""
     load = ", what follows the force" if gives else ""
     load += "; velocity as recorded" if from_record else ""
     words = []
     for segment in stretch.segments:
-        mine = [k for k, wave in enumerate(waves) if segment.start <= wave.start < segment.stop]
-        for k in mine:
-            orders = ", ".join(str(order) for order in waves[k].orders)
-            words.append(
-                f"{waves[k].frequency:.5g} Hz with harmonics {orders}{load}, "
-                f"the rest below {cutoffs[1 + k]:.3g} Hz"
-            )
+        mine = [wave for wave in waves if segment.start <= wave.start < segment.stop]
+        for wave in mine:
+            orders = ", ".join(str(order) for order in wave.orders)
+            below = cutoff[(wave.start + wave.stop) // 2]
+            words.append(f"{wave.frequency:.5g} Hz with harmonics {orders}{load}, the rest below {below:.3g} Hz")
         if not mine:
-            middle = regions[(segment.start + segment.stop) // 2]
-            words.append(f"smoothed below {cutoffs[middle]:.3g} Hz{load}")
-    return tuple(words) or (f"smoothed below {cutoffs[regions[len(regions) // 2]]:.3g} Hz{load}",)
+            words.append(f"smoothed below {cutoff[(segment.start + segment.stop) // 2]:.3g} Hz{load}")
+    return tuple(words) or (f"smoothed below {cutoff[len(cutoff) // 2]:.3g} Hz{load}",)

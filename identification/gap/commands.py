@@ -24,7 +24,7 @@ def diagnose(
     seed: Annotated[int, typer.Option(help="Of the scattered starts.")] = 1,
 ) -> None:
     """Say where simulation and recording differ, which effect is missing, and how far adding it closes the gap."""
-    from identification.document_file import check_place, write_document
+    from identification.document_file import check_place, place_in_words, write_document
     from identification.gap.diagnose import diagnose as answer
     from identification.gap.model import read_model
     from identification.gap.words import summary
@@ -40,7 +40,7 @@ def diagnose(
     write_document(out, found.diagnosis)
     if twin is not None:
         write_document(twin, found.twin)
-    typer.echo(f"{'printed' if str(out) == '-' else out}: {summary(found.diagnosis)}", err=True)
+    typer.echo(f"{place_in_words(out)}: {summary(found.diagnosis)}", err=True)
 
 
 def trend(
@@ -51,7 +51,7 @@ def trend(
     seed: Annotated[int, typer.Option(help="Of the scattered starts.")] = 1,
 ) -> None:
     """Say what grows or falls over the runs of one specimen, by how much a run, and since which."""
-    from identification.document_file import check_place, write_document
+    from identification.document_file import check_place, place_in_words, write_document
     from identification.gap.trend import trend as answer
     from identification.progress import progress_on_terminal
     from identification.recordings import load
@@ -60,4 +60,4 @@ def trend(
     with progress_on_terminal("trend") as progress:
         found = answer([load(log) for log in logs], seed=seed, progress=progress)
     write_document(out, found)
-    typer.echo(f"{'printed' if str(out) == '-' else out}: {found.explanation}", err=True)
+    typer.echo(f"{place_in_words(out)}: {found.explanation}", err=True)

@@ -49,7 +49,10 @@ class Gap(Document):
     shrinkage: float | None = Field(
         description="1 - (after² - floor²)/(before² - floor²); null where before is within 2 % of the floor"
     )
-    shrinkage_ci95: tuple[float, float] | None = Field(description="by resampling the held-out cycles")
+    shrinkage_ci95: tuple[float, float] | None = Field(
+        description="95 % interval for other strokes: held-out conditions and cycles drawn anew, "
+        "noise of the motion and error of the form allowed for"
+    )
     nominal_n: float | None = Field(default=None, description="RMSE of the given simulation in N; null without")
     train_before_n: float = Field(description="RMSE without effects on the fitted strokes, in N")
     train_after_n: float = Field(description="RMSE with the named effects on the fitted strokes, in N")

@@ -7,7 +7,7 @@ gone on a thinned problem; the best end is refined on all samples.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 
@@ -51,6 +51,8 @@ class Effort:
     """Most steps of one descent."""
     default_start: bool = True
     """Whether the regression's coordinates are a start too."""
+    look: int = 1
+    """Every so many of the thinned samples on which starts are judged."""
     settling: int = 0
     """Steps of the law alone beside an effect that stays as it starts, before both move together."""
     polish: bool = True
@@ -179,7 +181,7 @@ def fit_with(
         joint.quicker().coarser(min(effort.thin, _PLAY_THIN) if play else effort.thin) if effort.polish else joint
     )
     with threadpool_limits(1, "blas"):
-        starts = sorted(_starts(quick, start, effort, further), key=lambda s: s.cost)
+        starts = sorted(_starts(quick.coarser(effort.look), start, effort, further), key=lambda s: s.cost)
         ends: list[Minimum] = []
         for begin in starts[: effort.descents]:
             ends.append(descend(quick, begin.unknowns, effort.iterations, _silent))
@@ -192,6 +194,27 @@ def fit_with(
         if play or any(p.low_pass for p in joint.pieces):
             best = descend(joint, best.unknowns, effort.iterations, _silent)
     return JointFit(joint, best)
+
+
+def fit_on_all(problem: Problem, near: JointFit, simulated: Sequence[Array], iterations: int) -> JointFit:
+    """The end of a way on thinned samples, taken on all of them.
+
+    What filter and play between samples do to the force costs several times all else and hardly changes near the
+    end: it is taken from a whole simulation, and held while the quick problem descends.
+
+    Args:
+        problem: all samples; its effects are replaced.
+        near: where the search ended.
+        simulated: (N,) forces [N] of the whole simulation there, one a piece.
+        iterations: most steps.
+    """
+    quick = problem.with_effects(near.effects).quicker()
+    unknowns = near.minimum.unknowns
+    missed = [whole - own for whole, own in zip(simulated, quick.simulate(unknowns), strict=True)]
+    pieces = tuple(replace(p, force=p.force - m) for p, m in zip(quick.pieces, missed, strict=True))
+    held = replace(quick, pieces=pieces)
+    with threadpool_limits(1, "blas"):
+        return JointFit(held, descend(held, unknowns, iterations, _silent))
 
 
 def _silent(what: str, error: float) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
-from identification.harmonics import fit_harmonics
+from identification.harmonics import steady_cycles
 from identification.motion import Motion
 from identification.recordings import Segment, Stretch
 from identification.smoother import derivative, smoothed, stiffness
@@ -90,9 +90,10 @@ def measure_floor(stretch: Stretch, motion: Motion) -> Floor:
         The floor and how it was got. Noise of the displacement is no part of it.
     """
     swift = high_frequency_noise(stretch.force)
-    pairs = [_pairs(stretch, motion, s) for s in stretch.segments if s.motion in _PERIODIC and s.frequency]
+    periodic = [s for s in stretch.segments if s.motion in _PERIODIC and s.frequency]
+    pairs = [p for s in periodic if (p := _pairs(stretch, motion, s)) is not None]
     limit = max(_as_alike_as(pairs), _SAME * float(np.std(stretch.displacement)))
-    repeats = [_repeats(p, limit) for p in pairs if p is not None]
+    repeats = [_repeats(p, limit) for p in pairs]
     freedom = sum(r.freedom for r in repeats)
     if freedom < _FEWEST:
         return Floor(swift, None, swift, f"high frequency: {_why_not(stretch, freedom)}")
@@ -181,13 +182,14 @@ def _pairs(stretch: Stretch, motion: Motion, segment: Segment) -> _Pairs | None:
     part = slice(segment.start, segment.stop)
     weights = stretch.measured[part].astype(float)
     frequency = segment.frequency or 0.0
-    wave = fit_harmonics(motion.displacement[part], weights, stretch.rate, frequency, motion.noise)
-    if wave is None:
+    cycles = steady_cycles(motion.displacement[part], weights, stretch.rate, frequency, motion.noise)
+    if cycles is None:
         return None
-    steady = slice(segment.start + wave.start, segment.start + wave.stop)
-    lag = stretch.rate / wave.frequency
+    start, stop, achieved_frequency = cycles
+    steady = slice(segment.start + start, segment.start + stop)
+    lag = stretch.rate / achieved_frequency
     difference, share = _cycle_difference(stretch.force[steady], lag)
-    achieved = _achieved(stretch, steady, wave.frequency)
+    achieved = _achieved(stretch, steady, achieved_frequency)
     explained = np.stack([_cycle_difference(x, lag)[0] for x in achieved])
     alike = _alike(stretch.drive[steady], stretch.measured[steady], lag, stretch.rate)
     if np.count_nonzero(alike) < _FEWEST_ALIKE:
@@ -198,12 +200,12 @@ def _pairs(stretch: Stretch, motion: Motion, segment: Segment) -> _Pairs | None:
     return _Pairs(difference[alike], explained[:, alike], velocity[alike], cycle, other, share)
 
 
-def _as_alike_as(pairs: Sequence[_Pairs | None]) -> float:
+def _as_alike_as(pairs: Sequence[_Pairs]) -> float:
     """[m] by which the motion of two cycles may differ: where the rod stumbled once, force differs with it.
 
     A force that is steep over some micrometres is not explained by terms that are linear in the difference.
     """
-    others = [p.other for p in pairs if p is not None]
+    others = [p.other for p in pairs]
     return _ALIKE * float(np.quantile(np.concatenate(others), 0.25)) if others else 0.0
 
 

@@ -1,17 +1,25 @@
 """What is kept out of every fit, and how far the gap shrinks there."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
 from identification.gap.residual import Cycles
+
+Indices = npt.NDArray[np.intp]
 
 _EVERY = 4
 """One segment, or cycle, of so many is held out."""
 _FEWEST_SEGMENTS = 10
 """Segments below which cycles are held out rather than whole segments."""
 _DRAWS = 1000
+_FORM, _FEW_STROKES = 0.35, 1.0
+"""[1] deviation of the logarithm of what a form leaves, from strokes to others; and more where strokes are few."""
+_SIZE = 0.25
+"""[1] deviation of the logarithm of the gap itself."""
 _NEAR_FLOOR = 1.02
 """[1] RMSE over the floor below which there is no gap to shrink."""
 
@@ -45,24 +53,56 @@ class Shrinkage:
     ci95: tuple[float, float] | None
 
 
-def shrinkage(before: Array, after: Array, counts: Array, floor: float) -> Shrinkage:
-    """How far the gap shrinks, with an interval from drawing the held-out cycles anew.
+class HeldOut(NamedTuple):
+    """The held-out cycles, (cycles,) each."""
+
+    before: Array
+    """Sum of squared residuals without effects [N²]."""
+    after: Array
+    """The same with them."""
+    counts: Array
+    """Samples."""
+    segment: Indices
+    """Which segment each belongs to."""
+
+
+def shrinkage(held: HeldOut, noise: float, carried: float, strokes: int) -> Shrinkage:
+    """How far the gap shrinks, with an interval for other strokes of the same damper.
+
+    Conditions that were held out are drawn anew, and their cycles. Two things are no matter of drawing: the motion
+    of another run carries its noise into the force again, and the error of a form is another one on other strokes,
+    the more so the fewer strokes the recording has.
 
     Args:
-        before: (cycles,) sum of squared residuals without effects [N²].
-        after: (cycles,) the same with them.
-        counts: (cycles,) samples.
-        floor: noise of the force [N].
+        held: the held-out cycles.
+        noise: of the recorded force [N].
+        carried: noise of the motion in the simulated force [N].
+        strokes: how many of different amplitude or frequency were recorded.
     """
-    total = float(counts.sum())
-    rms = [float(np.sqrt(s.sum() / total)) for s in (before, after)]
-    if rms[0] < _NEAR_FLOOR * floor:
+    total = float(held.counts.sum())
+    rms = [float(np.sqrt(s.sum() / total)) for s in held[:2]]
+    if rms[0] < _NEAR_FLOOR * noise:
         return Shrinkage(rms[0], rms[1], None, None)
-    draws = np.random.default_rng(0).integers(0, len(counts), (_DRAWS, len(counts)))
-    samples = counts[draws].sum(axis=1)
-    drawn = 1.0 - (after[draws].sum(axis=1) / samples - floor**2) / np.maximum(
-        before[draws].sum(axis=1) / samples - floor**2, 1e-3 * floor**2
-    )
-    value = 1.0 - (rms[1] ** 2 - floor**2) / (rms[0] ** 2 - floor**2)
-    low, high = np.quantile(drawn, [0.025, 0.975])
+    value = 1.0 - (rms[1] ** 2 - noise**2) / (rms[0] ** 2 - noise**2)
+    if held.before is held.after or np.array_equal(held.before, held.after):
+        return Shrinkage(rms[0], rms[1], value, (value, value))
+    random = np.random.default_rng(0)
+    before, after = _drawn(held, random)
+    spread = _FORM + _FEW_STROKES / max(strokes, 1)
+    left = np.maximum(after - noise**2, 0.0) * np.exp(spread * random.standard_normal(_DRAWS))
+    left += carried**2 * np.exp(_FORM * random.standard_normal(_DRAWS))
+    whole = np.maximum(before - noise**2, 1e-2 * noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
+    low, high = np.quantile(1.0 - left / whole, [0.025, 0.975])
     return Shrinkage(rms[0], rms[1], value, (min(float(low), value), max(float(high), value)))
+
+
+def _drawn(held: HeldOut, random: np.random.Generator) -> tuple[Array, Array]:
+    """Mean squares (draws,) [N²] without and with effects: segments drawn anew, then cycles within each."""
+    names, place = np.unique(held.segment, return_inverse=True)
+    members = [np.flatnonzero(place == k) for k in range(len(names))]
+    means = np.empty((2, _DRAWS))
+    for draw in range(_DRAWS):
+        chosen = random.integers(0, len(names), len(names))
+        rows = np.concatenate([random.choice(members[k], len(members[k])) for k in chosen])
+        means[:, draw] = np.array([held.before[rows].sum(), held.after[rows].sum()]) / held.counts[rows].sum()
+    return means[0], means[1]

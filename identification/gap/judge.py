@@ -8,8 +8,9 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.assemble import Assembled
-from identification.gap.held_out import Shrinkage, held_out_cycles, shrinkage
+from identification.gap.held_out import HeldOut, Shrinkage, held_out_cycles, shrinkage
 from identification.gap.residual import Cycles, cut_cycles
+from identification.gap.stumbles import left_out
 from identification.gap.where import Left
 from identification.problem import Piece
 
@@ -28,6 +29,8 @@ class Judge:
     """(cycles,) kept out of every fit."""
     start: Array
     """(N,) [s] of each sample since the first."""
+    notes: tuple[str, ...] = ()
+    """What was left out of the recordings, in words."""
 
     @staticmethod
     def of(assembled: Assembled) -> "Judge":
@@ -35,7 +38,8 @@ class Judge:
         cycles = cut_cycles(assembled.stretches, assembled.pieces)
         first = assembled.stretches[0].time[0]
         time = np.concatenate([s.time - first for s in assembled.stretches])
-        return Judge(tuple(map(_once_moved, assembled.pieces)), cycles, held_out_cycles(cycles), time)
+        pieces, notes = left_out(assembled.pieces, cycles)
+        return Judge(tuple(map(_once_moved, pieces)), cycles, held_out_cycles(cycles), time, tuple(notes))
 
     @cached_property
     def usable(self) -> BoolArray:
@@ -82,12 +86,19 @@ class Judge:
         """RMSE [N] on seen and on unseen strokes."""
         return _rms(left.residual[self.seen]), _rms(left.residual[self.unseen])
 
-    def shrunk(self, before: Left, after: Left, floor: float) -> Shrinkage:
-        """How far the gap shrinks on the unseen strokes; ``floor`` [N]."""
+    def shrunk(self, before: Left, after: Left, noise: float, carried: float) -> Shrinkage:
+        """How far the gap shrinks on the unseen strokes.
+
+        Args:
+            before, after: what the law leaves without and with effects.
+            noise: of the recorded force [N].
+            carried: noise of the motion in the simulated force [N].
+        """
         sums = [self.cycles.sums(left.residual**2, self.unseen) for left in (before, after)]
         counts = self.cycles.sums(np.ones(len(self.force)), self.unseen)
         there = counts > 0
-        return shrinkage(sums[0][there], sums[1][there], counts[there], floor)
+        drawn = HeldOut(sums[0][there], sums[1][there], counts[there], self.cycles.segment[there])
+        return shrinkage(drawn, noise, carried, self.cycles.strokes)
 
 
 def _once_moved(piece: Piece) -> Piece:

@@ -51,6 +51,11 @@ class Cycles:
         """How many cycles there are."""
         return len(self.segment)
 
+    @property
+    def strokes(self) -> int:
+        """How many strokes of different amplitude or frequency there are."""
+        return len({(f"{c.amplitude:.2g}", f"{c.frequency:.2g}") for c in self.conditions if c.frequency})
+
     def sums(self, values: Array, where: BoolArray) -> Array:
         """(cycles,) sum of values (N,) over the samples of each cycle that are marked."""
         chosen = where & (self.cycle >= 0)

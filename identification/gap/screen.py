@@ -81,7 +81,7 @@ def screen(
         frame = _Frame.at(quick, first.unknowns, line)
         looks = sorted((frame.best(choice) for choice in chosen), key=lambda g: -g.gain)
         found = [frame.taken(look) for look in looks[:_TRIED]] + looks[_TRIED:]
-    return sorted(found, key=lambda g: -max(g.gain, g.achieved))
+    return sorted(found, key=lambda g: -promise(g))
 
 
 def worth_fitting(gains: Sequence[Gain], count: int) -> list[Gain]:

@@ -16,9 +16,9 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.effects import EFFECTS
 from identification.effect_choice import EffectChoice
-from identification.gap.colour import floor_under
 from identification.gap.contender import Contender
-from identification.gap.explain import Effort, JointFit, fit_with
+from identification.gap.explain import Effort, JointFit, fit_on_all, fit_with
+from identification.gap.hearing import NOTHING, Hearing
 from identification.gap.hum import strongest_line
 from identification.gap.judge import Judge
 from identification.gap.plausible import plausibility
@@ -33,8 +33,6 @@ _SCREEN_RATE = 125.0
 """[Hz] of the first look, and of long recordings."""
 _MANY = 15_000
 """[samples] above which a recording is thinned further."""
-_NOTHING = 1.008
-"""[1] RMSE over the floor up to which nothing is looked for."""
 _FITTED = (6, 4, 2)
 """Effects fitted beside none, one and two others."""
 _LARGE, _MORE = 2.0, 10
@@ -61,10 +59,16 @@ _FAIR = 0.15
 """[1] that part."""
 _SHOWN = 0.8
 """[1] part of the excess that the simplest form of play or give may leave, for richer ones to be tried."""
-_COLOURED = 1.02
-"""[1] noise over the floor so far from which on it is coloured."""
+_HELPS = 0.97
+"""[1] part of the excess that play or give may leave alone, to be tried beside other effects too."""
+_POLISHED, _ROUNDS = 15, 3
+"""Most steps on all samples, and how often what they hold is taken anew."""
+_HELD = 1e-3
+"""[1] of the floor by which what they hold may be off."""
 Progress = Callable[[str, float], None]
-_STAGED = Effort(thin=1, starts=0, descents=2, iterations=25, default_start=False, settling=5, polish=False)
+_STAGED = Effort(
+    thin=1, starts=0, descents=2, iterations=25, default_start=False, look=2, settling=5, polish=False
+)
 _PLAIN = Effort(thin=1, starts=1, descents=1, iterations=40, polish=False)
 _QUICK = Effort(thin=1, starts=0, descents=1, iterations=25, default_start=False, polish=False)
 
@@ -76,8 +80,8 @@ class Search:
     full: Problem
     """All samples that may be fitted."""
     judge: Judge
-    floor: float
-    """[N] what counts as noise: the white one, or a coloured one once a residual has shown it."""
+    hearing: Hearing
+    """What counts as noise so far."""
     progress: Progress = lambda what, error: None
     found: dict[frozenset[str], Contender] = field(default_factory=dict)
     complete: set[frozenset[str]] = field(default_factory=set)
@@ -88,8 +92,8 @@ class Search:
     def run(self) -> None:
         """Fit what is worth it; ``found`` holds the best of each set."""
         none = self.fit((), effort=_PLAIN)
-        self._hear(none)
-        if self.at_floor(none) or max(none.seen, none.unseen) < _NOTHING * self.floor:
+        self.hearing.listen(none, self.full, self.judge)
+        if self.at_floor(none) or self._nothing(none):
             return
         beam = [none]
         for size, count in enumerate(_FITTED, 1):
@@ -100,11 +104,15 @@ class Search:
             grown = sorted((c for n, c in self.found.items() if len(n) == size), key=self.left_of)
             if not grown or size > len(_BEAM) or not self._worth_it(grown[0], beam[0]):
                 break
-            self._hear(grown[0])
+            self.hearing.listen(grown[0], self.full, self.judge)
             limit = _RIVAL * max(self.left_of(grown[0]), _ENOUGH)
             near = [c for c in grown if self.left_of(c) < limit]
             beam = near[: _BEAM[size - 1]]
         self._back()
+
+    def _nothing(self, none: Contender) -> bool:
+        """Whether the law alone stands so near the floor that nothing is looked for."""
+        return max(none.seen, none.unseen) < NOTHING * self.floor
 
     @property
     def _late(self) -> bool:
@@ -116,11 +124,10 @@ class Search:
         left = self.left_of(best)
         return left < _WORTH * self.left_of(parent) or (not parent.names and left > _LARGE)
 
-    def _hear(self, contender: Contender) -> None:
-        """Raise the floor to what a set leaves, as far as that is noise though not white."""
-        heard = floor_under(contender.left, self.judge.cycles)
-        if heard is not None and heard > _COLOURED * self.floor:
-            self.floor = heard
+    @property
+    def floor(self) -> float:
+        """[N] what no effect explains."""
+        return self.hearing.floor
 
     def left_of(self, contender: Contender) -> float:
         """Its excess over the floor [1]."""
@@ -128,8 +135,7 @@ class Search:
 
     def at_floor(self, contender: Contender) -> bool:
         """Whether nothing is left to look for."""
-        whole = self.left_of(self.found[frozenset()])
-        return self.left_of(contender) < _ENOUGH + _ENOUGH_OF_WHOLE * max(whole, 0.0)
+        return self.left_of(contender) < _ENOUGH + _ENOUGH_OF_WHOLE * max(self._none_left, 0.0)
 
     def best(self) -> Contender:
         """What leaves least."""
@@ -170,10 +176,14 @@ class Search:
 
     def _polished(self, contender: Contender) -> Contender:
         """The same set, fitted on all samples."""
-        effort = Effort(thin=1, starts=0, descents=1, iterations=15, default_start=False)
-        return self.judged(
-            fit_with(self.full, contender.fit.effects, None, effort, [contender.fit.minimum.unknowns])
-        )
+        edges = np.cumsum([len(p.force) for p in self.full.pieces])[:-1]
+        for _ in range(_ROUNDS):
+            simulated = np.split(contender.left.simulated, edges)
+            fit = fit_on_all(self.full, contender.fit, simulated, _POLISHED)
+            contender = self.judged(fit)
+            if abs(contender.seen - fit.rmse) < _HELD * self.floor:
+                break
+        return contender
 
     @cached_property
     def _thin(self) -> Problem:
@@ -198,7 +208,16 @@ class Search:
             self._fit_beside(parent, gain, [])
         for name in ALWAYS:
             mine = [g for g in gains if g.choice.name == name]
-            self._try_always(parent, sorted(mine, key=lambda g: len(g.choice.quantities)))
+            if self._may_help(parent, name):
+                # A pin that the damper follows and one that lies free differ: neither speaks for the other.
+                for acts in dict.fromkeys(g.choice.form.acts for g in mine):
+                    alike = [g for g in mine if g.choice.form.acts == acts]
+                    self._try_always(parent, sorted(alike, key=lambda g: len(g.choice.quantities)))
+
+    def _may_help(self, parent: Contender, name: str) -> bool:
+        """Whether an effect is tried beside others without a promise: not where alone it took nothing away."""
+        alone = self.found.get(frozenset({name}))
+        return not parent.names or alone is None or self.left_of(alone) < _HELPS * self._none_left
 
     def _try_always(self, parent: Contender, gains: Sequence[Gain]) -> None:
         """Fit a set with an effect whose promise says little, with its richer forms where the first has shown."""
@@ -210,6 +229,11 @@ class Search:
             with_it = self._fit_beside(parent, gain, gain.choice.form.starts)
             if self.left_of(with_it) > _SHOWN * self.left_of(parent):
                 return
+
+    @property
+    def _none_left(self) -> float:
+        """What the law alone leaves [1]."""
+        return self.left_of(self.found[frozenset()])
 
     def _fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> Contender:
         """A set with a further effect, fitted from its screening's end and with further values of it."""

@@ -12,15 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from identification.assemble import assemble
 from identification.damper.coordinates import COORDINATES
 from identification.effect_choice import EffectChoice
 from identification.errors import NothingToFit
-from identification.gap.checks import one_specimen, without_clipping
-from identification.gap.diagnose import Progress, diagnose, diagnosed_problem
+from identification.gap.checks import one_specimen
+from identification.gap.diagnose import Prepared, Progress, diagnose_prepared, diagnosed_problem, prepare
 from identification.gap.documents import Diagnosis
 from identification.gap.explain import Effort, JointFit, fit_with
-from identification.gap.judge import Judge
 from identification.gap.trend_documents import Change, RunOfLife, Size, Trend, Way
 from identification.gap.words import advice
 from identification.problem import COORDINATE_COUNT
@@ -67,9 +65,10 @@ def trend(
     if len(recordings) < FEWEST:
         raise NothingToFit(f"{len(recordings)} runs are no trend; give the logs of at least {FEWEST}")
     one_specimen(recordings)
-    found = [diagnose([r], seed=seed, progress=progress).diagnosis for r in recordings]
+    prepared = [prepare([r]) for r in recordings]
+    found = [diagnose_prepared(p, seed=seed, progress=progress).diagnosis for p in prepared]
     common = common_effects(found)
-    fits = [_fitted(r, common) for r in recordings]
+    fits = [_fitted(p, common) for p in prepared]
     logs = [r.path.name for r in recordings]
     changes = [
         *_of_effects(fits, common, logs, recordings[0].drive_unit),
@@ -100,11 +99,9 @@ def common_effects(found: Sequence[Diagnosis]) -> tuple[EffectChoice, ...]:
     return tuple(EffectChoice(name, form) for name, (_, form) in surest.items())
 
 
-def _fitted(recording: Recording, effects: tuple[EffectChoice, ...]) -> JointFit:
+def _fitted(run: Prepared, effects: tuple[EffectChoice, ...]) -> JointFit:
     """The law with the effects, fitted to all samples of one run."""
-    cleaned, _ = without_clipping([recording])
-    assembled = assemble(cleaned)
-    return fit_with(diagnosed_problem(assembled, Judge.of(assembled).pieces), effects, None, Effort())
+    return fit_with(diagnosed_problem(run.assembled, run.judge.pieces), effects, None, Effort())
 
 
 def _run(log: str, diagnosis: Diagnosis) -> RunOfLife:

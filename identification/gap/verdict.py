@@ -23,23 +23,22 @@ _POSSIBLE = 0.01
 """[1] probability below which a set is no alternative."""
 
 
-def verdict_on(before: float, after: float, floor: float, odds: Odds, named: frozenset[str]) -> Verdict:
-    """The answer in a word.
+def verdict_on(plain: Contender, named: Contender, floor: float, odds: Odds) -> Verdict:
+    """The answer in a word; what counts is the worse of seen and unseen strokes.
 
     Args:
-        before: RMSE of the plain law [N].
-        after: RMSE with the likeliest set [N].
-        floor: noise of the force [N].
+        plain: the law alone.
+        named: the likeliest set.
+        floor: what no effect explains [N].
         odds: of all sets.
-        named: the likeliest.
     """
-    if before < _NO_GAP * floor or (not named and odds.unknown < _UNLIKELY):
+    if plain.unseen < _NO_GAP * floor or (not named.names and odds.unknown < _UNLIKELY):
         return "no_gap"
-    taken = 1.0 - (after**2 - floor**2) / max(before**2 - floor**2, 1e-12)
+    taken = 1.0 - named.share_of(plain, floor) / max(plain.excess(floor), 1e-12)
     unknown = odds.unknown > _UNLIKELY
-    if not named or taken < _NOTHING_KNOWN or (unknown and taken < _MOST):
+    if not named.names or taken < _NOTHING_KNOWN or (unknown and taken < _MOST):
         return "unexplained"
-    if after < _AT_FLOOR * floor or (taken > _MOST and not unknown):
+    if max(named.seen, named.unseen) < _AT_FLOOR * floor or (taken > _MOST and not unknown):
         return "explained"
     return "partly_explained"
 

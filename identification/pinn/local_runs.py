@@ -106,9 +106,16 @@ def _better(problem: Problem, best: _Best | None, now: _Best) -> _Best:
     """The better of two, and whether the other one agrees with it."""
     if best is None:
         return now
-    same = abs(now.found.misfit.force / best.found.misfit.force - 1.0) < _SAME
+    wavering = _wavering(best.training) + _wavering(now.training)
+    same = abs(now.found.misfit.force / best.found.misfit.force - 1.0) < max(_SAME, wavering)
     winner = now if _badness(problem, now.found) < _badness(problem, best.found) else best
     return replace(winner, tried=now.tried, agreed=best.agreed + 1 if same else winner.agreed * (winner is best))
+
+
+def _wavering(training: LocalTraining) -> float:
+    """[1] by which the misfit still changed on the last mesh: what no law follows lets the elements waver."""
+    last = [moment.force for moment in training.history[-2:] if moment.phase == training.phase]
+    return abs(last[-1] / last[0] - 1.0)
 
 
 def _arrived(problem: Problem, found: Trained) -> bool:

@@ -133,11 +133,8 @@ class PaperTraining:
         return Parameters(*(float(value.detach()) for value in self._tensors()))
 
     def _tensors(self) -> list[Tensor]:
-        """Thirteen parameters and x0; zero raw numbers are the start."""
-        return [
-            start * torch.exp(raw) if name in _POSITIVE else (abs(start) + 1e-12) * raw + start
-            for name, start, raw in zip(Parameters._fields, self.begin, self.raw, strict=True)
-        ]
+        """Thirteen parameters and x0."""
+        return searched(self.begin, list(self.raw))
 
     def _parameters(self) -> Parameters:
         """The same by their names: the law takes tensors for numbers."""
@@ -149,10 +146,10 @@ class PaperTraining:
         value, rate, _ = self.network.forward(self.weights, self.data.inputs[at], self.data.rates[at])
         return value * scale, rate * scale
 
-    def _forces(self, at: Tensor) -> tuple[Tensor, Tensor]:
-        """Eqs. 1 and 2."""
+    def _forces(self, at: Tensor, states: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
+        """Eqs. 1 and 2, with the states there and their rates."""
         p, d = self._parameters(), self.data
-        (u, y, z), (_, y_rate, _) = (part.T for part in self._states(at))
+        (u, y, z), (_, y_rate, _) = (part.T for part in states)
         alpha, c0, c1 = (law.at_field(a, b, u) for a, b in _pairs(p))
         first = alpha * z + c0 * (d.v[at] - y_rate) + p.k0 * (d.x[at] - y) + p.k1 * (d.x[at] - p.x0)
         return first, law.force(y_rate, d.x[at], c1, p.k1, p.x0)
@@ -160,7 +157,8 @@ class PaperTraining:
     def _loss(self, at: Tensor) -> Tensor:
         """Eq. 21."""
         p, d, s = self._parameters(), self.data, self.scales
-        (u, y, z), (u_rate, y_rate, z_rate) = (part.T for part in self._states(at))
+        states = self._states(at)
+        (u, y, z), (u_rate, y_rate, z_rate) = (part.T for part in states)
         alpha, c0, c1 = (law.at_field(a, b, u) for a, b in _pairs(p))
         both = torch.clamp(c0 + c1, min=_LEAST_C)
         inner = law.inner_velocity(d.x[at], d.v[at], y, z, alpha, c0, both - c0, p.k0)
@@ -170,7 +168,7 @@ class PaperTraining:
             (y_rate - inner) / s.velocity,
             (z_rate - hysteresis) / (self.begin.A * s.velocity),
         )
-        misfits = [(d.force[at] - force) / s.force for force in self._forces(at)]
+        misfits = [(d.force[at] - force) / s.force for force in self._forces(at, states)]
         fitted = d.fitted[at]
         data = torch.stack([((misfit * fitted) ** 2).sum() / fitted.sum() for misfit in misfits]).sum()
         law_broken = torch.stack([(r**2).mean() for r in physics]).sum()
@@ -188,7 +186,8 @@ class PaperTraining:
     def force(self) -> Tensor:
         """The network's own force (N,): the mean of both branches."""
         with torch.no_grad():
-            first, second = self._forces(torch.arange(len(self.data.x), device=self.data.x.device))
+            every = torch.arange(len(self.data.x), device=self.data.x.device)
+            first, second = self._forces(every, self._states(every))
         return 0.5 * (first + second)
 
     def _gathered(self, held: Sequence[Array]) -> _Data:
@@ -210,6 +209,14 @@ class PaperTraining:
         return _Data(
             *(torch.as_tensor(q, device=device) for q in (values, rates, x, v, drive, force, fitted, aside))
         )
+
+
+def searched(begin: Parameters, raw: Sequence[Tensor]) -> list[Tensor]:
+    """Thirteen parameters and x0 from the numbers that are searched; zeros are where the search begins."""
+    return [
+        start * torch.exp(number) if name in _POSITIVE else (abs(start) + 1e-12) * number + start
+        for name, start, number in zip(Parameters._fields, begin, raw, strict=True)
+    ]
 
 
 def _pairs(p: Parameters) -> tuple[tuple[float, float], ...]:

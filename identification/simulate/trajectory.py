@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.simulate import channel, inputs, yielding
+from identification.simulate import channel, inputs, yielding, yielding_slopes
 from identification.simulate.curves import over_parameters
 from identification.simulate.kernel import Derivatives, Plan, march, march_with_slopes
 from identification.simulate.motion import Motion, damper_motion
@@ -136,7 +136,7 @@ class _Chain:
             return Trajectory(force, y, zeta, self._field.u, plan), None
         over_motion, own = channel.beside_slopes(self._setting, self._motion)
         rows = yielding.derivatives_of(self._motion, self._field, self._scales, over_motion, own, h)
-        y, zeta, force, partial = yielding.march_with_slopes(fixed, *g, h, start, fineness, plan, *rows)
+        y, zeta, force, partial = yielding_slopes.march_with_slopes(fixed, *g, h, start, fineness, plan, *rows)
         J = np.zeros((len(partial), len(UNKNOWNS) + sum(len(e.values) for e in self._setting.effects)))
         J[:, _STRUCTURAL_COLUMNS] = partial[:, :STRUCTURAL]
         J[:, [_K1, _F0]] = partial[:, STRUCTURAL : STRUCTURAL + 2]

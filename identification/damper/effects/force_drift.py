@@ -23,31 +23,13 @@ def swinging(time: Any, drive: Any, cosine: Any, sine: Any, period: Any) -> Any:
     return cosine * np.cos(angle) + sine * np.sin(angle) + 0.0 * drive
 
 
-def wandering(
-    time: Any,
-    drive: Any,
-    c1: Any,
-    s1: Any,
-    c2: Any,
-    s2: Any,
-    c3: Any,
-    s3: Any,
-    c4: Any,
-    s4: Any,
-    c5: Any,
-    s5: Any,
-    c6: Any,
-    s6: Any,
-    period: Any,
-) -> Any:
-    """The same as a slow wave with five overtones."""
-    angle = 2.0 * np.pi * time / period
-    wave = c1 * np.cos(angle) + s1 * np.sin(angle) + 0.0 * drive
-    wave = wave + c2 * np.cos(2.0 * angle) + s2 * np.sin(2.0 * angle)
-    wave = wave + c3 * np.cos(3.0 * angle) + s3 * np.sin(3.0 * angle)
-    wave = wave + c4 * np.cos(4.0 * angle) + s4 * np.sin(4.0 * angle)
-    wave = wave + c5 * np.cos(5.0 * angle) + s5 * np.sin(5.0 * angle)
-    return wave + c6 * np.cos(6.0 * angle) + s6 * np.sin(6.0 * angle)
+def wandering(time: Any, drive: Any, *parts: Any) -> Any:
+    """The same as a wave with overtones; cosine and sine [N] of each order come first, the period [s] last."""
+    angle = 2.0 * np.pi * time / parts[-1]
+    wave = 0.0 * angle + 0.0 * drive
+    for k in range(len(parts) // 2):
+        wave = wave + parts[2 * k] * np.cos((k + 1.0) * angle) + parts[2 * k + 1] * np.sin((k + 1.0) * angle)
+    return wave
 
 
 _PARTS = tuple(

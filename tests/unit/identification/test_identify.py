@@ -13,7 +13,8 @@ from identification.damper.parameter_sets import parameter_set
 from identification.errors import NothingToFit
 from identification.force_channel import LowPass, filter_lag
 from identification.identify import Request, identify
-from identification.motion_noise import motion_scatter
+from identification.motion import recorded_noise
+from identification.motion_noise import play_noise, with_motion, without_pull
 from identification.predict import predict_log
 from identification.problem import Piece, Problem
 from identification.recordings import ChannelFilter, Recording, Segment, Stretch
@@ -186,9 +187,32 @@ def test_displacement_noise_adds_to_the_uncertainty():
     problem = Problem(assembled.pieces, SearchSpace(0.0, 0.5), NOISE, 20e-6)
     minimum = refine(problem)
     quiet = replace(FAST, displacement=np.array(assembled.pieces[0].stroke.displacement))
-    noisy = motion_scatter(problem, [FAST], minimum, 1)
+    noisy = play_noise(problem, [FAST], minimum, 1).scatter
     assert np.all(np.linalg.eigvalsh(noisy) > -1e-9)
-    assert noisy[2, 2] > 4 * motion_scatter(problem, [quiet], minimum, 1)[2, 2]
+    assert noisy[2, 2] > 4 * play_noise(problem, [quiet], minimum, 1).scatter[2, 2]
+
+
+def test_a_wrong_motion_pulls_the_yield_displacement_as_far_as_the_replays_say():
+    """Fits to noise and to the same noise turned round: what the two share is no scatter."""
+    loud = replace(
+        FAST, displacement=FAST.displacement + 8e-6 * np.random.default_rng(5).standard_normal(len(FAST.time))
+    )
+    problem = Problem(assemble([recording(loud)]).pieces, SearchSpace(0.0, 0.5), NOISE, 20e-6)
+    minimum = refine(problem)
+    played = play_noise(problem, [loud], minimum, 1)
+    force, motion = problem.simulate(minimum.unknowns)[0], problem.pieces[0].stroke.displacement
+    ends = []
+    for seed in range(8):
+        noise = recorded_noise(loud) * np.random.default_rng(seed).standard_normal(len(motion))
+        for sign in (-1.0, 1.0):
+            again = replace(loud, displacement=motion + sign * noise, force=force)
+            piece = with_motion(replace(problem.pieces[0], force=force), again)
+            ends.append(refine(replace(problem, pieces=(piece,)), start=minimum.unknowns).unknowns[2])
+    assert played.pull[2] > 0.1 * np.sqrt(played.scatter[2, 2])
+    assert np.mean(ends) - minimum.unknowns[2] == pytest.approx(played.pull[2], rel=0.5)
+    corrected = without_pull(problem, minimum, played.pull)
+    assert corrected.unknowns[2] == pytest.approx(minimum.unknowns[2] - played.pull[2], abs=1e-12)
+    assert minimum.evaluation.cost < corrected.evaluation.cost < minimum.evaluation.cost + 2.0
 
 
 def test_noise_of_the_measured_drive_adds_to_the_uncertainty_of_the_yield_force():
@@ -198,7 +222,7 @@ def test_noise_of_the_measured_drive_adds_to_the_uncertainty_of_the_yield_force(
     scatter = []
     for stretch in (quiet, noisy):
         problem = Problem(assemble([recording(stretch)]).pieces, SearchSpace(0.0, 0.5), NOISE, 20e-6)
-        scatter.append(motion_scatter(problem, [stretch], refine(problem), 1))
+        scatter.append(play_noise(problem, [stretch], refine(problem), 1).scatter)
     assert scatter[1][0, 0] > 1.5 * scatter[0][0, 0]
 
 

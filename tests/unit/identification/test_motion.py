@@ -179,12 +179,13 @@ def test_fewer_than_two_cycles_have_no_harmonics():
     assert fit_harmonics(displacement, np.ones(len(displacement)), RATE, 0.2, 2e-6) is None
 
 
-def test_the_smoother_halves_a_wave_at_its_cutoff():
+@pytest.mark.parametrize(("twice", "left"), [(False, 0.5), (True, 0.75)])
+def test_the_smoother_leaves_a_half_or_three_quarters_of_a_wave_at_its_cutoff(twice, left):
     wave, _ = sine(1.0, 20.0, 4.0)
     count = len(wave)
     penalty = np.full(count - 3, float(stiffness(20.0, RATE)))
-    smooth = smoothed(wave, np.ones(count), penalty, np.zeros(count - 3))
-    assert np.max(np.abs(smooth[500:-500] - 0.5 * wave[500:-500])) < 1e-4
+    smooth = smoothed(wave, np.ones(count), penalty, np.zeros(count - 3), twice=twice)
+    assert np.max(np.abs(smooth[500:-500] - left * wave[500:-500])) < 1e-4
 
 
 def test_the_smoother_solves_its_normal_equations():
@@ -195,14 +196,17 @@ def test_the_smoother_solves_its_normal_equations():
     matrix = np.diag(weights) + third.T @ (penalty[:, None] * third)
     solution = np.linalg.solve(matrix, weights * values + third.T @ (penalty * expected))
     assert np.allclose(smoothed(values, weights, penalty, expected), solution)
+    again = np.linalg.solve(matrix, weights * (values - solution))
+    assert np.allclose(smoothed(values, weights, penalty, expected, twice=True), solution + again)
 
 
-def test_kept_noise_is_the_covariance_of_smoothed_and_measured_steps():
+@pytest.mark.parametrize("twice", [False, True])
+def test_kept_noise_is_the_covariance_of_smoothed_and_measured_steps(twice):
     noise = default_rng(1).standard_normal(200_000)
     penalty = np.full(len(noise) - 3, float(stiffness(60.0, RATE)))
-    smooth = smoothed(noise, np.ones(len(noise)), penalty, np.zeros(len(noise) - 3))
+    smooth = smoothed(noise, np.ones(len(noise)), penalty, np.zeros(len(noise) - 3), twice=twice)
     covariance = np.mean(np.diff(smooth) * np.diff(noise))
-    assert kept_noise(60.0, RATE) == pytest.approx(covariance, rel=0.05)
+    assert kept_noise(60.0, RATE, twice=twice) == pytest.approx(covariance, rel=0.05)
 
 
 def test_the_derivative_is_exact_for_polynomials_up_to_its_ends():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from identification.gap.held_out import held_out_cycles, shrinkage
+from identification.gap.held_out import HeldOut, held_out_cycles, shrinkage
 from identification.gap.residual import cut_cycles
 from identification.gap.where import Left, drift, gap_map, harmonics
 from identification.recordings import Segment, Stretch
@@ -98,20 +98,35 @@ def test_drift_of_mean_and_size_and_a_free_line_are_told_apart():
     assert humming.line_n == pytest.approx(3.0, rel=0.1)
 
 
+def held_out(before, after, segments=5):
+    counts = np.full(len(before), 500.0)
+    return HeldOut(counts * before, counts * after, counts, np.arange(len(before)) * segments // len(before))
+
+
+def gap_of(left, share, random, cycles=30):
+    """Mean squares of cycles without and with effects that leave a share of the gap."""
+    excess = left * random.uniform(0.5, 1.5, cycles)
+    return held_out(NOISE**2 + excess, NOISE**2 + share * excess * random.uniform(0.7, 1.3, cycles))
+
+
 def test_shrinkage_has_an_interval_that_holds_it():
-    random = default_rng(2)
-    counts = np.full(30, 500.0)
-    before = counts * (NOISE**2 + 9.0 * random.uniform(0.5, 1.5, 30))
-    after = counts * (NOISE**2 + 0.9 * random.uniform(0.5, 1.5, 30))
-    found = shrinkage(before, after, counts, NOISE)
-    assert found.value == pytest.approx(0.9, abs=0.03)
+    found = shrinkage(gap_of(9.0, 0.02, default_rng(2)), NOISE, 0.1 * NOISE, strokes=5)
+    assert found.value == pytest.approx(0.98, abs=0.01)
     low, high = found.ci95
     assert low < found.value < high
-    assert high - low < 0.1
+    assert high - low < 0.12
+
+
+def test_few_strokes_and_a_noisy_motion_widen_the_interval():
+    rich = shrinkage(gap_of(9.0, 0.1, default_rng(2)), NOISE, 0.0, strokes=5)
+    poor = shrinkage(gap_of(9.0, 0.1, default_rng(2)), NOISE, 0.0, strokes=1)
+    blurred = shrinkage(gap_of(9.0, 0.1, default_rng(2)), NOISE, NOISE, strokes=5)
+    assert poor.value == rich.value == blurred.value
+    assert poor.ci95[0] < rich.ci95[0] - 0.1
+    assert blurred.ci95[0] < rich.ci95[0] - 0.05
 
 
 def test_at_the_floor_there_is_nothing_to_shrink():
-    counts = np.full(30, 500.0)
-    found = shrinkage(counts * NOISE**2 * 1.02, counts * NOISE**2, counts, NOISE)
+    found = shrinkage(held_out(np.full(30, NOISE**2 * 1.02), np.full(30, NOISE**2)), NOISE, 0.0, strokes=5)
     assert found.value is None
     assert found.ci95 is None

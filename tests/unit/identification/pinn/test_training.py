@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import replace
+from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +13,10 @@ from made_up_problem import TRUTH, problem
 from identification.damper.coordinates import to_coordinates
 from identification.errors import IdentificationError
 from identification.pinn import local_runs
+from identification.pinn.beginning import starts
 from identification.pinn.mlp import Network
 from identification.pinn.paper_runs import PaperTraining
+from identification.pinn.result import Moment
 from identification.pinn.settings import PaperSettings, preset_names, read_settings
 from identification.pinn.split import validation_masks
 from identification.pinn.supervision import Stopped, Supervision
@@ -34,6 +38,23 @@ def test_the_local_network_reaches_the_noise_and_so_does_the_law_with_its_parame
     assert trained.simulation.train == pytest.approx(noise, rel=0.03)
     assert trained.simulation.validation == pytest.approx(noise, rel=0.1)
     assert trained.reconstruction.train == pytest.approx(trained.simulation.train, rel=0.02)
+
+
+def test_the_second_start_has_the_outer_dashpot_rise_with_the_drive():
+    first, second = (start.coordinates for start in islice(starts(problem()), 2))
+    assert second.c1_a == pytest.approx(first.c1_a / 5.0)
+    assert second.c1_a + 0.5 * second.c1_b == pytest.approx(5.0 * (first.c1_a + 0.5 * first.c1_b))
+    assert second[:8] == first[:8]
+
+
+def test_two_starts_agree_as_far_as_their_misfits_still_waver():
+    def moment(phase, force):
+        return Moment(0.0, phase, force, 0.0, 0.0)
+
+    last = SimpleNamespace(phase="last", history=[moment("first", 9.0), moment("last", 4.0), moment("last", 3.9)])
+    assert local_runs._wavering(last) == pytest.approx(0.025)
+    alone = SimpleNamespace(phase="last", history=[moment("first", 9.0), moment("last", 4.0)])
+    assert local_runs._wavering(alone) == 0.0
 
 
 def test_its_parameters_lie_within_their_deviations(trained):

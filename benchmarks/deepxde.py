@@ -1,0 +1,164 @@
+"""The paper's network in DeepXDE beside ours: time of a step of Adam, and what the same time brings.
+
+    python -m benchmarks.deepxde                 the step, then what the time of `local` and of `paper` brings
+    python -m benchmarks.deepxde step local      some of them
+
+The same layers, samples, losses, start and rate of learning; every sample carries what the residuals ask for, so
+that DeepXDE passes each of them through its network once. DeepXDE (its PyTorch backend) is no dependency of this
+project: `pip install deepxde`, best into an environment of its own.
+"""
+
+import importlib
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from types import ModuleType
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from benchmarks.pinn_cases import LABORATORY, pooled_error, problem_of, try_out, unseen_ratio
+from benchmarks.timing import cpu_seconds, line, reference_seconds
+from identification.damper import law
+from identification.damper.coordinates import Coordinates, to_coordinates
+from identification.damper.parameters import Parameters
+from identification.pinn.paper_runs import PaperTraining, searched
+from identification.pinn.settings import PaperSettings, read_settings
+from identification.pinn.split import validation_masks
+from identification.pinn.supervision import Supervision
+
+STEPS, REPEATS = 100, 5
+"""Steps in one timing, and timings; the least counts."""
+SEED = 0
+_SILENT = 10**9
+"""Steps between two of DeepXDE's own reports."""
+
+
+def training() -> PaperTraining:
+    """Ours, as it begins: its samples, scales and start are DeepXDE's too."""
+    settings = read_settings("paper")
+    assert isinstance(settings, PaperSettings)
+    settings = settings.model_copy(
+        update={"seed": SEED, "validation_share": 0.0, "adam_steps": STEPS, "lbfgs_steps": 0}
+    )
+    problem = problem_of(LABORATORY, SEED)
+    held = validation_masks(problem.pieces, settings.validation_share, SEED)
+    return PaperTraining(problem, held, settings, Supervision())
+
+
+class InDeepXde:
+    """The same training, as a user of DeepXDE writes it."""
+
+    def __init__(self, dde: ModuleType, ours: PaperTraining) -> None:
+        self.dde, self.ours = dde, ours
+        random = np.random.default_rng(SEED)
+        at = random.choice(len(ours.data.x), ours.settings.samples, replace=False)
+        d = ours.data
+        points = d.inputs[at].numpy()
+        told = torch.column_stack([d.rates, d.x, d.v, d.drive, d.force, d.fitted])[at].numpy()
+        self.raw = [dde.Variable(0.0) for _ in Parameters._fields]
+        data = dde.data.PDE(
+            dde.geometry.PointCloud(points), self._residuals, [], num_domain=0, anchors=points,
+            auxiliary_var_function=lambda _: told,
+        )  # fmt: skip
+        width, layers = ours.settings.width, ours.settings.layers
+        network = dde.nn.FNN([4, *[width] * layers, 3], "tanh", "Glorot normal")
+        self.model = dde.Model(data, network)
+        self.model.compile(
+            "adam", lr=ours.settings.learning_rate, external_trainable_variables=self.raw, verbose=0
+        )
+
+    def run(self, steps: int) -> None:
+        """So many steps of Adam."""
+        self.model.train(iterations=steps, display_every=_SILENT, verbose=0)
+
+    def coordinates(self) -> Coordinates:
+        """What it has found."""
+        return to_coordinates(Parameters(*(float(p.detach()) for p in self._parameters())))
+
+    def _parameters(self) -> list[Tensor]:
+        return searched(self.ours.begin, self.raw)
+
+    def _residuals(self, inputs: Tensor, outputs: Tensor, told: Tensor) -> list[Tensor]:
+        """Two misfits of the force and three of the law; the derivative is that along the trajectory."""
+        s, p = self.ours.scales, Parameters(*self._parameters())  # type: ignore[arg-type]
+        x, v, drive, force, fitted = told[:, 4:].T
+        u, y, z = outputs.T * torch.tensor([[s.u], [s.y], [s.z]])
+        rates = [
+            sum(self.dde.grad.jacobian(outputs, inputs, i, j)[:, 0] * told[:, j] for j in range(4))
+            for i in range(3)
+        ]
+        u_rate, y_rate, z_rate = rates[0] * s.u, rates[1] * s.y, rates[2] * s.z
+        pairs = ((p.alpha_a, p.alpha_b), (p.c0_a, p.c0_b), (p.c1_a, p.c1_b))
+        alpha, c0, c1 = (law.at_field(a, b, u) for a, b in pairs)
+        inner = law.inner_velocity(x, v, y, z, alpha, c0, c1, p.k0)
+        hysteresis = law.hysteresis_rate(v - y_rate, z, p.A, p.beta, p.gamma, p.n)
+        first = alpha * z + c0 * (v - y_rate) + p.k0 * (x - y) + p.k1 * (x - p.x0)
+        second = law.force(y_rate, x, c1, p.k1, p.x0)
+        return [
+            (force - first) / s.force * fitted,
+            (force - second) / s.force * fitted,
+            (u_rate - law.field_rate(u, drive, p.eta)) / (s.rate * s.u),
+            (y_rate - inner) / s.velocity,
+            (z_rate - hysteresis) / (self.ours.begin.A * s.velocity),
+        ]
+
+
+def step_seconds(hundred: Callable[[], None]) -> float:
+    """[s] of processor time of one step: the least of some repeats of ``STEPS`` steps, warm."""
+    hundred()
+    return cpu_seconds(hundred, REPEATS) / STEPS
+
+
+def brought(theirs: InDeepXde, seconds: float) -> tuple[float, float, int]:
+    """Unseen error over the true damper's, pooled error and steps after some processor time [s] from the start."""
+    steps, began = 0, time.process_time()
+    while time.process_time() - began < seconds:
+        theirs.run(STEPS)
+        steps += STEPS
+    found = theirs.coordinates()
+    problem = problem_of(LABORATORY, SEED)
+    return unseen_ratio(found, LABORATORY, SEED), pooled_error(problem, found, LABORATORY), steps
+
+
+def step(dde: ModuleType) -> None:
+    """Time of a step of Adam."""
+    ours, theirs = training(), InDeepXde(dde, training())
+    steps = step_seconds(ours.run), step_seconds(lambda: theirs.run(STEPS))
+    line("a step of Adam, 2048 samples: ours", 1e3 * steps[0], "ms", "")
+    line("the same in DeepXDE", 1e3 * steps[1], "ms", "")
+    line("ours over DeepXDE's", steps[0] / steps[1], "x", "at most 1/3")
+
+
+def beside(dde: ModuleType, preset: str) -> None:
+    """What DeepXDE finds in the time that a preset takes."""
+    score = try_out(preset, LABORATORY, SEED)
+    print(f"in the {score.seconds:.1f} s of preset {preset}, unseen error over the true damper's, and pooled:")
+    line(f"  {preset}", score.ratio, "x", f"{score.pooled:.3g}")
+    unseen, pooled, count = brought(InDeepXde(dde, training()), score.seconds)
+    line(f"  DeepXDE, {count} steps", unseen, "x", f"{pooled:.3g}")
+
+
+def run(parts: Sequence[str] = ("step", "local", "paper")) -> None:
+    """Print the parts asked for: the step, and presets beside DeepXDE."""
+    if find_spec("deepxde") is None:
+        print("deepxde: left out; it is no dependency of this project, `pip install deepxde` brings it")
+        return
+    os.environ["DDE_BACKEND"] = "pytorch"
+    torch.set_num_threads(1)
+    dde = importlib.import_module("deepxde")
+    dde.config.set_default_float("float64")
+    dde.config.set_random_seed(SEED)
+    print(f"deepxde {dde.__version__}, torch {torch.__version__}; reference {reference_seconds():.4f} s")
+    for part in parts:
+        if part == "step":
+            step(dde)
+        else:
+            beside(dde, part)
+
+
+if __name__ == "__main__":
+    run(sys.argv[1:] or ("step", "local", "paper"))

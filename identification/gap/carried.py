@@ -1,0 +1,67 @@
+"""What noise of the displacement becomes in the force of a simulation.
+
+It is not in the recorded force, so that no comparison of cycles shows it: it enters through the model's input, and
+where the loop is steep a tenth of a micrometre is a newton. So it is played again: the motion gets fresh noise, is
+estimated anew in the same way, and the force simulated on it is compared with that on the motion as it was.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.motion import estimate_motion, recorded_noise
+from identification.problem import Piece, Problem
+from identification.recordings import Stretch
+
+_DRAWS = 2
+"""Times the noise is played again: each knows its size to a few hundredths."""
+
+
+def replayed(
+    stretches: Sequence[Stretch], pieces: Sequence[Piece], forces: Sequence[Array], noise: float, seed: int
+) -> list[tuple[Piece, ...]]:
+    """The pieces with motions estimated from fresh noise, some draws of them.
+
+    Args:
+        stretches: as recorded, one a piece.
+        pieces: with the motion as it was estimated.
+        forces: (N,) simulated [N], one a piece: the actuator gives way under them.
+        noise: of the recorded force [N].
+        seed: of the noise.
+    """
+    return [
+        tuple(
+            _replayed(stretch, piece, force, noise, np.random.default_rng([seed, i, draw]))
+            for i, (stretch, piece, force) in enumerate(zip(stretches, pieces, forces, strict=True))
+        )
+        for draw in range(_DRAWS)
+    ]
+
+
+def _replayed(stretch: Stretch, piece: Piece, force: Array, noise: float, random: np.random.Generator) -> Piece:
+    played = replace(
+        stretch,
+        displacement=piece.stroke.displacement + recorded_noise(stretch) * random.standard_normal(len(force)),
+        force=force + noise * random.standard_normal(len(force)),
+    )
+    x, v, a = estimate_motion(played)[:3]
+    return replace(piece, stroke=replace(piece.stroke, displacement=x, velocity=v, acceleration=a))
+
+
+def carried_noise(problem: Problem, unknowns: Array, draws: Sequence[Sequence[Piece]]) -> float:
+    """RMS change [N] of the simulated force over the fitted samples, motion by motion.
+
+    Args:
+        problem: what was fitted, with its effects.
+        unknowns: (U,) where.
+        draws: the pieces with other motions, as ``replayed`` makes them.
+    """
+    quick = problem.quicker()
+    here, fitted = quick.simulate(unknowns), [p.train > 0.0 for p in quick.pieces]
+    squares = []
+    for pieces in draws:
+        there = replace(quick, pieces=tuple(p.quicker() for p in pieces)).simulate(unknowns)
+        squares += [(t - h)[m] ** 2 for t, h, m in zip(there, here, fitted, strict=True)]
+    return float(np.sqrt(np.mean(np.concatenate(squares))))

@@ -57,8 +57,8 @@ The named set is in bold where it is the true one. "Shrinkage" is claimed / that
 """
 
 
-def page(whole: Trial, drawn: int, next_strokes: Share) -> str:
-    """The page of the cases that have been diagnosed."""
+def page(whole: Trial, drawn: int, next_strokes: Share, notes: Sequence[str] = ()) -> str:
+    """The page of the cases that have been diagnosed; notes stand beside what the cases themselves say."""
     honest = [case for case in whole.cases if case.verdict or "not been diagnosed" not in (case.failure or "")]
     told = whole.model_copy(update={"cases": tuple(honest), "scores": scores(honest)})
     grid = " --grid" if whole.draw == "grid" else ""
@@ -69,7 +69,7 @@ def page(whole: Trial, drawn: int, next_strokes: Share) -> str:
         command=f"mrbench trial --cases {drawn} --seed {whole.seed}{grid} --over-wires 10 --out trial.json",
         bars="\n".join(f"| {' | '.join(line)} |" for line in _bars(told.scores, honest, next_strokes)),
         table=table(told),
-        care="\n".join(f"- {line}" for line in _care(honest, drawn)),
+        care="\n".join(f"- {line}" for line in (*_care(honest, drawn), *notes)),
         rows="\n".join(map(_row, honest)),
     )
 
@@ -187,6 +187,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("trial", type=Path, help="the answer of `mrbench trial`; its folder stands beside it")
     options.add_argument("--page", type=Path, default=EVIDENCE / "trial.md")
+    options.add_argument("--note", action="append", default=[], help="what else is to be read with care")
     asked = options.parse_args()
     folder = TrialFolder(asked.trial)
     seal = folder.seal()
@@ -195,7 +196,8 @@ def main() -> None:
     twice = [path.name for path in (folder.root / "diagnoses").glob(f"*{WIRES}.outcome.json")]
     wires = max((int(name.split("_")[1]) + 1 for name in twice), default=0)
     plan = Plan(seal.cases, seal.seed, seal.draw, 1, wires, DIAGNOSE)
-    asked.page.write_text(page(answer(folder, plan), seal.cases, _came_true(folder)), encoding="utf-8")
+    text = page(answer(folder, plan), seal.cases, _came_true(folder), asked.note)
+    asked.page.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -77,7 +77,7 @@ class GlobalSettings(TorchSettings):
     width: int = Field(default=20, ge=2, description="tanh units of each of the two hidden layers")
     samples: int = Field(default=3600, ge=100, description="in one batch")
     physics: tuple[float, float] = Field(default=(3.0, 30.0), description="first and last weight of the law")
-    steps: int = Field(default=200, ge=10, description="of Gauss-Newton")
+    steps: int = Field(default=280, ge=10, description="of Gauss-Newton")
 
 
 class PaperSettings(TorchSettings):

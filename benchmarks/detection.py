@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from benchmarks.effect_logs import NOTHING, USUAL, record, scenario, stretched
+from benchmarks.kept import figures
 from benchmarks.timing import timed
 from identification.damper.effects import EFFECTS
 from identification.gap.diagnose import diagnose
@@ -74,13 +75,17 @@ def cases(seeds: int) -> Iterator[Case]:
 def answered(case: Case, folder: Path) -> bool:
     """Record and diagnose a run, once; whether it was new."""
     out = folder / f"{case.name}.json"
-    if out.exists():
-        return False
+    new = not out.exists()
+    figures(out, lambda: _answer(case, folder))
+    return new
+
+
+def _answer(case: Case, folder: Path) -> dict[str, Any]:
     log = folder / f"{case.name}.mcap"
     record(stretched("quick", 1), case.effect, case.size, 1000 + case.seed, log)
     recording = load(log)
     found, seconds = timed(lambda: diagnose([recording]).diagnosis)
-    figures = {
+    answer = {
         **case._asdict(),
         "verdict": found.verdict,
         "named": {e.name: e.probability for e in found.effects},
@@ -88,10 +93,9 @@ def answered(case: Case, folder: Path) -> bool:
         "seconds": seconds,
         "recorded": sum(len(s.time) / s.rate for s in recording.stretches),
     }
-    out.write_text(json.dumps(figures), encoding="utf-8")
     log.unlink()
-    print(f"{case.name}: {found.verdict} {figures['named']} {figures['ratio']:.3f}", flush=True)
-    return True
+    print(f"{case.name}: {found.verdict} {answer['named']} {answer['ratio']:.3f}", flush=True)
+    return answer
 
 
 def page(answers: list[dict[str, Any]]) -> str:

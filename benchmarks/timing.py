@@ -11,12 +11,7 @@ Result = TypeVar("Result")
 
 def cpu_seconds(action: Callable[[], object], repeats: int = 5) -> float:
     """Least processor time [s] of some repeats: what neighbours add is noise, never a gain."""
-    best = float("inf")
-    for _ in range(repeats):
-        began = time.process_time()
-        action()
-        best = min(best, time.process_time() - began)
-    return best
+    return min(timed(action)[1] for _ in range(repeats))
 
 
 def timed(work: Callable[[], Result]) -> tuple[Result, float]:

@@ -24,7 +24,6 @@ from identification.motion import estimate_motion, recorded_noise
 from identification.problem import Piece, Problem
 from identification.recordings import Stretch
 from identification.refine import Minimum
-from identification.simulate import Stroke
 
 DRAWS = 12
 """Times the noise is played again."""
@@ -40,9 +39,9 @@ def with_motion(piece: Piece, stretch: Stretch, cutoff: Array | None = None) -> 
         stretch: the recording behind it, or one like it.
         cutoff: (N,) of the motion's smoother [Hz], where it is known already.
     """
-    motion = estimate_motion(stretch, cutoff)
+    x, v, a = estimate_motion(stretch, cutoff)[:3]
     drive = steady_levels(stretch.drive)
-    stroke = Stroke(stretch.rate, motion.displacement, motion.velocity, motion.acceleration, drive)
+    stroke = replace(piece.stroke, rate=stretch.rate, displacement=x, velocity=v, acceleration=a, drive=drive)
     return replace(piece, stroke=stroke)
 
 

@@ -13,6 +13,7 @@ from bench.agent.header import LogFacts
 from bench.agent.messages import RunCommand, RunOutcome, RunStatus
 from bench.agent.recording import Recording
 from bench.errors import BenchError, MethodError, RunError
+from bench.faults import first_fault
 from bench.methods import Method, Programme, compile_method
 from bench.methods.compile import BETWEEN
 from bench.recorder.live import LiveRecorder
@@ -84,9 +85,9 @@ def _method(command: RunCommand) -> Method:
     try:
         return Method.model_validate(command.method)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
+        first, words = first_fault(error)
         place = ".".join(str(step) for step in first["loc"]) or "the document"
-        raise MethodError(f"that is no method: {place}: {first['msg']}") from None
+        raise MethodError(f"that is no method: {place}: {words}") from None
 
 
 class Run:

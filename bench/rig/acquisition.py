@@ -158,9 +158,10 @@ class _Wire:
         if stamp is not None and stamp is not self._stamp:
             self._stamp = stamp
             self._owner.maps[self.name].feed(stamp)
-        if blocks and (device_ns := blocks[-1].device_ns) is not None:
-            self._owner.maps[self.name].feed_sample(int(device_ns[-1]), blocks[-1].received_ns)
         if blocks:
+            newest = blocks[-1]
+            if newest.device_ns is not None:
+                self._owner.maps[self.name].feed_sample(int(newest.device_ns[-1]), newest.received_ns)
             self._sink(Batch(self.name, tuple(blocks)))
 
     def _patience(self) -> float:

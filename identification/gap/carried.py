@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.motion import estimate_motion, recorded_noise
+from identification.motion import recorded_noise
+from identification.motion_noise import with_motion
 from identification.problem import Piece, Problem
 from identification.recordings import Stretch
 
@@ -46,8 +47,7 @@ def _replayed(stretch: Stretch, piece: Piece, force: Array, noise: float, random
         displacement=piece.stroke.displacement + recorded_noise(stretch) * random.standard_normal(len(force)),
         force=force + noise * random.standard_normal(len(force)),
     )
-    x, v, a = estimate_motion(played)[:3]
-    return replace(piece, stroke=replace(piece.stroke, displacement=x, velocity=v, acceleration=a))
+    return with_motion(piece, played)
 
 
 def carried_noise(problem: Problem, unknowns: Array, draws: Sequence[Sequence[Piece]]) -> float:

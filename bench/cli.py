@@ -60,6 +60,7 @@ def main(arguments: list[str] | None = None) -> None:
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     words = sys.argv[1:] if arguments is None else arguments
     commands = entry_points(group=GROUP)
+    # Loading all of them takes longer than most of them take: only the one that was called, if there is one.
     called = commands.select(name=words[0]) if words else commands
     try:
         _application(called or commands)(args=words, prog_name="mrbench")

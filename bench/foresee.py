@@ -63,6 +63,7 @@ def write_planned(path: Path, programme: Programme) -> None:
     samples = {f"addition_{k}": _channels(added) for k, (_, added) in enumerate(could_be_added)}
     arrays: dict[str, Any] = {"plan": _channels(programme), **samples, "info": np.array(json.dumps(info))}
     try:
+        # By an open file: numpy adds .npz to a name that does not end so.
         with path.open("wb") as file:
             np.savez(file, **arrays)
     except OSError as error:

@@ -6,7 +6,6 @@ Nothing of the rig is imported; what a real specimen would hide stays hidden in 
 import queue
 import subprocess
 import sys
-import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
+from bench.child_process import Lines, read_along
 from bench.errors import RunError
 
 Array = npt.NDArray[np.float64]
@@ -71,10 +71,8 @@ def _run(command: list[str], progress: Callable[[float], None]) -> None:
         )
     except OSError as error:
         raise RunError(f"the simulated rig cannot be started: {error}") from None
-    lines: queue.Queue[str | None] = queue.Queue()
-    reader = threading.Thread(target=_pump, args=(process, lines), daemon=True)
     with process:
-        reader.start()
+        lines, reader = read_along(process)
         try:
             complaint = _follow(lines, progress)
             process.wait(LONGEST_SILENCE)
@@ -88,7 +86,7 @@ def _run(command: list[str], progress: Callable[[float], None]) -> None:
         raise RunError(f"the simulated rig failed: {complaint or f'exit status {process.returncode}'}")
 
 
-def _follow(lines: "queue.Queue[str | None]", progress: Callable[[float], None]) -> str:
+def _follow(lines: Lines, progress: Callable[[float], None]) -> str:
     """Read to the last line, each within the longest silence; what is no progress is the complaint."""
     complaint = ""
     while (line := lines.get(timeout=LONGEST_SILENCE)) is not None:
@@ -98,13 +96,6 @@ def _follow(lines: "queue.Queue[str | None]", progress: Callable[[float], None])
         elif line.strip():
             complaint = line.strip()
     return complaint
-
-
-def _pump(process: subprocess.Popen[str], lines: "queue.Queue[str | None]") -> None:
-    if process.stderr is not None:
-        for line in process.stderr:
-            lines.put(line)
-    lines.put(None)
 
 
 def _share(line: str) -> float | None:

@@ -137,6 +137,7 @@ def _record(
     kept_ns, kept = time_ns[whole], {name: column[whole] for name, column in values.items()}
     done = 0
     for sample, action in sorted(_actions(programme, found, time_ns, scenario), key=itemgetter(0)):
+        # Marks count the programme's samples, of which some may have been lost.
         place = int(kept_before[sample])
         _write(log, kept_ns, kept, slice(done, place))
         action(log)

@@ -15,6 +15,7 @@ from typing import Any
 
 from drivers import cia402
 from drivers.actuator_samples import TIME_STAMP, ActuatorSamples, Scale
+from drivers.beat import ACTUATOR
 from drivers.can_bus import CanAddress, CanBus
 from drivers.canopen_node import CanopenNode
 from drivers.channel import Block, Channel, Reading, Stamp
@@ -27,8 +28,6 @@ _EDS = Path(__file__).parent / "wire" / "actuator.eds"
 _OBJECTS = {"actuator_position": 0x6064, "actuator_velocity": 0x606C, "actuator_torque": 0x6077}
 _CLOCK_EVERY_NS = 100_000_000
 """[ns] between two readings of the drive's clock."""
-_TOGETHER = 2
-"""Samples that are handed over at once: to be woken for each costs more than all that is done with them."""
 _USUAL = ActuatorSettings()
 
 
@@ -74,9 +73,8 @@ class Actuator:
         self._leading = threading.RLock()
         self._armed_ns: int | None = None
         self._boots = 0
-        self._last_ns = self._beat_ns = self._clock_asked_ns = self._due_ns = 0
-        self._turn_ns = round(_TOGETHER * settings.cycle * 1e9)
-        self._stale_ns = 2 * self._turn_ns
+        self._last_ns = self._beat_ns = self._clock_asked_ns = 0
+        self._stale_ns = 3 * ACTUATOR.every_ns
         self._last = 0.0
         self._words = ""
 
@@ -173,9 +171,8 @@ class Actuator:
             self._clock_asked_ns = self._clock()
             with contextlib.suppress(NoReply, BadReply, Refused):
                 self._node.number(TIME_STAMP)
-        time.sleep(max(self._due_ns - self._clock(), 0) * 1e-9)
+        time.sleep(ACTUATOR.wait(self._clock()))
         blocks = self._samples.blocks(timeout)
-        self._due_ns = self._clock() + self._turn_ns
         if not blocks:
             self._node.check_alive()
         return blocks
@@ -305,6 +302,7 @@ class Actuator:
             NoReply: the reference was not found in time.
         """
         after = cia402.step(self._mounting, "home")
+        self._check_not_led("home")
         self._drive.check_no_fault()
         self._disarm()
         try:
@@ -317,6 +315,7 @@ class Actuator:
 
     def mount(self) -> None:
         """Take note that a specimen has been clamped."""
+        self._check_not_led("mount")
         self._mounting = cia402.step(self._mounting, "mount")
         self._clamped = True
 

@@ -19,9 +19,11 @@ import numpy as np
 
 from drivers.can_bus import unpack_frame
 from drivers.canopen_node import PdoLayout
-from drivers.channel import Block, Frame, Stamp
+from drivers.channel import Block, Frame, Quality, Stamp
 
 STATUSWORD, POSITION, VELOCITY, TORQUE, TIME_STAMP = 0x6041, 0x6064, 0x606C, 0x6077, 0x1013
+_CHANNELS = {POSITION: "actuator_position", VELOCITY: "actuator_velocity", TORQUE: "actuator_torque"}
+"""Channel of each object that a sample holds."""
 _PATIENCE_NS = 100_000_000
 """A SYNC unanswered for this long never will be."""
 _REMEMBERED = 256
@@ -148,7 +150,7 @@ class ActuatorSamples:
         self._layouts = {layout.identifier: layout for layout in layouts if layout.on_sync}
         self._order = sorted(self._layouts)
         self._boot = 0x700 + node_id
-        self._scale = scale
+        self._count = np.array([[scale.position], [scale.velocity], [scale.torque]])
         self._parts: dict[int, int] = {}
         self._due = 0
         self._number = 0
@@ -201,8 +203,12 @@ class ActuatorSamples:
 
     def catch_up(self) -> None:
         """Decode what has passed, for whoever wants to know how things stand and not the samples."""
-        with self._decoding:
-            self._decode_passed()
+        # Whoever holds it decodes all that comes as it comes; a setpoint must not wait for that.
+        if self._decoding.acquire(blocking=False):
+            try:
+                self._decode_passed()
+            finally:
+                self._decoding.release()
 
     def _decode_passed(self) -> None:
         for _ in range(self._passed.qsize()):
@@ -278,22 +284,9 @@ class ActuatorSamples:
             stretch = [sample for _, sample in group]
             stamped = [sample.device_ns for sample in stretch if sample.device_ns is not None]
             device_ns = np.array(stamped, dtype=np.int64) if stamped else None
-            for channel, entry, count, zero in self._measured():
-                raw = np.array([sample.raw[entry] for sample in stretch], dtype=np.float64)
-                yield Block(
-                    channel=channel,
-                    first=stretch[0].number,
-                    device_ns=device_ns,
-                    received_ns=stretch[-1].received_ns,
-                    values=raw * count - zero,
-                    raw=raw,
-                    quality="good" if stamped else "uncertain",
-                )
-
-    def _measured(self) -> tuple[tuple[str, int, float, float], ...]:
-        """Channel, object, size of a count and zero of each quantity [m, m/s, N m]."""
-        return (
-            ("actuator_position", POSITION, self._scale.position, self.origin),
-            ("actuator_velocity", VELOCITY, self._scale.velocity, 0.0),
-            ("actuator_torque", TORQUE, self._scale.torque, 0.0),
-        )
+            raw = np.array([[sample.raw[entry] for sample in stretch] for entry in _CHANNELS], dtype=np.float64)
+            values = raw * self._count - [[self.origin], [0.0], [0.0]]
+            first, received_ns = stretch[0].number, stretch[-1].received_ns
+            quality: Quality = "good" if stamped else "uncertain"
+            for channel, own, counts in zip(_CHANNELS.values(), values, raw, strict=True):
+                yield Block(channel, first, device_ns, received_ns, own, counts, quality)

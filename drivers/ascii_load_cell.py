@@ -190,7 +190,7 @@ class AsciiLoadCell:
         self._stream = ReadingStream(wild_step)
         self._before = (0, 0, 0, 0)
         self._pending: list[Block] = []
-        self._feeding = threading.Lock()
+        self._reading = threading.RLock()
 
     def connect(self) -> None:
         """Open the line and wait for two readings that agree.
@@ -219,8 +219,9 @@ class AsciiLoadCell:
         Raises:
             NotConnected: the line has gone, or was never opened.
         """
-        self._waited(timeout)
-        taken, self._pending = self._pending, []
+        with self._reading:
+            self._waited(timeout)
+            taken, self._pending = self._pending, []
         return taken
 
     def read(self, channel: str) -> Reading:
@@ -231,13 +232,13 @@ class AsciiLoadCell:
             OutOfRange: there is no such channel.
         """
         self._known(channel)
-        held = self._pending
-        self._pending = []
-        try:
-            self._waited(_LIMITS["silence_s"])
-            block = next((block for block in self._pending if block.channel == channel), None)
-        finally:
-            self._pending = held + self._pending
+        with self._reading:
+            held, self._pending = self._pending, []
+            try:
+                self._waited(_LIMITS["silence_s"])
+                block = next((block for block in self._pending if block.channel == channel), None)
+            finally:
+                self._pending = held + self._pending
         if block is None:
             raise NoReply(
                 f"{self.name}: no reading of {channel} within {_LIMITS['silence_s']:.3g} s; check that the "
@@ -256,7 +257,7 @@ class AsciiLoadCell:
 
     def describe(self) -> dict[str, Any]:
         """What a replay needs beside the frames from now on, see `drivers.replay`."""
-        with self._feeding:
+        with self._reading:
             return {"decoder": "ascii_load_cell", "state": self._stream.state()}
 
     def make_safe(self) -> None:
@@ -297,7 +298,6 @@ class AsciiLoadCell:
             left = deadline - time.monotonic()
             frame = self._line.read(0.0 if self._pending else max(left, 0.0))
             if frame is not None:
-                with self._feeding:
-                    self._pending += self._stream.feed(frame.received_ns, frame.data)
+                self._pending += self._stream.feed(frame.received_ns, frame.data)
             if self._pending or left <= 0:
                 return bool(self._pending)

@@ -12,7 +12,7 @@ import select
 import socket
 import struct
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,6 +20,7 @@ import can
 from can.interfaces.socketcand import SocketCanDaemonBus
 from can.interfaces.socketcand.socketcand import convert_can_message_to_ascii_message
 
+from drivers.beat import FRAMES
 from drivers.channel import Frame
 from drivers.errors import DriverError, NotConnected
 from drivers.instrument import Clock, Tap
@@ -130,6 +131,7 @@ class CanBus:
         self._heard: list[Heard] = []
         self._taps: list[Tap] = []
         self._order, self._sending = threading.Lock(), threading.Lock()
+        self._hurry = threading.Event()
 
     def __str__(self) -> str:
         return str(self._address)
@@ -206,6 +208,15 @@ class CanBus:
             for message in messages:
                 bus.send(message, self._timeout)
 
+    @contextlib.contextmanager
+    def at_once(self) -> Iterator[None]:
+        """Within, every frame is taken as it comes: somebody waits for an answer, or times it."""
+        self._hurry.set()
+        try:
+            yield
+        finally:
+            self._hurry.clear()
+
     def subscribe(self, heard: Heard) -> None:
         """Tell ``heard`` of every frame received, on the receiving thread."""
         self._heard.append(heard)
@@ -243,8 +254,10 @@ class CanBus:
         try:
             while self._bus is bus and self._ended is None:
                 message = bus.recv(_TURN)
-                if message is not None:
+                while message is not None:
                     self._take(message)
+                    message = bus.recv(0.0)
+                self._hurry.wait(FRAMES.wait(self._clock()))
         except Exception as error:
             # Whatever it was, nothing is heard any more: `check` tells.
             self._ended = error
@@ -253,16 +266,18 @@ class CanBus:
         if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
             self.corrupted += message.is_error_frame
             return
+        data = bytes(message.data)
         with self._order:
             now = self._clock()
             self.received += 1
-            self._show(now, False, message.arbitration_id, bytes(message.data))
+            self._show(now, False, message.arbitration_id, data)
         for heard in self._heard:
             try:
-                heard(now, message.arbitration_id, bytes(message.data))
+                heard(now, message.arbitration_id, data)
             except (DriverError, ValueError, IndexError, struct.error):
                 self.corrupted += 1
 
     def _show(self, now: int, sent: bool, identifier: int, data: bytes) -> None:
+        frame = Frame(now, sent, pack_frame(identifier, data))
         for tap in self._taps:
-            tap(Frame(now, sent, pack_frame(identifier, data)))
+            tap(frame)

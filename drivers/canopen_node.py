@@ -2,7 +2,7 @@
 
 `canopen` brings the object dictionary, object access and the layout of process data. It has no consumer of
 heartbeats and reports silence, nonsense and refusal through one class of error; both are mended here. A late
-answer is waited for before the next question, so that it can never be taken for the answer to it.
+answer is waited for once more before the next question, so that it is not taken for the answer to it.
 """
 
 import contextlib
@@ -261,7 +261,7 @@ class CanopenNode:
 
     def _asked(self, what: str, ask: Callable[[], _Answer]) -> _Answer:
         """Ask the node, one question at a time, in the words of our own errors."""
-        with self._access:
+        with self._access, self._bus.at_once():
             self._bus.check()
             self._await_late_answer()
             try:

@@ -41,6 +41,9 @@ class CoilFault(IntFlag):
     OVER_CURRENT = 4
 
 
+_KNOWN_FAULTS = sum(CoilFault)
+
+
 class CoilState(IntFlag):
     """What the amplifier is doing."""
 
@@ -62,6 +65,8 @@ class Condition(NamedTuple):
     def words(self) -> str:
         """For a person; empty where all is well."""
         names = [fault.name or "" for fault in self.fault]
+        if unknown := int(self.fault) & ~_KNOWN_FAULTS:
+            names.append(f"fault {unknown:02X}h, see the amplifier's manual")
         if self.state & CoilState.WATCHDOG_TRIPPED:
             names.append("watchdog tripped: nobody spoke for too long")
         return ", ".join(name.lower().replace("_", " ") for name in names)
@@ -108,6 +113,7 @@ class CoilAmplifier(ModbusInstrument):
         drive = replace(registers["setpoint"], low=-limit, high=limit).channel()
         self._drive = replace(drive, name="coil_drive", unit=DRIVE_UNITS[mode])
         self._table = StepTable(self._registers, self._drive)
+        self._unconfirmed = ""
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -249,16 +255,19 @@ class CoilAmplifier(ModbusInstrument):
         """Bring the output to zero by its ramp; where the wire is dead, the amplifier's watchdog does it."""
         for _ in range(2):
             try:
-                self._table.command("abort")
+                self.abort_table()
                 self._registers.write("setpoint", 0.0)
-            except DriverError:  # refused in a fault or after its watchdog: it is at zero or on its way
+            except DriverError as error:  # refused in a fault or after its watchdog: it is at zero or on its way
+                self._unconfirmed = f"zero output not confirmed: {error}"
                 continue
+            self._unconfirmed = ""
             return
 
     def health(self) -> Health:
         """Counts and state, faults included."""
         health = super().health()
-        return replace(health, words=health.words or Condition(self.faults, self.state, 0.0).words)
+        words = health.words or Condition(self.faults, self.state, 0.0).words
+        return replace(health, words="; ".join(filter(None, [self._unconfirmed, words])))
 
     def _wait_for_zero(self) -> None:
         deadline = time.monotonic() + _LONGEST_RAMP
@@ -272,7 +281,7 @@ class CoilAmplifier(ModbusInstrument):
 
     def _configure(self) -> None:
         registers = self._registers
-        registers.write("table_command", registers.map.document["codes"]["table_command"]["abort"])
+        self.abort_table()
         self.reset()
         registers.write("setpoint", 0.0)
         self._wait_for_zero()

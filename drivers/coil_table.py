@@ -85,7 +85,11 @@ class StepTable:
             NotConnected, NoReply, BadReply, Refused: it did not say.
         """
         found, _ = self._registers.read_together("table_state", "table_started")
-        state = TableState(found["table_state"].raw)
+        raw = found["table_state"].raw
+        if raw not in set(TableState):
+            name = self._registers.line.name
+            raise BadReply(f"{name}: its step table is in state {raw}, which is none; see its wire file")
+        state = TableState(raw)
         begun = state in {TableState.RUNNING, TableState.DONE} and device_ns is not None
         return TableProgress(state, device_ns(found["table_started"].raw) if begun and device_ns else None)
 

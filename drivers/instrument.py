@@ -61,9 +61,12 @@ class Instrument(Protocol):
     def acquire(self, timeout: float) -> list[Block]:
         """Samples that came since the last call, waiting up to ``timeout`` [s] for the first; empty if none.
 
+        Some milliseconds of samples are taken together, so that it may last so much longer (`drivers.beat`).
+
         Raises:
-            NotConnected: the wire has gone, or the instrument has started anew and must be connected again.
-            NoReply: it is there no more, though its wire is: no heartbeat, no block for a second.
+            NotConnected: the wire has gone, no block has come for a second, or the instrument has started anew and
+                must be connected again.
+            NoReply: it is there no more, though its wire is: no heartbeat.
         """
 
     def read(self, channel: str) -> Reading:

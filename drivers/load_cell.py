@@ -13,6 +13,7 @@ import threading
 import time
 from typing import Any, Final
 
+from drivers.beat import FORCE
 from drivers.channel import Block, Channel, Reading, Stamp
 from drivers.errors import BadReply, DriverError, NoReply, OutOfRange, Refused
 from drivers.instrument import Clock, Health, Tap
@@ -30,8 +31,6 @@ _HINTS = {
     "tare": "; the reading must be steady and in range: hold the actuator still",
     "set_rate": "; stop the stream first",
 }
-_TURN = 0.01
-"""[s] of samples that are taken at once: to be woken for each costs more than all that is done with it."""
 _SLICE = 0.01
 """[s] that one thread waits before it looks whether the other has read its answer."""
 
@@ -70,7 +69,6 @@ class LoadCell:
         self._pending: list[Block] = []
         self._newest: dict[str, Block] = {}
         self._tokens = itertools.count()
-        self._due = 0.0
         self._reading = threading.RLock()
         self._asking = threading.Lock()
 
@@ -117,15 +115,14 @@ class LoadCell:
             NotConnected: the line has gone, or was never opened.
         """
         deadline = time.monotonic() + timeout
-        time.sleep(min(max(self._due - time.monotonic(), 0.0), self._clock_reader.idle()))
+        time.sleep(min(FORCE.wait(self._clock()), self._clock_reader.idle()))
         while True:
             left = deadline - time.monotonic()
-            with contextlib.suppress(DriverError):  # of a line that has gone, reading tells
+            with self._reading, contextlib.suppress(DriverError):  # of a line that has gone, reading tells
                 self._clock_reader.attend(self._token, self._line.write)
             self._pump(0.0 if self._pending else max(min(left, self._clock_reader.patience() or _SLICE), 0.0))
             if self._pending or left <= 0:
                 break
-        self._due = time.monotonic() + _TURN
         with self._reading:
             taken, self._pending = self._pending, []
         return taken

@@ -15,8 +15,9 @@ from drivers.load_cell_stream import SampleStream
 _COMMAND: int = CONTRACT["commands"]["read_clock"]
 _PERIOD_NS = round(CONTRACT["deadlines"]["clock_s"] * 1e9)
 _REPLY_NS = round(CONTRACT["deadlines"]["reply_s"] * 1e9)
-_QUICK_NS, _MANY = 5_000_000, 64
-"""[ns] between the first questions, and how many these are."""
+_AT_FIRST = ((64, 5_000_000), (256, 40_000_000))
+"""Up to so many questions, [ns] from one to the next: the sooner the clock's rate is known, the sooner a run may
+begin."""
 _BEAT_NS = 8_000_000
 """[ns] over which questions are spread to find the best moment; an adapter's beat is shorter."""
 _NEAR_NS = 300_000
@@ -82,7 +83,7 @@ class ClockReader:
         if now < self._moment() or waiting or not self._known or self._stream.rate is None:
             return
         self._asked += 1
-        self._due_ns = now + (_QUICK_NS if self._asked < _MANY else _PERIOD_NS)
+        self._due_ns = now + next((every for many, every in _AT_FIRST if self._asked < many), _PERIOD_NS)
         self._token = token()
         self._stream.answers.pop(self._token, None)
         self._after_ns = now - (self._stream.last_ns or now)

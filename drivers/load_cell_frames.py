@@ -11,6 +11,7 @@ CONTRACT: dict[str, Any] = tomllib.loads((Path(__file__).parent / "wire" / "load
 """``wire/load_cell.toml``, which says what every field means."""
 
 _SYNC = bytes(CONTRACT["framing"]["sync"])
+_CHECKSUM_START = int(CONTRACT["checksum"]["start"])
 
 
 class Sample(NamedTuple):
@@ -63,19 +64,15 @@ class _Form(NamedTuple):
     code: int
     body: struct.Struct
     make: type[Packet]
-
-    @property
-    def size(self) -> int:
-        """[bytes] of the whole frame."""
-        return self.body.size + int(CONTRACT["framing"]["overhead"])
+    size: int
+    """[bytes] of the whole frame."""
 
 
 def _form(name: str, make: type[Packet]) -> _Form:
     fields = CONTRACT["frames"][name]["fields"]
     letters = {"u8": "B", "u16": "H", "u32": "I", "i32": "i"}
-    return _Form(
-        CONTRACT["frames"][name]["type"], struct.Struct("<" + "".join(letters[f["format"]] for f in fields)), make
-    )
+    body = struct.Struct("<" + "".join(letters[field["format"]] for field in fields))
+    return _Form(CONTRACT["frames"][name]["type"], body, make, body.size + CONTRACT["framing"]["overhead"])
 
 
 _FORMS: dict[int, _Form] = {
@@ -93,7 +90,7 @@ _HEADER_INSIDE = _SYNC + bytes((_form("sample", Sample).body.size, _form("sample
 
 
 def _checksum(covered: bytes | bytearray) -> int:
-    return binascii.crc_hqx(covered, CONTRACT["checksum"]["start"])
+    return binascii.crc_hqx(covered, _CHECKSUM_START)
 
 
 def encode(packet: Packet) -> bytes:

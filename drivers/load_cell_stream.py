@@ -16,6 +16,9 @@ from drivers.load_cell_frames import CONTRACT, Acknowledgement, Answer, Decoder,
 
 _STATUS = CONTRACT["status"]
 _UNUSABLE = _STATUS["overload"] | _STATUS["sensor_fault"]
+_COUNTS_PER_NEWTON = float(CONTRACT["instrument"]["counts_per_newton"])
+_FULL_SCALE = CONTRACT["instrument"]["full_scale_n"] * _COUNTS_PER_NEWTON
+"""[counts]"""
 _SEQUENCES = 1 << 16
 _TICKS = 1 << 32
 """[us] in one turn of the instrument's clock."""
@@ -89,8 +92,9 @@ class SampleStream:
         for packet in self._decoder.feed(data):
             self._received += 1
             if isinstance(packet, Acknowledgement | Identity):
-                self._answered(packet)
+                # First when, then what: another thread takes both as soon as the answer is there.
                 self.answered_ns[packet.token] = received_ns
+                self._answered(packet)
             elif isinstance(packet, Sample) and self.rate is not None:
                 numbered.append(self._placed(packet, self.rate, received_ns))
             self.last_ns = received_ns
@@ -168,8 +172,7 @@ class SampleStream:
 
 
 def _quality(sample: Sample) -> Quality:
-    limit = CONTRACT["instrument"]["full_scale_n"] * CONTRACT["instrument"]["counts_per_newton"]
-    return "bad" if sample.status & _UNUSABLE or abs(sample.counts) > limit else "good"
+    return "bad" if sample.status & _UNUSABLE or abs(sample.counts) > _FULL_SCALE else "good"
 
 
 def _blocks(samples: list[_Numbered], received_ns: int) -> Iterator[Block]:
@@ -182,5 +185,5 @@ def _blocks(samples: list[_Numbered], received_ns: int) -> Iterator[Block]:
         counts = np.array([numbered.sample.counts for numbered in stretch], dtype=np.float64)
         tare = np.array([numbered.sample.tare for numbered in stretch], dtype=np.float64)
         for channel, raw in (("force", counts - tare), ("force_raw", counts)):
-            newtons = raw / CONTRACT["instrument"]["counts_per_newton"]
+            newtons = raw / _COUNTS_PER_NEWTON
             yield Block(channel, first, device_ns, received_ns, newtons, raw, quality)

@@ -70,10 +70,10 @@ class ModbusInstrument:
             OutOfRange: the serial line does not carry the samples that it makes.
         """
         map_ = load_map(kind)
-        address = replace(address, baud=address.baud or map_.document["serial"]["baud"])
+        address = replace(address, baud=map_.document["serial"]["baud"] if address.baud is None else address.baud)
         self.rate = check_rate(name, address, map_)
         """Samples a second that the wire carries [Hz]."""
-        self._line = ModbusLine(name, address, unit or map_.unit, clock, timeout)
+        self._line = ModbusLine(name, address, map_.unit if unit is None else unit, clock, timeout)
         self._registers = Registers(self._line, map_)
         layout = Layout(map_)
         interval = layout.interval_ns * 1e-9

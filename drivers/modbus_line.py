@@ -118,11 +118,7 @@ class ModbusLine:
             read = client.read_holding_registers if table == "holding" else client.read_input_registers
             return read(address, count=count, device_id=self._unit)
 
-        with self._lock:
-            answer = self._exchange(ask, _READ[table], what)
-            if len(answer.registers) != count:
-                raise self._bad(what, f"{len(answer.registers)} registers came")
-            return self._answered([int(word) for word in answer.registers])
+        return self._registers(ask, _READ[table], count, what)
 
     def write_and_read(self, write_at: int, words: Sequence[int], read_at: int, count: int) -> Answer:
         """Write holding registers, then read some, 1 to 125, in one exchange (function 23).
@@ -141,8 +137,12 @@ class ModbusLine:
                 device_id=self._unit,
             )
 
+        return self._registers(ask, _WRITE_AND_READ, count, what)
+
+    def _registers(self, ask: Callable[[Client], ModbusPDU], function: int, count: int, what: str) -> Answer:
+        """The registers that a question is answered by, as many as were asked for."""
         with self._lock:
-            answer = self._exchange(ask, _WRITE_AND_READ, what)
+            answer = self._exchange(ask, function, what)
             if len(answer.registers) != count:
                 raise self._bad(what, f"{len(answer.registers)} registers came")
             return self._answered([int(word) for word in answer.registers])
@@ -203,7 +203,9 @@ class ModbusLine:
     def _bad(self, what: str, found: str) -> BadReply:
         self.corrupted += 1
         self._in_step = False
-        return BadReply(f"{self.name}: {what}: {found}; nothing of it was used")
+        return BadReply(
+            f"{self.name}: {what}: {found}; nothing of it was used; see cable, baud rate and unit number"
+        )
 
     def _ready(self, what: str) -> Client:
         """The open client, with nothing old left on its wire."""

@@ -113,9 +113,10 @@ class RingDecoder:
 
     def device_ns(self, microseconds: int) -> int:
         """The instrument's clock [ns] from its wrapped microseconds, close to the last ones seen."""
-        step = (microseconds - self._device_us) % _WRAP
-        self._device_us += step - _WRAP if step >= _BEHIND else step
-        return self._device_us * 1000
+        last = self._device_us  # read once: another thread may ask for a value meanwhile
+        step = (microseconds - last) % _WRAP
+        self._device_us = last = last + (step - _WRAP if step >= _BEHIND else step)
+        return last * 1000
 
     def take(self, words: Sequence[int], received_ns: int) -> "Taken":
         """The samples of a block; what was wanted and skipped is lost.

@@ -49,7 +49,10 @@ def decoder(description: Mapping[str, Any]) -> Decoder:
         made = _DECODERS[description["decoder"]](description)
         return _Later(made, int(description["state"]["at_ns"]))
     except (KeyError, TypeError, ValueError) as error:
-        raise BadReply(f"the decoder {description.get('decoder')!r} cannot be made: {error!r}") from error
+        raise BadReply(
+            f"the decoder {description.get('decoder')!r} cannot be made: {error!r}; the log's document "
+            "instruments.json is not whole, or of a later version"
+        ) from error
 
 
 class _Later:

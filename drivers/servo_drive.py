@@ -120,8 +120,10 @@ class ServoDrive:
         Raises:
             NoReply: it does not stand within ``within`` [s], or says nothing.
         """
-        if self.state() in (DriveState.ENABLED, DriveState.QUICK_STOP):
+        state = self.state()
+        if state in (DriveState.ENABLED, DriveState.QUICK_STOP):
             self._node.download(0x6040, cia402.QUICK_STOP)
+        if state in (DriveState.ENABLED, DriveState.QUICK_STOP, DriveState.FAULT_REACTION):
             self._until(self._stands, within, "the rod to stand")
         self._node.download(0x1016, 0, 1)
 
@@ -180,15 +182,16 @@ class ServoDrive:
             )
         low, high = settings.travel
         wanted = [
-            (0x1017, 0, round(settings.drive_beat * 1e3)),
-            (0x1006, 0, cycle * 1000),
-            (0x60C2, 1, cycle),
-            (0x60C2, 2, -3),
-            (0x1400, 5, round(settings.stale_after * 1e3)),
-            (0x6007, 0, 3),
-            (0x605A, 0, 6),
+            (0x1017, 0, round(settings.drive_beat * 1e3)),  # its heartbeat
+            (0x1006, 0, cycle * 1000),  # from SYNC to SYNC [us]
+            (0x60C2, 1, cycle),  # over which it interpolates between setpoints
+            (0x60C2, 2, -3),  # in ms
+            (0x1400, 5, round(settings.stale_after * 1e3)),  # without a setpoint it stops
+            (0x6007, 0, 3),  # and without the master's heartbeat: by quick stop
+            (0x605A, 0, 6),  # by its own ramp; then it holds the rod
             (0x607D, 1, round(low / COUNT)),
             (0x607D, 2, round(high / COUNT)),
+            # Twice what the bench commands: setpoints that left late are made up for by some that follow closer.
             (0x607F, 0, round(2 * settings.top_speed / COUNT)),
             (0x6065, 0, round(settings.following / COUNT)),
             (0x6067, 0, round(settings.arrival / COUNT)),
@@ -228,6 +231,7 @@ class ServoDrive:
         while not done():
             if time.monotonic() > deadline:
                 raise NoReply(
-                    f"{self._name}: waited {within:g} s for {what}; the drive says: {self.state().value}"
+                    f"{self._name}: waited {within:g} s for {what}; the drive says: {self.state().value}; "
+                    "see its supply, its enable input and its limit switches"
                 )
             time.sleep(_POLL)

@@ -46,11 +46,11 @@ class Effects:
         give, gap, hardening, film = (float(sum(part[k] for part in parts)) for k in range(4))
         return give, gap, hardening, film
 
-    def coil(self) -> tuple[float, float, float]:
-        """Dead time [s] and second lag [s] from output to field, and the part of the field behind that lag [1]."""
+    def coil(self) -> tuple[float, float, float, float]:
+        """From output to field: dead time [s], second lag [s], part behind it [1], such lags in a row [1]."""
         acting = [form.act(*values) for form, values in self.that("drive_delay")]
-        dead, lag, part = acting[0] if acting else (0.0, 0.0, 1.0)
-        return float(dead), float(lag), float(part)
+        dead, lag, part, layers = acting[0] if acting else (0.0, 0.0, 1.0, 1)
+        return float(dead), float(lag), float(part), float(layers)
 
     def parallel(self) -> OfThree:
         """Force beside the law [N] over displacement [m], velocity [m/s] and the bend of a seal's lip [1]."""

@@ -20,6 +20,7 @@ class CanFrame(NamedTuple):
 
 def frame_bits(size: int) -> int:
     """Bits on the wire of a frame with this many data bytes, interframe space included."""
+    # 47: start, identifier, control, checksum, acknowledgement, end, and the three bits until the next may begin.
     return 47 + 8 * size + (34 + 8 * size - 1) // 8
 
 

@@ -33,6 +33,8 @@ class Machine(NamedTuple):
 
     lead: float = 5e-3
     """[m] the rod moves for one turn of the motor."""
+    torque: float = 1.27
+    """[N m] rated, of the motor."""
     switch: float = -0.06
     """[m] rig position at which the negative limit switch closes."""
     ppm: float = 12.0
@@ -42,6 +44,11 @@ class Machine(NamedTuple):
 
 
 _PLAIN_MACHINE = Machine()
+
+
+def torque_for(force: float, lead: float = _PLAIN_MACHINE.lead) -> float:
+    """Torque [N m] of the motor that pushes with a force [N] through a screw of this lead [m], without loss."""
+    return force * lead / (2 * math.pi)
 
 
 class CanopenActuator:
@@ -58,6 +65,7 @@ class CanopenActuator:
         self, signals: Signals, *, node_id: int = 5, referenced: bool = False, machine: Machine = _PLAIN_MACHINE
     ) -> None:
         self.objects = ObjectDictionary(_EDS, node_id)
+        self.objects.put(0x6076, round(machine.torque * 1e3))
         self.state = State.SWITCH_ON_DISABLED
         self.demand = Demand()
         self.referenced = referenced
@@ -109,6 +117,7 @@ class CanopenActuator:
         if not math.isfinite(position):
             if self.state not in (State.FAULT, State.FAULT_REACTION):
                 self.fail(0x7320, now_ns)
+            self.objects.put(0x6041, self._statusword())  # of all that it sends, this alone is still known
             return
         self.objects.put(0x1013, self._micros(taken_ns))
         self.objects.put(0x6064, _counts(position - self._zero))
@@ -196,9 +205,12 @@ class CanopenActuator:
 
     def _emergency(self, code: int, now_ns: int) -> None:
         self.objects.put(0x603F, code)
+        # Error register of CiA 301: generic, and communication (10h) or what the device profile says (20h).
         self.slave.emergency(code, 0x11 if code & 0xF000 == 0x8000 else 0x21, now_ns)
 
     def _statusword(self) -> int:
+        # Beside the state, by CiA 402: voltage on 10h, remote 200h, target reached 400h, a limit at work 800h,
+        # homing attained or setpoints followed 1000h; 8000h, referenced, is this maker's own.
         word = self.state.value | 0x10
         moving = self.demand.motion is not Motion.REST
         if self.objects.number(0x6060) == _HOMING:
@@ -216,6 +228,7 @@ class CanopenActuator:
             self._limited = True
             self.fail(0x8612, now_ns)
             return
+        # A motor at its limit holds what it has; it neither lets go nor goes on until the load is less.
         saturated = abs(self.objects.number(0x6077)) > self.objects.number(0x6072)
         self._limited = saturated
         target = self.demand.position if saturated else self._zero + wanted * _COUNT
@@ -236,7 +249,7 @@ class CanopenActuator:
     def _lag(self, demanded: float, now_ns: int) -> None:
         """Following error, that of the demand [m] and not of setpoints still to be reached, once it has lasted."""
         seen_ns, position = self._rig_position()
-        if now_ns - seen_ns > _BEHIND_NS:
+        if now_ns - seen_ns > _BEHIND_NS:  # a busy machine holds the simulation up: no fault of the drive
             return
         if abs(demanded - position) <= self.objects.number(0x6065) * _COUNT:
             self._away_ns = None
@@ -303,8 +316,7 @@ class CanopenActuator:
         """Motor torque behind the force on the rod [per mille of rated]."""
         _, force = self._signals.latest("force", 1, now_ns)
         newtons = float(force[-1]) if len(force) and math.isfinite(force[-1]) else 0.0
-        torque = newtons * self._machine.lead / (2 * math.pi)
-        share = round(torque / (self.objects.number(0x6076) * 1e-3) * 1000)
+        share = round(torque_for(newtons, self._machine.lead) / (self.objects.number(0x6076) * 1e-3) * 1000)
         return max(min(share, 32767), -32768)
 
 

@@ -220,7 +220,7 @@ class CanopenSlave:
 
     def _answer(self, data: bytes, now_ns: int) -> bytes | None:
         command, index, sub = struct.unpack_from("<BHB", data)
-        kind = command >> 5
+        kind = command >> 5  # 0 and 1 download, 2 and 3 upload, the segment and its begin; 4 abort
         if kind == 4:
             self._transfer = None
             return None
@@ -237,6 +237,7 @@ class CanopenSlave:
         self._device.asked(index, now_ns)
         content = self.objects.upload(index, sub)
         if len(content) <= 4:
+            # Expedited, and how many of the four bytes hold nothing.
             return struct.pack("<BHB4s", 0x43 | (4 - len(content)) << 2, index, sub, content)
         self._transfer = _Transfer(index, sub, True, content)
         return struct.pack("<BHBI", 0x41, index, sub, len(content))
@@ -268,7 +269,7 @@ class CanopenSlave:
 
     def _write(self, index: int, sub: int, content: bytes, now_ns: int) -> None:
         self.objects.download(index, sub, content)
-        if index == 0x1016:
+        if index == 0x1016:  # the watch begins with the first heartbeat after it was set
             self._master_seen_ns = None
         self._device.written(index, sub, now_ns)
 
@@ -295,5 +296,6 @@ def _is_pdo(objects: ObjectDictionary, number: int, identifier: int) -> bool:
 
 def _mapping(objects: ObjectDictionary, number: int) -> list[tuple[int, int, int]]:
     """Index, sub-index and bits of what a process data frame carries."""
+    # Index, sub-index and length in bits stand in one number: 16, 8 and 8 of its bits.
     words = [objects.number(number, sub) for sub in range(1, objects.number(number) + 1)]
     return [(word >> 16, word >> 8 & 0xFF, word & 0xFF) for word in words]

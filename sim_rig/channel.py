@@ -141,6 +141,7 @@ class ChannelStream:
         noise = sensor.noise * self._white.standard_normal(count) if sensor.noise else np.zeros(count)
         if sensor.slow_noise and count:
             shocks = sensor.slow_noise * self._shocks.standard_normal(count)
+            # All but the very first: the noise has its full size from the beginning.
             shocks[1 if self._next == 0 else 0 :] *= math.sqrt(1 - self._kept**2)
             coloured, self._slow = signal.lfilter([1.0], [1.0, -self._kept], shocks, zi=self._slow)
             noise += coloured

@@ -70,7 +70,7 @@ class CoilOutput:
         if self.table is Table.RUNNING and now_ns - self.started_ns >= self._steps[-1][0]:
             self.table, (after, level) = Table.DONE, self._steps[-1]
             self._from = self.target = level
-            self._since_ns = self.started_ns + after
+            self._since_ns = self.started_ns + after  # when it came there, however late this is looked at
 
     def _hold(self, now_ns: int) -> None:
         self._from = self.level(now_ns)

@@ -54,7 +54,7 @@ def of_the_plant(scenario: Scenario, law: Array, effects: Effects) -> Array:
     """All of them, (CONSTANTS,): what the rig is, and what the effects add."""
     k = np.zeros(at.CONSTANTS)
     k[: at.SATURATED + 1] = of_the_rig(scenario, law)
-    k[at.DEAD_TIME], lag, k[at.SLOW_PART] = effects.coil()
+    k[at.DEAD_TIME], lag, k[at.SLOW_PART], k[at.LAYERS] = effects.coil()
     k[at.SECOND_LAG] = 1.0 / lag if lag > _NO_LAG else 0.0
     k[at.BRISTLES] = effects.bristles()
     k[at.EVER_PRESENT] = fastest_of_the_rig(scenario, law, _steepest(effects.parallel()))

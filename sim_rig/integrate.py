@@ -82,13 +82,14 @@ def steps_for(
     if k[PLAY] != 0.0:
         carried = follow(x, s[POSITION] + s[SPEED] * AHEAD) != x
         carried_later = follow(x, s[POSITION] + s[SPEED] * h) != x
-        if carried != carried_later:
+        if carried != carried_later:  # the clevis takes the damper along, or lets go of it, within this block
             steps = CONTACT_STEPS
             fastest += abs(s[SPEED])
     if k[GIVE] > 0.0:
         steps = max(steps, _YIELDING_STEPS)
     per_slip = p[5] * h / k[SATURATED]
     travel = abs(rate[Z]) * h / k[SATURATED] + turn * per_slip
+    # Behind a reversal z runs back at twice the rate, until it has its new sign.
     if slip * s[Z] < 0.0 or abs(slip) <= turn:
         travel = max(travel, 2.0 * fastest * per_slip)
     if abs(slip) <= turn and turn * per_slip > _FELT:

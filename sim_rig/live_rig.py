@@ -172,6 +172,7 @@ class LiveRig:
                 calm = due - self._commanded_ns > _CALM_NS
                 if due - self._done >= self._block_ns * (_CALM_BLOCK if calm else 1):
                     self.catch_up()
+                # Late turns are not made up for one by one: `catch_up` plays all that is due at once.
                 due = max(due + self._block_ns // 2, self._clock.now_ns())
         except Exception as error:  # the thread's end is looked at by whoever runs the rig
             self.failure = error

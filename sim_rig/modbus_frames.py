@@ -34,7 +34,7 @@ class _Mbap:
         if len(heard) < 8:
             return None, heard
         number, protocol, length, unit = struct.unpack_from(">HHHB", heard)
-        if protocol != 0 or not 2 <= length <= 254:
+        if protocol != 0 or not 2 <= length <= 254:  # out of step, and nothing in it can be trusted
             return None, b""
         if len(heard) < 6 + length:
             return None, heard

@@ -2,7 +2,7 @@
 
 Three wires: Modbus TCP, RTU frames on a TCP socket, RTU frames on a pty. A request is taken only when the answer
 before it has left, as in a small instrument; what comes meanwhile waits in the wire. Serial answers leave when the
-line could have carried them. Functions 3, 4, 6, 8 (return query data) and 16.
+line could have carried them. Functions 3, 4, 6, 8 (return query data), 16 and 23.
 """
 
 import contextlib
@@ -24,6 +24,8 @@ _LOOK = 0.005
 """[s] of real time between two looks at a device that nobody asks."""
 _QUIET = 0.05
 """[s] after which half a request is forgotten."""
+_VALUE = 3
+"""Code of the exception for what a request gives and cannot be taken."""
 
 
 class Illegal(Exception):  # noqa: N818 - its name in the protocol is exception, too
@@ -95,6 +97,8 @@ def answer(device: Device, pdu: bytes) -> bytes:
         return bytes([function]) + _content(device, function, pdu[1:])
     except Illegal as refusal:
         return bytes([function | 0x80, refusal.code])
+    except (struct.error, IndexError):  # the request ends before all that its function needs
+        return bytes([function | 0x80, _VALUE])
 
 
 def _content(device: Device, function: int, body: bytes) -> bytes:
@@ -273,6 +277,7 @@ class ModbusServer:
         frame = self._suffered(request._replace(pdu=pdu), fault)
         delay = fault.value if fault.kind == "delay" else 0.0
         if self.baud and self.framing is RTU:
+            # Request and answer, and before each the 3.5 characters of silence that tell frames apart.
             delay += (length + len(frame) + 7) * self.character / self.baud
         self._pending = _Pending(host, frame, time.monotonic() + delay)
         self._send_due()

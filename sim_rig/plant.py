@@ -69,6 +69,7 @@ class Plant:
         self._command = displacement
         self._states, self._held = self._settled(displacement, drive)
         self._remembered, self._blocks = 0.0, 0
+        # How finely it will be played is not known yet: room for the finest.
         dead = self._constants[at.DEAD_TIME] / _SHORTEST_BLOCK
         self._past = np.full(math.ceil(dead) + 3, float(drive))
         self._samples = 0
@@ -125,6 +126,7 @@ class Plant:
         """States at rest under the load of the resting damper, and where that stands [m]."""
         stiffness, rest = self._law[11], self._law[13]
         place = displacement
+        # The droop changes the load but little: each round leaves less than a hundredth of what was missing.
         for _ in range(3):
             load = stiffness * (place - rest) + self._parallel(place, 0.0, 0.0)
             place = displacement - self._constants[at.COMPLIANCE] * load
@@ -135,7 +137,7 @@ class Plant:
         behind = place - stretched(load, *carrying) if carrying[0] > 0.0 else place
         states[[at.COMMAND, at.POSITION, at.Y]] = displacement, place, behind
         states[at.BEHIND] = behind
-        states[[at.FIELD, at.OUTPUT, at.LAGGED]] = drive
+        states[[at.FIELD, at.OUTPUT, at.LAGGED, at.TWICE]] = drive
         states[at.TEMPERATURE] = self._constants[at.AMBIENT]
         return states, place
 

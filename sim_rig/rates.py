@@ -31,6 +31,7 @@ from sim_rig.states import (
     HEAT_LOSS,
     LAG,
     LAGGED,
+    LAYERS,
     MASS,
     OUTPUT,
     PLAY,
@@ -40,6 +41,7 @@ from sim_rig.states import (
     SLOW_PART,
     SPEED,
     TEMPERATURE,
+    TWICE,
     Y,
     Z,
 )
@@ -133,8 +135,10 @@ def _drive_coil(s: Array, drive: float, late: float, eta: float, k: Array, rate:
     rate[OUTPUT] = k[AMPLIFIER] * (drive - s[OUTPUT])
     source = late if k[DEAD_TIME] > 0.0 else s[OUTPUT]
     rate[LAGGED] = k[SECOND_LAG] * (source - s[LAGGED])
+    rate[TWICE] = k[SECOND_LAG] * (s[LAGGED] - s[TWICE])
     slow = k[SLOW_PART] if k[SECOND_LAG] > 0.0 else 0.0
-    rate[FIELD] = field_rate(s[FIELD], source + slow * (s[LAGGED] - source), eta)
+    behind = s[TWICE] if k[LAYERS] > 1.0 else s[LAGGED]
+    rate[FIELD] = field_rate(s[FIELD], source + slow * (behind - source), eta)
 
 
 @compiled

@@ -282,6 +282,7 @@ def _march(
             start = command[i] + (command[i + 1] - command[i]) * j / blocks
             end = command[i] + (command[i + 1] - command[i]) * (j + 1) / blocks
             instant = time + (i * blocks + j) * h
+            # An output that has all but arrived would ask for fine steps for ever.
             if abs(drive[i] - s[OUTPUT]) < 1e-7 * (abs(drive[i]) + 1e-3):
                 s[OUTPUT] = drive[i]
             force, slip = rates(s, instant, start, drive[i], now, forms, k, p, rate)

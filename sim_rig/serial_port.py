@@ -110,7 +110,7 @@ class SerialPort:
         if len(self._waiting) + len(through) > self._buffer:
             self.overruns += 1
             return
-        if not self._waiting:
+        if not self._waiting:  # an idle line begins with the frame, a busy one goes on
             self._begun_ns = now_ns
         self._waiting += through
 
@@ -123,7 +123,7 @@ class SerialPort:
         self._carry(now_ns)
         if not self._carried or now_ns - self._batched_ns < self._batch_ns:
             return
-        del self._carried[: self._end.write(bytes(self._carried))]
+        del self._carried[: self._end.write(bytes(self._carried))]  # what the host leaves unread stays here
         self._batched_ns = now_ns
 
     def _carry(self, now_ns: int) -> None:

@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
-from sim_rig.canopen_actuator import CanopenActuator, Machine
+from sim_rig.canopen_actuator import CanopenActuator, Machine, torque_for
 from sim_rig.clock import Clock
 from sim_rig.device_clock import DeviceClock
 from sim_rig.errors import WireError
@@ -110,6 +110,7 @@ class ServedRig:
         self._scenario, self._clock, self._choices = scenario, clock, choices
         self._faults = dict(faults or {})
         self._open = ExitStack()
+        # Chances of its own: a wire more or less changes no reading.
         self._offsets = np.random.default_rng([scenario.seed, 4711])
 
     def __enter__(self) -> "ServedRig":
@@ -146,6 +147,7 @@ class ServedRig:
     def _amplifier(self) -> CoilAmplifierDevice:
         unit = self._scenario.drive_unit
         device = CoilAmplifierDevice(self.rig, self._clock_of("coil_amplifier"), unit)
+        # Looked after by the plant's thread, too: its output has to move between two questions.
         self._modbus("coil_amplifier", cast("Device", device), mode="voltage" if unit == "V" else "current")
         self.rig.attend = [device.advance]
         return device
@@ -186,14 +188,15 @@ class ServedRig:
     def _actuator(self, amplifier: CoilAmplifierDevice) -> None:
         """The drive: its encoder knows where it is, for the specimen is clamped and it could not be homed."""
         clock = self._clock_of("actuator")
-        machine = Machine(ppm=clock.ppm, clock_offset_ns=clock.offset_ns)
+        torque = round(torque_for(self._scenario.actuator.force), 3)
+        machine = Machine(torque=torque, ppm=clock.ppm, clock_offset_ns=clock.offset_ns)
         drive = CanopenActuator(self.rig, referenced=True, machine=machine)
         server = SocketcandServer([drive, SyncLine(amplifier.trigger)], self._clock)
         self._open.enter_context(server)
         host, port = self._behind_faults("actuator", f"tcp://127.0.0.1:{server.port}").split("/")[2].split(":")
         settings: Section = {"interface": "socketcand", "host": host, "port": int(port), "channel": "can0"}
         # A drive that is only simulated shares a busy machine with whoever leads it, and may be kept waiting.
-        settings |= {"node": 5, "clamped": True, "stale_after": 0.2}
+        settings |= {"node": 5, "clamped": True, "stale_after": 0.2, "torque": torque}
         self._reached("actuator", "CANopen, CiA 402, over socketcand", settings)
 
     def _behind_faults(self, name: str, url: str) -> str:

@@ -45,6 +45,12 @@ class Actuator(Setting):
         le=60,
         description="[s] over which the commanded motion fades in from its first position",
     )
+    force: float = Field(
+        default=1600.0,
+        ge=10,
+        le=1e6,
+        description="[N] that its motor can push; over the wires, a damper that resists more holds the rod back",
+    )
 
 
 class Amplifier(Setting):
@@ -57,7 +63,7 @@ class Amplifier(Setting):
 
 
 class Thermal(Setting):
-    """How the damper warms; nothing in the law depends on it yet."""
+    """How the damper warms. The law does not feel it; an effect that does keeps its own account of the energy."""
 
     ambient: float = Field(
         default=22.0, ge=-60, le=120, description="[degC] of the room, and of the damper at the start"

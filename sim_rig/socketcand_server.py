@@ -176,7 +176,7 @@ class SocketcandServer:
                 connection.setsockopt(socket.SOL_SOCKET, _STAMPED, 1)
             connection.setblocking(False)
             client = _Client(connection)
-            client.unsent = b"< hi >"
+            client.unsent = b"< hi >"  # the protocol greets first
             self._clients.append(client)
 
     def _receive(self, client: _Client) -> None:

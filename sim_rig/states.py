@@ -1,12 +1,12 @@
 """States and constants of the motion: what stands where in their arrays."""
 
-STATES = 12
+STATES = 13
 """Command behind the lag [m], actuator position [m] and velocity [m/s], y [m], z [m], field u, amplifier output
 [both V or A], temperature [degC], drive behind a second lag [V or A], energy in the damper [J], displacement of
-the damper behind a fixture that gives way [m], bend of a seal's lip [1]."""
-COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND, BENT = range(STATES)
+the damper behind a fixture that gives way [m], bend of a seal's lip [1], drive behind two such lags [V or A]."""
+COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND, BENT, TWICE = range(STATES)
 
-CONSTANTS = 23
+CONSTANTS = 24
 """Rates and weights of everything but the law, in the order of the names below."""
 (
     LAG,  # [1/s] rate of the command's lag
@@ -32,4 +32,5 @@ CONSTANTS = 23
     HARDENING,  # [1/m²] of the same
     FILM,  # [N s/m] in that gap
     BRISTLES,  # [1/m] rate over the way with which a seal's lip bends, 0 without one
+    LAYERS,  # second lags in a row, one or two
 ) = range(CONSTANTS)

@@ -9,6 +9,7 @@ import contextlib
 import sys
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -87,13 +88,15 @@ class Agent:
         self._no_priority = priority_refused()
         self._rig = build_rig(config, self._clock, prompt=not self._no_priority)
         self._interlocks = Interlocks(config.limits.matrix(), self._rig.drive_channel)
-        self._warden = Warden(self._rig, self._interlocks, self._clock, self._tell, self._stop_run)
         actuator = self._rig.actuator
         self._acquisition = Acquisition(
             {one.name: one.instrument for one in self._rig.named},
             self._take,
             self._instrument_failed,
             idle={actuator.name: actuator},
+        )
+        self._warden = Warden(
+            self._rig, self._interlocks, self._clock, self._acquisition.maps, self._tell, self._stop_run
         )
         aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
         self._bench = BenchThread(aligner, force_rate(config), publish, self._beat, self._log_failed)
@@ -106,7 +109,7 @@ class Agent:
         self._preparation = Preparation(self._rig, self._move, self._tell, self._prepared)
         self._run: Run | None = None
         self._thread: threading.Thread | None = None
-        self._finished: list[RunStatus] = []
+        self._finished: deque[RunStatus] = deque(maxlen=_REMEMBERED)
         self._told: tuple[AgentState, str] | None = None
         self._told_at = 0.0
         self._open = contextlib.ExitStack()
@@ -146,7 +149,7 @@ class Agent:
     def status(self) -> AgentStatus:
         """All that the agent says of itself."""
         with self._lock:
-            state, finished = self._state, tuple(self._finished[-_REMEMBERED:])
+            state, finished = self._state, tuple(self._finished)
         return AgentStatus(
             state=state,
             trip=self._interlocks.tripped,
@@ -173,8 +176,10 @@ class Agent:
             self._set_state("preparing")
         try:
             self._begin(command)
-        except (BenchError, DriverError) as found:
+        except Exception as found:
             self._set_state("idle", instead_of=("preparing",))
+            if not isinstance(found, BenchError | DriverError):
+                raise
             return Answer(ok=False, error=str(found), status=self.status())
         return Answer(ok=True, status=self.status())
 
@@ -214,7 +219,8 @@ class Agent:
         return Answer(ok=not error, error=error, status=self.status())
 
     def shut_down(self) -> None:
-        """End the run in good order and bring everything to rest; harmless when repeated."""
+        """End run or step in good order and bring everything to rest; harmless when repeated."""
+        self._preparation.end(_END_WITHIN)
         thread = self._thread
         if thread is not None and thread.is_alive():
             self._stop_run("the agent was shut down", False)

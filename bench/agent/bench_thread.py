@@ -55,6 +55,7 @@ class BenchThread:
         self._lost_before: Counter[str] = Counter()
         self._live: list[tuple[AlignedSamples, Columns]] = []
         self._published = 0.0
+        self._defect = False
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="bench", daemon=True)
 
@@ -75,7 +76,7 @@ class BenchThread:
         """Record from now on."""
         with self._lock:
             self._lost_before = Counter(self._aligner.lost)
-            self._recording = recording
+            self._recording, self._defect = recording, False
 
     def lost(self) -> dict[str, int]:
         """Samples lost since recording began, by channel."""
@@ -92,12 +93,25 @@ class BenchThread:
 
     def _run(self) -> None:
         while not self._stopping.wait(PERIOD):
-            with self._lock:
-                self._turn()
-            self._send_live()
-            self._beat()
+            for step in (self._turn, self._send_live, self._beat):
+                try:
+                    step()
+                except (
+                    Exception
+                ) as error:  # a thread that died in silence would take the watch over the force along
+                    self._told_defect(error)
+
+    def _told_defect(self, error: Exception) -> None:
+        """Told once a run: what cannot be done now cannot be done a tenth of a second later."""
+        if not self._defect:
+            self._defect = True
+            self._failed(LogError(f"bench samples cannot be made: {error!r}; this is a defect, the run ends"))
 
     def _turn(self) -> None:
+        with self._lock:
+            self._take_ready()
+
+    def _take_ready(self) -> None:
         aligned = self._aligner.ready()
         if aligned is None:
             return

@@ -105,7 +105,10 @@ def _answered(request: bytes, handle: Handler) -> Answer:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(step) for step in first["loc"]) or "the message"
         return Answer(ok=False, error=f"that is no command: {place}: {first['msg']}")
-    return handle(command)
+    try:
+        return handle(command)
+    except Exception as error:  # or one bad command would take the agent, and everybody's rig, with it
+        return Answer(ok=False, error=f"{command.command} ended: {error!r}; this is a defect of the agent")
 
 
 class Publisher:

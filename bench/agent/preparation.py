@@ -58,24 +58,33 @@ class Preparation:
             if self.status is not None and self.status.step == "home":
                 self._rig.actuator.make_safe()
 
+    def end(self, within: float) -> None:
+        """Bring a step that goes on to its end, waiting [s] for it at most."""
+        self.stop()
+        if self._thread is not None:
+            self._thread.join(within)
+
     def _carry_out(self, step: Step, position: float) -> None:
         self._tell("command", step)
         try:
             self.status = StepStatus(step=step, outcome="done", words=self._done(step, position))
             self._tell("state", self.status.words)
         except (DriverError, RunError) as error:
-            self.status = StepStatus(step=step, outcome="failed", words=str(error))
-            self._tell("alarm", self.status.words)
+            self._failed(step, str(error))
+        except Exception as error:  # without a word the step would go on for ever
+            self._failed(step, f"{step} ended: {error!r}; this is a defect")
         finally:
             self._over()
+
+    def _failed(self, step: Step, words: str) -> None:
+        self.status = StepStatus(step=step, outcome="failed", words=words)
+        self._tell("alarm", words)
 
     def _done(self, step: Step, position: float) -> str:
         """Carry out a step; what is so then, in one sentence."""
         if step == "home":
             self._rig.actuator.home()
-            position = (
-                0.0  # the switch stands beyond where a specimen may be taken; the middle of the travel does not
-            )
+            position = 0.0  # where a specimen may be taken; the switch stands beyond that
         if step in ("home", "move"):
             self._move(position, self._ending)
             return f"the rod stands at {_position(self._rig)}"

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from pydantic import ValidationError
-
 from bench.agent.bench_thread import BenchThread
 from bench.agent.header import LogFacts
 from bench.agent.messages import RunCommand, RunOutcome, RunStatus
 from bench.agent.recording import Recording
-from bench.errors import BenchError, MethodError, RunError
-from bench.faults import first_fault
+from bench.errors import BenchError, RunError
 from bench.methods import Method, Programme, compile_method
 from bench.methods.compile import BETWEEN
+from bench.methods.document import method_of
 from bench.recorder.live import LiveRecorder
 from bench.rig.clock_map import ClockMap
 from bench.rig.instruments import Rig
@@ -63,7 +61,7 @@ def order(command: RunCommand, rig: Rig, specimen: str, folder: Path) -> Order:
         MethodError: the method is none, or cannot be compiled within its limits.
         RunError: this bench cannot run it, or there is no place for the log.
     """
-    programme = compile_method(_method(command))
+    programme = compile_method(method_of(command.method, "what was sent"))
     method = programme.method
     if method.drive_kind != rig.drive_kind:
         raise RunError(
@@ -79,15 +77,6 @@ def order(command: RunCommand, rig: Rig, specimen: str, folder: Path) -> Order:
     except OSError as error:
         raise RunError(f"{path.parent}: logs cannot go there ({error.strerror}); choose another folder") from None
     return Order(programme, first, identity, path)
-
-
-def _method(command: RunCommand) -> Method:
-    try:
-        return Method.model_validate(command.method)
-    except ValidationError as error:
-        first, words = first_fault(error)
-        place = ".".join(str(step) for step in first["loc"]) or "the document"
-        raise MethodError(f"that is no method: {place}: {words}") from None
 
 
 class Run:

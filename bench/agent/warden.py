@@ -5,16 +5,16 @@ waits for nobody.
 """
 
 import threading
-from collections.abc import Callable
-
-import numpy as np
+from collections.abc import Callable, Mapping
 
 from bench.rig.acquisition import Batch
+from bench.rig.clock_map import ClockMap
 from bench.rig.instruments import Rig
 from bench.safety.interlocks import Interlocks, following_error
 from bench.safety.limits import Action, Verdict
 from bench.safety.trip import DEADLINE, bring_to_rest
 from bench.sequencer.plan import RunPlan
+from drivers.channel import Block
 
 _TOLD_CYCLES = 2
 """Cycles of lateness beyond which the log says so; a drive bridges less."""
@@ -30,6 +30,7 @@ class Warden:
         rig: what is brought to rest in a trip.
         interlocks: that judge.
         clock: of the bench [ns].
+        maps: of the instruments' clocks, by name.
         tell: told of what happens: kind, words.
         stop: ends a run in good order.
     """
@@ -39,13 +40,14 @@ class Warden:
         rig: Rig,
         interlocks: Interlocks,
         clock: Callable[[], int],
+        maps: Mapping[str, ClockMap],
         tell: Callable[[str, str], None],
         stop: Stop,
     ) -> None:
         self.plan: RunPlan | None = None
         """What the rod was sent to, while a run leads it."""
         self._rig, self._interlocks, self._clock = rig, interlocks, clock
-        self._tell, self._stop = tell, stop
+        self._maps, self._tell, self._stop = maps, tell, stop
         self._rest: threading.Thread | None = None
         self._cycle_ns = round(rig.actuator.settings.cycle * 1e9)
 
@@ -104,8 +106,16 @@ class Warden:
         self._tell("state", f"brought to rest: {rest}")
 
     def _following_error(self, batch: Batch, plan: RunPlan) -> float:
-        """The samples of a batch are one cycle apart, the last one fresh."""
+        """The samples of a batch are one cycle apart."""
         positions = [block for block in batch.blocks if block.channel == "actuator_position"]
-        values = np.concatenate([block.values for block in positions])
-        ages = np.arange(len(values))[::-1] * self._cycle_ns
-        return following_error(values, positions[-1].received_ns - ages, plan.position)
+        values = [value for block in positions for value in block.values.tolist()]
+        last = self._taken_ns(batch.instrument, positions[-1])
+        times = range(last - (len(values) - 1) * self._cycle_ns, last + 1, self._cycle_ns)
+        return following_error(values, times, plan.position)
+
+    def _taken_ns(self, instrument: str, block: Block) -> int:
+        """Bench clock when a block's last sample was taken [ns]: a rod is not astray because it was read late."""
+        clock = self._maps.get(instrument)
+        if clock is None or not clock.known or block.device_ns is None:
+            return block.received_ns
+        return clock.instant(int(block.device_ns[-1]))

@@ -34,7 +34,11 @@ def open_database(url: str) -> Engine:
         engine = create_engine(url)
         if engine.dialect.name == "sqlite":
             event.listen(engine, "connect", _set_pragmas)
-        _migrate(engine)
+        try:
+            _migrate(engine)
+        except BaseException:
+            engine.dispose()  # or its connections, and an SQLite file's lock, stay until chance collects them
+            raise
     except CommandError as error:
         raise CatalogueError(f"the catalogue {url} is of a later version ({error}); take that mrbench") from error
     except (SQLAlchemyError, ImportError) as error:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from bench.agent.link import AgentClient
 from bench.agent.messages import ShutDownCommand, StatusCommand
+from bench.child_process import end
 from bench.demo.folder import DemoFolder
 from bench.errors import AgentUnreachable, RunError
 from bench.rig.config import load_config
@@ -44,6 +45,7 @@ def processes(folder: DemoFolder) -> Iterator[str]:
         _await(rig, folder.path / "rig.log", folder.rig.is_file)
         _configure(folder)
         running.callback(_end_agent, folder.config)
+        # The demo talks to the service as the page does; a token of an earlier demo cannot be had any more.
         words = ["serve", "--config", str(folder.config), "--data", str(folder.data), "--port", "0", "--new-token"]
         said = folder.path / "service.log"
         service = running.enter_context(_process(words, said))
@@ -74,12 +76,7 @@ def _process(words: list[str], said: Path) -> Iterator["subprocess.Popen[bytes]"
     try:
         yield process
     finally:
-        process.terminate()
-        try:
-            process.wait(_DOWN_WITHIN)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+        end(process, _DOWN_WITHIN)
 
 
 def _await(process: "subprocess.Popen[bytes]", said: Path, ready: Callable[[], bool]) -> None:

@@ -63,7 +63,14 @@ class Rest:
             return urlopen(Request(self._base + path, content, headers), timeout=_TIMEOUT)
         except HTTPError as error:
             with error:
-                problem = json.load(error)
-            raise RunError(f"the service refuses {path}: {problem.get('detail', problem)}") from None
+                raise RunError(f"the service refuses {path}: {_detail(error)}") from None
         except (URLError, OSError, HTTPException) as error:
             raise RunError(f"the service does not answer {path}: {error}") from error
+
+
+def _detail(error: HTTPError) -> str:
+    """What a refusal says; by its number, where something else than the service has answered."""
+    try:
+        return str(json.load(error)["detail"])
+    except (ValueError, KeyError, TypeError):
+        return f"HTTP {error.code}; is it the service that listens there?"

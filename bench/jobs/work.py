@@ -7,13 +7,13 @@ import queue
 import shutil
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
+from bench.child_process import Lines, read_along
 from bench.errors import BenchError
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.order import FIT, REPORT, Order, Summary
@@ -104,7 +104,7 @@ def _workplace(result: Path) -> Iterator[Path]:
 
 def _appear(place: Path, result: Path) -> None:
     """Give the folder its name; another attempt may have been first, with the same content."""
-    place.chmod(0o755)
+    place.chmod(0o755)  # mkdtemp keeps it from others, who may read all else in the data folder
     try:
         place.rename(result)
     except OSError as error:
@@ -115,7 +115,6 @@ def _appear(place: Path, result: Path) -> None:
 def _run(command: list[str], what: str, following: Following, deadline: float) -> None:
     """Run one command to its end; its last line is its complaint."""
     following.says(what)
-    lines: queue.Queue[str | None] = queue.Queue()
     process = subprocess.Popen(
         [*LEASH, *command],
         stdin=subprocess.PIPE,
@@ -125,8 +124,7 @@ def _run(command: list[str], what: str, following: Following, deadline: float) -
         errors="replace",
         env=os.environ | ONE_THREAD,
     )
-    reader = threading.Thread(target=_pump, args=(process, lines), daemon=True)
-    reader.start()
+    lines, reader = read_along(process)
     try:
         last = _follow(lines, what, following, deadline)
     finally:
@@ -140,7 +138,7 @@ def _run(command: list[str], what: str, following: Following, deadline: float) -
         raise JobError(f"{what}: {last.removeprefix('mrbench: ') or f'exit status {process.returncode}'}")
 
 
-def _follow(lines: "queue.Queue[str | None]", what: str, following: Following, deadline: float) -> str:
+def _follow(lines: Lines, what: str, following: Following, deadline: float) -> str:
     """The last line that was said, once all is said."""
     last = ""
     while True:
@@ -157,10 +155,3 @@ def _follow(lines: "queue.Queue[str | None]", what: str, following: Following, d
         if line.strip():
             last = line.strip()
             following.says(f"{what}: {last}")
-
-
-def _pump(process: "subprocess.Popen[str]", lines: "queue.Queue[str | None]") -> None:
-    if process.stderr is not None:
-        for line in process.stderr:
-            lines.put(line)
-    lines.put(None)

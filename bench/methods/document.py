@@ -114,6 +114,18 @@ def shipped_methods() -> list[str]:
     return sorted(entry.name.removesuffix(".json") for entry in library.iterdir() if entry.name.endswith(".json"))
 
 
+def method_of(content: Any, origin: str) -> Method:
+    """The method that a parsed document describes; ``origin`` names it in messages.
+
+    Raises:
+        MethodError: it is not of the form; the message names the place.
+    """
+    try:
+        return Method.model_validate(content)
+    except ValidationError as error:
+        raise MethodError(f"{origin} is no method: {_first_fault(error, content)}") from None
+
+
 def load_method(name_or_path: str | Path) -> Method:
     """A shipped method by its name, or any other from its file.
 
@@ -122,12 +134,10 @@ def load_method(name_or_path: str | Path) -> Method:
     """
     text = _text(name_or_path)
     try:
-        content: Any = json.loads(text)
-        return Method.model_validate_json(text)
+        content = json.loads(text)
     except ValueError as error:
-        if isinstance(error, ValidationError):
-            raise MethodError(f"{name_or_path} is no method: {_first_fault(error, content)}") from None
         raise MethodError(f"{name_or_path} is no method: not JSON, {error}") from None
+    return method_of(content, str(name_or_path))
 
 
 def _text(name_or_path: str | Path) -> str:

@@ -129,11 +129,14 @@ def _multisine(motion: Multisine, time: Array) -> Kinematics:
 def _random(motion: Random, time: Array) -> Kinematics:
     """Equal sines with random phases on every line of the band, summed by one inverse transform each."""
     count = len(time)
+    # The noise repeats after as many samples as there are, one step beyond the last.
     spacing = float(time[-1] - time[0]) * count / (count - 1)
     frequency = np.fft.rfftfreq(count, spacing / count)
     band = (frequency >= motion.spectrum.low_hz) & (frequency <= motion.spectrum.high_hz)
     lines = int(band.sum())
     phases = np.random.default_rng(motion.seed).uniform(0.0, 2 * math.pi, lines)
+    # The inverse transform gives a line of size s the amplitude 2 s / count; n sines of amplitude a have an rms of
+    # a sqrt(n / 2), whatever their phases.
     size = motion.spectrum.rms_m * math.sqrt(2 / max(lines, 1)) * count / 2
     spectrum = np.zeros(len(frequency), dtype=np.complex128)
     spectrum[band] = size * np.exp(1j * phases)
@@ -147,6 +150,7 @@ def _table(motion: MotionTable, time: Array) -> Kinematics:
 
     length = motion.time_s[-1]
     spline = CubicSpline(motion.time_s, motion.displacement_m, bc_type="clamped")
+    # The end of a cycle still belongs to it: the last sample must not jump back to the first point.
     cycle = np.maximum(np.ceil(time / length) - 1, 0.0)
     t = np.clip(time - cycle * length, 0.0, length)
     return Kinematics(*(np.asarray(spline(t, order), dtype=np.float64) for order in range(3)))

@@ -181,7 +181,7 @@ def _cell_fault(cells: Sequence[str], place: int) -> str | None:
         return f"the row ends after {len(cells)} cells; give a number"
     text = cells[place].strip()
     try:
-        value = float(text.replace("_", "?"))
+        value = float(text.replace("_", "?"))  # Python would read 1_000 as a number, numpy does not
     except ValueError:
         return f"{text!r} is no number" if text else "the cell is empty; give a number"
     return None if math.isfinite(value) else f"{text} is no finite number; leave the row out or repair it"

@@ -189,6 +189,11 @@ class LiveRecorder:
             except LogError as error:
                 self._error = error
                 return
+            except Exception as error:  # a thread that dies in silence would leave a log that calls itself clean
+                self._error = LogError(
+                    f"{self.path}: cannot be written: {error!r}; this is a defect of the recorder"
+                )
+                return
 
     def _write_waiting(self) -> None:
         """Everything that waits now: readings and frames of one instrument together, all else one by one."""

@@ -65,6 +65,7 @@ def find_plateaus(drive: Array, rate: float) -> tuple[list[Plateau], float]:
 def _tolerance(medians: Array) -> float:
     """Four deviations from block to block, but within 2 to 4 % of the largest drive."""
     steps = np.abs(np.diff(medians)) if len(medians) > 1 else np.zeros(1)
+    # A difference of two blocks has twice the variance of one.
     noise = 1.4826 * float(np.median(steps)) / np.sqrt(2)
     largest = float(np.max(np.abs(medians)))
     return max(NEGLIGIBLE, float(np.clip(4 * noise, 0.02 * largest, 0.04 * largest)))

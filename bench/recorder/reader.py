@@ -110,7 +110,7 @@ def _read(path: Path, reader: McapReader) -> Log:
     for _, channel, message in reader.iter_messages(topics=list(messages), log_time_order=False):
         messages[channel.topic].append(message.data)
     if not messages[SAMPLE]:
-        raise LogError(f"{path}: the log holds no sample")
+        raise LogError(f"{path}: the log holds no sample; its run ended before one came")
     samples = _arrays(_decoded(messages[SAMPLE]))
     return Log(
         path=path,

@@ -90,7 +90,7 @@ def salvage(path: Path | str, out: Path | str | None = None) -> Salvage:
         raise LogError(f"{broken}: stands there already; move it away, or give the mended log a name with --out")
     with replacing(target) as beside:
         remains, size = _mend(path, beside)
-        read_log(beside)
+        read_log(beside)  # before it takes the place of anything
         if broken is not None:
             shutil.copy2(path, broken)
     return Salvage(
@@ -187,6 +187,7 @@ def _look_beyond(file: IO[bytes], remains: _Remains) -> None:
     """Take from the head of a chunk that was cut off up to when it reached."""
     file.seek(remains.whole_until)
     head = file.read(25)
+    # Kind (1 byte), length (8), then the times of its first and last message (8 each).
     if len(head) == 25 and head[0] == Opcode.CHUNK:
         remains.known_until_ns = max(remains.known_until_ns, *struct.unpack("<QQ", head[9:]))
 

@@ -182,6 +182,7 @@ def _is_even(run: Sequence[Stroke], travel: float) -> bool:
     """Whether a run stays one sine, where each stroke alone resembles the one before: a slow sweep does not."""
     amplitudes = [s.amplitude for s in run]
     paces = np.diff([s.middle for s in run])
+    # Noise moves a crossing by its size over the slope there, which is 2 pi amplitudes a period.
     spread = _SINE_SPREAD + travel / (2 * np.pi * min(amplitudes))
     return max(amplitudes) < 1.5 * min(amplitudes) and float(np.max(paces) / np.min(paces)) < 1 + spread
 
@@ -221,6 +222,7 @@ def _without_slivers(motions: Sequence[_Motion], rate: float) -> list[_Motion]:
     """The motions without those too short to be any, and neighbours that are no sine made one."""
     kept: list[_Motion] = []
     for motion in motions:
+        # Some 20 ms between two motions are the seam of both.
         sliver = motion.stop - motion.start < max(3, 0.02 * rate)
         if kept and (sliver or _alike(kept[-1], motion)):
             longer = max(kept[-1], motion, key=lambda m: m.stop - m.start)
@@ -238,6 +240,7 @@ def _snapped(motions: Sequence[_Motion], edges: Sequence[int]) -> list[_Motion]:
     """The motions, moved onto a change of drive where one stands very near their boundary."""
     snapped = list(motions)
     for i, (left, right) in enumerate(pairwise(motions)):
+        # A turning point is known less sharply than a step of the drive: a tenth of a stroke is within doubt.
         near = 0.1 * min(left.half, right.half)
         close = [at for at in edges if abs(at - right.start) <= near]
         if close and left.start < close[0] < right.stop:

@@ -52,6 +52,8 @@ class SineFit:
 
 def smallest_travel(displacement: Array) -> float:
     """Travel that stands above the noise [m]: eight deviations, 0.3 % of the range, at least 20 µm."""
+    # Motion hardly shows in second differences; white noise has six times its variance there. 1.4826 makes the
+    # median of magnitudes a standard deviation, which a few jumps do not move.
     rough = np.diff(displacement, 2)
     noise = 1.4826 * float(np.median(np.abs(rough))) / 6**0.5 if len(rough) else 0.0
     return max(SMALLEST_TRAVEL, 8 * noise, 0.003 * float(np.ptp(displacement)))
@@ -115,6 +117,7 @@ def find_holds(
     for start, stop in true_runs(reach <= travel):
         start, stop = max(0, start - window // 2), min(len(displacement), stop + window // 2)
         touched = [stroke for stroke in strokes if stroke.start < stop and stroke.stop > start]
+        # The turning point of a slow sine lasts for a small part of its two strokes only.
         around = max((s.stop for s in touched), default=0) - min((s.start for s in touched), default=0)
         if stop - start >= 0.4 * around:
             holds.append((start, stop))

@@ -108,17 +108,25 @@ class LogWriter:
         self._chunk_start: int | None = None
         self._chunk_opened = self._synced = clock()
         self._closed = False
+        self._schemas: dict[str, int] = {}
+        self._topics: dict[str, int] = {}
         with file_errors(self.path):
             self._file = self.path.open("wb")
-            self._mcap = started_writer(self._file)
-            self._schemas: dict[str, int] = {}
-            self._topics: dict[str, int] = {}
-            for topic in MESSAGES:
-                self._register(topic)
-            for name, record in header.records().items():
-                self._mcap.add_metadata(name, record)
-            self.attach("README.txt", "text/plain", _README.encode())
-            self._to_disk()
+            try:
+                self._mcap = started_writer(self._file)
+                self._begin(header)
+            except BaseException:
+                self._file.close()
+                raise
+
+    def _begin(self, header: RunHeader) -> None:
+        """What stands before the first sample, so that a log cut off there still says whose it is."""
+        for topic in MESSAGES:
+            self._register(topic)
+        for name, record in header.records().items():
+            self._mcap.add_metadata(name, record)
+        self.attach("README.txt", "text/plain", _README.encode())
+        self._to_disk()
 
     def __enter__(self) -> Self:
         """The writer itself."""
@@ -235,6 +243,7 @@ class LogWriter:
             raise LogError(f"{self.path}: this log is closed")
         self._closed = True
         with file_errors(self.path), self._file:
+            # A record goes past the open chunk into the file: the outcome has to stand behind the last sample.
             flush(self._mcap)
             self._mcap.add_metadata(
                 "outcome", self._outcome(outcome or ("lossy" if self._lost else "clean"), reason)

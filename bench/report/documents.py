@@ -10,6 +10,7 @@ from typing import Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bench.errors import ReportError
+from bench.faults import first_fault
 
 
 class Part(BaseModel):
@@ -165,6 +166,6 @@ def read_document(path: Path, kind: type[Document], wanted: str) -> Document:
     except OSError as error:
         raise ReportError(f"{path}: cannot be read ({error.strerror}); give {wanted}") from error
     except ValidationError as error:
-        first = error.errors()[0]
+        first, words = first_fault(error)
         where = ".".join(str(step) for step in first["loc"])
-        raise ReportError(f"{path}: not {wanted} ({': '.join(filter(None, (where, first['msg'])))})") from error
+        raise ReportError(f"{path}: not {wanted} ({': '.join(filter(None, (where, words)))})") from error

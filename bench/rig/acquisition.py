@@ -108,6 +108,11 @@ class Acquisition:
         """Take note of what a thread was not granted."""
         self._warnings[wire] = sentence
 
+    @property
+    def stopping(self) -> bool:
+        """Whether the threads are to end."""
+        return self._stopping.is_set()
+
     def wait(self, seconds: float) -> bool:
         """Wait [s]; whether the threads are to end."""
         return self._stopping.wait(seconds)
@@ -142,7 +147,7 @@ class _Wire:
 
     def _run(self) -> None:
         self._owner.warn(self.name, raise_priority())
-        while not self._owner.wait(0.0):
+        while not self._owner.stopping:
             try:
                 self._turn()
             except DriverError as error:
@@ -189,7 +194,8 @@ class _Wire:
             pause = min(2 * pause, LONGEST_PAUSE)
 
     def _connected(self) -> bool:
-        with contextlib.suppress(DriverError):
+        # Why it failed has been told; whatever keeps it from coming back must not end the thread that tries.
+        with contextlib.suppress(Exception):
             self._instrument.close()
             self._instrument.connect()
             self._owner.maps[self.name].restart()

@@ -196,6 +196,6 @@ class Aligner:
             if name in columns:
                 due = instants >= (0 if track is None or name in self._required() else track.began)
                 self._lost[name] += int(np.count_nonzero(np.isnan(columns[name]) & due))
-        self._lost = +self._lost
+        self._lost = +self._lost  # without those of which none are missing
         whole = np.all([np.isfinite(columns[name]) for name in (*self._required(), "velocity", "force")], axis=0)
         return AlignedSamples(instants[whole], {name: column[whole] for name, column in columns.items()})

@@ -147,6 +147,18 @@ class ClockMap:
                 self._handed = newest if self._handed is None else max(self._handed, newest)
             return self._mapped(asked)
 
+    def instant(self, device_ns: int) -> int:
+        """`bench_ns` of one instant [ns], quick enough for every cycle.
+
+        Raises:
+            ValueError: there has been no stamp.
+        """
+        with self._lock:
+            if not self._knots:
+                raise ValueError("the device's clock has never been read beside the bench's")
+            knot = next((one for one in reversed(self._knots) if one.at <= device_ns), self._knots[0])
+            return round(knot.bench) + round((device_ns - knot.at) * knot.slope)
+
     def skew(self) -> float:
         """Bound of what the mapping leaves at the newest instant [s]; infinite before the first stamp.
 
@@ -218,10 +230,11 @@ class ClockMap:
         """Let the mapping approach the estimate from here on; what has been handed out stays as it is."""
         self._arrays = None
         rate = 1 + corridor.rate
-        if self._handed is None or not self._knots:
+        if self._handed is None or not self._knots:  # nobody has asked yet: no need to approach it softly
             self._knots.clear()
             self._knots.append(_Knot(at, at + corridor.likeliest(at), rate))
             return
+        # What was handed out must not change any more: the bend lies behind the newest sample.
         at = max(at, self._handed)
         while len(self._knots) > 1 and self._knots[-1].at > at:
             self._knots.pop()

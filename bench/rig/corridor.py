@@ -75,6 +75,7 @@ def corridor(lows: Sequence[Bound], highs: Sequence[Bound], at: int) -> Corridor
     origin = lows[-1].offset
     low_x, low_y = _arrays(lows, at, origin)
     high_x, high_y = _arrays(highs, at, origin)
+    # The older a bound, the less it says of now: the clocks' rates may have wandered since.
     low_y, high_y = low_y + WANDER * np.minimum(low_x, 0), high_y - WANDER * np.minimum(high_x, 0)
     rates = np.linspace(-FASTEST, FASTEST, _RATES)
     found: Corridor | None = None
@@ -94,6 +95,7 @@ def corridor(lows: Sequence[Bound], highs: Sequence[Bound], at: int) -> Corridor
             found = Corridor(
                 at, origin + low, origin + high, slowest, fastest, line, float(gap[best]), float(rates[best])
             )
+        # The edge of what is possible lies between two rates that were tried: one more on each side.
         rates = np.linspace(rates[max(first - 1, 0)], rates[min(last + 1, _RATES - 1)], _RATES)
     return found
 

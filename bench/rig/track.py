@@ -63,6 +63,7 @@ class Track:
 
     def forget(self, before_ns: int) -> None:
         """Let go of what is older, but for the last such sample and the three before it."""
+        # A cubic takes two samples on each side of an instant, and the oldest instant may lie before the first.
         start = max(int(np.searchsorted(self.time_ns, before_ns)) - 4, 0)
         self.time_ns, self.values = self.time_ns[start:], self.values[start:]
 

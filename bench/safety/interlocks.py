@@ -7,10 +7,7 @@ come, good for the record alone.
 
 import math
 import threading
-from collections.abc import Callable, Iterable, Iterator
-
-import numpy as np
-import numpy.typing as npt
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from bench.errors import Interlocked
 from bench.safety.limits import Action, Matrix, Quantity, Verdict, judge
@@ -27,8 +24,6 @@ _WATCHED: dict[str, Quantity] = {
 """Quantity behind each channel; ``force_raw``, LVDT and torque are not limited."""
 _AGAIN = 1.0
 """[s] after which an action that was taken already is reported again, if its cause stays."""
-
-Array = npt.NDArray[np.float64]
 
 
 class Interlocks:
@@ -143,15 +138,12 @@ def _largest(values: Iterable[float]) -> float:
     return max((value for value in values if value == value), key=abs, default=math.nan)
 
 
-def following_error(position: Array, time_ns: npt.NDArray[np.int64], command: Callable[[int], float]) -> float:
-    """How far the rod is from where it was sent, at worst.
+def following_error(position: Sequence[float], time_ns: Sequence[int], command: Callable[[int], float]) -> float:
+    """How far the rod is from where it was sent, at worst, with its sign [m].
 
     Args:
-        position: (samples,) [m] by the drive's encoder.
-        time_ns: (samples,) bench clock of these samples [ns].
+        position: [m] by the drive's encoder. Lists, since for a sample or two arrays are the slower way.
+        time_ns: bench clock of these samples [ns].
         command: where the rod was sent at an instant of the bench clock [ns]: [m].
     """
-    # A batch is a sample or two, for which arrays are the slower way.
-    return _largest(
-        place - command(instant) for place, instant in zip(position.tolist(), time_ns.tolist(), strict=True)
-    )
+    return _largest(place - command(instant) for place, instant in zip(position, time_ns, strict=True))

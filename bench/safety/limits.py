@@ -22,17 +22,18 @@ Quantity: TypeAlias = Literal[
     "setpoint_lateness",
 ]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-UNITS: dict[Quantity, str] = {
-    "force": "N",
-    "displacement": "m",
-    "actuator_velocity": "m/s",
-    "following_error": "m",
-    "coil_current": "A",
-    "coil_voltage": "V",
-    "temperature": "degC",
-    "force_age": "s",
-    "setpoint_lateness": "s",
+_READ: dict[Quantity, tuple[float, str]] = {
+    "force": (1.0, "N"),
+    "displacement": (1e3, "mm"),
+    "actuator_velocity": (1.0, "m/s"),
+    "following_error": (1e3, "mm"),
+    "coil_current": (1.0, "A"),
+    "coil_voltage": (1.0, "V"),
+    "temperature": (1.0, "°C"),
+    "force_age": (1e3, "ms"),
+    "setpoint_lateness": (1e3, "ms"),
 }
+"""The unit in which a person reads each quantity, and how many of it the SI unit is."""
 _SPARE = 1.05
 """A method keeps its limits of motion and drive exactly; what is measured of them carries noise and overshoot."""
 _BEYOND = 1.25
@@ -69,9 +70,9 @@ class Verdict(NamedTuple):
 
     def __str__(self) -> str:
         """For a person."""
-        unit = UNITS[self.quantity]
+        times, unit = _READ[self.quantity]
         name = self.quantity.replace("_", " ")
-        return f"{name} {self.value:.4g} {unit} exceeds the limit of {self.limit:.4g} {unit}"
+        return f"{name} {times * self.value:.4g} {unit} exceeds the limit of {times * self.limit:.4g} {unit}"
 
 
 def judge(matrix: Matrix, quantity: Quantity, value: float) -> Verdict | None:

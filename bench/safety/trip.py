@@ -60,6 +60,8 @@ def bring_to_rest(
             seconds[one.name] = clock() - begin
         except DriverError as error:
             failures[one.name] = str(error)
+        except Exception as error:  # what is not told here would read as if it had come to rest
+            failures[one.name] = f"{error!r}; this is a defect of the driver"
 
     threads = {one.name: threading.Thread(target=stop, args=(one,), daemon=True) for one in instruments}
     for thread in threads.values():

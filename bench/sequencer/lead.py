@@ -17,7 +17,7 @@ from bench.sequencer.plan import Entry, RunPlan
 from bench.sequencer.track import Playing, Track, standing
 from drivers.errors import DriverError
 
-_PAUSE = 0.6
+PAUSE = 0.6
 """Share of the time after which the drive stops by itself that setpoints may be withheld."""
 _LEFT_OUT = 4
 """Cycles by which the thread may be late and still make up for the setpoints that it owes."""
@@ -48,7 +48,7 @@ class Lead:
     ) -> None:
         self.cycle_ns: Final = round(cycle * 1e9)
         self._actuator, self._permit, self._plan = actuator, permit, plan
-        self._patience_ns = round(_PAUSE * stale_after * 1e9)
+        self._patience_ns = round(PAUSE * stale_after * 1e9)
         self._lock = threading.Lock()
         self._entry: Entry | None = None
         self._next: tuple[Track, Passage | None] | None = None
@@ -110,6 +110,7 @@ class Lead:
                 self._enter(Entry(Playing(track, now_ns), passage))
             if self._entry is None:
                 return False
+            # The drive is there a cycle later.
             position = self._entry.playing.position(now_ns + self.cycle_ns)
             self._permit(position)
             self._actuator.command(position)
@@ -145,8 +146,6 @@ class LeadThread:
     ) -> None:
         self.late_cycles = 0
         """Cycles in which no setpoint left in time."""
-        self.worst = 0.0
-        """[s] by which the latest setpoint left late."""
         self.failure: Exception | None = None
         self.warning = ""
         """Why setpoints leave without real-time priority; empty where they have it."""
@@ -164,7 +163,8 @@ class LeadThread:
 
     def _run(self) -> None:
         self.warning = raise_priority(HASTE)
-        due, cycle = self._clock(), self._lead.cycle_ns
+        cycle = self._lead.cycle_ns
+        due = self._clock() // cycle * cycle
         try:
             while not self._stopping.is_set():
                 due += cycle
@@ -182,7 +182,6 @@ class LeadThread:
             self._told_failed(self.failure)
 
     def _note(self, now_ns: int, late: float) -> None:
-        self.worst = max(self.worst, late)
         missed = int(late * 1e9) // self._lead.cycle_ns
         if missed:
             self.late_cycles += missed

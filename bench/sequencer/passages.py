@@ -67,10 +67,12 @@ def passages(programme: Programme, capacity: int, first: int = 0) -> tuple[Passa
     found, start = [], first
     while start < len(programme.time) - 1:
         later = [rest for rest in rests if rest > start]
+        # The level at its begin takes a place of the table, too: as many changes as it holds are one too many.
         fitting = [rest for rest in later if steps[rest] - steps[start] < capacity]
         if not fitting:
             raise _too_many(programme, steps, start, later[0], capacity)
         short = [rest for rest in fitting if rest - start <= LONGEST * programme.rate]
+        # Where it rests too seldom, the first rest after LONGEST is the best that can be had.
         stop = short[-1] if short else fitting[0]
         found.append(Passage(programme, start, stop))
         start = stop

@@ -75,15 +75,10 @@ class RunPlan:
 
     def reached(self, sample: int, now_ns: int) -> bool:
         """Whether the programme's ``sample`` was due at an instant [ns], had nothing been stopped."""
-        time = np.array([now_ns])
         for entry in reversed(self.entries):
             if entry.passage is not None and entry.playing.begin_ns <= now_ns:
-                last = int(
-                    entry.passage.samples_at(np.asarray((time - entry.playing.begin_ns) * 1e-9, dtype=np.float64))[
-                        0
-                    ]
-                )
-                return last >= sample
+                since = np.array([(now_ns - entry.playing.begin_ns) * 1e-9])
+                return int(entry.passage.samples_at(since)[0]) >= sample
         return False
 
     def position(self, time_ns: int) -> float:

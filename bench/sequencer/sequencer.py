@@ -13,7 +13,7 @@ import numpy as np
 
 from bench.errors import RunError
 from bench.methods import Programme
-from bench.sequencer.lead import Lead, LeadThread
+from bench.sequencer.lead import PAUSE, Lead, LeadThread
 from bench.sequencer.passages import Passage, passages
 from bench.sequencer.plan import RunPlan
 from bench.sequencer.track import FADES, approach
@@ -100,11 +100,6 @@ class Sequencer:
         """Cycles in which no setpoint left in time."""
         return self._thread.late_cycles
 
-    @property
-    def worst_lateness(self) -> float:
-        """[s] by which the latest setpoint left late."""
-        return self._thread.worst
-
     def stop(self, why: str, hold: bool = False) -> None:
         """End in good order: the motion fades out, the coil goes to zero; from any thread, harmless when repeated.
 
@@ -141,6 +136,7 @@ class Sequencer:
                 try:
                     self._play(programme, parts, here)
                 finally:
+                    # Within the thread's context: setpoints have to go on until nothing moves.
                     self._come_to_rest(programme)
         finally:
             self._told_leading(False)
@@ -205,7 +201,7 @@ class Sequencer:
             self._amplifier.abort_table()
         raise RunError(
             f"{self._amplifier.name}: its table was armed {_ATTEMPTS} times, each answer came later than "
-            f"{self._actuator.settings.stale_after * 0.6 * 1e3:.0f} ms; see its wire, or raise stale_after"
+            f"{self._actuator.settings.stale_after * PAUSE * 1e3:.0f} ms; see its wire, or raise stale_after"
         )
 
     def _see_table_run(self) -> None:
@@ -250,6 +246,7 @@ class Sequencer:
         if self._guard.tripped or self._thread.failure is not None:
             return
         self._lead.stop(self._clock(), programme.method.limits.acceleration_mps2)
+        # While the motion fades: without its field the damper resists the least.
         self._amplifier.make_safe()
         deadline = time.monotonic() + FADES[-1] + _SPARE
         while not self._lead.done(self._clock()) and self._thread.failure is None:
@@ -268,7 +265,7 @@ class Sequencer:
 
     def _switch_off(self) -> None:
         """No voltage at coil and drive; where the rod may still move, the drive's own quick stop."""
-        if self._guard.tripped:
+        if self._guard.tripped:  # its own threads see to that
             return None
         self._amplifier.make_safe()
         if self._thread.failure is not None:

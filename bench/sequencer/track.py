@@ -21,6 +21,7 @@ MOVE_VELOCITY, MOVE_ACCELERATION = 0.03, 0.3
 FADES = (0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0)
 """[s] lengths of a stop; the first that keeps the acceleration is taken."""
 _MOVE_RATE = 1000.0
+"""[Hz] of a motion that no method has sampled; setpoints lie between its samples."""
 _FINE = 200
 """Instants of a fade at which its acceleration is looked at."""
 
@@ -136,6 +137,7 @@ class Playing:
 
 def _slowed(elapsed: Array, fade: Fade) -> tuple[Array, Array, Array]:
     """Track time [s], its rate [1] and the change of that [1/s] at times since the begin [s]: a raised cosine."""
+    # From 1 to 0, so that neither velocity nor acceleration jumps; `way` is the integral of the pace.
     share = np.clip((elapsed - fade.at) / fade.lasts, 0.0, 1.0)
     pace = (1 + np.cos(np.pi * share)) / 2
     way = fade.lasts * (share + np.sin(np.pi * share) / np.pi) / 2

@@ -9,12 +9,14 @@ from typing import Protocol
 from pydantic import BaseModel
 
 from bench.agent.messages import AgentEvent, AgentStatus, Answer, Message, ResetCommand, Samples, StatusCommand
-from bench.errors import AgentUnreachable, BenchError, RunError
+from bench.errors import AgentUnreachable, RunError
 
 BATCH = 0.04
 """[s] of samples that go to listeners at once: 25 batches a second."""
 FRESH = 2.0
 """[s] for which a status counts as the present one; the agent sends four a second."""
+_AGAIN = 0.5
+"""[s] before the agent is listened to anew, after something that cannot be used."""
 _LOG = logging.getLogger(__name__)
 
 Published = AgentStatus | Samples | AgentEvent | None
@@ -130,11 +132,14 @@ class AgentWatch:
         return answer.status
 
     def _listen(self) -> None:
-        for message in self._link.subscribe(self._stopping):
+        while not self._stopping.is_set():
             try:
-                self._take(message)
-            except BenchError as error:
-                _LOG.warning("agent_message_unused", extra={"why": str(error)})
+                for message in self._link.subscribe(self._stopping):
+                    self._take(message)
+            except Exception as error:
+                # Such as a message of another version. Whoever listens no more sees an agent that never answers.
+                _LOG.warning("agent_message_unused", extra={"why": repr(error)})
+                self._stopping.wait(_AGAIN)
 
     def _take(self, message: Published) -> None:
         if isinstance(message, Samples):

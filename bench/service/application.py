@@ -1,8 +1,10 @@
 """The web application: routes, access, problems, the page; and what lives as long as it does."""
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator, Callable
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, suppress
+from concurrent.futures import Future
+from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -29,6 +31,7 @@ from bench.service.routes import jobs, live, methods, rig, runs
 from bench.service.run_book import RunBook
 from bench.service.views import job_view
 
+_LOG = logging.getLogger(__name__)
 API = "/api/v1"
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]", "::1")
 PAGE = Path(__file__).parent.parent / "web" / "static"
@@ -63,7 +66,7 @@ def create_app(surroundings: Surroundings | None = None) -> FastAPI:
         version=version("mrbench"),
         description="Test bench for magnetorheological dampers. SI throughout; times are UTC.",
         openapi_url=f"{API}/openapi.json",
-        docs_url=None,
+        docs_url=None,  # its pages of documentation load scripts from elsewhere
         redoc_url=None,
         lifespan=None if surroundings is None else lambda app: _life(app, surroundings),
     )
@@ -94,42 +97,54 @@ def _with_token(
 
 @asynccontextmanager
 async def _life(app: FastAPI, surroundings: Surroundings) -> AsyncIterator[None]:
-    """Everything that goes on beside the requests."""
-    loop = asyncio.get_running_loop()
+    """Everything that goes on beside the requests; it ends in the opposite order, whatever happens meanwhile."""
     database = await asyncio.to_thread(
         open_database, surroundings.database or sqlite_url(surroundings.data / "catalogue.db")
     )
-    catalogue = Catalogue(database, surroundings.data)
-    live_messages = Live()
-    async with surroundings.engine() as engine:
+    async with AsyncExitStack() as living:
+        catalogue = Catalogue(database, surroundings.data)
+        living.callback(catalogue.close)
+        engine = await living.enter_async_context(surroundings.engine())
+        desk = app.state.desk = _put_together(surroundings, catalogue, engine)
+        living.push_async_callback(engine.close)
+        await engine.start(desk.keeper)
+        living.enter_context(desk.watch)
+        living.push_async_callback(_ended, asyncio.create_task(desk.book.scan_on()))
+        yield
 
-        def job_changed(row: JobRow) -> None:
-            live_messages.publish("job", as_text("job", job_view(row)), row.id)
 
-        async def run_changed(row: RunRow) -> None:
-            shown = (await asyncio.to_thread(desk.shown, row))[0]
-            live_messages.publish("run", as_text("run", shown), row.id)
+def _put_together(surroundings: Surroundings, catalogue: Catalogue, engine: Engine) -> Desk:
+    """What the routes work with, each told of what the others do; called in the event loop."""
+    loop, live_messages = asyncio.get_running_loop(), Live()
 
-        def observed(status: AgentStatus) -> None:
-            if not loop.is_closed():
-                asyncio.run_coroutine_threadsafe(book.observe(status), loop)
+    def job_changed(row: JobRow) -> None:
+        live_messages.publish("job", as_text("job", job_view(row)), row.id)
 
-        keeper = JobKeeper(catalogue, engine, job_changed)
-        watch = AgentWatch(surroundings.link, live_messages.publisher(loop), observed)
-        book = RunBook(catalogue, keeper, lambda: watch.latest, run_changed)
-        desk = Desk(
-            surroundings.access, catalogue, watch, live_messages, engine, keeper, book, surroundings.logs_here
-        )
-        app.state.desk = desk
-        await engine.start(keeper)
-        with watch:
-            scanning = asyncio.create_task(book.scan_on())
-            yield
-            scanning.cancel()
-            with suppress(asyncio.CancelledError):
-                await scanning
-        await engine.close()
-    catalogue.close()
+    async def run_changed(row: RunRow) -> None:
+        shown = (await asyncio.to_thread(desk.shown, row))[0]
+        live_messages.publish("run", as_text("run", shown), row.id)
+
+    def observed(status: AgentStatus) -> None:
+        if not loop.is_closed():
+            asyncio.run_coroutine_threadsafe(book.observe(status), loop).add_done_callback(_told_if_failed)
+
+    keeper = JobKeeper(catalogue, engine, job_changed)
+    watch = AgentWatch(surroundings.link, live_messages.publisher(loop), observed)
+    book = RunBook(catalogue, keeper, lambda: watch.latest, run_changed)
+    desk = Desk(surroundings.access, catalogue, watch, live_messages, engine, keeper, book, surroundings.logs_here)
+    return desk
+
+
+def _told_if_failed(writing: "Future[None]") -> None:
+    """Nobody waits for what a status says of runs: what goes wrong with it would be lost without a word."""
+    if not writing.cancelled() and (error := writing.exception()) is not None:
+        _LOG.error("status_unused", extra={"why": repr(error)})
+
+
+async def _ended(task: "asyncio.Task[None]") -> None:
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
 
 
 def _described(app: FastAPI) -> dict[str, Any]:

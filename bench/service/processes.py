@@ -10,6 +10,7 @@ from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 
 from bench.agent.messages import ShutDownCommand, StatusCommand
+from bench.child_process import end
 from bench.errors import AgentUnreachable
 from bench.jobs.engine import DaskEngine, local_scheduler
 from bench.service.agent_watch import AgentLink
@@ -21,6 +22,7 @@ AGENT_WITHIN = 90.0
 LONGEST_PAUSE = 30.0
 """[s] between two starts of a worker that ends at once."""
 _TERM_WITHIN = 5.0
+"""[s] for a process to end in good order."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -59,7 +61,7 @@ async def _keep_alive(command: Sequence[str], log: Path) -> None:
             status = await asyncio.to_thread(process.wait)
         finally:
             # Cancelled: the thread that waits ends as soon as the process does.
-            await asyncio.shield(asyncio.to_thread(_end, process))
+            await asyncio.shield(asyncio.to_thread(end, process, _TERM_WITHIN))
         _LOG.warning("worker_ended", extra={"pid": process.pid, "status": status, "log": str(log)})
         pause = 1.0 if time.monotonic() - began > LONGEST_PAUSE else min(2.0 * pause, LONGEST_PAUSE)
         await asyncio.sleep(pause)
@@ -71,15 +73,6 @@ def _start(command: Sequence[str], log: Path) -> "subprocess.Popen[bytes]":
         return subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=words, stderr=words, start_new_session=True
         )
-
-
-def _end(process: "subprocess.Popen[bytes]") -> None:
-    process.terminate()
-    try:
-        process.wait(_TERM_WITHIN)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
 
 
 def answers(link: AgentLink, timeout: float = 1.0) -> bool:
@@ -114,7 +107,7 @@ def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str
         if process.poll() is not None:
             raise ServiceError(f"the rig agent ended at once: {_last_line(log)}")
         if time.monotonic() > deadline:
-            _end(process)
+            end(process, _TERM_WITHIN)
             raise ServiceError(f"the rig agent did not answer within {AGENT_WITHIN:g} s; see {log}")
     _LOG.info("agent_started", extra={"pid": process.pid, "log": str(log)})
 

@@ -67,8 +67,8 @@ class RunBook:
         while True:
             try:
                 await self.scan()
-            except OSError as error:
-                _LOG.warning("scan_failed", extra={"why": str(error)})
+            except Exception as error:  # a task that ends in silence would leave all later logs unseen
+                _LOG.warning("scan_failed", extra={"why": repr(error)})
             await asyncio.sleep(SCAN_EVERY)
 
     async def _begin(self, run: RunStatus) -> RunRow:

@@ -75,7 +75,7 @@ def prepare(recordings: Sequence[Recording]) -> Prepared:
         assembled = assemble(cleaned)
         judge = Judge.of(assembled)
     enough_cycles(judge.cycles)
-    sliding_recorded(judge.fitted_pieces())
+    sliding_recorded(assembled.pieces)
     return Prepared(assembled, judge, [*judge.notes, *notes])
 
 

@@ -28,13 +28,14 @@ def held_out_cycles(cycles: Cycles) -> BoolArray:
     """(cycles,) True where a cycle is kept out of every fit: each fourth segment, or each fourth cycle of few.
 
     Whole segments are conditions that no fit saw, next to others that it did; with few of them only time is left.
+    Cycles are taken from another place in every segment, so that there is one that follows a step of the drive.
     """
     if len(cycles.conditions) >= _FEWEST_SEGMENTS:
         return np.asarray(cycles.segment % _EVERY == _EVERY // 2)
     held = np.zeros(cycles.count, bool)
-    for segment in np.unique(cycles.segment):
+    for place, segment in enumerate(np.unique(cycles.segment), _EVERY // 2):
         mine = np.flatnonzero(cycles.segment == segment)
-        held[mine[_EVERY // 2 :: _EVERY]] = True
+        held[mine[place % _EVERY :: _EVERY]] = True
     if not held.any():
         held[1::_EVERY] = True
     return held

@@ -57,12 +57,16 @@ def left_out(pieces: Sequence[Piece], cycles: Cycles) -> tuple[tuple[Piece, ...]
 
 
 def _not_only_at_the_ends(bad: BoolArray, cycles: Cycles) -> BoolArray:
-    """The cycles (cycles,) that stumbled, but not where it may have been the stroke that began or ended."""
+    """The cycles (cycles,) that stumbled, but not where it may have been the stroke that began or ended.
+
+    A stumble that began in the segment before, or goes on in the next, is one.
+    """
     found = bad.copy()
     for number in np.unique(cycles.segment[bad]):
         mine = np.flatnonzero(cycles.segment == number)
         found[mine] &= bad[mine[1:-1]].any()
-    return found
+    goes_on = np.convolve(found, [1, 0, 1], "same") > 0
+    return np.asarray(found | (bad & goes_on))
 
 
 def _without(pieces: Sequence[Piece], cycles: Cycles, bad: BoolArray) -> tuple[Piece, ...]:

@@ -32,7 +32,8 @@ def verdict_on(plain: Contender, named: Contender, floor: float, odds: Odds) -> 
         floor: what no effect explains [N].
         odds: of all sets.
     """
-    if plain.unseen < _NO_GAP * floor or (not named.names and odds.unknown < _UNLIKELY):
+    nothing = plain.unseen < _NO_GAP * floor and plain.seen < _AT_FLOOR * floor
+    if nothing or (not named.names and odds.unknown < _UNLIKELY):
         return "no_gap"
     taken = 1.0 - named.share_of(plain, floor) / max(plain.excess(floor), 1e-12)
     unknown = odds.unknown > _UNLIKELY

@@ -4,11 +4,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
-from identification.arrays import Array
+from identification.arrays import Array, compiled
 from identification.damper.effects import Form
-from identification.simulate.curves import over_number, over_parameters
+from identification.simulate.curves import lagged, over_number, over_parameters
 from identification.simulate.inputs import remembered
 from identification.simulate.motion import Motion, machine
 from identification.simulate.setting import Setting, Stroke
@@ -17,10 +16,10 @@ _DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-8, 1e-7
 """[m], [m/s] of differences of forces beside the law."""
 _ACCELERATION_STEP = 1e-3
 """[m/s^2] of differences of inertia."""
-_AT_ONCE = 1e-6
-"""[s] a lag below which the channel passes the force as it is."""
 _LAG_STEP = 1e-7
 """[s] of differences of the channel's lag."""
+_STILL = 1e-6
+"""[m] to either side that a lip does not feel: the noise of a rest would wear away what it keeps."""
 
 
 def beside(setting: Setting, motion: Motion) -> Array:
@@ -35,7 +34,18 @@ def beside(setting: Setting, motion: Motion) -> Array:
 
 def _dragging(form: Form, x: Array, v: Array, *values: float) -> Array:
     """(N,) force [N] beside the law of a form that remembers the way."""
-    return np.asarray(form.act(x, v, remembered(machine(form.memory), x, *values), *values))
+    return np.asarray(form.act(x, v, remembered(machine(form.memory), _felt(x, _STILL), *values), *values))
+
+
+@compiled
+def _felt(x: Array, still: float) -> Array:
+    """(N,) displacement [m] that follows another one only where that goes beyond so much to either side."""
+    found = np.empty(len(x))
+    held = x[0]
+    for i in range(len(x)):
+        held = min(max(held, x[i] - still), x[i] + still)
+        found[i] = held
+    return found
 
 
 def beside_slopes(setting: Setting, motion: Motion) -> tuple[Array, list[tuple[int, Array]]]:
@@ -111,20 +121,9 @@ def _add_columns(J: Array, at: int, function: Any, form: Form, values: tuple[flo
 
 def _lagged_with_slopes(force: Array, lag: float, h: float, J: Array | None, at: int) -> Array:
     """The force behind a first-order lag; slopes J are lagged in place."""
-    found = _lagged(force, lag, h)
+    found = lagged(force, lag, h)
     if J is not None:
-        J[:] = _lagged(J, lag, h)
+        J[:] = lagged(J, lag, h)
         lower = max(lag - _LAG_STEP, 0.0)
-        J[:, at] = (_lagged(force, lag + _LAG_STEP, h) - _lagged(force, lower, h)) / (lag + _LAG_STEP - lower)
+        J[:, at] = (lagged(force, lag + _LAG_STEP, h) - lagged(force, lower, h)) / (lag + _LAG_STEP - lower)
     return found
-
-
-def _lagged(values: Array, lag: float, h: float) -> Array:
-    """Values (N, ...) behind a first-order lag [s], exact for what goes straight from sample to sample."""
-    if lag < _AT_ONCE:
-        return values - lag * np.gradient(values, h, axis=0)
-    fade = float(np.exp(-h / lag))
-    new = 1.0 - lag / h * (1.0 - fade)
-    old = 1.0 - fade - new
-    start = values[:1] * (fade + old)
-    return np.asarray(signal.lfilter([new, old], [1.0, -fade], values, axis=0, zi=start)[0])

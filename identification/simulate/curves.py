@@ -4,12 +4,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy import signal
 
 from identification.arrays import Array
 from identification.damper.parameters import Quantity
 
 _SMALL = 1e-6
 """[1] step of a difference over the size of what is moved: rounding and curvature both stay below 1e-9."""
+_AT_ONCE = 1e-6
+"""[s] a lag below which values pass as they are."""
 
 
 def hermite(value: Array, slope: Array, i: Any, t: Any, h: float) -> tuple[Array, Array]:
@@ -53,3 +56,14 @@ def _over(function: Callable[..., Any], values: tuple[float, ...], k: int, quant
 def over_number(function: Callable[[Array], Any], values: Array, step: float) -> Any:
     """Derivative of a form over one of its arguments, at every sample, by central differences."""
     return (np.asarray(function(values + step)) - np.asarray(function(values - step))) / (2.0 * step)
+
+
+def lagged(values: Array, lag: float, h: float) -> Array:
+    """Values (N, ...) behind a first-order lag [s], exact for what goes straight from sample to sample."""
+    if lag < _AT_ONCE:
+        return values - lag * np.gradient(values, h, axis=0)
+    fade = float(np.exp(-h / lag))
+    new = 1.0 - lag / h * (1.0 - fade)
+    old = 1.0 - fade - new
+    start = values[:1] * (fade + old)
+    return np.asarray(signal.lfilter([new, old], [1.0, -fade], values, axis=0, zi=start)[0])

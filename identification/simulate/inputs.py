@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.arrays import Array, compiled, compiled_anew
 from identification.damper.parameters import Quantity
-from identification.simulate.curves import over_parameters
+from identification.simulate.curves import lagged, over_parameters
 from identification.simulate.motion import machine
 from identification.simulate.setting import Setting, Stroke
 
@@ -76,17 +76,19 @@ def _thinned(at: Array, middle: Array, finer: int) -> tuple[Array, Array]:
 
 def _through(coil: Any, parameters: tuple[float, ...], drive: Array, h: float) -> Array:
     """(2N-1,) field on the grid of half samples, through every effect of the coil in the order of the chain."""
-    eta, delay, lag, part, at = parameters[0], parameters[1], 0.0, 1.0, 2
+    eta, delay, lag, part, layers, at = parameters[0], parameters[1], 0.0, 1.0, 1, 2
     maps = []
     for _, form, some in coil:
         own = parameters[at : at + len(some)]
         at += len(some)
         if form.acts == "drive_delay":
-            further, slower, part = form.act(*own)
+            further, slower, part, layers = form.act(*own)
             delay, lag = delay + further, lag + slower
         else:
             maps.append((form, own))
     u = twice_lagged(drive, eta, lag, delay, h)
+    for _ in range(1, layers):
+        u = lagged(u, lag, 0.5 * h)
     if part < 1.0:
         u = part * u + (1.0 - part) * twice_lagged(drive, eta, 0.0, delay, h)
     for form, own in maps:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from identification.arrays import Array, compiled
+from identification.arrays import Array, compiled, compiled_within
 from identification.simulate.step import (
     GAMMA,
     HALF,
@@ -31,6 +31,9 @@ from identification.simulate.step import (
 Plan = npt.NDArray[np.uint8]
 """(samples - 1,) steps in each sample; 0 where they are still to be chosen."""
 
+Places = npt.NDArray[np.int64]
+"""Columns of a table of slopes."""
+
 _MOST_STEPS = 64
 _STEPS_AT_TURN = 4
 _FADED = 1e-200
@@ -39,7 +42,7 @@ _FIELD_JUMP = 0.05
 """[1] relative change of the yield force in one sample above which the field counts as turning."""
 
 
-@compiled
+@compiled_within
 def choose_steps(
     fineness: float,
     s: Array,
@@ -67,7 +70,7 @@ def choose_steps(
     return max(steps, _STEPS_AT_TURN) if turns or jumps else steps
 
 
-@compiled
+@compiled_within
 def _inputs(
     x: Array, v: Array, u: Array, u_middle: Array, h: float, i: int, t: float
 ) -> tuple[float, float, float]:
@@ -76,15 +79,14 @@ def _inputs(
     return xs, vs, through_middle(u[i], u_middle[i], u[i + 1], t)
 
 
-@compiled
+@compiled_within
 def scaled(s: Array, factors: Array, middle: Array, i: int, t: float, out: Array) -> None:
-    """Structural coordinates (10,) with alpha, c0 and c1 scaled, at the fraction t of sample i."""
+    """Alpha, c0 and c1 of structural coordinates (10,), scaled, at the fraction t of sample i."""
     a, b, c = factors[0, i], factors[1, i], factors[2, i]
     if t > 0.0:
         a = through_middle(a, middle[0, i], factors[0, i + 1], t)
         b = through_middle(b, middle[1, i], factors[1, i + 1], t)
         c = through_middle(c, middle[2, i], factors[2, i + 1], t)
-    out[:] = s
     out[0], out[1] = a * s[0], a * s[1]
     out[5], out[6] = b * s[5], b * s[6]
     out[7], out[8] = c * s[7], c * s[8]
@@ -144,8 +146,7 @@ def march(
             xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
             if scales:
                 scaled(s, factors, factors_middle, i, t, sc)
-            y, zeta = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
-            y_rate, zeta_rate = rates(sc, xs, vs, us, y, zeta)
+            y, zeta, y_rate, zeta_rate = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
     return ys, zetas, y_rates
 
 
@@ -185,36 +186,42 @@ def march_with_slopes(
     fineness: float,
     plan: Plan,
     over: Derivatives,
-) -> tuple[Array, Array, Array, Array]:
+    columns: Places,
+    slopes: Array,
+) -> tuple[Array, Array, Array]:
     """States along a recording, and the slopes of the dashpot force c1 y' over coordinates, y0 and inputs.
 
     Args:
         s, x, v, u, u_middle, factors, factors_middle, h, y0, zeta0, fineness, plan: as in ``march``.
         c1: (N,) roll-off dashpot at the samples [N s/m], unscaled.
         over: derivatives of the inputs over E further unknowns.
+        columns: (10 + 1 + E,) where the slopes over structural coordinates, y0 and the further unknowns go.
+        slopes: (N, U), filled in those columns.
 
     Returns:
-        y [m], zeta [1], y' [m/s], each (N,), and slopes (N, 10 + 1 + E): structural coordinates, y0, further.
+        y [m], zeta [1] and y' [m/s], each (N,).
     """
-    field_rows, motion_rows, scale_rows = len(over.du), len(over.dx), len(over.df)
-    columns = STRUCTURAL + 1 + max(field_rows, field_rows - 1 + max(motion_rows, scale_rows))
     count = len(x)
-    ys, zetas, y_rates, slopes = np.empty(count), np.empty(count), np.empty(count), np.empty((count, columns))
-    Sy, Sz, Sy1, Sz1 = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
-    fy, fz, gy, gz = np.zeros(columns), np.zeros(columns), np.zeros(columns), np.zeros(columns)
-    over_y, over_zeta, stage_y, stage_zeta = np.zeros(2), np.zeros(2), np.zeros(2), np.zeros(2)
-    over_inputs = np.zeros((2, 3))
+    ys, zetas, y_rates = np.empty(count), np.empty(count), np.empty(count)
+    width = len(columns)
+    # Of y in the first row and of zeta in the second: the state, at the stage and after the step, and the rates.
+    S1, S, S_rate = np.zeros((2, width)), np.zeros((2, width)), np.zeros((2, width))
+    f1, f = np.zeros((2, width)), np.zeros((2, width))
+    J1, J, over_inputs = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 3))
     scales, sc = factors.shape[1] > 0, s.copy()
-    Sy[STRUCTURAL] = 1.0
+    S[0, STRUCTURAL] = 1.0
     y, zeta = y0, zeta0
     if scales:
         scaled(s, factors, factors_middle, 0, 0.0, sc)
-    y_rate, zeta_rate = rate_slopes(sc, x[0], v[0], u[0], y, zeta, over_y, over_zeta, over_inputs, fy, fz)
-    _from_inputs(over_inputs, over, s, sc, 0, 0.0, h, fy, fz)
+    y_rate, zeta_rate = rate_slopes(sc, x[0], v[0], u[0], y, zeta, J, over_inputs, f)
+    _from_inputs(over_inputs, over, s, sc, 0, 0.0, h, f)
+    for j in range(width):
+        S_rate[0, j] = J[0, 0] * S[0, j] + J[0, 1] * S[1, j] + f[0, j]
+        S_rate[1, j] = J[1, 0] * S[0, j] + J[1, 1] * S[1, j] + f[1, j]
     for i in range(count):
         ys[i], zetas[i], y_rates[i] = y, zeta, y_rate
-        f1 = factors[2, i] if scales else 1.0
-        _record(slopes[i], c1[i], f1, u[i], s[8], y_rate, over_y[0], over_zeta[0], Sy, Sz, fy, over, i)
+        factor = factors[2, i] if scales else 1.0
+        _record(slopes, columns, c1[i], factor, u[i], s[8], y_rate, S_rate, over, i)
         if i == count - 1:
             break
         if plan[i] == 0:
@@ -226,121 +233,130 @@ def march_with_slopes(
             if scales:
                 scaled(s, factors, factors_middle, i, t, sc)
             y1, zeta1 = first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
-            rate_slopes(sc, xs, vs, us, y1, zeta1, stage_y, stage_zeta, over_inputs, gy, gz)
-            _from_inputs(over_inputs, over, s, sc, i, t, h, gy, gz)
+            rate_slopes(sc, xs, vs, us, y1, zeta1, J1, over_inputs, f1)
+            _from_inputs(over_inputs, over, s, sc, i, t, h, f1)
             # The slopes take the very steps that the states took, so they are those of the discrete solution.
-            for j in range(columns):
-                Sy1[j] = Sy[j] + weight * (over_y[0] * Sy[j] + over_zeta[0] * Sz[j] + fy[j] + gy[j])
-                Sz1[j] = Sz[j] + weight * (over_y[1] * Sy[j] + over_zeta[1] * Sz[j] + fz[j] + gz[j])
-            _solve(weight, stage_y, stage_zeta, Sy1, Sz1)
+            _first_slopes(weight, J1, f1, S, S_rate, S1)
             t = (k + 1.0) / plan[i]
             xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
             if scales:
                 scaled(s, factors, factors_middle, i, t, sc)
-            y, zeta = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
-            y_rate, zeta_rate = rate_slopes(sc, xs, vs, us, y, zeta, over_y, over_zeta, over_inputs, fy, fz)
-            _from_inputs(over_inputs, over, s, sc, i, t, h, fy, fz)
-            for j in range(columns):
-                Sy[j] = WEIGHT_STAGE * Sy1[j] - WEIGHT_START * Sy[j] + weight * fy[j]
-                Sz[j] = WEIGHT_STAGE * Sz1[j] - WEIGHT_START * Sz[j] + weight * fz[j]
-            _solve(weight, over_y, over_zeta, Sy, Sz)
-    return ys, zetas, y_rates, slopes
+            y, zeta, _, _ = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
+            y_rate, zeta_rate = rate_slopes(sc, xs, vs, us, y, zeta, J, over_inputs, f)
+            _from_inputs(over_inputs, over, s, sc, i, t, h, f)
+            _second_slopes(weight, J, f, S1, S, S_rate)
+    return ys, zetas, y_rates
 
 
-@compiled
+@compiled_within
+def _first_slopes(weight: float, J: Array, f: Array, S: Array, S_rate: Array, S1: Array) -> None:
+    """Slopes S1 of the first stage, from those of the step's start and their rates; all (2, columns).
+
+    Each is the solution of (1 - weight J) S1 = S + weight (S' + f); J is the 2 by 2 slope of the rates.
+    """
+    a, b, c, d = _inverse(weight, J)
+    for j in range(S.shape[1]):
+        first = S[0, j] + weight * (S_rate[0, j] + f[0, j])
+        second = S[1, j] + weight * (S_rate[1, j] + f[1, j])
+        S1[0, j] = a * first + b * second
+        steep = c * first + d * second
+        # In saturation slopes fade away; the last digits before zero would be a hundred times slower to carry on.
+        S1[1, j] = steep if abs(steep) > _FADED else 0.0
+
+
+@compiled_within
+def _second_slopes(weight: float, J: Array, f: Array, S1: Array, S: Array, S_rate: Array) -> None:
+    """Slopes S after the step and their rates, from those of its start, in S, and of its first stage, S1."""
+    a, b, c, d = _inverse(weight, J)
+    per_weight = 1.0 / weight
+    for j in range(S.shape[1]):
+        y_known = WEIGHT_STAGE * S1[0, j] - WEIGHT_START * S[0, j]
+        zeta_known = WEIGHT_STAGE * S1[1, j] - WEIGHT_START * S[1, j]
+        first, second = y_known + weight * f[0, j], zeta_known + weight * f[1, j]
+        y = a * first + b * second
+        steep = c * first + d * second
+        zeta = steep if abs(steep) > _FADED else 0.0
+        S[0, j], S[1, j] = y, zeta
+        S_rate[0, j], S_rate[1, j] = (y - y_known) * per_weight, (zeta - zeta_known) * per_weight
+
+
+@compiled_within
+def _inverse(weight: float, J: Array) -> tuple[float, float, float, float]:
+    """Of the 2 by 2 matrix 1 - weight J, row by row."""
+    a, b = 1.0 - weight * J[0, 0], -weight * J[0, 1]
+    c, d = -weight * J[1, 0], 1.0 - weight * J[1, 1]
+    per_determinant = 1.0 / (a * d - b * c)
+    return d * per_determinant, -b * per_determinant, -c * per_determinant, a * per_determinant
+
+
+@compiled_within
 def _from_inputs(
-    over_inputs: Array,
-    over: Derivatives,
-    s: Array,
-    sc: Array,
-    i: int,
-    t: float,
-    h: float,
-    fy: Array,
-    fz: Array,
+    over_inputs: Array, over: Derivatives, s: Array, sc: Array, i: int, t: float, h: float, f: Array
 ) -> None:
     """Slopes of the two rates over the unknowns that act through the inputs, at the fraction t of sample i."""
-    field_rows, scale_rows = len(over.du), len(over.df)
     first = STRUCTURAL + 1
-    for j in range(first, len(fy)):
-        fy[j] = fz[j] = 0.0
-    for e in range(field_rows):
-        c = between_rows(over.du, over.du_middle, e, i, t)
-        fy[first + e] = over_inputs[0, 2] * c
-        fz[first + e] = over_inputs[1, 2] * c
-    first += field_rows - 1
+    for j in range(first, f.shape[1]):
+        f[0, j] = f[1, j] = 0.0
+    for e in range(len(over.du)):
+        c = over.du[e, i]
+        if t > 0.0:
+            c = through_middle(c, over.du_middle[e, i], over.du[e, i + 1], t)
+        f[0, first + e] = over_inputs[0, 2] * c
+        f[1, first + e] = over_inputs[1, 2] * c
+    first += len(over.du) - 1
     for m in range(len(over.dx)):
-        if t == 0.0:
-            a, b = over.dx[m, i], over.dv[m, i]
-        else:
-            a, b = between(over.dx[m, i], over.dx[m, i + 1], over.dv[m, i], over.dv[m, i + 1], h, t)
-        fy[first + m] += over_inputs[0, 0] * a + over_inputs[0, 1] * b
-        fz[first + m] += over_inputs[1, 0] * a + over_inputs[1, 1] * b
-    for m in range(scale_rows):
-        # Slopes over the scaled coordinates stand in fy and fz: carried to the three factors.
+        a, b = over.dx[m, i], over.dv[m, i]
+        if t > 0.0:
+            a, b = between(a, over.dx[m, i + 1], b, over.dv[m, i + 1], h, t)
+        f[0, first + m] += over_inputs[0, 0] * a + over_inputs[0, 1] * b
+        f[1, first + m] += over_inputs[1, 0] * a + over_inputs[1, 1] * b
+    if len(over.df) > 0:
+        _from_factors(over, s, sc, i, t, f, first)
+
+
+@compiled_within
+def _from_factors(over: Derivatives, s: Array, sc: Array, i: int, t: float, f: Array, first: int) -> None:
+    """Slopes over the scaled coordinates stand in f: carried to the three factors, and made those of ``s``."""
+    for m in range(len(over.df)):
         for k in range(3):
             a, b = _PAIRS[k]
-            c = between_rows(over.df[m], over.df_middle[m], k, i, t)
-            fy[first + m] += (s[a] * fy[a] + s[b] * fy[b]) * c
-            fz[first + m] += (s[a] * fz[a] + s[b] * fz[b]) * c
-    if scale_rows > 0:
-        for k in range(3):
-            a, b = _PAIRS[k]
-            factor = sc[a] / s[a]
-            fy[a] *= factor
-            fy[b] *= factor
-            fz[a] *= factor
-            fz[b] *= factor
+            c = over.df[m, k, i]
+            if t > 0.0:
+                c = through_middle(c, over.df_middle[m, k, i], over.df[m, k, i + 1], t)
+            f[0, first + m] += (s[a] * f[0, a] + s[b] * f[0, b]) * c
+            f[1, first + m] += (s[a] * f[1, a] + s[b] * f[1, b]) * c
+    for k in range(3):
+        a, b = _PAIRS[k]
+        factor = sc[a] / s[a]
+        f[0, a] *= factor
+        f[0, b] *= factor
+        f[1, a] *= factor
+        f[1, b] *= factor
 
 
 _PAIRS = ((0, 1), (5, 6), (7, 8))
 """Structural coordinates that each factor scales."""
 
 
-@compiled
-def between_rows(values: Array, middle: Array, row: int, i: int, t: float) -> float:
-    """Value of a row at the fraction t of sample i, by the parabola through the sample's middle."""
-    if t == 0.0:
-        return float(values[row, i])
-    return through_middle(values[row, i], middle[row, i], values[row, i + 1], t)
-
-
-@compiled
-def _solve(weight: float, over_y: Array, over_zeta: Array, Sy: Array, Sz: Array) -> None:
-    """Solve (1 - weight J) S = S in place for every unknown at once; J is the 2 by 2 slope of the rates."""
-    a, b = 1.0 - weight * over_y[0], -weight * over_zeta[0]
-    c, d = -weight * over_y[1], 1.0 - weight * over_zeta[1]
-    inverse = 1.0 / (a * d - b * c)
-    for j in range(len(Sy)):
-        first, second = Sy[j], Sz[j]
-        Sy[j] = (d * first - b * second) * inverse
-        steep = (a * second - c * first) * inverse
-        # In saturation slopes fade away; the last digits before zero would be a hundred times slower to carry on.
-        Sz[j] = steep if abs(steep) > _FADED else 0.0
-
-
-@compiled
+@compiled_within
 def _record(
-    row: Array,
+    slopes: Array,
+    columns: Places,
     c1: float,
     factor: float,
     u: float,
     c1_b: float,
     y_rate: float,
-    over_y: float,
-    over_zeta: float,
-    Sy: Array,
-    Sz: Array,
-    fy: Array,
+    S_rate: Array,
     over: Derivatives,
     i: int,
 ) -> None:
     """Write the slopes of the scaled c1 y' at one sample into its row."""
-    for j in range(len(Sy)):
-        row[j] = factor * c1 * (over_y * Sy[j] + over_zeta * Sz[j] + fy[j])
-    row[7] += factor * y_rate
-    row[8] += factor * u * y_rate
+    for j in range(len(columns)):
+        slopes[i, columns[j]] = factor * c1 * S_rate[0, j]
+    slopes[i, columns[7]] += factor * y_rate
+    slopes[i, columns[8]] += factor * u * y_rate
     for e in range(len(over.du)):
-        row[STRUCTURAL + 1 + e] += factor * c1_b * over.du[e, i] * y_rate
+        slopes[i, columns[STRUCTURAL + 1 + e]] += factor * c1_b * over.du[e, i] * y_rate
     for m in range(len(over.df)):
-        row[STRUCTURAL + len(over.du) + m] += c1 * over.df[m, 2, i] * y_rate
+        slopes[i, columns[STRUCTURAL + len(over.du) + m]] += c1 * over.df[m, 2, i] * y_rate

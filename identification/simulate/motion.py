@@ -7,8 +7,9 @@ import numpy as np
 
 from identification.arrays import Array, compiled, compiled_anew
 from identification.damper.effects import Form
-from identification.simulate.curves import hermite, over_parameters
+from identification.simulate.curves import over_parameters
 from identification.simulate.setting import Setting, Stroke
+from identification.simulate.step import between
 
 _STEP, _WIDE = 1e-6, 1e-5
 """[m] of first and second differences of a channel's bend."""
@@ -60,18 +61,32 @@ def _with_rows(motion: Motion, dx: Array, dv: Array, columns: tuple[int, ...]) -
 def _delayed(stroke: Stroke, delay: float) -> Motion:
     """Motion ``delay`` [s] ago, by Hermite cubics, and its derivative over the delay."""
     x, v, a = stroke.displacement, stroke.velocity, stroke.acceleration
-    h, count = 1.0 / stroke.rate, len(x)
+    h = 1.0 / stroke.rate
     if delay == 0.0:
         return Motion(x, v, a, -v[None, :], -a[None, :], -np.gradient(a, h), ())
-    place = np.clip(np.arange(count) - delay / h, 0.0, count - 1.0)
-    i = np.minimum(place.astype(np.int64), count - 2)
-    t = place - i
-    inside = (place > 0.0) & (place < count - 1.0)
-    shifted, x_slope = hermite(x, v, i, t, h)
-    speed, v_slope = hermite(v, a, i, t, h)
-    jerk = (a[i + 1] - a[i]) / h
-    dx, dv, da = (np.where(inside, -slope, 0.0) for slope in (x_slope, v_slope, jerk))
-    return Motion(shifted, speed, a[i] + t * h * jerk, dx[None, :], dv[None, :], da, ())
+    shifted, speed, pushed, dx, dv, da = _earlier(x, v, a, delay / h, h)
+    return Motion(shifted, speed, pushed, dx[None, :], dv[None, :], da, ())
+
+
+@compiled
+def _earlier(x: Array, v: Array, a: Array, samples: float, h: float) -> tuple[Array, ...]:
+    """Displacement, velocity and acceleration (N,) some samples ago, and their derivatives over that time [s].
+
+    Before the first sample and behind the last the motion stands still.
+    """
+    count = len(x)
+    found = np.empty((6, count))
+    for k in range(count):
+        place = min(max(k - samples, 0.0), count - 1.0)
+        i = min(int(place), count - 2)
+        t = place - i
+        found[0, k], x_slope = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
+        found[1, k], v_slope = between(v[i], v[i + 1], a[i], a[i + 1], h, t)
+        jerk = (a[i + 1] - a[i]) / h
+        found[2, k] = a[i] + t * h * jerk
+        inside = 0.0 < place < count - 1.0
+        found[3, k], found[4, k], found[5, k] = (-x_slope, -v_slope, -jerk) if inside else (0.0, 0.0, 0.0)
+    return found[0], found[1], found[2], found[3], found[4], found[5]
 
 
 def _straightened(motion: Motion, form: Form, values: tuple[float, ...], at: int, slopes: bool) -> Motion:

@@ -11,7 +11,7 @@ F_a F_b D_y rho n c0_a c0_b c1_a c1_b k0.
 
 import math
 
-from identification.arrays import Array, compiled
+from identification.arrays import Array, compiled_within
 from identification.damper import law
 
 GAMMA = 2.0 - math.sqrt(2.0)
@@ -23,17 +23,18 @@ WEIGHT_START = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
 STRUCTURAL = 10
 """How many structural coordinates there are."""
 
-TOLERANCE = 1e-11
+TOLERANCE = 1e-8
+"""[1] last move of a Newton iteration: what it leaves is of the order of its square."""
 LARGEST_MOVE = 0.5
 ITERATIONS = 40
 
-at_field = compiled(law.at_field)
-inner_velocity = compiled(law.inner_velocity)
-hysteresis_rate = compiled(law.hysteresis_rate)
-hysteresis_slopes = compiled(law.hysteresis_slopes)
+at_field = compiled_within(law.at_field)
+inner_velocity = compiled_within(law.inner_velocity)
+hysteresis_rate = compiled_within(law.hysteresis_rate)
+hysteresis_slopes = compiled_within(law.hysteresis_slopes)
 
 
-@compiled
+@compiled_within
 def between(x0: float, x1: float, v0: float, v1: float, h: float, t: float) -> tuple[float, float]:
     """Displacement [m] and velocity [m/s] at the fraction t of a sample of h [s], by a Hermite cubic."""
     d = x1 - x0
@@ -42,14 +43,14 @@ def between(x0: float, x1: float, v0: float, v1: float, h: float, t: float) -> t
     return x0 + t * (h * v0 + t * (square + t * cube)), v0 + t * (2.0 * square + 3.0 * t * cube) / h
 
 
-@compiled
+@compiled_within
 def through_middle(start: float, middle: float, end: float, t: float) -> float:
     """Value at the fraction t of a sample, by the parabola through its start, middle and end."""
     bend = 2.0 * (start + end) - 4.0 * middle
     return start + t * (end - start - bend + t * bend)
 
 
-@compiled
+@compiled_within
 def rates(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> tuple[float, float]:
     """Rates y' [m/s] and zeta' [1/s]."""
     y_rate = inner_velocity(
@@ -58,7 +59,7 @@ def rates(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> tupl
     return y_rate, hysteresis_rate(v - y_rate, zeta, 1.0 / s[2], s[3] / s[2], (1.0 - s[3]) / s[2], s[4])
 
 
-@compiled
+@compiled_within
 def solve_stage(
     s: Array, x: float, v: float, u: float, y_known: float, zeta_known: float, weight: float, zeta: float
 ) -> tuple[float, float]:
@@ -84,7 +85,7 @@ def solve_stage(
     return constant + slope * zeta, zeta
 
 
-@compiled
+@compiled_within
 def first_stage(
     s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y_rate: float, zeta_rate: float
 ) -> tuple[float, float]:
@@ -92,39 +93,28 @@ def first_stage(
     return solve_stage(s, x, v, u, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
 
 
-@compiled
+@compiled_within
 def second_stage(
     s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y1: float, zeta1: float
-) -> tuple[float, float]:
-    """State at the end of the step, from its start (y, zeta) and its first stage (y1, zeta1)."""
+) -> tuple[float, float, float, float]:
+    """State at the end of the step and its rates, from its start (y, zeta) and its first stage (y1, zeta1)."""
     y_known = WEIGHT_STAGE * y1 - WEIGHT_START * y
     zeta_known = WEIGHT_STAGE * zeta1 - WEIGHT_START * zeta
-    return solve_stage(s, x, v, u, y_known, zeta_known, weight, zeta1)
+    y, zeta = solve_stage(s, x, v, u, y_known, zeta_known, weight, zeta1)
+    return y, zeta, (y - y_known) / weight, (zeta - zeta_known) / weight
 
 
-@compiled
+@compiled_within
 def rate_slopes(
-    s: Array,
-    x: float,
-    v: float,
-    u: float,
-    y: float,
-    zeta: float,
-    over_y: Array,
-    over_zeta: Array,
-    over_inputs: Array,
-    of_y: Array,
-    of_zeta: Array,
+    s: Array, x: float, v: float, u: float, y: float, zeta: float, over_state: Array, over_inputs: Array, of: Array
 ) -> tuple[float, float]:
     """Slopes of y' and zeta' over everything, written into the arrays given; returns the rates too.
 
     Args:
         s, x, v, u, y, zeta: where; as everywhere.
-        over_y: (2,) slopes of y' and zeta' over y.
-        over_zeta: (2,) slopes of y' and zeta' over zeta.
+        over_state: (2, 2) slopes of y' and zeta' over y and zeta.
         over_inputs: (2, 3) slopes of y' and zeta' over x, v and u.
-        of_y: (10 or more,) slopes of y' over the structural coordinates come first.
-        of_zeta: (10 or more,) the same of zeta'.
+        of: (2, 10 or more) slopes of y' and zeta' over the structural coordinates come first.
     """
     yield_force = at_field(s[0], s[1], u)
     c0 = at_field(s[5], s[6], u)
@@ -137,31 +127,31 @@ def rate_slopes(
     gamma = A - beta
     zeta_rate = hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
     over_slip, steep = hysteresis_slopes(slip, zeta, A, beta, gamma, s[4])
-    of_y[0] = zeta * inverse
-    of_y[1] = u * zeta * inverse
-    of_y[2] = 0.0
-    of_y[3] = 0.0
-    of_y[4] = 0.0
-    of_y[5] = slip * inverse
-    of_y[6] = u * slip * inverse
-    of_y[7] = -y_rate * inverse
-    of_y[8] = -u * y_rate * inverse
-    of_y[9] = (x - y) * inverse
+    of[0, 0] = zeta * inverse
+    of[0, 1] = u * zeta * inverse
+    of[0, 2] = 0.0
+    of[0, 3] = 0.0
+    of[0, 4] = 0.0
+    of[0, 5] = slip * inverse
+    of[0, 6] = u * slip * inverse
+    of[0, 7] = -y_rate * inverse
+    of[0, 8] = -u * y_rate * inverse
+    of[0, 9] = (x - y) * inverse
     for k in range(STRUCTURAL):
-        of_zeta[k] = -over_slip * of_y[k]
+        of[1, k] = -over_slip * of[0, k]
     size = abs(zeta)
     power = (size + law.Z_GUARD) ** (s[4] - 1.0)
-    of_zeta[2] -= zeta_rate * A
-    of_zeta[3] += (abs(slip) * zeta - slip * size) * power * A
-    of_zeta[4] -= (gamma * abs(slip) * zeta + beta * slip * size) * power * math.log(size + law.Z_GUARD)
+    of[1, 2] -= zeta_rate * A
+    of[1, 3] += (abs(slip) * zeta - slip * size) * power * A
+    of[1, 4] -= (gamma * abs(slip) * zeta + beta * slip * size) * power * math.log(size + law.Z_GUARD)
     over_inputs[0, 0] = s[9] * inverse
     over_inputs[0, 1] = c0 * inverse
     over_inputs[0, 2] = (s[1] * zeta + s[6] * v - (s[6] + s[8]) * y_rate) * inverse
     over_inputs[1, 0] = -over_slip * over_inputs[0, 0]
     over_inputs[1, 1] = over_slip * (1.0 - over_inputs[0, 1])
     over_inputs[1, 2] = -over_slip * over_inputs[0, 2]
-    over_y[0] = -s[9] * inverse
-    over_y[1] = -over_slip * over_y[0]
-    over_zeta[0] = yield_force * inverse
-    over_zeta[1] = steep - over_slip * over_zeta[0]
+    over_state[0, 0] = -s[9] * inverse
+    over_state[1, 0] = -over_slip * over_state[0, 0]
+    over_state[0, 1] = yield_force * inverse
+    over_state[1, 1] = steep - over_slip * over_state[0, 1]
     return y_rate, zeta_rate

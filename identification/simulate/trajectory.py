@@ -89,33 +89,36 @@ class _Chain:
         c, motion, field, scales = self._setting.coordinates, self._motion, self._field, self._scales
         c1 = c.c1_a + c.c1_b * field.u
         h, y0 = 1.0 / self._stroke.rate, self._setting.y0
-        inner = (motion.x, motion.v, field.u, field.middle, scales.at, scales.middle)
+        inner = (motion.x, motion.v, field.u, field.middle, scales.at, scales.middle, h, y0, self._zeta0, fineness)
+        J = None
         if slopes:
+            J = self._empty()
             over = Derivatives(field.du, field.dmiddle, motion.dx, motion.dv, scales.over, scales.over_middle)
-            y, zeta, y_rate, partial = march_with_slopes(
-                self._s, c1, *inner, h, y0, self._zeta0, fineness, plan, over
-            )
+            columns = np.array([*_STRUCTURAL_COLUMNS, _Y0, *self._columns])
+            y, zeta, y_rate = march_with_slopes(self._s, c1, *inner, plan, over, columns, J)
+            self._add_rest(J)
         else:
-            y, zeta, y_rate = march(self._s, *inner, h, y0, self._zeta0, fineness, plan)
+            y, zeta, y_rate = march(self._s, *inner, plan)
         dashpot = c1 * y_rate * (scales.at[2] if scales.at.shape[1] else 1.0)
         force = dashpot + c.k1 * motion.x - c.f0 + self._beside
-        found = Trajectory(force, y, zeta, field.u, plan)
-        return found, self._laid_out(partial) if slopes else None
+        return Trajectory(force, y, zeta, field.u, plan), J
 
-    def _laid_out(self, partial: Array) -> Array:
-        """Slopes (N, U) as ``UNKNOWNS`` and the parameters of the effects, from those of the dashpot force."""
-        J = np.zeros((len(partial), len(UNKNOWNS) + sum(len(e.values) for e in self._setting.effects)))
-        J[:, _STRUCTURAL_COLUMNS] = partial[:, :STRUCTURAL]
-        J[:, _Y0] = partial[:, STRUCTURAL]
-        J[:, self._columns] = partial[:, STRUCTURAL + 1 :]
+    def _empty(self) -> Array:
+        """(N, U) zeros for the slopes over ``UNKNOWNS`` and the parameters of the effects."""
+        return np.zeros((len(self._motion.x), len(UNKNOWNS) + sum(len(e.values) for e in self._setting.effects)))
+
+    def _add_rest(self, J: Array) -> None:
+        """What the force depends on beside the dashpot force, added to its slopes J (N, U)."""
         J[:, _K1] = self._motion.x
         J[:, _F0] = -1.0
         moving = [_FORCE_DELAY, *(len(UNKNOWNS) + at for at in self._motion.columns)]
         over_motion, own = channel.beside_slopes(self._setting, self._motion)
-        J[:, moving] += (self._setting.coordinates.k1 * self._motion.dx + over_motion).T
+        rows = self._setting.coordinates.k1 * self._motion.dx + over_motion
+        for column, row in zip(moving, rows, strict=True):
+            J[:, column] += row
         for at, row in own:
             J[:, len(UNKNOWNS) + at] += row
-        return self._with_shifts(J)
+        self._with_shifts(J)
 
     def _with_shifts(self, J: Array) -> Array:
         """An effect that makes the force late acts as the delay does."""
@@ -137,7 +140,7 @@ class _Chain:
         over_motion, own = channel.beside_slopes(self._setting, self._motion)
         rows = yielding.derivatives_of(self._motion, self._field, self._scales, over_motion, own, h)
         y, zeta, force, partial = yielding_slopes.march_with_slopes(fixed, *g, h, start, fineness, plan, *rows)
-        J = np.zeros((len(partial), len(UNKNOWNS) + sum(len(e.values) for e in self._setting.effects)))
+        J = self._empty()
         J[:, _STRUCTURAL_COLUMNS] = partial[:, :STRUCTURAL]
         J[:, [_K1, _F0]] = partial[:, STRUCTURAL : STRUCTURAL + 2]
         for at, form, values in self._setting.acting("connection"):

@@ -124,8 +124,9 @@ def test_lost_connection_greys_the_values_and_says_why(seen):
 
 
 @browser_test
-def test_page_fits_a_tablet(seen):
-    assert seen["overflow"] == {"1280": 0, "768": 0}
+def test_page_fits_a_tablet_and_a_telephone(seen):
+    assert seen["overflow"] == {"1280": 0, "768": 0, "390": 0}
+    assert all(place["left"] >= 0 and place["right"] <= int(width) for width, place in seen["stopPlaces"].items())
 
 
 @browser_test

@@ -25,6 +25,7 @@ async def live(websocket: WebSocket, desk: AtDesk, token: str = "") -> None:
             while True:
                 await websocket.receive_text()
         except (WebSocketDisconnect, KeyError):
+            # It has gone, or sends bytes where words are expected: either way, this is its end.
             pass
         finally:
             sending.cancel()

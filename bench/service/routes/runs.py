@@ -7,14 +7,14 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
-from pydantic import ValidationError
 
 from bench.agent.messages import AgentStatus, RunCommand, StatusCommand, StopCommand
 from bench.catalogue.models import RunRow
 from bench.catalogue.scan import catalogue_log
-from bench.errors import MethodError, RunError
+from bench.errors import RunError
 from bench.jobs.order import FIT, REPORT, IdentifySettings
 from bench.methods import Method, compile_method
+from bench.methods.document import method_of
 from bench.recorder.salvage import salvage as mend
 from bench.service.desk import AtDesk, Desk
 from bench.service.problems import ProblemError, conflict, not_found
@@ -53,12 +53,7 @@ def _checked(wanted: str | dict[str, Any]) -> Method:
     """
     if isinstance(wanted, str):
         return shipped(wanted)
-    try:
-        method = Method.model_validate(wanted)
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(step) for step in first["loc"]) or "the document"
-        raise MethodError(f"no method: {place}: {first['msg'].removeprefix('Value error, ')}") from None
+    method = method_of(wanted, "what was sent")
     compile_method(method)
     return method
 

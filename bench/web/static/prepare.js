@@ -23,6 +23,10 @@ export class Preparation {
   }
 
   ask(step) {
+    // An empty field is no place: taken for zero, it would move the rod to the middle.
+    if (step === "move" && Number.isNaN(byId("move-to").valueAsNumber)) {
+      return write(byId("prepare-note"), "Nothing was done: say where to move to, in mm.");
+    }
     if (step !== "home") return this.carryOut(step);
     byId("home-dialog").returnValue = "";
     byId("home-dialog").showModal();
@@ -30,7 +34,8 @@ export class Preparation {
 
   async carryOut(step) {
     try {
-      this.take(await post("agent/prepare", { step, position_m: byId("move-to").valueAsNumber / 1000 || 0 }));
+      const place = step === "move" ? byId("move-to").valueAsNumber / 1000 : 0;
+      this.take(await post("agent/prepare", { step, position_m: place }));
     } catch (problem) {
       write(byId("prepare-note"), problem.after("Nothing was done"));
     }

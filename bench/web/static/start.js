@@ -9,7 +9,7 @@ const OPERATOR = "mrbench.operator";
 const OBSTACLES = {
   idle: "",
   unknown: "The bench does not answer.",
-  preparing: "A run is being prepared.",
+  preparing: "A run, or a step before one, is being prepared.",
   running: "A run goes on.",
   stopping: "The run is being stopped.",
   tripped: "The bench has tripped: reset it first.",

@@ -34,7 +34,8 @@ Action = Literal[
 ]
 """How a form acts, and what its function takes before the values of the parameters, and gives:
 
-- ``drive_delay``: () -> dead time [s], time constant of a second lag [s], part of the field behind that lag [1].
+- ``drive_delay``: () -> dead time [s], time constant of a second lag [s], part of the field behind that lag [1],
+  and how many such lags there are in a row [1], one or two.
 - ``field``: field [drive] -> field that the damper sees [drive].
 - ``field_memory``: field, remembered [drive] -> field that the damper sees; with ``memory`` over (remembered,
   change of the field), which never depends on how a change in one sense is cut.

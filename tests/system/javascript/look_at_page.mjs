@@ -85,6 +85,9 @@ async function reset() {
 }
 
 async function prepare() {
+  await page.fill("#move-to", "");
+  await page.click("#prepare button[data-step=move]");
+  await hasText("#prepare-note", "say where");
   await page.fill("#move-to", "12.5");
   await page.click("#prepare button[data-step=move]");
   await hasText("#prepare-note", "move is done");
@@ -118,10 +121,15 @@ async function loseConnection() {
 
 async function measureWidths() {
   seen.overflow = {};
-  for (const width of [1280, 768]) {
+  seen.stopPlaces = {};
+  for (const width of [1280, 768, 390]) {
     await page.setViewportSize({ width, height: 800 });
     await until((wanted) => innerWidth === wanted, width);
     seen.overflow[width] = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    seen.stopPlaces[width] = await page.evaluate(() => {
+      const { left, right } = document.getElementById("stop").getBoundingClientRect();
+      return { left, right };
+    });
   }
 }
 

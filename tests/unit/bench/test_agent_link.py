@@ -85,3 +85,21 @@ def test_a_closed_publisher_drops_what_comes_late():
     with Publisher(ANYWHERE) as publisher:
         pass
     publisher.publish(AgentStatus(state="idle"))
+
+
+def test_a_defect_in_a_command_is_answered_and_the_next_one_works(stopping):
+    def handle(command):
+        if isinstance(command, RunCommand):
+            raise ZeroDivisionError("division by zero")
+        return Answer(ok=True)
+
+    with CommandServer(ANYWHERE) as made:
+        thread = threading.Thread(target=made.serve, args=(handle, stopping))
+        thread.start()
+        client = AgentClient(made.address, "")
+        answer = client.send(RunCommand(method={}))
+        assert not answer.ok
+        assert "ZeroDivisionError" in answer.error
+        assert client.send(StopCommand()).ok
+        stopping.set()
+        thread.join()

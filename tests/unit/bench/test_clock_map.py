@@ -152,3 +152,18 @@ def test_a_sample_from_before_its_time_tells_nothing():
     clock.feed(wire.stamp(BENCH + 4000 * MS))
     asked = wire.device(BENCH + 4010 * MS)
     assert abs(clock.bench_ns([asked])[0] - wire.true(asked)) < 0.1e6
+
+
+def test_one_instant_is_mapped_as_many_are():
+    """Over corrections, too, whose bends lie ahead."""
+    wire, clock = CASES["outliers"], ClockMap()
+    for k in range(200):
+        stamp = wire.stamp(BENCH + k * 50 * MS)
+        clock.feed(stamp)
+        asked = np.arange(stamp.device_ns - 40 * MS, stamp.device_ns, 7 * MS)
+        assert [clock.instant(int(one)) for one in asked] == clock.bench_ns(asked).tolist()
+
+
+def test_one_instant_of_a_clock_never_read_is_refused():
+    with pytest.raises(ValueError, match="never been read"):
+        ClockMap().instant(0)

@@ -15,7 +15,7 @@ class Service:
         if path != "/runs":
             return {}
         outcome = self.outcomes.pop(0)
-        reason = "" if outcome == "clean" else "following error 0.01 m exceeds the limit of 0.008 m"
+        reason = "" if outcome == "clean" else "following error 10 mm exceeds the limit of 8 mm"
         return {
             "id": f"run{self.asked.count('/runs')}", "state": "ended", "outcome": outcome, "reason": reason,
             "duration_s": 1.0,
@@ -33,7 +33,7 @@ def test_a_spoiled_run_is_made_once_more_after_a_reset_and_says_why():
     assert record(service, "quick", lambda share: None, told.append) == "run2"
     assert service.asked == ["/runs", "/agent/reset", "/runs"]
     assert told == [
-        "the run of quick is incomplete: following error 0.01 m exceeds the limit of 0.008 m; once more (2 of 3)"
+        "the run of quick is incomplete: following error 10 mm exceeds the limit of 8 mm; once more (2 of 3)"
     ]
 
 

@@ -128,3 +128,22 @@ def test_an_exception_closes_the_log_as_incomplete(tmp_path):
         log.samples(*samples(1, 10))
         log.__exit__(KeyError, KeyError("x"), None)
     assert read_log(tmp_path / "a.mcap").outcome == "incomplete"
+
+
+def test_a_defect_on_the_writing_thread_does_not_end_in_a_clean_log(tmp_path, monkeypatch):
+    log = LiveRecorder(tmp_path / "a.mcap", HEADER)
+
+    def defect(*_):
+        raise ZeroDivisionError("division by zero")
+
+    log.samples(*samples(1, 10))
+    monkeypatch.setattr(log._log, "event", defect)
+    log.event(0, "state", "this cannot be written")
+    log._thread.join(10)
+    with pytest.raises(LogError, match="defect of the recorder"):
+        log.samples(*samples(11, 10))
+    with pytest.raises(LogError, match="defect of the recorder"):
+        log.close()
+    whole = read_log(tmp_path / "a.mcap")
+    assert whole.outcome == "incomplete"
+    assert "division by zero" in whole.metadata["outcome"]["reason"]

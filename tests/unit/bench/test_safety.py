@@ -63,6 +63,17 @@ def test_every_sample_of_a_block_is_judged(interlocks):
     assert "2000 N exceeds the limit of 1000 N" in str(verdicts[0])
 
 
+@pytest.mark.parametrize(
+    ("quantity", "value", "words"),
+    [
+        ("following_error", -8.6991e-3, "following error -8.699 mm exceeds the limit of 8 mm"),
+        ("setpoint_lateness", 0.0251, "setpoint lateness 25.1 ms exceeds the limit of 8 ms"),
+    ],
+)
+def test_what_is_exceeded_is_said_in_units_of_its_size(quantity, value, words):
+    assert str(judge({quantity: {Action.TRIP: 8e-3}}, quantity, value)) == words
+
+
 def test_what_is_not_limited_is_let_pass(interlocks):
     assert interlocks.check([block("displacement", 9.0), block("force_raw", 1e6)], 0) == []
 
@@ -115,8 +126,8 @@ def test_only_one_of_many_threads_is_the_first_to_latch(interlocks):
 
 
 def test_following_error_is_taken_at_each_samples_own_instant():
-    times = np.array([0, 4, 8]) * MS
-    assert following_error(np.array([0.0, 0.003, 0.001]), times, lambda t: t * 1e-9) == pytest.approx(-0.007)
+    times = [0, 4 * MS, 8 * MS]
+    assert following_error([0.0, 0.003, 0.001], times, lambda t: t * 1e-9) == pytest.approx(-0.007)
 
 
 class Stoppable:
@@ -132,11 +143,16 @@ def test_neither_waits_for_the_other_on_the_way_to_rest():
         raise NoReply("nobody there")
 
     hanging = Stoppable("hanging", lambda: release.wait(30))
+    defect = Stoppable("defect", lambda: 1 / 0)
     began = time.monotonic()
-    rest = bring_to_rest([hanging, Stoppable("quick", stopped.set), Stoppable("dead", refuses)], within=0.2)
+    rest = bring_to_rest(
+        [hanging, Stoppable("quick", stopped.set), Stoppable("dead", refuses), defect], within=0.2
+    )
     assert time.monotonic() - began < 10
     release.set()
     assert stopped.is_set()
     assert list(rest.seconds) == ["quick"]
     assert "waited 0.2 s" in rest.failures["hanging"]
     assert rest.failures["dead"] == "nobody there"
+    assert "division by zero" in rest.failures["defect"]
+    assert "defect: ZeroDivisionError" in str(rest)

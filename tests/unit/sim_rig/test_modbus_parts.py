@@ -4,6 +4,7 @@ import pytest
 
 from sim_rig.coil_output import CoilOutput, Table
 from sim_rig.modbus_frames import MBAP, RTU, Request, crc
+from sim_rig.modbus_server import answer
 
 MS = 1_000_000
 
@@ -57,3 +58,24 @@ def test_a_trigger_without_an_armed_table_does_nothing():
     output.trigger(0)
     assert output.table is Table.IDLE
     assert output.level(MS) == 0.0
+
+
+class Nothing:
+    """A device whose registers are all zero."""
+
+    def read(self, function, address, count):
+        return [0] * count
+
+    def write(self, address, words):
+        pass
+
+
+@pytest.mark.parametrize("request_", ["03", "0400", "0600010a", "10000100020401", "170001000200010001", "08"])
+def test_a_request_that_ends_too_soon_is_refused_and_not_the_end_of_the_instrument(request_):
+    pdu = bytes.fromhex(request_)
+    assert answer(Nothing(), pdu)[0] == pdu[0] | 0x80
+
+
+def test_a_request_that_writes_and_reads_does_both():
+    pdu = bytes.fromhex("17 0004 0002 0001 0001 02 002a".replace(" ", ""))
+    assert answer(Nothing(), pdu) == bytes.fromhex("170400000000")

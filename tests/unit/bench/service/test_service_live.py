@@ -1,11 +1,13 @@
 """The websocket, and what a slow listener loses."""
 
 import asyncio
+import time
 
 import orjson
 from service_logs import whole_log
 
-from bench.agent.messages import AgentEvent, Samples
+from bench.agent.messages import AgentEvent, RunCommand, Samples
+from bench.service import run_book
 from bench.service.agent_watch import joined
 from bench.service.live import BATCHES_KEPT, EVENTS_KEPT, Mailbox
 
@@ -20,6 +22,13 @@ def messages(socket, topic):
         assert set(said) == {"topic", "data"}
         if said["topic"] == topic:
             yield said["data"]
+
+
+def eventually(found):
+    deadline = time.monotonic() + 20
+    while not found():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.001)
 
 
 def listening(service):
@@ -112,3 +121,48 @@ def test_health_says_what_is_missing(service):
 def test_a_silent_agent_shows_in_health(service):
     service.agent.reachable = False
     assert "no rig agent answered" in service.get("/health")["agent"]
+
+
+def test_what_cannot_be_used_of_the_agent_does_not_end_the_listening(service, caplog, monkeypatch):
+    monkeypatch.setattr("bench.service.agent_watch._AGAIN", 0.001)
+    with listening(service) as socket:
+        service.agent.publish(
+            AgentEvent.model_construct(time_ns=object(), kind="alarm", text="of another version")
+        )
+        service.agent.publish(AgentEvent(time_ns=6, kind="alarm", text="understood"))
+        assert next(messages(socket, "event"))["text"] == "understood"
+    assert "agent_message_unused" in caplog.text
+
+
+def test_a_status_that_cannot_be_written_down_is_said_and_taken_up_again(service, caplog, monkeypatch):
+    book = service.client.app.state.desk.book
+    begin, refusals = book._begin, iter([RuntimeError("the catalogue is locked")])
+
+    async def refuses_once(run):
+        if (error := next(refusals, None)) is not None:
+            raise error
+        return await begin(run)
+
+    monkeypatch.setattr(book, "_begin", refuses_once)
+    service.agent.send(RunCommand(method={"name": "quick"}))
+    service.agent.publish()
+    eventually(lambda: "status_unused" in caplog.text)
+    service.agent.publish()
+    service.await_("/runs", lambda found: [run["id"] for run in found["items"]] == ["run-1"])
+
+
+def test_a_folder_that_cannot_be_looked_through_once_is_looked_through_again(service, caplog, monkeypatch):
+    monkeypatch.setattr("bench.service.run_book.SCAN_EVERY", 0.01)
+    refusals = iter([ValueError("a defect")])
+    look = run_book.scan
+
+    def refuses_once(*given):
+        if (error := next(refusals, None)) is not None:
+            raise error
+        return look(*given)
+
+    monkeypatch.setattr(run_book, "scan", refuses_once)
+    service.start()
+    eventually(lambda: "scan_failed" in caplog.text)
+    whole_log(service.data / "found.mcap", "found")
+    service.await_("/runs", lambda found: [run["id"] for run in found["items"]] == ["found"])

@@ -18,6 +18,7 @@ MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
         "dead_time": (0.0061,),
         "late_and_slow": (0.0047, 0.006),
         "partly_slow": (0.03, 0.4),
+        "deeply_slow": (0.02, 0.4),
     },
     "gas_spring": {"polytropic": (90.0, 0.05), "polytropic_turned": (90.0, 0.05)},
     "seal_friction": {

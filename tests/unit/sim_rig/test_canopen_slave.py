@@ -11,7 +11,7 @@ from sim_rig.canopen_actuator import CanopenActuator, Machine, torque_for
 from sim_rig.drive_states import State
 from sim_rig.object_dictionary import Abort, ObjectDictionary
 from sim_rig.scenario import load_scenario
-from sim_rig.serve import bench_toml
+from sim_rig.serve import Wire, bench_toml
 
 EDS = Path(__file__).parents[3] / "drivers" / "wire" / "actuator.eds"
 NODE, MS = 5, 1_000_000
@@ -95,7 +95,7 @@ def test_a_network_command_changes_what_its_heart_says(node, command, state):
     node.write(0x1017, 10, 2)
     node.command(command)
     node.sent.clear()
-    for at in (0, 20, 40):
+    for at in (2000, 2020, 2040):
         node.drive.tick(at * MS)
     assert set(node.frames(0x700 + NODE)) == {state}
 
@@ -158,7 +158,7 @@ def test_a_position_that_is_no_number_is_a_fault_and_shows_in_the_statusword(nod
     assert node.read(0x6041, at_ns=1 * MS) & 0x6F == 0x40
     node.rod.position = math.nan
     assert node.read(0x6041, at_ns=2 * MS) & 0x4F == 0x08
-    assert struct.unpack("<H", node.frames(0x80 + NODE)[0][:2]) == (0x7320,) if node.frames(0x80 + NODE) else True
+    assert [struct.unpack("<H", data[:2]) for data in node.frames(0x80 + NODE)] == [(0x7320,)]
     assert node.drive.state is State.FAULT
 
 
@@ -175,8 +175,6 @@ def test_a_scenario_says_how_hard_its_actuator_can_push(scenario, force):
 
 
 def test_a_section_of_the_configuration_says_what_the_motor_may_give():
-    from sim_rig.serve import Wire
-
     wire = Wire("actuator", "CANopen", {"driver": "actuator", "interface": "socketcand", "torque": 3.183})
     assert "torque = 3.183" in bench_toml([wire], load_scenario("lord_class"))
 

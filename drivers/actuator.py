@@ -8,7 +8,6 @@ centred, from home before.
 """
 
 import contextlib
-import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -19,10 +18,11 @@ from drivers.beat import ACTUATOR
 from drivers.can_bus import CanAddress, CanBus
 from drivers.canopen_node import CanopenNode
 from drivers.channel import Block, Channel, Reading, Stamp
-from drivers.cia402 import DriveState, Fault, Mounting
+from drivers.cia402 import Fault, Mounting
 from drivers.errors import BadReply, DriverError, NoReply, OutOfRange, Refused
 from drivers.instrument import Clock, Health, Tap
 from drivers.servo_drive import COUNT, ActuatorSettings, ServoDrive
+from drivers.setpoints import Setpoints
 
 _EDS = Path(__file__).parent / "wire" / "actuator.eds"
 _OBJECTS = {"actuator_position": 0x6064, "actuator_velocity": 0x606C, "actuator_torque": 0x6077}
@@ -70,12 +70,8 @@ class Actuator:
         self._channels = self._described()
         self._samples = self.decoder(0.0, 1.0)
         self._bus.listen(lambda frame: self._samples.take(frame))
-        self._leading = threading.RLock()
-        self._armed_ns: int | None = None
-        self._boots = 0
-        self._last_ns = self._beat_ns = self._clock_asked_ns = 0
-        self._stale_ns = 3 * ACTUATOR.every_ns
-        self._last = 0.0
+        self._setpoints = Setpoints(name, self._node, self._drive, clock, settings, master_id)
+        self._clock_asked_ns = 0
         self._words = ""
 
     @property
@@ -127,7 +123,8 @@ class Actuator:
 
     def connect(self) -> None:
         """Open the bus, check that the drive is the right one, set its limits, leave it without voltage."""
-        self._armed_ns, self._words = None, ""
+        self._setpoints.disarm()
+        self._words = ""
         self._bus.open()
         try:
             self._node.attach()
@@ -136,7 +133,7 @@ class Actuator:
         except DriverError:
             self._bus.close()
             raise
-        self._boots = self._node.boots
+        self._setpoints.connected()
         if not referenced or self._mounting not in (Mounting.MOUNTED, Mounting.CENTRED):
             self._mounting, self._origin = cia402.found(self._clamped, referenced), 0.0
         self._channels = self._described()
@@ -232,9 +229,7 @@ class Actuator:
         self._drive.check_no_fault()
         self._drive.lead_from_now(self._master_id, self.settings)
         here = self.read("actuator_position").value
-        with self._leading:
-            self._armed_ns = self._last_ns = self._clock()
-            self._beat_ns, self._last = 0, here
+        self._setpoints.arm(here)
         return here
 
     def command(self, position: float) -> None:
@@ -248,17 +243,7 @@ class Actuator:
             Refused: not armed, or the drive has stopped by itself, with its reason.
             NoReply, NotConnected: the drive or the bus has gone.
         """
-        with self._leading:
-            now = self._clock()
-            self._check_led()
-            since = (now - self._last_ns) / 1e9
-            self._check_setpoint(position, since)
-            target = round((position + self._origin) / COUNT)
-            self._node.lead({0x6040: cia402.ENABLE, 0x6060: cia402.CYCLIC_POSITION, 0x607A: target})
-            if since <= 2 * self.settings.cycle and now - self._beat_ns >= self.settings.master_beat * 1e9:
-                self._node.send_heartbeat(self._master_id)
-                self._beat_ns = now
-            self._last_ns, self._last = now, position
+        self._setpoints.send(position, self._origin, self.channels[0], self._samples)
 
     def sample(self) -> None:
         """Ask for one sample without moving anything: a SYNC alone."""
@@ -266,12 +251,12 @@ class Actuator:
 
     def rest(self) -> None:
         """End leading the rod in good order, where it stands: no voltage."""
-        self._disarm()
+        self._setpoints.disarm()
         self._drive.switch_off()
 
     def make_safe(self) -> None:
         """Quick stop by the drive's own ramp, watched until the rod stands or the deadline is over."""
-        self._disarm()
+        self._setpoints.disarm()
         try:
             self._drive.stop(self.settings.stop_within)
             self._words = ""
@@ -284,7 +269,7 @@ class Actuator:
         Raises:
             NoReply: a fault stays.
         """
-        self._disarm()
+        self._setpoints.disarm()
         self._drive.reset()
         self._words = ""
 
@@ -304,7 +289,7 @@ class Actuator:
         after = cia402.step(self._mounting, "home")
         self._check_not_led("home")
         self._drive.check_no_fault()
-        self._disarm()
+        self._setpoints.disarm()
         try:
             self._drive.home(method, within)
         except DriverError:
@@ -337,45 +322,6 @@ class Actuator:
         self._origin = self._samples.origin = origin
         self._channels = self._described()
 
-    def _disarm(self) -> None:
-        with self._leading:
-            self._armed_ns = None
-
     def _check_not_led(self, verb: str) -> None:
-        if self._armed_ns is not None:
+        if self._setpoints.armed:
             raise Refused(f"{self._name}: cannot {verb} while the rod is led; call rest first")
-
-    def _check_led(self) -> None:
-        """See that the drive still does what it is told."""
-        if self._armed_ns is None:
-            raise Refused(f"{self._name}: not armed; call arm first")
-        self._node.check_alive()
-        why = self._stopped(self._armed_ns)
-        if why:
-            self._armed_ns = None
-            raise Refused(f"{self._name}: the drive has stopped by itself: {why}; find the cause, then reset")
-
-    def _stopped(self, armed_ns: int) -> str:
-        """Why the drive no longer follows, empty if it does."""
-        if self._node.boots != self._boots:
-            return "it has restarted (connect again)"
-        if self.faults:
-            return "; ".join(map(str, self.faults))
-        samples = self._samples
-        if self._clock() - (samples.last_ns or 0) > self._stale_ns:  # nobody asks for samples
-            samples.catch_up()
-        if samples.last_ns is None or samples.last_ns < armed_ns or samples.statusword is None:
-            return ""
-        state = cia402.drive_state(samples.statusword)
-        return "" if state is DriveState.ENABLED else state.value
-
-    def _check_setpoint(self, position: float, since: float) -> None:
-        """See that a setpoint lies within the travel and can be reached."""
-        self.channels[0].checked(position)
-        time = max(min(since, self.settings.stale_after), self.settings.cycle)
-        speed = abs(position - self._last) / time
-        if speed > self.settings.top_speed:
-            raise OutOfRange(
-                f"{self._name}: {position:.6g} m is {speed:.3g} m/s from the last setpoint, "
-                f"{self.settings.top_speed:g} m/s are allowed; nothing was sent"
-            )

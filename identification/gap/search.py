@@ -61,8 +61,6 @@ _SHOWN = 0.8
 """[1] part of the excess that the simplest form of play or give may leave, for richer ones to be tried."""
 _HELPS = 0.97
 """[1] part of the excess that play or give may leave alone, to be tried beside other effects too."""
-_MUCH = 0.1
-"""[1] part of the excess that is left where effects that a first look has passed over are fitted as well."""
 _POLISHED, _ROUNDS = 15, 3
 """Most steps on all samples, and how often what they hold is taken anew."""
 _HELD = 1e-3
@@ -110,7 +108,6 @@ class Search:
             limit = _RIVAL * max(self.left_of(grown[0]), _ENOUGH)
             near = [c for c in grown if self.left_of(c) < limit]
             beam = near[: _BEAM[size - 1]]
-        self._look_again()
         self._back()
 
     def _nothing(self, none: Contender) -> bool:
@@ -195,36 +192,12 @@ class Search:
         times = min(max(rate / _THIN_RATE, samples / _MANY), rate / _SCREEN_RATE)
         return self.full.quicker().coarser(max(1, round(times)))
 
-    def _look_again(self) -> None:
-        """Where much is left, fit what a first look has passed over beside the best effect.
-
-        Beside several effects the law's coordinates stand so far off that a step from there tells little.
-        """
-        ones = [c for c in self.found.values() if len(c.names) == 1]
-        if not ones or self.left_of(self.best()) < max(_MUCH * self._none_left, _SMALL):
-            return
-        first, before = min(ones, key=self.left_of), self.best()
-        if not self._worth_it(first, self.found[frozenset()]):
-            return
-        for gain in worth_fitting(self._gains(first), len(EFFECTS)):
-            if self._late:
-                return
-            if first.names | {gain.choice.name} not in self.found:
-                self._fit_beside(first, gain, [])
-        pair = min((c for c in self.found.values() if first.names < c.names), key=self.left_of, default=first)
-        if len(pair.names) == 2 and self.left_of(pair) < self.left_of(before):
-            self._grow(pair, _FITTED[2])
-
-    def _gains(self, parent: Contender) -> list[Gain]:
-        """What every further effect promises beside a set, the most promising first."""
+    def _grow(self, parent: Contender, count: int) -> None:
+        """Fit a set with each of the most promising further effects."""
         thin = self._thin
         rate = max(p.stroke.rate for p in thin.pieces)
         choices = every_choice([n for n in EFFECTS if n not in parent.names])
-        return screen(thin, parent.fit, choices, max(1, round(rate / _SCREEN_RATE)), self._line(parent))
-
-    def _grow(self, parent: Contender, count: int) -> None:
-        """Fit a set with each of the most promising further effects."""
-        gains = self._gains(parent)
+        gains = screen(thin, parent.fit, choices, max(1, round(rate / _SCREEN_RATE)), self._line(parent))
         if not parent.names and self.left_of(parent) > _LARGE:
             count = _MORE
         if self.left_of(parent) < _SMALL and promise(gains[0]) < _FAIR:

@@ -108,8 +108,8 @@ def test_what_comes_before_a_run_is_asked_of_the_agent_and_homing_asks_first(see
     asked = [json.loads(body) for path, body in bench.posted if path == "agent/prepare"]
     assert asked == [
         {"step": "move", "position_m": pytest.approx(0.0125)},
-        {"step": "mount", "position_m": pytest.approx(0.0125)},
-        {"step": "home", "position_m": pytest.approx(0.0125)},
+        {"step": "mount", "position_m": 0},
+        {"step": "home", "position_m": 0},
     ]
     assert seen["homing"] == f"Nothing was done: {CLAMPED}."
     assert seen["prepareWhileRunning"]

@@ -134,7 +134,7 @@ def test_late_setpoints_bring_no_heartbeat(rig):
         actuator.arm()
         beats = []
         actuator.listen(lambda frame: beats.append(frame) if unpack_frame(frame.data)[0] == 0x77F else None)
-        actuator._last_ns -= int(0.02e9)
+        actuator._setpoints._last_ns -= int(0.02e9)
         actuator.command(0.0)
         assert beats == []
 

@@ -168,11 +168,15 @@ class Actuator:
             self._clock_asked_ns = self._clock()
             with contextlib.suppress(NoReply, BadReply, Refused):
                 self._node.number(TIME_STAMP)
-        time.sleep(ACTUATOR.wait(self._clock()))
-        blocks = self._samples.blocks(timeout)
-        if not blocks:
-            self._node.check_alive()
-        return blocks
+        deadline = time.monotonic() + timeout
+        while True:
+            time.sleep(ACTUATOR.wait(self._clock()))
+            self._bus.take_waiting()
+            if blocks := self._samples.blocks():
+                return blocks
+            if time.monotonic() >= deadline:
+                self._node.check_alive()
+                return []
 
     def describe(self) -> dict[str, Any]:
         """What a replay needs beside the frames from now on, see `drivers.replay`."""

@@ -6,10 +6,8 @@ many as stay unanswered for a while, beyond what the drive's clock shows to be m
 running number leaps over them.
 """
 
-import contextlib
 import queue
 import threading
-import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from itertools import groupby, takewhile
@@ -190,25 +188,17 @@ class ActuatorSamples:
         self._parts = {int(entry): value for entry, value in state["parts"].items()}
         self._answers.resume(state["answers"])
 
-    def blocks(self, timeout: float = 0.0) -> list[Block]:
-        """The samples since the last call, waiting up to ``timeout`` [s] for the first."""
-        deadline = time.monotonic() + timeout
-        with self._decoding, contextlib.suppress(queue.Empty):
-            self._decode_passed()
-            while not self._ready:
-                self._decode(self._passed.get(timeout=max(deadline - time.monotonic(), 0.0)))
+    def blocks(self) -> list[Block]:
+        """The samples since the last call."""
         with self._decoding:
+            self._decode_passed()
             samples, self._ready = self._ready, []
         return list(self._blocks_of(samples))
 
     def catch_up(self) -> None:
         """Decode what has passed, for whoever wants to know how things stand and not the samples."""
-        # Whoever holds it decodes all that comes as it comes; a setpoint must not wait for that.
-        if self._decoding.acquire(blocking=False):
-            try:
-                self._decode_passed()
-            finally:
-                self._decoding.release()
+        with self._decoding:
+            self._decode_passed()
 
     def _decode_passed(self) -> None:
         for _ in range(self._passed.qsize()):

@@ -23,9 +23,7 @@ class Beat(NamedTuple):
         return (self.every_ns - (now_ns - self.at_ns) % self.every_ns) * 1e-9
 
 
-FRAMES = Beat(8 * _MILLISECOND, round(1.5 * _MILLISECOND))
-"""Frames of the drive are taken from the bus: those of two setpoints."""
-ACTUATOR = Beat(8 * _MILLISECOND, round(2.3 * _MILLISECOND))
-"""They are made samples."""
+ACTUATOR = Beat(8 * _MILLISECOND, round(1.5 * _MILLISECOND))
+"""The drive's frames are taken from the bus: those of two setpoints."""
 FORCE = Beat(12 * _MILLISECOND, round(3.1 * _MILLISECOND))
 """The load cell's line is read."""

@@ -12,6 +12,7 @@ import select
 import socket
 import struct
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -20,7 +21,6 @@ import can
 from can.interfaces.socketcand import SocketCanDaemonBus
 from can.interfaces.socketcand.socketcand import convert_can_message_to_ascii_message
 
-from drivers.beat import FRAMES
 from drivers.channel import Frame
 from drivers.errors import DriverError, NotConnected
 from drivers.instrument import Clock, Tap
@@ -29,8 +29,10 @@ Heard = Callable[[int, int, bytes], None]
 """Told of each received frame: bench clock [ns], identifier, data."""
 
 _FRAME = struct.Struct("<IB3x8s")
-_TURN = 0.1
-"""[s] the receiving thread waits before it looks whether it is still wanted."""
+_TURN = 0.01
+"""[s] the receiving thread waits for a frame before it looks whether it is still wanted."""
+_ALONE = 0.05
+"""[s] without anybody who takes frames, after which the receiving thread does."""
 _ATTEMPTS = 3
 """A greeting may be spoilt by a frame that follows it too closely."""
 
@@ -131,7 +133,8 @@ class CanBus:
         self._heard: list[Heard] = []
         self._taps: list[Tap] = []
         self._order, self._sending = threading.Lock(), threading.Lock()
-        self._hurry = threading.Event()
+        self._receiving, self._hurry = threading.Lock(), threading.Event()
+        self._taken = 0.0
 
     def __str__(self) -> str:
         return str(self._address)
@@ -208,6 +211,20 @@ class CanBus:
             for message in messages:
                 bus.send(message, self._timeout)
 
+    def take_waiting(self) -> None:
+        """Take the frames that have come, on the calling thread.
+
+        Who does so again and again spares the bus's own thread from being woken for them.
+
+        Raises:
+            NotConnected: the bus has gone.
+        """
+        self.check()
+        self._taken = time.monotonic()
+        if self._bus is not None:
+            self._receive(self._bus, 0.0)
+        self.check()
+
     @contextlib.contextmanager
     def at_once(self) -> Iterator[None]:
         """Within, every frame is taken as it comes: somebody waits for an answer, or times it."""
@@ -218,7 +235,7 @@ class CanBus:
             self._hurry.clear()
 
     def subscribe(self, heard: Heard) -> None:
-        """Tell ``heard`` of every frame received, on the receiving thread."""
+        """Tell ``heard`` of every frame received, on the thread that takes it."""
         self._heard.append(heard)
 
     def unsubscribe(self, heard: Heard) -> None:
@@ -251,16 +268,24 @@ class CanBus:
         return can.Bus(**options)
 
     def _listen(self, bus: can.BusABC) -> None:
+        while self._bus is bus and self._ended is None:
+            if self._hurry.wait(_ALONE):
+                self._receive(bus, _TURN)
+            elif time.monotonic() - self._taken > _ALONE:
+                self._receive(bus, 0.0)
+
+    def _receive(self, bus: can.BusABC, patience: float) -> None:
+        """Take all frames that have come, waiting [s] for the first."""
         try:
-            while self._bus is bus and self._ended is None:
-                message = bus.recv(_TURN)
+            with self._receiving:
+                message = bus.recv(patience)
                 while message is not None:
                     self._take(message)
                     message = bus.recv(0.0)
-                self._hurry.wait(FRAMES.wait(self._clock()))
         except Exception as error:
             # Whatever it was, nothing is heard any more: `check` tells.
-            self._ended = error
+            if self._bus is bus:
+                self._ended = error
 
     def _take(self, message: can.Message) -> None:
         if message.is_error_frame or message.is_remote_frame or message.is_extended_id:

@@ -53,7 +53,7 @@ class RunningClock:
 
     def wait_until(self, instant_ns: int, patience: float = _LONGEST_NAP) -> bool:
         """Wait for an instant [ns], at most ``patience`` [s] of real time; whether it has come."""
-        ahead = (instant_ns - self.now_ns()) / self.speed * 1e-9
+        ahead = (instant_ns - self.now_ns()) / self.speed * 1e-9  # of real time, which is what is slept
         if ahead > 0:
             time.sleep(min(ahead, patience))
         return self.now_ns() >= instant_ns

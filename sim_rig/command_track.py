@@ -59,7 +59,7 @@ class JoinedTrack:
             self._vertices.pop()
         reached, last = self._vertices[-1]
         begin = at_ns if since_ns is None else since_ns + self._take_up
-        if begin > reached:
+        if begin > reached:  # it stood meanwhile
             self._vertices.append((begin, last))
         self._vertices.append((max(end, reached + 1), value))
 

@@ -45,7 +45,7 @@ def fastest_of_the_rig(scenario: Scenario, law: Array, beside: float = 0.0) -> f
     """
     actuator = scenario.actuator
     servo = 2 * math.pi * actuator.bandwidth
-    mass = actuator.stiffness / servo**2
+    mass = actuator.stiffness / servo**2  # what a loop of this bandwidth and stiffness moves
     viscous = min(abs(law[6]) + 2 * abs(law[7]), 1e6)
     return float(max(1 / actuator.command_lag, 2 * servo * max(actuator.damping, 1)) + (beside + viscous) / mass)
 

@@ -121,6 +121,7 @@ class Demand:
         begin = self._ahead[-1][0] if self._ahead else self._now_ns
         self._ahead.append((reached, before + self._pace * span))
         self.motion, self._deceleration = Motion.FOLLOW, deceleration
+        # Should no other come: on at this pace for a while, then braked.
         self._bridged_ns = reached + _BRIDGED * period_ns
         self._head_on()
         self._way.append(self._ahead[-1])
@@ -132,6 +133,7 @@ class Demand:
             return []
         times, (a, b, c, d) = [at for at, _ in self._way], [position for _, position in self._way]
         begin, length = times[1], times[2] - times[1]
+        # The formula is that of legs of one length.
         if max(abs(times[1] - times[0] - length), abs(times[3] - times[2] - length)) > _EVEN * length:
             return []
         legs, last = [], begin

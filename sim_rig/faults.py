@@ -178,7 +178,7 @@ class _Pipe:
         piece = b""
         with contextlib.suppress(OSError):
             piece = self.source.recv(4096)
-        self.ended = not piece
+        self.ended = not piece  # before a fault takes bytes away: an empty piece is the end, a cut one is not
         for fault in faults:
             piece = _spoilt(piece, fault)
         delay = sum(fault.delay for fault in faults if fault.kind == "late")
@@ -187,7 +187,7 @@ class _Pipe:
 
     def deliver(self, now_ns: int, faults: list[WireFault]) -> bool:
         """Pass on what is due; whether the connection goes on."""
-        if any(fault.kind == "stuck" for fault in faults):
+        if any(fault.kind == "stuck" for fault in faults):  # all of it waits, and passes at once in the end
             return True
         try:
             while self.waiting and self.waiting[0][0] <= now_ns:

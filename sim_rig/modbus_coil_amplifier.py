@@ -246,6 +246,7 @@ class CoilAmplifierDevice:
                 from_words(part, column["type"], column["scale"], low_first)
                 for part, column in zip((words[:half], words[half:]), columns, strict=True)
             )
+            # Its times are its own clock's, which is some ppm off the rig's.
             steps.append((round(own * 1e9 / (1 + self._clock.ppm * 1e-6)), level))
         rising = all(before[0] < after[0] for before, after in itertools.pairwise(steps))
         if not (steps and rising and all(abs(level) <= self._limit for _, level in steps)):

@@ -38,6 +38,7 @@ def to_words(value: float, type_: str, scale: float, low_first: bool) -> list[in
     """A value as registers: saturated where it does not fit, the least signed number where there is none."""
     bits = int(type_[1:])
     least, most = (0, 2**bits - 1) if type_[0] == "u" else (1 - 2 ** (bits - 1), 2 ** (bits - 1) - 1)
+    # The least signed number is kept for "no value": it stands one below what a value may be.
     number = least - 1 if math.isnan(value) else min(max(round(value / scale), least), most)
     words = [(number >> shift) % _WORD for shift in range(bits - 16, -1, -16)]
     return words[::-1] if low_first else words

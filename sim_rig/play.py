@@ -65,7 +65,7 @@ def play(scenario: Scenario, commands: Commands, progress: Callable[[float], Non
     count = len(commands.time)
     dt = float(commands.time[-1] - commands.time[0]) / (count - 1)
     command = faded_in(scenario, commands.time, commands.displacement)
-    ahead = np.append(command, command[-1])
+    ahead = np.append(command, command[-1])  # the last sample, too, has an end to go to
     plant, parts = plant_for(scenario, float(command[0]), float(commands.drive[0])), []
     for part in chunks(count, _CHUNK):
         parts.append(plant.play(dt, ahead[part.start : part.stop + 1], commands.drive[part]))

@@ -45,6 +45,7 @@ class SealedPlant(Plant):
         dt = 1e-3
         count = round(_STANDING / dt)
         self.play(dt, np.full(count + 1, displacement), np.full(count, drive))
+        # The moment of standing was no part of the run.
         self._time, self._samples = 0.0, 0
         self._states[at.PATH] = 0.0
 

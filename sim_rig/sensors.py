@@ -45,6 +45,7 @@ def streams(
         random = np.random.default_rng([scenario.seed, place])
         sensor: Sensor = getattr(scenario.sensors, name)
         drawn = drawn_for(sensor, getattr(scenario.clocks, CHANNELS[name][1]), random)
+        # Over the wires the bench maps the clocks itself: what that leaves is real there, not drawn.
         chances[name] = drawn if mapped else drawn._replace(offset=0.0)
         made[name] = ChannelStream(view, sensor.rate or 1 / step, sensor, chances[name], random)
     return made, chances

@@ -44,6 +44,7 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: Settings) -> None
     stopping = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopping.set())
+    broken = _end_with_any_thread(stopping)
     _remove(out)
     block = max(_BLOCK, round(_BLOCK * settings.speed))
     clock = RunningClock(settings.speed)
@@ -57,8 +58,24 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: Settings) -> None
         while not stopping.wait(_LOOK):
             if served.rig.failure is not None:
                 raise served.rig.failure
+        if broken:
+            raise broken[0]
     if isinstance(served.rig.failure, SimRigError):
         raise served.rig.failure
+
+
+def _end_with_any_thread(stopping: threading.Event) -> list[BaseException]:
+    """End the rig when one of its threads ends by an error, which is kept."""
+    # A wire that nobody serves any more looks like a silent instrument, and is searched for on the wrong side.
+    broken: list[BaseException] = []
+
+    def end(thread: threading.ExceptHookArgs) -> None:
+        if thread.exc_value is not None:
+            broken.append(thread.exc_value)
+        stopping.set()
+
+    threading.excepthook = end
+    return broken
 
 
 def _remove(out: Path) -> None:

@@ -187,7 +187,7 @@ class SocketcandServer:
         while b">" in client.received:
             command, client.received = client.received.split(b">", 1)
             self._obey(client, command.decode("ascii", "replace").strip().removeprefix("<").split(), came_ns)
-        if len(client.received) > _LINE_LIMIT:
+        if len(client.received) > _LINE_LIMIT:  # no command is so long: it speaks something else
             raise ConnectionResetError
 
     def _read(self, connection: socket.socket) -> tuple[bytes, int]:

@@ -22,6 +22,7 @@ class Catalogue:
         """
         self.folder = folder
         self._engine = engine
+        # Rows are read after their session has ended: they must not be fetched again.
         self._sessions = sessionmaker(engine, expire_on_commit=False)
 
     def close(self) -> None:

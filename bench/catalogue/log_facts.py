@@ -105,7 +105,7 @@ def _of_cut_off(path: Path, file: IO[bytes]) -> LogFacts:
                 metadata[record.name] = record.metadata
             elif isinstance(record, Message):
                 return _facts(path, metadata, record.log_time, None)
-    except DAMAGE:
+    except DAMAGE:  # cut off before its first message: whose it is may stand in it all the same
         pass
     return _facts(path, metadata, None, None)
 

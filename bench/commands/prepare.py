@@ -13,13 +13,13 @@ _STEPS = ", ".join(get_args(Step))
 def prepare(
     step: Annotated[str, typer.Argument(metavar="STEP", help=f"One of: {_STEPS}.")],
     to: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--to",
             metavar="METRES",
             help="Where `move` goes [m], from the specimen's middle, or from home before there is one.",
         ),
-    ] = 0.0,
+    ] = None,
     config: Annotated[Path, typer.Option(metavar="FILE", help="The bench whose agent is asked.")] = Path(
         "bench.toml"
     ),
@@ -32,4 +32,6 @@ def prepare(
     """
     from bench.agent.prepare import prepare_through_agent
 
-    typer.echo(prepare_through_agent(config, step, to))
+    if step == "move" and to is None:
+        raise typer.BadParameter("say where the rod is to go: --to METRES")
+    typer.echo(prepare_through_agent(config, step, to or 0.0))

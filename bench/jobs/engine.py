@@ -122,7 +122,7 @@ class DaskEngine:
 
     async def submit(self, order: Order) -> None:
         """Hand an order to the scheduler and follow it."""
-        if self._client is None or order.job_id in self._futures:
+        if self._client is None or order.job_id in self._futures:  # without a scheduler: `connected` asks again
             return
         future = self._client.submit(carry_out_order, order, key=order.key, pure=True)
         self._futures[order.job_id] = future

@@ -71,6 +71,7 @@ def _motions(programme: Programme) -> Iterator[dict[str, Any]]:
         for part in PARTS:
             yield {"kind": "sine", "amplitude_m": amplitude, "frequency_hz": _two_digits(part * highest)}
         slow = _two_digits(0.1 * highest)
+        # Some ten times the least that a triangle of this size can have, 32 amplitude frequency².
         corners = _two_digits(300 * amplitude * slow**2)
         yield {
             "kind": "triangle",

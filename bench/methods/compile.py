@@ -83,6 +83,7 @@ def compile_method(method: Method) -> Programme:
     pieces = list(plan(method))
     starts = np.concatenate([[0.0], np.cumsum([piece.duration for piece in pieces])])
     programme = _empty(method, float(starts[-1]))
+    # There is one edge more than pieces.
     for piece, start, end in zip(pieces, starts, starts[1:], strict=False):
         _lay(piece, float(start), _sample_at(float(end), method.rate_hz), programme)
     segments = _segments(pieces, starts, method.rate_hz)

@@ -132,6 +132,7 @@ def _bits(seed: int, count: int) -> npt.NDArray[np.bool_]:
     register = int(np.random.default_rng(seed).integers(1, 2**15))
     bits = np.empty(count, dtype=bool)
     for index in range(count):
+        # Both taps together make it run through all 32767 states but zero before it repeats.
         new = ((register >> 14) ^ (register >> 13)) & 1
         register = ((register << 1) & 0x7FFF) | new
         bits[index] = bool(new)

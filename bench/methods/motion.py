@@ -164,6 +164,7 @@ def period(motion: Motion) -> float | None:
 
 def _common_frequency(frequencies: list[float]) -> float:
     """The largest frequency [Hz] of which all are multiples, to a part in a thousand of a hertz."""
+    # A document says 0.7 Hz, and the binary number nearest to it has no period that anybody would wait for.
     parts = [Fraction(frequency).limit_denominator(1000) for frequency in frequencies]
     denominator = math.lcm(*(part.denominator for part in parts))
     return math.gcd(*(int(part * denominator) for part in parts)) / denominator

@@ -72,6 +72,7 @@ def plan(method: Method) -> Iterator[Piece]:
             yield from _conditioning(stage)
             place = 0.0
         piece = _piece(method, segment, names)
+        # A move to the segment is made under its first drive: the coil need not jump when it begins.
         start, end = (segment.centre_m + offset for offset in ends(segment.motion))
         first, drive = (float(value) for value in piece.drive(np.array([0.0, piece.duration])))
         yield from _moved(place, start, first, method.limits)

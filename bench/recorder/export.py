@@ -85,7 +85,7 @@ def _write_csv(table: Columns, path: Path) -> None:
 def _texts(column: npt.NDArray[np.float64] | npt.NDArray[np.int64]) -> list[str]:
     if column.dtype.kind == "i":
         return [str(value) if value >= 0 else "" for value in column.tolist()]
-    return [repr(value) if value == value else "" for value in column.tolist()]
+    return [repr(value) if value == value else "" for value in column.tolist()]  # NaN alone differs from itself
 
 
 def _write_parquet(table: Columns, path: Path) -> None:

@@ -51,7 +51,7 @@ def import_recordings(
     measured = all(recording.velocity is not None for recording in recordings)
     header = _header(recordings, unit, drive_kind, specimen, measured)
     with replacing(out) as beside, LogWriter(beside, header) as writer:
-        start = index = 0
+        start = index = 0  # one clock for all files: each begins a pause after the one before
         for name, recording in zip(_stretch_names(recordings), recordings, strict=True):
             time_ns = start + recording.time_ns
             index = write_stretch(writer, name, time_ns, _values(recording, measured), _spans(recording), index)

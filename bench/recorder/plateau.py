@@ -55,7 +55,7 @@ def find_plateaus(drive: Array, rate: float) -> tuple[list[Plateau], float]:
     for start, stop, median in zip(starts.tolist(), stops.tolist(), medians, strict=True):
         if plateaus and abs(median - plateaus[-1].level) <= tolerance:
             last = plateaus.pop()
-            share = (stop - start) / (stop - last.start)
+            share = (stop - start) / (stop - last.start)  # the running mean of all its blocks
             plateaus.append(Plateau(last.start, stop, last.level + share * (median - last.level)))
         else:
             plateaus.append(Plateau(start, stop, median))

@@ -107,6 +107,7 @@ def check_profile(path: Path, profile: str) -> None:
 def _read(path: Path, reader: McapReader) -> Log:
     check_profile(path, reader.get_header().profile)
     messages: dict[str, list[bytes]] = {SAMPLE: [], SEGMENT: [], EVENT: []}
+    # In the order of the file, which is that of the samples: nothing has to be sorted.
     for _, channel, message in reader.iter_messages(topics=list(messages), log_time_order=False):
         messages[channel.topic].append(message.data)
     if not messages[SAMPLE]:

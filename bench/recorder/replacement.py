@@ -19,6 +19,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """
     if not path.parent.is_dir():
         raise LogError(f"{path}: there is no folder {path.parent}; make it first")
+    # In the same folder: a file takes another's place at once only within one file system.
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         yield beside

@@ -86,6 +86,7 @@ def _samples(blocks: Iterable[Block]) -> dict[_Key, tuple[_Sample, int]]:
         device = np.full(len(block.values), -1) if block.device_ns is None else block.device_ns
         parts = zip(device.tolist(), block.values, block.raw.tolist(), strict=True)
         for place, (device_ns, value, raw) in enumerate(parts):
+            # Bit for bit; a NaN, which equals nothing, as no bytes at all.
             sample = _Sample(device_ns, value.tobytes() if value == value else b"", raw, block.quality)
             found[block.channel, block.first + place] = sample, block.received_ns
     return found

@@ -117,7 +117,7 @@ def render(report: Report, drawn: dict[str, Figure], command: str, made: datetim
     environment = Environment(
         loader=PackageLoader("bench.report", "."),
         autoescape=True,
-        undefined=StrictUndefined,
+        undefined=StrictUndefined,  # a name that the page misses is an error, not a gap
         trim_blocks=True,
         lstrip_blocks=True,
     )

@@ -103,5 +103,5 @@ def _powered(text: str, power: int) -> str:
 
 def _fixed(value: float, decimals: int) -> str:
     """A number rounded to decimals, which may be negative; with a true minus sign and never a negative zero."""
-    rounded = round(value, decimals) + 0.0
+    rounded = round(value, decimals) + 0.0  # takes the sign off a zero
     return f"{rounded:.{max(0, decimals)}f}".replace("-", "−")

@@ -80,7 +80,7 @@ def with_priority(work: Callable[[], None]) -> None:
     Every thread of a rig's process needs it: one that holds the interpreter and is put aside for another process
     would hold up the setpoints, too. The calling thread stays as it is.
     """
-    failures: list[BaseException] = []
+    failures: list[BaseException] = []  # raised again by the caller: a thread has nobody to raise to
 
     def run() -> None:
         raise_priority(-HASTE)

@@ -112,7 +112,7 @@ class Interlocks:
         quantity = _WATCHED.get(block.channel)
         if quantity is None or not len(block.values):
             return
-        worst = _largest(block.values.tolist())
+        worst = _largest(block.values.tolist())  # plain numbers: blocks are short, and arrays the slower way
         expected = self._force_ns is not None
         if expected and block.channel == "force" and block.quality != "bad" and not math.isnan(worst):
             self._force_ns = block.received_ns

@@ -124,7 +124,7 @@ class AgentWatch:
         answer = self._link.send(command, timeout)
         if not answer.ok:
             raise RunError(answer.error or "the rig agent refuses, and does not say why")
-        if answer.status is None:
+        if answer.status is None:  # some answers carry none
             answer = self._link.send(StatusCommand(), timeout)
         if answer.status is None:
             raise AgentUnreachable("the rig agent answers without its status; it is of another version")

@@ -18,6 +18,7 @@ class Mailbox:
     """What waits for one listener, as JSON text; used in the event loop only."""
 
     def __init__(self) -> None:
+        # Of what has a state the newest word is enough; events and samples are each their own, and have an end.
         self._latest: dict[tuple[str, str], str] = {}
         self._events: deque[str] = deque(maxlen=EVENTS_KEPT)
         self._samples: deque[str] = deque(maxlen=BATCHES_KEPT)

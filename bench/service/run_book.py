@@ -50,7 +50,7 @@ class RunBook:
         """Write down what a status says of runs; what is known already costs nothing."""
         told = {run.id: run for run in (*status.finished, *([status.run] if status.run else []))}
         for run in told.values():
-            mark = (run.id, run.outcome is not None)
+            mark = (run.id, run.outcome is not None)  # a run is news twice: when it begins and when it ends
             if mark not in self._seen:
                 async with self._one_at_a_time:
                     await (self._end(run) if run.outcome else self._begin(run))

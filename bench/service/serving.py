@@ -90,6 +90,7 @@ def _address(page: str, token: str | None) -> str:
 @contextmanager
 def _folder(data: Path) -> Iterator[None]:
     """The data folder, for one service at a time."""
+    # The lock is the system's, not the file's presence: a service that was killed leaves none behind.
     try:
         data.mkdir(parents=True, exist_ok=True)
         lock = (data / "service.lock").open("w")

@@ -1,9 +1,9 @@
 """What the REST interface answers: frozen types, units in every field's description."""
 
 from datetime import datetime
-from typing import Any
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bench.agent.messages import AgentStatus
 from bench.agent.steps import Step
@@ -29,7 +29,15 @@ class Preparation(View):
     """A step before a run."""
 
     step: Step = Field(description="home, move, mount, centre, unmount, tare or clear-tare")
-    position_m: float = Field(default=0.0, description="[m] where `move` goes, from the middle or from home")
+    position_m: float | None = Field(
+        default=None, description="[m] where `move` goes, from the middle or from home; no other step needs it"
+    )
+
+    @model_validator(mode="after")
+    def _place_of_a_move(self) -> Self:
+        if self.step == "move" and self.position_m is None:
+            raise ValueError("move needs position_m; nothing was done")
+        return self
 
 
 class MethodSummary(View):

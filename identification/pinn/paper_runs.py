@@ -143,7 +143,7 @@ class PaperTraining:
     def _states(self, at: Tensor) -> tuple[Tensor, Tensor]:
         """[u, y, z] (n, 3) and their rates."""
         scale = torch.tensor([self.scales.u, self.scales.y, self.scales.z], dtype=torch.float64, device=at.device)
-        value, rate, _ = self.network.forward(self.weights, self.data.inputs[at], self.data.rates[at])
+        value, rate = self.network.outputs(self.weights, self.data.inputs[at], self.data.rates[at])
         return value * scale, rate * scale
 
     def _forces(self, at: Tensor, states: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:

@@ -1,6 +1,7 @@
 """What is sent at each instant, on a clock that the test steps; no thread, no wire."""
 
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ from bench.methods import Method, compile_method
 from bench.methods.compile import BETWEEN
 from bench.sequencer.lead import Lead
 from bench.sequencer.passages import after_segment, passages
-from bench.sequencer.plan import RunPlan
-from bench.sequencer.track import FADES, Playing, approach
+from bench.sequencer.plan import Entry, RunPlan
+from bench.sequencer.track import FADES, Playing, approach, standing
 
 CYCLE, STALE = 0.004, 0.05
 CYCLE_NS = 4_000_000
@@ -243,3 +244,35 @@ def test_an_interrupted_run_goes_on_at_rest_after_a_checkpoint():
         after_segment(TWO, "c")
     with pytest.raises(RunError, match="nothing comes after"):
         after_segment(TWO, "b")
+
+
+def test_the_plan_knows_how_far_it_should_be_at_an_instant(plan):
+    (part,) = passages(TWO, 500)
+    begin = 7_000_000_000
+    assert not plan.reached(0, begin)
+    assert plan.progress(begin) == (0.0, BETWEEN)
+    plan.enter(Entry(Playing(approach(0.0, 0.001), begin - 1_000_000_000)))
+    plan.enter(Entry(Playing(part.track, begin), part))
+    sample = TWO.segments[1].start
+    due = begin + round(TWO.time[sample] * 1e9)
+    assert not plan.reached(sample, due - 2_000_000)
+    assert plan.reached(sample, due)
+    assert not plan.reached(0, begin - 1)
+    assert plan.progress(due) == (pytest.approx(TWO.time[sample]), 1)
+    plan.switch_off(due)
+    assert plan.progress(due) == (pytest.approx(TWO.time[sample]), BETWEEN)
+
+
+def test_the_same_passage_stopped_takes_the_place_of_itself(plan):
+    (part,) = passages(TWO, 500)
+    playing = Playing(part.track, 1000)
+    plan.enter(Entry(playing, part))
+    plan.enter(Entry(playing.stopped(500_000_000, 8.0), part))
+    assert [entry.playing.fade is not None for entry in plan.entries] == [True]
+
+
+def test_where_the_rod_was_sent_is_unknown_before_the_first_setpoint(plan):
+    assert math.isnan(plan.position(0))
+    plan.enter(Entry(Playing(standing(0.003), 10)))
+    assert math.isnan(plan.position(9))
+    assert plan.position(10) == 0.003

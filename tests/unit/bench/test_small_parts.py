@@ -9,9 +9,12 @@ import threading
 from typing import Annotated, Literal
 
 import pytest
+import typer
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError, field_validator
 
+from bench.agent import prepare as agent_prepare
 from bench.child_process import end, read_along
+from bench.commands.prepare import prepare
 from bench.errors import LogError
 from bench.faults import first_fault
 from bench.jobs.errors import WorkerError
@@ -137,3 +140,14 @@ def test_a_worker_finds_the_scheduler_by_the_service_s_folder(tmp_path):
         scheduler_of(tmp_path)
     (tmp_path / "scheduler.address").write_text("tcp://127.0.0.1:4567")
     assert scheduler_of(tmp_path) == "tcp://127.0.0.1:4567"
+
+
+def test_a_move_without_a_place_is_misuse_and_not_a_move_to_zero(monkeypatch, capsys):
+    asked = []
+    monkeypatch.setattr(agent_prepare, "prepare_through_agent", lambda *given: asked.append(given) or "done")
+    with pytest.raises(typer.BadParameter, match="--to METRES"):
+        prepare("move")
+    assert asked == []
+    prepare("move", 0.0)
+    prepare("tare")
+    assert [(step, place) for _, step, place in asked] == [("move", 0.0), ("tare", 0.0)]

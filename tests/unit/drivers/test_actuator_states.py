@@ -1,7 +1,5 @@
 """The states of a drive, of a mounting, and of the stream of samples, without a bus."""
 
-import threading
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,6 @@ from drivers.cia402 import DriveState, FaultKind, Mounting, active_faults, drive
 from drivers.errors import Refused
 
 MILLISECOND = 1_000_000
-WITHIN = 10.0
 
 
 @pytest.mark.parametrize(
@@ -235,18 +232,3 @@ def test_demanded_frame_holds_its_objects_and_zero_for_the_rest():
     assert layout.packed({0x6040: 0x1F, 0x607A: -2}) == b"\x1f\x00" + b"\x00" + b"\xfe\xff\xff\xff"
     with pytest.raises(OverflowError):
         layout.packed({0x6040: 1 << 16})
-
-
-def test_a_setpoint_does_not_wait_for_whoever_waits_for_samples():
-    """The one who waits holds the decoder; what comes meanwhile is decoded there."""
-    wire, found = Wire(), []
-    waiting = threading.Thread(target=lambda: found.extend(wire.samples.blocks(WITHIN)), daemon=True)
-    waiting.start()
-    while not wire.samples._decoding.locked():
-        assert waiting.is_alive()
-    wire.samples.catch_up()
-    assert waiting.is_alive()
-    wire.sync(1000)
-    wire.answer(1000, 7)
-    waiting.join(WITHIN)
-    assert len(found) == 3

@@ -107,3 +107,33 @@ def test_bus_that_is_not_open_or_not_there_is_not_connected():
         bus.send(0x181, b"")
     with pytest.raises(NotConnected, match=r"CAN bus can9 \(socketcan\): cannot be opened"):
         CanBus(CanAddress("socketcan", "can9"), lambda: 0).open()
+
+
+def test_whoever_takes_waiting_frames_hears_them_on_its_own_thread(pair):
+    one, other = pair
+    heard_on = []
+    other.subscribe(lambda now, identifier, data: heard_on.append(threading.current_thread()))
+    other.take_waiting()
+    one.send(0x181, b"\x01")
+    other.take_waiting()
+    assert heard_on == [threading.current_thread()]
+
+
+def test_while_somebody_waits_for_an_answer_frames_are_taken_by_the_bus_itself(pair):
+    one, other = pair
+    came = threading.Event()
+    other.subscribe(lambda now, identifier, data: came.set())
+    with other.at_once():
+        one.send(0x181, b"\x01")
+        assert came.wait(WITHIN)
+
+
+def test_error_while_taking_is_told_to_whoever_takes(pair, monkeypatch):
+    _, other = pair
+
+    def broken(timeout):
+        raise can.CanOperationError("cable pulled")
+
+    monkeypatch.setattr(other._bus, "recv", broken)
+    with pytest.raises(NotConnected, match="cable pulled"):
+        other.take_waiting()

@@ -257,3 +257,13 @@ def test_unfinished_jobs_are_submitted_again_under_their_key(service):
     assert service.get(f"/jobs/{job['id']}")["attempts"] == 2
     complete_folder = service.engine.orders[job["id"]].result
     assert complete_folder == str(service.data / f"{run['log'].removesuffix('.mcap')}.fit-{key[:12]}")
+
+
+def test_a_move_without_a_place_is_refused_and_nothing_is_sent(service):
+    answer = service.client.post("/api/v1/agent/prepare", json={"step": "move"})
+    assert answer.status_code == 422
+    assert "move needs position_m" in answer.json()["detail"]
+    assert service.agent.commands == []
+    service.post("/agent/prepare", {"step": "move", "position_m": 0.0})
+    service.post("/agent/prepare", {"step": "tare"})
+    assert [(one.step, one.position_m) for one in service.agent.commands] == [("move", 0.0), ("tare", 0.0)]

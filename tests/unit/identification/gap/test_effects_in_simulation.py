@@ -9,6 +9,8 @@ from effect_examples import FORMS, IDS, LABORATORY, MEDIUM, active, sine
 from identification.damper.coordinates import Coordinates
 from identification.damper.effects import EFFECTS
 from identification.simulate import UNKNOWNS, ActiveEffect, Setting, simulate
+from identification.simulate.channel import beside
+from identification.simulate.motion import Motion
 
 SETTING = Setting(LABORATORY, y0=1e-4, force_delay=3.3e-4, drive_delay=1e-4)
 TOGETHER = [
@@ -105,3 +107,13 @@ def test_heat_softens_only_where_the_power_is_known():
     heated = replace(SETTING, effects=(active("viscous_heating"),))
     cold = replace(sine(), power=None)
     assert np.array_equal(simulate(heated, cold).force, simulate(SETTING, cold).force)
+
+
+def test_a_lip_keeps_its_force_through_the_noise_of_a_rest():
+    seal = replace(SETTING, effects=(active("seal_friction", "bending_lip"),))
+    noise = 3e-7 * np.random.default_rng(0).standard_normal(4000)
+    x = np.concatenate([np.linspace(0.0, 1e-3, 1000), 1e-3 + noise])
+    motion = Motion(x, *np.zeros((2, len(x))), *np.zeros((3, 0, len(x))), ())
+    force = beside(seal, motion)[1000:]
+    assert force[-500:].mean() == pytest.approx(force[:500].mean(), rel=0.03)
+    assert force.mean() > 5.0

@@ -65,6 +65,13 @@ def test_whole_segments_are_held_out_and_of_few_segments_cycles():
     assert all({True, False} == set(held[few.segment == k]) for k in range(3))
 
 
+def test_of_few_segments_some_cycle_that_follows_a_step_of_the_drive_is_held_out():
+    _, few = recording(segments=5, cycles=6)
+    held = held_out_cycles(few)
+    first = [int(np.flatnonzero(few.segment == k)[0]) for k in range(5)]
+    assert 0 < np.count_nonzero(held[first]) < 5
+
+
 def test_the_map_names_drive_and_phase_of_the_gap_and_takes_the_noise_off():
     stretch, cycles = recording()
     bump = 10.0 * ((stretch.drive > 0.3) & (np.abs(cycles.phase - 0.25) < 0.06))

@@ -63,6 +63,16 @@ def test_cycles_in_which_the_rod_stumbled_are_left_out_and_said():
     assert "left out" in notes[0]
 
 
+def test_a_stumble_that_goes_on_over_the_end_of_a_segment_is_left_out_there_too():
+    bad = (13, 14, 15, 16)
+    piece, cycles = strokes(1e-3, bad)
+    (kept,), _ = left_out([piece], cycles)
+    assert set(cycles.cycle[kept.train == 0.0]) == set(bad)
+    piece, cycles = strokes(1e-3, (16,))
+    (kept,), _ = left_out([piece], cycles)
+    assert kept is piece
+
+
 def test_where_most_cycles_stumble_all_are_kept_and_the_recording_is_called_bad():
     piece, cycles = strokes(1e-3, range(8, 36))
     (kept,), notes = left_out([piece], cycles)

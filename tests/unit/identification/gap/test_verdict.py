@@ -47,3 +47,8 @@ def test_nothing_named_is_no_gap_unless_something_unknown_is_likely():
     assert word((), 1.005, 1.02, plain=(1.005, 1.02)) == "no_gap"
     assert word((), 3.0, 3.0, unknown=0.9) == "unexplained"
     assert word(("gas_spring",), 1.0, 1.0, plain=(1.0, 1.007)) == "no_gap"
+
+
+def test_a_gap_on_the_fitted_strokes_alone_is_one():
+    assert word(("coil_lag",), 1.005, 1.0, plain=(1.08, 1.0)) == "explained"
+    assert word(("coil_lag",), 1.005, 1.0, plain=(1.02, 1.0)) == "no_gap"

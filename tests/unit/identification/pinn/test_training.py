@@ -198,6 +198,22 @@ def test_the_derivative_carried_forward_is_that_of_automatic_differentiation():
     assert torch.allclose(network.forward(weights, inputs, rates)[1], expected)
 
 
+def test_the_way_back_through_outputs_and_rates_is_that_of_automatic_differentiation():
+    network = Network([3, 5, 4, 2])
+    weights = network.begin(7, "cpu").requires_grad_()
+    inputs, rates = torch.randn(1100, 3, dtype=torch.float64), torch.randn(1100, 3, dtype=torch.float64)
+
+    def slopes(value, rate):
+        return torch.autograd.grad((value * rate).sum() + (value[:, 0] ** 3).sum() + (rate**2).sum(), weights)[0]
+
+    written = [network.outputs(weights, inputs, rates) for _ in range(2)]
+    expected = network.forward(weights, inputs, rates)[:2]
+    for found in written:
+        assert torch.allclose(found[0], expected[0])
+        assert torch.allclose(found[1], expected[1])
+        assert torch.allclose(slopes(*found), slopes(*network.forward(weights, inputs, rates)[:2]))
+
+
 def test_the_paper_network_learns_the_force_and_gives_parameters_of_a_damper():
     given = problem((0.0, 0.4), 1.0)
     found = train(given, QUICK_PAPER)

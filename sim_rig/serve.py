@@ -32,6 +32,13 @@ _SYNC = 0x80
 _LONGEST_UP = 3_600_000_000_000
 """[ns] that an instrument may have been switched on before the rig's clock began."""
 
+_LIMITS = (
+    "# Nothing can break here, and rig and agent share their cores with whatever else goes on, so that setpoints",
+    "# may leave tens of milliseconds late. On hardware, leave these out: then it is 8 mm and 0.6 m/s.",
+    "following_error = { indicate = 0.01, trip = 0.03 }",
+    "actuator_velocity = { trip = 2.0 }",
+)
+
 Faults = dict[str, tuple[WireFault, ...]]
 Section = dict[str, str | int | float | bool]
 """Of ``bench.toml``."""
@@ -225,6 +232,7 @@ def bench_toml(wires: list[Wire], scenario: Scenario) -> str:
         # The drive is measured by the channel of voltage or current.
         if name != "coil_drive":
             lines += ["", f"[channels.{name}]", *_claimed(getattr(scenario.sensors, name))]
+    lines += ["", "[limits]", *_LIMITS]
     return "\n".join(lines) + "\n"
 
 

@@ -22,11 +22,6 @@ DEADLINE = 90.0
 
 TCP = Choices(load_cell="tcp")
 _PATIENT = "stale_after = 0.3"
-_LIMITS = """
-[limits]
-actuator_velocity = { trip = 2.0 }
-following_error = { trip = 0.03 }
-"""
 """The other processes of a busy machine, and what they do to a simulated drive, are not what is tested here."""
 
 
@@ -127,7 +122,7 @@ def live_bench(folder, choices=TCP, faults=None, limits=""):
         write_bench_toml(folder / "bench.toml", served.wires, scenario)
         bench = Bench(served, folder)
         text = bench.toml.read_text().replace("stale_after = 0.2", _PATIENT)
-        bench.toml.write_text(f"{text}{_LIMITS}{limits}\n")
+        bench.toml.write_text(f"{text}{limits}\n")
         yield bench
 
 

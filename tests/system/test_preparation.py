@@ -79,7 +79,7 @@ def test_the_way_from_an_empty_rig_to_a_centred_specimen(bench):
 def test_a_move_out_of_the_limits_is_refused_before_anything_moves(bench):
     before = bench.truth().position[-1]
     code, said = prepare(bench, "move", "--to", "0.2")
-    assert (code, "0.2" in said, len(said.splitlines())) == (1, True, 1), said
+    assert (code, "200 mm exceeds the limit of 55 mm" in said, len(said.splitlines())) == (1, True, 1), said
     assert bench.truth().position[-1] == pytest.approx(before, abs=1e-5)
 
 

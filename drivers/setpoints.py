@@ -12,6 +12,8 @@ from drivers.errors import OutOfRange, Refused
 from drivers.instrument import Clock
 from drivers.servo_drive import COUNT, ActuatorSettings, ServoDrive
 
+_OWED = 5
+"""Cycles of motion that may follow at once on a setpoint that left late; beyond, it begins a new row."""
 _STALE_NS = 3 * ACTUATOR.every_ns
 """[ns] without a sample after which nobody seems to ask for them."""
 
@@ -42,7 +44,8 @@ class Setpoints:
         self._sending = threading.RLock()
         self._armed_ns: int | None = None
         self._boots = 0
-        self._last_ns = self._beat_ns = 0
+        self._last_ns = self._beat_ns = self._place_ns = 0
+        self._cycle_ns = round(settings.cycle * 1e9)
         self._last = 0.0
 
     @property
@@ -58,7 +61,7 @@ class Setpoints:
     def arm(self, here: float) -> None:
         """Lead the rod from where it stands [m] on."""
         with self._sending:
-            self._armed_ns = self._last_ns = self._clock()
+            self._armed_ns = self._last_ns = self._place_ns = self._clock()
             self._beat_ns, self._last = 0, here
 
     def disarm(self) -> None:
@@ -83,12 +86,11 @@ class Setpoints:
         with self._sending:
             now = self._clock()
             self._check_led(samples)
-            since = (now - self._last_ns) / 1e9
-            self._check(position, since, travel)
+            self._check(position, (now - self._place_ns) / 1e9, travel)
             target = round((position + origin) / COUNT)
             self._node.lead({0x6040: cia402.ENABLE, 0x6060: cia402.CYCLIC_POSITION, 0x607A: target})
-            self._beat(now, since)
-            self._last_ns, self._last = now, position
+            self._beat(now, (now - self._last_ns) / 1e9)
+            self._last_ns, self._place_ns, self._last = now, self._placed(now), position
 
     def _beat(self, now: int, since: float) -> None:
         """The bench's heartbeat goes with setpoints that come in time: who leads no more must not seem alive."""
@@ -96,6 +98,14 @@ class Setpoints:
         if in_time and now - self._beat_ns >= self._settings.master_beat * 1e9:
             self._node.send_heartbeat(self._master_id)
             self._beat_ns = now
+
+    def _placed(self, now: int) -> int:
+        """Where a setpoint that leaves now has its place in the row [ns]: a cycle behind the last, however late.
+
+        What was late is made up for by setpoints that follow closer, or by one that stands for several; by the
+        time between sendings alone a rod that keeps to its motion would seem to leap.
+        """
+        return now if now - self._place_ns > _OWED * self._cycle_ns else min(self._place_ns + self._cycle_ns, now)
 
     def _check_led(self, samples: ActuatorSamples) -> None:
         """See that the drive still does what it is told."""
@@ -121,7 +131,7 @@ class Setpoints:
         return "" if state is DriveState.ENABLED else state.value
 
     def _check(self, position: float, since: float, travel: Channel) -> None:
-        """See that a setpoint lies within the travel and can be reached."""
+        """See that a setpoint lies within the travel and can be reached ``since`` [s] the last one's place."""
         travel.checked(position)
         time = max(min(since, self._settings.stale_after), self._settings.cycle)
         speed = abs(position - self._last) / time

@@ -33,6 +33,9 @@ _WORKSHOP = _LABORATORY._replace(
 )
 _LORD_CLASS = to_coordinates(PARAMETER_SETS["lord_class"].parameters)
 
+_REACH = 2.5
+"""Times the damper's force that the actuator can push: over the wires a weaker one lags and trips."""
+
 SIZES: dict[str, Size] = {
     "small": Size(_LABORATORY, "coil_v", 0.5, 0.011, 600.0, 2.5),
     "middle": Size(_WORKSHOP, "coil_v", 0.8, 0.014, 1600.0, 4.0),
@@ -60,5 +63,6 @@ def scenario_document(size: str, parameters: dict[str, float], **more: Any) -> d
         "drive_kind": kind,
         "drive_unit": "A" if kind == "coil_a" else "V",
         "specimen": {"serial": f"T-{size}", "model": "damper of a blind trial"},
+        "actuator": {"force": _REACH * SIZES[size].force},
         **more,
     }

@@ -1,13 +1,15 @@
 """What came out of a demo, in short: all of it from the files that it has left."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from bench.demo.folder import DemoFolder
+from bench.recorder.reader import read_log
 from bench.report.diagnosis import VERDICTS, read_diagnosis
 from bench.report.documents import Fit, Prediction, read_fit, read_prediction
 from bench.report.values import newton, quantity, times
@@ -26,8 +28,22 @@ def summarise(demo: DemoFolder, console: Console) -> None:
     if demo.diagnosis is not None:
         diagnosis = read_diagnosis(demo.diagnosis)
         console.print(f"{VERDICTS[diagnosis.verdict]} {diagnosis.explanation}\n", highlight=False)
+    for path in filter(None, (demo.log, demo.unseen_log)):
+        if words := held_up(read_log(path).events):
+            console.print(f"{path.name}: {words}\n", highlight=False)
     for name, path, how in _files(demo):
         console.print(f"  {name:<15} {path}  {how}".rstrip(), highlight=False, soft_wrap=True)
+
+
+def held_up(events: Sequence[Mapping[str, Any]]) -> str:
+    """What a busy machine did to a recording, from the log's events; empty where it did nothing."""
+    late = [event["text"] for event in events if event["kind"] == "alarm" and "setpoint lateness" in event["text"]]
+    if not late:
+        return ""
+    return (
+        f"this machine held the setpoints up ({late[0]}). The rod stumbled there, and numbers may be further off "
+        "than their intervals say; record again while less goes on."
+    )
 
 
 def _error_table(fit: Fit, prediction: Prediction | None) -> Table:

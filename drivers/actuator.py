@@ -293,7 +293,6 @@ class Actuator:
         after = cia402.step(self._mounting, "home")
         self._check_not_led("home")
         self._drive.check_no_fault()
-        self._setpoints.disarm()
         try:
             self._drive.home(method, within)
         except DriverError:

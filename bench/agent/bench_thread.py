@@ -96,16 +96,17 @@ class BenchThread:
             for step in (self._turn, self._send_live, self._beat):
                 try:
                     step()
-                except (
-                    Exception
-                ) as error:  # a thread that died in silence would take the watch over the force along
+                except Exception as error:
+                    # A thread that died in silence would take the watch over the force along.
                     self._told_defect(error)
 
     def _told_defect(self, error: Exception) -> None:
         """Told once a run: what cannot be done now cannot be done a tenth of a second later."""
         if not self._defect:
             self._defect = True
-            self._failed(LogError(f"bench samples cannot be made: {error!r}; this is a defect, the run ends"))
+            self._failed(
+                LogError(f"bench samples are not looked after: {error!r}; this is a defect, the run ends")
+            )
 
     def _turn(self) -> None:
         with self._lock:

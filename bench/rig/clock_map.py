@@ -39,6 +39,7 @@ _FALSE_STAMPS = 5
 """Stamps in a row that contradict all before: then these were wrong, or the clock has been set."""
 SET_ANEW_NS = 50_000_000
 """[ns] by which a clock must have moved for the mapping to follow in one leap."""
+_NEVER_READ = "the device's clock has never been read beside the bench's"
 _KNOTS = 48
 """Bends of the mapping that are remembered, two of them in half a second; samples come sooner than that."""
 
@@ -141,7 +142,7 @@ class ClockMap:
         asked = np.asarray(device_ns, dtype=np.int64)
         with self._lock:
             if not self._knots:
-                raise ValueError("the device's clock has never been read beside the bench's")
+                raise ValueError(_NEVER_READ)
             if asked.size:
                 newest = int(asked.max())
                 self._handed = newest if self._handed is None else max(self._handed, newest)
@@ -155,7 +156,7 @@ class ClockMap:
         """
         with self._lock:
             if not self._knots:
-                raise ValueError("the device's clock has never been read beside the bench's")
+                raise ValueError(_NEVER_READ)
             knot = next((one for one in reversed(self._knots) if one.at <= device_ns), self._knots[0])
             return round(knot.bench) + round((device_ns - knot.at) * knot.slope)
 

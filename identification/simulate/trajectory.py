@@ -118,13 +118,12 @@ class _Chain:
             J[:, column] += row
         for at, row in own:
             J[:, len(UNKNOWNS) + at] += row
-        self._with_shifts(J)
+        self._add_shifts(J)
 
-    def _with_shifts(self, J: Array) -> Array:
+    def _add_shifts(self, J: Array) -> None:
         """An effect that makes the force late acts as the delay does."""
         for at, _, _ in self._setting.acting("time_shift"):
             J[:, len(UNKNOWNS) + at] = J[:, _FORCE_DELAY]
-        return J
 
     def yielding(
         self, plan: Plan, carrying: Array, fineness: float, slopes: bool
@@ -149,4 +148,5 @@ class _Chain:
         J[:, _Y0] = partial[:, STRUCTURAL + 6]
         columns = [*self._columns, *(len(UNKNOWNS) + at for at, _ in own)]
         J[:, columns] = partial[:, STRUCTURAL + 7 :]
-        return Trajectory(force, y, zeta, self._field.u, plan), self._with_shifts(J)
+        self._add_shifts(J)
+        return Trajectory(force, y, zeta, self._field.u, plan), J

@@ -20,6 +20,8 @@ from identification.simulate import Stroke
 _SKIPPED = 0.02
 """[s] at the start of a stretch, while the hysteretic state that nobody recorded is forgotten."""
 
+_MOST_LOST = 0.5
+"""[1] part of a stretch that may be left out since the rod stumbled."""
 _FILTER_RATE = 4000.0
 """[Hz] at which the force is simulated in front of a filter."""
 _TIMED = {"force", "displacement", "coil_voltage", "coil_current"}
@@ -65,6 +67,8 @@ class Assembled:
     stretches: tuple[Stretch, ...]
     floor: Floor
     recordings: tuple[Recording, ...]
+    notes: tuple[str, ...] = ()
+    """What was left out since the rod stumbled, in words."""
 
     @property
     def drive_unit(self) -> str:
@@ -113,9 +117,10 @@ def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> 
     held = [hold_out.mask(s) for s in stretches]
     starts = [s.time[0] - r.stretches[0].time[0] for r in recordings for s in r.stretches]
     logs = [k for k, r in enumerate(recordings) for _ in r.stretches]
-    pieces, floors = [], []
-    for stretch, out, start, log in zip(stretches, held, starts, logs, strict=True):
-        motion = estimate_motion(stretch)
+    pieces, floors, notes = [], [], list[str]()
+    for k, (out, start, log) in enumerate(zip(held, starts, logs, strict=True)):
+        motion = estimate_motion(stretches[k])
+        stretch = stretches[k] = _without_lost(stretches[k], motion.lost, notes)
         floors.append(measure_floor(replace(stretch, measured=stretch.counts), motion))
         fitted = stretch.counts & ~out
         fitted[: round(_SKIPPED * stretch.rate)] = False
@@ -124,7 +129,21 @@ def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> 
         pieces.append(replace(_piece(stretch, stroke, fitted), log=log))
     _check(hold_out, held, pieces)
     floor = combine_floors(stretches, floors)
-    return Assembled(tuple(pieces), tuple(held), tuple(stretches), floor, tuple(recordings))
+    return Assembled(tuple(pieces), tuple(held), tuple(stretches), floor, tuple(recordings), tuple(notes))
+
+
+def _without_lost(stretch: Stretch, lost: BoolArray, notes: list[str]) -> Stretch:
+    """The stretch without the force where nobody knows how the rod moved, all of it if that is most; says so."""
+    if not lost.any():
+        return stretch
+    said = (
+        f"{stretch.name}: the rod left its stroke (late setpoints, or a knock) in {lost.mean():.2%} of the samples"
+    )
+    if lost.mean() > _MOST_LOST:
+        notes.append(f"{said}; the recording itself is bad: record again")
+        return stretch
+    notes.append(f"{said}; they are left out")
+    return replace(stretch, force_valid=~lost if stretch.force_valid is None else stretch.force_valid & ~lost)
 
 
 def _piece(stretch: Stretch, stroke: Stroke, fitted: BoolArray) -> Piece:

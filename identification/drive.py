@@ -27,11 +27,16 @@ def drive_noise(drive: Array) -> float:
     return float(np.median(np.abs(changes))) / 0.6745 / np.sqrt(6.0) if len(changes) else 0.0
 
 
+def drive_steps(drive: Array) -> Indices:
+    """The first sample behind every step of a measured drive (N,) that stands out of its noise."""
+    jumps = np.abs(np.diff(drive)) > max(_JUMP * drive_noise(drive), 1e-12)
+    return np.asarray(np.flatnonzero(jumps) + 1)
+
+
 def steady_levels(drive: Array) -> Array:
     """The drive (N,) [V or A] with every constant level replaced by its mean; anything that moves stays."""
     noise = drive_noise(drive)
-    steps = np.abs(np.diff(drive))
-    edges = np.concatenate([[0], np.flatnonzero(steps > max(_JUMP * noise, 1e-12)) + 1, [len(drive)]])
+    edges = np.concatenate([[0], drive_steps(drive), [len(drive)]])
     result = drive.copy()
     for start, stop in itertools.pairwise(edges):
         level = drive[start:stop]

@@ -43,6 +43,8 @@ class Ending:
     """Of the agreement, in words."""
     why_not: str = ""
     """Why it is no answer; empty where the descent itself says it."""
+    notes: tuple[str, ...] = ()
+    """What a person should know of how it ended."""
 
 
 def fit_document(assembled: Assembled, end: Ending, provenance: Provenance) -> Fit:

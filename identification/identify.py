@@ -11,6 +11,7 @@ import numpy as np
 from identification.agreement import compare
 from identification.arrays import Array
 from identification.assemble import Assembled, HoldOut, assemble
+from identification.clock_wander import wander_in_words, without_wander
 from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError, NothingToFit
 from identification.fit_document import MISFIT, Ending, fit_document, of_samples, simulated_errors, unseen
@@ -102,7 +103,7 @@ def _identified(
     fit = fit_document(assembled, end, _provenance(assembled, request, problem))
     if request.profile:
         fit = _profiled(fit, end, progress)
-    return fit.model_copy(update={"notes": [*notes, *_strangers(assembled, fit)]})
+    return fit.model_copy(update={"notes": [*notes, *assembled.notes, *end.notes, *_strangers(assembled, fit)]})
 
 
 def _profiled(fit: Fit, end: Ending, progress: Progress) -> Fit:
@@ -142,7 +143,7 @@ def _refined(
     settings = replace(request.settings, budget=None if budget is None else share * budget)
     minimum = refine(problem.quicker(), settings, progress)
     polish = replace(settings, restarts=0)
-    scatter = None
+    scatter, notes = None, tuple[str, ...]()
     if _ratio(problem, minimum) > MISFIT:
         problem = replace(problem, noise=problem.noise * _ratio(problem, minimum))
         minimum = refine(problem, polish, progress, minimum.unknowns)
@@ -151,11 +152,13 @@ def _refined(
         minimum = refine(problem, polish, progress, minimum.unknowns)
         played = play_noise(problem, stretches, minimum, request.settings.seed)
         minimum, scatter = without_pull(problem, minimum, played.pull), played.scatter
+        minimum, wander = without_wander(problem, minimum)
+        notes = wander_in_words(wander)
     found = covariance(problem, minimum, scatter)
     seconds = time.process_time() - began
     error = _train_error(under_conditions(assembled, problem, minimum), problem, minimum)
     stage = Stage(name="refine", seconds=round(seconds, 3), rmse_n=error, iterations=minimum.iterations)
-    return Ending(problem, minimum, found, (stage,))
+    return Ending(problem, minimum, found, (stage,), notes=notes)
 
 
 def _network_alone(assembled: Assembled, problem: Problem, testimony: Testimony | None) -> Ending:

@@ -12,13 +12,16 @@ difference of 2 µm noise at 1 kHz is 2.8 mm/s, at 2000 N s/m some 6 N. What is 
    are not alike: one stiffness for all of them bends the fades by micrometres, and k0 and k1 with them.
 """
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import minimum_filter1d
 
 from identification.arrays import Array, BoolArray
-from identification.harmonics import Harmonics, fit_harmonics
+from identification.harmonics import Harmonics, fit_harmonics, steady_cycles
+from identification.motion_parts import MOST_GIVE, divide, marked, stumbles
 from identification.recordings import Segment, Stretch
 from identification.smoother import derivative, kept_noise, smoothed, stiffness
 
@@ -29,8 +32,6 @@ _LONGEST_RUN = 30.0
 """[s] Segments of one stroke are fitted together up to this length; longer ones average enough by themselves."""
 _WHOLE_RUN = 0.9
 """[1] share of a run that must be steady, else its segments are fitted one by one."""
-_JOINT = 0.03
-"""[s] Around the ends of what is known of the motion, transients are left room."""
 _CUTOFF_RATIO = 1.35
 _LOWEST, _HIGHEST = 0.003, 0.25
 """Of the trial cutoffs, in cycles a sample."""
@@ -40,10 +41,11 @@ _END = 2.0
 """How much looser the smoother is at an end of the stretch."""
 _LAGS = np.arange(-0.006, 0.0451, 0.003)
 """[s] At which the displacement may follow the force."""
-_MOST_GIVE = 0.03
-"""[1] of the stroke: an actuator that gave way more would not be one."""
+_BLOCK = 2.0
+"""[s] so long are the blocks whose middle cutoff tells what follows the force: a few stumbles do not move it."""
 _KNOCK = 4.0
 """[1] What stands out so many times over most is a knock of the actuator and follows no force."""
+_ROUNDS = 3
 _CHANCE = 4.0
 """The force explains the displacement if it does so this many times better than chance."""
 
@@ -61,6 +63,8 @@ class Motion(NamedTuple):
     """Standard deviation of the noise of the recorded displacement [m]."""
     cutoff: Array
     """Of the smoother at each sample [Hz]."""
+    lost: BoolArray
+    """True where the rod stumbled so far off its wave that nobody knows how it moved from sample to sample."""
     method: tuple[str, ...]
     """How it was got, in words, one statement a segment; one for all where there are no segments."""
 
@@ -77,13 +81,18 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
     """
     weights = stretch.measured.astype(float)
     noise = recorded_noise(stretch)
-    give = _give_under_load(stretch, weights, noise)
+    stumbled = _roughly_stumbled(stretch, weights, noise)
+    give = _give_under_load(stretch, np.where(stumbled, 0.0, weights), noise)
     waves = _periodic_parts(stretch, weights, give, noise)
-    regions = _regions(len(weights), waves, stretch.rate, bool(np.any(give)))
+    parts = divide(stretch, waves, bool(np.any(give)))
     expected = _expected(give, waves, int(_LAGS[-1] * stretch.rate))
     if cutoff is None:
-        found = _cutoffs(stretch.displacement, weights, expected, regions, stretch.rate, noise, twice=True)
-        cutoff = found[regions]
+        trial = partial(_cutoffs, expected=expected, regions=parts.regions, rate=stretch.rate, noise=noise)
+        cutoff = trial(stretch.displacement, weights, twice=True)[parts.regions]
+        if parts.stumbled.any():
+            # Beside a stumble, what a stiff smoother makes of that is no fault of the motion there.
+            calm = trial(stretch.displacement, np.where(parts.stumbled, 0.0, weights), twice=True)
+            cutoff = np.where(parts.stumbled, cutoff, calm[parts.regions])
     penalty = stiffness(_looser_at_the_ends(cutoff, stretch.rate)[1:-2], stretch.rate)
     displacement = smoothed(stretch.displacement, weights, penalty, expected, twice=True)
     velocity, from_record = _better_velocity(stretch, displacement)
@@ -94,6 +103,7 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
         derivative(velocity, stretch.rate),
         float(np.std(rest)),
         cutoff,
+        parts.lost,
         _in_words(stretch, waves, cutoff, bool(np.any(give)), from_record),
     )
 
@@ -121,14 +131,26 @@ def displacement_noise(displacement: Array, measured: BoolArray, stride: int = 1
     return float(np.sqrt(np.mean(usual) / 0.92476))
 
 
+def _roughly_stumbled(stretch: Stretch, weights: Array, noise: float) -> BoolArray:
+    """(N,) True where a periodic stroke stumbled, at a first look."""
+    off = np.zeros(len(weights))
+    for run in _runs(stretch):
+        part, frequency = slice(run[0].start, run[-1].stop), run[0].frequency or 0.0
+        steady = steady_cycles(stretch.displacement[part], weights[part], stretch.rate, frequency, noise)
+        if steady:
+            off[part] = steady.off
+    return marked(stumbles(stretch, off), len(off))
+
+
 def _give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
     """What the displacement follows of the force (N,) [m]; zeros where it follows nothing."""
     x, rate = stretch.displacement, stretch.rate
     nothing = np.zeros(len(x))
     if len(x) < 50 * len(_LAGS):
         return nothing
-    everywhere = np.zeros(len(x), int)
-    cutoff = _cutoffs(x, weights, nothing[3:], everywhere, rate, noise)[0]
+    blocks = (np.arange(len(x)) / (_BLOCK * rate)).astype(np.intp)
+    cutoffs = _cutoffs(x, weights, nothing[3:], blocks, rate, noise)
+    cutoff = float(np.quantile(cutoffs, 0.5, method="lower"))
     penalty = np.full(len(x) - 3, float(stiffness(cutoff, rate)))
     shifts = np.unique(np.rint(_LAGS * rate).astype(int))
     reach = int(np.max(np.abs(shifts))) + 1
@@ -136,20 +158,36 @@ def _give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
     swift = (x - smoothed(x, weights, penalty, nothing[3:])) * weights
     driver = force - smoothed(force, np.ones(len(x)), penalty, nothing[3:])
     rows = np.arange(reach, len(x) - reach, max(1, len(x) // 100_000))
-    rows = rows[np.abs(swift[rows]) < _KNOCK * np.quantile(np.abs(swift[rows]), 0.95)]
+    rows = rows[minimum_filter1d(weights, 2 * reach + 1)[rows] > 0.0]
     lagged = np.stack([driver[rows - shift] for shift in shifts])
-    normal, right = lagged @ lagged.T, lagged @ swift[rows]
-    gains = np.linalg.lstsq(normal, right, rcond=1e-10)[0]
-    explained, left = float(gains @ right), float(np.sum(swift[rows] ** 2))
-    if explained < _CHANCE * len(shifts) * left / len(rows):
+    gains, chance = _followed(lagged, swift[rows], reach)
+    if chance < _CHANCE:
         return nothing
     kernel = np.zeros(2 * reach + 1)
     kernel[reach + shifts] = gains
     give = np.convolve(np.pad(force, reach, "edge"), kernel, "valid")
-    if np.std(give) < _MOST_GIVE * np.std(x):
+    if np.std(give) < MOST_GIVE * np.std(x):
         return give
     # Of the slow part of the force too little was learnt; the smoother follows what it does.
     return np.convolve(np.pad(driver, reach, "edge"), kernel, "valid")
+
+
+def _followed(lagged: Array, swift: Array, reach: int) -> tuple[Array, float]:
+    """Gains [m/N] of each lag on a displacement (rows,) [m], and how much better than chance they explain it [1].
+
+    A knock moves rod and force by itself. It is known by what no gain explains, and what lies around it by then
+    tells nothing of the actuator either.
+    """
+    rest, sound = swift, np.ones(len(swift), bool)
+    for round_ in range(_ROUNDS):
+        off = np.abs(rest) > _KNOCK * np.quantile(np.abs(rest), 0.95)
+        sound = ~off if round_ == 0 else minimum_filter1d(~off, 2 * reach + 1)
+        known = lagged[:, sound]
+        gains = np.linalg.lstsq(known @ known.T, known @ swift[sound], rcond=1e-10)[0]
+        rest = swift - gains @ lagged
+    explained = float(gains @ (known @ swift[sound]))
+    left = float(np.sum(swift[sound] ** 2))
+    return np.asarray(gains), explained * len(swift[sound]) / max(len(gains) * left, 1e-300)
 
 
 def _blurred(values: Array, width: int) -> Array:
@@ -209,23 +247,8 @@ def _overlap(wave: Harmonics, segment: Segment) -> int:
 def _cut(wave: Harmonics, segment: Segment) -> Harmonics:
     """The part of a run's harmonics that lies in one of its segments."""
     start, stop = max(wave.start, segment.start), min(wave.stop, segment.stop)
-    return wave._replace(start=start, stop=stop, values=wave.values[start - wave.start : stop - wave.start])
-
-
-def _regions(count: int, waves: list[Harmonics], rate: float, gives: bool) -> Indices:
-    """(N,) what each sample belongs to: 0 a joint, 1 and on a periodic part, then what lies between them."""
-    regions = np.full(count, -1)
-    reach = int(_JOINT * rate) + 1
-    for k, wave in enumerate(waves):
-        regions[wave.start : wave.stop] = 1 + k
-    edges = {edge for wave in waves for edge in (wave.start, wave.stop)} - {0, count}
-    for edge in edges | ({0, count} if gives else set()):
-        regions[max(edge - reach, 0) : edge + reach] = 0
-    unknown = np.flatnonzero(regions < 0)
-    between = np.split(unknown, np.flatnonzero(np.diff(unknown) > 1) + 1)
-    for k, part in enumerate(between):
-        regions[part] = 1 + len(waves) + k
-    return regions
+    part = slice(start - wave.start, stop - wave.start)
+    return wave._replace(start=start, stop=stop, values=wave.values[part], off=wave.off[part])
 
 
 def _expected(give: Array, waves: list[Harmonics], unknown: int) -> Array:

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from threadpoolctl import threadpool_limits
-
 from identification.assemble import Assembled, assemble
 from identification.gap.checks import enough_cycles, one_specimen, sliding_recorded, without_clipping
 from identification.gap.floor import Floor
@@ -17,6 +15,7 @@ from identification.gap.search import Search
 from identification.identify import fit_problem
 from identification.problem import Piece, Problem
 from identification.recordings import Recording
+from identification.threads import one_thread
 from identification.usable import refuse_useless
 
 _CLOCKS = 5e-5
@@ -68,7 +67,7 @@ def prepare(recordings: Sequence[Recording]) -> Prepared:
     Raises:
         NothingToFit: as ``diagnose`` does.
     """
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         one_specimen(recordings)
         refuse_useless(recordings)
         cleaned, notes = without_clipping(recordings)
@@ -76,7 +75,7 @@ def prepare(recordings: Sequence[Recording]) -> Prepared:
         judge = Judge.of(assembled)
     enough_cycles(judge.cycles)
     sliding_recorded(assembled.pieces)
-    return Prepared(assembled, judge, [*judge.notes, *notes])
+    return Prepared(assembled, judge, [*assembled.notes, *judge.notes, *notes])
 
 
 def diagnose_prepared(
@@ -91,8 +90,7 @@ def diagnose_prepared(
     problem = diagnosed_problem(assembled, judge.fitted_pieces())
     hearing = Hearing(white_floor(assembled.floor), assembled.stretches, seed)
     search = Search(problem, judge, hearing, progress)
-    # The matrices are long and thin: more threads only wait for each other, at full power.
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         search.run()
         return Report(assembled, judge, search, _final_odds(search), model, prepared.notes, seed).answer()
 

@@ -185,8 +185,8 @@ def _pairs(stretch: Stretch, motion: Motion, segment: Segment) -> _Pairs | None:
     cycles = steady_cycles(motion.displacement[part], weights, stretch.rate, frequency, motion.noise)
     if cycles is None:
         return None
-    start, stop, achieved_frequency = cycles
-    steady = slice(segment.start + start, segment.start + stop)
+    achieved_frequency = cycles.frequency
+    steady = slice(segment.start + cycles.start, segment.start + cycles.stop)
     lag = stretch.rate / achieved_frequency
     difference, share = _cycle_difference(stretch.force[steady], lag)
     achieved = _achieved(stretch, steady, achieved_frequency)

@@ -1,0 +1,109 @@
+"""How far the force channel's clock wanders within a run, and what that does to a fit.
+
+What is left between the clocks of two devices changes over seconds. A force that is late by some ten microseconds
+looks like one that is a little stiffer, and k0 and k1 of a clean fit lie several of their deviations off. So the
+delay is let bend at the end of a fit, along straight lines between knots. How far is told by the recording itself,
+where the likelihood of its residuals is greatest with the bends integrated out (empirical Bayes; Robbins 1956).
+The unknowns follow by one Gauss-Newton step from which the knots are eliminated; their intervals grow with them.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from identification.arrays import Array, BoolArray
+from identification.problem import COORDINATE_COUNT, Problem
+from identification.refine import Minimum
+
+_KNOTS = 4.0
+"""[s] from knot to knot."""
+_LEAST = 1e-6
+"""[s] below which a wander is none."""
+_TRIALS = 60
+_SEEN = 1e-9
+"""[1] information on a bend, of the largest, below which it says nothing."""
+_TOLD = 10e-6
+"""[s] from which on a person should know of it."""
+
+
+class _Bends(NamedTuple):
+    """What the bends of the delay do, in units of the noise; B of them."""
+
+    own: Array
+    """(B, B) information of the bends on each other [1/s²]."""
+    shared: Array
+    """(U, B) with the unknowns [1/s]."""
+    gradient: Array
+    """(B,) of half the cost [1/s]."""
+
+
+def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
+    """A minimum as it is where the force's delay may bend, and the standard deviation [s] of that.
+
+    The information in its ``evaluation`` is what the bends leave of it.
+
+    Args:
+        problem: what was minimised.
+        minimum: where.
+    """
+    bends = _bends(problem, minimum.unknowns)
+    H, gradient = minimum.evaluation.hessian, minimum.evaluation.gradient
+    low, high = problem.bounds()
+    inside = problem.free & (minimum.unknowns > low + 1e-9) & (minimum.unknowns < high - 1e-9)
+    free = np.ix_(inside, inside)
+    wander = _likeliest(bends, H[free], gradient[inside], inside, problem.delay_prior)
+    if wander < _LEAST:
+        return minimum, 0.0
+    held = bends.own + np.eye(len(bends.own)) / wander**2
+    left = H - bends.shared @ np.linalg.solve(held, bends.shared.T)
+    pull = gradient - bends.shared @ np.linalg.solve(held, bends.gradient)
+    unknowns = minimum.unknowns.copy()
+    unknowns[inside] -= np.linalg.solve(left[free], pull[inside])
+    unknowns = np.clip(unknowns, low, high)
+    return replace(minimum, unknowns=unknowns, evaluation=replace(minimum.evaluation, hessian=left)), wander
+
+
+def wander_in_words(wander: float) -> tuple[str, ...]:
+    """What a person should know of a wander [s]; nothing of a small one."""
+    if wander < _TOLD:
+        return ()
+    return (
+        f"the delay of the force wanders by {1e6 * wander:.2g} µs within the run, as clocks do; what is surer "
+        "without that (k0 and k1 most) has wider intervals for it",
+    )
+
+
+def _bends(problem: Problem, unknowns: Array) -> _Bends:
+    own, shared, gradients = [], [], []
+    for i, piece in enumerate(problem.pieces):
+        r, J = problem.residuals(unknowns, i)
+        bent = _hats(len(r), piece.stroke.rate) * (J[:, COORDINATE_COUNT] / problem.delay_prior)[:, None]
+        rows = np.zeros((len(unknowns), bent.shape[1]))
+        rows[problem.columns(i)] = J.T @ bent
+        own.append(bent.T @ bent)
+        shared.append(rows)
+        gradients.append(bent.T @ r)
+    return _Bends(block_diag(*own), np.hstack(shared), np.concatenate(gradients))
+
+
+def _hats(count: int, rate: float) -> Array:
+    """(count, knots) weights of the knots in each sample."""
+    time = np.arange(count) / rate
+    knots = np.linspace(0.0, time[-1], max(round(time[-1] / _KNOTS), 1) + 1)
+    return np.stack([np.interp(time, knots, one) for one in np.eye(len(knots))], axis=1)
+
+
+def _likeliest(bends: _Bends, H: Array, gradient: Array, inside: BoolArray, most: float) -> float:
+    """The wander [s] with which the residuals are likeliest, the unknowns fitted along."""
+    shared = bends.shared[inside]
+    solved = np.linalg.solve(H, np.column_stack([shared, gradient]))
+    information = bends.own - shared.T @ solved[:, :-1]
+    size, turned = np.linalg.eigh(information)
+    seen = size > _SEEN * size[-1]
+    size, slope = size[seen], (turned.T @ (bends.gradient - shared.T @ solved[:, -1]))[seen]
+    trials = np.concatenate([[0.0], np.geomspace(_LEAST, max(most, 2.0 * _LEAST), _TRIALS)])
+    grown = 1.0 + trials[:, None] ** 2 * size
+    unlikely = np.sum(np.log(grown) + slope**2 / (size * grown), axis=1)
+    return float(trials[np.argmin(unlikely)])

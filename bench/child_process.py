@@ -2,11 +2,14 @@
 
 import queue
 import subprocess
+import sys
 import threading
 from typing import TypeAlias
 
 Lines: TypeAlias = "queue.Queue[str | None]"
 """What a process says, line by line; None once all is said."""
+MRBENCH = (sys.executable, "-m", "bench.cli")
+"""The command line as a process: of this environment, whatever stands on the path."""
 
 
 def read_along(process: "subprocess.Popen[str]") -> tuple[Lines, threading.Thread]:

@@ -5,7 +5,6 @@ The bench makes the exact samples of the method and of what could be added to it
 
 import json
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -13,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from bench.child_process import MRBENCH
 from bench.errors import RunError
 from bench.methods import Programme
 from bench.methods.additions import additions
 from bench.methods.kinematics import Array
 
-FORESEE = (sys.executable, "-m", "bench.cli", "foresee")
+FORESEE = (*MRBENCH, "foresee")
 """Command that judges planned strokes; the file and options follow."""
 LONGEST = 300.0
 """[s] after which it is given up; its first start compiles."""

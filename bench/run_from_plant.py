@@ -189,11 +189,12 @@ def _actions(
     if np.any(above := force > method.limits.force_n):
         first = int(np.argmax(above))
         text = f"force {force[first]:.1f} N exceeds the method's limit of {method.limits.force_n:g} N"
-        yield first, _event(time_ns[first], "alarm", text)
+        judged = {"quantity": "force", "value": float(force[first]), "limit": method.limits.force_n}
+        yield first, _event(time_ns[first], "alarm", text, **judged)
     yield len(time_ns), _event(time_ns[-1], "state", "run finished")
 
 
-def _event(time_ns: np.int64 | int, kind: str, text: str, **more: str) -> Action:
+def _event(time_ns: np.int64 | int, kind: str, text: str, **more: Any) -> Action:
     return lambda log: log.event(int(time_ns), kind, text, **more)
 
 

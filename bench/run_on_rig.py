@@ -9,6 +9,7 @@ from typing import Any
 
 from bench.agent.agent import Agent
 from bench.agent.messages import RunCommand, RunStatus
+from bench.agent.ownership import sole_agent
 from bench.errors import RunError
 from bench.methods import Method
 from bench.rig.config import load_config
@@ -16,8 +17,6 @@ from drivers.errors import DriverError
 
 _LOOK = 0.2
 """[s] between two looks at how far it is."""
-_SETTLING = 3.0
-"""[s] in which the clocks of the instruments are watched before a run."""
 
 
 def run_on_rig(
@@ -48,16 +47,16 @@ def run_on_rig(
     Raises:
         ConfigError: the configuration does not describe a bench.
         MethodError: the method cannot be compiled within its limits.
-        RunError: an instrument does not answer, or the run ended before its end; what was recorded is in the log.
+        RunError: another agent has the bench, an instrument does not answer, or the run ended before its end; what
+            was recorded is in the log.
     """
     found = load_config(config)
     stopping = threading.Event()
-    with stopped_by_signals(stopping), contextlib.ExitStack() as opened:
+    with stopped_by_signals(stopping), sole_agent(config), contextlib.ExitStack() as opened:
         try:
             agent = opened.enter_context(Agent(found, config))
         except DriverError as error:
             raise RunError(str(error)) from error
-        stopping.wait(_SETTLING)
         for sentence in agent.status().warnings:
             warn(sentence)
         command = RunCommand(

@@ -12,15 +12,15 @@ import time
 from pathlib import Path
 from typing import Any
 
-from drivers import cia402
 from drivers.actuator_samples import TIME_STAMP, ActuatorSamples, Scale
 from drivers.beat import ACTUATOR
 from drivers.can_bus import CanAddress, CanBus
 from drivers.canopen_node import CanopenNode
 from drivers.channel import Block, Channel, Reading, Stamp
-from drivers.cia402 import Fault, Mounting
+from drivers.cia402 import Fault
 from drivers.errors import BadReply, DriverError, NoReply, OutOfRange, Refused
 from drivers.instrument import Clock, Health, Tap
+from drivers.mounting import Mounting, found, step
 from drivers.servo_drive import COUNT, ActuatorSettings, ServoDrive
 from drivers.setpoints import Setpoints
 
@@ -64,11 +64,12 @@ class Actuator:
         self._bus = CanBus(address, clock)
         self._node = CanopenNode(name, self._bus, node_id, eds, clock, silent_after=settings.drive_silent_after)
         self._drive = ServoDrive(name, self._node)
-        self._mounting = cia402.found(clamped, referenced=False)
+        self._mounting = found(clamped, referenced=False)
         self._clamped = clamped
         self._origin = 0.0
         self._channels = self._described()
         self._samples = self.decoder(0.0, 1.0)
+        # Looked up for each frame: to connect makes another collector, and the bus cannot be told to forget one.
         self._bus.listen(lambda frame: self._samples.take(frame))
         self._setpoints = Setpoints(name, self._node, self._drive, clock, settings, master_id)
         self._clock_asked_ns = 0
@@ -134,8 +135,9 @@ class Actuator:
             self._bus.close()
             raise
         self._setpoints.connected()
+        # What was clamped before the wire broke still is, and where, as long as the drive has not forgotten home.
         if not referenced or self._mounting not in (Mounting.MOUNTED, Mounting.CENTRED):
-            self._mounting, self._origin = cia402.found(self._clamped, referenced), 0.0
+            self._mounting, self._origin = found(self._clamped, referenced), 0.0
         self._channels = self._described()
         self._samples = self.decoder(self._origin, self._drive.rated_torque)
 
@@ -166,6 +168,7 @@ class Actuator:
         """
         if self._clock() - self._clock_asked_ns >= _CLOCK_EVERY_NS:
             self._clock_asked_ns = self._clock()
+            # A clock that does not answer is asked again; whether the drive is there, its heartbeat says.
             with contextlib.suppress(NoReply, BadReply, Refused):
                 self._node.number(TIME_STAMP)
         deadline = time.monotonic() + timeout
@@ -290,9 +293,11 @@ class Actuator:
             Refused: a specimen is clamped, or a fault stands.
             NoReply: the reference was not found in time.
         """
-        after = cia402.step(self._mounting, "home")
+        after = step(self._mounting, "home")
         self._check_not_led("home")
         self._drive.check_no_fault()
+        # A drive forgets its reference as soon as it seeks it anew, and keeps none where the search ends early.
+        self._mounting = Mounting.UNMOUNTED
         try:
             self._drive.home(method, within)
         except DriverError:
@@ -304,12 +309,12 @@ class Actuator:
     def mount(self) -> None:
         """Take note that a specimen has been clamped."""
         self._check_not_led("mount")
-        self._mounting = cia402.step(self._mounting, "mount")
+        self._mounting = step(self._mounting, "mount")
         self._clamped = True
 
     def centre(self) -> None:
         """Count positions from where the rod now stands: the middle of the specimen."""
-        after = cia402.step(self._mounting, "centre")
+        after = step(self._mounting, "centre")
         self._check_not_led("centre")
         self._set_origin(self.read("actuator_position").value + self._origin)
         self._mounting = after
@@ -317,7 +322,7 @@ class Actuator:
     def unmount(self) -> None:
         """Take note that nothing is clamped any more; positions count from home again."""
         self._check_not_led("unmount")
-        self._mounting = cia402.step(self._mounting, "unmount")
+        self._mounting = step(self._mounting, "unmount")
         self._clamped = False
         self._set_origin(0.0)
 

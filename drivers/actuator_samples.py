@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from drivers.can_bus import unpack_frame
-from drivers.canopen_node import PdoLayout
+from drivers.canopen_layout import PdoLayout
 from drivers.channel import Block, Frame, Quality, Stamp
 
 STATUSWORD, POSITION, VELOCITY, TORQUE, TIME_STAMP = 0x6041, 0x6064, 0x606C, 0x6077, 0x1013

@@ -1,15 +1,12 @@
 """One CAN bus: opened, listened to, and known to be dead when it is.
 
 python-can does the talking: `socketcan` on real hardware, its own `socketcand` client over TCP, `virtual` inside
-one process. What it leaves open is closed here: its notifier thread dies of any error in silence, so the receiving
-thread is ours and says why it ended; its socketcand client neither limits the greeting nor sees that the server
-has hung up. Every frame is stamped on the bench clock and shown to the tap before anybody acts on it.
+one process. Its notifier thread dies of any error in silence, so the receiving thread is ours and says why it
+ended. Every frame is stamped on the bench clock and shown to the tap before anybody acts on it.
 """
 
 import contextlib
-import os
-import select
-import socket
+import logging
 import struct
 import threading
 import time
@@ -18,12 +15,14 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import can
-from can.interfaces.socketcand import SocketCanDaemonBus
-from can.interfaces.socketcand.socketcand import convert_can_message_to_ascii_message
 
 from drivers.channel import Frame
 from drivers.errors import DriverError, NotConnected
 from drivers.instrument import Clock, Tap
+from drivers.socketcand_bus import SocketcandBus
+
+# What goes wrong is raised or counted here; the library would also write it on standard error.
+logging.getLogger("can").addHandler(logging.NullHandler())
 
 Heard = Callable[[int, int, bytes], None]
 """Told of each received frame: bench clock [ns], identifier, data."""
@@ -63,51 +62,6 @@ def unpack_frame(packed: bytes) -> tuple[int, bytes]:
     """Identifier and data of a packed frame."""
     identifier, size, data = _FRAME.unpack(packed)
     return int(identifier), bytes(data[:size])
-
-
-class _SocketcandBus(SocketCanDaemonBus):
-    """python-can's client with a deadline for the greeting and an eye on the other end."""
-
-    def __init__(self, address: CanAddress, timeout: float) -> None:
-        # A refused connection would be tried again in a busy loop for ten seconds.
-        socket.create_connection((address.host, address.port), timeout).close()
-        hang_up = threading.Timer(timeout, self._hang_up)
-        hang_up.start()
-        try:
-            client: Any = super()
-            client.__init__(address.channel, address.host, address.port, tcp_tune=os.name == "posix")
-        except BaseException:
-            self._line().close()
-            raise
-        finally:
-            hang_up.cancel()
-        self._line().settimeout(timeout)
-
-    def send_together(self, messages: Sequence[can.Message]) -> None:
-        """Several frames in one segment: a call to the system costs more than all else about a frame."""
-        self._line().sendall("".join(map(convert_can_message_to_ascii_message, messages)).encode("ascii"))
-
-    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
-        client: Any = super()
-        message, filtered = client._recv_internal(timeout)  # noqa: SLF001 - the one place where its bus can be seen
-        if message is None and self._hung_up():
-            raise can.CanOperationError("the server has closed the connection")
-        return message, filtered
-
-    def _hung_up(self) -> bool:
-        """Whether the other end is gone: readable, and nothing to read."""
-        line = self._line()
-        return bool(select.select([line], [], [], 0)[0]) and not line.recv(1, socket.MSG_PEEK)
-
-    def _hang_up(self) -> None:
-        with contextlib.suppress(OSError, KeyError):
-            self._line().shutdown(socket.SHUT_RDWR)
-
-    def _line(self) -> socket.socket:
-        # The library keeps its socket to itself, and without it neither deadline nor hang-up can be had.
-        line = self.__dict__["_SocketCanDaemonBus__socket"]
-        assert isinstance(line, socket.socket)  # noqa: S101 - for the type checker
-        return line
 
 
 class CanBus:
@@ -158,12 +112,14 @@ class CanBus:
 
     def close(self) -> None:
         """Stop listening and close; harmless when repeated."""
-        bus, self._bus = self._bus, None
+        bus, self._bus = self._bus, None  # the listening thread ends when its bus is no longer this one
         if self._thread is not None:
             self._thread.join(self._timeout)
             self._thread = None
         if bus is not None:
-            bus.shutdown()
+            # A bus that has gone cannot be closed in good order, and whoever closes it is about to close more.
+            with contextlib.suppress(can.CanError, OSError):
+                bus.shutdown()
 
     def check(self) -> None:
         """See whether the bus is still there.
@@ -200,12 +156,13 @@ class CanBus:
             try:
                 self._put(messages)
             except (can.CanError, OSError) as error:
+                # Not raised here: whoever waits for frames of this bus has to hear of it as well.
                 self._ended = error
         self.check()
 
     def _put(self, messages: Sequence[can.Message]) -> None:
         bus = self._bus
-        if isinstance(bus, _SocketcandBus):
+        if isinstance(bus, SocketcandBus):
             bus.send_together(messages)
         elif bus is not None:
             for message in messages:
@@ -262,12 +219,14 @@ class CanBus:
         ) from error
 
     def _attempt(self) -> can.BusABC:
-        if self._address.interface == "socketcand":
-            return _SocketcandBus(self._address, self._timeout)
-        options: dict[str, Any] = {"interface": self._address.interface, "channel": self._address.channel}
+        at = self._address
+        if at.interface == "socketcand":
+            return SocketcandBus(at.channel, at.host, at.port, self._timeout)
+        options: dict[str, Any] = {"interface": at.interface, "channel": at.channel}
         return can.Bus(**options)
 
     def _listen(self, bus: can.BusABC) -> None:
+        # Frames that somebody else takes are left to him: to be woken for each costs more than to take it.
         while self._bus is bus and self._ended is None:
             if self._hurry.wait(_ALONE):
                 self._receive(bus, _TURN)
@@ -288,6 +247,7 @@ class CanBus:
                 self._ended = error
 
     def _take(self, message: can.Message) -> None:
+        # CANopen speaks in data frames of eleven bits alone; others on the bus may speak as they like.
         if message.is_error_frame or message.is_remote_frame or message.is_extended_id:
             self.corrupted += message.is_error_frame
             return

@@ -10,7 +10,7 @@ import logging
 import queue
 import struct
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -18,7 +18,8 @@ import can
 import canopen
 
 from drivers.can_bus import CanBus
-from drivers.errors import BadReply, NoReply, NotConnected, Refused
+from drivers.canopen_layout import layout_of
+from drivers.errors import BadReply, NoReply, NotConnected, OutOfRange, Refused
 from drivers.instrument import Clock
 
 # What goes wrong is raised or counted here; a library that also writes it on standard error says it twice.
@@ -27,8 +28,6 @@ logging.getLogger("canopen").addHandler(logging.NullHandler())
 _SILENCE = "No SDO response received"
 _EMERGENCY = struct.Struct("<HB5s")
 _STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
-_LAST_SYNCHRONOUS = 240
-"""Largest transmission type that answers SYNC."""
 _KEPT = 1000
 """Emergencies remembered."""
 _SYNC = (0x80, b"")
@@ -45,40 +44,6 @@ class Emergency(NamedTuple):
     register: int
     received_ns: int
     """Bench clock [ns]."""
-
-
-class Field(NamedTuple):
-    """An object's place in a process data frame."""
-
-    entry: int
-    """Index of the object."""
-    start: int
-    """[bytes] from the beginning."""
-    size: int
-    """[bytes]"""
-    signed: bool
-
-
-class PdoLayout(NamedTuple):
-    """A process data frame that the node sends or takes."""
-
-    identifier: int
-    size: int
-    """[bytes]"""
-    on_sync: bool
-    """Sent in answer to each SYNC, or taken at one."""
-    fields: tuple[Field, ...]
-
-    def packed(self, values: Mapping[int, int]) -> bytes:
-        """The frame's data from values by index; zero where none is given.
-
-        Raises:
-            OverflowError: a value does not fit its object.
-        """
-        data = bytearray(self.size)
-        for entry, start, size, signed in self.fields:
-            data[start : start + size] = values.get(entry, 0).to_bytes(size, "little", signed=signed)
-        return bytes(data)
 
 
 class _Network(canopen.Network):
@@ -131,9 +96,9 @@ class CanopenNode:
         self._network.add_node(self._node)
         maps: Any = self._node.pdo
         maps.read(from_od=True)
-        self.layouts = tuple(_layout(pdo) for pdo in self._node.tpdo.values())
+        self.layouts = tuple(layout_of(pdo) for pdo in self._node.tpdo.values())
         """The frames that the node sends, as its data sheet maps them."""
-        self._demanded = _layout(self._node.rpdo[1])
+        self._demanded = layout_of(self._node.rpdo[1])
         self._demands: dict[int, int] = {}
         self._access = threading.Lock()
         self._beat = threading.Condition()
@@ -145,7 +110,7 @@ class CanopenNode:
         """Begin to listen on the bus."""
         self._state = self._beat_ns = None
         self._owed = False
-        self._bus.unsubscribe(self._heard)
+        self._bus.unsubscribe(self._heard)  # or each new connection would hear every frame once more
         self._bus.subscribe(self._heard)
 
     @property
@@ -208,10 +173,21 @@ class CanopenNode:
         return int(self.upload(index, sub))
 
     def download(self, index: int, value: int, sub: int = 0) -> None:
-        """Write an object; raises as `upload` does."""
+        """Write an object; raises as `upload` does.
+
+        Raises:
+            OutOfRange: the object's type does not hold the value; nothing was sent.
+        """
 
         def write() -> None:
-            self._variable(index, sub).raw = value
+            self._variable(index, sub).data = data
+
+        try:
+            data = self._variable(index, sub).od.encode_raw(value)
+        except (ValueError, TypeError, canopen.ObjectDictionaryError) as error:
+            raise OutOfRange(
+                f"{self._name}: {value} does not fit {_place(index, sub)} ({error}); nothing was sent"
+            ) from error
 
         self._asked(f"writing {value} to {_place(index, sub)}", write)
 
@@ -311,10 +287,3 @@ class CanopenNode:
 
 def _place(index: int, sub: int) -> str:
     return f"object {index:04X}h:{sub:02X}"
-
-
-def _layout(pdo: Any) -> PdoLayout:
-    """What a mapping of the library says, as plain data."""
-    signed = canopen.objectdictionary.SIGNED_TYPES
-    fields = tuple(Field(v.index, v.offset // 8, v.length // 8, v.od.data_type in signed) for v in pdo)
-    return PdoLayout(int(pdo.cob_id), pdo.length // 8, pdo.trans_type <= _LAST_SYNCHRONOUS, fields)

@@ -6,6 +6,7 @@ amplifier's own clock from its trigger on. The amplifier watches its wire: when 
 ramps its output to zero by itself. `make_safe` is the faster way there, never the only one.
 """
 
+import contextlib
 import time
 from dataclasses import replace
 from enum import IntEnum, IntFlag
@@ -255,7 +256,9 @@ class CoilAmplifier(ModbusInstrument):
         """Bring the output to zero by its ramp; where the wire is dead, the amplifier's watchdog does it."""
         for _ in range(2):
             try:
-                self.abort_table()
+                # An amplifier that has nothing to abort may say so: no reason to leave its output on.
+                with contextlib.suppress(Refused):
+                    self.abort_table()
                 self._registers.write("setpoint", 0.0)
             except DriverError as error:  # refused in a fault or after its watchdog: it is at zero or on its way
                 self._unconfirmed = f"zero output not confirmed: {error}"

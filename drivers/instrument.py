@@ -64,8 +64,9 @@ class Instrument(Protocol):
         Some milliseconds of samples are taken together, so that it may last so much longer (`drivers.beat`).
 
         Raises:
-            NotConnected: the wire has gone, no block has come for a second, or the instrument has started anew and
-                must be connected again.
+            NotConnected: the wire has gone, an instrument that is asked has not answered for a second, or it has
+                started anew and must be connected again. One that speaks unasked and falls silent raises nothing:
+                its silence shows in `health`, and the interlocks judge the age of what came last.
             NoReply: it is there no more, though its wire is: no heartbeat.
         """
 

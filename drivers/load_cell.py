@@ -8,31 +8,23 @@ line feeds the one stream; samples that come while an answer is awaited are kept
 """
 
 import contextlib
-import itertools
 import threading
 import time
 from typing import Any, Final
 
 from drivers.beat import FORCE
 from drivers.channel import Block, Channel, Reading, Stamp
-from drivers.errors import BadReply, DriverError, NoReply, OutOfRange, Refused
+from drivers.errors import BadReply, DriverError, NoReply, OutOfRange
 from drivers.instrument import Clock, Health, Tap
 from drivers.load_cell_clock import ClockReader
-from drivers.load_cell_frames import CONTRACT, Acknowledgement, Answer, Identity, Request, encode
+from drivers.load_cell_dialogue import SLICE, Dialogue
+from drivers.load_cell_frames import CONTRACT
 from drivers.load_cell_stream import Counts, SampleStream
 from drivers.serial_line import SerialLine
 
-_COMMANDS: Final[dict[str, int]] = CONTRACT["commands"]
 _STATUS: Final[dict[str, int]] = CONTRACT["status"]
 _INSTRUMENT = CONTRACT["instrument"]
 _DEADLINES = CONTRACT["deadlines"]
-_CODES = {code: name.replace("_", " ") for name, code in CONTRACT["codes"].items()}
-_HINTS = {
-    "tare": "; the reading must be steady and in range: hold the actuator still",
-    "set_rate": "; stop the stream first",
-}
-_SLICE = 0.01
-"""[s] that one thread waits before it looks whether the other has read its answer."""
 
 
 class LoadCell:
@@ -68,9 +60,8 @@ class LoadCell:
         self._before = Counts()
         self._pending: list[Block] = []
         self._newest: dict[str, Block] = {}
-        self._tokens = itertools.count()
         self._reading = threading.RLock()
-        self._asking = threading.Lock()
+        self._dialogue = Dialogue(name, self._stream, self._line.write, self._pump)
 
     def connect(self) -> None:
         """Open the line, check that a load cell of this calibration answers, and start its stream.
@@ -81,8 +72,8 @@ class LoadCell:
         """
         self._line.open()
         try:
-            self.stop()
-            self._identify()
+            self.stop()  # another host may have left its stream on, at a rate that drowns every answer
+            self._dialogue.identify()
             self._set_rate(self._rate)
             with self._reading:
                 self._pending = []
@@ -119,8 +110,8 @@ class LoadCell:
         while True:
             left = deadline - time.monotonic()
             with self._reading, contextlib.suppress(DriverError):  # of a line that has gone, reading tells
-                self._clock_reader.attend(self._token, self._line.write)
-            self._pump(0.0 if self._pending else max(min(left, self._clock_reader.patience() or _SLICE), 0.0))
+                self._clock_reader.attend(self._dialogue.token, self._line.write)
+            self._pump(0.0 if self._pending else max(min(left, self._clock_reader.patience() or SLICE), 0.0))
             if self._pending or left <= 0:
                 break
         with self._reading:
@@ -143,7 +134,7 @@ class LoadCell:
                     f"{self.name}: no sample of {channel} within {_DEADLINES['reply_s'] + 1 / self._rate:.3g} s; "
                     "check that the stream has been started and the instrument has power"
                 )
-            self._pump(_SLICE)
+            self._pump(SLICE)
         device_ns = None if block.device_ns is None else int(block.device_ns[-1])
         return Reading(float(block.values[-1]), block.received_ns, device_ns, float(block.raw[-1]), block.quality)
 
@@ -170,11 +161,11 @@ class LoadCell:
         Raises:
             NoReply, BadReply, Refused: it did not start, or not at the rate that was set.
         """
-        self._rate_agreed("start", self._acknowledged("start"))
+        self._rate_agreed("start", self._dialogue.acknowledged("start"))
 
     def stop(self) -> None:
         """Stop the stream."""
-        self._acknowledged("stop")
+        self._dialogue.acknowledged("stop")
 
     def tare(self) -> float:
         """Make the present reading the zero of ``force``.
@@ -185,11 +176,11 @@ class LoadCell:
         Raises:
             Refused: the reading is not steady, or out of range.
         """
-        return self._acknowledged("tare").value / float(_INSTRUMENT["counts_per_newton"])
+        return self._dialogue.acknowledged("tare") / float(_INSTRUMENT["counts_per_newton"])
 
     def clear_tare(self) -> None:
         """Let ``force`` be ``force_raw`` again."""
-        self._acknowledged("clear_tare")
+        self._dialogue.acknowledged("clear_tare")
 
     def set_rate(self, rate: int) -> None:
         """Change the samples a second [Hz]; a running stream is stopped for it and starts again.
@@ -241,59 +232,13 @@ class LoadCell:
             raise OutOfRange(f"{self.name}: {rate} Hz is none of the rates {offered} Hz; nothing was sent")
         return rate
 
-    def _identify(self) -> None:
-        answer = self._ask("identify")
-        if not isinstance(answer, Identity):
-            raise BadReply(f"{self.name}: identify was answered by {answer}; check that this is the load cell")
-        for what in ("protocol", "counts_per_newton"):
-            said, expected = getattr(answer, what), _INSTRUMENT[what]
-            if said != expected:
-                raise BadReply(
-                    f"{self.name}: it says {what} {said}, expected {expected}; set it, or mend the wire file"
-                )
-
     def _set_rate(self, rate: int) -> None:
         self._rate = rate
-        self._rate_agreed("set_rate", self._acknowledged("set_rate", rate))
+        self._rate_agreed("set_rate", self._dialogue.acknowledged("set_rate", rate))
 
-    def _rate_agreed(self, command: str, answer: Acknowledgement) -> None:
-        if answer.value != self._rate:
-            raise BadReply(f"{self.name}: {command} gave {answer.value} Hz, not {self._rate} Hz; set it again")
-
-    def _acknowledged(self, command: str, argument: int = 0) -> Acknowledgement:
-        answer = self._ask(command, argument)
-        if not isinstance(answer, Acknowledgement):
-            raise BadReply(f"{self.name}: {command} was answered by {answer}; check that this is the load cell")
-        if answer.code:
-            reason = _CODES.get(answer.code, f"code {answer.code}")
-            raise Refused(f"{self.name}: {command} {argument or ''} refused: {reason}{_HINTS.get(command, '')}")
-        return answer
-
-    def _ask(self, command: str, argument: int = 0) -> Answer:
-        """Send a request until it is answered; its token tells a late answer from the right one."""
-        with self._asking:
-            request = Request(self._token(), _COMMANDS[command], argument)
-            self._stream.answers.pop(request.token, None)
-            for _ in range(_DEADLINES["attempts"]):
-                self._line.write(encode(request))
-                if (answer := self._answer_to(request)) is not None:
-                    return answer
-        raise NoReply(
-            f"{self.name}: {command} was not answered within {_DEADLINES['reply_s']:.3g} s, "
-            f"asked {_DEADLINES['attempts']} times; check power, cable and baud rate"
-        )
-
-    def _token(self) -> int:
-        return next(self._tokens) % 256
-
-    def _answer_to(self, request: Request) -> Answer | None:
-        deadline = time.monotonic() + _DEADLINES["reply_s"]
-        while time.monotonic() < deadline:
-            self._pump(_SLICE)
-            answer = self._stream.answers.get(request.token)
-            if answer is not None and answer.command == request.command:
-                return answer
-        return None
+    def _rate_agreed(self, command: str, rate: int) -> None:
+        if rate != self._rate:
+            raise BadReply(f"{self.name}: {command} gave {rate} Hz, not {self._rate} Hz; set it again")
 
     def _pump(self, timeout: float) -> None:
         """Read once, or wait as long for the other thread that is reading."""

@@ -163,5 +163,6 @@ class Decoder:
         self._astray = True
         place = self._buffer.find(_SYNC, 1)
         if place < 0:
+            # The last byte may be the first of a sync word whose second has not come yet.
             place = len(self._buffer) - self._buffer.endswith(_SYNC[:1])
         del self._buffer[:place]

@@ -1,4 +1,4 @@
-"""pymodbus's blocking clients, opened for an address, with what passes on their wire told to a tap."""
+"""pymodbus's blocking clients, opened for an address, with what passes on their wire told to taps."""
 
 import logging
 import select
@@ -21,7 +21,7 @@ class Trace:
     """Follows what passes on the wire: pymodbus shows the same growing buffer again and again."""
 
     def __init__(self, clock: Clock) -> None:
-        self.tap: Tap | None = None
+        self.taps: list[Tap] = []
         self.sent_ns = self.received_ns = clock()
         self._heard = b""
         self._clock = clock
@@ -46,8 +46,8 @@ class Trace:
         return len(heard)
 
     def _tell(self, at: int, sent: bool, data: bytes) -> None:
-        if self.tap is not None:
-            self.tap(Frame(at, sent, data))
+        for tap in self.taps:
+            tap(Frame(at, sent, data))
 
 
 class PromptSerialClient(ModbusSerialClient):
@@ -73,6 +73,7 @@ def client_for(address: ModbusAddress, timeout: float, trace: Trace) -> Client:
     A raw ``socket://`` goes through the TCP client with RTU framing: through pyserial it would come byte by byte.
     """
     client = _tcp(address, timeout, trace) or _serial(address, timeout, trace)
+    # By itself the library hangs up after a few silences; when a wire is to be opened anew is our decision.
     client.set_max_no_responses(_NEVER)
     client.transaction.count_until_disconnect = _NEVER
     return client

@@ -111,7 +111,7 @@ class ModbusInstrument:
         self._line.open()
         try:
             self._ring.start()
-        except Exception:
+        except Exception:  # not a driver's error alone: whatever it was, the wire must not stay open
             self._line.close()
             raise
 

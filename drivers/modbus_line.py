@@ -87,7 +87,7 @@ class ModbusLine:
 
     def listen(self, tap: Tap) -> None:
         """Tell ``tap`` of every frame from now on."""
-        self._trace.tap = tap
+        self._trace.taps.append(tap)
 
     def open(self) -> None:
         """Open the wire; harmless when it is open.
@@ -211,6 +211,7 @@ class ModbusLine:
         """The open client, with nothing old left on its wire."""
         if not self._wanted_open:
             raise NotConnected(f"{self.name}: {what}: connect first")
+        # What stands on the wire before the question is no answer to it.
         if self._client is not None and self._in_step and not self._stirs(self._client):
             return self._client
         if not self.address.rtu:
@@ -221,7 +222,7 @@ class ModbusLine:
         if self.address.rtu:
             self._find_step(client, what)
         self._in_step = True
-        self.resynchronised += self.received > 0
+        self.resynchronised += self.received > 0  # to find one's step for the first time is no failure
         return client
 
     def _stirs(self, client: Client) -> bool:
@@ -232,8 +233,8 @@ class ModbusLine:
             return True
 
     def _connect(self) -> None:
-        client = client_for(self.address, self.patience, self._trace)
         try:
+            client = client_for(self.address, self.patience, self._trace)
             opened = client.connect()
         except Exception as error:
             raise NotConnected(f"{self.name}: {self.address.url} cannot be opened: {error}") from error

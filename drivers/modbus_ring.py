@@ -132,7 +132,7 @@ class Ring:
         self._failing_since, self._words = None, ""
         self.stamp = Stamp(taken.now_ns, answer.sent_ns, answer.received_ns)
         blocks.extend(taken.blocks)
-        if taken.more:
+        if taken.more:  # behind after a failure: caught up as fast as the wire carries
             self._next = 0.0
         return taken.more
 

@@ -143,6 +143,7 @@ class RingDecoder:
                 f"{self._name}: it has restarted ({self._boot} power-ups, now {head['boot']}); its clock and "
                 "settings have gone, connect again"
             )
+        # Ahead of what was wanted only where the ring has overrun: then it begins at the oldest that is kept.
         ahead = (head["first"] - self.wanted) % _WRAP
         kept = (head["newest"] - head["first"]) % _WRAP < self._layout.size
         if head["count"] > self._layout.capacity or (ahead and not (kept and ahead < _BEHIND)):

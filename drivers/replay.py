@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
 from drivers.actuator_samples import ActuatorSamples, Scale
-from drivers.ascii_load_cell import ReadingStream
-from drivers.canopen_node import Field, PdoLayout
+from drivers.ascii_load_cell_stream import ReadingStream
+from drivers.canopen_layout import Field, PdoLayout
 from drivers.channel import Block, Frame
 from drivers.errors import BadReply, DriverError
 from drivers.load_cell_stream import SampleStream
@@ -48,7 +48,7 @@ def decoder(description: Mapping[str, Any]) -> Decoder:
     try:
         made = _DECODERS[description["decoder"]](description)
         return _Later(made, int(description["state"]["at_ns"]))
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OSError) as error:
         raise BadReply(
             f"the decoder {description.get('decoder')!r} cannot be made: {error!r}; the log's document "
             "instruments.json is not whole, or of a later version"
@@ -128,6 +128,7 @@ class _Ring:
         """The block's words, if it was asked for and came whole, whatever stood before it."""
         question, self._question = self._question, b""
         head, tail = (1, 2) if self._rtu else (7, 0)
+        # On RTU an old answer, or noise, may stand before the one that the driver took: that is always the last.
         answer = heard[-(head + 2 + self._length + tail) :]
         asked = question[head : head + 5]
         if asked not in self._asked or answer[head : head + 2] != bytes((asked[0], self._length)):

@@ -86,7 +86,7 @@ class ServoDrive:
         node.wait_for_heartbeat(_STEP_WITHIN)
         self._identify()
         self.stop(settings.stop_within)
-        node.command_state(127, _STEP_WITHIN)
+        node.command_state(127, _STEP_WITHIN)  # process data may be mapped anew in pre-operational alone
         node.set_up_process_data()
         self._set_limits(settings)
         node.command_state(5, _STEP_WITHIN)
@@ -108,6 +108,7 @@ class ServoDrive:
 
     def switch_off(self) -> None:
         """Take the voltage away, and stop watching the master."""
+        # First, or the drive would take the silence of whoever led it for a lost master, and fault.
         self._node.download(0x1016, 0, 1)
         self._node.download(0x6040, cia402.DISABLE_VOLTAGE)
         self._until(
@@ -133,6 +134,7 @@ class ServoDrive:
         Raises:
             NoReply: a fault stays.
         """
+        # A reset is the rising edge of its bit: it has to be down before, and must not stay up.
         for word in (cia402.DISABLE_VOLTAGE, cia402.RESET_FAULT, cia402.DISABLE_VOLTAGE):
             self._node.download(0x6040, word)
         self._until(
@@ -172,7 +174,12 @@ class ServoDrive:
                     f"{self._name}: unit object {index:04X}h reads {found:08X}h, not {wanted:08X}h; "
                     "set its unit to 0.1 µm"
                 )
-        self.rated_torque = self._node.number(0x6076) * 1e-3
+        rated = self._node.number(0x6076)
+        if rated <= 0:
+            raise BadReply(
+                f"{self._name}: rated torque (6076h) reads {rated} mN m; enter the motor's in the drive"
+            )
+        self.rated_torque = rated * 1e-3
 
     def _set_limits(self, settings: ActuatorSettings) -> None:
         cycle = round(settings.cycle * 1e3)
@@ -214,6 +221,7 @@ class ServoDrive:
         self._until(stepped, _STEP_WITHIN, "operation enabled")
 
     def _stands(self) -> bool:
+        # An enabled rod is still for a moment at every reversal, and goes on.
         still = abs(self._node.number(0x606C)) * COUNT < _AT_REST
         return still and self.state() is not DriveState.ENABLED
 

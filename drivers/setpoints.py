@@ -125,6 +125,7 @@ class Setpoints:
             return "; ".join(map(str, faults))
         if self._clock() - (samples.last_ns or 0) > _STALE_NS:
             samples.catch_up()
+        # A sample from before it was armed shows the drive as it was, switched off.
         if samples.last_ns is None or samples.last_ns < armed_ns or samples.statusword is None:
             return ""
         state = cia402.drive_state(samples.statusword)

@@ -8,13 +8,10 @@ then its position is only relative to where it was switched on.
 
 import math
 from pathlib import Path
-from typing import NamedTuple
-
-import numpy as np
 
 from sim_rig.canopen_slave import CanopenSlave, Send
-from sim_rig.device_clock import DeviceClock
 from sim_rig.drive_motion import Demand, Motion
+from sim_rig.drive_senses import PLAIN_MACHINE, DriveSenses, Machine
 from sim_rig.drive_states import State, next_state
 from sim_rig.object_dictionary import ObjectDictionary
 from sim_rig.signals import Signals
@@ -28,29 +25,6 @@ _BEHIND_NS = 15_000_000
 _HOMING, _CYCLIC_POSITION = 6, 8
 
 
-class Machine(NamedTuple):
-    """What this drive is coupled to."""
-
-    lead: float = 5e-3
-    """[m] the rod moves for one turn of the motor."""
-    torque: float = 1.27
-    """[N m] rated, of the motor."""
-    switch: float = -0.06
-    """[m] rig position at which the negative limit switch closes."""
-    ppm: float = 12.0
-    """[ppm] by which the drive's clock is fast."""
-    clock_offset_ns: int = 1_234_567_891
-    """[ns] shown by the drive's clock when the rig's shows zero."""
-
-
-_PLAIN_MACHINE = Machine()
-
-
-def torque_for(force: float, lead: float = _PLAIN_MACHINE.lead) -> float:
-    """Torque [N m] of the motor that pushes with a force [N] through a screw of this lead [m], without loss."""
-    return force * lead / (2 * math.pi)
-
-
 class CanopenActuator:
     """One drive as a node of a `SocketcandServer`.
 
@@ -62,17 +36,17 @@ class CanopenActuator:
     """
 
     def __init__(
-        self, signals: Signals, *, node_id: int = 5, referenced: bool = False, machine: Machine = _PLAIN_MACHINE
+        self, signals: Signals, *, node_id: int = 5, referenced: bool = False, machine: Machine = PLAIN_MACHINE
     ) -> None:
         self.objects = ObjectDictionary(_EDS, node_id)
         self.objects.put(0x6076, round(machine.torque * 1e3))
         self.state = State.SWITCH_ON_DISABLED
         self.demand = Demand()
         self.referenced = referenced
-        self._signals = signals
-        self._machine = machine
+        self._signals, self._machine = signals, machine
+        self._senses = DriveSenses(signals, machine)
         self._node_id = node_id
-        self._zero = 0.0 if referenced else self._rig_position()[1]
+        self._zero = 0.0 if referenced else self._senses.position()[1]
         self._setpoint_ns: int | None = None
         self._away_ns: int | None = None
         self._controlword = 0
@@ -113,24 +87,24 @@ class CanopenActuator:
         if now_ns == self._refreshed_ns:
             return
         self._refreshed_ns = now_ns
-        taken_ns, position, velocity = self._measured(now_ns)
+        taken_ns, position, velocity = self._senses.measured(now_ns)
         if not math.isfinite(position):
             if self.state not in (State.FAULT, State.FAULT_REACTION):
                 self.fail(0x7320, now_ns)
             self.objects.put(0x6041, self._statusword())  # of all that it sends, this alone is still known
             return
-        self.objects.put(0x1013, self._micros(taken_ns))
+        self.objects.put(0x1013, self._senses.micros(taken_ns))
         self.objects.put(0x6064, _counts(position - self._zero))
         self.objects.put(0x606C, _counts(velocity))
         self.objects.put(0x60F4, _counts(self.demand.position - position))
-        self.objects.put(0x6077, self._torque(now_ns))
+        self.objects.put(0x6077, self._senses.torque(now_ns, self.objects.number(0x6076) * 1e-3))
         self.objects.put(0x6061, self.objects.number(0x6060))
         self.objects.put(0x6041, self._statusword())
 
     def asked(self, index: int, now_ns: int) -> None:
         """Process data carry the instant of their position; a client that asks for the clock gets the clock."""
         if index == 0x1013:
-            self.objects.put(0x1013, self._micros(now_ns))
+            self.objects.put(0x1013, self._senses.micros(now_ns))
             self._refreshed_ns = -1
 
     def written(self, index: int, sub: int, now_ns: int) -> None:
@@ -157,7 +131,7 @@ class CanopenActuator:
     def reset(self, now_ns: int) -> None:
         """Start anew: disabled, parameters as they were."""
         self.state, self._latched = State.SWITCH_ON_DISABLED, False
-        self.demand.rest(self._rig_position()[1])
+        self.demand.rest(self._senses.position()[1])
 
     # States
 
@@ -180,7 +154,7 @@ class CanopenActuator:
             self._brake()
         elif state is State.ENABLED:
             self.demand.advance(now_ns)
-            self.demand.rest(self._rig_position()[1])
+            self.demand.rest(self._senses.position()[1])
             self._setpoint_ns = self._away_ns = None
         elif self.state in (State.ENABLED, State.QUICK_STOP):
             self.demand.rest(self.demand.position)
@@ -248,7 +222,7 @@ class CanopenActuator:
 
     def _lag(self, demanded: float, now_ns: int) -> None:
         """Following error, that of the demand [m] and not of setpoints still to be reached, once it has lasted."""
-        seen_ns, position = self._rig_position()
+        seen_ns, position = self._senses.position()
         if now_ns - seen_ns > _BEHIND_NS:  # a busy machine holds the simulation up: no fault of the drive
             return
         if abs(demanded - position) <= self.objects.number(0x6065) * _COUNT:
@@ -291,33 +265,6 @@ class CanopenActuator:
         if self.demand.motion is not Motion.FOLLOW and self.demand.position != self._pushed:
             self._pushed = self.demand.position
             self._signals.command("displacement", self.demand.position, now_ns)
-
-    # The rig
-
-    def _micros(self, rig_ns: int) -> int:
-        """What its clock shows at an instant of the rig's [us], wrapped."""
-        clock = DeviceClock(self._machine.clock_offset_ns, self._machine.ppm)
-        return clock.ns(rig_ns) // 1000 % 2**32
-
-    def _rig_position(self) -> tuple[int, float]:
-        times, values = self._signals.latest("actuator_position", 1, self._signals.now_ns())
-        return (int(times[-1]), float(values[-1])) if len(values) else (self._signals.now_ns(), 0.0)
-
-    def _measured(self, now_ns: int) -> tuple[int, float, float]:
-        """Time [ns], position [m] and velocity [m/s] over the last samples."""
-        times, values = self._signals.latest("actuator_position", 5, now_ns)
-        if len(values) < 2 or not np.isfinite(values).all():
-            return now_ns, (float(values[-1]) if len(values) else 0.0), 0.0
-        seconds = (times - times[-1]) / 1e9
-        spread = seconds - seconds.mean()
-        return int(times[-1]), float(values[-1]), float(spread @ values / (spread @ spread))
-
-    def _torque(self, now_ns: int) -> int:
-        """Motor torque behind the force on the rod [per mille of rated]."""
-        _, force = self._signals.latest("force", 1, now_ns)
-        newtons = float(force[-1]) if len(force) and math.isfinite(force[-1]) else 0.0
-        share = round(torque_for(newtons, self._machine.lead) / (self.objects.number(0x6076) * 1e-3) * 1000)
-        return max(min(share, 32767), -32768)
 
 
 def _counts(value: float) -> int:

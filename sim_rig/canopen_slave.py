@@ -1,4 +1,4 @@
-"""A CANopen slave, written by hand: network management, object access, process data, heartbeats, emergencies.
+"""A CANopen slave, written by hand: network management, process data, heartbeats, emergencies.
 
 What the device does with its objects is not known here: a `Device` is asked before an object is read, after one
 was written, at each SYNC, and when the master's heartbeat has gone. Frames come and go as (identifier, bytes);
@@ -10,12 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from sim_rig.object_dictionary import (
-    ABORT_COMMAND,
-    ABORT_TOGGLE,
-    Abort,
-    ObjectDictionary,
-)
+from sim_rig.object_dictionary import Abort, ObjectDictionary
+from sim_rig.sdo_server import SdoServer
 
 Send = Callable[[int, bytes, int], None]
 """Puts a frame on the bus: identifier, data, not before [ns]."""
@@ -77,7 +73,7 @@ class CanopenSlave:
         self.injection = Injection()
         self._device = device
         self._put = send
-        self._transfer: _Transfer | None = None
+        self._sdo = SdoServer(objects, self._asked, self._written)
         self._staged: dict[int, bytes] = {}
         self._events: dict[int, bytes] = {}
         self._next_heartbeat_ns = 0
@@ -86,7 +82,8 @@ class CanopenSlave:
     def boot(self, now_ns: int) -> None:
         """Announce the node; it becomes pre-operational."""
         self.state = PRE_OPERATIONAL
-        self._transfer, self._master_seen_ns = None, None
+        self._sdo.forget()
+        self._master_seen_ns = None
         self._send(0x700 + self.node_id, b"\x00", now_ns)
         self._next_heartbeat_ns = now_ns + self._heartbeat_period()
 
@@ -206,11 +203,7 @@ class CanopenSlave:
     def _object_request(self, data: bytes, now_ns: int) -> None:
         if len(data) != 8:
             return
-        try:
-            answer = self._answer(data, now_ns)
-        except Abort as abort:
-            self._transfer = None
-            answer = struct.pack("<B3sI", 0x80, data[1:4], abort.code)
+        answer = self._sdo.respond(data, now_ns)
         if answer is None:
             return
         if self.injection.corrupt_sdo > 0:
@@ -218,57 +211,11 @@ class CanopenSlave:
             answer = bytes([answer[0], answer[1] ^ 0xFF]) + answer[2:]
         self._send(0x580 + self.node_id, answer, now_ns + self.injection.late_sdo_ns)
 
-    def _answer(self, data: bytes, now_ns: int) -> bytes | None:
-        command, index, sub = struct.unpack_from("<BHB", data)
-        kind = command >> 5  # 0 and 1 download, 2 and 3 upload, the segment and its begin; 4 abort
-        if kind == 4:
-            self._transfer = None
-            return None
-        if kind == 2:
-            return self._start_upload(index, sub, now_ns)
-        if kind == 1:
-            return self._start_download(command, index, sub, data, now_ns)
-        if kind in (0, 3) and self._transfer is not None:
-            return self._segment(self._transfer, command, data, now_ns)
-        raise Abort(ABORT_COMMAND)
-
-    def _start_upload(self, index: int, sub: int, now_ns: int) -> bytes:
+    def _asked(self, index: int, now_ns: int) -> None:
         self._device.refresh(now_ns)
         self._device.asked(index, now_ns)
-        content = self.objects.upload(index, sub)
-        if len(content) <= 4:
-            # Expedited, and how many of the four bytes hold nothing.
-            return struct.pack("<BHB4s", 0x43 | (4 - len(content)) << 2, index, sub, content)
-        self._transfer = _Transfer(index, sub, True, content)
-        return struct.pack("<BHBI", 0x41, index, sub, len(content))
 
-    def _start_download(self, command: int, index: int, sub: int, data: bytes, now_ns: int) -> bytes:
-        if command & 0x02:
-            size = 4 - ((command >> 2) & 0x3) if command & 0x01 else 4
-            self._write(index, sub, data[4 : 4 + size], now_ns)
-        else:
-            self._transfer = _Transfer(index, sub, False, b"")
-        return struct.pack("<BHB4x", 0x60, index, sub)
-
-    def _segment(self, transfer: "_Transfer", command: int, data: bytes, now_ns: int) -> bytes:
-        if bool(command & 0x10) != transfer.toggle:
-            raise Abort(ABORT_TOGGLE)
-        toggle = 0x10 if transfer.toggle else 0
-        transfer.toggle = not transfer.toggle
-        if transfer.upload and command >> 5 == 3:
-            part, transfer.content = transfer.content[:7], transfer.content[7:]
-            last = 0 if transfer.content else 1
-            return struct.pack("<B7s", toggle | (7 - len(part)) << 1 | last, part)
-        if transfer.upload or command >> 5 != 0:
-            raise Abort(ABORT_COMMAND)
-        transfer.content += data[1 : 8 - ((command >> 1) & 0x7)]
-        if command & 0x01:
-            self._write(transfer.index, transfer.sub, transfer.content, now_ns)
-            self._transfer = None
-        return struct.pack("<B7x", 0x20 | toggle)
-
-    def _write(self, index: int, sub: int, content: bytes, now_ns: int) -> None:
-        self.objects.download(index, sub, content)
+    def _written(self, index: int, sub: int, now_ns: int) -> None:
         if index == 0x1016:  # the watch begins with the first heartbeat after it was set
             self._master_seen_ns = None
         self._device.written(index, sub, now_ns)
@@ -276,17 +223,6 @@ class CanopenSlave:
     def _send(self, identifier: int, data: bytes, not_before_ns: int) -> None:
         if not self.injection.silent:
             self._put(identifier, data, not_before_ns)
-
-
-@dataclass
-class _Transfer:
-    """A segmented transfer under way."""
-
-    index: int
-    sub: int
-    upload: bool
-    content: bytes
-    toggle: bool = False
 
 
 def _is_pdo(objects: ObjectDictionary, number: int, identifier: int) -> bool:

@@ -25,7 +25,10 @@ def sim(
         Path | None, typer.Option(metavar="FILE", help="Faults on the wires: JSON, by instrument.")
     ] = None,
 ) -> None:
-    """Run the simulated rig, every instrument on its own wire, until Ctrl-C or SIGTERM."""
+    """Run the simulated rig, every instrument on its own wire.
+
+    Until Ctrl-C or SIGTERM; `bench.toml` says meanwhile where each instrument is reached.
+    """
     from sim_rig.faults import load_wire_faults
     from sim_rig.scenario import load_scenario
     from sim_rig.serve import Choices

@@ -19,7 +19,7 @@ from sim_rig.modbus_device import (
     size_of,
     wire_file,
 )
-from sim_rig.modbus_server import Illegal
+from sim_rig.modbus_requests import Illegal
 from sim_rig.signals import Signals
 
 FaultName = Literal["over_temperature", "open_coil", "over_current"]

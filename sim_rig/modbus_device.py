@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from sim_rig.device_clock import DeviceClock
-from sim_rig.modbus_server import Illegal
+from sim_rig.modbus_requests import Illegal
 from sim_rig.signals import Signals
 
 _WIRE = Path(__file__).parents[1] / "drivers" / "wire"
@@ -200,6 +200,7 @@ class SampleRing:
         """The block that begins at the wanted sample, or at the oldest one kept."""
         with self._lock:
             now = self._signals.now_ns()
+            # What has come since the wanted sample is enough; to look through all that is kept takes long.
             size = min(self._ring["size"], max(1, now // self._interval - self._from - self.wanted + 2))
             held = [self._signals.latest(name, size, now) for name in self._names]
             newest = self._number(min(int(times[-1]) for times, _ in held)) if all(len(t) for t, _ in held) else -1
@@ -220,6 +221,7 @@ class SampleRing:
 
     def _words(self, held: list[Any], first: int, count: int, newest: int, now: int) -> list[int]:
         """The block as it goes out; held: times and values of each channel."""
+        # The sample of a number lies within half an interval of its place on the grid, before or behind.
         edges = (np.arange(first, first + count) + self._from) * self._interval + self._interval // 2
         places = [np.searchsorted(times, edges) - 1 for times, _ in held]
         begins = int(held[0][0][places[0][0]]) if count else now

@@ -56,6 +56,9 @@ class Scenario(Setting):
     clocks: Clocks = Field(default=Clocks(), description="device clocks")
     faults: tuple[Fault, ...] = Field(default=(), description="channels that fail for a while")
     seed: int = Field(default=0, ge=0, description="[1] of everything drawn: noise, zero shifts, clock errors")
+    nuisances: dict[str, Any] | None = Field(
+        default=None, description="of a twin: lags that its fit left in the channels; a rig's own clocks are exact"
+    )
     baseline: dict[str, Any] | None = Field(default=None, description="of a twin: the fit without its effects")
     provenance: dict[str, Any] | None = Field(default=None, description="of a twin: where it comes from")
 

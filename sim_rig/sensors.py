@@ -117,6 +117,7 @@ def _added(effects: Effects, truth: Truth, start: float, step: float) -> Array:
     time = start + np.arange(len(truth.force)) * (step / blocks)
     drive = np.repeat(truth.output, blocks)
     added = effects.that("added_force")
+    # Zeros where nothing is at work: an empty sum has no shape.
     return np.asarray(0.0 * time + sum(form.act(time, drive, *values) for form, values in added))
 
 

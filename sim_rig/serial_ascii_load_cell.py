@@ -8,7 +8,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from sim_rig.serial_port import SerialAdapter, SerialPort
+from sim_rig.serial_adapter import SerialAdapter
+from sim_rig.serial_port import SerialPort
 from sim_rig.signals import Signals
 
 CONTRACT: dict[str, Any] = tomllib.loads(

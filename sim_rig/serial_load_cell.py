@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from sim_rig.device_clock import TRUE_CLOCK, DeviceClock
-from sim_rig.serial_port import SerialAdapter, SerialPort
+from sim_rig.serial_adapter import SerialAdapter
+from sim_rig.serial_port import SerialPort
 from sim_rig.signals import Signals
 
 CONTRACT: dict[str, Any] = tomllib.loads(
@@ -115,6 +116,7 @@ class LoadCellDevice:
 
     def speak(self, now_ns: int) -> list[tuple[int, bytes]]:
         """Frames of the samples up to ``now_ns`` [ns] that are new, each with its time on the rig's clock [ns]."""
+        # Twice what can have come: what is asked for too often is passed over below, what is not is lost.
         window = int((now_ns - self._seen_ns) * 1e-9 * 2 * max(_INSTRUMENT["rates_hz"])) + 2
         times, values = self._signals.latest("force", window, now_ns)
         frames = []
@@ -129,6 +131,7 @@ class LoadCellDevice:
         self._recent.append((at_ns, self._counts))
         while self._recent[0][0] < at_ns - _INSTRUMENT["tare_time_s"] * 1e9:
             self._recent.popleft()
+        # A quarter off: no instant of the rig's samples lies where rounding could turn either way.
         tick = round(at_ns * self._rate * 1e-9 - 0.25)
         due, self._tick = tick != self._tick, tick
         if not (self._running and due):

@@ -9,9 +9,10 @@ from typing import Literal, NamedTuple, cast
 
 import numpy as np
 
-from sim_rig.canopen_actuator import CanopenActuator, Machine, torque_for
+from sim_rig.canopen_actuator import CanopenActuator
 from sim_rig.clock import Clock
 from sim_rig.device_clock import DeviceClock
+from sim_rig.drive_senses import Machine, torque_for
 from sim_rig.errors import WireError
 from sim_rig.faults import FaultProxy, WireFault
 from sim_rig.live_rig import LiveRig
@@ -19,7 +20,8 @@ from sim_rig.modbus_coil_amplifier import CoilAmplifierDevice
 from sim_rig.modbus_device import wire_file
 from sim_rig.modbus_frames import MBAP
 from sim_rig.modbus_lvdt import LvdtDevice
-from sim_rig.modbus_server import Device, ModbusServer
+from sim_rig.modbus_requests import Device
+from sim_rig.modbus_server import ModbusServer
 from sim_rig.modbus_thermometer import ThermometerDevice
 from sim_rig.scenario import Scenario
 from sim_rig.sensors import CHANNELS
@@ -32,6 +34,8 @@ _SYNC = 0x80
 _LONGEST_UP = 3_600_000_000_000
 """[ns] that an instrument may have been switched on before the rig's clock began."""
 
+_MADE_ANEW = "# Reaches the simulated rig for as long as it runs; made anew each time it is started."
+"""First line of the file: what does not say so of itself was written by somebody, and is not replaced."""
 _LIMITS = (
     "# Nothing can break here, and rig and agent share their cores with whatever else goes on, so that setpoints",
     "# may leave tens of milliseconds late. On hardware, leave these out: then it is 8 mm and 0.6 m/s.",
@@ -222,7 +226,7 @@ class ServedRig:
 
 def bench_toml(wires: list[Wire], scenario: Scenario) -> str:
     """The configuration that reaches these wires, with what the instruments claim of their channels."""
-    lines = ["# Reaches the simulated rig for as long as it runs; made anew each time it is started."]
+    lines = [_MADE_ANEW]
     specimen = ", ".join(str(value) for value in scenario.specimen.model_dump().values())
     lines += ["", "[rig]", 'name = "simulated rig"', f"specimen = {json.dumps(specimen)}"]
     for wire in wires:
@@ -249,9 +253,11 @@ def write_bench_toml(path: Path, wires: list[Wire], scenario: Scenario) -> None:
     """Write it in one go: whoever waits for the file finds it whole.
 
     Raises:
-        WireError: it cannot be written.
+        WireError: it cannot be written, or stands in the place of one that somebody else wrote.
     """
     try:
+        if path.exists() and _MADE_ANEW not in path.read_text("utf-8", errors="replace"):
+            raise WireError(f"{path}: was written by hand and is left as it is; choose another place with --out")
         draft = path.with_name(f".{path.name}.draft")
         draft.write_text(bench_toml(wires, scenario), "utf-8")
         draft.replace(path)

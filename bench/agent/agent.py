@@ -9,15 +9,14 @@ import contextlib
 import sys
 import threading
 import time
-from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from bench.agent.bench_clock import BenchClock
 from bench.agent.bench_thread import BenchThread
-from bench.agent.header import LogFacts, force_rate
+from bench.agent.header import force_rate
 from bench.agent.instrument_status import instrument_status
 from bench.agent.messages import (
     AgentEvent,
@@ -30,12 +29,12 @@ from bench.agent.messages import (
     Samples,
 )
 from bench.agent.preparation import Preparation
-from bench.agent.run import Run
 from bench.agent.runner import Runner
+from bench.agent.runs import Runs
+from bench.agent.steps import MOVING
 from bench.agent.warden import Warden
 from bench.errors import BenchError, LogError
 from bench.methods.compile import BETWEEN
-from bench.recorder.live import LiveRecorder
 from bench.rig.acquisition import Acquisition, Batch
 from bench.rig.alignment import Aligner
 from bench.rig.config import BenchConfig
@@ -62,8 +61,6 @@ _SWITCH = 2e-4
 """[s] after which a thread that computes lets another one go on: setpoints do not wait for a summary."""
 _END_WITHIN = 20.0
 """[s] for a run to end in good order when the agent is shut down."""
-_REMEMBERED = 100
-"""Ended runs that the status lists."""
 
 
 class Agent:
@@ -96,7 +93,7 @@ class Agent:
             idle={actuator.name: actuator},
         )
         self._warden = Warden(
-            self._rig, self._interlocks, self._clock, self._acquisition.maps, self._tell, self._stop_run
+            self._rig, self._interlocks, self._clock, self._acquisition.maps, self._tell, self._stop_moving
         )
         aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
         self._bench = BenchThread(aligner, force_rate(config), publish, self._beat, self._log_failed)
@@ -107,9 +104,7 @@ class Agent:
         self._lock = threading.RLock()
         self._state: AgentState = "idle"
         self._preparation = Preparation(self._rig, self._move, self._tell, self._prepared)
-        self._run: Run | None = None
-        self._thread: threading.Thread | None = None
-        self._finished: deque[RunStatus] = deque(maxlen=_REMEMBERED)
+        self._runs = Runs(self._lock, self._runner.carry_out, self._ended)
         self._told: tuple[AgentState, str] | None = None
         self._told_at = 0.0
         self._open = contextlib.ExitStack()
@@ -149,13 +144,13 @@ class Agent:
     def status(self) -> AgentStatus:
         """All that the agent says of itself."""
         with self._lock:
-            state, finished = self._state, tuple(self._finished)
+            state, finished = self._state, self._runs.finished
         return AgentStatus(
             state=state,
             trip=self._interlocks.tripped,
             mounting=self._rig.actuator.mounting.value,
             step=self._preparation.status,
-            run=self.run_status(),
+            run=self._runs.status(),
             finished=finished,
             instruments=tuple(instrument_status(one, self._acquisition, self._clock) for one in self._rig.named),
             warnings=self._warnings(),
@@ -165,8 +160,7 @@ class Agent:
 
     def run_status(self) -> RunStatus | None:
         """The run that goes on, or the last one; none before the first."""
-        with self._lock:
-            return self._run.status() if self._run else self._finished[-1] if self._finished else None
+        return self._runs.status()
 
     def run(self, command: RunCommand) -> Answer:
         """Begin a run; answered as soon as it is accepted."""
@@ -174,8 +168,9 @@ class Agent:
             if error := self._not_ready():
                 return Answer(ok=False, error=error, status=self.status())
             self._set_state("preparing")
+        # Without the lock: a method takes its time to compile, and the state keeps everybody else out.
         try:
-            self._begin(command)
+            self._runs.begin(*self._runner.made(command))
         except Exception as found:
             self._set_state("idle", instead_of=("preparing",))
             if not isinstance(found, BenchError | DriverError):
@@ -189,10 +184,12 @@ class Agent:
             if error := self._not_ready():
                 return Answer(ok=False, error=error, status=self.status())
             self._set_state("preparing")
+        if command.step in MOVING:
+            self._interlocks.expect_force(self._clock())
         if command.step == "home":  # the reference stands beyond where a specimen may be taken; force is watched
             matrix = self._config.limits.matrix()
             self._interlocks.matrix = {name: steps for name, steps in matrix.items() if name != "displacement"}
-        begun = self._preparation.begin(command.step, command.position_m)
+        begun = self._preparation.begin(command.step, command.position_m or 0.0)
         failed = begun.outcome == "failed"
         return Answer(ok=not failed, error=begun.words if failed else "", status=self.status())
 
@@ -201,39 +198,33 @@ class Agent:
         move_rod(self._rig.actuator, self._interlocks.permit, self._clock, self._runner.set_led, target, ending)
 
     def _prepared(self) -> None:
+        self._interlocks.expect_force(None)
         self._interlocks.matrix = self._config.limits.matrix()
         self._set_state("idle", instead_of=("preparing",))
 
     def stop(self) -> Answer:
         """End the run, or a step before one, in good order; harmless when nothing runs."""
         self._tell("command", "stop")
-        self._preparation.stop()
-        self._stop_run("stopped on request", False)
+        self._stop_moving("stopped on request", False)
         return Answer(ok=True, status=self.status())
 
     def reset(self) -> Answer:
         """Take back a trip whose cause has gone; nothing moves."""
         self._tell("command", "reset")
-        with self._lock:
-            error = self._reset()
+        error = self._not_resettable() or self._taken_back()
         return Answer(ok=not error, error=error, status=self.status())
 
     def shut_down(self) -> None:
         """End run or step in good order and bring everything to rest; harmless when repeated."""
-        self._preparation.end(_END_WITHIN)
-        thread = self._thread
-        if thread is not None and thread.is_alive():
-            self._stop_run("the agent was shut down", False)
-            thread.join(_END_WITHIN)
+        self._stop_moving("the agent was shut down", False)
+        self._preparation.wait(_END_WITHIN)
+        self._runs.wait(_END_WITHIN)
 
     def wait(self, timeout: float) -> bool:
         """Wait [s] for the run to end; whether it has."""
-        thread = self._thread
-        if thread is not None:
-            thread.join(timeout)
-        return thread is None or not thread.is_alive()
+        return self._runs.wait(timeout)
 
-    # A run
+    # States
 
     def _not_ready(self) -> str:
         """Why no run can begin; empty where one can."""
@@ -243,47 +234,39 @@ class Agent:
         down = ", ".join(self._acquisition.down)
         return f"{down} does not answer; nothing was started; see its wire" if down else ""
 
-    def _begin(self, command: RunCommand) -> None:
-        """Check what can be checked, and start.
-
-        Raises:
-            MethodError, RunError: it cannot be run.
-        """
-        run, facts = self._runner.made(command)
-        self._run = run
-        self._thread = threading.Thread(target=self._carry_out, args=(run, facts), name="run", daemon=True)
-        self._thread.start()
-
-    def _carry_out(self, run: Run, facts: LogFacts) -> None:
-        try:
-            self._runner.carry_out(run, facts)
-        finally:
-            self._end(run)
-
-    def _end(self, run: Run) -> None:
-        with self._lock:
-            status = run.status()
-            self._finished.append(status)
-            self._run = None
-            self._set_state("tripped" if self._interlocks.tripped else "idle")
+    def _ended(self, status: RunStatus) -> None:
+        """A run is over, whatever it was that ended it."""
+        self._set_state("tripped" if self._interlocks.tripped else "idle")
         self._tell("run_finished", f"{status.id}: {status.outcome} {status.reason}".strip())
 
-    def _stop_run(self, why: str, hold: bool) -> None:
-        run = self._run
+    def _stop_moving(self, why: str, hold: bool) -> None:
+        """End a run, or a step before one, in good order; from any thread, harmless where nothing goes on."""
+        run = self._runs.current
         if run is not None:
             run.sequencer.stop(why, hold)
         if self._interlocks.tripped:
             self._set_state("tripped")
         elif run is not None:
             self._set_state("stopping", instead_of=("preparing", "running"))
+        else:
+            self._preparation.stop(why)
 
-    def _reset(self) -> str:
-        if self._state != "tripped":
-            return "" if self._state == "idle" else f"the agent is {self._state}; stop it first"
-        if self._run is not None:
-            return "the run has not ended yet; try again in a moment"
-        if down := self._acquisition.down:
-            return f"{', '.join(down)} does not answer; see its wire, then reset"
+    def _not_resettable(self) -> str:
+        """Why a trip cannot be taken back now; empty where it can."""
+        if self._state not in ("tripped", "idle"):
+            return f"the agent is {self._state}; stop it first"
+        if self._runs.current is not None or self._preparation.going:
+            return "what was tripped has not ended yet; try again in a moment"
+        down = ", ".join(self._acquisition.down) if self._state == "tripped" else ""
+        return f"{down} does not answer; see its wire, then reset" if down else ""
+
+    def _taken_back(self) -> str:
+        """Take a trip back; why not, where an instrument refuses.
+
+        The lock is not held meanwhile: instruments take their time, and nothing else leads out of a trip.
+        """
+        if self._state == "idle":
+            return ""
         try:
             self._rig.amplifier.reset()
             self._rig.actuator.reset()
@@ -298,16 +281,17 @@ class Agent:
     def _take(self, batch: Batch) -> None:
         self._warden.look(batch)
         self._bench.feed(batch)
-        if (log := self._log) is not None:
+        if (log := self._runs.log) is not None:
             log.blocks(batch.instrument, batch.blocks)
 
     def _keep(self, name: str, frame: Frame) -> None:
-        if (log := self._log) is not None:
+        if (log := self._runs.log) is not None:
             log.frame(name, frame)
 
     def _instrument_failed(self, name: str, error: DriverError) -> None:
         driver = next(one.driver for one in self._rig.named if one.name == name)
-        action = self._config.silence.action(driver) if self._run is not None else Action.INDICATE
+        moves = self._runs.current is not None or self._preparation.moving
+        action = self._config.silence.action(driver) if moves else Action.INDICATE
         self._warden.act(action, str(error))
 
     def _log_failed(self, error: LogError) -> None:
@@ -318,11 +302,12 @@ class Agent:
     def _beat(self) -> None:
         """Every turn of the bench thread."""
         self._warden.tick()
-        run, now = self._run, time.monotonic()
+        run, now = self._runs.current, time.monotonic()
         segment = ""
         if run is not None:
             _, index = run.plan.progress(self._clock())
             segment = "" if index == BETWEEN else run.what.programme.segments[index].name
+            # The way to where the method begins is no part of it.
             if any(entry.passage for entry in run.plan.entries):
                 self._set_state("running", instead_of=("preparing",))
         if (self._state, segment) != self._told or now - self._told_at >= _STATUS_PERIOD:
@@ -337,21 +322,17 @@ class Agent:
             self._state = state
         self._tell("state", f"agent {state}")
 
-    def _tell(self, kind: str, text: str, time_ns: int | None = None) -> None:
-        """An event, into the log that is open and to whoever listens."""
+    def _tell(self, kind: str, text: str, time_ns: int | None = None, **more: Any) -> None:
+        """An event, into the log that is open, with what more is known of it, and to whoever listens."""
         moment = self._clock() if time_ns is None else time_ns
-        if (log := self._log) is not None:
-            log.event(moment, kind, text)
+        if (log := self._runs.log) is not None:
+            log.event(moment, kind, text, **more)
         self._publish(AgentEvent(time_ns=moment, kind=kind, text=text))
 
-    @property
-    def _log(self) -> LiveRecorder | None:
-        run = self._run
-        return None if run is None else run.log
-
     def _warnings(self) -> tuple[str, ...]:
-        found = dict.fromkeys(self._acquisition.warnings)
+        # What every thread was refused is said once, with what follows from it.
+        found = [sentence for sentence in self._acquisition.warnings if sentence != self._no_priority]
         if self._no_priority:
             stale = self._rig.actuator.settings.stale_after
-            found[f"{self._no_priority}; the drive stops by itself {stale:g} s after the last setpoint"] = None
+            found.append(f"{self._no_priority}; the drive stops by itself {stale:g} s after the last setpoint")
         return tuple(found)

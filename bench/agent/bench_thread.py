@@ -75,6 +75,7 @@ class BenchThread:
     def record(self, recording: Recording) -> None:
         """Record from now on."""
         with self._lock:
+            # What was lost before the run began is no loss of the run's.
             self._lost_before = Counter(self._aligner.lost)
             self._recording, self._defect = recording, False
 
@@ -110,27 +111,32 @@ class BenchThread:
 
     def _turn(self) -> None:
         with self._lock:
-            self._take_ready()
+            failure = self._take_ready()
+        if failure is not None:  # told without the lock: whoever ends the run may want to know what was lost
+            self._failed(failure)
 
-    def _take_ready(self) -> None:
+    def _take_ready(self) -> LogError | None:
+        """Record what is ready; why not, where the log cannot be written."""
         aligned = self._aligner.ready()
         if aligned is None:
-            return
+            return None
         columns: Columns = aligned.columns
         self.newest_ns = int(aligned.time_ns[-1])
+        failure = None
         if self._recording is not None:
             try:
                 columns = self._recording.take(aligned)
             except LogError as error:
-                self._recording = None
-                self._failed(error)
+                self._recording, failure = None, error
         self._live.append((aligned, columns))
+        return failure
 
     def _send_live(self) -> None:
         now = time.monotonic()
         if not self._live or now - self._published < LIVE_PERIOD:
             return
         live, self._live, self._published = self._live, [], now
+        recording = self._recording  # read once: a run may end meanwhile
         names = live[-1][1].keys()
         self._publish(
             Samples(
@@ -141,6 +147,7 @@ class BenchThread:
                     ]
                     for name in names
                 },
+                segment="" if recording is None else recording.segment,
             )
         )
 

@@ -18,7 +18,7 @@ from bench.rig.clock_map import ClockMap
 from bench.rig.config import AsciiLoadCellSection, BenchConfig, ChannelSection, LoadCellSection
 from bench.rig.instruments import Rig
 from bench.run_from_plant import Identity
-from drivers.ascii_load_cell import CONTRACT as ASCII_LOAD_CELL
+from drivers.ascii_load_cell_stream import CONTRACT as ASCII_LOAD_CELL
 from drivers.modbus_registers import load_map
 from drivers.replay import describe
 

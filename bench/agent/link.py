@@ -67,6 +67,26 @@ def _bound(kind: int, address: str) -> tuple["zmq.Socket[bytes]", str]:
     return socket, socket.getsockopt_string(zmq.LAST_ENDPOINT)
 
 
+def _connect(socket: "zmq.Socket[bytes]", address: str) -> None:
+    """Connect a socket; whether anybody listens there shows only when something is asked.
+
+    Raises:
+        AgentUnreachable: it is no address.
+    """
+    try:
+        socket.connect(address)
+    except zmq.ZMQError as error:
+        raise AgentUnreachable(
+            f"{address!r} is no address of a rig agent ({error}); give one such as tcp://127.0.0.1:5570"
+        ) from error
+
+
+def _first_fault(error: ValidationError) -> str:
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(step) for step in first["loc"]) or "the message"
+    return f"{place}: {first['msg']}"
+
+
 class CommandServer:
     """Answers commands in the order they come, in the thread that calls `serve`; a context manager."""
 
@@ -102,9 +122,7 @@ def _answered(request: bytes, handle: Handler) -> Answer:
     try:
         command = _COMMANDS.validate_json(request)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        place = ".".join(str(step) for step in first["loc"]) or "the message"
-        return Answer(ok=False, error=f"that is no command: {place}: {first['msg']}")
+        return Answer(ok=False, error=f"that is no command: {_first_fault(error)}")
     try:
         return handle(command)
     except Exception as error:  # or one bad command would take the agent, and everybody's rig, with it
@@ -165,23 +183,33 @@ class AgentClient:
             timeout: [s]
 
         Raises:
-            AgentUnreachable: no answer came in time.
+            AgentUnreachable: there is no such address, no answer came in time, or none that can be understood.
         """
         # A request socket that waits for an answer can do nothing else: one for each command outlives no failure.
         with _socket(zmq.REQ) as socket:
-            socket.connect(self._commands)
+            _connect(socket, self._commands)
             socket.send(command.model_dump_json().encode())
             if not socket.poll(round(timeout * 1e3)):
                 raise AgentUnreachable(
                     f"no rig agent answered at {self._commands} within {timeout:g} s; start one: mrbench rig"
                 )
-            return Answer.model_validate_json(socket.recv())
+            try:
+                return Answer.model_validate_json(socket.recv())
+            except ValidationError as error:
+                raise AgentUnreachable(
+                    f"what answers at {self._commands} is no rig agent of this version ({_first_fault(error)}); "
+                    "end it and start one: mrbench rig"
+                ) from error
 
     def subscribe(self, stopping: threading.Event) -> Iterator[AgentStatus | Samples | AgentEvent | None]:
-        """What the agent publishes, until ``stopping`` is set; None whenever it was silent for 0.1 s."""
+        """What the agent publishes, until ``stopping`` is set; None whenever it was silent for 0.1 s.
+
+        Raises:
+            AgentUnreachable: there is no such address.
+        """
         with _socket(zmq.SUB) as socket:
             socket.subscribe(b"")
-            socket.connect(self._samples)
+            _connect(socket, self._samples)
             while not stopping.is_set():
                 if not socket.poll(_LOOK_EVERY):
                     yield None

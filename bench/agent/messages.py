@@ -5,9 +5,9 @@ other socket publishes `AgentStatus` at every change and at least four times a s
 samples in batches (``samples``) and what happened (``event``).
 """
 
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bench.agent.steps import Step
 
@@ -70,10 +70,16 @@ class PrepareCommand(Message):
         "clamped, unclamped; centre: the rod stands at the specimen's middle; tare, clear-tare: the present force "
         "is zero, or no more"
     )
-    position_m: float = Field(
-        default=0.0,
+    position_m: float | None = Field(
+        default=None,
         description="[m] from the specimen's middle, or from home before there is one; where `move` goes",
     )
+
+    @model_validator(mode="after")
+    def _place_of_a_move(self) -> Self:
+        if self.step == "move" and self.position_m is None:
+            raise ValueError("move needs position_m; nothing was done")
+        return self
 
 
 class ShutDownCommand(Message):
@@ -155,14 +161,14 @@ class Samples(Message):
     values: dict[str, list[float | None]] = Field(
         description="by field of `/bench/sample`; null where there is none"
     )
-    segment: str = ""
+    segment: str = Field(default="", description="of the newest of them; empty between segments")
 
 
 class AgentEvent(Message):
     """Something that happened."""
 
     time_ns: int
-    kind: str = Field(description="state, command, alarm, trip, checkpoint, run_started, run_finished")
+    kind: str = Field(description="state, command, alarm, trip, late, checkpoint, run_finished")
     text: str
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 from bench.agent.messages import StepStatus
-from bench.agent.steps import Step
+from bench.agent.steps import MOVING, Step
 from bench.errors import RunError
 from bench.rig.instruments import Rig
 from drivers.errors import DriverError
@@ -35,7 +35,19 @@ class Preparation:
         """Of the last step; none before the first."""
         self._rig, self._move, self._tell, self._over = rig, move, tell, over
         self._ending = threading.Event()
+        self._why = ""
+        self._seeking = False
         self._thread: threading.Thread | None = None
+
+    @property
+    def going(self) -> bool:
+        """Whether a step goes on."""
+        return self._thread is not None and self._thread.is_alive()
+
+    @property
+    def moving(self) -> bool:
+        """Whether one goes on in which the rod moves."""
+        return self.going and self.status is not None and self.status.step in MOVING
 
     def begin(self, step: Step, position: float = 0.0) -> StepStatus:
         """Begin a step, wait a moment for its end, and say how far it is.
@@ -46,23 +58,26 @@ class Preparation:
         """
         self.status = StepStatus(step=step, outcome="going", words=f"{step} goes on")
         self._ending.clear()
+        self._why = ""
         self._thread = threading.Thread(target=self._carry_out, args=(step, position), name=step, daemon=True)
         self._thread.start()
         self._thread.join(_ANSWERED_WITHIN)
         return self.status
 
-    def stop(self) -> None:
-        """Bring the rod to rest where a step moves it; harmless where none goes on."""
-        if self._thread is not None and self._thread.is_alive():
-            self._ending.set()
-            if self.status is not None and self.status.step == "home":
-                self._rig.actuator.make_safe()
+    def stop(self, why: str) -> None:
+        """Let a step that moves the rod end early, for a reason; from any thread, and waits for nothing."""
+        if not self.moving or self._ending.is_set():
+            return
+        self._why = why
+        self._ending.set()
+        if self._seeking:
+            # Nobody leads the rod then, so the drive itself has to be told, and takes its time to answer.
+            threading.Thread(target=self._rig.actuator.make_safe, name="stop", daemon=True).start()
 
-    def end(self, within: float) -> None:
-        """Bring a step that goes on to its end, waiting [s] for it at most."""
-        self.stop()
+    def wait(self, timeout: float) -> None:
+        """Wait [s] for the step to end."""
         if self._thread is not None:
-            self._thread.join(within)
+            self._thread.join(timeout)
 
     def _carry_out(self, step: Step, position: float) -> None:
         self._tell("command", step)
@@ -77,18 +92,26 @@ class Preparation:
             self._over()
 
     def _failed(self, step: Step, words: str) -> None:
+        words = f"{self._why}: {words}" if self._why else words
         self.status = StepStatus(step=step, outcome="failed", words=words)
         self._tell("alarm", words)
 
     def _done(self, step: Step, position: float) -> str:
         """Carry out a step; what is so then, in one sentence."""
         if step == "home":
-            self._rig.actuator.home()
+            self._seek()
             position = 0.0  # where a specimen may be taken; the switch stands beyond that
-        if step in ("home", "move"):
+        if step in MOVING:
             self._move(position, self._ending)
             return f"the rod stands at {_position(self._rig)}"
         return _STILL[step](self._rig)
+
+    def _seek(self) -> None:
+        self._seeking = True
+        try:
+            self._rig.actuator.home()
+        finally:
+            self._seeking = False
 
 
 def _mount(rig: Rig) -> str:

@@ -49,6 +49,11 @@ class Recording:
         self._segment = BETWEEN
         self._begin_ns = begin_ns
 
+    @property
+    def segment(self) -> str:
+        """Name of the segment of the newest sample; empty between segments."""
+        return "" if self._segment == BETWEEN else self._programme.segments[self._segment].name
+
     def take(self, aligned: AlignedSamples) -> Columns:
         """Record samples made since recording began; returns the columns of all with what was commanded."""
         time_ns = aligned.time_ns
@@ -64,6 +69,7 @@ class Recording:
         return columns
 
     def _record(self, time_ns: Times, columns: Columns, segment: Times) -> None:
+        # Samples come some tens of milliseconds late: the first ones handed in are of before the run.
         first = int(np.searchsorted(time_ns, self._begin_ns))
         if first == len(time_ns):
             return

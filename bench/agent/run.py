@@ -1,5 +1,6 @@
 """One run: what was asked for, who carries it out, what became of it."""
 
+import contextlib
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -133,9 +134,18 @@ class Run:
         except Exception as error:  # the log is closed and the next run waits, whatever happened
             self._reason = f"the run failed: {error!r}; this is a defect"
         tripped = settled()
+        # A trip makes setpoints fail, and those end the run: of several reasons it is the first.
         self._reason = tripped or self._reason or self.sequencer.stopped
         self._await_samples(self._clock() + round(_AFTER * 1e9))
-        self._close(facts.clocks)
+        try:
+            self._close(facts.clocks)
+        except Exception as error:  # without an outcome the run would seem to go on for ever
+            self._reason = f"its log does not end in good order: {error!r}; this is a defect"
+            self._outcome = "incomplete"
+            log, self.log = self.log, None
+            if log is not None:
+                with contextlib.suppress(Exception):
+                    log.close("incomplete", self._reason)
 
     def status(self) -> RunStatus:
         """How far it is."""
@@ -192,5 +202,7 @@ class Run:
             outcome = "incomplete" if closed == "truncated" else closed
         except BenchError as error:
             self._reason = str(error)
-        self._lost, self._outcome = lost, outcome
+        # The outcome last: who sees one takes all else for final.
+        self._lost = lost
+        self._outcome = outcome
         self.log = None

@@ -92,6 +92,7 @@ class Runner:
         # The way to where a method begins may lie outside of where the method stays.
         self._limit_by(run.what.method, without="displacement")
         self._interlocks.expect_force(self._clock())
+        # An instrument that comes back begins its numbers and its clock anew, and would be set up mid-stroke.
         self._acquisition.reconnect, self._warden.plan = False, run.plan
         raise_priority(-HASTE)
         pause_collection()

@@ -17,6 +17,7 @@ from bench.agent.messages import (
     StatusCommand,
     StopCommand,
 )
+from bench.agent.ownership import sole_agent
 from bench.errors import RunError
 from bench.rig.config import load_config
 from bench.run_on_rig import stopped_by_signals
@@ -41,12 +42,13 @@ def serve_agent(
 
     Raises:
         ConfigError: the configuration does not describe a bench.
-        RunError: an address cannot be had, or an instrument does not answer.
+        RunError: another agent has the bench, an address cannot be had, or an instrument does not answer.
     """
     config = load_config(path)
     stopping = threading.Event()
     with (
         stopped_by_signals(stopping),
+        sole_agent(path),
         CommandServer(commands or config.agent.commands) as server,
         Publisher(samples or config.agent.samples) as publisher,
     ):

@@ -4,3 +4,5 @@ from typing import Literal, TypeAlias
 
 Step: TypeAlias = Literal["home", "move", "mount", "centre", "unmount", "tare", "clear-tare"]
 """What can be done before a run."""
+MOVING: tuple[Step, ...] = ("home", "move")
+"""Those in which the rod moves."""

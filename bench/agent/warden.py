@@ -6,6 +6,8 @@ waits for nobody.
 
 import threading
 from collections.abc import Callable, Mapping
+from itertools import chain
+from typing import Any
 
 from bench.rig.acquisition import Batch
 from bench.rig.clock_map import ClockMap
@@ -31,7 +33,7 @@ class Warden:
         interlocks: that judge.
         clock: of the bench [ns].
         maps: of the instruments' clocks, by name.
-        tell: told of what happens: kind, words.
+        tell: told of what happens: kind, words, and as names what more is known.
         stop: ends a run in good order.
     """
 
@@ -41,7 +43,7 @@ class Warden:
         interlocks: Interlocks,
         clock: Callable[[], int],
         maps: Mapping[str, ClockMap],
-        tell: Callable[[str, str], None],
+        tell: Callable[..., None],
         stop: Stop,
     ) -> None:
         self.plan: RunPlan | None = None
@@ -70,26 +72,29 @@ class Warden:
     def late(self, now_ns: int, late: float) -> None:
         """A setpoint left late [s]; the log says when, for then the rod may not have moved as it should."""
         if late * 1e9 > _TOLD_CYCLES * self._cycle_ns:
-            self._tell("late", f"a setpoint left {1e3 * late:.1f} ms late")
+            self._tell(
+                "late", f"a setpoint left {1e3 * late:.1f} ms late", quantity="setpoint_lateness", value=late
+            )
         for verdict in self._interlocks.check_value("setpoint_lateness", late, now_ns):
             self._act_on(verdict)
 
-    def act(self, action: Action, why: str) -> None:
-        """Do what an action means."""
+    def act(self, action: Action, why: str, **more: Any) -> None:
+        """Do what an action means; what more is known of its cause goes into the log."""
         if action is Action.TRIP:
-            self.trip(why)
+            self.trip(why, **more)
         elif action is not Action.NONE:
-            self._tell("alarm", why)
+            self._tell("alarm", why, **more)
             if action is not Action.INDICATE:
                 self._stop(why, action is Action.HOLD)
 
-    def trip(self, why: str) -> None:
+    def trip(self, why: str, **more: Any) -> None:
         """Bring coil and actuator to rest at once, each in a thread of its own; latched."""
         if not self._interlocks.latch(why):
             return
+        # To rest first, then words: to tell of it may wait for a lock, to act on it must not.
         self._rest = threading.Thread(target=self._bring_to_rest, name="trip", daemon=True)
         self._rest.start()
-        self._tell("trip", why)
+        self._tell("trip", why, **more)
         self._stop(why, False)
 
     def settled(self) -> str:
@@ -99,18 +104,20 @@ class Warden:
         return self._interlocks.tripped
 
     def _act_on(self, verdict: Verdict) -> None:
-        self.act(verdict.action, str(verdict))
+        self.act(verdict.action, str(verdict), quantity=verdict.quantity, value=verdict.value, limit=verdict.limit)
 
     def _bring_to_rest(self) -> None:
         rest = bring_to_rest([self._rig.amplifier, self._rig.actuator])
         self._tell("state", f"brought to rest: {rest}")
 
     def _following_error(self, batch: Batch, plan: RunPlan) -> float:
-        """The samples of a batch are one cycle apart."""
+        """Of all samples of a batch: their numbers say how many cycles they lie apart, lost ones included."""
         positions = [block for block in batch.blocks if block.channel == "actuator_position"]
-        values = [value for block in positions for value in block.values.tolist()]
-        last = self._taken_ns(batch.instrument, positions[-1])
-        times = range(last - (len(values) - 1) * self._cycle_ns, last + 1, self._cycle_ns)
+        values = list(chain.from_iterable(block.values.tolist() for block in positions))
+        numbers = chain.from_iterable(range(block.first, block.first + len(block.values)) for block in positions)
+        newest = positions[-1].first + len(positions[-1].values) - 1
+        taken_ns = self._taken_ns(batch.instrument, positions[-1])
+        times = [taken_ns - (newest - number) * self._cycle_ns for number in numbers]
         return following_error(values, times, plan.position)
 
     def _taken_ns(self, instrument: str, block: Block) -> int:

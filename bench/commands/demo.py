@@ -13,7 +13,11 @@ def demo(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where everything goes.")] = Path("runs/demo"),
     serve: Annotated[bool, typer.Option("--serve", help="Leave the bench up in the end, with its page.")] = False,
 ) -> None:
-    """Bring up a simulated bench, record six drives over its wires, identify the damper, write a report."""
+    """Bring up a simulated bench and show all of it at work.
+
+    It records six drives over its wires, identifies the damper, predicts strokes that the fit never saw, looks for
+    what the simulation lacks, and writes a report.
+    """
     from rich.console import Console
 
     from bench.demo.demo import Demo

@@ -16,9 +16,9 @@ def export(
         typer.Option(metavar="FILE", help="The file to write; by default beside the log, under its name."),
     ] = None,
 ) -> None:
-    """Write the samples of a log for other tools, with the unit in every column's name.
+    """Write the samples of a log for other tools.
 
-    A CSV can be imported again with `mrbench import`.
+    The unit stands in every column's name. A CSV can be imported again with `mrbench import`.
     """
     from bench.recorder.export import FORMATS, export_log
     from bench.recorder.reader import read_log

@@ -1,7 +1,7 @@
 """``mrbench prepare``: what a technician does before a run."""
 
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import Annotated, cast, get_args
 
 import typer
 
@@ -24,14 +24,21 @@ def prepare(
         "bench.toml"
     ),
 ) -> None:
-    """Home the rod, move it, say that a specimen is clamped or not, find its middle, tare: by the agent that runs.
+    """Do what comes before a run: home, move, clamp, centre, tare.
+
+    The agent that runs (`mrbench rig` or `mrbench serve`) does it.
 
     home seeks the reference and goes to the middle of the travel; it is refused with a specimen clamped. move goes
     where --to says. mount and unmount say that a specimen has been clamped or unclamped. centre makes the place
     where the rod stands the zero of positions. tare takes the present force off, clear-tare does so no more.
+    Ctrl-C brings the rod to rest.
     """
     from bench.agent.prepare import prepare_through_agent
 
+    if step not in get_args(Step):
+        raise typer.BadParameter(f"there is no step {step}; there are {_STEPS}")
     if step == "move" and to is None:
         raise typer.BadParameter("say where the rod is to go: --to METRES")
-    typer.echo(prepare_through_agent(config, step, to or 0.0))
+    if step != "move" and to is not None:
+        raise typer.BadParameter(f"--to says where move goes; {step} takes none")
+    typer.echo(prepare_through_agent(config, cast(Step, step), to))

@@ -21,9 +21,10 @@ def replay(
         ),
     ] = None,
 ) -> None:
-    """Decode the raw frames of a log anew and check that the same readings come out, bit for bit.
+    """Check that the raw frames of a log still give its readings.
 
-    With --publish the samples are then played to live views. Exits with 1 where a reading differs.
+    They are decoded anew by the drivers, and compared bit for bit; exits with 1 where a reading differs. With
+    --publish the samples are then played to live views.
     """
     from bench.recorder.reader import read_log
     from bench.replay.compare import replay_frames

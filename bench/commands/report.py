@@ -23,7 +23,10 @@ def report(
         Path | None, typer.Option(metavar="DIR", help="Also write the plots there, as SVG and PNG.")
     ] = None,
 ) -> None:
-    """Write one self-contained page: recorded over simulated force, errors, parameters with intervals, words."""
+    """Write one self-contained page of a recording.
+
+    It shows recorded over simulated force, errors, parameters with intervals, and says in words what falls short.
+    """
     import shlex
     from datetime import UTC, datetime
 

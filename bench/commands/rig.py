@@ -17,7 +17,10 @@ def rig(
         str | None, typer.Option(metavar="ADDRESS", help="ZeroMQ address that publishes, else as configured.")
     ] = None,
 ) -> None:
-    """Own the instruments of a bench and run methods on them, until Ctrl-C or SIGTERM."""
+    """Own the instruments of a bench and do what others ask of it.
+
+    Until Ctrl-C or SIGTERM; others are `mrbench prepare` and the service.
+    """
     from bench.agent.serve import serve_agent
 
     serve_agent(config, commands, samples, lambda line: typer.echo(line), lambda line: typer.echo(line, err=True))

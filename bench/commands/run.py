@@ -32,7 +32,11 @@ def run(
         int | None, typer.Option(help="Of everything that chance decides on the simulated rig.")
     ] = None,
 ) -> None:
-    """Run a method once and record it; with --scenario from the simulated plant, faster than real time."""
+    """Run a method once and record it.
+
+    On the instruments of --config, with an agent of its own; or with --scenario from the simulated plant, without
+    wires and faster than real time.
+    """
     if dry_run and planned is not None:
         return _write_samples(method, planned)
     if dry_run:

@@ -36,7 +36,10 @@ def serve(
         bool, typer.Option("--new-token", help="Make another token; the old one opens nothing any more.")
     ] = False,
 ) -> None:
-    """Serve REST interface, live values and page; start rig agent and one worker unless told where they are."""
+    """Serve REST interface, live values and page.
+
+    Starts a rig agent and one worker, unless told where they are. Prints the page's address, its token once.
+    """
     from bench.service.serving import Wanted
     from bench.service.serving import serve as serve_until_told_to_end
 

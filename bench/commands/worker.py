@@ -19,7 +19,10 @@ def worker(
         ),
     ] = 19,
 ) -> None:
-    """Carry out identification jobs, one at a time at the lowest priority, until the scheduler goes."""
+    """Carry out identification jobs, one at a time.
+
+    At the lowest priority, until the scheduler goes.
+    """
     from bench.jobs.worker import run_worker, scheduler_of
     from bench.service.log_lines import log_to_stderr
 

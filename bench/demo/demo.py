@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 from rich.console import Console
 
+from bench.child_process import MRBENCH
 from bench.demo.folder import DemoFolder
-from bench.demo.processes import MRBENCH, processes
+from bench.demo.processes import processes
 from bench.demo.recording import await_fit, record
 from bench.demo.rest import Rest
 from bench.demo.summary import summarise

@@ -3,19 +3,17 @@
 import contextlib
 import socket
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from bench.agent.link import AgentClient
 from bench.agent.messages import ShutDownCommand, StatusCommand
-from bench.child_process import end
+from bench.child_process import MRBENCH, end
 from bench.demo.folder import DemoFolder
 from bench.errors import AgentUnreachable, RunError
 from bench.rig.config import load_config
 
-MRBENCH = (sys.executable, "-m", "bench.cli")
 _UP_WITHIN = 120.0
 """[s] for a process to be ready; the rig compiles at its first start."""
 _THERE_WITHIN = 2.0

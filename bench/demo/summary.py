@@ -37,12 +37,13 @@ def summarise(demo: DemoFolder, console: Console) -> None:
 
 def held_up(events: Sequence[Mapping[str, Any]]) -> str:
     """What a busy machine did to a recording, from the log's events; empty where it did nothing."""
-    late = [event["text"] for event in events if event["kind"] == "alarm" and "setpoint lateness" in event["text"]]
-    if not late:
+    late = [event for event in events if event.get("quantity") == "setpoint_lateness"]
+    if all(event["kind"] != "alarm" for event in late):
         return ""
+    worst = max(event["value"] for event in late)
     return (
-        f"this machine held the setpoints up ({late[0]}). The rod stumbled there, and numbers may be further off "
-        "than their intervals say; record again while less goes on."
+        f"this machine held the setpoints up, for {1e3 * worst:.0f} ms at worst. The rod stumbled there, and "
+        "numbers may be further off than their intervals say; record again while less goes on."
     )
 
 

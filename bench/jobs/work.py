@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from bench.child_process import Lines, read_along
+from bench.child_process import MRBENCH, Lines, read_along
 from bench.errors import BenchError
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.order import FIT, REPORT, Order, Summary
@@ -23,7 +23,6 @@ LOOK_EVERY = 0.25
 """[s] between two looks whether somebody wants the end."""
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """A job keeps to one core; the other belongs to the rig."""
-MRBENCH = (sys.executable, "-m", "bench.cli")
 LEASH = (sys.executable, "-m", "bench.jobs.leash")
 
 

@@ -155,6 +155,7 @@ class LiveRecorder:
         if self._thread.is_alive():
             raise LogError(f"{self.path}: the disk has not taken what was recorded within {CLOSE_WITHIN:g} s")
         if self._error is not None:
+            # What reached the disk can be mended; an end that says so makes it easier, if there is room for one.
             with contextlib.suppress(LogError):
                 self._log.close("incomplete", str(self._error))
             raise self._error

@@ -81,8 +81,11 @@ class Event(BaseModel):
     model_config = ConfigDict(frozen=True, extra="allow")
 
     timestamp: Timestamp = Field(description="[s] bench clock")
-    kind: str = Field(description="what sort of event: state, command, alarm, trip, checkpoint, ...")
+    kind: str = Field(description="what sort of event: state, command, alarm, trip, late, checkpoint, ...")
     text: str = Field(description="what happened, in words")
+    quantity: str | None = Field(default=None, description="what was judged, of an alarm or a trip: force, ...")
+    value: float | None = _quantity("value that it had, in the quantity's own unit", "SI", default=None)
+    limit: float | None = _quantity("limit that it exceeded, in the same unit", "SI", default=None)
 
 
 def _list_of(text: str, unit: str) -> Any:
@@ -128,7 +131,7 @@ FAMILIES: dict[str, type[BaseModel]] = {INSTRUMENT: Readings, WIRE: Frames}
 """Message type by the beginning of a topic, for topics that end with the name of an instrument."""
 
 SAMPLE_FIELDS: tuple[str, ...] = tuple(name for name in Sample.model_fields if name != "timestamp")
-REQUIRED_FIELDS: tuple[str, ...] = SAMPLE_FIELDS[:4]
+REQUIRED_FIELDS: tuple[str, ...] = tuple(name for name in SAMPLE_FIELDS if Sample.model_fields[name].is_required())
 
 
 def model_of(topic: str) -> type[BaseModel]:

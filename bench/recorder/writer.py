@@ -1,11 +1,9 @@
-"""Writes a log so that a kill at any moment costs a fraction of a second.
+"""Writes a log: what each message says, what stands at its beginning and at its end.
 
-A chunk is closed after 0.2 s of bench or wall time, whichever comes first, or when it is large; a closed chunk
-goes to the operating system at once and to the disk four times a second. The file has its final name from the
-start: what a kill leaves there, ``mrbench salvage`` mends.
+When things reach the disk is the business of `bench.recorder.paced_file`; what a kill leaves there, ``mrbench
+salvage`` mends.
 """
 
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -20,7 +18,7 @@ import orjson
 from bench.errors import LogError
 from bench.recorder.columns import SECOND, checked_fields, not_finite, not_increasing, sample_messages
 from bench.recorder.header import RunHeader, text_values
-from bench.recorder.mcap_file import file_errors, finish, flush, started_writer
+from bench.recorder.mcap_file import file_errors
 from bench.recorder.messages import (
     EVENT,
     MESSAGES,
@@ -32,15 +30,8 @@ from bench.recorder.messages import (
     Phase,
     Segment,
     Timestamp,
-    message_schema,
-    schema_name,
 )
-
-CHUNK_TIME = 0.2
-"""[s] of bench or wall time after which a chunk is closed."""
-
-SYNC_PERIOD = 0.25
-"""[s] of wall time between two syncs to the disk."""
+from bench.recorder.paced_file import PacedFile
 
 _README = """This is a log of a damper test in the MCAP format, profile mrbench (https://mcap.dev).
 
@@ -101,32 +92,25 @@ class LogWriter:
             LogError: the file cannot be written.
         """
         self.path = Path(path)
-        self._clock = clock
-        self._written: Counter[str] = Counter()
         self._lost: Counter[str] = Counter()
         self._last = -1
-        self._chunk_start: int | None = None
-        self._chunk_opened = self._synced = clock()
         self._closed = False
-        self._schemas: dict[str, int] = {}
-        self._topics: dict[str, int] = {}
         with file_errors(self.path):
-            self._file = self.path.open("wb")
+            self._file = PacedFile(self.path, clock)
             try:
-                self._mcap = started_writer(self._file)
                 self._begin(header)
             except BaseException:
-                self._file.close()
+                self._file.abandon()
                 raise
 
     def _begin(self, header: RunHeader) -> None:
         """What stands before the first sample, so that a log cut off there still says whose it is."""
         for topic in MESSAGES:
-            self._register(topic)
+            self._file.register(topic)
         for name, record in header.records().items():
-            self._mcap.add_metadata(name, record)
+            self._file.record(name, record)
         self.attach("README.txt", "text/plain", _README.encode())
-        self._to_disk()
+        self._file.to_disk()
 
     def __enter__(self) -> Self:
         """The writer itself."""
@@ -180,20 +164,20 @@ class LogWriter:
         """Mark one end of a segment; ``time_ns`` is the bench clock [ns] of its first sample, or of its last."""
         mark = Segment(timestamp=Timestamp(**_clock_fields(time_ns)), **{**_WITHOUT_SIZE, **end})
         with file_errors(self.path):
-            self._put(SEGMENT, time_ns, mark.model_dump_json().encode())
+            self._file.put(SEGMENT, time_ns, mark.model_dump_json().encode())
 
     def event(self, time_ns: int, kind: str, text: str, **more: Any) -> None:
         """Write an event.
 
         Args:
             time_ns: bench clock [ns].
-            kind: state, command, alarm, trip, checkpoint, ...
+            kind: state, command, alarm, trip, late, checkpoint, ...
             text: what happened, in words.
             more: further fields of the message.
         """
         event = Event(timestamp=Timestamp(**_clock_fields(time_ns)), kind=kind, text=text, **more)
         with file_errors(self.path):
-            self._put(EVENT, time_ns, event.model_dump_json().encode())
+            self._file.put(EVENT, time_ns, event.model_dump_json(exclude_none=True).encode())
 
     def message(self, topic: str, time_ns: int, content: bytes) -> None:
         """Write a message of an instrument or its wire.
@@ -204,21 +188,18 @@ class LogWriter:
             content: JSON that keeps to the topic's schema.
         """
         with file_errors(self.path):
-            if topic not in self._topics:
-                self._register(topic)
-            self._put(topic, time_ns, content)
+            self._file.register(topic)
+            self._file.put(topic, time_ns, content)
 
     def record(self, name: str, values: Mapping[str, Any]) -> None:
         """Write a metadata record: what is known only after the recording has begun."""
         with file_errors(self.path):
-            flush(self._mcap)
-            self._mcap.add_metadata(name, text_values(values))
+            self._file.record(name, text_values(values))
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Keep a document in the log: the method, a configuration, a certificate."""
         with file_errors(self.path):
-            moment = max(self._last, 0)
-            self._mcap.add_attachment(moment, moment, name, media_type, data)
+            self._file.attach(max(self._last, 0), name, media_type, data)
 
     def lost(self, channel: str, samples: int = 1) -> None:
         """Count samples of a channel that could not be recorded; the log will close as ``lossy``."""
@@ -242,55 +223,25 @@ class LogWriter:
         if self._closed:
             raise LogError(f"{self.path}: this log is closed")
         self._closed = True
-        with file_errors(self.path), self._file:
-            # A record goes past the open chunk into the file: the outcome has to stand behind the last sample.
-            flush(self._mcap)
-            self._mcap.add_metadata(
-                "outcome", self._outcome(outcome or ("lossy" if self._lost else "clean"), reason)
-            )
-            finish(self._mcap)
-            self._file.flush()
-            os.fsync(self._file.fileno())
+        ended = outcome or ("lossy" if self._lost else "clean")
+        with file_errors(self.path):
+            try:
+                self._file.record("outcome", self._outcome(ended, reason))
+            except BaseException:
+                self._file.abandon()
+                raise
+            self._file.close()
 
     def _outcome(self, outcome: Outcome, reason: str) -> dict[str, str]:
-        counts = {topic: self._written[topic] for topic in self._topics}
+        counts = {topic: self._file.written[topic] for topic in self._file.topics}
         last = {"last_time_ns": self._last}
         return text_values({"outcome": outcome, "reason": reason, **counts, "lost": dict(self._lost), **last})
-
-    def _register(self, topic: str) -> None:
-        name = schema_name(topic)
-        if name not in self._schemas:
-            content = orjson.dumps(message_schema(topic))
-            self._schemas[name] = self._mcap.register_schema(name, "jsonschema", content)
-        self._topics[topic] = self._mcap.register_channel(topic, "json", self._schemas[name])
 
     def _put_sample(self, time_ns: int, message: bytes) -> None:
         if time_ns <= self._last:
             raise not_increasing(self._last, time_ns)
         self._last = time_ns
-        self._put(SAMPLE, time_ns, message)
-
-    def _put(self, topic: str, time_ns: int, message: bytes) -> None:
-        start = self._chunk_start
-        if start is not None and (
-            time_ns - start >= CHUNK_TIME * SECOND or self._clock() - self._chunk_opened >= CHUNK_TIME
-        ):
-            self._end_chunk()
-        if self._chunk_start is None:
-            self._chunk_start, self._chunk_opened = time_ns, self._clock()
-        self._mcap.add_message(self._topics[topic], time_ns, message, time_ns, self._written[topic])
-        self._written[topic] += 1
-
-    def _end_chunk(self) -> None:
-        flush(self._mcap)
-        self._chunk_start = None
-        if self._clock() - self._synced >= SYNC_PERIOD:
-            self._to_disk()
-
-    def _to_disk(self) -> None:
-        flush(self._mcap)
-        os.fsync(self._file.fileno())
-        self._synced = self._clock()
+        self._file.put(SAMPLE, time_ns, message)
 
 
 def _clock_fields(time_ns: int) -> dict[str, int]:

@@ -1,7 +1,6 @@
 """The force that a fit predicts for a log, got from ``mrbench predict`` as a process."""
 
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,6 +9,7 @@ from zipfile import BadZipFile
 import numpy as np
 import numpy.typing as npt
 
+from bench.child_process import MRBENCH
 from bench.errors import ReportError
 from bench.report.documents import Prediction, read_prediction
 
@@ -35,7 +35,7 @@ def predict(fit: Path, log: Path) -> tuple[Prediction, Series]:
     """
     with TemporaryDirectory(prefix="mrbench-report-") as folder:
         answer, series = Path(folder, "prediction.json"), Path(folder, "series.npz")
-        command = [sys.executable, "-m", "bench.cli", "predict", str(fit), str(log)]
+        command = [*MRBENCH, "predict", str(fit), str(log)]
         done = _call([*command, "--out", str(answer), "--series", str(series)])
         if done.returncode != 0:
             said = done.stderr.strip().splitlines() or [f"exit status {done.returncode}"]

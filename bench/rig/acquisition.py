@@ -159,6 +159,7 @@ class _Wire:
 
     def _turn(self) -> None:
         blocks = self._instrument.acquire(self._patience())
+        # The clock before the samples: whoever takes them asks at once when they were made.
         stamp = getattr(self._instrument, "stamp", None)
         if stamp is not None and stamp is not self._stamp:
             self._stamp = stamp

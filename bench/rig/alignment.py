@@ -167,6 +167,7 @@ class Aligner:
         for name, track in self._tracks.items():
             if name == "force" or name in HELD or not track.size:
                 continue
+            # Velocity is the displacement's slope, which needs samples on both sides of an instant.
             reach = track.newest if final or name != "displacement" else track.newest - track.half_window
             if newest - reach <= PATIENCE_NS and not final:
                 limit = min(limit, reach)

@@ -9,7 +9,15 @@ from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError, model_validator
+from pydantic import (
+    Field,
+    NonNegativeFloat,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from bench.errors import ConfigError
 from bench.faults import first_fault
@@ -47,6 +55,13 @@ class ActuatorSection(Frozen):
         description="[s] without a setpoint until the drive stops by itself; by default 0.05, or 0.15 where the "
         "agent gets no real-time priority",
     )
+
+    @field_validator("travel")
+    @classmethod
+    def _with_room(cls, travel: tuple[float, float]) -> tuple[float, float]:
+        if not travel[0] < travel[1]:
+            raise ValueError("the least position stands first, the largest second")
+        return travel
 
 
 class LoadCellSection(Frozen):
@@ -179,6 +194,22 @@ class LimitsSection(Frozen):
 ActionName: TypeAlias = Literal["none", "indicate", "hold", "controlled_stop", "trip"]
 
 
+ROLES: dict[str, tuple[str, ...]] = {
+    "actuator": ("actuator",),
+    "load_cell": ("load_cell", "ascii_load_cell"),
+    "lvdt": ("lvdt",),
+    "coil_amplifier": ("coil_amplifier",),
+    "thermometer": ("thermometer",),
+}
+"""What there is one of on a bench, and the drivers that can be it."""
+_OPTIONAL = ("thermometer",)
+
+
+def role_of(driver: str) -> str:
+    """What an instrument of a driver is on the bench."""
+    return next(role for role, drivers in ROLES.items() if driver in drivers)
+
+
 class SilenceSection(Frozen):
     """What is done when an instrument falls silent while a run goes on; lost samples make it lossy in any case."""
 
@@ -190,7 +221,7 @@ class SilenceSection(Frozen):
 
     def action(self, driver: str) -> Action:
         """For an instrument of a driver."""
-        name: ActionName = getattr(self, "load_cell" if driver == "ascii_load_cell" else driver)
+        name: ActionName = getattr(self, role_of(driver))
         return Action[name.upper()]
 
 
@@ -212,12 +243,6 @@ class AgentSection(Frozen):
 ChannelName: TypeAlias = Literal[
     "displacement", "force", "actuator_position", "coil_voltage", "coil_current", "temperature"
 ]
-_EXACTLY_ONE = {
-    "actuator": ("actuator",),
-    "load cell": ("load_cell", "ascii_load_cell"),
-    "lvdt": ("lvdt",),
-    "coil amplifier": ("coil_amplifier",),
-}
 
 
 class BenchConfig(Frozen):
@@ -233,12 +258,11 @@ class BenchConfig(Frozen):
     @model_validator(mode="after")
     def _one_of_each(self) -> Self:
         there: Counter[str] = Counter(section.driver for section in self.instruments.values())
-        for what, drivers in _EXACTLY_ONE.items():
+        for role, drivers in ROLES.items():
             count = sum(there[driver] for driver in drivers)
-            if count != 1:
-                raise ValueError(f"{count} instruments with driver {' or '.join(drivers)}; a bench has one {what}")
-        if there["thermometer"] > 1:
-            raise ValueError(f"{there['thermometer']} thermometers; a bench has one or none")
+            if count > 1 or (count == 0 and role not in _OPTIONAL):
+                allowed = "one of them, or none" if role in _OPTIONAL else "one of them"
+                raise ValueError(f"{count} instruments with driver {' or '.join(drivers)}; a bench has {allowed}")
         return self
 
 

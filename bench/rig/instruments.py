@@ -16,6 +16,7 @@ from bench.rig.config import (
     LvdtSection,
     ModbusSection,
     ThermometerSection,
+    role_of,
 )
 from drivers.actuator import Actuator
 from drivers.ascii_load_cell import AsciiLoadCell
@@ -74,7 +75,7 @@ class Rig:
         with contextlib.ExitStack() as opened:
             faults: list[DriverError] = []
             for one in self.named:
-                opened.callback(_closed, one.instrument)
+                opened.callback(_closed, one.instrument)  # before: one that fails half-way is closed, too
                 try:
                     one.instrument.connect()
                 except DriverError as error:
@@ -112,15 +113,15 @@ def build_rig(config: BenchConfig, clock: Clock, *, prompt: bool) -> Rig:
         Named(name, section.driver, _address(section), cast("Instrument", _built(name, section, clock, prompt)))
         for name, section in config.instruments.items()
     )
-    by_driver = {one.driver: one.instrument for one in named}
+    by_role = {role_of(one.driver): one.instrument for one in named}
     section = next(one for one in config.instruments.values() if isinstance(one, CoilAmplifierSection))
     by_current = section.mode == "current"
     return Rig(
-        actuator=cast("Actuator", by_driver["actuator"]),
-        load_cell=cast("LoadCell", by_driver.get("load_cell") or by_driver["ascii_load_cell"]),
-        lvdt=cast("Lvdt", by_driver["lvdt"]),
-        amplifier=cast("CoilAmplifier", by_driver["coil_amplifier"]),
-        thermometer=cast("Thermometer | None", by_driver.get("thermometer")),
+        actuator=cast("Actuator", by_role["actuator"]),
+        load_cell=cast("LoadCell | AsciiLoadCell", by_role["load_cell"]),
+        lvdt=cast("Lvdt", by_role["lvdt"]),
+        amplifier=cast("CoilAmplifier", by_role["coil_amplifier"]),
+        thermometer=cast("Thermometer | None", by_role.get("thermometer")),
         named=named,
         drive_kind="coil_a" if by_current else "coil_v",
         drive_unit=DRIVE_UNITS[section.mode],

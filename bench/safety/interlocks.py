@@ -113,6 +113,7 @@ class Interlocks:
         if quantity is None or not len(block.values):
             return
         worst = _largest(block.values.tolist())  # plain numbers: blocks are short, and arrays the slower way
+        # A sample that is bad came in time, and says nothing of the force: it must not count as news of it.
         expected = self._force_ns is not None
         if expected and block.channel == "force" and block.quality != "bad" and not math.isnan(worst):
             self._force_ns = block.received_ns
@@ -127,6 +128,7 @@ class Interlocks:
         fresh = []
         for verdict in sorted(verdicts, key=lambda one: one.action, reverse=True):
             key = verdict.quantity, verdict.action
+            # By action, too: what was an alarm a moment ago and is a trip now is news.
             if now_ns - self._told.get(key, -(2**62)) >= _AGAIN * 1e9:
                 self._told[key] = now_ns
                 fresh.append(verdict)

@@ -164,6 +164,7 @@ class LeadThread:
     def _run(self) -> None:
         self.warning = raise_priority(HASTE)
         cycle = self._lead.cycle_ns
+        # At whole cycles of the bench clock: those who take the drive's answers are woken by the same clock.
         due = self._clock() // cycle * cycle
         try:
             while not self._stopping.is_set():

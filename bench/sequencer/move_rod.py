@@ -41,18 +41,23 @@ def move_rod(
         DriverError: the drive refuses, or has gone; the place is forbidden.
     """
     permit(target)
+    if ending.is_set():
+        raise RunError("the move was broken off before it began")
     settings = actuator.settings
     lead = Lead(actuator, permit, RunPlan(), settings.cycle, settings.stale_after)
     thread = LeadThread(lead, clock, lambda now_ns, late: None, lambda error: None)
     way = approach(actuator.arm(), target)
     lead.play(way)
     led(True)
+    stands = False
     try:
         with thread:
             _await_rest(lead, thread, clock, time.monotonic() + way.duration + _SPARE, ending)
+        stands = thread.failure is None
     finally:
         led(False)
-        actuator.rest() if thread.failure is None else actuator.make_safe()
+        # A rod that may still move is braked by the drive; without voltage it would coast.
+        actuator.rest() if stands else actuator.make_safe()
     if thread.failure is not None:
         raise thread.failure
     if ending.is_set():

@@ -128,6 +128,8 @@ class Sequencer:
         parts = passages(programme, self._amplifier.table_capacity, first)
         self._check(programme)
         self._acceleration = programme.method.limits.acceleration_mps2
+        if self._ending.is_set():  # stopped before anything was switched on: nothing has to come to rest
+            return
         try:
             here = self._actuator.arm()
             self._lead.stand(here)
@@ -190,6 +192,7 @@ class Sequencer:
                 self._guard.permit()
                 self._amplifier.arm()
             except Exception:
+                # The run is to end in good order; in a silence that lasts the drive would stop by itself.
                 self._lead.stand(float(part.programme.displacement[part.start]))
                 raise
             started = self._lead.play(part.track, part)

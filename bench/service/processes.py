@@ -4,19 +4,17 @@ import asyncio
 import contextlib
 import logging
 import subprocess
-import sys
 import time
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 
 from bench.agent.messages import ShutDownCommand, StatusCommand
-from bench.child_process import end
+from bench.child_process import MRBENCH, end
 from bench.errors import AgentUnreachable
 from bench.jobs.engine import DaskEngine, local_scheduler
 from bench.service.agent_watch import AgentLink
 from bench.service.errors import ServiceError
 
-MRBENCH = (sys.executable, "-m", "bench.cli")
 AGENT_WITHIN = 90.0
 """[s] from its start to an agent's first answer."""
 LONGEST_PAUSE = 30.0

@@ -68,7 +68,8 @@ def test_salvaged_log_says_of_itself_that_it_is_truncated(killed):
     log = read_log(killed[0])
 
     assert log.outcome == "truncated"
-    assert float(log.metadata["outcome"]["seconds_lost"]) >= 0
+    # Of what the file itself speaks of, at most the chunk that was being written.
+    assert 0 <= float(log.metadata["outcome"]["seconds_lost"]) < 0.5
     assert log.metadata["run"]["id"] == "endless"
 
 

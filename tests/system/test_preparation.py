@@ -97,7 +97,20 @@ def test_a_stop_breaks_homing_off_and_the_rod_rests(bench):
     until(bench.rests)
 
 
-def test_an_unknown_step_is_answered_with_those_that_exist(bench):
+def test_an_unknown_step_is_misuse_and_answered_with_those_that_exist(bench):
     code, said = prepare(bench, "lubricate")
-    assert code == 1
+    assert code == 2
     assert "home, move, mount, centre, unmount, tare, clear-tare" in said
+
+
+def test_nobody_else_has_the_wires_meanwhile(bench):
+    """The coil's and the drive's would let a second agent in, and be brought to rest by it."""
+    done = subprocess.run(
+        [COMMAND, "run", bench.write_method(), "--config", bench.toml, "--out", bench.log],
+        capture_output=True,
+        text=True,
+        timeout=DEADLINE,
+    )
+    assert (done.returncode, len(done.stderr.strip().splitlines())) == (1, 1)
+    assert "another rig agent has this bench; end it" in done.stderr
+    assert not bench.log.exists()

@@ -9,7 +9,8 @@ import numpy as np
 
 from drivers.modbus_address import ModbusAddress
 from sim_rig.modbus_frames import MBAP, RTU
-from sim_rig.modbus_server import Device, ModbusServer
+from sim_rig.modbus_requests import Device
+from sim_rig.modbus_server import ModbusServer
 
 MS = 1_000_000
 TIMEOUT = 0.1

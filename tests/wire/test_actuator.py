@@ -10,10 +10,11 @@ from can_rig import PATIENT, CanRig, Leader, connected, positions, sine, wait_un
 
 from drivers.actuator import Actuator
 from drivers.can_bus import CanAddress, pack_frame, unpack_frame
-from drivers.cia402 import FaultKind, Mounting
+from drivers.cia402 import FaultKind
 from drivers.errors import NoReply, OutOfRange, Refused
+from drivers.mounting import Mounting
 from drivers.servo_drive import ActuatorSettings
-from sim_rig.canopen_actuator import Machine
+from sim_rig.drive_senses import Machine
 from sim_rig.drive_states import State
 
 pytestmark = pytest.mark.timeout(60)

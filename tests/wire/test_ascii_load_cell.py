@@ -5,7 +5,8 @@ import pytest
 import serial
 from serial_examples import KnownForce, awaited, collected, joined, numbers, same
 
-from drivers.ascii_load_cell import AsciiLoadCell, ReadingStream
+from drivers.ascii_load_cell import AsciiLoadCell
+from drivers.ascii_load_cell_stream import ReadingStream
 from drivers.errors import NoReply, NotConnected, OutOfRange
 from sim_rig.serial_ascii_load_cell import serial_ascii_load_cell
 from sim_rig.serial_port import corrupted, cut, lost, with_garbage

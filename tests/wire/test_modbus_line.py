@@ -12,8 +12,9 @@ from pymodbus.client import ModbusTcpClient
 from drivers.errors import BadReply, DriverError, NoReply, NotConnected, Refused
 from drivers.modbus_address import ModbusAddress
 from drivers.modbus_line import ModbusLine
-from sim_rig import modbus_server
-from sim_rig.modbus_server import Illegal, WireFault
+from sim_rig import modbus_requests
+from sim_rig.modbus_requests import Illegal
+from sim_rig.modbus_server import WireFault
 
 pytestmark = pytest.mark.timeout(60)
 
@@ -207,14 +208,14 @@ def test_several_threads_get_their_own_answers(wire):
 
 
 def test_an_instrument_without_the_echo_function_is_found_again_too(monkeypatch):
-    known = modbus_server._content
+    known = modbus_requests._content
 
     def content(device, function, body):
         if function == 8:
             raise Illegal(1)
         return known(device, function, body)
 
-    monkeypatch.setattr(modbus_server, "_content", content)
+    monkeypatch.setattr(modbus_requests, "_content", content)
     with served(Echo(), "rtu over pty") as (server, address):
         line = ModbusLine("echo", address, 1, time.monotonic_ns, TIMEOUT)
         line.open()

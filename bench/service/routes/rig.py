@@ -50,7 +50,7 @@ def stop(desk: AtDesk) -> AgentStatus:
 @router.post("/agent/prepare")
 def prepare(desk: AtDesk, wanted: Preparation) -> AgentStatus:
     """One step before a run; where the answer's state is `preparing`, it goes on."""
-    return desk.watch.command(PrepareCommand(step=wanted.step, position_m=wanted.position_m or 0.0))
+    return desk.watch.command(PrepareCommand(step=wanted.step, position_m=wanted.position_m))
 
 
 @router.get("/instruments")

@@ -42,7 +42,15 @@ def test_every_command_gets_the_answer_of_its_own(server):
     assert client.send(StopCommand()).ok
 
 
-@pytest.mark.parametrize("request_", [b"nonsense", b'{"command": "explode"}', b'{"command": "stop", "now": 1}'])
+@pytest.mark.parametrize(
+    "request_",
+    [
+        b"nonsense",
+        b'{"command": "explode"}',
+        b'{"command": "stop", "now": 1}',
+        b'{"command": "prepare", "step": "move"}',
+    ],
+)
 def test_what_is_no_command_is_answered_with_what_is_wrong_and_the_next_one_works(server, request_):
     with zmq.Context.instance().socket(zmq.REQ) as socket:
         socket.linger = 0
@@ -102,4 +110,27 @@ def test_a_defect_in_a_command_is_answered_and_the_next_one_works(stopping):
         assert "ZeroDivisionError" in answer.error
         assert client.send(StopCommand()).ok
         stopping.set()
+        thread.join()
+
+
+def test_an_address_that_is_none_is_said_in_words(stopping):
+    client = AgentClient("localhost:5570", "nowhere")
+    with pytest.raises(AgentUnreachable, match="'localhost:5570' is no address of a rig agent"):
+        client.send(StatusCommand())
+    with pytest.raises(AgentUnreachable, match="'nowhere' is no address"):
+        next(client.subscribe(stopping))
+
+
+def test_an_answer_of_another_version_is_said_in_words(stopping):
+    with zmq.Context.instance().socket(zmq.REP) as other:
+        port = other.bind_to_random_port("tcp://127.0.0.1")
+
+        def answer():
+            other.recv()
+            other.send(b'{"fine": true}')
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        with pytest.raises(AgentUnreachable, match=r"no rig agent of this version \(ok: Field required\)"):
+            AgentClient(f"tcp://127.0.0.1:{port}", "").send(StatusCommand())
         thread.join()

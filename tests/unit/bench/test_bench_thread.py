@@ -1,11 +1,13 @@
 """The thread that brings samples together, where something in it is broken."""
 
 import threading
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 
+import numpy as np
 import pytest
 
 from bench.agent.bench_thread import BenchThread
+from bench.errors import LogError
 
 WITHIN = 10.0
 
@@ -50,3 +52,44 @@ def test_a_defect_ends_the_run_and_not_the_watch(aligner, look, words):
         assert again.wait(WITHIN)
     assert len(told) == 1
     assert words in str(told[0])
+
+
+def test_live_samples_say_in_which_segment_they_are():
+    told = []
+    bench = BenchThread(Idle(), 1000.0, told.append, no_defect, told.append)
+    for recording in (SimpleNamespace(segment="5mm_3Hz", end=no_defect), None):
+        bench._recording = recording
+        bench._live.append((SimpleNamespace(time_ns=np.arange(4)), {"force": np.ones(4)}))
+        bench._published = 0.0
+        bench._send_live()
+    assert [(samples.segment, samples.values) for samples in told] == [
+        ("5mm_3Hz", {"force": [1.0]}),
+        ("", {"force": [1.0]}),
+    ]
+
+
+class Full:
+    """A recording whose disk is full."""
+
+    def take(self, aligned):
+        raise LogError("a.mcap: no space left on device")
+
+
+class Ready(Idle):
+    """One sample, again and again."""
+
+    def ready(self):
+        return SimpleNamespace(time_ns=np.arange(1), columns={"force": np.ones(1)})
+
+
+def test_whoever_is_told_of_a_full_disk_may_ask_what_was_lost():
+    """The agent ends the run then, and a status asked for at the same moment counts the losses."""
+    told = []
+    bench = BenchThread(
+        Ready(), 1000.0, told.append, no_defect, lambda error: told.append((str(error), bench.lost()))
+    )
+    bench.record(Full())
+    turn = threading.Thread(target=bench._turn, daemon=True)
+    turn.start()
+    turn.join(WITHIN / 5)
+    assert told == [("a.mcap: no space left on device", {})]

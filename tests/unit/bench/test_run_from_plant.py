@@ -96,6 +96,7 @@ def test_the_course_of_the_run_is_in_its_events(log):
 def test_a_force_beyond_the_limit_is_an_alarm_where_it_first_happens(log):
     alarm = next(event for event in log.events if event["kind"] == "alarm")
     assert alarm["text"] == "force 500.0 N exceeds the method's limit of 450 N"
+    assert (alarm["quantity"], alarm["value"], alarm["limit"]) == ("force", 500.0, 450.0)
     fifth = log.segments[4]
     assert alarm["timestamp"]["sec"] == int(log.samples["time"][fifth.start])
 

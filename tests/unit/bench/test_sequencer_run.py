@@ -181,6 +181,15 @@ def test_the_first_reason_to_stop_is_kept():
     assert bench.sequencer.stopped == "first"
 
 
+def test_a_run_that_is_stopped_before_it_begins_switches_nothing_on():
+    bench = Bench()
+    bench.sequencer.stop("stopped on request")
+    bench.sequencer.run(LONG)
+    assert bench.calls == []
+    assert bench.led == []
+    assert bench.sequencer.stopped == "stopped on request"
+
+
 def test_a_hold_keeps_the_rod_led_until_it_is_let_go():
     bench = Bench()
     holding = bench.in_the_middle(lambda: bench.sequencer.stop("held", hold=True))
@@ -296,6 +305,13 @@ class TestMove:
         assert 0 < rod.sent[-1] < 0.009
         assert rod.calls[-1] == "rod at rest"
 
+    def test_broken_off_before_it_begins_nothing_is_armed(self):
+        (ending := threading.Event()).set()
+        rod = Rod(calls := [])
+        with pytest.raises(RunError, match="broken off before it began"):
+            self.lead(rod, ending=ending)
+        assert calls == []
+
     def test_a_drive_that_goes_is_made_safe_and_its_error_kept(self):
         rod = Rod(calls := [], refuses_at=3)
         with pytest.raises(Refused, match="stopped by itself"):
@@ -307,7 +323,7 @@ class TestMove:
         rod = Rod(calls := [])
         with pytest.raises(RunError, match="has not arrived"):
             self.lead(rod, target=0.009)
-        assert calls[-1] == "rod at rest"
+        assert calls[-1] == "rod safe"
 
     def test_a_drive_that_cannot_be_armed_is_not_led(self):
         rod = Rod([])

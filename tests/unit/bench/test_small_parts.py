@@ -150,4 +150,8 @@ def test_a_move_without_a_place_is_misuse_and_not_a_move_to_zero(monkeypatch, ca
     assert asked == []
     prepare("move", 0.0)
     prepare("tare")
-    assert [(step, place) for _, step, place in asked] == [("move", 0.0), ("tare", 0.0)]
+    with pytest.raises(typer.BadParameter, match="there is no step lubricate; there are home, move, mount"):
+        prepare("lubricate")
+    with pytest.raises(typer.BadParameter, match="--to says where move goes; home takes none"):
+        prepare("home", 0.01)
+    assert [(step, place) for _, step, place in asked] == [("move", 0.0), ("tare", None)]

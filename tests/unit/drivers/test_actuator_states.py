@@ -5,10 +5,12 @@ import pytest
 
 from drivers.actuator_samples import ActuatorSamples, Scale
 from drivers.can_bus import pack_frame
-from drivers.canopen_node import Emergency, Field, PdoLayout
+from drivers.canopen_layout import Field, PdoLayout
+from drivers.canopen_node import Emergency
 from drivers.channel import Frame
-from drivers.cia402 import DriveState, FaultKind, Mounting, active_faults, drive_state, found, onward, step
+from drivers.cia402 import DriveState, FaultKind, active_faults, drive_state, onward
 from drivers.errors import Refused
+from drivers.mounting import Mounting, found, step
 
 MILLISECOND = 1_000_000
 

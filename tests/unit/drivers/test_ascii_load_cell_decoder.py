@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.ascii_load_cell import ReadingStream
+from drivers.ascii_load_cell_stream import ReadingStream
 
 
 def text(newtons, zero="GS", state="ST"):

@@ -1,6 +1,8 @@
 """A bus inside this process: frames in order, and a dead bus that says so."""
 
 import itertools
+import subprocess
+import sys
 import threading
 
 import can
@@ -101,6 +103,17 @@ def test_error_while_sending_is_not_connected(pair, monkeypatch):
         one.send(0x181, b"")
 
 
+def test_bus_that_has_gone_is_closed_all_the_same(pair, monkeypatch):
+    one, _ = pair
+
+    def gone():
+        raise OSError("no such device")
+
+    monkeypatch.setattr(one._bus, "shutdown", gone)
+    one.close()
+    assert not one.is_open
+
+
 def test_bus_that_is_not_open_or_not_there_is_not_connected():
     bus = CanBus(CanAddress("virtual", "nowhere"), lambda: 0)
     with pytest.raises(NotConnected, match="connect first"):
@@ -137,3 +150,9 @@ def test_error_while_taking_is_told_to_whoever_takes(pair, monkeypatch):
     monkeypatch.setattr(other._bus, "recv", broken)
     with pytest.raises(NotConnected, match="cable pulled"):
         other.take_waiting()
+
+
+def test_what_the_library_would_say_on_standard_error_is_not_said():
+    words = "import logging, drivers.can_bus; logging.getLogger('can.interfaces.socketcand').warning('incomplete')"
+    done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim_rig.canopen_actuator import CanopenActuator, Machine, torque_for
+from sim_rig.canopen_actuator import CanopenActuator
+from sim_rig.drive_senses import Machine, torque_for
 from sim_rig.drive_states import State
 from sim_rig.object_dictionary import Abort, ObjectDictionary
 from sim_rig.scenario import load_scenario

@@ -4,7 +4,7 @@ import pytest
 
 from sim_rig.coil_output import CoilOutput, Table
 from sim_rig.modbus_frames import MBAP, RTU, Request, crc
-from sim_rig.modbus_server import answer
+from sim_rig.modbus_requests import answer
 
 MS = 1_000_000
 

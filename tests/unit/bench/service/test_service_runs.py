@@ -266,4 +266,4 @@ def test_a_move_without_a_place_is_refused_and_nothing_is_sent(service):
     assert service.agent.commands == []
     service.post("/agent/prepare", {"step": "move", "position_m": 0.0})
     service.post("/agent/prepare", {"step": "tare"})
-    assert [(one.step, one.position_m) for one in service.agent.commands] == [("move", 0.0), ("tare", 0.0)]
+    assert [(one.step, one.position_m) for one in service.agent.commands] == [("move", 0.0), ("tare", None)]

@@ -42,8 +42,8 @@ def held_up(events: Sequence[Mapping[str, Any]]) -> str:
         return ""
     worst = max(event["value"] for event in late)
     return (
-        f"this machine held the setpoints up, for {1e3 * worst:.0f} ms at worst. The rod stumbled there, and "
-        "numbers may be further off than their intervals say; record again while less goes on."
+        f"this machine held the setpoints up, for {1e3 * worst:.0f} ms at worst. The rod stumbled there; where "
+        "nobody knows how it moved, samples are left out of fit and prediction."
     )
 
 

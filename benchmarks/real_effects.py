@@ -31,7 +31,8 @@ _TEST = ("5mm_4Hz", "25mm_0.5Hz")
 _PART = 0.6
 """[1] of the random stroke that is fitted."""
 _GREASED, _THIN = ("clevis_backlash", "greased_pin"), ("shear_thinning", "shares")
-_KNEE, _SIDE = ("field_saturation", "knee"), ("side_load_friction", "linear")
+_IRON, _SIDE = ("field_saturation", "magnetisation"), ("side_load_friction", "linear")
+_BENT = ("displacement_nonlinearity", "powers")
 _LATE, _TANH = ("displacement_delay", "pure_delay"), ("field_saturation", "tanh")
 Names = tuple[tuple[str, str], ...]
 SETS: dict[str, tuple[Names, ...]] = {
@@ -40,8 +41,9 @@ SETS: dict[str, tuple[Names, ...]] = {
         (_THIN,),
         (_GREASED,),
         (_GREASED, _THIN),
-        (_GREASED, _THIN, _SIDE),
-        (_GREASED, _THIN, _SIDE, _KNEE),
+        (_GREASED, _THIN, _IRON),
+        (_GREASED, _THIN, _IRON, _SIDE),
+        (_GREASED, _THIN, _IRON, _SIDE, _BENT),
     ),
     "nees": ((), (_LATE,), (_LATE, _TANH), (_LATE, _TANH, _THIN)),
 }

@@ -20,7 +20,9 @@ from identification.refine import Minimum
 _KNOTS = 4.0
 """[s] from knot to knot."""
 _LEAST = 1e-6
-"""[s] below which a wander is none."""
+"""[s] smallest wander that is tried."""
+_CHANCE = 6.0
+"""[1] by which twice the logarithm of the likelihood must grow for a wander to be more than chance."""
 _TRIALS = 60
 _SEEN = 1e-9
 """[1] information on a bend, of the largest, below which it says nothing."""
@@ -54,7 +56,7 @@ def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
     inside = problem.free & (minimum.unknowns > low + 1e-9) & (minimum.unknowns < high - 1e-9)
     free = np.ix_(inside, inside)
     wander = _likeliest(bends, H[free], gradient[inside], inside, problem.delay_prior)
-    if wander < _LEAST:
+    if not wander:
         return minimum, 0.0
     held = bends.own + np.eye(len(bends.own)) / wander**2
     left = H - bends.shared @ np.linalg.solve(held, bends.shared.T)
@@ -96,7 +98,7 @@ def _hats(count: int, rate: float) -> Array:
 
 
 def _likeliest(bends: _Bends, H: Array, gradient: Array, inside: BoolArray, most: float) -> float:
-    """The wander [s] with which the residuals are likeliest, the unknowns fitted along."""
+    """The wander [s] with which the residuals are likeliest, the unknowns fitted along; 0 if it may be chance."""
     shared = bends.shared[inside]
     solved = np.linalg.solve(H, np.column_stack([shared, gradient]))
     information = bends.own - shared.T @ solved[:, :-1]
@@ -106,4 +108,5 @@ def _likeliest(bends: _Bends, H: Array, gradient: Array, inside: BoolArray, most
     trials = np.concatenate([[0.0], np.geomspace(_LEAST, max(most, 2.0 * _LEAST), _TRIALS)])
     grown = 1.0 + trials[:, None] ** 2 * size
     unlikely = np.sum(np.log(grown) + slope**2 / (size * grown), axis=1)
-    return float(trials[np.argmin(unlikely)])
+    best = int(np.argmin(unlikely))
+    return float(trials[best]) if unlikely[0] - unlikely[best] > _CHANCE else 0.0

@@ -42,7 +42,7 @@ _END = 2.0
 _LAGS = np.arange(-0.006, 0.0451, 0.003)
 """[s] At which the displacement may follow the force."""
 _BLOCK = 2.0
-"""[s] so long are the blocks whose middle cutoff tells what follows the force: a few stumbles do not move it."""
+"""[s] length of the blocks of which the middle one's cutoff is taken."""
 _KNOCK = 4.0
 """[1] What stands out so many times over most is a knock of the actuator and follows no force."""
 _ROUNDS = 3
@@ -148,8 +148,9 @@ def _give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
     nothing = np.zeros(len(x))
     if len(x) < 50 * len(_LAGS):
         return nothing
-    blocks = (np.arange(len(x)) / (_BLOCK * rate)).astype(np.intp)
-    cutoffs = _cutoffs(x, weights, nothing[3:], blocks, rate, noise)
+    # Where the rod stumbled, the middle of many blocks is not moved by it.
+    length = _BLOCK * rate if not weights.all() else len(x)
+    cutoffs = _cutoffs(x, weights, nothing[3:], (np.arange(len(x)) / length).astype(np.intp), rate, noise)
     cutoff = float(np.quantile(cutoffs, 0.5, method="lower"))
     penalty = np.full(len(x) - 3, float(stiffness(cutoff, rate)))
     shifts = np.unique(np.rint(_LAGS * rate).astype(int))

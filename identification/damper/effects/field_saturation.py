@@ -21,6 +21,12 @@ def knee(field: Any, sharpness: Any, power: Any) -> Any:
     return field / (1.0 + (np.abs(sharpness * field) + _STRAIGHT) ** power) ** (1.0 / power)
 
 
+def magnetisation(field: Any, sharpness: Any, missing: Any, rise: Any) -> Any:
+    """The same behind a slow beginning: permeability grows from its initial value first (Rayleigh 1887)."""
+    begun = field * (1.0 - missing * np.exp(-np.abs(field) / rise))
+    return begun / np.sqrt(1.0 + (sharpness * begun) ** 2)
+
+
 _SHARPNESS = Quantity("sharpness", "1/{drive}", 0.0, 50.0, 1.0, "one over the drive at which the iron is full")
 
 FIELD_SATURATION = Effect(
@@ -35,6 +41,17 @@ FIELD_SATURATION = Effect(
             (_SHARPNESS, Quantity("power", "1", 1.0, 8.0, 2.0, "hardness of the knee")),
             ((0.4, 1.2), (1.5, 3.0), (2.5, 6.0)),
             knee,
+        ),
+        Form(
+            "magnetisation",
+            "field",
+            (
+                _SHARPNESS,
+                Quantity("missing", "1", 0.0, 0.95, 0.3, "share of the permeability that a small field lacks"),
+                Quantity("rise", "{drive}", 0.02, 2.0, 0.2, "drive over which that comes"),
+            ),
+            ((0.7, 0.4, 0.2), (1.5, 0.6, 0.4), (0.4, 0.3, 0.1)),
+            magnetisation,
         ),
     ),
 )

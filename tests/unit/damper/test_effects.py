@@ -132,6 +132,16 @@ def test_a_saturated_field_is_bounded_and_begins_straight(form, values):
     assert field(50.0, *values) == pytest.approx(0.5, rel=1e-3)
 
 
+def test_iron_that_begins_slowly_begins_slowly_and_is_full_at_last():
+    field = act("field_saturation", "magnetisation")
+    missing = 0.6
+    values = (0.5, missing, 0.2)
+    assert field(1e-6, *values) == pytest.approx(1e-6 * (1.0 - missing), rel=1e-3)
+    assert field(0.6, *values) / 0.6 > 1.3 * field(0.1, *values) / 0.1, "its permeability grows"
+    assert field(500.0, *values) == pytest.approx(2.0, rel=1e-3)
+    assert field(-0.3, *values) == -field(0.3, *values)
+
+
 @pytest.mark.parametrize(("form", "values"), [("exponential", (0.02, 0.05)), ("play", (0.02,))])
 def test_iron_is_below_on_the_way_up_and_above_on_the_way_down(form, values):
     shape = EFFECTS["magnetic_remanence"].form(form)

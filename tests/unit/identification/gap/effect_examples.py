@@ -11,7 +11,7 @@ LABORATORY = to_coordinates(parameter_set("laboratory").parameters)
 RATE = 1000.0
 
 MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
-    "field_saturation": {"tanh": (1.5,), "knee": (1.8, 3.0)},
+    "field_saturation": {"tanh": (1.5,), "knee": (1.8, 3.0), "magnetisation": (1.2, 0.4, 0.2)},
     "magnetic_remanence": {"exponential": (0.03, 0.1), "closing": (0.03, 0.1, 0.3), "play": (0.03,)},
     "coil_lag": {
         "second_lag": (0.008,),

@@ -18,8 +18,9 @@ _CLIPPED = 5
 """[samples] in a row at the very extreme of the force that count as clipped."""
 _MOST_CLIPPED = 0.2
 """[1] part of the samples that may be clipped."""
-_FAST = 0.5
-"""[1] of a stroke's largest speed, above which a damper slides."""
+_FAST, _FASTEST = 0.5, 0.99
+"""[1] of a stroke's largest speed, above which a damper slides; and the part of the samples that go slower than
+that: a knock is faster than any stroke."""
 
 
 def one_specimen(recordings: Sequence[Recording]) -> None:
@@ -88,9 +89,11 @@ def sliding_recorded(pieces: Sequence[Piece]) -> None:
         NothingToFit: no sample at speed is measured.
     """
     speeds = [np.abs(p.stroke.velocity) for p in pieces]
-    if not any(((v > _FAST * v.max()) & (p.train > 0)).any() for v, p in zip(speeds, pieces, strict=True)):
+    limits = [_FAST * float(np.quantile(v, _FASTEST)) for v in speeds]
+    measured = zip(speeds, limits, pieces, strict=True)
+    if not any(((v > limit) & (p.train > 0)).any() for v, limit, p in measured):
         raise NothingToFit(
-            f"above {_FAST * max(v.max() for v in speeds):.2g} m/s no force was recorded that counts (clipped or "
+            f"above {max(limits):.2g} m/s no force was recorded that counts (clipped or "
             "not measured), so that nothing tells what the damper resists there; record again with a larger range"
         )
 

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from identification.results import Document, Fit, Provenance
+from identification.results import Document, Fit, Nuisances, Provenance
 
 DriveKind = Literal["driver_command_v", "coil_v", "coil_a"]
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
@@ -142,5 +142,6 @@ class Twin(Document):
     drive_unit: Literal["V", "A"] = Field(description="unit of the drive")
     effects: list[TwinEffect] = Field(description="what was found beside the law")
     sensors: dict[str, dict[str, Any]] = Field(description="channels as found: their noise")
+    nuisances: Nuisances = Field(description="what had to be estimated along with it: lags of the channels, y(0)")
     baseline: Fit = Field(description="the fit without effects")
     provenance: Provenance

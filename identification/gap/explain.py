@@ -12,7 +12,6 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
@@ -21,6 +20,7 @@ from identification.problem import COORDINATE_COUNT, Evaluation, Problem
 from identification.refine import Minimum, bounded_step, descend
 from identification.simulate import ActiveEffect, Setting
 from identification.start import starting_points
+from identification.threads import one_thread
 from identification.uncertainty import Covariance, covariance
 
 _CUTS = (1.0, 0.5, 0.2, 0.05)
@@ -180,7 +180,7 @@ def fit_with(
     quick = (
         joint.quicker().coarser(min(effort.thin, _PLAY_THIN) if play else effort.thin) if effort.polish else joint
     )
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         starts = sorted(_starts(quick.coarser(effort.look), start, effort, further), key=lambda s: s.cost)
         ends: list[Minimum] = []
         for begin in starts[: effort.descents]:
@@ -213,7 +213,7 @@ def fit_on_all(problem: Problem, near: JointFit, simulated: Sequence[Array], ite
     missed = [whole - own for whole, own in zip(simulated, quick.simulate(unknowns), strict=True)]
     pieces = tuple(replace(p, force=p.force - m) for p, m in zip(quick.pieces, missed, strict=True))
     held = replace(quick, pieces=pieces)
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         return JointFit(held, descend(held, unknowns, iterations, _silent))
 
 

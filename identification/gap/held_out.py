@@ -1,7 +1,7 @@
 """What is kept out of every fit, and how far the gap shrinks there."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +10,7 @@ from identification.arrays import Array, BoolArray
 from identification.gap.residual import Cycles
 
 Indices = npt.NDArray[np.intp]
+Drawn = TypeVar("Drawn", float, Array)
 
 _EVERY = 4
 """One segment, or cycle, of so many is held out."""
@@ -54,8 +55,19 @@ class Shrinkage:
     ci95: tuple[float, float] | None
 
 
+class Start(NamedTuple):
+    """The first instants of the recordings, before the damper has moved: no fit sees them."""
+
+    share: float = 0.0
+    """[1] of all samples."""
+    before: float = 0.0
+    """Mean squared residual there without effects [N²]."""
+    after: float = 0.0
+    """The same with them."""
+
+
 class HeldOut(NamedTuple):
-    """The held-out cycles, (cycles,) each."""
+    """The held-out cycles, (cycles,) each, and how the recordings begin."""
 
     before: Array
     """Sum of squared residuals without effects [N²]."""
@@ -65,6 +77,7 @@ class HeldOut(NamedTuple):
     """Samples."""
     segment: Indices
     """Which segment each belongs to."""
+    start: Start = Start()
 
 
 def shrinkage(held: HeldOut, noise: float, carried: float, strokes: int) -> Shrinkage:
@@ -72,7 +85,8 @@ def shrinkage(held: HeldOut, noise: float, carried: float, strokes: int) -> Shri
 
     Conditions that were held out are drawn anew, and their cycles. Two things are no matter of drawing: the motion
     of another run carries its noise into the force again, and the error of a form is another one on other strokes,
-    the more so the fewer strokes the recording has.
+    the more so the fewer strokes the recording has. Every run begins, too, with a hysteresis that nobody knows and
+    a motion that is known from one side only: that counts with the share that it has in the recording.
 
     Args:
         held: the held-out cycles.
@@ -80,21 +94,28 @@ def shrinkage(held: HeldOut, noise: float, carried: float, strokes: int) -> Shri
         carried: noise of the motion in the simulated force [N].
         strokes: how many of different amplitude or frequency were recorded.
     """
-    total = float(held.counts.sum())
-    rms = [float(np.sqrt(s.sum() / total)) for s in held[:2]]
+    total, start = float(held.counts.sum()), held.start
+    squares = [float(s.sum()) / total for s in held[:2]]
+    rms = [float(np.sqrt(_begun(s, start.share, own))) for s, own in zip(squares, start[1:], strict=True)]
     if rms[0] < _NEAR_FLOOR * noise:
         return Shrinkage(rms[0], rms[1], None, None)
     value = 1.0 - (rms[1] ** 2 - noise**2) / (rms[0] ** 2 - noise**2)
     if held.before is held.after or np.array_equal(held.before, held.after):
         return Shrinkage(rms[0], rms[1], value, (value, value))
     random = np.random.default_rng(0)
-    before, after = _drawn(held, random)
+    drawn = _drawn(held, random)
+    before, after = (_begun(s, start.share, own) for s, own in zip(drawn, start[1:], strict=True))
     spread = _FORM + _FEW_STROKES / max(strokes, 1)
     left = np.maximum(after - noise**2, 0.0) * np.exp(spread * random.standard_normal(_DRAWS))
     left += carried**2 * np.exp(_FORM * random.standard_normal(_DRAWS))
     whole = np.maximum(before - noise**2, 1e-2 * noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
     low, high = np.quantile(1.0 - left / whole, [0.025, 0.975])
     return Shrinkage(rms[0], rms[1], value, (min(float(low), value), max(float(high), value)))
+
+
+def _begun(square: Drawn, share: float, start: float) -> Drawn:
+    """Mean square [N²] of strokes together with how they begin."""
+    return (1.0 - share) * square + share * start
 
 
 def _drawn(held: HeldOut, random: np.random.Generator) -> tuple[Array, Array]:

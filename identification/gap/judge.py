@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.assemble import Assembled
-from identification.gap.held_out import HeldOut, Shrinkage, held_out_cycles, shrinkage
+from identification.gap.held_out import HeldOut, Shrinkage, Start, held_out_cycles, shrinkage
 from identification.gap.residual import Cycles, cut_cycles
 from identification.gap.stumbles import left_out
 from identification.gap.where import Left
@@ -29,6 +29,8 @@ class Judge:
     """(cycles,) kept out of every fit."""
     start: Array
     """(N,) [s] of each sample since the first."""
+    begins: BoolArray
+    """(N,) measured before the damper first moved: no fit looks there, but every run has such instants."""
     notes: tuple[str, ...] = ()
     """What was left out of the recordings, in words."""
 
@@ -38,8 +40,10 @@ class Judge:
         cycles = cut_cycles(assembled.stretches, assembled.pieces)
         first = assembled.stretches[0].time[0]
         time = np.concatenate([s.time - first for s in assembled.stretches])
-        pieces, notes = left_out(assembled.pieces, cycles)
-        return Judge(tuple(map(_once_moved, pieces)), cycles, held_out_cycles(cycles), time, tuple(notes))
+        sound, notes = left_out(assembled.pieces, cycles)
+        pieces = tuple(map(_once_moved, sound))
+        begins = np.concatenate([a.train - b.train for a, b in zip(sound, pieces, strict=True)]) > 0
+        return Judge(pieces, cycles, held_out_cycles(cycles), time, begins, tuple(notes))
 
     @cached_property
     def usable(self) -> BoolArray:
@@ -97,8 +101,17 @@ class Judge:
         sums = [self.cycles.sums(left.residual**2, self.unseen) for left in (before, after)]
         counts = self.cycles.sums(np.ones(len(self.force)), self.unseen)
         there = counts > 0
-        drawn = HeldOut(sums[0][there], sums[1][there], counts[there], self.cycles.segment[there])
+        drawn = HeldOut(
+            sums[0][there], sums[1][there], counts[there], self.cycles.segment[there], self._start(before, after)
+        )
         return shrinkage(drawn, noise, carried, self.cycles.strokes)
+
+    def _start(self, before: Left, after: Left) -> Start:
+        """What the models leave of the first instants, which no fit saw either."""
+        if not self.begins.any():
+            return Start()
+        share = float(self.begins.sum()) / float(self.begins.sum() + self.usable.sum())
+        return Start(share, *(float(np.mean(left.residual[self.begins] ** 2)) for left in (before, after)))
 
 
 def _once_moved(piece: Piece) -> Piece:

@@ -16,7 +16,7 @@ from identification.damper.parameters import Parameters
 from identification.errors import IdentificationError
 from identification.prediction import Predicted, predict_piece
 from identification.problem import Piece
-from identification.results import Fit
+from identification.results import Fit, Nuisances
 from identification.simulate import ActiveEffect
 
 
@@ -27,7 +27,7 @@ class Model:
     point: Coordinates
     effects: tuple[ActiveEffect, ...] = ()
     delays: tuple[float, float] = (0.0, 0.0)
-    """[s] residual lags of the force and drive channel that came with a fit."""
+    """[s] residual lags of the force and drive channel that came with a fit or a twin."""
     baseline: Fit | None = None
     """Of a twin: the fit without effects."""
 
@@ -77,7 +77,11 @@ def read_fit_or_model(path: Path) -> Fit | Model:
 
 def model_of_fit(fit: Fit) -> Model:
     """A fit as a model, with the lags of its bench."""
-    return Model(fit.point(), (), (fit.nuisances.force_delay.value, fit.nuisances.drive_delay.value))
+    return Model(fit.point(), (), _lags(fit.nuisances))
+
+
+def _lags(nuisances: Nuisances) -> tuple[float, float]:
+    return nuisances.force_delay.value, nuisances.drive_delay.value
 
 
 def _of_scenario(content: dict[str, Any]) -> Model:
@@ -86,8 +90,11 @@ def _of_scenario(content: dict[str, Any]) -> Model:
     effects = tuple(_active(e) for e in content.get("effects", ()))
     given = content.get("baseline")
     baseline = None if given is None else Fit.model_validate(given)
-    # The truth of a rig says nothing of channel delays: what its devices report stands in every log.
-    return Model(to_coordinates(parameters), effects, (0.0, 0.0), baseline)
+    # The truth of a rig says nothing of channel delays: what its devices report stands in every log. A twin does:
+    # its parameters were fitted beside the lags of its bench, and leave more without them.
+    found = content.get("nuisances")
+    lags = (0.0, 0.0) if found is None else _lags(Nuisances.model_validate(found))
+    return Model(to_coordinates(parameters), effects, lags, baseline)
 
 
 def _active(entry: dict[str, Any]) -> ActiveEffect:

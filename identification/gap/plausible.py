@@ -9,6 +9,8 @@ _ABSURD = 0.03
 """[1] weight of an effect whose size no bench has shown."""
 _BENT = 0.1
 """[1] of the stroke that a displacement channel may be off its line."""
+_FREE = 0.3
+"""[1] of the half stroke that a rod moves before it meets a stop at its end."""
 _NEAR = 1e-3
 """[1] of a bound's size."""
 _SLOW = 8.0
@@ -32,6 +34,8 @@ def _usual(effect: ActiveEffect, displacement: Array) -> bool:
     match effect.effect.name:
         case "displacement_nonlinearity":
             return _bend(effect, displacement) < _BENT
+        case "end_stop":
+            return values["gap"] > _FREE * float(np.abs(displacement).max())
         case "force_drift":
             return min(values.get("duration", np.inf), values.get("period", np.inf) / 4.0) > _SLOW
         case "viscous_heating":

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array
 from identification.damper.effects import EFFECTS, USUAL
@@ -19,6 +18,7 @@ from identification.effect_choice import EffectChoice
 from identification.gap.explain import JointFit, joint_step, promised_step
 from identification.gap.hum import MAINS
 from identification.problem import Evaluation, Problem
+from identification.threads import one_thread
 
 THIN = 4
 """Every so many samples that a screening looks at."""
@@ -75,7 +75,7 @@ def screen(
     """
     chosen = effects or every_choice()
     quick = problem.with_effects(baseline.effects).coarser(thin)
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         # The baseline was fitted on more samples: its own step here is no merit of an effect.
         first, _, _ = joint_step(quick, baseline.minimum.unknowns)
         frame = _Frame.at(quick, first.unknowns, line)

@@ -2,7 +2,9 @@
 
 Every effect is screened, the best are fitted together with the law, and the two best ends are each taken further
 with a second effect, the better end with a third. Then every effect of a set is left out once, so that each set
-stands beside all those it grew from. All of it on thinned data; the odds decide what is worth a full fit.
+stands beside all those it grew from. Where the best set leaves something, others are tried in the place of each of
+its effects: the first was chosen while the rest was missing. All of it on thinned data; the odds decide what is
+worth a full fit.
 """
 
 import math
@@ -17,6 +19,7 @@ from identification.arrays import Array
 from identification.damper.effects import EFFECTS
 from identification.effect_choice import EffectChoice
 from identification.gap.contender import Contender
+from identification.gap.exchange import exchange, leave_out
 from identification.gap.explain import Effort, JointFit, fit_on_all, fit_with
 from identification.gap.hearing import NOTHING, Hearing
 from identification.gap.hum import strongest_line
@@ -47,8 +50,6 @@ _WORTH = 0.9
 """[1] part of the excess that may remain for a set to be worth taking further."""
 _RIVAL = 3.0
 """[1] multiple of what the best set leaves up to which another is taken further too."""
-_TAKEN_BACK = 2
-"""Sets of several effects that are fitted again with each one left out."""
 _ENOUGH = 0.005
 """[1] excess over the floor's variance at which nothing is left to look for."""
 _ENOUGH_OF_WHOLE = 0.012
@@ -97,7 +98,7 @@ class Search:
             return
         beam = [none]
         for size, count in enumerate(_FITTED, 1):
-            if self._late or self.at_floor(beam[0]):
+            if self.late or self.at_floor(beam[0]):
                 break
             for parent in beam:
                 self._grow(parent, count)
@@ -108,14 +109,15 @@ class Search:
             limit = _RIVAL * max(self.left_of(grown[0]), _ENOUGH)
             near = [c for c in grown if self.left_of(c) < limit]
             beam = near[: _BEAM[size - 1]]
-        self._back()
+        leave_out(self)
+        exchange(self)
 
     def _nothing(self, none: Contender) -> bool:
         """Whether the law alone stands so near the floor that nothing is looked for."""
         return max(none.seen, none.unseen) < NOTHING * self.floor
 
     @property
-    def _late(self) -> bool:
+    def late(self) -> bool:
         """Whether enough time has been spent."""
         return time.process_time() - self.began > _PATIENCE
 
@@ -194,18 +196,15 @@ class Search:
 
     def _grow(self, parent: Contender, count: int) -> None:
         """Fit a set with each of the most promising further effects."""
-        thin = self._thin
-        rate = max(p.stroke.rate for p in thin.pieces)
-        choices = every_choice([n for n in EFFECTS if n not in parent.names])
-        gains = screen(thin, parent.fit, choices, max(1, round(rate / _SCREEN_RATE)), self._line(parent))
+        gains = self.screened(parent, parent.names)
         if not parent.names and self.left_of(parent) > _LARGE:
             count = _MORE
         if self.left_of(parent) < _SMALL and promise(gains[0]) < _FAIR:
             return
         for gain in worth_fitting(gains, count):
-            if self._late:
+            if self.late:
                 return
-            self._fit_beside(parent, gain, [])
+            self.fit_beside(parent, gain, [])
         for name in ALWAYS:
             mine = [g for g in gains if g.choice.name == name]
             if self._may_help(parent, name):
@@ -213,6 +212,13 @@ class Search:
                 for acts in dict.fromkeys(g.choice.form.acts for g in mine):
                     alike = [g for g in mine if g.choice.form.acts == acts]
                     self._try_always(parent, sorted(alike, key=lambda g: len(g.choice.quantities)))
+
+    def screened(self, parent: Contender, without: frozenset[str]) -> list[Gain]:
+        """What every further effect promises beside a set; those named are not looked at."""
+        thin = self._thin
+        rate = max(p.stroke.rate for p in thin.pieces)
+        choices = every_choice([n for n in EFFECTS if n not in without])
+        return screen(thin, parent.fit, choices, max(1, round(rate / _SCREEN_RATE)), self._line(parent))
 
     def _may_help(self, parent: Contender, name: str) -> bool:
         """Whether an effect is tried beside others without a promise: not where alone it took nothing away."""
@@ -224,9 +230,9 @@ class Search:
         for gain in gains:
             if parent.names and gain.choice.form.acts == "displacement_follower":
                 continue  # its contacts ask for a high rate, and a free pin shows beside others as well
-            if self._late or self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
+            if self.late or self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
                 return
-            with_it = self._fit_beside(parent, gain, gain.choice.form.starts)
+            with_it = self.fit_beside(parent, gain, gain.choice.form.starts)
             if self.left_of(with_it) > _SHOWN * self.left_of(parent):
                 return
 
@@ -235,7 +241,7 @@ class Search:
         """What the law alone leaves [1]."""
         return self.left_of(self.found[frozenset()])
 
-    def _fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> Contender:
+    def fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> Contender:
         """A set with a further effect, fitted from its screening's end and with further values of it."""
         # Under a wrong law the coordinates have moved to where they hide an effect: begin elsewhere, too.
         elsewhere = np.concatenate([self._regression, gain.unknowns[len(self._regression) :]])
@@ -257,29 +263,17 @@ class Search:
         error = np.where(parent.left.valid, parent.left.residual, 0.0)[part]
         return strongest_line(error, self.full.pieces[longest].stroke.rate)
 
-    def _back(self) -> None:
-        """The best sets with each of their effects left out, begun where the whole set ended.
-
-        What a second effect seems to gain may only be that the search for the first one had stopped short.
-        """
-        best = sorted((c for c in self.found.values() if len(c.names) > 1), key=self.left_of)[:_TAKEN_BACK]
-        for contender in best:
-            for choice in contender.fit.effects:
-                rest = tuple(c for c in contender.fit.effects if c != choice)
-                self.fit(rest, None, [_without(contender.fit, choice)])
-
     def polish(self, names: frozenset[str]) -> None:
         """Fit a set on all samples, once, from where it ended on thinned ones."""
         if names not in self.complete:
+            self._finish(names)
             self.found[names] = self._polished(self.found[names])
             self.complete.add(names)
 
-
-def _without(fit: JointFit, left_out: EffectChoice) -> Array:
-    """Unknowns of a fit without those of one of its effects."""
-    at, kept = fit.problem.first_effect, [fit.minimum.unknowns[: fit.problem.first_effect]]
-    for choice in fit.effects:
-        if choice != left_out:
-            kept.append(fit.minimum.unknowns[at : at + len(choice.quantities)])
-        at += len(choice.quantities)
-    return np.concatenate(kept)
+    def _finish(self, names: frozenset[str]) -> None:
+        """Let a descent that ran out of steps go on."""
+        for _ in range(_ROUNDS):
+            known = self.found[names]
+            if known.fit.converged or self.late:
+                return
+            self.fit(known.fit.effects, None, [known.fit.minimum.unknowns])

@@ -14,10 +14,8 @@ from identification.gap.model import named_effects
 from identification.motion import recorded_noise
 from identification.prediction import normalised, per_drive, rmse
 from identification.problem import COORDINATE_COUNT
-from identification.refine import Minimum
 from identification.results import Delay, Errors, Fit, NoiseFloor, Nuisances, Provenance, Stage
 from identification.uncertainty import (
-    Covariance,
     coordinate_covariance,
     coordinate_estimates,
     covariance,
@@ -55,6 +53,7 @@ def twin_of(
         drive_unit="A" if baseline.drive_unit == "A" else "V",
         effects=effects,
         sensors={"force": {"noise": floor}, "displacement": {"noise": noise}},
+        nuisances=_nuisances(named),
         baseline=baseline,
         provenance=provenance,
     )
@@ -82,7 +81,7 @@ def baseline_fit(
         drive_range=(problem.space.lowest_drive, problem.space.highest_drive),
         parameters=parameter_estimates(plain.fit.coordinates, spread, coordinates, unit),
         coordinates=coordinates,
-        nuisances=_nuisances(plain, found),
+        nuisances=_nuisances(plain),
         noise_floor_n=floor,
         floor=NoiseFloor(
             cycle_to_cycle=assembled.floor.cycle_to_cycle,
@@ -114,19 +113,19 @@ def baseline_fit(
     )
 
 
-def _nuisances(plain: Contender, found: Covariance) -> Nuisances:
-    """y(0) of each stretch; the delays are held where the clocks put them."""
-    minimum: Minimum = plain.fit.minimum
-    problem = plain.fit.problem
-    held = [
+def _nuisances(contender: Contender) -> Nuisances:
+    """y(0) of each stretch, and the lags that the fit left in the channels beside what their clocks say."""
+    unknowns, problem = contender.fit.minimum.unknowns, contender.fit.problem
+    most = 1e6 * problem.delay_limit * problem.delay_prior
+    force, drive = (
         Delay(
-            value=float(minimum.unknowns[at]) * problem.delay_prior,
+            value=float(unknowns[at]) * problem.delay_prior,
             ci95=None,
             prior_sd=problem.delay_prior,
             outside_prior=False,
-            note="held where the clocks put it: a later force is an effect here",
+            note=f"no more than {most:.3g} µs: what is later is an effect here",
         )
         for at in (COORDINATE_COUNT, COORDINATE_COUNT + 1)
-    ]
-    starts = {p.name: problem.setting(minimum.unknowns, i).y0 for i, p in enumerate(problem.pieces)}
-    return Nuisances(y0=starts, force_delay=held[0], drive_delay=held[1])
+    )
+    starts = {p.name: problem.setting(unknowns, i).y0 for i, p in enumerate(problem.pieces)}
+    return Nuisances(y0=starts, force_delay=force, drive_delay=drive)

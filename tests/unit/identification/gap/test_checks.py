@@ -1,5 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -7,7 +8,13 @@ from made_up_strokes import stretch
 from numpy.random import default_rng
 
 from identification.errors import NothingToFit
-from identification.gap.checks import blind_spots, enough_cycles, one_specimen, without_clipping
+from identification.gap.checks import (
+    blind_spots,
+    enough_cycles,
+    one_specimen,
+    sliding_recorded,
+    without_clipping,
+)
 from identification.gap.floor import Floor
 from identification.gap.residual import Condition, Cycles
 from identification.recordings import Recording
@@ -51,6 +58,17 @@ def test_clipped_samples_are_left_out_and_it_is_said():
 def test_a_force_that_is_mostly_clipped_is_refused_with_the_limit():
     with pytest.raises(NothingToFit, match="100 N"):
         without_clipping([recording(np.clip(loop(), -100.0, 100.0))])
+
+
+def test_a_knock_that_was_left_out_is_no_speed_that_the_stroke_lacks():
+    velocity = 0.1 * np.sin(np.arange(4000) / 100.0)
+    train = np.ones(4000)
+    velocity[2000:2010], train[1990:2020] = 0.4, 0.0
+    made = SimpleNamespace(stroke=SimpleNamespace(velocity=velocity), train=train)
+    sliding_recorded([made])
+    made.train = np.where(np.abs(velocity) > 0.04, 0.0, 1.0)
+    with pytest.raises(NothingToFit, match=r"above 0\.05 m/s no force"):
+        sliding_recorded([made])
 
 
 def test_one_cycle_is_refused_in_words():

@@ -7,7 +7,7 @@ from made_up_runs import NOISE, run
 
 from identification import schemas
 from identification.errors import NothingToFit
-from identification.gap.diagnose import diagnose
+from identification.gap.diagnose import diagnose, prepare
 from identification.gap.documents import STAGES
 from identification.gap.model import read_model
 from sim_rig.scenario import parse_scenario
@@ -94,6 +94,18 @@ def test_a_given_simulation_is_judged_too(gas, tmp_path):
     path.write_text(gas.twin.model_dump_json(by_alias=True), encoding="utf-8")
     again = diagnose([run(stiffening, seed=1)], read_model(path))
     assert again.diagnosis.gap.nominal_n == pytest.approx(NOISE, rel=0.1)
+
+
+def test_the_twin_keeps_the_lags_beside_which_it_was_fitted(gas, tmp_path):
+    lags = gas.twin.nuisances.force_delay.value, gas.twin.nuisances.drive_delay.value
+    assert lags[0] != 0.0
+    path = tmp_path / "twin.json"
+    path.write_text(gas.twin.model_dump_json(by_alias=True), encoding="utf-8")
+    model = read_model(path)
+    assert model.delays == pytest.approx(lags)
+    prepared = prepare([run(stiffening)])
+    left = prepared.judge.left([model.force_on(p) for p in prepared.judge.fitted_pieces()])
+    assert prepared.judge.rmse(left)[1] == pytest.approx(gas.diagnosis.gap.after_n, rel=1e-3)
 
 
 def test_logs_of_two_dampers_are_refused():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from identification.gap.held_out import HeldOut, held_out_cycles, shrinkage
+from identification.gap.held_out import HeldOut, Start, held_out_cycles, shrinkage
 from identification.gap.residual import cut_cycles
 from identification.gap.where import Left, drift, gap_map, harmonics
 from identification.recordings import Segment, Stretch
@@ -131,6 +131,16 @@ def test_few_strokes_and_a_noisy_motion_widen_the_interval():
     assert poor.value == rich.value == blurred.value
     assert poor.ci95[0] < rich.ci95[0] - 0.1
     assert blurred.ci95[0] < rich.ci95[0] - 0.05
+
+
+def test_how_a_run_begins_counts_with_its_share():
+    strokes = gap_of(9.0, 0.02, default_rng(2))
+    begun = strokes._replace(start=Start(0.01, 100.0, 64.0))
+    plain, found = (shrinkage(held, NOISE, 0.0, strokes=5) for held in (strokes, begun))
+    assert found.before**2 == pytest.approx(0.99 * plain.before**2 + 1.0)
+    assert found.after**2 == pytest.approx(0.99 * plain.after**2 + 0.64)
+    assert found.value < plain.value - 0.05
+    assert found.ci95[0] < found.value < found.ci95[1]
 
 
 def test_at_the_floor_there_is_nothing_to_shrink():

@@ -106,6 +106,9 @@ def test_absurd_sizes_count_for_little():
     drift = EFFECTS["force_drift"]
     assert plausibility(ActiveEffect(drift, (5.0, 60.0)), x) == 1.0
     assert plausibility(ActiveEffect(drift, (5.0, 3.0)), x) < 0.1
+    stop = EFFECTS["end_stop"]
+    assert plausibility(ActiveEffect(stop, (2e4, 0.006, 1e-3)), x) == 1.0
+    assert plausibility(ActiveEffect(stop, (5e3, 2e-4, 0.03)), x) < 0.1
 
 
 def test_what_comes_nearest_is_said_with_what_it_leaves():

@@ -1,0 +1,73 @@
+"""The best sets once more: with each of their effects left out, and with others in its place.
+
+A search that goes forward keeps what came first. What a second effect seems to gain may only be that the search
+for the first one had stopped short; and an effect that came first because two others together look like it would
+stay.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.effect_choice import EffectChoice
+from identification.gap.contender import Contender
+from identification.gap.explain import JointFit
+from identification.gap.screen import worth_fitting
+
+if TYPE_CHECKING:
+    from identification.gap.search import Search
+
+_TAKEN_BACK = 2
+"""Sets of several effects that are fitted again with each one left out."""
+_EXCHANGED, _EXCHANGES = 2, 2
+"""Effects tried in the place of each one of the best set, and how often that is done."""
+_BETTER = 0.9
+"""[1] part of what the best set left that the better one may leave, for a further exchange."""
+
+
+def leave_out(search: "Search") -> None:
+    """Fit the best sets with each of their effects left out, from where the whole set ended."""
+    best = sorted((c for c in search.found.values() if len(c.names) > 1), key=search.left_of)[:_TAKEN_BACK]
+    for contender in best:
+        for choice in contender.fit.effects:
+            _left_out(search, contender, choice)
+
+
+def _left_out(search: "Search", contender: Contender, choice: EffectChoice) -> Contender:
+    rest = tuple(c for c in contender.fit.effects if c != choice)
+    return search.fit(rest, None, [_without(contender.fit, choice)])
+
+
+def exchange(search: "Search") -> None:
+    """Fit other effects in the place of each one of the best set, where that leaves something."""
+    for _ in range(_EXCHANGES):
+        best = search.best()
+        if len(best.names) < 2 or search.at_floor(best):
+            return
+        before = search.left_of(best)
+        for choice in best.fit.effects:
+            if search.late:
+                return
+            _replace(search, best, choice)
+        if search.left_of(search.best()) > _BETTER * before:
+            return
+
+
+def _replace(search: "Search", best: Contender, choice: EffectChoice) -> None:
+    """Fit the most promising effects in the place of one."""
+    rest = search.found.get(best.names - {choice.name}) or _left_out(search, best, choice)
+    gains = search.screened(rest, best.names)
+    for gain in worth_fitting(gains, _EXCHANGED):
+        if rest.names | {gain.choice.name} not in search.found:
+            search.fit_beside(rest, gain, [])
+
+
+def _without(fit: JointFit, left_out: EffectChoice) -> Array:
+    """Unknowns of a fit without those of one of its effects."""
+    at, kept = fit.problem.first_effect, [fit.minimum.unknowns[: fit.problem.first_effect]]
+    for choice in fit.effects:
+        if choice != left_out:
+            kept.append(fit.minimum.unknowns[at : at + len(choice.quantities)])
+        at += len(choice.quantities)
+    return np.concatenate(kept)

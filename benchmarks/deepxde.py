@@ -15,13 +15,14 @@ import time
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 from types import ModuleType
+from typing import cast
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from benchmarks.pinn_cases import LABORATORY, pooled_error, problem_of, try_out, unseen_ratio
-from benchmarks.timing import cpu_seconds, line, reference_seconds
+from benchmarks.timing import line, reference_seconds, timed
 from identification.damper import law
 from identification.damper.coordinates import Coordinates, to_coordinates
 from identification.damper.parameters import Parameters
@@ -30,7 +31,7 @@ from identification.pinn.settings import PaperSettings, read_settings
 from identification.pinn.split import validation_masks
 from identification.pinn.supervision import Supervision
 
-STEPS, REPEATS = 100, 5
+STEPS, REPEATS = 100, 10
 """Steps in one timing, and timings; the least counts."""
 SEED = 0
 _SILENT = 10**9
@@ -57,9 +58,9 @@ class InDeepXde:
         random = np.random.default_rng(SEED)
         at = random.choice(len(ours.data.x), ours.settings.samples, replace=False)
         d = ours.data
-        points = d.inputs[at].numpy()
-        told = torch.column_stack([d.rates, d.x, d.v, d.drive, d.force, d.fitted])[at].numpy()
-        self.raw = [dde.Variable(0.0) for _ in Parameters._fields]
+        points = d.inputs.T[at].numpy()
+        told = torch.column_stack([d.rates.T, d.x, d.v, d.drive, d.force, d.fitted])[at].numpy()
+        self.raw = dde.Variable([0.0] * len(Parameters._fields))
         data = dde.data.PDE(
             dde.geometry.PointCloud(points), self._residuals, [], num_domain=0, anchors=points,
             auxiliary_var_function=lambda _: told,
@@ -77,14 +78,11 @@ class InDeepXde:
 
     def coordinates(self) -> Coordinates:
         """What it has found."""
-        return to_coordinates(Parameters(*(float(p.detach()) for p in self._parameters())))
-
-    def _parameters(self) -> list[Tensor]:
-        return searched(self.ours.begin, self.raw)
+        return to_coordinates(Parameters(*searched(self.ours.begin, self.raw).tolist()))
 
     def _residuals(self, inputs: Tensor, outputs: Tensor, told: Tensor) -> list[Tensor]:
         """Two misfits of the force and three of the law; the derivative is that along the trajectory."""
-        s, p = self.ours.scales, Parameters(*self._parameters())  # type: ignore[arg-type]
+        s, p = self.ours.scales, Parameters(*cast(list[float], searched(self.ours.begin, self.raw).unbind()))
         x, v, drive, force, fitted = told[:, 4:].T
         u, y, z = outputs.T * torch.tensor([[s.u], [s.y], [s.z]])
         rates = [
@@ -107,10 +105,12 @@ class InDeepXde:
         ]
 
 
-def step_seconds(hundred: Callable[[], None]) -> float:
-    """[s] of processor time of one step: the least of some repeats of ``STEPS`` steps, warm."""
-    hundred()
-    return cpu_seconds(hundred, REPEATS) / STEPS
+def step_seconds(hundreds: Sequence[Callable[[], None]]) -> list[float]:
+    """[s] of processor time of one step of each: the least of some repeats of ``STEPS`` steps, by turns, warm."""
+    for hundred in hundreds:
+        hundred()
+    spent = [[timed(hundred)[1] for hundred in hundreds] for _ in range(REPEATS)]
+    return [min(times) / STEPS for times in zip(*spent, strict=True)]
 
 
 def brought(theirs: InDeepXde, seconds: float) -> tuple[float, float, int]:
@@ -127,7 +127,7 @@ def brought(theirs: InDeepXde, seconds: float) -> tuple[float, float, int]:
 def step(dde: ModuleType) -> None:
     """Time of a step of Adam."""
     ours, theirs = training(), InDeepXde(dde, training())
-    steps = step_seconds(ours.run), step_seconds(lambda: theirs.run(STEPS))
+    steps = step_seconds((ours.run, lambda: theirs.run(STEPS)))
     line("a step of Adam, 2048 samples: ours", 1e3 * steps[0], "ms", "")
     line("the same in DeepXDE", 1e3 * steps[1], "ms", "")
     line("ours over DeepXDE's", steps[0] / steps[1], "x", "at most 1/3")

@@ -36,6 +36,7 @@ class Row(NamedTuple):
 def _rows() -> Iterator[Row]:
     yield Row("slip", "as shipped: elements by the slip", {})
     yield Row("slip", "elements by the turns of the stroke", {}, patched=True)
+    yield Row("network", "one network, all layers trained (global)", {}, preset="global")
     for meshes in (1, 2, 3, 10):
         levels = (_FIRST.model_copy(update={"meshes": min(meshes, 3)}), _last(meshes=meshes, settled=0.0))
         yield Row("meshes", f"{meshes} meshes at most in the last level", {"levels": levels})

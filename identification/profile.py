@@ -10,13 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array
 from identification.damper.coordinates import COORDINATES, Coordinates
 from identification.problem import COORDINATE_COUNT, Evaluation, Problem
 from identification.refine import Minimum, bounded_step, refine
 from identification.refine import Settings as RefineSettings
+from identification.threads import one_thread
 from identification.uncertainty import Covariance, coordinate_covariance
 
 _Z95 = 1.959964
@@ -70,7 +70,7 @@ def profile_intervals(
         covariance's width is where the search ended.
     """
     quick = problem.quicker()
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         best = refine(quick, RefineSettings(restarts=0), start=minimum.unknowns)
         spread = coordinate_covariance(problem, minimum, found)
         plain = coordinate_covariance(quick, best, _plain(quick, best))

@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array, BoolArray
 from identification.problem import Evaluation, Problem
 from identification.start import further_points, scattered, starting_points
+from identification.threads import one_thread
 
 _LARGEST_STEP = 1.5
 """[1] largest change of a search number in one step: a factor 4.5 for the logarithmic ones."""
@@ -75,8 +75,7 @@ def refine(
         progress: told of every step.
         start: unknowns (U,) to begin with; the regression's if None.
     """
-    # The matrices are long and thin: more threads only wait for each other, at full power.
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         return _search(problem, settings, progress, start)
 
 

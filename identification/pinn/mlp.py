@@ -23,67 +23,65 @@ class Passed(NamedTuple):
     """(N, units) rates before the activation."""
 
 
-_BLOCK = 512
-"""Samples that are taken through all layers before the next: their activations stay in the processor's cache."""
+class Room(NamedTuple):
+    """Memory for one hidden layer, (units, N) each: new memory costs as much as its use."""
+
+    value: Tensor
+    """Activations."""
+    rate: Tensor
+    """Their rates [1/s]."""
+    slope: Tensor
+    """Of the activation."""
+    over: Tensor
+    """Slope of the loss over what goes into the activation."""
+    over_rate: Tensor
+    """Slope of the loss over its rate [s]."""
 
 
 class _Outputs(torch.autograd.Function):
-    """Outputs of a whole network and their rates; the way back is written out, for one loss of all of them."""
+    """Outputs of a whole network and their rates; the way back is written out, for one loss of all of them.
+
+    A row is a unit at all samples, (units, N): products with the weights take a quarter less time so.
+    """
 
     @staticmethod
     def forward(
-        ctx: Any, network: "Network", weights: Tensor, inputs: Tensor, rates: Tensor
+        ctx: Any, network: "Network", room: list[Room], weights: Tensor, inputs: Tensor, rates: Tensor
     ) -> tuple[Tensor, Tensor]:
-        layers, room = network.layers(weights), network.lend(inputs)
-        one = inputs.new_ones(())
-        out, out_rate = (inputs.new_empty(len(inputs), network.sizes[-1]) for _ in range(2))
-        for block in _blocks(inputs):
-            value, rate = inputs[block], rates[block]
-            for (matrix, offset), kept in zip(layers[:-1], room, strict=True):
-                inner, inner_rate, slope = kept[0, block], kept[1, block], kept[2, block]
-                _to_tanh(torch.addmm(offset, value, matrix, out=inner))
-                torch.mm(rate, matrix, out=inner_rate)
-                torch.addcmul(one, inner, inner, value=-1.0, out=slope)
-                value, rate = inner, inner_rate.mul_(slope)
-            matrix, offset = layers[-1]
-            torch.addmm(offset, value, matrix, out=out[block])
-            torch.mm(rate, matrix, out=out_rate[block])
+        layers, one, value, rate = network.layers(weights), inputs.new_ones(()), inputs, rates
+        for (matrix, offset), kept in zip(layers[:-1], room, strict=True):
+            value, rate = (
+                torch.addmm(offset[:, None], matrix.T, value, alpha=2.0, beta=2.0, out=kept.value),
+                torch.mm(matrix.T, rate, out=kept.rate),
+            )
+            # tanh(a) = 2 sigmoid(2 a) - 1, to rounding of 1 and in a quarter of the time.
+            torch.add(-one, value.sigmoid_(), alpha=2.0, out=value)
+            rate.mul_(torch.addcmul(one, value, value, value=-1.0, out=kept.slope))
+        matrix, offset = layers[-1]
         ctx.network, ctx.room = network, room
         ctx.save_for_backward(weights, inputs, rates)
-        return out, out_rate
+        return torch.addmm(offset[:, None], matrix.T, value), matrix.T @ rate
 
     @staticmethod
-    def backward(ctx: Any, *given: Tensor) -> tuple[None, Tensor, None, None]:
+    def backward(ctx: Any, *given: Tensor) -> tuple[None, None, Tensor, None, None]:
         weights, inputs, rates = ctx.saved_tensors
         network, room = ctx.network, ctx.room
-        found = torch.zeros_like(weights)
+        found = torch.empty_like(weights)
         layers, slopes = network.layers(weights), network.layers(found)
-        passed = [(inputs, rates), *((kept[0], kept[1]) for kept in room)]
-        for block in _blocks(inputs):
-            over, over_rate = given[0][block], given[1][block]
-            for k in range(len(layers) - 1, -1, -1):
-                value, rate = (part[block] for part in passed[k])
-                slopes[k][0].addmm_(value.T, over).addmm_(rate.T, over_rate)
-                slopes[k][1].add_(over.sum(0))
-                if k:
-                    slope, matrix = room[k - 1][2, block], layers[k][0].T
-                    over, over_rate = over @ matrix, over_rate @ matrix
-                    # The slope falls with the value: d(slope * inner rate) = -2 value * rate.
-                    over.mul_(slope).addcmul_(value, rate.mul_(over_rate), value=-2.0)
-                    over_rate.mul_(slope)
+        over, over_rate = given
+        for k in range(len(layers) - 1, -1, -1):
+            value, rate = (room[k - 1].value, room[k - 1].rate) if k else (inputs, rates)
+            torch.mm(value, over.T, out=slopes[k][0]).addmm_(rate, over_rate.T)
+            torch.sum(over, 1, out=slopes[k][1])
+            if k:
+                kept, matrix = room[k - 1], layers[k][0]
+                over = torch.mm(matrix, over, out=kept.over)
+                over_rate = torch.mm(matrix, over_rate, out=kept.over_rate)
+                # The slope falls with the value: d(slope * inner rate) = -2 value * rate.
+                over.mul_(kept.slope).addcmul_(value, rate.mul_(over_rate), value=-2.0)
+                over_rate.mul_(kept.slope)
         network.give_back(room)
-        return None, found, None, None
-
-
-def _to_tanh(inner: Tensor) -> None:
-    """The hyperbolic tangent in place, by one exponential: to rounding of 1, in half of torch's own time."""
-    inner.mul_(2.0).exp_().add_(1.0).reciprocal_().mul_(-2.0).add_(1.0)
-
-
-def _blocks(inputs: Tensor) -> list[slice]:
-    """Where each block of the samples stands; an accelerator takes all at once."""
-    size = _BLOCK if inputs.device.type == "cpu" else len(inputs)
-    return [slice(at, at + size) for at in range(0, len(inputs), size)]
+        return None, None, found, None, None
 
 
 class Network:
@@ -91,7 +89,7 @@ class Network:
 
     def __init__(self, sizes: Sequence[int]) -> None:
         self.sizes = tuple(sizes)
-        self._spare: list[Tensor] = []
+        self._spare: list[Room] = []
         self._shapes = list(zip(self.sizes[:-1], self.sizes[1:], strict=True))
         self.count = sum(a * b + b for a, b in self._shapes)
 
@@ -125,20 +123,27 @@ class Network:
         matrix, offset = layers[-1]
         return passed[-1].value @ matrix + offset, passed[-1].rate @ matrix, passed
 
-    def lend(self, inputs: Tensor) -> list[Tensor]:
-        """Room (3, N, units) a layer for values, rates and slopes: new memory costs as much as its use."""
-        room, self._spare = self._spare, []
-        if room and room[0].shape[1] == len(inputs):
-            return room
-        return [inputs.new_empty(3, len(inputs), units) for units in self.sizes[1:-1]]
-
-    def give_back(self, room: list[Tensor]) -> None:
+    def give_back(self, room: list[Room]) -> None:
         """The room is needed no more."""
         self._spare = room
 
     def outputs(self, weights: Tensor, inputs: Tensor, rates: Tensor) -> tuple[Tensor, Tensor]:
-        """Outputs (N, last) and their total rates [1/s]; a loss of them has slopes over the weights, once."""
-        return cast(tuple[Tensor, Tensor], _Outputs.apply(self, weights, inputs, rates))  # type: ignore[no-untyped-call]
+        """Outputs (last, N) and their total rates [1/s] for inputs and rates (I, N).
+
+        A loss of both has slopes over the weights, once.
+        """
+        room = self._lent(inputs)
+        found = _Outputs.apply(self, room, weights, inputs, rates)  # type: ignore[no-untyped-call]
+        if not torch.is_grad_enabled():
+            self.give_back(room)
+        return cast(tuple[Tensor, Tensor], found)
+
+    def _lent(self, inputs: Tensor) -> list[Room]:
+        """Room for every hidden layer, of the step before where it fits."""
+        room, self._spare = self._spare, []
+        if room and room[0].value.shape[1] == inputs.shape[1]:
+            return room
+        return [Room(*inputs.new_empty(len(Room._fields), n, inputs.shape[1])) for n in self.sizes[1:-1]]
 
     def jacobian(self, weights: Tensor, passed: Sequence[Passed], over: Tensor, over_rate: Tensor) -> Tensor:
         """(N, count) slopes of one row per sample over all weights.

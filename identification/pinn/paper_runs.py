@@ -46,15 +46,18 @@ class _Data(NamedTuple):
     """Samples of all pieces, one after the other; all (N,) but the inputs."""
 
     inputs: Tensor
-    """(N, 4)"""
+    """(4, N)"""
     rates: Tensor
-    """(N, 4) along the trajectory, or those of t alone."""
+    """(4, N) along the trajectory, or those of t alone."""
     x: Tensor
     v: Tensor
     drive: Tensor
     force: Tensor
     fitted: Tensor
-    aside: Tensor
+
+    def at(self, places: Tensor) -> "_Data":
+        """Some of the samples."""
+        return _Data(*(part[..., places] for part in self))
 
 
 class _Scales(NamedTuple):
@@ -78,6 +81,7 @@ class PaperTraining:
         self.pieces = learned(self.problem)
         self.begin = to_parameters(next(starts(self.problem)).coordinates)
         self.data = self._gathered(held)
+        self.shown = self._spread(settings.samples)
         saturated = self.begin.A * to_coordinates(self.begin).D_y
         velocity = float(torch.sqrt(torch.mean(self.data.v**2)))
         self.scales = _Scales(
@@ -102,7 +106,7 @@ class PaperTraining:
         for self.steps in range(1, s.adam_steps + 1):
             at = torch.randint(0, count, (min(s.samples, count),), generator=random)
             adam.zero_grad()
-            self._loss(at).backward()  # type: ignore[no-untyped-call]
+            self._loss(self.data.at(at)).backward()  # type: ignore[no-untyped-call]
             adam.step()
             falling.step()
             if self.steps % _TOLD == 0:
@@ -112,7 +116,7 @@ class PaperTraining:
     def _polish(self) -> None:
         if not self.settings.lbfgs_steps:
             return
-        every = torch.arange(0, len(self.data.x), max(1, len(self.data.x) // (4 * self.settings.samples)))
+        every = self._spread(4 * self.settings.samples)
         rest = torch.optim.LBFGS(
             [self.weights, self.raw], max_iter=_TOLD_LATER, history_size=50, line_search_fn="strong_wolfe"
         )
@@ -128,67 +132,59 @@ class PaperTraining:
             self.steps += _TOLD_LATER
             self._note("L-BFGS")
 
+    def _spread(self, most: int) -> _Data:
+        """So many samples in even steps, or all."""
+        count = len(self.data.x)
+        return self.data.at(torch.linspace(0, count - 1, min(most, count)).long())
+
     def parameters(self) -> Parameters:
         """What has been found."""
-        return Parameters(*(float(value.detach()) for value in self._tensors()))
+        return Parameters(*searched(self.begin, self.raw).tolist())
 
-    def _tensors(self) -> list[Tensor]:
-        """Thirteen parameters and x0."""
-        return searched(self.begin, list(self.raw))
-
-    def _parameters(self) -> Parameters:
-        """The same by their names: the law takes tensors for numbers."""
-        return Parameters(*cast(list[float], self._tensors()))
-
-    def _states(self, at: Tensor) -> tuple[Tensor, Tensor]:
-        """[u, y, z] (n, 3) and their rates."""
-        scale = torch.tensor([self.scales.u, self.scales.y, self.scales.z], dtype=torch.float64, device=at.device)
-        value, rate = self.network.outputs(self.weights, self.data.inputs[at], self.data.rates[at])
+    def _states(self, d: _Data) -> tuple[Tensor, Tensor]:
+        """[u, y, z] (3, n) and their rates."""
+        scale = d.x.new_tensor([[self.scales.u], [self.scales.y], [self.scales.z]])
+        value, rate = self.network.outputs(self.weights, d.inputs, d.rates)
         return value * scale, rate * scale
 
-    def _forces(self, at: Tensor, states: tuple[Tensor, Tensor]) -> tuple[Tensor, Tensor]:
-        """Eqs. 1 and 2, with the states there and their rates."""
-        p, d = self._parameters(), self.data
-        (u, y, z), (_, y_rate, _) = (part.T for part in states)
+    def _equations(self, d: _Data) -> tuple[Tensor, Tensor]:
+        """Forces [N] by eqs. 1 and 2 (2, n), and what eqs. 8, 4 and 3 leave (3, n), of order one."""
+        # The law takes tensors for numbers.
+        s, p = self.scales, Parameters(*cast(list[float], searched(self.begin, self.raw).unbind()))
+        (u, y, z), (u_rate, y_rate, z_rate) = self._states(d)
         alpha, c0, c1 = (law.at_field(a, b, u) for a, b in _pairs(p))
-        first = alpha * z + c0 * (d.v[at] - y_rate) + p.k0 * (d.x[at] - y) + p.k1 * (d.x[at] - p.x0)
-        return first, law.force(y_rate, d.x[at], c1, p.k1, p.x0)
-
-    def _loss(self, at: Tensor) -> Tensor:
-        """Eq. 21."""
-        p, d, s = self._parameters(), self.data, self.scales
-        states = self._states(at)
-        (u, y, z), (u_rate, y_rate, z_rate) = (part.T for part in states)
-        alpha, c0, c1 = (law.at_field(a, b, u) for a, b in _pairs(p))
+        first = alpha * z + c0 * (d.v - y_rate) + p.k0 * (d.x - y) + p.k1 * (d.x - p.x0)
+        second = law.force(y_rate, d.x, c1, p.k1, p.x0)
         both = torch.clamp(c0 + c1, min=_LEAST_C)
-        inner = law.inner_velocity(d.x[at], d.v[at], y, z, alpha, c0, both - c0, p.k0)
-        hysteresis = law.hysteresis_rate(d.v[at] - y_rate, z, p.A, p.beta, p.gamma, p.n)
-        physics = (
-            (u_rate - law.field_rate(u, d.drive[at], p.eta)) / (s.rate * s.u),
+        inner = law.inner_velocity(d.x, d.v, y, z, alpha, c0, both - c0, p.k0)
+        hysteresis = law.hysteresis_rate(d.v - y_rate, z, p.A, p.beta, p.gamma, p.n)
+        left = (
+            (u_rate - law.field_rate(u, d.drive, p.eta)) / (s.rate * s.u),
             (y_rate - inner) / s.velocity,
             (z_rate - hysteresis) / (self.begin.A * s.velocity),
         )
-        misfits = [(d.force[at] - force) / s.force for force in self._forces(at, states)]
-        fitted = d.fitted[at]
-        data = torch.stack([((misfit * fitted) ** 2).sum() / fitted.sum() for misfit in misfits]).sum()
-        law_broken = torch.stack([(r**2).mean() for r in physics]).sum()
-        return self.settings.phi_data * data + self.settings.phi_phys * law_broken
+        return torch.stack((first, second)), torch.stack(left)
+
+    def _loss(self, d: _Data) -> Tensor:
+        """Eq. 21."""
+        forces, left = self._equations(d)
+        misfits = (forces - d.force) * (d.fitted / self.scales.force)
+        data, physics = misfits.square().sum() / d.fitted.sum(), left.square().mean(1).sum()
+        return self.settings.phi_data * data + self.settings.phi_phys * physics
 
     def _note(self, phase: str) -> None:
-        with torch.no_grad():
-            force = self.force()
-        error = float(
-            torch.sqrt((((force - self.data.force) * self.data.fitted) ** 2).sum() / self.data.fitted.sum())
-        )
+        d = self.shown
+        error = float(torch.sqrt((((self._force(d) - d.force) * d.fitted) ** 2).sum() / d.fitted.sum()))
         self.history.append(Moment(self.supervision.seconds, phase, error, float("nan"), float("nan")))
         self.supervision.step(f"pinn, {phase}", error)
 
     def force(self) -> Tensor:
         """The network's own force (N,): the mean of both branches."""
+        return self._force(self.data)
+
+    def _force(self, d: _Data) -> Tensor:
         with torch.no_grad():
-            every = torch.arange(len(self.data.x), device=self.data.x.device)
-            first, second = self._forces(every, self._states(every))
-        return 0.5 * (first + second)
+            return self._equations(d)[0].mean(0)
 
     def _gathered(self, held: Sequence[Array]) -> _Data:
         tables = []
@@ -198,25 +194,22 @@ class PaperTraining:
             x, v = inputs.motion(time)
             a = (inputs.motion(time + 0.5 * inputs.h)[1] - inputs.motion(time - 0.5 * inputs.h)[1]) / inputs.h
             drive = inputs.drive(time, piece.drive_delay)
-            tables.append(np.stack([x, v, a, drive, time, piece.force, piece.train - aside, aside]))
-        x, v, a, drive, time, force, fitted, aside = np.hstack(tables)
+            tables.append(np.stack([x, v, a, drive, time, piece.force, piece.train - aside]))
+        x, v, a, drive, time, force, fitted = np.hstack(tables)
         scale = np.array([np.abs(x).max(), v.std(), max(np.abs(drive).max(), 1e-9), time.max() / 2.0])
         total = self.settings.derivative == "total"
         zero, one = np.zeros_like(x), np.ones_like(x)
-        rates = np.column_stack([v, a, zero, one] if total else [zero, zero, zero, one]) / scale
-        values = np.column_stack([x, v, drive, time - time.max() / 2.0]) / scale
+        rates = np.stack([v, a, zero, one] if total else [zero, zero, zero, one]) / scale[:, None]
+        values = np.stack([x, v, drive, time - time.max() / 2.0]) / scale[:, None]
         device = self.settings.device
-        return _Data(
-            *(torch.as_tensor(q, device=device) for q in (values, rates, x, v, drive, force, fitted, aside))
-        )
+        return _Data(*(torch.as_tensor(q, device=device) for q in (values, rates, x, v, drive, force, fitted)))
 
 
-def searched(begin: Parameters, raw: Sequence[Tensor]) -> list[Tensor]:
-    """Thirteen parameters and x0 from the numbers that are searched; zeros are where the search begins."""
-    return [
-        start * torch.exp(number) if name in _POSITIVE else (abs(start) + 1e-12) * number + start
-        for name, start, number in zip(Parameters._fields, begin, raw, strict=True)
-    ]
+def searched(begin: Parameters, raw: Tensor) -> Tensor:
+    """Thirteen parameters and x0 (14,) from the numbers that are searched; zeros are where the search begins."""
+    start = raw.new_tensor(begin)
+    positive = torch.tensor([name in _POSITIVE for name in Parameters._fields], device=raw.device)
+    return torch.where(positive, start * raw.exp(), (start.abs() + 1e-12) * raw + start)
 
 
 def _pairs(p: Parameters) -> tuple[tuple[float, float], ...]:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
@@ -15,6 +14,7 @@ from identification.pinn.supervision import Supervision
 from identification.prediction import predict_piece, rmse
 from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.recordings import Stretch
+from identification.threads import one_thread
 
 
 def train(
@@ -38,7 +38,7 @@ def train(
     """
     supervision = supervision or Supervision()
     held = validation_masks(problem.pieces, settings.validation_share, settings.seed)
-    with threadpool_limits(1, "blas"):
+    with one_thread():
         outcome, blind = _network(settings)(problem, held, settings, supervision, stretches)
     seconds = supervision.seconds
     return _judged(problem, held, settings.network, outcome, blind, seconds)

@@ -2,10 +2,14 @@
 
 import importlib.util
 import re
+import tomllib
 from importlib.metadata import entry_points
 
 import blocks
 import pytest
+
+from bench.rig.config import BenchConfig
+from bench.safety.limits import Action
 
 HIDDEN = {".venv", "node_modules", "build", "runs"}
 ALL_PAGES = [p for p in sorted(blocks.ROOT.rglob("*.md")) if not HIDDEN & set(p.relative_to(blocks.ROOT).parts)]
@@ -72,3 +76,11 @@ def test_a_decision_says_what_it_must_in_at_most_sixty_lines(decision):
     assert len(text.splitlines()) <= 60
     for heading in ("## Context", "## Options", "## Decision", "## Consequences"):
         assert f"\n{heading}\n" in text
+
+
+def test_the_pieces_of_bench_toml_in_the_how_to_make_a_bench():
+    page = blocks.ROOT / "docs" / "how-to" / "connect-real-hardware.md"
+    pieces = [block.text for block in blocks.blocks(page) if block.language == "toml"]
+    config = BenchConfig.model_validate(tomllib.loads("\n".join(pieces)))
+    assert len(config.instruments) == 5
+    assert config.limits.matrix()["force"][Action.TRIP] == 1500.0

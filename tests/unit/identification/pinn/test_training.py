@@ -182,8 +182,9 @@ def test_rates_of_the_paper_network_are_those_along_the_trajectory():
     time = at.numpy() * inputs.h
     expected = (states(time + 1e-6) - states(time - 1e-6)) / 2e-6
     units = np.array([training.scales.u, training.scales.y, training.scales.z])
-    _, rates = training._states(at)
-    assert rates.detach().numpy() == pytest.approx(expected * units, rel=1e-3, abs=1e-9)
+    _, rates = training._states(training.data.at(at))
+    found = rates.detach().numpy().T
+    assert found == pytest.approx(expected * units, rel=1e-3, abs=1e-9)
 
 
 def test_the_derivative_carried_forward_is_that_of_automatic_differentiation():
@@ -203,15 +204,21 @@ def test_the_way_back_through_outputs_and_rates_is_that_of_automatic_differentia
     weights = network.begin(7, "cpu").requires_grad_()
     inputs, rates = torch.randn(1100, 3, dtype=torch.float64), torch.randn(1100, 3, dtype=torch.float64)
 
-    def slopes(value, rate):
-        return torch.autograd.grad((value * rate).sum() + (value[:, 0] ** 3).sum() + (rate**2).sum(), weights)[0]
+    def automatic():
+        value, rate, _ = network.forward(weights, inputs, rates)
+        return value.T, rate.T
 
-    written = [network.outputs(weights, inputs, rates) for _ in range(2)]
-    expected = network.forward(weights, inputs, rates)[:2]
-    for found in written:
-        assert torch.allclose(found[0], expected[0])
-        assert torch.allclose(found[1], expected[1])
-        assert torch.allclose(slopes(*found), slopes(*network.forward(weights, inputs, rates)[:2]))
+    def slopes(value, rate):
+        return torch.autograd.grad((value * rate).sum() + (value[0] ** 3).sum() + (rate**2).sum(), weights)[0]
+
+    def same(found, expected):
+        return torch.allclose(found, expected, rtol=1e-11, atol=1e-11 * float(expected.detach().abs().max()))
+
+    for found in [network.outputs(weights, inputs.T, rates.T) for _ in range(2)]:
+        assert all(same(*pair) for pair in zip(found, automatic(), strict=True))
+        assert same(slopes(*found), slopes(*automatic()))
+    with torch.no_grad():
+        assert all(map(same, network.outputs(weights, inputs.T, rates.T), automatic()))
 
 
 def test_the_paper_network_learns_the_force_and_gives_parameters_of_a_damper():

@@ -239,18 +239,19 @@ class Actuator:
         self._setpoints.arm(here)
         return here
 
-    def command(self, position: float) -> None:
+    def command(self, position: float, place_ns: int | None = None) -> None:
         """One setpoint, to be called every cycle.
 
         Args:
             position: [m] from the centre, or from home before a specimen is centred.
+            place_ns: bench clock at which it was due, if it is late; it is judged by that.
 
         Raises:
             OutOfRange: outside the travel or too fast from the last one; nothing was sent.
             Refused: not armed, or the drive has stopped by itself, with its reason.
             NoReply, NotConnected: the drive or the bus has gone.
         """
-        self._setpoints.send(position, self._origin, self.channels[0], self._samples)
+        self._setpoints.send(position, self._origin, self.channels[0], self._samples, place_ns)
 
     def sample(self) -> None:
         """Ask for one sample without moving anything: a SYNC alone."""

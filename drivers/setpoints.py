@@ -12,8 +12,6 @@ from drivers.errors import OutOfRange, Refused
 from drivers.instrument import Clock
 from drivers.servo_drive import COUNT, ActuatorSettings, ServoDrive
 
-_OWED = 5
-"""Cycles of motion that may follow at once on a setpoint that left late; beyond, it begins a new row."""
 _STALE_NS = 3 * ACTUATOR.every_ns
 """[ns] without a sample after which nobody seems to ask for them."""
 
@@ -45,7 +43,6 @@ class Setpoints:
         self._armed_ns: int | None = None
         self._boots = 0
         self._last_ns = self._beat_ns = self._place_ns = 0
-        self._cycle_ns = round(settings.cycle * 1e9)
         self._last = 0.0
 
     @property
@@ -69,14 +66,25 @@ class Setpoints:
         with self._sending:
             self._armed_ns = None
 
-    def send(self, position: float, origin: float, travel: Channel, samples: ActuatorSamples) -> None:
+    def send(
+        self,
+        position: float,
+        origin: float,
+        travel: Channel,
+        samples: ActuatorSamples,
+        place_ns: int | None = None,
+    ) -> None:
         """Send one setpoint, with its SYNC and now and then the heartbeat of the bench.
+
+        However late it leaves, it is judged by its place in the row: what makes up for setpoints that were held up
+        follows closer upon them, or stands for several, and only looks like a leap.
 
         Args:
             position: [m] from ``origin``.
             origin: [m from home]
             travel: what the rod's position may be.
             samples: of the drive; they say what state it is in.
+            place_ns: bench clock at which it was due; now, where nobody says.
 
         Raises:
             OutOfRange: outside the travel or too fast from the last one; nothing was sent.
@@ -86,11 +94,12 @@ class Setpoints:
         with self._sending:
             now = self._clock()
             self._check_led(samples)
-            self._check(position, (now - self._place_ns) / 1e9, travel)
+            place = now if place_ns is None else min(place_ns, now)
+            self._check(position, (place - self._place_ns) / 1e9, travel)
             target = round((position + origin) / COUNT)
             self._node.lead({0x6040: cia402.ENABLE, 0x6060: cia402.CYCLIC_POSITION, 0x607A: target})
             self._beat(now, (now - self._last_ns) / 1e9)
-            self._last_ns, self._place_ns, self._last = now, self._placed(now), position
+            self._last_ns, self._place_ns, self._last = now, place, position
 
     def _beat(self, now: int, since: float) -> None:
         """The bench's heartbeat goes with setpoints that come in time: who leads no more must not seem alive."""
@@ -98,14 +107,6 @@ class Setpoints:
         if in_time and now - self._beat_ns >= self._settings.master_beat * 1e9:
             self._node.send_heartbeat(self._master_id)
             self._beat_ns = now
-
-    def _placed(self, now: int) -> int:
-        """Where a setpoint that leaves now has its place in the row [ns]: a cycle behind the last, however late.
-
-        What was late is made up for by setpoints that follow closer, or by one that stands for several; by the
-        time between sendings alone a rod that keeps to its motion would seem to leap.
-        """
-        return now if now - self._place_ns > _OWED * self._cycle_ns else min(self._place_ns + self._cycle_ns, now)
 
     def _check_led(self, samples: ActuatorSamples) -> None:
         """See that the drive still does what it is told."""
@@ -132,7 +133,7 @@ class Setpoints:
         return "" if state is DriveState.ENABLED else state.value
 
     def _check(self, position: float, since: float, travel: Channel) -> None:
-        """See that a setpoint lies within the travel and can be reached ``since`` [s] the last one's place."""
+        """See that a setpoint lies within the travel and can be reached ``since`` [s] behind the last one."""
         travel.checked(position)
         time = max(min(since, self._settings.stale_after), self._settings.cycle)
         speed = abs(position - self._last) / time

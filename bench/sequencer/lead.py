@@ -28,8 +28,8 @@ _JOIN = 2.0
 class Led(Protocol):
     """The actuator, as it is led."""
 
-    def command(self, position: float) -> None:
-        """One setpoint [m] and the SYNC that goes with it."""
+    def command(self, position: float, place_ns: int) -> None:
+        """One setpoint [m] that was due at this instant, and the SYNC that goes with it."""
 
 
 class Lead:
@@ -113,7 +113,7 @@ class Lead:
             # The drive is there a cycle later.
             position = self._entry.playing.position(now_ns + self.cycle_ns)
             self._permit(position)
-            self._actuator.command(position)
+            self._actuator.command(position, now_ns)
             return True
 
     def _is_silent(self, now_ns: int) -> bool:

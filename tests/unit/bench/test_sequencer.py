@@ -54,7 +54,7 @@ class Recorded:
         self.now_ns = 0
         self.sent = []
 
-    def command(self, position):
+    def command(self, position, place_ns):
         self.sent.append((self.now_ns, position))
 
 

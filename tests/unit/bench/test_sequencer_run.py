@@ -61,7 +61,7 @@ class Rod:
         self.calls.append("rod armed")
         return 0.0
 
-    def command(self, position):
+    def command(self, position, place_ns):
         if len(self.sent) == self.refuses_at:
             raise Refused("actuator: the drive has stopped by itself")
         self.sent.append(position)

@@ -28,9 +28,11 @@ class Bench:
     def beat(self, master):
         self.beats += 1
 
-    def send(self, at_ms, place_ms):
+    def send(self, at_ms, place_ms, where_ms=None):
+        """One that leaves at an instant, has its place at another, and a position of a third one."""
         self.now = round(at_ms * MS)
-        self.setpoints.send(SPEED * place_ms * 1e-3, 0.0, TRAVEL, SAMPLES)
+        position = SPEED * (place_ms if where_ms is None else where_ms) * 1e-3
+        self.setpoints.send(position, 0.0, TRAVEL, SAMPLES, place_ms * MS)
 
 
 def test_setpoints_that_were_held_up_are_made_up_for():
@@ -41,21 +43,47 @@ def test_setpoints_that_were_held_up_are_made_up_for():
     assert len(bench.sent) == 7
 
 
+def test_one_that_is_held_up_on_its_way_is_made_up_for_at_once():
+    """It had begun in time and left 30 ms late; the next one stands for eight places and follows upon it."""
+    bench = Bench()
+    for at, place in ((4, 4), (8, 8), (42, 12), (42.1, 44), (48, 48)):
+        bench.send(at, place)
+    assert len(bench.sent) == 5
+
+
+def test_a_place_to_come_is_not_believed():
+    bench = Bench()
+    bench.send(4, 4)
+    with pytest.raises(OutOfRange):
+        bench.send(8, 100, 100)
+
+
 def test_a_leap_in_a_row_that_is_on_time_is_refused():
     bench = Bench()
     for place in (4, 8, 12):
         bench.send(place, place)
     with pytest.raises(OutOfRange, match=r"m/s from the last setpoint, 0\.5 m/s are allowed; nothing was sent"):
-        bench.send(16, 30)
+        bench.send(16, 16, 30)
     assert len(bench.sent) == 3
 
 
 def test_a_leap_after_a_long_silence_is_refused_as_well():
     bench = Bench()
     bench.send(4, 4)
-    bench.send(104, 44)
+    bench.send(104, 104, 44)
     with pytest.raises(OutOfRange):
-        bench.send(108, 60)
+        bench.send(108, 108, 60)
+
+
+def test_where_nobody_says_its_place_the_clock_does():
+    bench = Bench()
+    bench.send(4, 4)
+    bench.now = 8 * MS
+    with pytest.raises(OutOfRange):
+        bench.setpoints.send(SPEED * 0.03, 0.0, TRAVEL, SAMPLES)
+    bench.now = 28 * MS
+    bench.setpoints.send(SPEED * 0.03, 0.0, TRAVEL, SAMPLES)
+    assert len(bench.sent) == 2
 
 
 def test_the_heartbeat_goes_with_setpoints_that_come_in_time_alone():

@@ -43,6 +43,8 @@ _LAGS = np.arange(-0.006, 0.0451, 0.003)
 """[s] At which the displacement may follow the force."""
 _BLOCK = 2.0
 """[s] length of the blocks of which the middle one's cutoff is taken."""
+_CALM = 3.0
+"""[1] deviations of the noise within which nine tenths of what is swift must stay, or it is the stroke."""
 _KNOCK = 4.0
 """[1] What stands out so many times over most is a knock of the actuator and follows no force."""
 _ROUNDS = 3
@@ -148,10 +150,7 @@ def _give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
     nothing = np.zeros(len(x))
     if len(x) < 50 * len(_LAGS):
         return nothing
-    # Where the rod stumbled, the middle of many blocks is not moved by it.
-    length = _BLOCK * rate if not weights.all() else len(x)
-    cutoffs = _cutoffs(x, weights, nothing[3:], (np.arange(len(x)) / length).astype(np.intp), rate, noise)
-    cutoff = float(np.quantile(cutoffs, 0.5, method="lower"))
+    cutoff = _calm_cutoff(x, weights, rate, noise)
     penalty = np.full(len(x) - 3, float(stiffness(cutoff, rate)))
     shifts = np.unique(np.rint(_LAGS * rate).astype(int))
     reach = int(np.max(np.abs(shifts))) + 1
@@ -171,6 +170,24 @@ def _give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
         return give
     # Of the slow part of the force too little was learnt; the smoother follows what it does.
     return np.convolve(np.pad(driver, reach, "edge"), kernel, "valid")
+
+
+def _calm_cutoff(values: Array, weights: Array, rate: float, noise: float) -> float:
+    """The cutoff [Hz] above which a displacement (N,) shows noise, and what it follows of the force."""
+
+    def middle(block: float) -> float:
+        blocks = (np.arange(len(values)) / block).astype(np.intp)
+        cutoffs = _cutoffs(values, weights, np.zeros(len(values) - 3), blocks, rate, noise)
+        return float(np.quantile(cutoffs, 0.5, method="lower"))
+
+    if not weights.all():
+        # Where the rod stumbled, small stumbles are left: they raise the cutoff of the whole, not of most blocks.
+        cutoff = middle(_BLOCK * rate)
+        penalty = np.full(len(values) - 3, float(stiffness(cutoff, rate)))
+        swift = np.abs(values - smoothed(values, weights, penalty, np.zeros(len(penalty))))[weights > 0.0]
+        if np.quantile(swift, 0.9) < _CALM * noise:
+            return cutoff
+    return middle(len(values))
 
 
 def _followed(lagged: Array, swift: Array, reach: int) -> tuple[Array, float]:

@@ -59,14 +59,15 @@ def divide(stretch: Stretch, waves: list[Harmonics], gives: bool) -> Parts:
 
 
 def stumbles(stretch: Stretch, off: Array) -> list[Indices]:
-    """The samples of every stumble; what begins where the drive steps is the actuator's answer to that.
+    """The samples of every stumble; what begins where drive or stroke change is the actuator's answer to that.
 
     Args:
         stretch: the recording.
         off: (N,) by how much the rod leaves its wave where it stumbles [m]; 0 elsewhere.
     """
     reach = _reach(stretch)
-    steps = _around(set(drive_steps(stretch.drive).tolist()), len(off), reach)
+    seams = {s.start for s in stretch.segments} & {s.stop for s in stretch.segments}
+    steps = _around(seams | set(drive_steps(stretch.drive).tolist()), len(off), reach)
     runs = _unbroken(_widened(off > 0.0, reach))
     begins = [min(run[0] + reach, len(off) - 1) for run in runs]
     most = MOST_GIVE * _size(stretch)

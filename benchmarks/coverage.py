@@ -20,6 +20,7 @@ import numpy as np
 from bench.methods import load_method
 from bench.rig_process import RIG
 from bench.run_from_plant import Identity, run_from_plant
+from benchmarks import kept
 from benchmarks.timing import line
 from identification.assemble import assemble
 from identification.damper.coordinates import Coordinates, to_coordinates
@@ -87,12 +88,10 @@ def fitted(seed: int, scenario: str) -> dict[str, Any]:
 
 def run(seeds: int = SEEDS, results: Path | None = None, scenario: str = "default") -> None:
     """Print coverage and unseen errors; with a file, results are kept a line each and a later call goes on."""
-    rows = [json.loads(text) for text in results.read_text().splitlines()] if results and results.exists() else []
+    rows = kept.rows(results)
     for seed in sorted(set(range(seeds)) - {row["seed"] for row in rows}):
         rows.append(fitted(seed, scenario))
-        if results:
-            with results.open("a") as file:
-                file.write(json.dumps(rows[-1]) + "\n")
+        kept.keep_row(results, rows[-1])
     print(f"coverage: {len(rows)} seeds of scenario {scenario}, {TRAINING} fitted, {UNSEEN} unseen")
     _table(rows)
 

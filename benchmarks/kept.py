@@ -46,6 +46,18 @@ def figures(path: Path, make: Callable[[], Any]) -> Any:
     return json.loads(path.read_text(encoding="utf-8"))
 
 
+def rows(path: Path | None) -> list[dict[str, Any]]:
+    """What was kept a line each; nothing where there is no file yet."""
+    return [json.loads(text) for text in path.read_text().splitlines()] if path and path.exists() else []
+
+
+def keep_row(path: Path | None, row: dict[str, Any]) -> None:
+    """Keep one more, where there is a file to keep it in."""
+    if path:
+        with path.open("a") as file:
+            file.write(json.dumps(row) + "\n")
+
+
 def mrbench(*words: object) -> None:
     """Type a command of the product."""
     subprocess.run([str(Path(sys.executable).with_name("mrbench")), *map(str, words)], check=True)

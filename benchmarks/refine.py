@@ -8,7 +8,6 @@ same data, and is timed to the same final cost.
     python -m benchmarks.refine baseline
 """
 
-import json
 import sys
 import time
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import OptimizeResult, least_squares
 
+from benchmarks import kept
 from benchmarks.fitting import RISING, SHUFFLED, TRAINING, UNSEEN, random_damper, recorded, stroke
 from benchmarks.timing import cpu_seconds, line, reference_seconds
 from identification.damper import law
@@ -78,13 +78,11 @@ def fitted(c: Coordinates, seed: int) -> dict[str, Any]:
 
 def dampers(first: int = 0, last: int = DAMPERS, results: Path | None = None) -> None:
     """Fit random dampers; with a file, results are kept a line each and the table is of all in it."""
-    done = [json.loads(text) for text in results.read_text().splitlines()] if results and results.exists() else []
+    done = kept.rows(results)
     fitted(to_coordinates(parameter_set("laboratory").parameters), 0)
     for seed in sorted(set(range(first, last)) - {row["seed"] for row in done}):
         done.append(fitted(random_damper(seed), seed))
-        if results:
-            with results.open("a") as file:
-                file.write(json.dumps(done[-1]) + "\n")
+        kept.keep_row(results, done[-1])
     _table(done)
 
 

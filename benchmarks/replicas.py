@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import kept
 from benchmarks.coverage import record
 from benchmarks.pinn_cases import LABORATORY, random_strokes
 from identification.assemble import assemble
@@ -84,14 +85,13 @@ def _noisy(stretch: Stretch, random: np.random.Generator) -> Stretch:
 
 def run(method: str, first: int, last: int, results: Path) -> None:
     """Fit the replicas from ``first`` up to, not including, ``last`` that are not in the file yet."""
-    known = {row["seed"] for row in rows(results)} if results.exists() else set()
+    known = {row["seed"] for row in kept.rows(results)}
     for base in sorted({seed // SHARED for seed in range(first, last) if seed not in known}):
         with TemporaryDirectory() as folder:
             recording, true, _ = record(method, base, Path(folder), str(without_noise(Path(folder))))
         for seed in range(max(first, base * SHARED), min(last, (base + 1) * SHARED)):
             if seed not in known:
-                with results.open("a") as file:
-                    file.write(json.dumps(_fitted(noisy(recording, seed), seed, true)) + "\n")
+                kept.keep_row(results, _fitted(noisy(recording, seed), seed, true))
 
 
 def _fitted(recording: Recording, seed: int, true: Coordinates) -> dict[str, Any]:
@@ -125,8 +125,7 @@ def run_random(first: int, last: int, results: Path) -> None:
             np.concatenate([predict_piece(p, c).force - p.force for p in pieces]) for c in (point, LABORATORY)
         ]
         row["unseen"] = rmse(errors[0]) / rmse(errors[1])
-        with results.open("a") as file:
-            file.write(json.dumps(row) + "\n")
+        kept.keep_row(results, row)
 
 
 def _coarse(recording: Recording) -> Recording:
@@ -138,14 +137,9 @@ def _coarse(recording: Recording) -> Recording:
     )
 
 
-def rows(results: Path) -> list[dict[str, Any]]:
-    """What is known of every replica."""
-    return [json.loads(text) for text in results.read_text().splitlines()]
-
-
 def table(results: Path) -> None:
     """Print the coverage, pooled and of each coordinate, with bias and spread in the fit's own deviations."""
-    found = rows(results)
+    found = kept.rows(results)
     names = list(found[0]["coordinates"])
     inside = {level: [_inside(found, name, f"ci{level}") for name in names] for level in QUANTILES}
     print(f"{len(found)} replicas, {sum(r['result'] == 'converged' for r in found)} end in `converged` alone")

@@ -52,8 +52,7 @@ def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
     """
     bends = _bends(problem, minimum.unknowns)
     H, gradient = minimum.evaluation.hessian, minimum.evaluation.gradient
-    low, high = problem.bounds()
-    inside = problem.free & (minimum.unknowns > low + 1e-9) & (minimum.unknowns < high - 1e-9)
+    inside = problem.inside(minimum.unknowns)
     free = np.ix_(inside, inside)
     wander = _likeliest(bends, H[free], gradient[inside], inside, problem.delay_prior)
     if not wander:
@@ -63,7 +62,7 @@ def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
     pull = gradient - bends.shared @ np.linalg.solve(held, bends.gradient)
     unknowns = minimum.unknowns.copy()
     unknowns[inside] -= np.linalg.solve(left[free], pull[inside])
-    unknowns = np.clip(unknowns, low, high)
+    unknowns = np.clip(unknowns, *problem.bounds())
     return replace(minimum, unknowns=unknowns, evaluation=replace(minimum.evaluation, hessian=left)), wander
 
 

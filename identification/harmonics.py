@@ -171,16 +171,12 @@ def _steady(
         frequency, rest = _extended(values, np.where(stumbled, 0.0, weights), rate, frequency, start, stop)
         rest *= weights
         before, stumbled = stumbled, _standing_out(rest, slice(start, stop), weights, noise)
-        usual = _rms(rest[start:stop][~stumbled[start:stop]])
+        usual = float(np.sqrt(np.mean(rest[start:stop][~stumbled[start:stop]] ** 2)))
         grown = _run_of_cycles(rest, stumbled, rate / frequency, _UNSTEADY * max(usual, noise))
         if grown == (start, stop) and np.array_equal(before, stumbled):
             break
         start, stop = grown
     return start, stop, frequency, np.where(stumbled, np.abs(rest), 0.0)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
 def _extended(

@@ -4,11 +4,11 @@ Velocity enters the force through c0, so that noise of the displacement becomes 
 difference of 2 µm noise at 1 kHz is 2.8 mm/s, at 2000 N s/m some 6 N. What is known of the motion is used in turn:
 
 1. The actuator gives way under the load. What the displacement follows of the recorded force is regressed on
-   the force at lags of -6 to 45 ms, if it is there at all.
+   the force at lags of -6 to 45 ms, if it is there at all (actuator_give.py).
 2. A periodic stroke repeats: its harmonics are fitted (harmonics.py), over all segments that it goes on through.
 3. The rest is smoothed twice (smoother.py): the third differences of the motion are expected to be those of 1
    and 2. How stiffly is chosen place by place (each periodic segment, each stretch between them, the joints) where
-   the estimated error of the *velocity* is least (Mallows' Cp of the first differences). A fade, a move and a hold
+   the estimated error of the *velocity* is least (cutoffs.py). A fade, a move and a hold
    are not alike: one stiffness for all of them bends the fades by micrometres, and k0 and k1 with them.
 """
 
@@ -16,40 +16,22 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
-from scipy.ndimage import minimum_filter1d
 
+from identification.actuator_give import LONGEST_LAG, give_under_load
 from identification.arrays import Array, BoolArray
+from identification.cutoffs import best_cutoffs
 from identification.harmonics import Harmonics, fit_harmonics, steady_cycles
-from identification.motion_parts import MOST_GIVE, divide, marked, stumbles
+from identification.motion_parts import divide, marked, stumbles
 from identification.recordings import Segment, Stretch
-from identification.smoother import derivative, kept_noise, smoothed, stiffness
-
-Indices = npt.NDArray[np.intp]
+from identification.smoother import derivative, smoothed, stiffness
 
 _PERIODIC = ("sine", "triangle")
 _LONGEST_RUN = 30.0
 """[s] Segments of one stroke are fitted together up to this length; longer ones average enough by themselves."""
 _WHOLE_RUN = 0.9
 """[1] share of a run that must be steady, else its segments are fitted one by one."""
-_CUTOFF_RATIO = 1.35
-_LOWEST, _HIGHEST = 0.003, 0.25
-"""Of the trial cutoffs, in cycles a sample."""
-_STROKE_BAND = 200.0
-"""[Hz] No hydraulic or electric stroke carries more; what a sensor shows above it is noise of any colour."""
 _END = 2.0
 """How much looser the smoother is at an end of the stretch."""
-_LAGS = np.arange(-0.006, 0.0451, 0.003)
-"""[s] At which the displacement may follow the force."""
-_BLOCK = 2.0
-"""[s] length of the blocks of which the middle one's cutoff is taken."""
-_CALM = 3.0
-"""[1] deviations of the noise within which nine tenths of what is swift must stay, or it is the stroke."""
-_KNOCK = 4.0
-"""[1] What stands out so many times over most is a knock of the actuator and follows no force."""
-_ROUNDS = 3
-_CHANCE = 4.0
-"""The force explains the displacement if it does so this many times better than chance."""
 
 
 class Motion(NamedTuple):
@@ -84,12 +66,13 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
     weights = stretch.measured.astype(float)
     noise = recorded_noise(stretch)
     stumbled = _roughly_stumbled(stretch, weights, noise)
-    give = _give_under_load(stretch, np.where(stumbled, 0.0, weights), noise)
+    give = give_under_load(stretch, np.where(stumbled, 0.0, weights), noise)
+    gives = bool(np.any(give))
     waves = _periodic_parts(stretch, weights, give, noise)
-    parts = divide(stretch, waves, bool(np.any(give)))
-    expected = _expected(give, waves, int(_LAGS[-1] * stretch.rate))
+    parts = divide(stretch, waves, gives)
+    expected = _expected(give, waves, int(LONGEST_LAG * stretch.rate))
     if cutoff is None:
-        trial = partial(_cutoffs, expected=expected, regions=parts.regions, rate=stretch.rate, noise=noise)
+        trial = partial(best_cutoffs, expected=expected, regions=parts.regions, rate=stretch.rate, noise=noise)
         cutoff = trial(stretch.displacement, weights, twice=True)[parts.regions]
         if parts.stumbled.any():
             # Beside a stumble, what a stiff smoother makes of that is no fault of the motion there.
@@ -106,7 +89,7 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
         float(np.std(rest)),
         cutoff,
         parts.lost,
-        _in_words(stretch, waves, cutoff, bool(np.any(give)), from_record),
+        _in_words(stretch, waves, cutoff, gives, from_record),
     )
 
 
@@ -142,76 +125,6 @@ def _roughly_stumbled(stretch: Stretch, weights: Array, noise: float) -> BoolArr
         if steady:
             off[part] = steady.off
     return marked(stumbles(stretch, off), len(off))
-
-
-def _give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
-    """What the displacement follows of the force (N,) [m]; zeros where it follows nothing."""
-    x, rate = stretch.displacement, stretch.rate
-    nothing = np.zeros(len(x))
-    if len(x) < 50 * len(_LAGS):
-        return nothing
-    cutoff = _calm_cutoff(x, weights, rate, noise)
-    penalty = np.full(len(x) - 3, float(stiffness(cutoff, rate)))
-    shifts = np.unique(np.rint(_LAGS * rate).astype(int))
-    reach = int(np.max(np.abs(shifts))) + 1
-    force = _blurred(stretch.force, int(shifts[1] - shifts[0]))
-    swift = (x - smoothed(x, weights, penalty, nothing[3:])) * weights
-    driver = force - smoothed(force, np.ones(len(x)), penalty, nothing[3:])
-    rows = np.arange(reach, len(x) - reach, max(1, len(x) // 100_000))
-    rows = rows[minimum_filter1d(weights, 2 * reach + 1)[rows] > 0.0]
-    lagged = np.stack([driver[rows - shift] for shift in shifts])
-    gains, chance = _followed(lagged, swift[rows], reach)
-    if chance < _CHANCE:
-        return nothing
-    kernel = np.zeros(2 * reach + 1)
-    kernel[reach + shifts] = gains
-    give = np.convolve(np.pad(force, reach, "edge"), kernel, "valid")
-    if np.std(give) < MOST_GIVE * np.std(x):
-        return give
-    # Of the slow part of the force too little was learnt; the smoother follows what it does.
-    return np.convolve(np.pad(driver, reach, "edge"), kernel, "valid")
-
-
-def _calm_cutoff(values: Array, weights: Array, rate: float, noise: float) -> float:
-    """The cutoff [Hz] above which a displacement (N,) shows noise, and what it follows of the force."""
-
-    def middle(block: float) -> float:
-        blocks = (np.arange(len(values)) / block).astype(np.intp)
-        cutoffs = _cutoffs(values, weights, np.zeros(len(values) - 3), blocks, rate, noise)
-        return float(np.quantile(cutoffs, 0.5, method="lower"))
-
-    if not weights.all():
-        # Where the rod stumbled, small stumbles are left: they raise the cutoff of the whole, not of most blocks.
-        cutoff = middle(_BLOCK * rate)
-        penalty = np.full(len(values) - 3, float(stiffness(cutoff, rate)))
-        swift = np.abs(values - smoothed(values, weights, penalty, np.zeros(len(penalty))))[weights > 0.0]
-        if np.quantile(swift, 0.9) < _CALM * noise:
-            return cutoff
-    return middle(len(values))
-
-
-def _followed(lagged: Array, swift: Array, reach: int) -> tuple[Array, float]:
-    """Gains [m/N] of each lag on a displacement (rows,) [m], and how much better than chance they explain it [1].
-
-    A knock moves rod and force by itself. It is known by what no gain explains, and what lies around it by then
-    tells nothing of the actuator either.
-    """
-    rest, sound = swift, np.ones(len(swift), bool)
-    for round_ in range(_ROUNDS):
-        off = np.abs(rest) > _KNOCK * np.quantile(np.abs(rest), 0.95)
-        sound = ~off if round_ == 0 else minimum_filter1d(~off, 2 * reach + 1)
-        known = lagged[:, sound]
-        gains = np.linalg.lstsq(known @ known.T, known @ swift[sound], rcond=1e-10)[0]
-        rest = swift - gains @ lagged
-    explained = float(gains @ (known @ swift[sound]))
-    left = float(np.sum(swift[sound] ** 2))
-    return np.asarray(gains), explained * len(swift[sound]) / max(len(gains) * left, 1e-300)
-
-
-def _blurred(values: Array, width: int) -> Array:
-    """The signal under a triangle of twice this many samples: what stands between two lags is not lost."""
-    hat = width - np.abs(np.arange(1 - width, width))
-    return np.convolve(np.pad(values, width - 1, "edge"), hat / width**2, "valid")
 
 
 def _periodic_parts(stretch: Stretch, weights: Array, give: Array, noise: float) -> list[Harmonics]:
@@ -276,32 +189,6 @@ def _expected(give: Array, waves: list[Harmonics], unknown: int) -> Array:
     for wave in waves:
         expected[wave.start : wave.stop - 3] += np.diff(wave.values, 3)
     return expected
-
-
-def _cutoffs(
-    values: Array,
-    weights: Array,
-    expected: Array,
-    regions: Indices,
-    rate: float,
-    noise: float,
-    *,
-    twice: bool = False,
-) -> Array:
-    """The cutoff [Hz] for each region that makes the estimated error of the velocity least."""
-    highest = max(min(_HIGHEST * rate, _STROKE_BAND), 2.0 * _LOWEST * rate)
-    steps = int(np.log(highest / (_LOWEST * rate)) / np.log(_CUTOFF_RATIO)) + 1
-    trials = np.geomspace(highest, _LOWEST * rate, steps + 1)[::-1]
-    both = weights[1:] * weights[:-1]
-    count = int(regions.max()) + 1
-    sizes = np.bincount(regions[1:], both, count)
-    costs = np.empty((len(trials), count))
-    for cost, cutoff in zip(costs, trials, strict=True):
-        penalty = np.full(len(expected), float(stiffness(cutoff, rate)))
-        left = np.diff(values - smoothed(values, weights, penalty, expected, twice=twice)) ** 2
-        cost[:] = np.bincount(regions[1:], both * left, count)
-        cost += 2.0 * noise**2 * sizes * kept_noise(cutoff, rate, twice=twice)
-    return np.asarray(trials[np.argmin(costs, axis=0)])
 
 
 def _looser_at_the_ends(cutoffs: Array, rate: float) -> Array:

@@ -65,8 +65,7 @@ def play_noise(problem: Problem, stretches: Sequence[Stretch], minimum: Minimum,
         seed: of the noise.
     """
     fitted = _as_fitted(problem.quicker(), minimum.unknowns)
-    low, high = fitted.bounds()
-    inside = fitted.free & (minimum.unknowns > low + 1e-9) & (minimum.unknowns < high - 1e-9)
+    inside = fitted.inside(minimum.unknowns)
     slopes = [fitted.residuals(minimum.unknowns, i)[1] for i in range(len(fitted.pieces))]
     played = [replace(s, force=p.force) for s, p in zip(stretches, fitted.pieces, strict=True)]
     # The fitted motion is smoother than the real one: a cutoff chosen anew would pass less noise than it did.

@@ -65,6 +65,8 @@ def stumbles(stretch: Stretch, off: Array) -> list[Indices]:
         stretch: the recording.
         off: (N,) by how much the rod leaves its wave where it stumbles [m]; 0 elsewhere.
     """
+    if not off.any():
+        return []
     reach = _reach(stretch)
     seams = {s.start for s in stretch.segments} & {s.stop for s in stretch.segments}
     steps = _around(seams | set(drive_steps(stretch.drive).tolist()), len(off), reach)

@@ -30,6 +30,8 @@ _SHARED = COORDINATE_COUNT + 2
 """Unknowns that all pieces share: the search numbers and the two delays."""
 _MOST_FOR_PLAY = 8
 """Times a thinned rate at which play is still looked at."""
+_AT_BOUND = 1e-9
+"""[1] of a search number within which an unknown stands at a bound."""
 _FAR = 10.0
 """[1] change of an effect's size, in its usual unit, that counts like one of a search number."""
 
@@ -143,6 +145,11 @@ class Problem:
         delays = [True, not self.space.one_drive]
         rest = len(self.pieces) + self.effect_count + self.own_count
         return np.concatenate([self.space.free, delays, np.ones(rest, bool)])
+
+    def inside(self, unknowns: Array) -> BoolArray:
+        """(U,) True where an unknown is free and stands at none of its bounds."""
+        low, high = self.bounds()
+        return self.free & (unknowns > low + _AT_BOUND) & (unknowns < high - _AT_BOUND)
 
     @property
     def effect_count(self) -> int:

@@ -92,9 +92,8 @@ def profile_intervals(
 
 def _plain(problem: Problem, minimum: Minimum) -> Covariance:
     """Covariance by the curvature alone, not scaled."""
-    low, high = problem.bounds()
-    p, H = minimum.unknowns, minimum.evaluation.hessian
-    inside = problem.free & (p > low + 1e-9) & (p < high - 1e-9) & (np.diag(H) > 0)
+    H = minimum.evaluation.hessian
+    inside = problem.inside(minimum.unknowns) & (np.diag(H) > 0)
     full = np.zeros_like(H)
     full[np.ix_(inside, inside)] = np.linalg.pinv(H[np.ix_(inside, inside)], rcond=1e-13)
     return Covariance(full, problem.free, inside, coloured=False)

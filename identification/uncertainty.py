@@ -52,10 +52,9 @@ def covariance(problem: Problem, minimum: Minimum, scatter: Array | None = None)
         minimum: where.
         scatter: (U, U) what the noise of the motion adds, if it was played again.
     """
-    low, high = problem.bounds()
     p = minimum.unknowns
     seen = np.diag(minimum.evaluation.hessian) > _SEEN
-    inside = problem.free & seen & (p > low + 1e-9) & (p < high - 1e-9)
+    inside = problem.inside(p) & seen
     H = minimum.evaluation.hessian[np.ix_(inside, inside)]
     size = np.sqrt(np.diag(H))
     size = np.where(size > 0, size, 1.0)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from dataclasses import dataclass, field
@@ -10,10 +11,15 @@ from typing import Any
 
 from benchmarks.prediction_series import Series, read_series
 
+_OUT = re.compile(r"--out (\S+)")
+
 
 @dataclass(frozen=True)
 class Desk:
-    """A folder in which commands are typed, and what was typed."""
+    """A folder in which commands are typed, and what was typed.
+
+    What a command would write is made once: in a folder that was kept, work goes on where it stopped.
+    """
 
     folder: Path
     typed: list[str] = field(default_factory=list)
@@ -21,6 +27,9 @@ class Desk:
     def type(self, line: str) -> None:
         """Run a command line as a person would; stop with its own words where it fails."""
         self.typed.append(line)
+        out = _OUT.search(line)
+        if out and (self.folder / out[1]).exists():
+            return
         print(line, file=sys.stderr)
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
         done = subprocess.run(

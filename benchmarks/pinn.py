@@ -120,8 +120,8 @@ def real() -> None:
             desk.type(f"mrbench import {shared}/data/{files} --out {name}.mcap {how}")
             errors = []
             for stage in ("pinn", "refine"):
-                desk.type(f"mrbench identify {name}.mcap {options} --stages {stage} --out {name}.json")
-                fit = desk.document(name)
+                desk.type(f"mrbench identify {name}.mcap {options} --stages {stage} --out {name}-{stage}.json")
+                fit = desk.document(f"{name}-{stage}")
                 errors.append(fit["rmse_n"]["held_out"])
                 print(f"  {name} {stage}: {fit['stages'][0]['seconds']:.0f} s, {fit['result']}")
             line(f"{name}: held-out error of pinn over that of refine", errors[0] / errors[1], "x", "at most 1.05")

@@ -1,21 +1,23 @@
 """Recordings of two real dampers through the commands of the product: import, identify, predict.
 
 `MRBENCH_SHARED` names the folder that holds `data/utfsm_sine` and `data/nees_dyke`; nothing of the recordings is
-kept, only figures and pictures. Writes `docs/evidence/real-damper.md`.
+kept, only figures and pictures. Writes `docs/evidence/real-damper.md`. ``--keep FOLDER`` keeps logs, fits and
+predictions there, and a later call takes up where this one stopped.
 """
 
+import argparse
 import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from platform import python_version
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import jinja2
 
 from benchmarks.desk import Desk, Found
+from benchmarks.kept import folder
 from benchmarks.laid_over import cycles_of
 from benchmarks.real_damper_plots import draw_all
 from benchmarks.real_damper_tables import (
@@ -133,14 +135,17 @@ def page(context: dict[str, Any]) -> str:
 
 def main() -> None:
     """Run everything and write the page and its pictures."""
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--keep", type=Path, default=None, help="folder for logs, fits and predictions")
+    asked = options.parse_args()
     shared = os.environ.get("MRBENCH_SHARED")
     if shared is None or not (Path(shared) / "data" / "utfsm_sine").is_dir():
         sys.exit(
             "MRBENCH_SHARED: names no folder with data/utfsm_sine and data/nees_dyke; point it at the recordings"
         )
     os.environ["MRBENCH_SHARED"] = str(Path(shared).resolve())
-    with TemporaryDirectory() as folder:
-        desk = Desk(Path(folder))
+    with folder(asked.keep) as place:
+        desk = Desk(place)
         found = {"utfsm": utfsm(desk), "nees": nees(desk)}
     rows = [
         summary(log, label, found[log]["fits"][key])

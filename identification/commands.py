@@ -1,12 +1,19 @@
 """The commands of this room: `mrbench identify` and `mrbench predict`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from identification.identify import Request
+    from identification.results import Fit
+
 Logs = Annotated[
-    list[Path], typer.Argument(metavar="LOG...", help="Logs of one specimen, as recorded or imported.")
+    list[Path],
+    typer.Argument(metavar="LOG...", help="Logs of one specimen, as recorded or imported; see `--each`."),
 ]
 Out = Annotated[Path, typer.Option("--out", help="Where the document goes; `-` prints it.")]
 
@@ -49,6 +56,14 @@ def identify(
     profile: Annotated[
         bool, typer.Option("--profile", help="Also intervals by profile likelihood; takes several times as long.")
     ] = False,
+    each: Annotated[
+        bool,
+        typer.Option(
+            "--each",
+            help="Every log is of a specimen of its own: a document each, named as the log, in the folder "
+            "`--out`. The preset `global` trains many of them at once.",
+        ),
+    ] = False,
 ) -> None:
     """Find the damper's parameters in recordings, each with an interval and what it means."""
     from identification.assemble import HoldOut
@@ -66,17 +81,45 @@ def identify(
     if not asked:
         raise IdentificationError("no stage was asked for; there are pinn and refine")
     own = _own(free)
-    check_place(out)
     held = HoldOut(_words(hold_out), hold_out_after)
+    request = Request(held, delay_prior, Settings(seed=seed, budget=budget), asked, preset, own, profile)
+    if each:
+        return _each(logs, out, request)
+    check_place(out)
     with progress_on_terminal("identify") as progress:
-        found = fit(
-            [load(log) for log in logs],
-            Request(held, delay_prior, Settings(seed=seed, budget=budget), asked, preset, own, profile),
-            progress,
-        )
+        found = fit([load(log) for log in logs], request, progress)
     write_document(out, found)
-    said = "; ".join(words for words in (found.result, found.agreement, *found.notes) if words)
-    _say(out, found.rmse_n.train, found.nrmse.train, found.noise_floor_n, said)
+    _say_fit(out, found)
+    return None
+
+
+def _each(logs: "Sequence[Path]", folder: Path, request: "Request") -> None:
+    """A fit of every log by itself; those that cannot be fitted are named in the end."""
+    from identification.campaign import identify_each, places
+    from identification.document_file import check_place, write_document
+    from identification.errors import IdentificationError
+    from identification.progress import progress_on_terminal
+
+    if request.own:
+        raise IdentificationError("--free says what logs of one specimen differ in; with --each none are of one")
+    if str(folder) == "-":
+        raise IdentificationError("--out -: with --each there are several documents; name a folder for them")
+    check_place(folder)
+    outs = places(logs, folder)
+    folder.mkdir(exist_ok=True)
+    with progress_on_terminal("identify") as progress:
+        found = identify_each(logs, request, progress)
+    for out, one in zip(outs, found, strict=True):
+        if one.fit is not None:
+            write_document(out, one.fit)
+            _say_fit(out, one.fit)
+    if failed := [f"{one.log.name}: {one.why_not}" for one in found if one.fit is None]:
+        raise IdentificationError(f"{len(failed)} of {len(logs)} logs have no fit: {'; '.join(failed)}")
+
+
+def _say_fit(out: Path, fit: "Fit") -> None:
+    said = "; ".join(words for words in (fit.result, fit.agreement, *fit.notes) if words)
+    _say(out, fit.rmse_n.train, fit.nrmse.train, fit.noise_floor_n, said)
 
 
 def predict(

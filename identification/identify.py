@@ -11,9 +11,10 @@ import numpy as np
 from identification.agreement import compare
 from identification.arrays import Array
 from identification.assemble import Assembled, HoldOut, assemble
+from identification.breakdown import breakdown_in_words
 from identification.clock_wander import wander_in_words, without_wander
 from identification.damper.coordinates import Coordinates
-from identification.errors import IdentificationError, NothingToFit
+from identification.errors import IdentificationError
 from identification.fit_document import MISFIT, Ending, fit_document, of_samples, simulated_errors, unseen
 from identification.motion_noise import play_noise, with_motion, without_pull
 from identification.prediction import rmse
@@ -60,6 +61,12 @@ class Request:
     profile: bool = False
     """Whether intervals by profile likelihood are wanted, too."""
 
+    @property
+    def network_budget(self) -> float | None:
+        """[s] of processor time for the network; beside a refinement it may spend half."""
+        budget = self.settings.budget
+        return 0.5 * budget if budget is not None and "refine" in self.stages else budget
+
 
 def identify(
     recordings: Sequence[Recording], request: Request = Request(), progress: Progress = lambda what, error: None
@@ -74,26 +81,41 @@ def identify(
     Raises:
         NothingToFit: too little is left to fit.
     """
+    with breakdown_in_words():
+        return conclude(prepare(recordings, request), request, progress)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Recordings of one damper that can be used, ready to be fitted."""
+
+    assembled: Assembled
+    problem: Problem
+    stretches: tuple[Stretch, ...]
+    """Behind the problem's pieces."""
+    notes: tuple[str, ...]
+    """What was left out of the recordings, in words."""
+
+
+def prepare(recordings: Sequence[Recording], request: Request) -> Prepared:
+    """Look over recordings of one damper and say what a fit of them minimises.
+
+    Raises:
+        NothingToFit: too little is left to fit.
+    """
     cleaned, notes = usable(recordings)
-    try:
-        return _identified(cleaned, notes, request, progress)
-    except (np.linalg.LinAlgError, ZeroDivisionError, FloatingPointError) as error:
-        raise NothingToFit(
-            f"these recordings determine no damper: the equations of the fit break down ({error}); record longer "
-            "strokes, or look at the channels for what no damper does"
-        ) from error
-
-
-def _identified(
-    recordings: Sequence[Recording], notes: Sequence[str], request: Request, progress: Progress
-) -> Fit:
-    """The fit of recordings that can be used."""
-    assembled = assemble(recordings, request.hold_out)
+    assembled = assemble(cleaned, request.hold_out)
     problem = replace(fit_problem(assembled, request.delay_prior), own=request.own)
     stretches = [s for s, p in zip(assembled.stretches, assembled.pieces, strict=True) if p.train.any()]
+    return Prepared(assembled, problem, tuple(stretches), (*notes, *assembled.notes))
+
+
+def conclude(prepared: Prepared, request: Request, progress: Progress, testimony: Testimony | None = None) -> Fit:
+    """The fit of recordings that can be used; the network is trained, unless its testimony is there already."""
+    assembled, problem, stretches = prepared.assembled, prepared.problem, prepared.stretches
     # The network knows one damper in one condition; it is no witness where each log has its own.
-    train = "pinn" in request.stages and not request.own
-    testimony = _trained(problem, stretches, request, progress) if train else None
+    if testimony is None and "pinn" in request.stages and not request.own:
+        testimony = _trained(problem, stretches, request, progress)
     if "refine" in request.stages:
         found = _refined(assembled, problem, stretches, request, progress)
         assembled = under_conditions(assembled, found.problem, found.minimum)
@@ -103,7 +125,7 @@ def _identified(
     fit = fit_document(assembled, end, _provenance(assembled, request, problem))
     if request.profile:
         fit = _profiled(fit, end, progress)
-    return fit.model_copy(update={"notes": [*notes, *assembled.notes, *end.notes, *_strangers(assembled, fit)]})
+    return fit.model_copy(update={"notes": [*prepared.notes, *end.notes, *_strangers(assembled, fit)]})
 
 
 def _profiled(fit: Fit, end: Ending, progress: Progress) -> Fit:
@@ -126,11 +148,8 @@ def _strangers(assembled: Assembled, fit: Fit) -> list[str]:
 
 
 def _trained(problem: Problem, stretches: Sequence[Stretch], request: Request, progress: Progress) -> Testimony:
-    """The network's own answer; beside a refinement it may spend half of the budget."""
-    budget = request.settings.budget
-    if budget is not None and "refine" in request.stages:
-        budget *= 0.5
-    return train_stage(problem, stretches, request.preset, request.settings.seed, budget, progress)
+    """The network's own answer."""
+    return train_stage(problem, stretches, request.preset, request.settings.seed, request.network_budget, progress)
 
 
 def _refined(

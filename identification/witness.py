@@ -22,6 +22,7 @@ from identification.uncertainty import Covariance, coordinate_estimates
 
 if TYPE_CHECKING:
     from identification.pinn.result import PinnResult
+    from identification.pinn.settings import GlobalSettings, LocalSettings, PaperSettings
 
 _BOUND = 1e-9
 _SEEN = 1e-2
@@ -60,9 +61,61 @@ def train_stage(
     Raises:
         IdentificationError: there is no such preset, or its network needs torch, which is not installed.
     """
-    from identification.pinn.settings import read_settings
     from identification.pinn.supervision import Stopped, Supervision
     from identification.pinn.train import train
+
+    settings = _settings(preset, seed)
+    try:
+        return Testimony(train(problem, settings, Supervision(progress, budget=budget), stretches), "")
+    except Stopped as stopped:
+        return Testimony(None, str(stopped))
+
+
+def train_together(
+    problems: Sequence[Problem], preset: str, seed: int, budget: float | None, progress: Progress
+) -> list[Testimony | None]:
+    """Train the network of a preset on many dampers at once; None for each where it is trained alone.
+
+    Args:
+        problems: what is fitted, one a damper.
+        preset: name of a preset, or path of a settings file.
+        seed: of everything that chance decides.
+        budget: [s] of processor time for each damper; None for as long as it takes.
+        progress: told of every step.
+
+    Raises:
+        IdentificationError: as for one damper.
+    """
+    from identification.pinn.settings import GlobalSettings
+
+    settings = _settings(preset, seed)
+    found: list[Testimony | None] = [None] * len(problems)
+    if isinstance(settings, GlobalSettings):
+        from identification.pinn.train import batches
+
+        for batch in batches(problems, settings):
+            some = [problems[k] for k in batch]
+            for k, testimony in zip(batch, _batch(some, settings, budget, progress), strict=True):
+                found[k] = testimony
+    return found
+
+
+def _batch(
+    problems: Sequence[Problem], settings: "GlobalSettings", budget: float | None, progress: Progress
+) -> list[Testimony]:
+    from identification.pinn.supervision import Stopped, Supervision
+    from identification.pinn.train import train_batch
+
+    supervision = Supervision(progress, budget=None if budget is None else budget * len(problems))
+    try:
+        return [Testimony(one, "") for one in train_batch(problems, settings, supervision)]
+    except Stopped as stopped:
+        return [Testimony(None, str(stopped))] * len(problems)
+
+
+def _settings(preset: str, seed: int) -> "LocalSettings | GlobalSettings | PaperSettings":
+    """Settings of a preset, if its network can be trained here."""
+    from identification.pinn.settings import read_settings
 
     settings = read_settings(preset).model_copy(update={"seed": seed})
     if settings.network != "local" and find_spec("torch") is None:
@@ -70,10 +123,7 @@ def train_stage(
             f"the {settings.network} network needs torch, which is missing; install mrbench[identification] or "
             "say --preset local"
         )
-    try:
-        return Testimony(train(problem, settings, Supervision(progress, budget=budget), stretches), "")
-    except Stopped as stopped:
-        return Testimony(None, str(stopped))
+    return settings
 
 
 def as_minimum(problem: Problem, found: "PinnResult") -> tuple[Minimum, Covariance]:

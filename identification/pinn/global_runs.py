@@ -3,10 +3,13 @@
 Levenberg-Marquardt on weights and coordinates together; the law's weight rises, and the inputs that follow the
 network's own slip are refreshed until three fifths of the way. Filters of the force channel count as a delay, and
 the channels' delays are taken as reported.
+
+Several dampers go through the same steps together, each with a network, coordinates, samples and damping of its
+own: the products of one are small change for an accelerator. Alone, a damper is a batch of one.
 """
 
-import itertools
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import torch
@@ -14,20 +17,18 @@ from torch import Tensor
 
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
-from identification.pinn.batches import Learned, learned
-from identification.pinn.beginning import FirstStates, starts
-from identification.pinn.global_inputs import Shown, network_inputs
+from identification.pinn.global_damper import DamperInTraining
+from identification.pinn.global_inputs import Shown
 from identification.pinn.global_loss import GlobalLoss, Samples
-from identification.pinn.levenberg import Levenberg
+from identification.pinn.levenberg import Levenberg, Normal
 from identification.pinn.local import coarse
-from identification.pinn.mesh import Y_UNIT, SlipVelocity, States
+from identification.pinn.mesh import Y_UNIT
 from identification.pinn.mlp import Network
 from identification.pinn.reconstruct import recorded_force
 from identification.pinn.result import Moment, Outcome
 from identification.pinn.settings import GlobalSettings
 from identification.pinn.supervision import Stopped, Supervision
 from identification.problem import COORDINATE_COUNT, Problem
-from identification.recordings import Stretch
 
 _PRETRAINING, _REFRESH = 25, 6
 """Steps on the first states; steps between two refreshments of inputs and batch."""
@@ -38,43 +39,41 @@ _TAKEN_BACK = 0.75
 """[1] of the steps, after which the blocks set aside are fitted too."""
 _LATE = ("rho", "n", "c1_b")
 _LARGEST = 0.4
-_DENSER = 4.0
-"""[1] how much likelier a sample near a breakthrough or a step is taken."""
-_FAST = 3.0
-"""[1] of the median rate of the memory input: faster is near a breakthrough."""
 _HELD, _HELD_UNTIL = (1e-3, 1e-5), 0.5
 """[1] per sample: damping of the coordinates at first, and from this share of the steps on."""
-_NARROW = -4
-"""Column of the memory input as wide as the breakthrough."""
 _REACHED = 1.03
 """[1] force misfit over the noise up to which the training counts as arrived."""
 
 
 class GlobalTraining:
-    """The network in training."""
+    """Networks in training, one a damper.
 
-    def __init__(self, problem: Problem, settings: GlobalSettings, supervision: Supervision) -> None:
-        self.problem, self.settings, self.supervision = problem, settings, supervision
-        self.pieces = learned(problem)
-        self.first = next(starts(problem)).coordinates
-        self.q = problem.space.to_search(self.first)
-        self.random = np.random.default_rng(settings.seed)
-        self.history: list[Moment] = []
-        self.descent, self.done = Levenberg(), 0
-        self.times = [_sample_times(p) for p in self.pieces]
-        states = [FirstStates(p, self.first) for p in self.pieces]
-        self.slips = [s.slip_velocity() for s in states]
-        raw = network_inputs(self.pieces, self.times, self.slips, self.first)
-        self.centre, self.spread = raw.value.mean(0), np.maximum(raw.value.std(0), 1e-9)
-        self.shown = self._scaled(raw)
-        self.network = Network([raw.value.shape[1], settings.width, settings.width, 2])
-        self.weights = self.network.begin(settings.seed, settings.device)
-        self._pretrain([s.at(t) for s, t in zip(states, self.times, strict=True)])
+    Raises:
+        ValueError: the dampers bring different numbers of samples or of stretches.
+    """
+
+    def __init__(self, problems: Sequence[Problem], settings: GlobalSettings, supervision: Supervision) -> None:
+        self.settings, self.supervision = settings, supervision
+        self.dampers = [DamperInTraining(problem, settings.seed) for problem in problems]
+        sizes = {batch_size(d.problem, settings) for d in self.dampers}
+        if len(sizes) > 1:
+            raise ValueError(f"dampers of different sizes {sorted(sizes)} in one batch")
+        self.samples = min(settings.samples, *(d.size[0] for d in self.dampers))
+        self.network = Network([self.dampers[0].size[1], settings.width, settings.width, 2])
+        self.weights = self.network.begin(settings.seed, settings.device).repeat(len(problems), 1)
+        self.descent, self.done = Levenberg(self.weights, len(problems)), 0
+        self.history: list[list[Moment]] = [[] for _ in problems]
+        self._pretrain()
 
     @property
     def loss(self) -> GlobalLoss:
         """Of the samples that may be fitted now."""
-        return GlobalLoss(self.problem, self.pieces, self.network)
+        return GlobalLoss([d.recorded for d in self.dampers], self.network)
+
+    @property
+    def q(self) -> Array:
+        """(B, 13) search numbers."""
+        return np.array([d.q for d in self.dampers])
 
     def run(self, last: float) -> None:
         """Steps up to a share of them all."""
@@ -88,10 +87,10 @@ class GlobalTraining:
             self._step(samples, self._physics(share), self._free(share), _HELD[share >= _HELD_UNTIL])
             self.done += 1
 
-    def take_back(self, problem: Problem) -> None:
+    def take_back(self, problems: Sequence[Problem]) -> None:
         """Fit the blocks set aside too."""
-        self.problem = problem
-        self.pieces = learned(problem)
+        for damper, problem in zip(self.dampers, problems, strict=True):
+            damper.take_back(problem)
 
     def _physics(self, done: float) -> float:
         first, last = self.settings.physics
@@ -99,170 +98,142 @@ class GlobalTraining:
         return first * float((last / first) ** share)
 
     def _free(self, done: float) -> Array:
-        """(13,) 1.0 where a coordinate moves."""
+        """(B, 13) 1.0 where a coordinate moves."""
         late = np.array([name in _LATE for name in Coordinates._fields])
-        free = self.problem.space.free & ~(late & (done < _FREED[1]))
-        return np.asarray(free * float(done >= _FREED[0]))
-
-    def _scaled(self, raw: Shown) -> Shown:
-        return Shown((raw.value - self.centre) / self.spread, raw.rate / self.spread)
+        seen = np.array([d.problem.space.free for d in self.dampers])
+        return np.asarray((seen & ~(late & (done < _FREED[1]))) * float(done >= _FREED[0]))
 
     def _refresh(self) -> None:
-        """Inputs at all samples, for the slip as the network has it now."""
-        rates = self._states(self.shown).y_rate
-        edges = np.cumsum([0, *(len(t) for t in self.times)])
-        self.slips = [
-            _interpolated(t, p.inputs.motion(t)[1] - rates[a:b])
-            for t, p, (a, b) in zip(self.times, self.pieces, itertools.pairwise(edges), strict=True)
-        ]
-        c = self.problem.space.to_coordinates(self.q)
-        self.shown = self._scaled(network_inputs(self.pieces, self.times, self.slips, c))
+        """Inputs for the slips as the networks have them now."""
+        for number, damper in enumerate(self.dampers):
+            damper.refresh(self._inner_velocity(number, damper.shown))
 
-    def _states(self, shown: Shown) -> States:
-        value, rate, _ = self.network.forward(self.weights, self._tensor(shown.value), self._tensor(shown.rate))
-        z, y = value.T.cpu().numpy()
-        return States(z, y * Y_UNIT, rate[:, 1].cpu().numpy() * Y_UNIT)
+    def _inner_velocity(self, damper: int, shown: Shown) -> Array:
+        """Y' (N,) [m/s] of a damper where its network is shown this."""
+        _, rate, _ = self.network.forward(self.weights[damper], *map(self._tensor, shown))
+        return np.asarray(rate[:, 1].cpu().numpy() * Y_UNIT)
 
-    def inner_velocity(self, piece: int, time: Array) -> Array:
-        """Y' [m/s] of a piece at times [s]."""
-        times = [time if k == piece else self.times[k][:1] for k in range(len(self.pieces))]
-        c = self.problem.space.to_coordinates(self.q)
-        found = self._states(self._scaled(network_inputs(self.pieces, times, self.slips, c)))
-        first = sum(len(t) for t in times[:piece])
-        return found.y_rate[first : first + len(time)]
+    def inner_velocity(self, damper: int, piece: int, time: Array) -> Array:
+        """Y' [m/s] of a damper at times [s] of one of its pieces."""
+        shown, rows = self.dampers[damper].shown_at(piece, time)
+        return self._inner_velocity(damper, shown)[rows]
 
-    def _pretrain(self, states: Sequence[States]) -> None:
-        """Towards the states that the recorded force shows; the coordinates wait."""
-        every = max(1, len(self.shown.value) // self.settings.samples)
-        value, rate = (self._tensor(a[::every]) for a in self.shown)
-        columns = [np.concatenate([s.z for s in states]), np.concatenate([s.y for s in states]) / Y_UNIT]
-        target = self._tensor(np.column_stack(columns)[::every])
+    def _pretrain(self) -> None:
+        """Towards the states that the recorded forces show; the coordinates wait."""
+        at = [np.linspace(0, d.size[0] - 1, self.samples).astype(np.int64) for d in self.dampers]
+        shown, states = zip(*(d.beginning(k) for d, k in zip(self.dampers, at, strict=True)), strict=True)
+        value, rate = (self._tensor(np.stack(part)) for part in zip(*shown, strict=True))
+        target = self._tensor(np.stack(states))
 
-        def missed(weights: Tensor) -> Tensor:
-            return (self.network.forward(weights, value, rate)[0] - target).T.reshape(-1)
+        def missed(weights: Tensor, some: Tensor) -> Tensor:
+            outputs = self.network.forward(weights, value[some], rate[some])[0]
+            return (outputs - target[some]).mT.flatten(1)
 
-        def moved(weights: Tensor) -> tuple[Tensor, float]:
-            return weights, float((missed(weights) ** 2).sum())
+        def moved(some: Tensor, weights: Tensor) -> tuple[Tensor, Tensor]:
+            return weights, (missed(weights, some) ** 2).sum(1)
 
         for k in range(_PRETRAINING):
-            _, _, passed = self.network.forward(self.weights, value, rate)
-            sides = [
-                target.new_zeros(target.shape).index_fill(1, torch.tensor(i, device=target.device), 1.0)
-                for i in (0, 1)
-            ]
-            J = torch.cat([self.network.jacobian(self.weights, passed, s, torch.zeros_like(s)) for s in sides])
-            self.weights = self.descent.step(
-                J, missed(self.weights), self.weights, torch.zeros_like(self.weights), moved
-            )
+            slopes = self._state_slopes(value, rate)
+            normal = Normal.of(slopes, missed(self.weights, torch.arange(len(target))))
+            self.weights = self.descent.step(normal, self.weights, torch.zeros_like(self.weights), moved)
             self.supervision.step(f"pinn, first states {k + 1}", float("nan"))
 
+    def _state_slopes(self, value: Tensor, rate: Tensor) -> Tensor:
+        """(B, 2 N, W) slopes of z, then of y, over the weights."""
+        _, _, passed = self.network.forward(self.weights, value, rate)
+        dampers, samples, _ = value.shape
+        slopes = value.new_empty(dampers, 2 * samples, self.network.count)
+        for k in range(2):
+            side = value.new_zeros(dampers, samples, 2)
+            side[..., k] = 1.0
+            part = slopes[:, k * samples : (k + 1) * samples]
+            self.network.jacobian(self.weights, passed, side, torch.zeros_like(side), part)
+        return slopes
+
     def _step(self, samples: Samples, physics: float, free: Array, held: float) -> None:
-        count, loss = self.network.count, self.loss
-        rows, J = loss.linearised(samples, self.weights, self.q, physics)
-        J[:, count:] *= self._tensor(free)
-        low, high = (bound[:COORDINATE_COUNT] for bound in self.problem.bounds())
+        count, loss, begin = self.network.count, self.loss, self.q
+        low, high = (np.array(bound) for bound in zip(*(d.bounds for d in self.dampers), strict=True))
 
-        def moved(point: Tensor) -> tuple[Tensor, float]:
-            step = np.clip(point[count:].cpu().numpy() - self.q, -_LARGEST, _LARGEST)
-            q = np.clip(self.q + step, low, high)
-            cost = float((loss.rows(samples, point[:count], q, physics) ** 2).sum())
-            return torch.cat([point[:count], self._tensor(q)]), cost
+        def moved(some: Tensor, points: Tensor) -> tuple[Tensor, Tensor]:
+            at = some.tolist()
+            step = np.clip(points[:, count:].cpu().numpy() - begin[at], -_LARGEST, _LARGEST)
+            q = np.clip(begin[at] + step, low[at], high[at])
+            rows = loss.of(at).rows(samples.of(at), points[:, :count], q, physics)
+            return torch.cat([points[:, :count], self._tensor(q)], 1), (rows**2).sum(1)
 
-        holding = torch.zeros_like(J[0])
-        holding[count:] = held * len(samples.x)
-        found = self.descent.step(J, rows, torch.cat([self.weights, self._tensor(self.q)]), holding, moved)
-        self.weights, self.q = found[:count], found[count:].cpu().numpy()
+        normal = loss.normal(samples, self.weights, begin, physics)
+        normal = normal.only(torch.cat([torch.ones_like(self.weights), self._tensor(free)], 1))
+        point = torch.cat([self.weights, self._tensor(begin)], 1)
+        holding = torch.zeros_like(point)
+        holding[:, count:] = held * self.samples
+        found = self.descent.step(normal, point, holding, moved)
+        self.weights = found[:, :count]
+        for damper, q in zip(self.dampers, found[:, count:].cpu().numpy(), strict=True):
+            damper.q = q
         self._note(samples, physics)
 
     def _batch(self) -> Samples:
-        """Some samples, more of them where z runs; their weights undo that."""
-        rate = np.abs(self.shown.rate[:, _NARROW])
-        chance = 1.0 + _DENSER * (rate > _FAST * np.median(rate))
-        chance /= chance.sum()
-        size = min(self.settings.samples, len(chance))
-        at = np.sort(self.random.choice(len(chance), size, replace=False, p=chance))
-        undo = np.clip(1.0 / (chance[at] * len(chance)), 0.3, 2.0)
-        motion = [p.inputs.motion(t) for p, t in zip(self.pieces, self.times, strict=True)]
-        columns = [np.concatenate(values)[at] for values in zip(*motion, strict=True)]
-        columns += [np.concatenate(a)[at] for a in zip(*(_recorded(p) for p in self.pieces), strict=True)]
-        x, v, force, fitted = map(self._tensor, columns)
-        numbers = np.repeat(np.arange(len(self.times), dtype=np.int64), [len(t) for t in self.times])
-        shown = self._tensor(self.shown.value[at]), self._tensor(self.shown.rate[at])
-        counts = self._tensor(np.sqrt(undo / undo.mean()))
-        return Samples(*shown, x, v, force, fitted, counts, numbers[at], np.concatenate(self.times)[at])
+        """Some samples of every damper."""
+        drawn = zip(*(d.drawn(self.samples) for d in self.dampers), strict=True)
+        piece, time, *columns = (np.stack(part) for part in drawn)
+        return Samples(piece.astype(np.int64), time, *map(self._tensor, columns))
 
     def _note(self, samples: Samples, physics: float) -> None:
-        misfits = self.loss.misfits(samples, self.weights, self.q)
-        self.history.append(Moment(self.supervision.seconds, f"law weighed {physics:.3g}", *misfits))
-        self.supervision.step(f"pinn, {self.history[-1].phase}", misfits[0])
+        """Keep where each stands; the batch is told of by its worst."""
+        misfits, phase = self.loss.misfits(samples, self.weights, self.q), f"law weighed {physics:.3g}"
+        for history, own in zip(self.history, misfits.tolist(), strict=True):
+            history.append(Moment(self.supervision.seconds, phase, *own))
+        self.supervision.step(f"pinn, {phase}", float(misfits[:, 0].max()))
 
-    def covariance(self) -> Array:
-        """(15, 15) of search numbers; the delays are not fitted."""
-        found = np.zeros((COORDINATE_COUNT + 2,) * 2)
-        inner = self.loss.covariance(self._batch(), self.weights, self.q, self.settings.physics[1])
-        found[:COORDINATE_COUNT, :COORDINATE_COUNT] = inner
-        return found
+    def outcomes(self, said: str) -> list[Outcome]:
+        """Where the dampers stand."""
+        loss, samples = self.loss, self._batch()
+        spread = loss.covariance(samples, self.weights, self.q, self.settings.physics[1])
+        return [self._outcome(k, own, said) for k, own in enumerate(spread)]
+
+    def _outcome(self, number: int, spread: Array, said: str) -> Outcome:
+        damper, found = self.dampers[number], self.history[number][-1]
+        unknowns = np.concatenate([damper.q, np.zeros(2)])
+        velocity = partial(self.inner_velocity, number)
+        forces = tuple(
+            recorded_force(p, i, velocity, unknowns, damper.problem) for i, p in enumerate(damper.pieces)
+        )
+        covariance = np.zeros((COORDINATE_COUNT + 2,) * 2)  # the delays are not fitted
+        covariance[:COORDINATE_COUNT, :COORDINATE_COUNT] = spread
+        ratio = found.force / damper.problem.noise
+        accepted = not said and ratio <= _REACHED
+        note = f"{said}all layers trained; the network's force stays at {ratio:.3g} times the noise"
+        return Outcome(unknowns, covariance, forces, accepted, note, self.done, tuple(self.history[number]))
 
     def _tensor(self, values: Array) -> Tensor:
         return torch.as_tensor(values, device=self.settings.device)
 
 
-def _samples_of(source: Learned) -> Array:
-    """Samples from the first to the last fitted one."""
-    fitted = np.flatnonzero(source.piece.train)
-    return np.arange(fitted[0], fitted[-1] + 1)
-
-
-def _sample_times(source: Learned) -> Array:
-    """Their times [s] on the displacement's clock."""
-    return _samples_of(source) * source.inputs.h - source.piece.force_delay
-
-
-def _recorded(source: Learned) -> tuple[Array, Array]:
-    """Their force [N], and 1.0 where it is fitted."""
-    at = _samples_of(source)
-    return source.piece.force[at], source.piece.train[at]
-
-
-def _interpolated(time: Array, values: Array) -> SlipVelocity:
-    return lambda t: np.interp(t, time, values)
+def batch_size(problem: Problem, settings: GlobalSettings) -> tuple[int, int]:
+    """Samples in a step and stretches of a damper: those with the same can be trained together."""
+    spans = [np.flatnonzero(p.train)[[0, -1]] for p in problem.pieces]
+    return min(settings.samples, sum(int(last - first) + 1 for first, last in spans)), len(problem.pieces)
 
 
 def train_global(
-    problem: Problem,
-    held: Sequence[Array],
+    problems: Sequence[Problem],
+    held: Sequence[Sequence[Array]],
     settings: GlobalSettings,
     supervision: Supervision,
-    stretches: Sequence[Stretch] | None,
-) -> tuple[Outcome, Outcome]:
-    """One training: three quarters on what is not set aside, the rest on everything."""
-    split = problem.without(held)
-    training = GlobalTraining(coarse(split), settings, supervision)
+) -> list[tuple[Outcome, Outcome]]:
+    """One training of several dampers: three quarters on what is not set aside, the rest on everything."""
+    split = [coarse(problem.without(aside)) for problem, aside in zip(problems, held, strict=True)]
+    training = GlobalTraining(split, settings, supervision)
     blind, said = None, ""
     try:
         training.run(_TAKEN_BACK if settings.take_back else 1.0)
-        blind = _outcome(training, said)
+        blind = training.outcomes(said)
         if settings.take_back:
-            training.take_back(coarse(problem))
+            training.take_back([coarse(problem) for problem in problems])
             training.run(1.0)
     except Stopped as stopped:
-        if not training.history:
+        if not all(training.history):
             raise
         said = f"{stopped}; "
-    final = _outcome(training, said)
-    return final, blind or final
-
-
-def _outcome(training: GlobalTraining, said: str) -> Outcome:
-    """Where a training stands."""
-    problem = training.problem
-    found = training.history[-1]
-    unknowns = np.concatenate([training.q, np.zeros(2)])
-    forces = tuple(
-        recorded_force(p, i, training.inner_velocity, unknowns, training.problem)
-        for i, p in enumerate(training.pieces)
-    )
-    ratio = found.force / problem.noise
-    accepted = not said and ratio <= _REACHED
-    note = f"{said}all layers trained; the network's force stays at {ratio:.3g} times the noise"
-    return Outcome(unknowns, training.covariance(), forces, accepted, note, training.done, tuple(training.history))
+    final = training.outcomes(said)
+    return list(zip(final, blind or final, strict=True))

@@ -104,24 +104,27 @@ class Network:
         return torch.cat(parts).to(device)
 
     def layers(self, weights: Tensor) -> list[tuple[Tensor, Tensor]]:
-        """Matrix and offset of each layer."""
+        """Matrix and offset of each layer, as they lie in the last axis."""
         found, place = [], 0
         for a, b in self._shapes:
-            matrix = weights[place : place + a * b].reshape(a, b)
-            found.append((matrix, weights[place + a * b : place + a * b + b]))
+            matrix = weights[..., place : place + a * b].view(*weights.shape[:-1], a, b)
+            found.append((matrix, weights[..., place + a * b : place + a * b + b]))
             place += a * b + b
         return found
 
     def forward(self, weights: Tensor, inputs: Tensor, rates: Tensor) -> tuple[Tensor, Tensor, list[Passed]]:
-        """Outputs (N, last), their total rates [1/s], and what every layer handed on."""
+        """Outputs (N, last), their total rates [1/s], and what every layer handed on.
+
+        A first axis in front of all arguments is of several networks, each with weights of its own.
+        """
         layers = self.layers(weights)
         passed = [Passed(inputs, rates, rates)]
         for matrix, offset in layers[:-1]:
             before, inner = passed[-1], passed[-1].rate @ matrix
-            value = torch.tanh(torch.addmm(offset, before.value, matrix))
+            value = torch.tanh(before.value @ matrix + offset[..., None, :])
             passed.append(Passed(value, (1.0 - value**2) * inner, inner))
         matrix, offset = layers[-1]
-        return passed[-1].value @ matrix + offset, passed[-1].rate @ matrix, passed
+        return passed[-1].value @ matrix + offset[..., None, :], passed[-1].rate @ matrix, passed
 
     def give_back(self, room: list[Room]) -> None:
         """The room is needed no more."""
@@ -145,25 +148,24 @@ class Network:
             return room
         return [Room(*inputs.new_empty(len(Room._fields), n, inputs.shape[1])) for n in self.sizes[1:-1]]
 
-    def jacobian(self, weights: Tensor, passed: Sequence[Passed], over: Tensor, over_rate: Tensor) -> Tensor:
-        """(N, count) slopes of one row per sample over all weights.
+    def jacobian(
+        self, weights: Tensor, passed: Sequence[Passed], over: Tensor, over_rate: Tensor, out: Tensor
+    ) -> None:
+        """Write the slopes (N, count) of one row per sample over all weights to ``out``.
 
         Args:
-            weights: (count,)
+            weights: (count,), or with an axis of networks in front, as all that follows.
             passed: of the forward pass.
             over: (N, last) slope of the row over each output.
             over_rate: (N, last) slope over each output's rate.
+            out: where they go.
         """
-        layers, parts = self.layers(weights), []
-        for k in range(len(layers) - 1, -1, -1):
-            before = passed[k]
-            outer = before.value[:, :, None] * over[:, None] + before.rate[:, :, None] * over_rate[:, None]
-            parts.append(torch.cat([outer.reshape(len(over), -1), over], 1))
-            if k == 0:
-                break
-            matrix, _ = layers[k]
-            value, rate = over @ matrix.T, over_rate @ matrix.T
+        layers = list(zip(self.layers(weights), self.layers(out), passed, strict=True))
+        for (matrix, _), (slopes, offsets), before in reversed(layers):
+            torch.mul(before.value[..., None], over[..., None, :], out=slopes)
+            slopes.addcmul_(before.rate[..., None], over_rate[..., None, :])
+            offsets.copy_(over)
+            value, rate = over @ matrix.mT, over_rate @ matrix.mT
             slope = 1.0 - before.value**2
             over = value * slope - 2.0 * rate * before.inner_rate * before.value * slope
             over_rate = rate * slope
-        return torch.cat(parts[::-1], 1)

@@ -16,6 +16,9 @@ from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.recordings import Stretch
 from identification.threads import one_thread
 
+_MOST = 16
+"""Dampers in one batch: their Jacobians take some 0.3 GB each on an accelerator, with what they are made from."""
+
 
 def train(
     problem: Problem,
@@ -36,6 +39,8 @@ def train(
     Raises:
         Stopped: before anything was found.
     """
+    if isinstance(settings, GlobalSettings):
+        return train_batch([problem], settings, supervision)[0]
     supervision = supervision or Supervision()
     held = validation_masks(problem.pieces, settings.validation_share, settings.seed)
     with one_thread():
@@ -44,19 +49,61 @@ def train(
     return _judged(problem, held, settings.network, outcome, blind, seconds)
 
 
-def _network(settings: LocalSettings | GlobalSettings | PaperSettings) -> Callable[..., tuple[Outcome, Outcome]]:
-    """The training of a kind of network; the others stay unloaded, and torch with them."""
+def train_batch(
+    problems: Sequence[Problem], settings: GlobalSettings, supervision: Supervision | None = None
+) -> list[PinnResult]:
+    """Train the global network on several dampers of one size, in the same steps.
+
+    Each has a network, parameters and a judgement of its own, and ends where it would alone, but for rounding. Its
+    seconds are its share of the batch's.
+
+    Args:
+        problems: one a damper.
+        settings: of the network.
+        supervision: of all of them; what stops one stops all.
+
+    Raises:
+        Stopped: before anything was found.
+    """
+    import torch
+
+    from identification.pinn.global_runs import train_global
+
+    torch.set_num_threads(1)
+    supervision = supervision or Supervision()
+    held = [validation_masks(p.pieces, settings.validation_share, settings.seed) for p in problems]
+    with one_thread():
+        outcomes = train_global(problems, held, settings, supervision)
+    seconds = supervision.seconds / len(problems)
+    return [
+        _judged(problem, aside, settings.network, outcome, blind, seconds)
+        for problem, aside, (outcome, blind) in zip(problems, held, outcomes, strict=True)
+    ]
+
+
+def batches(problems: Sequence[Problem], settings: GlobalSettings) -> list[list[int]]:
+    """Numbers of the dampers that can be trained together, batch by batch.
+
+    They bring as many stretches, and as many samples in a step; how long they were recorded beyond that does not
+    matter.
+    """
+    from identification.pinn.global_runs import batch_size
+
+    alike = dict[tuple[int, int], list[int]]()
+    for number, problem in enumerate(problems):
+        alike.setdefault(batch_size(problem, settings), []).append(number)
+    return [some[k : k + _MOST] for some in alike.values() for k in range(0, len(some), _MOST)]
+
+
+def _network(settings: LocalSettings | PaperSettings) -> Callable[..., tuple[Outcome, Outcome]]:
+    """The training of a kind of network; the other one stays unloaded, and torch with it."""
     if isinstance(settings, LocalSettings):
         return train_local
     import torch
 
-    torch.set_num_threads(1)
-    if isinstance(settings, GlobalSettings):
-        from identification.pinn.global_runs import train_global
-
-        return train_global
     from identification.pinn.paper_runs import train_paper
 
+    torch.set_num_threads(1)
     return train_paper
 
 

@@ -11,7 +11,7 @@ from numpy.random import default_rng
 from identification.pinn import law_rows
 from identification.pinn.batches import gauss_points, learned
 from identification.pinn.elimination import NodePrior, factorise
-from identification.pinn.global_loss import GlobalLoss, Samples
+from identification.pinn.global_loss import GlobalLoss, Recorded, Samples
 from identification.pinn.local_rows import UNKNOWNS, LocalLoss, Weights
 from identification.pinn.mesh import Heads
 from identification.pinn.mlp import Network
@@ -175,35 +175,29 @@ def test_information_is_that_of_the_shared_unknowns_with_the_heads_marginalised(
     assert found == pytest.approx(rest.T @ rest, rel=1e-5, abs=1e-6 * np.abs(rest.T @ rest).max())
 
 
-def global_samples(given, inputs=5):
+def global_samples(given, inputs=5, dampers=1):
     random = default_rng(2)
     source = learned(given)[0]
-    time = np.sort(random.uniform(0.05, source.inputs.duration - 0.05, 40))
+    time = np.sort(random.uniform(0.05, source.inputs.duration - 0.05, (dampers, 40)))
     x, v = source.inputs.motion(time)
-    made = (
-        random.standard_normal((40, inputs)),
-        random.standard_normal((40, inputs)),
-        x,
-        v,
-        100 * v,
-        np.ones(40),
-        np.ones(40),
-    )
-    return Samples(*map(torch.as_tensor, made), np.zeros(40, np.int64), time)
+    shown = random.standard_normal((2, dampers, 40, inputs))
+    made = (*shown, x, v, 100 * v, np.ones_like(x), np.ones_like(x))
+    return Samples(np.zeros(time.shape, np.int64), time, *map(torch.as_tensor, made))
 
 
-def test_rows_of_the_global_network_have_the_slopes_of_finite_differences():
-    given = problem((0.0, 0.4), 0.8)
-    samples, network = global_samples(given), Network([5, 6, 6, 2])
-    loss = GlobalLoss(given, learned(given), network)
-    weights, q = network.begin(1, "cpu"), shared_unknowns(given)[:13]
+def test_rows_of_the_global_network_have_the_slopes_of_finite_differences_for_each_damper_of_a_batch():
+    given = (problem((0.0, 0.4), 0.8), problem((0.0, 0.3), 0.8, seed=4))
+    samples, network = global_samples(given[0], dampers=2), Network([5, 6, 6, 2])
+    loss = GlobalLoss([Recorded(one, learned(one)) for one in given], network)
+    weights = torch.stack([network.begin(seed, "cpu") for seed in (1, 2)])
+    q = np.array([shared_unknowns(one, seed)[:13] for seed, one in enumerate(given)])
     random = default_rng(3)
-    along, step = torch.as_tensor(random.standard_normal(network.count)), random.standard_normal(13)
+    along, step = torch.as_tensor(random.standard_normal((2, network.count))), random.standard_normal((2, 13))
     rows, J = loss.linearised(samples, weights, q, 4.0)
     assert torch.equal(rows, loss.rows(samples, weights, q, 4.0))
     high, low = (loss.rows(samples, weights + s * along, q + s * step, 4.0) for s in (STEP, -STEP))
     expected = ((high - low) / (2 * STEP)).numpy()
-    found = (J @ torch.cat([along, torch.as_tensor(step)])).numpy()
+    found = (J @ torch.cat([along, torch.as_tensor(step)], 1)[..., None])[..., 0].numpy()
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-6 * np.abs(expected).max())
 
 

@@ -30,8 +30,8 @@ _LONGEST_RUN = 30.0
 """[s] Segments of one stroke are fitted together up to this length; longer ones average enough by themselves."""
 _WHOLE_RUN = 0.9
 """[1] share of a run that must be steady, else its segments are fitted one by one."""
-_END = 2.0
-"""How much looser the smoother is at an end of the stretch."""
+_END = 1.5
+"""How much looser the smoother is at an end of the stretch: with 2, noise there is up to half as much again."""
 
 
 class Motion(NamedTuple):

@@ -16,12 +16,14 @@ from identification.motion_noise import with_motion
 from identification.problem import Piece, Problem
 from identification.recordings import Stretch
 
-_DRAWS = 2
-"""Times the noise is played again: each knows its size to a few hundredths."""
-
 
 def replayed(
-    stretches: Sequence[Stretch], pieces: Sequence[Piece], forces: Sequence[Array], noise: float, seed: int
+    stretches: Sequence[Stretch],
+    pieces: Sequence[Piece],
+    forces: Sequence[Array],
+    noise: float,
+    seed: int,
+    draws: Sequence[int],
 ) -> list[tuple[Piece, ...]]:
     """The pieces with motions estimated from fresh noise, some draws of them.
 
@@ -31,13 +33,14 @@ def replayed(
         forces: (N,) simulated [N], one a piece: the actuator gives way under them.
         noise: of the recorded force [N].
         seed: of the noise.
+        draws: numbers of the draws.
     """
     return [
         tuple(
             _replayed(stretch, piece, force, noise, np.random.default_rng([seed, i, draw]))
             for i, (stretch, piece, force) in enumerate(zip(stretches, pieces, forces, strict=True))
         )
-        for draw in range(_DRAWS)
+        for draw in draws
     ]
 
 
@@ -50,8 +53,8 @@ def _replayed(stretch: Stretch, piece: Piece, force: Array, noise: float, random
     return with_motion(piece, played)
 
 
-def carried_noise(problem: Problem, unknowns: Array, draws: Sequence[Sequence[Piece]]) -> float:
-    """RMS change [N] of the simulated force over the fitted samples, motion by motion.
+def carried(problem: Problem, unknowns: Array, draws: Sequence[Sequence[Piece]]) -> Array:
+    """(draws, N) squared change [N²] of the simulated force, motion by motion; all pieces one after the other.
 
     Args:
         problem: what was fitted, with its effects.
@@ -59,9 +62,6 @@ def carried_noise(problem: Problem, unknowns: Array, draws: Sequence[Sequence[Pi
         draws: the pieces with other motions, as ``replayed`` makes them.
     """
     quick = problem.quicker()
-    here, fitted = quick.simulate(unknowns), [p.train > 0.0 for p in quick.pieces]
-    squares = []
-    for pieces in draws:
-        there = replace(quick, pieces=tuple(p.quicker() for p in pieces)).simulate(unknowns)
-        squares += [(t - h)[m] ** 2 for t, h, m in zip(there, here, fitted, strict=True)]
-    return float(np.sqrt(np.mean(np.concatenate(squares))))
+    here = np.concatenate(quick.simulate(unknowns))
+    moved = (replace(quick, pieces=tuple(p.quicker() for p in pieces)).simulate(unknowns) for pieces in draws)
+    return np.stack([(np.concatenate(there) - here) ** 2 for there in moved])

@@ -119,6 +119,10 @@ def white_floor(floor: Floor) -> float:
 
 
 def diagnosed_problem(assembled: Assembled, pieces: tuple[Piece, ...]) -> Problem:
-    """The fit of some recordings as a diagnosis takes it: its own floor, and no delay beyond the clocks'."""
-    problem = fit_problem(assembled, _CLOCKS)
-    return replace(problem, pieces=pieces, noise=white_floor(assembled.floor), delay_limit=_LATEST)
+    """The fit of some recordings as a diagnosis takes it.
+
+    Its own floor, no delay beyond the clocks', and a force offset of each further log: the load cell has another
+    zero in every run.
+    """
+    problem, own = fit_problem(assembled, _CLOCKS), ("offset",) if len(assembled.recordings) > 1 else ()
+    return replace(problem, pieces=pieces, noise=white_floor(assembled.floor), delay_limit=_LATEST, own=own)

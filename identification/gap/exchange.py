@@ -7,13 +7,10 @@ stay.
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from identification.arrays import Array
 from identification.effect_choice import EffectChoice
 from identification.gap.contender import Contender
-from identification.gap.explain import JointFit
 from identification.gap.screen import worth_fitting
+from identification.gap.unknowns import without
 
 if TYPE_CHECKING:
     from identification.gap.search import Search
@@ -36,7 +33,7 @@ def leave_out(search: "Search") -> None:
 
 def _left_out(search: "Search", contender: Contender, choice: EffectChoice) -> Contender:
     rest = tuple(c for c in contender.fit.effects if c != choice)
-    return search.fit(rest, None, [_without(contender.fit, choice)])
+    return search.fit(rest, None, [without(contender.fit.problem, contender.fit.minimum.unknowns, choice)])
 
 
 def exchange(search: "Search") -> None:
@@ -61,13 +58,3 @@ def _replace(search: "Search", best: Contender, choice: EffectChoice) -> None:
     for gain in worth_fitting(gains, _EXCHANGED):
         if rest.names | {gain.choice.name} not in search.found:
             search.fit_beside(rest, gain, [])
-
-
-def _without(fit: JointFit, left_out: EffectChoice) -> Array:
-    """Unknowns of a fit without those of one of its effects."""
-    at, kept = fit.problem.first_effect, [fit.minimum.unknowns[: fit.problem.first_effect]]
-    for choice in fit.effects:
-        if choice != left_out:
-            kept.append(fit.minimum.unknowns[at : at + len(choice.quantities)])
-        at += len(choice.quantities)
-    return np.concatenate(kept)

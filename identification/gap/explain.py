@@ -16,6 +16,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.effect_choice import EffectChoice
+from identification.gap.unknowns import with_effects_at
 from identification.problem import COORDINATE_COUNT, Evaluation, Problem
 from identification.refine import Minimum, bounded_step, descend
 from identification.simulate import ActiveEffect, Setting
@@ -208,8 +209,7 @@ def fit_on_all(problem: Problem, near: JointFit, simulated: Sequence[Array], ite
         simulated: (N,) forces [N] of the whole simulation there, one a piece.
         iterations: most steps.
     """
-    quick = problem.with_effects(near.effects).quicker()
-    unknowns = near.minimum.unknowns
+    quick, unknowns = problem.with_effects(near.effects).quicker(), near.minimum.unknowns
     missed = [whole - own for whole, own in zip(simulated, quick.simulate(unknowns), strict=True)]
     pieces = tuple(replace(p, force=p.force - m) for p, m in zip(quick.pieces, missed, strict=True))
     held = replace(quick, pieces=pieces)
@@ -238,7 +238,7 @@ def _starts(
             if count >= effort.starts:
                 return
             count += 1
-            yield joint_step(problem, np.concatenate([unknowns[: problem.first_effect], values]))[0]
+            yield joint_step(problem, with_effects_at(problem, unknowns, values))[0]
 
 
 def _settled(problem: Problem, unknowns: Array, steps: int) -> Array:
@@ -247,7 +247,7 @@ def _settled(problem: Problem, unknowns: Array, steps: int) -> Array:
     A play or a soft fixture is soon lost where the law still has a wrong yield displacement.
     """
     free = problem.free & ~problem.delays
-    free[problem.first_effect :] = False
+    free[problem.first_effect : problem.first_own] = False
     for _ in range(steps):
         here = problem.evaluate(unknowns)
         if not np.isfinite(here.cost):

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from identification.gap.carried import carried_noise, replayed
+from identification.arrays import Array
+from identification.gap.carried import carried, replayed
 from identification.gap.colour import floor_under
 from identification.gap.contender import Contender
 from identification.gap.judge import Judge
@@ -21,6 +22,9 @@ NOTHING = 1.008
 """[1] RMSE over the floor up to which nothing is looked for."""
 _COLOURED = 1.02
 """[1] noise over the floor so far from which on it is coloured."""
+_FEW, _MANY = 2, 8
+"""Times the noise of the motion is played again: each knows its size to a few hundredths where the damper moves;
+at rest, where a run begins, they differ by more than their mean."""
 
 
 @dataclass
@@ -35,7 +39,13 @@ class Hearing:
     """Of the noise of the motion that is played again."""
     carried: float | None = None
     """[N] noise of the displacement, carried into the force; None before it was looked for."""
+    white: float = field(init=False)
+    """[N] the noise it began with."""
     _replays: list[tuple[Piece, ...]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Keep the white noise."""
+        self.white = self.noise
 
     @property
     def floor(self) -> float:
@@ -52,14 +62,34 @@ class Hearing:
         """
         if max(contender.seen, contender.unseen) < NOTHING * self.noise:
             return
-        if not self._replays:
-            edges = np.cumsum([len(p.force) for p in full.pieces])[:-1]
-            forces = np.split(contender.left.simulated, edges)
-            self._replays = replayed(self.stretches, full.pieces, forces, self.noise, self.seed)
-        problem = full.with_effects(contender.fit.effects)
-        carried = carried_noise(problem, contender.fit.minimum.unknowns, self._replays)
+        squares = self._carried(contender, full, _FEW)[:, judge.seen]
+        size = math.sqrt(float(squares.mean()))
         # Under a wrong law the loop may be far too steep: what is carried least is what is sure.
-        self.carried = carried if self.carried is None else min(carried, self.carried)
+        self.carried = size if self.carried is None else min(size, self.carried)
         heard = floor_under(contender.left, judge.cycles)
         if heard is not None and heard > _COLOURED * self.floor:
             self.noise = math.sqrt(heard**2 - self.carried**2)
+
+    def noise_under(self, contender: Contender) -> float:
+        """[N] of the recorded force: no more than a set leaves that was fitted in full after it was heard."""
+        left = contender.left.residual[contender.left.valid]
+        most = math.sqrt(max(float(np.mean(left**2)) - (self.carried or 0.0) ** 2, 0.0))
+        return max(min(self.noise, most), self.white)
+
+    def other_runs(self, contender: Contender, full: Problem) -> Array:
+        """(runs, N) squared change [N²] of the force of a set, as the noise of other runs' motion makes it.
+
+        Args:
+            contender: the set.
+            full: the problem of all samples.
+        """
+        return self._carried(contender, full, _MANY)
+
+    def _carried(self, contender: Contender, full: Problem, draws: int) -> Array:
+        if len(self._replays) < draws:
+            edges = np.cumsum([len(p.force) for p in full.pieces])[:-1]
+            forces = np.split(contender.left.simulated, edges)
+            missing = range(len(self._replays), draws)
+            self._replays += replayed(self.stretches, full.pieces, forces, self.noise, self.seed, missing)
+        problem = full.with_effects(contender.fit.effects)
+        return carried(problem, contender.fit.minimum.unknowns, self._replays[:draws])

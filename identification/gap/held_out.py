@@ -1,7 +1,8 @@
 """What is kept out of every fit, and how far the gap shrinks there."""
 
+import math
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -10,16 +11,15 @@ from identification.arrays import Array, BoolArray
 from identification.gap.residual import Cycles
 
 Indices = npt.NDArray[np.intp]
-Drawn = TypeVar("Drawn", float, Array)
 
 _EVERY = 4
 """One segment, or cycle, of so many is held out."""
 _FEWEST_SEGMENTS = 10
 """Segments below which cycles are held out rather than whole segments."""
 _DRAWS = 1000
-_FORM, _FEW_STROKES = 0.35, 1.0
+_FORM, _FEW_STROKES = 0.8, 0.4
 """[1] deviation of the logarithm of what a form leaves, from strokes to others; and more where strokes are few."""
-_SIZE = 0.25
+_SIZE = 0.35
 """[1] deviation of the logarithm of the gap itself."""
 _NEAR_FLOOR = 1.02
 """[1] RMSE over the floor below which there is no gap to shrink."""
@@ -49,25 +49,14 @@ class Shrinkage:
     before: float
     """[N] RMSE without effects."""
     after: float
-    """[N] RMSE with them."""
+    """[N] RMSE with them, as it is to be expected of another run."""
     value: float | None
     """[1] none where there is no gap to shrink."""
     ci95: tuple[float, float] | None
 
 
-class Start(NamedTuple):
-    """The first instants of the recordings, before the damper has moved: no fit sees them."""
-
-    share: float = 0.0
-    """[1] of all samples."""
-    before: float = 0.0
-    """Mean squared residual there without effects [N²]."""
-    after: float = 0.0
-    """The same with them."""
-
-
 class HeldOut(NamedTuple):
-    """The held-out cycles, (cycles,) each, and how the recordings begin."""
+    """The held-out cycles, (cycles,) each."""
 
     before: Array
     """Sum of squared residuals without effects [N²]."""
@@ -77,45 +66,56 @@ class HeldOut(NamedTuple):
     """Samples."""
     segment: Indices
     """Which segment each belongs to."""
-    start: Start = Start()
 
 
-def shrinkage(held: HeldOut, noise: float, carried: float, strokes: int) -> Shrinkage:
-    """How far the gap shrinks, with an interval for other strokes of the same damper.
+class Again(NamedTuple):
+    """The strokes played once more, with the noise of the motion drawn anew and nothing else changed."""
 
-    Conditions that were held out are drawn anew, and their cycles. Two things are no matter of drawing: the motion
-    of another run carries its noise into the force again, and the error of a form is another one on other strokes,
-    the more so the fewer strokes the recording has. Every run begins, too, with a hysteresis that nobody knows and
-    a motion that is known from one side only: that counts with the share that it has in the recording.
+    held: float
+    """Mean squared change of the simulated force [N²] on the held-out cycles."""
+    runs: Array
+    """(runs,) the same over everything that was recorded, first instants and ends as well."""
+    before: float
+    """Mean squared residual without effects [N²] over everything that was recorded."""
+
+
+def shrinkage(held: HeldOut, noise: float, again: Again, strokes: int) -> Shrinkage:
+    """How far the gap shrinks on another run of the same damper: its expectation, with an interval.
+
+    Two things are left there. The error of the form is that of the held-out cycles beyond both noises: their
+    conditions are drawn anew, and their cycles, it is never below zero, and it is another one on other strokes,
+    the more so the fewer strokes the recording has. The motion of another run carries its own noise into the
+    force, most where it is known from one side only; no fit looks at these instants, but every run has them.
 
     Args:
         held: the held-out cycles.
         noise: of the recorded force [N].
-        carried: noise of the motion in the simulated force [N].
+        again: the strokes played once more with the effects.
         strokes: how many of different amplitude or frequency were recorded.
     """
-    total, start = float(held.counts.sum()), held.start
-    squares = [float(s.sum()) / total for s in held[:2]]
-    rms = [float(np.sqrt(_begun(s, start.share, own))) for s, own in zip(squares, start[1:], strict=True)]
-    if rms[0] < _NEAR_FLOOR * noise:
-        return Shrinkage(rms[0], rms[1], None, None)
-    value = 1.0 - (rms[1] ** 2 - noise**2) / (rms[0] ** 2 - noise**2)
+    total = float(held.counts.sum())
+    before, after = (float(s.sum()) / total for s in held[:2])
+    if before < (_NEAR_FLOOR * noise) ** 2:
+        return Shrinkage(math.sqrt(before), math.sqrt(after), None, None)
     if held.before is held.after or np.array_equal(held.before, held.after):
-        return Shrinkage(rms[0], rms[1], value, (value, value))
+        return Shrinkage(math.sqrt(before), math.sqrt(after), 0.0, (0.0, 0.0))
+    lost = _lost(held, noise, again, strokes)
+    value = 1.0 - float(lost.mean())
+    low, high = np.quantile(1.0 - lost, [0.025, 0.975])
+    expected = math.sqrt(noise**2 + (1.0 - value) * (before - noise**2))
+    return Shrinkage(math.sqrt(before), expected, value, (min(float(low), value), max(float(high), value)))
+
+
+def _lost(held: HeldOut, noise: float, again: Again, strokes: int) -> Array:
+    """(draws,) parts of the gap [1] that other runs would leave."""
     random = np.random.default_rng(0)
-    drawn = _drawn(held, random)
-    before, after = (_begun(s, start.share, own) for s, own in zip(drawn, start[1:], strict=True))
+    before, after = _drawn(held, random)
+    gap = np.maximum(before - noise**2, 1e-2 * noise**2)
+    form = np.maximum(after - noise**2 - again.held, 0.0) / gap
     spread = _FORM + _FEW_STROKES / max(strokes, 1)
-    left = np.maximum(after - noise**2, 0.0) * np.exp(spread * random.standard_normal(_DRAWS))
-    left += carried**2 * np.exp(_FORM * random.standard_normal(_DRAWS))
-    whole = np.maximum(before - noise**2, 1e-2 * noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
-    low, high = np.quantile(1.0 - left / whole, [0.025, 0.975])
-    return Shrinkage(rms[0], rms[1], value, (min(float(low), value), max(float(high), value)))
-
-
-def _begun(square: Drawn, share: float, start: float) -> Drawn:
-    """Mean square [N²] of strokes together with how they begin."""
-    return (1.0 - share) * square + share * start
+    form *= np.exp(spread * random.standard_normal(_DRAWS))
+    size = (again.before - noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
+    return np.asarray(form + random.choice(again.runs, _DRAWS) / np.maximum(size, 1e-2 * noise**2))
 
 
 def _drawn(held: HeldOut, random: np.random.Generator) -> tuple[Array, Array]:

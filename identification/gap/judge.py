@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.assemble import Assembled
-from identification.gap.held_out import HeldOut, Shrinkage, Start, held_out_cycles, shrinkage
+from identification.gap.held_out import Again, HeldOut, Shrinkage, held_out_cycles, shrinkage
 from identification.gap.residual import Cycles, cut_cycles
 from identification.gap.stumbles import left_out
 from identification.gap.where import Left
@@ -29,8 +29,8 @@ class Judge:
     """(cycles,) kept out of every fit."""
     start: Array
     """(N,) [s] of each sample since the first."""
-    begins: BoolArray
-    """(N,) measured before the damper first moved: no fit looks there, but every run has such instants."""
+    recorded: BoolArray
+    """(N,) measured at all: a prediction is judged there, first instants and ends as well."""
     notes: tuple[str, ...] = ()
     """What was left out of the recordings, in words."""
 
@@ -42,8 +42,8 @@ class Judge:
         time = np.concatenate([s.time - first for s in assembled.stretches])
         sound, notes = left_out(assembled.pieces, cycles)
         pieces = tuple(map(_once_moved, sound))
-        begins = np.concatenate([a.train - b.train for a, b in zip(sound, pieces, strict=True)]) > 0
-        return Judge(pieces, cycles, held_out_cycles(cycles), time, begins, tuple(notes))
+        recorded = np.concatenate([s.counts for s in assembled.stretches])
+        return Judge(pieces, cycles, held_out_cycles(cycles), time, recorded, tuple(notes))
 
     @cached_property
     def usable(self) -> BoolArray:
@@ -90,28 +90,25 @@ class Judge:
         """RMSE [N] on seen and on unseen strokes."""
         return _rms(left.residual[self.seen]), _rms(left.residual[self.unseen])
 
-    def shrunk(self, before: Left, after: Left, noise: float, carried: float) -> Shrinkage:
-        """How far the gap shrinks on the unseen strokes.
+    def shrunk(self, before: Left, after: Left, noise: float, carried: Array) -> Shrinkage:
+        """How far the gap is to shrink on another run.
 
         Args:
             before, after: what the law leaves without and with effects.
             noise: of the recorded force [N].
-            carried: noise of the motion in the simulated force [N].
+            carried: (runs, N) squared change [N²] of the force simulated with effects, as the noise of the motion
+                of other runs makes it.
         """
         sums = [self.cycles.sums(left.residual**2, self.unseen) for left in (before, after)]
         counts = self.cycles.sums(np.ones(len(self.force)), self.unseen)
         there = counts > 0
-        drawn = HeldOut(
-            sums[0][there], sums[1][there], counts[there], self.cycles.segment[there], self._start(before, after)
+        held = HeldOut(sums[0][there], sums[1][there], counts[there], self.cycles.segment[there])
+        again = Again(
+            float(carried[:, self.unseen].mean()),
+            carried[:, self.recorded].mean(axis=1),
+            float(np.mean(before.residual[self.recorded] ** 2)),
         )
-        return shrinkage(drawn, noise, carried, self.cycles.strokes)
-
-    def _start(self, before: Left, after: Left) -> Start:
-        """What the models leave of the first instants, which no fit saw either."""
-        if not self.begins.any():
-            return Start()
-        share = float(self.begins.sum()) / float(self.begins.sum() + self.usable.sum())
-        return Start(share, *(float(np.mean(left.residual[self.begins] ** 2)) for left in (before, after)))
+        return shrinkage(held, noise, again, self.cycles.strokes)
 
 
 def _once_moved(piece: Piece) -> Piece:

@@ -1,10 +1,12 @@
 """The stroke that would best separate what the data leave open.
 
 Trial segments inside the limits of the recording are simulated with each of the tied sets. What counts is the
-difference of their forces that no refit could take away: linearised in the damper's parameters, each held as well
-as the recording already fixes it, over the noise (the T-optimal design of Atkinson and Fedorov 1975).
+difference of their forces that no refit could take away: linearised in the parameters of damper and effects, each
+held as well as the recording already fixes it, over the noise (the T-optimal design of Atkinson and Fedorov 1975).
+Whichever of two sets is the true one, the other is refitted: the worse of both cases counts.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,13 +15,14 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
+from identification.gap.explain import JointFit
+from identification.problem import COORDINATE_COUNT
 from identification.simulate import UNKNOWNS, ActiveEffect, Setting, Stroke, simulate
 
 _RATE = 1000.0
 _SECONDS = 6.0
 """[s] about as long as a segment is to be."""
 _FADE = 0.5
-_COLUMNS = [*range(13), UNKNOWNS.index("y0")]
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class Rival:
     probability: float
     """[1] weight among the rivals."""
     information: Array
-    """(13, 13) what the recording says of the coordinates."""
+    """(13 + P, 13 + P) what the recording says of coordinates and parameters of the effects [1/SI²]."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ def best_segment(rivals: Sequence[Rival], limits: Limits, noise: float) -> Choic
     best: Choice | None = None
     for segment, stroke in trials(limits) if pairs else ():
         forces = {r.names: _answer(r, stroke, limits.centre) for r in rivals}
-        scores = [_separation(forces[a.names], forces[b.names], a, noise) for a, b in pairs]
+        scores = [_told_apart((a, forces[a.names]), (b, forces[b.names]), noise) for a, b in pairs]
         weights = np.array([a.probability * b.probability for a, b in pairs])
         score = float(np.sum(weights * np.array([s for s, _ in scores])) / max(float(weights.sum()), 1e-12))
         if np.isfinite(score) and (best is None or score > best.detectability):
@@ -84,26 +87,58 @@ def best_segment(rivals: Sequence[Rival], limits: Limits, noise: float) -> Choic
     return best
 
 
+def information(fit: JointFit) -> Array:
+    """(13 + P, 13 + P) what the recording says of coordinates and parameters of the effects [1/SI²].
+
+    With lags, y(0) and what each log has of its own left free.
+    """
+    problem, unknowns = fit.problem, fit.minimum.unknowns
+    mine = np.zeros(len(unknowns), bool)
+    mine[:COORDINATE_COUNT] = mine[problem.first_effect : problem.first_own] = True
+    H = fit.minimum.evaluation.hessian
+    cross = H[np.ix_(mine, ~mine)]
+    known = H[np.ix_(mine, mine)] - cross @ np.linalg.pinv(H[np.ix_(~mine, ~mine)]) @ cross.T
+    back = np.zeros(known.shape)
+    law = slice(0, COORDINATE_COUNT)
+    back[law, law] = np.linalg.pinv(problem.space.slopes(unknowns[law]))
+    values = unknowns[problem.first_effect : problem.first_own]
+    edges = np.cumsum([len(e.quantities) for e in fit.effects])[:-1]
+    scales = [e.slopes(v) for e, v in zip(fit.effects, np.split(values, edges), strict=True)]
+    own = range(COORDINATE_COUNT, len(known))
+    back[own, own] = 1.0 / np.concatenate([*scales, np.empty(0)])
+    return np.asarray(back.T @ known @ back)
+
+
 def _answer(rival: Rival, stroke: Stroke, centre: float) -> tuple[Array, Array]:
-    """Force (N,) of a set on a stroke and its slopes (N, 14) over coordinates and y(0)."""
+    """Force (N,) of a set on a stroke and its slopes (N, 13 + P + 2) over all that another run may have otherwise.
+
+    Coordinates, parameters of the effects, y(0) and the zero of the load cell.
+    """
     found = simulate(Setting(rival.point, y0=centre, effects=rival.effects), stroke, slopes=True)
-    return found.force, found.slopes[:, _COLUMNS]
+    own = range(len(UNKNOWNS), found.slopes.shape[1])
+    columns = [*range(COORDINATE_COUNT), *own, UNKNOWNS.index("y0")]
+    return found.force, np.column_stack([found.slopes[:, columns], np.ones(len(found.force))])
 
 
-def _separation(
-    one: tuple[Array, Array], other: tuple[Array, Array], held: Rival, noise: float
+def _told_apart(
+    one: tuple[Rival, tuple[Array, Array]], other: tuple[Rival, tuple[Array, Array]], noise: float
 ) -> tuple[float, float]:
-    """What no refit takes away of the difference, over the noise [1]; and the plain difference [N]."""
-    difference = (one[0] - other[0]) / noise
-    J = one[1] / noise
-    size = np.maximum(np.sqrt(np.sum(J * J, axis=0)), 1e-12)
-    known = np.zeros((len(size), len(size)))
-    known[:13, :13] = held.information
-    normal = (J.T @ J + known) / np.outer(size, size)
+    """What no refit takes away of the difference of two sets, over the noise [1]; and the plain difference [N]."""
+    difference = one[1][0] - other[1][0]
+    left = min(_left(difference / noise, slopes / noise, rival) for rival, (_, slopes) in (one, other))
+    return left, float(np.sqrt(np.mean(difference**2)))
+
+
+def _left(difference: Array, J: Array, held: Rival) -> float:
+    """Norm [1] of what a refit of one set cannot take away of a difference (N,), both over the noise."""
+    normal, known = J.T @ J, len(held.information)
+    normal[:known, :known] += held.information
+    # What moves nothing on this stroke is known from the recording alone: both together set the scale.
+    size = np.sqrt(np.diag(normal))
+    size[size == 0.0] = 1.0
     right = (J.T @ difference) / size
-    taken = float(right @ np.linalg.lstsq(normal, right, rcond=1e-12)[0])
-    left = max(float(difference @ difference) - taken, 0.0)
-    return float(np.sqrt(left)), noise * float(np.sqrt(np.mean(difference**2)))
+    taken = float(right @ np.linalg.lstsq(normal / np.outer(size, size), right, rcond=1e-12)[0])
+    return math.sqrt(max(float(difference @ difference) - taken, 0.0))
 
 
 def trials(limits: Limits) -> Iterator[tuple[dict[str, Any], Stroke]]:

@@ -13,14 +13,13 @@ from identification.gap.contender import Contender
 from identification.gap.documents import STAGES, Diagnosis, Gap, NextStroke, Twin, Verdict, Where
 from identification.gap.judge import Judge
 from identification.gap.model import Model
-from identification.gap.next_stroke import Limits, Rival, best_segment
+from identification.gap.next_stroke import Limits, Rival, best_segment, information
 from identification.gap.posterior import Odds, stage_odds
 from identification.gap.search import Search
 from identification.gap.twin import baseline_fit, twin_of
 from identification.gap.verdict import alternatives, named_effects, shares, verdict_on
 from identification.gap.where import drift, gap_map, harmonics
 from identification.gap.words import explanation, nearest
-from identification.problem import COORDINATE_COUNT
 from identification.results import Provenance
 
 TIED = 0.05
@@ -96,7 +95,10 @@ class Report:
         return [nearest(sorted(best.names), plain.unseen, best.unseen, self.search.floor)]
 
     def _gap(self, verdict: Verdict, plain: Contender, named: Contender) -> Gap:
-        noise, carried = self.search.hearing.noise, self.search.hearing.carried or 0.0
+        hearing = self.search.hearing
+        noise = hearing.noise_under(named)
+        nowhere = np.zeros((1, len(self.judge.force)))
+        carried = hearing.other_runs(named, self.search.full) if named.names else nowhere
         shrunk = self.judge.shrunk(plain.left, named.left, noise, carried)
         nothing = verdict == "no_gap"
         return Gap(
@@ -165,10 +167,7 @@ class Report:
 
     def _rival(self, names: frozenset[str], probability: float) -> Rival:
         fit = self.search.found[names].fit
-        q = fit.minimum.unknowns[:COORDINATE_COUNT]
-        back = np.linalg.pinv(fit.problem.space.slopes(q))
-        known = fit.minimum.evaluation.hessian[:COORDINATE_COUNT, :COORDINATE_COUNT]
-        return Rival(tuple(sorted(names)), fit.coordinates, fit.active, probability, back.T @ known @ back)
+        return Rival(tuple(sorted(names)), fit.coordinates, fit.active, probability, information(fit))
 
     def _limits(self) -> Limits:
         """What the recording reached."""

@@ -17,6 +17,7 @@ from identification.damper.effects import EFFECTS, USUAL
 from identification.effect_choice import EffectChoice
 from identification.gap.explain import JointFit, joint_step, promised_step
 from identification.gap.hum import MAINS
+from identification.gap.unknowns import with_further
 from identification.problem import Evaluation, Problem
 from identification.threads import one_thread
 
@@ -45,11 +46,6 @@ class Gain:
     """[1] part of it that the step really takes away, after a line search; the promise where it was not taken."""
     unknowns: Array
     """(U,) of the joint problem, where that was: a start of the refit."""
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Parameters there [SI]."""
-        return self.choice.to_values(self.unknowns[len(self.unknowns) - len(self.choice.quantities) :])
 
 
 def every_choice(names: Sequence[str] = USUAL) -> tuple[EffectChoice, ...]:
@@ -152,7 +148,7 @@ class _Frame:
     def _promise(self, choice: EffectChoice, values: tuple[float, ...]) -> Gain:
         """What the linear step from a start takes away."""
         joint = self.problem.with_effects((*self.problem.effects, choice))
-        begin = np.concatenate([self.unknowns, choice.to_search(values)])
+        begin = with_further(self.problem, self.unknowns, choice.to_search(values))
         here = self._beside(joint, begin, choice, values)
         promised = promised_step(joint, here, begin)[1]
         gain = min((self.here.cost - promised) / self.excess, 1.0)
@@ -160,25 +156,27 @@ class _Frame:
 
     def _beside(self, joint: Problem, begin: Array, choice: EffectChoice, values: tuple[float, ...]) -> Evaluation:
         """Cost, J'J and J'r of the joint problem at a start, the effect's slopes by differences."""
-        count, own = len(self.unknowns), len(choice.quantities)
+        first = self.problem.first_own
+        own = np.arange(first, first + len(choice.quantities))
+        others = np.setdiff1d(np.arange(len(begin)), own)
         absent = not any(v for v, q in zip(values, choice.quantities, strict=True) if q.low <= 0.0)
         moved = [self._weighed(joint, begin) if not absent else self.residuals]
-        steps = [_step(joint, begin, count + k, absent) for k in range(own)]
+        steps = [_step(joint, begin, int(place), absent) for place in own]
         moved += [self._weighed(joint, begin + s) if s.any() else moved[0] for s in steps]
-        hessian, gradient = np.zeros((count + own, count + own)), np.zeros(count + own)
-        hessian[:count, :count], gradient[:count] = self.here.hessian, self.here.gradient
+        hessian, gradient = np.zeros((len(begin), len(begin))), np.zeros(len(begin))
+        hessian[np.ix_(others, others)], gradient[others] = self.here.hessian, self.here.gradient
         cost = self.here.cost
         for i, (r, J) in enumerate(zip(self.residuals, self.slopes, strict=True)):
-            columns, there = self.problem.columns(i), moved[0][i]
+            columns, there = others[self.problem.columns(i)], moved[0][i]
             E = np.column_stack(
                 [(m[i] - there) / max(s.sum(), 1e-12) for m, s in zip(moved[1:], steps, strict=True)]
             )
             cross = J.T @ E
-            hessian[np.ix_(columns, range(count, count + own))] += cross
-            hessian[np.ix_(range(count, count + own), columns)] += cross.T
-            hessian[count:, count:] += E.T @ E
+            hessian[np.ix_(columns, own)] += cross
+            hessian[np.ix_(own, columns)] += cross.T
+            hessian[np.ix_(own, own)] += E.T @ E
             gradient[columns] += J.T @ (there - r)
-            gradient[count:] += E.T @ there
+            gradient[own] += E.T @ there
             cost += float(there @ there - r @ r)
         return Evaluation(cost if np.isfinite(cost) else np.inf, hessian, gradient)
 

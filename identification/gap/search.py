@@ -244,9 +244,11 @@ class Search:
     def fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> Contender:
         """A set with a further effect, fitted from its screening's end and with further values of it."""
         # Under a wrong law the coordinates have moved to where they hide an effect: begin elsewhere, too.
-        elsewhere = np.concatenate([self._regression, gain.unknowns[len(self._regression) :]])
-        others = elsewhere[: len(elsewhere) - len(gain.choice.quantities)]
-        starts = [np.concatenate([others, gain.choice.to_search(v)]) for v in values]
+        first, at = self._thin.first_effect, parent.fit.problem.first_own
+        elsewhere = np.concatenate([self._regression[:first], gain.unknowns[first:]])
+        starts = [elsewhere.copy() for _ in values]
+        for start, tried in zip(starts, values, strict=True):
+            start[at : at + len(tried)] = gain.choice.to_search(tried)
         effort = _STAGED if values else _QUICK
         return self.fit((*parent.fit.effects, gain.choice), None, [gain.unknowns, elsewhere, *starts], effort)
 

@@ -52,6 +52,13 @@ def test_a_large_effect_is_named_though_its_form_differs(gas):
     assert " N" in found.explanation
 
 
+def test_every_run_has_another_zero_of_the_load_cell():
+    shifted = run(lambda x, v: np.full(len(x), 8.0), seed=1)
+    found = diagnose([run(), shifted]).diagnosis
+    assert found.verdict == "no_gap"
+    assert found.gap.before_n == pytest.approx(NOISE, rel=0.05)
+
+
 def test_seen_and_unseen_strokes_agree(gas):
     gap = gas.diagnosis.gap
     assert gap.after_n == pytest.approx(gap.train_after_n, rel=0.1)

@@ -31,7 +31,7 @@ class MadeUpSearch:
         count = sum(len(e.quantities) for e in effects)
         fit = SimpleNamespace(
             effects=effects,
-            problem=SimpleNamespace(first_effect=15),
+            problem=SimpleNamespace(first_effect=15, effects=effects),
             minimum=SimpleNamespace(unknowns=np.zeros(15 + count)),
         )
         contender = SimpleNamespace(fit=fit, names=frozenset(e.name for e in effects))

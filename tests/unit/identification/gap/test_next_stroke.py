@@ -14,7 +14,7 @@ LIMITS = Limits(amplitude=0.015, centre=0.0, velocity=0.2, frequency=3.0, drives
 
 def rival(name, *values):
     active = ActiveEffect(EFFECTS[name], values)
-    return Rival((name,), POINT, (active,), 0.5, np.diag(np.full(13, 1e-6)))
+    return Rival((name,), POINT, (active,), 0.5, np.diag(np.full(13 + len(values), 1e-6)))
 
 
 def test_one_set_leaves_nothing_open():
@@ -33,11 +33,23 @@ def test_delay_and_mass_are_separated_inside_the_limits():
 
 def test_what_a_refit_takes_away_does_not_count():
     loose = rival("moving_mass", 0.05)
-    tight = loose.__class__(loose.names, loose.point, loose.effects, 0.5, np.diag(np.full(13, 1e12)))
+    tight = loose.__class__(loose.names, loose.point, loose.effects, 0.5, np.diag(np.full(14, 1e12)))
     other = rival("force_delay", 2e-4)
+    other = other.__class__(other.names, other.point, other.effects, 0.5, tight.information)
     free = best_segment([loose, other], LIMITS, 2.0)
     held = best_segment([tight, other], LIMITS, 2.0)
     assert held.detectability >= free.detectability
+
+
+def test_what_a_stroke_does_not_move_hides_no_refit_of_the_rest():
+    surely = np.diag(np.full(14, 1e-6))
+    surely[POINT._fields.index("eta")] *= 1e14
+    mass = (ActiveEffect(EFFECTS["moving_mass"], (0.5,)),)
+    damped = POINT._replace(c0_a=1.01 * POINT.c0_a)
+    rivals = [Rival((name,), point, mass, 0.5, surely) for name, point in (("one", POINT), ("other", damped))]
+    found = best_segment(rivals, LIMITS, 2.0)
+    assert found.difference > 0.1
+    assert found.detectability < 0.05 * found.difference / 2.0 * np.sqrt(6000)
 
 
 def test_the_bench_compiles_every_segment_that_may_be_proposed():

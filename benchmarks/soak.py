@@ -4,6 +4,7 @@ python -m benchmarks soak              the paper's six voltages, 100 s each
 python -m benchmarks.soak quick        another method
 """
 
+import json
 import os
 import subprocess
 import sys
@@ -75,9 +76,9 @@ def _cpu(process: "subprocess.Popen[bytes]") -> float:
 
 def _report(log: Path, shares: dict[str, float]) -> None:
     recorded = read_log(log)
-    lost = {name: count for name, count in recorded.metadata["outcome"].items() if "lost" in name}
+    lost = json.loads(recorded.metadata["outcome"]["lost"])
     seconds = float(recorded.samples["time"][-1] - recorded.samples["time"][0])
-    print(f"soak: {seconds:.0f} s recorded, outcome {recorded.outcome}, {lost or 'nothing said of losses'}")
+    print(f"soak: {seconds:.0f} s recorded, outcome {recorded.outcome}, lost: {lost or 'nothing'}")
     line("samples at the load cell's conversions", len(recorded.samples["time"]), "", "")
     for name, share in shares.items():
         line(f"processor time of the {name}", 100 * share, "% core", "at most 30" if name == "agent" else "")

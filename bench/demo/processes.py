@@ -38,7 +38,8 @@ def processes(folder: DemoFolder) -> Iterator[str]:
         RunError: one of them does not come up; its last words are in the message.
     """
     with contextlib.ExitStack() as running:
-        folder.rig.unlink(missing_ok=True)  # an earlier demo's would lead the agent to ports that are closed
+        with contextlib.suppress(OSError):  # where it stays, the rig says that it cannot write there
+            folder.rig.unlink(missing_ok=True)  # an earlier demo's would lead the agent to ports that are closed
         rig = running.enter_context(_process(["sim", "--out", str(folder.rig)], folder.path / "rig.log"))
         _await(rig, folder.path / "rig.log", folder.rig.is_file)
         _configure(folder)

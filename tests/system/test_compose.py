@@ -1,0 +1,116 @@
+"""What `docker-compose up` would start: the file itself, and its processes on this machine, without containers."""
+
+import contextlib
+import json
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.request import Request, urlopen
+
+import pytest
+import yaml
+from test_service import PATIENCE, PROMPT, TINY
+
+ROOT = Path(__file__).parents[2]
+FILE = ROOT / "docker-compose.yml"
+PROGRAMS = Path(sys.executable).parent
+COMPOSE = shutil.which("docker-compose")
+ORDER = ("sim", "rig", "scheduler", "worker", "service")
+
+
+def services():
+    return yaml.safe_load(FILE.read_text())["services"]
+
+
+def dockerfile(word):
+    """What an instruction of the Dockerfile says, at its last place."""
+    return re.findall(rf"^{word} (.*)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)[-1]
+
+
+@pytest.mark.skipif(COMPOSE is None, reason="`apt-get install docker-compose` brings what reads the file")
+def test_compose_reads_its_file():
+    words = [COMPOSE, "-f", FILE, "config", "--services"]
+    read = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert read.returncode == 0, read.stderr
+    assert set(read.stdout.split()) == set(ORDER)
+
+
+def test_every_container_waits_for_what_it_needs():
+    waits = {name: set(service.get("depends_on", ())) for name, service in services().items()}
+    assert waits == {
+        "sim": set(), "rig": {"sim"}, "scheduler": {"sim"}, "worker": {"scheduler"},
+        "service": {"rig", "scheduler", "worker"},
+    }  # fmt: skip
+    networks = {name: service.get("network_mode") for name, service in services().items()}
+    assert networks == {name: "service:sim" if name != "sim" else None for name in networks}
+
+
+def test_image_holds_all_that_the_package_is_made_of():
+    packages = {path.parent.name for path in ROOT.glob("*/__init__.py")} - {"tests", "benchmarks"}
+    copied = re.findall(r"^COPY (\w+) \1$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
+    assert set(copied) == packages
+    project = (ROOT / "pyproject.toml").read_text()
+    extras = re.search(r"\[(.*)\]", dockerfile("RUN"))[1].split(",")
+    assert all(re.search(rf"^{extra} = \[", project, re.MULTILINE) for extra in extras)
+    assert json.loads(dockerfile("ENTRYPOINT")) == ["mrbench"]
+
+
+def free_port():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        return taken.getsockname()[1]
+
+
+def words(service, data, scheduler):
+    """The command line of a container, its volume in a folder and its network on loopback."""
+    line = [*service.get("entrypoint", ["mrbench"]), *service["command"]]
+    here = [word.replace("/data", str(data)).replace("0.0.0.0", "127.0.0.1").replace("8786", str(scheduler))
+            for word in line]  # fmt: skip
+    if here[1] == "serve":
+        here += ["--port", "0"]
+    return [PROGRAMS / here[0], *here[1:]]
+
+
+@pytest.fixture
+def address(tmp_path):
+    """Of the service, once every process of the file runs, with its token."""
+    scheduler = free_port()
+    with contextlib.ExitStack() as stack:
+        for name in ORDER:
+            log = stack.enter_context((tmp_path / f"{name}.log").open("w"))
+            line = words(services()[name], tmp_path, scheduler)
+            process = subprocess.Popen(line, stdout=log, stderr=subprocess.STDOUT, cwd=tmp_path, env=PROMPT)
+            stack.callback(process.wait, PATIENCE)
+            stack.callback(process.terminate)
+            if name == "sim":
+                until(lambda: (tmp_path / "bench.toml").is_file(), tmp_path)
+        text = tmp_path / "service.log"
+        until(lambda: "#token=" in text.read_text(), tmp_path)
+        yield re.search(r"(http://127\.0\.0\.1:\d+/)#token=(\S+)", text.read_text()).groups()
+
+
+def until(condition, folder):
+    deadline = time.monotonic() + PATIENCE
+    while not condition():
+        said = {log.name: log.read_text()[-300:] for log in folder.glob("*.log")}
+        assert time.monotonic() < deadline, said
+        time.sleep(0.1)
+
+
+@pytest.mark.wire
+def test_processes_of_the_file_record_and_identify(address, tmp_path):
+    def call(path, body=None):
+        headers = {"Authorization": f"Bearer {address[1]}", "Content-Type": "application/json"}
+        with urlopen(Request(f"{address[0]}api/v1/{path}", body, headers), timeout=30) as answer:
+            return json.load(answer)
+
+    until(lambda: call("agent")["state"] == "idle", tmp_path)
+    call("runs", json.dumps({"method": TINY}).encode())
+    until(lambda: any(job["state"] == "done" for job in call("jobs")["items"]), tmp_path)
+    (run,) = call("runs")["items"]
+    assert run["outcome"] == "clean"
+    assert call(f"runs/{run['id']}/fit")["schema"] == "mrbench.fit/1"

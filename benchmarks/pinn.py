@@ -16,14 +16,18 @@ import numpy as np
 
 from benchmarks.desk import Desk
 from benchmarks.fitting import random_damper
-from benchmarks.pinn_cases import LABORATORY, Score, random_strokes, try_out
+from benchmarks.pinn_cases import LABORATORY, Score, problem_of, random_strokes, score, try_out
 from benchmarks.timing import line
 from identification.assemble import assemble
 from identification.identify import Request, identify
+from identification.pinn.settings import GlobalSettings, read_settings
+from identification.pinn.train import train_batch
 from identification.prediction import predict_piece, rmse
 from identification.refine import Settings
 
 SEEDS, DAMPERS = 10, 100
+STEPS = 28
+"""Of Gauss-Newton where only the time of a step counts: all of them cost the same."""
 _ROW = "  {:>6} {:>10.4f} {:>10.2f} {:>9.1f} {:>9} {:>12.3f} {:>12.3f}"
 _HEAD = "  {:>6} {:>10} {:>10} {:>9} {:>9} {:>12} {:>12}".format(
     "seed", "unseen", "pooled", "s", "accepted", "own force", "simulated"
@@ -77,6 +81,25 @@ def globally() -> None:
     _summary(_table("global, six voltages (12 s)", scores), 1.03, 4.0, 120.0)
 
 
+def many() -> None:
+    """Preset global, many dampers at once: time over that of one by one, and where ten of them end."""
+    settings = read_settings("global")
+    assert isinstance(settings, GlobalSettings)
+    short = settings.model_copy(update={"steps": STEPS})
+    for count in (1, 4, 16):
+        problems = [problem_of(LABORATORY, seed) for seed in range(count)]
+        together = sum(found.seconds for found in train_batch(problems, short))
+        alone = sum(train_batch([problem], short)[0].seconds for problem in problems)
+        words = f"{count} at once, {STEPS} of {settings.steps} steps: {together:.1f} s; one by one {alone:.1f} s"
+        line(words, together / alone, "x", "")
+    problems = [problem_of(LABORATORY, seed) for seed in range(SEEDS)]
+    scores = {
+        seed: score(found, LABORATORY, problems[seed], problems[seed], seed)
+        for seed, found in enumerate(train_batch(problems, settings))
+    }
+    _summary(_table("global, six voltages, ten seeds of noise in one batch", scores), 1.03, 4.0, 120.0)
+
+
 def paper() -> None:
     """Preset paper, six voltages."""
     scores = {seed: try_out("paper", LABORATORY, seed) for seed in range(2)}
@@ -128,7 +151,7 @@ def real() -> None:
 
 
 PARTS: dict[str, Callable[[], None]] = {
-    "local": local, "pairs": pairs, "dampers": dampers, "global": globally, "paper": paper,
+    "local": local, "pairs": pairs, "dampers": dampers, "global": globally, "many": many, "paper": paper,
     "displacement": displacement, "real": real,
 }  # fmt: skip
 

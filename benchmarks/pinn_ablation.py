@@ -12,7 +12,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from benchmarks.pinn_cases import LABORATORY, try_out
+from benchmarks.pinn_cases import LABORATORY, Score, noisy_problem, try_out
 from identification.pinn.local import LocalTraining
 from identification.pinn.settings import LayerSize, Level, LocalSettings, read_settings
 
@@ -31,6 +31,8 @@ class Row(NamedTuple):
     preset: str = "local"
     patched: bool = False
     """Elements and inputs by the stroke's own velocity in place of the slip's."""
+    motion: str = ""
+    """How the motion of a displacement with noise is had; without one it is known."""
 
 
 def _rows() -> Iterator[Row]:
@@ -51,6 +53,10 @@ def _rows() -> Iterator[Row]:
         for multipliers in (3, 6):
             words = f"law weighed {weight:g}, {multipliers} multiplier steps"
             yield Row("multipliers", words, _weighed(weight, multipliers))
+    for motion in ("", "estimated", "by differences"):
+        for residual in ("points", "means", "weak"):
+            words = f"5 µm, motion {motion}" if motion else "known motion"
+            yield Row("residual", f"{words}: {residual}", {"residual": residual}, motion=motion)
     yield Row("taking back", "blocks set aside stay aside", {"take_back": False})
     yield Row("paper", "derivative along the trajectory", {"derivative": "total"}, preset="paper")
     yield Row("paper", "derivative over the input t alone", {"derivative": "partial"}, preset="paper")
@@ -71,6 +77,11 @@ def _by_the_stroke() -> AbstractContextManager[object]:
     return patch.object(LocalTraining, "_slip", velocity)
 
 
+def _score(row: Row, seed: int) -> Score:
+    given = noisy_problem(seed, row.motion) if row.motion else None
+    return try_out(row.preset, LABORATORY, seed, given=given, **row.changes)
+
+
 def run(groups: tuple[str, ...] = ()) -> None:
     """Print a row for each."""
     print(f"  seeds {SEEDS}, six voltages: pooled error in Cramér-Rao deviations; unseen error over the truth's;")
@@ -79,7 +90,7 @@ def run(groups: tuple[str, ...] = ()) -> None:
         if groups and row.group not in groups:
             continue
         with _by_the_stroke() if row.patched else nullcontext():
-            scores = [try_out(row.preset, LABORATORY, seed, **row.changes) for seed in SEEDS]
+            scores = [_score(row, seed) for seed in SEEDS]
         pooled = "/".join(f"{s.pooled:.2g}" for s in scores)
         unseen = "/".join(f"{s.ratio:.4g}" for s in scores)
         own = "/".join(f"{s.reconstruction:.3g}" for s in scores)

@@ -9,7 +9,7 @@ slow beside it. A filter remembers the element before: what that one adds is tak
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -18,6 +18,8 @@ from identification.arrays import Array
 from identification.force_channel import LowPass
 from identification.pinn.inputs import Inputs
 from identification.pinn.mesh import Element, Indices, LocalNetwork, Mesh, Span
+from identification.pinn.quadrature import gauss_points, slopes_by_parts
+from identification.pinn.settings import Residual
 from identification.problem import Piece, Problem
 
 _ALIKE = 1.35
@@ -98,12 +100,14 @@ class Batch:
     tests: Array
     """(M, rank) orthonormal combinations of the functions' slopes and, last, of the functions; weighed by the
     quadrature."""
+    asked: Array
+    """(M, rank) the tests as they are asked, the last one lightly; (M, M) where each point is asked by itself."""
     share: Array
     """(K, M) root of the samples that each point stands for."""
     slip_velocity: Array
     """(K,) [m/s] that a violation of the hysteresis is measured by."""
     motion: tuple[Array, Array]
-    """(K, M) displacement [m] and velocity [m/s]."""
+    """(K, M) displacement [m] and velocity [m/s], the latter as the residual is asked for."""
     sample_time: Array
     """(K, S) [s] of the motion that each recorded force belongs to."""
     sample_rate: Array
@@ -119,13 +123,10 @@ class Batch:
     counts: Array
     """(K, S) weight of each sample [1]; 0 where it is not fitted."""
 
-    @cached_property
-    def asked(self) -> Array:
-        """(M, rank) the tests as they are asked, the last one lightly."""
-        return np.hstack([self.tests[:, :-1], _LOOSE * self.tests[:, -1:]])
 
-
-def make_batches(pieces: Sequence[Learned], network: LocalNetwork, force_delay: float, points: int) -> list[Batch]:
+def make_batches(
+    pieces: Sequence[Learned], network: LocalNetwork, force_delay: float, points: int, residual: Residual = "means"
+) -> list[Batch]:
     """All elements in batches.
 
     Args:
@@ -133,9 +134,10 @@ def make_batches(pieces: Sequence[Learned], network: LocalNetwork, force_delay: 
         network: whose elements and hidden layer they are.
         force_delay: lag of the force channel beyond what it reports [s], as far as it is known.
         points: M.
+        residual: how the law is asked for.
     """
     return [
-        _batch(source, network, elements, force_delay, points)
+        _batch(source, network, elements, force_delay, points, residual)
         for number, source in enumerate(pieces)
         for elements in _alike(source, network.mesh, network.mesh.of_piece(number))
     ]
@@ -155,7 +157,9 @@ def _alike(source: Learned, mesh: Mesh, mine: Indices) -> Iterator[Indices]:
             start = stop
 
 
-def _batch(source: Learned, network: LocalNetwork, numbers: Indices, force_delay: float, points: int) -> Batch:
+def _batch(
+    source: Learned, network: LocalNetwork, numbers: Indices, force_delay: float, points: int, residual: Residual
+) -> Batch:
     elements = [network.mesh.elements[k] for k in numbers]
     nodes, quadrature = gauss_points(points)
     time = np.stack([e.start + e.memory.time(nodes) for e in elements])
@@ -166,6 +170,10 @@ def _batch(source: Learned, network: LocalNetwork, numbers: Indices, force_delay
     sample_rate, sample_change, before = _at_samples(source, network, elements, samples, late)
     lengths = np.array([e.memory.length for e in elements]) / source.inputs.h
     values = network.layer.values(nodes)
+    tests = _tests(values, network.layer.slopes(nodes), np.sqrt(quadrature)[:, None])
+    motion = source.inputs.motion(time)
+    if residual == "weak":
+        motion = motion[0], rate * _rises(source, elements, points)
     return Batch(
         source=source,
         elements=numbers,
@@ -173,10 +181,11 @@ def _batch(source: Learned, network: LocalNetwork, numbers: Indices, force_delay
         time=time,
         values=values,
         slopes=network.layer.slopes(nodes) * rate[..., None],
-        tests=_tests(values, network.layer.slopes(nodes), np.sqrt(quadrature)[:, None]),
+        tests=tests,
+        asked=np.eye(points) if residual == "points" else np.hstack([tests[:, :-1], _LOOSE * tests[:, -1:]]),
         share=np.sqrt(quadrature * np.maximum(lengths, 1.0)[:, None]),
         slip_velocity=np.array([e.slip_velocity for e in elements]),
-        motion=source.inputs.motion(time),
+        motion=motion,
         sample_time=sample_time,
         sample_rate=sample_rate,
         sample_change=sample_change,
@@ -196,6 +205,13 @@ def _tests(values: Array, slopes: Array, weight: Array) -> Array:
     met = np.linalg.svd(weight * slopes, full_matrices=False)[0][:, :-1]
     beyond = weight * values - met @ (met.T @ (weight * values))
     return np.hstack([met, np.linalg.svd(beyond, full_matrices=False)[0][:, :1]])
+
+
+def _rises(source: Learned, elements: Sequence[Element], points: int) -> Array:
+    """(K, M) slopes [m] of the displacement over the input, from the displacement alone."""
+    places, table = slopes_by_parts(points)
+    x, _ = source.inputs.motion(np.stack([e.start + e.memory.time(places) for e in elements]))
+    return np.asarray(x @ table)
 
 
 def _at_samples(
@@ -233,13 +249,6 @@ def _passed(source: Learned, values: Array) -> Array:
     """Values on the fine grid (K, L, C) as the force channel passes them, at the samples (K, S, C)."""
     windows = sliding_window_view(values, len(source.response), axis=1)[:, :: source.step]
     return np.asarray(np.einsum("ksct,t->ksc", windows, source.response[::-1]))
-
-
-@cache
-def gauss_points(count: int) -> tuple[Array, Array]:
-    """Points and weights of Gauss and Legendre on 0..1."""
-    points, weights = np.polynomial.legendre.leggauss(count)
-    return 0.5 + 0.5 * points, 0.5 * weights
 
 
 def _ranges(source: Learned, elements: Sequence[Element], late: float) -> list[range]:

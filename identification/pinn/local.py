@@ -9,12 +9,13 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.damper.coordinates import Coordinates
 from identification.force_channel import filter_lag
-from identification.pinn.batches import Learned, gauss_points, learned, make_batches
+from identification.pinn.batches import Learned, learned, make_batches
 from identification.pinn.beginning import FirstStates, Start
 from identification.pinn.elimination import Factorised, NodePrior, factorise
 from identification.pinn.hidden_layer import HiddenLayer
 from identification.pinn.local_rows import UNKNOWNS, LocalLoss, Rows, Weights
 from identification.pinn.mesh import Y_UNIT, Heads, LocalNetwork, SlipVelocity, States, make_mesh
+from identification.pinn.quadrature import gauss_points
 from identification.pinn.result import Moment
 from identification.pinn.settings import Level, LocalSettings
 from identification.pinn.supervision import Supervision
@@ -233,7 +234,8 @@ class LocalTraining:
 
     def _loss(self, problem: Problem, pieces: Sequence[Learned]) -> LocalLoss:
         delay = float(self.unknowns[COORDINATE_COUNT]) * problem.delay_prior
-        return LocalLoss(problem, make_batches(pieces, self.network, delay, self.size.points), delay)
+        batches = make_batches(pieces, self.network, delay, self.size.points, self.settings.residual)
+        return LocalLoss(problem, batches, delay)
 
     def _remesh(self, pieces: Sequence[Learned]) -> float:
         """Place the elements anew by the network's own slip; the largest shift of a reversal [s]."""

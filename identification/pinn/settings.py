@@ -11,6 +11,10 @@ PRESETS = Path(__file__).parent / "presets"
 """Where the presets lie that ship with the product."""
 
 
+Residual = Literal["points", "means", "weak"]
+"""How the law is asked for in an element: at points, in the mean, or in the mean without the stroke's velocity."""
+
+
 class CommonSettings(BaseModel):
     """What every network is told."""
 
@@ -60,6 +64,11 @@ class LocalSettings(CommonSettings):
         description="residual of the hysteresis, over the slip velocity at breakthrough, that is kept",
     )
     levels: tuple[Level, ...] = Field(description="of rising weight")
+    residual: Residual = Field(
+        default="means",
+        description="the law at `points`, in `means` weighed with an element's functions, or `weak`: means in "
+        "which the stroke's velocity is integrated by parts",
+    )
     multipliers: int = Field(default=3, ge=0, description="steps of the method of multipliers at the end")
     starts: int = Field(default=8, ge=1, description="most starts")
 

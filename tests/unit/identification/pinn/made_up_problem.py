@@ -7,11 +7,12 @@ import numpy as np
 from identification.damper.coordinates import to_coordinates
 from identification.damper.parameter_sets import parameter_set
 from identification.force_channel import LowPass
-from identification.pinn.batches import gauss_points, learned, make_batches
+from identification.pinn.batches import learned, make_batches
 from identification.pinn.beginning import FirstStates
 from identification.pinn.hidden_layer import HiddenLayer
 from identification.pinn.local_rows import LocalLoss
 from identification.pinn.mesh import Heads, LocalNetwork, make_mesh
+from identification.pinn.quadrature import gauss_points
 from identification.problem import Piece, Problem
 from identification.recordings import ChannelFilter
 from identification.search_space import SearchSpace
@@ -45,7 +46,7 @@ def _piece(levels, seconds, seed, low_pass) -> Piece:
     return Piece(clean.name, stroke, force, train, low_pass=channel)
 
 
-def network_on(given: Problem, rank=10, points=14) -> tuple[LocalNetwork, LocalLoss]:
+def network_on(given: Problem, rank=10, points=14, residual="means") -> tuple[LocalNetwork, LocalLoss]:
     """A small local network on a problem, with states as its beginning has them."""
     sources = learned(given)
     first = [FirstStates(source, TRUTH) for source in sources]
@@ -56,4 +57,4 @@ def network_on(given: Problem, rank=10, points=14) -> tuple[LocalNetwork, LocalL
     layer = HiddenLayer(40, rank, 1)
     network = LocalNetwork(layer, mesh, Heads.nothing())
     network = network.fitted(mesh, lambda piece, t: first[piece].at(t), gauss_points(points)[0])
-    return network, LocalLoss(given, make_batches(sources, network, 0.0, points), 0.0)
+    return network, LocalLoss(given, make_batches(sources, network, 0.0, points, residual), 0.0)

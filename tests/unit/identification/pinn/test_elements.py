@@ -7,6 +7,7 @@ from made_up_problem import RATE, TRUTH, network_on, problem
 from identification.pinn.hidden_layer import HiddenLayer
 from identification.pinn.inputs import Inputs
 from identification.pinn.memory_input import MemoryInput, after_reversal
+from identification.pinn.quadrature import gauss_points
 from identification.pinn.reversals import reversals, turning_points
 from identification.pinn.split import validation_masks
 from identification.simulate import Setting, simulate
@@ -79,7 +80,7 @@ def test_a_new_mesh_moves_with_the_slip_and_keeps_the_states():
     given = problem()
     network, loss = network_on(given, rank=24, points=40)
     sources = [loss.batches[0].source]
-    from identification.pinn.batches import gauss_points
+
     from identification.pinn.mesh import make_mesh
 
     def later(time):

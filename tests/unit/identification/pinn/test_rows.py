@@ -9,12 +9,13 @@ from made_up_problem import TRUTH, network_on, problem
 from numpy.random import default_rng
 
 from identification.pinn import law_rows
-from identification.pinn.batches import gauss_points, learned
+from identification.pinn.batches import learned
 from identification.pinn.elimination import NodePrior, factorise
 from identification.pinn.global_loss import GlobalLoss, Recorded, Samples
 from identification.pinn.local_rows import UNKNOWNS, LocalLoss, Weights
 from identification.pinn.mesh import Heads
 from identification.pinn.mlp import Network
+from identification.pinn.quadrature import gauss_points
 
 STEP = 1e-6
 FAR = np.full(UNKNOWNS, np.inf)
@@ -32,10 +33,11 @@ def random_heads(like: Heads, seed=5) -> Heads:
     return Heads(*(random.standard_normal(p.shape) for p in parts))
 
 
+@pytest.mark.parametrize("residual", ["points", "means", "weak"])
 @pytest.mark.parametrize("low_pass", [False, True], ids=["plain", "behind a filter"])
-def test_rows_of_the_local_network_have_the_slopes_of_finite_differences(low_pass):
+def test_rows_of_the_local_network_have_the_slopes_of_finite_differences(low_pass, residual):
     given = problem((0.0, 0.4), 0.8, low_pass=low_pass)
-    network, loss = network_on(given)
+    network, loss = network_on(given, residual=residual)
     assert isinstance(loss, LocalLoss)
     unknowns, weights = shared_unknowns(given), Weights(7.0, given.noise)
     pull = loss.rows(unknowns, network.heads, weights, slopes=False)

@@ -107,7 +107,9 @@ class NextStroke(Document):
     segment: dict[str, Any] = Field(description="as in a method document")
     separates: list[list[str]] = Field(description="the sets of effects it tells apart")
     expected_n: float = Field(description="root mean square difference of their forces there, in N")
-    detectability: float = Field(description="that difference over the noise, times the root of its samples")
+    detectability: float = Field(
+        description="what no refit takes away of it, over noise and error of forms, times the root of its samples"
+    )
 
 
 class Diagnosis(Document):

@@ -3,7 +3,8 @@
 Trial segments inside the limits of the recording are simulated with each of the tied sets. What counts is the
 difference of their forces that no refit could take away: linearised in the parameters of damper and effects, each
 held as well as the recording already fixes it, over the noise (the T-optimal design of Atkinson and Fedorov 1975).
-Whichever of two sets is the true one, the other is refitted: the worse of both cases counts.
+Whichever of two sets is the true one, the other is refitted: the worse of both cases counts. And where the sets
+themselves stand far from the law, the error of their forms is large, too, and hides the difference as noise does.
 """
 
 import math
@@ -34,6 +35,8 @@ class Rival:
     effects: tuple[ActiveEffect, ...]
     probability: float
     """[1] weight among the rivals."""
+    left: float
+    """[1] part of the gap that the error of its forms leaves."""
     information: Array
     """(13 + P, 13 + P) what the recording says of coordinates and parameters of the effects [1/SI²]."""
 
@@ -63,26 +66,27 @@ class Choice:
     difference: float
     """[N] root mean square."""
     detectability: float
-    """[1] that no refit takes away, over the noise, times the root of the samples."""
+    """[1] that no refit takes away, over noise and error of the forms, times the root of the samples."""
 
 
-def best_segment(rivals: Sequence[Rival], limits: Limits, noise: float) -> Choice | None:
+def best_segment(rivals: Sequence[Rival], law: Coordinates, limits: Limits, noise: float) -> Choice | None:
     """The trial segment that separates the rivals best; None where there are fewer than two.
 
     Args:
         rivals: the tied sets.
+        law: the damper without effects.
         limits: of motion and drive.
         noise: of the force [N].
     """
-    pairs = [(a, b) for i, a in enumerate(rivals) for b in rivals[:i]]
     best: Choice | None = None
-    for segment, stroke in trials(limits) if pairs else ():
-        forces = {r.names: _answer(r, stroke, limits.centre) for r in rivals}
-        scores = [_told_apart((a, forces[a.names]), (b, forces[b.names]), noise) for a, b in pairs]
-        weights = np.array([a.probability * b.probability for a, b in pairs])
-        score = float(np.sum(weights * np.array([s for s, _ in scores])) / max(float(weights.sum()), 1e-12))
+    for segment, stroke in trials(limits) if len(rivals) > 1 else ():
+        plain = simulate(Setting(law, y0=limits.centre), stroke).force
+        answers = [_Answer.of(r, stroke, limits.centre, plain, noise) for r in rivals]
+        pairs = [(a, b) for i, a in enumerate(answers) for b in answers[:i]]
+        weights = np.array([a.rival.probability * b.rival.probability + 1e-12 for a, b in pairs])
+        score = float(np.average([_told_apart(a, b, noise) for a, b in pairs], weights=weights))
         if np.isfinite(score) and (best is None or score > best.detectability):
-            size = float(np.sqrt(np.average([d**2 for _, d in scores], weights=weights + 1e-12)))
+            size = float(np.sqrt(np.average([_rms(a.force - b.force) ** 2 for a, b in pairs], weights=weights)))
             best = Choice(segment, [list(r.names) for r in rivals], size, score)
     return best
 
@@ -109,24 +113,41 @@ def information(fit: JointFit) -> Array:
     return np.asarray(back.T @ known @ back)
 
 
-def _answer(rival: Rival, stroke: Stroke, centre: float) -> tuple[Array, Array]:
-    """Force (N,) of a set on a stroke and its slopes (N, 13 + P + 2) over all that another run may have otherwise.
+@dataclass(frozen=True)
+class _Answer:
+    """What a set makes of a stroke."""
+
+    rival: Rival
+    force: Array
+    """(N,) [N]"""
+    slopes: Array
+    """(N, 13 + P + 2) over all that another run may have otherwise.
 
     Coordinates, parameters of the effects, y(0) and the zero of the load cell.
     """
-    found = simulate(Setting(rival.point, y0=centre, effects=rival.effects), stroke, slopes=True)
-    own = range(len(UNKNOWNS), found.slopes.shape[1])
-    columns = [*range(COORDINATE_COUNT), *own, UNKNOWNS.index("y0")]
-    return found.force, np.column_stack([found.slopes[:, columns], np.ones(len(found.force))])
+    blur: float
+    """[N] noise and error of the forms."""
+
+    @staticmethod
+    def of(rival: Rival, stroke: Stroke, centre: float, plain: Array, noise: float) -> "_Answer":
+        """Of a stroke on which the law alone makes a ``plain`` force (N,) [N]."""
+        found = simulate(Setting(rival.point, y0=centre, effects=rival.effects), stroke, slopes=True)
+        own = range(len(UNKNOWNS), found.slopes.shape[1])
+        columns = [*range(COORDINATE_COUNT), *own, UNKNOWNS.index("y0")]
+        slopes = np.column_stack([found.slopes[:, columns], np.ones(len(found.force))])
+        blur = math.hypot(noise, math.sqrt(rival.left) * _rms(found.force - plain))
+        return _Answer(rival, found.force, slopes, blur)
 
 
-def _told_apart(
-    one: tuple[Rival, tuple[Array, Array]], other: tuple[Rival, tuple[Array, Array]], noise: float
-) -> tuple[float, float]:
-    """What no refit takes away of the difference of two sets, over the noise [1]; and the plain difference [N]."""
-    difference = one[1][0] - other[1][0]
-    left = min(_left(difference / noise, slopes / noise, rival) for rival, (_, slopes) in (one, other))
-    return left, float(np.sqrt(np.mean(difference**2)))
+def _told_apart(one: _Answer, other: _Answer, noise: float) -> float:
+    """What no refit takes away of the difference of two sets, over what hides it [1]."""
+    difference = one.force - other.force
+    left = min(_left(difference / noise, answer.slopes / noise, answer.rival) for answer in (one, other))
+    return left * noise / max(one.blur, other.blur)
+
+
+def _rms(force: Array) -> float:
+    return float(np.sqrt(np.mean(force**2)))
 
 
 def _left(difference: Array, J: Array, held: Rival) -> float:

@@ -155,7 +155,8 @@ class Report:
     def _next_stroke(self, floor: float) -> NextStroke | None:
         tied = [(names, p) for names, p in self.odds.ranked() if p > TIED][:MOST_TIED]
         rivals = [self._rival(names, p) for names, p in tied]
-        chosen = best_segment(rivals, self._limits(), floor)
+        law = self.search.found[frozenset()].fit.coordinates
+        chosen = best_segment(rivals, law, self._limits(), floor)
         if chosen is None:
             return None
         return NextStroke(
@@ -166,8 +167,12 @@ class Report:
         )
 
     def _rival(self, names: frozenset[str], probability: float) -> Rival:
-        fit = self.search.found[names].fit
-        return Rival(tuple(sorted(names)), fit.coordinates, fit.active, probability, information(fit))
+        found, none = self.search.found[names], self.search.found[frozenset()]
+        left = max(self.search.left_of(found), 0.0) / max(self.search.left_of(none), 1e-3)
+        fit = found.fit
+        return Rival(
+            tuple(sorted(names)), fit.coordinates, fit.active, probability, min(left, 1.0), information(fit)
+        )
 
     def _limits(self) -> Limits:
         """What the recording reached."""

@@ -51,9 +51,23 @@ def summary(log: str, label: str, found: Found) -> dict[str, Any]:
         "bar": bar,
         "below": 100 * (1 - held / bar),
         "floors": d["rmse_n"]["held_out"] / d["noise_floor_n"],
-        "seconds": d["stages"][0]["seconds"],
+        "seconds": d["stages"][-1]["seconds"],
         "result": d["result"],
-        "iterations": d["stages"][0]["iterations"],
+    }
+
+
+def witness(row: dict[str, Any], found: Found) -> dict[str, Any]:
+    """What the network says of a recording, beside the refinement's row in the table of results."""
+    network, refined = found.document["stages"]
+    assert (network["name"], refined["name"]) == ("pinn", "refine")
+    names = ("D_y", "n", "c0_a", "c1_a", "k0", "k1")
+    own, fitted = network["coordinates"], found.document["coordinates"]
+    return row | {
+        "network": network,
+        "network_held": network["simulated_n"]["held_out"],
+        "ratio": network["simulated_n"]["held_out"] / row["held_n"],
+        "agreement": found.document["agreement"],
+        "coordinates": {name: (own[name]["value"], fitted[name]["value"], own[name]["unit"]) for name in names},
     }
 
 

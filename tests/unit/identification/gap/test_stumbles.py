@@ -7,7 +7,7 @@ from made_up_runs import NOISE, run
 from made_up_strokes import stretch
 
 from identification.assemble import assemble
-from identification.gap.carried import carried_noise, replayed
+from identification.gap.carried import carried, replayed
 from identification.gap.diagnose import diagnosed_problem
 from identification.gap.judge import Judge
 from identification.gap.residual import cut_cycles
@@ -86,10 +86,12 @@ def test_noise_of_the_motion_becomes_force_in_proportion():
     problem = diagnosed_problem(sound, judge.fitted_pieces())
     start = starting_points(problem)[0]
     forces = problem.simulate(start)
-    draws = replayed(sound.stretches, problem.pieces, forces, NOISE, 1)
-    carried = carried_noise(problem, start, draws)
-    assert 0.0 < carried < 0.5 * NOISE
+    draws = replayed(sound.stretches, problem.pieces, forces, NOISE, 1, range(2))
+    squares = carried(problem, start, draws)
+    assert squares.shape == (2, len(judge.force))
+    size = np.sqrt(squares[:, judge.seen].mean())
+    assert 0.0 < size < 0.5 * NOISE
     (recorded,) = sound.stretches
     shaken = recorded.displacement + 6e-6 * np.random.default_rng(3).standard_normal(len(recorded.time))
-    louder = replayed([replace(recorded, displacement=shaken)], problem.pieces, forces, NOISE, 1)
-    assert carried_noise(problem, start, louder) > 1.5 * carried
+    louder = replayed([replace(recorded, displacement=shaken)], problem.pieces, forces, NOISE, 1, range(2))
+    assert np.sqrt(carried(problem, start, louder)[:, judge.seen].mean()) > 1.5 * size

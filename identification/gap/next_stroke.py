@@ -105,11 +105,12 @@ def information(fit: JointFit) -> Array:
     back = np.zeros(known.shape)
     law = slice(0, COORDINATE_COUNT)
     back[law, law] = np.linalg.pinv(problem.space.slopes(unknowns[law]))
-    values = unknowns[problem.first_effect : problem.first_own]
-    edges = np.cumsum([len(e.quantities) for e in fit.effects])[:-1]
-    scales = [e.slopes(v) for e, v in zip(fit.effects, np.split(values, edges), strict=True)]
+    at, scales = problem.first_effect, [np.empty(0)]
+    for choice in fit.effects:
+        scales.append(choice.slopes(unknowns[at : at + len(choice.quantities)]))
+        at += len(choice.quantities)
     own = range(COORDINATE_COUNT, len(known))
-    back[own, own] = 1.0 / np.concatenate([*scales, np.empty(0)])
+    back[own, own] = 1.0 / np.concatenate(scales)
     return np.asarray(back.T @ known @ back)
 
 

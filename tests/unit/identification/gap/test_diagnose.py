@@ -112,7 +112,7 @@ def test_the_twin_keeps_the_lags_beside_which_it_was_fitted(gas, tmp_path):
     assert model.delays == pytest.approx(lags)
     prepared = prepare([run(stiffening)])
     left = prepared.judge.left([model.force_on(p) for p in prepared.judge.fitted_pieces()])
-    assert prepared.judge.rmse(left)[1] == pytest.approx(gas.diagnosis.gap.after_n, rel=1e-3)
+    assert prepared.judge.rmse(left)[0] == pytest.approx(gas.diagnosis.gap.train_after_n, rel=1e-3)
 
 
 def test_logs_of_two_dampers_are_refused():

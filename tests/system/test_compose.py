@@ -13,6 +13,7 @@ from urllib.request import Request, urlopen
 
 import pytest
 import yaml
+from test_page import CHROMIUM, FOLDER, NODE, browser_test
 from test_service import PATIENCE, PROMPT, TINY
 
 ROOT = Path(__file__).parents[2]
@@ -75,21 +76,26 @@ def words(service, data, scheduler):
     return [PROGRAMS / here[0], *here[1:]]
 
 
-@pytest.fixture
-def address(tmp_path):
-    """Of the service, once every process of the file runs, with its token."""
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("data")
+
+
+@pytest.fixture(scope="module")
+def address(folder):
+    """Of the service, once every process of the file runs, and its token."""
     scheduler = free_port()
     with contextlib.ExitStack() as stack:
         for name in ORDER:
-            log = stack.enter_context((tmp_path / f"{name}.log").open("w"))
-            line = words(services()[name], tmp_path, scheduler)
-            process = subprocess.Popen(line, stdout=log, stderr=subprocess.STDOUT, cwd=tmp_path, env=PROMPT)
+            log = stack.enter_context((folder / f"{name}.log").open("w"))
+            line = words(services()[name], folder, scheduler)
+            process = subprocess.Popen(line, stdout=log, stderr=subprocess.STDOUT, cwd=folder, env=PROMPT)
             stack.callback(process.wait, PATIENCE)
             stack.callback(process.terminate)
             if name == "sim":
-                until(lambda: (tmp_path / "bench.toml").is_file(), tmp_path)
-        text = tmp_path / "service.log"
-        until(lambda: "#token=" in text.read_text(), tmp_path)
+                until(lambda: (folder / "bench.toml").is_file(), folder)
+        text = folder / "service.log"
+        until(lambda: "#token=" in text.read_text(), folder)
         yield re.search(r"(http://127\.0\.0\.1:\d+/)#token=(\S+)", text.read_text()).groups()
 
 
@@ -102,15 +108,29 @@ def until(condition, folder):
 
 
 @pytest.mark.wire
-def test_processes_of_the_file_record_and_identify(address, tmp_path):
+def test_processes_of_the_file_record_and_identify(address, folder):
     def call(path, body=None):
         headers = {"Authorization": f"Bearer {address[1]}", "Content-Type": "application/json"}
         with urlopen(Request(f"{address[0]}api/v1/{path}", body, headers), timeout=30) as answer:
             return json.load(answer)
 
-    until(lambda: call("agent")["state"] == "idle", tmp_path)
-    call("runs", json.dumps({"method": TINY}).encode())
-    until(lambda: any(job["state"] == "done" for job in call("jobs")["items"]), tmp_path)
-    (run,) = call("runs")["items"]
-    assert run["outcome"] == "clean"
-    assert call(f"runs/{run['id']}/fit")["schema"] == "mrbench.fit/1"
+    until(lambda: call("agent")["state"] == "idle", folder)
+    begun = call("runs", json.dumps({"method": TINY}).encode())["id"]
+    until(lambda: [job["state"] for job in call(f"runs/{begun}")["jobs"]] == ["done"], folder)
+    assert call(f"runs/{begun}")["outcome"] == "clean"
+    assert call(f"runs/{begun}/fit")["schema"] == "mrbench.fit/1"
+
+
+@pytest.mark.wire
+@browser_test
+def test_a_technician_starts_and_watches_a_run_at_the_page_of_a_real_bench(address, folder):
+    picture = folder / "page.png"
+    command = [str(NODE), str(FOLDER / "watch_run.mjs"), *address, str(CHROMIUM), str(picture)]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=2 * PATIENCE, check=False)
+    assert result.returncode == 0, result.stderr
+    seen = json.loads(result.stdout)
+    assert seen["errors"] == []
+    assert (seen["moved"], seen["movedAgain"]) == (5, 5)
+    assert "clean" in seen["runs"][0]
+    assert "MR-0042" in seen["runs"][0]
+    assert picture.stat().st_size > 10_000

@@ -1,0 +1,44 @@
+// Starts a run of `quick` at the page of a bench whose rig is there, watches it to its fit, prints what it saw as JSON:
+//   node watch_run.mjs URL TOKEN CHROMIUM PICTURE.png
+// Every wait has playwright's deadline; that of the fit is longer.
+
+import { openPage } from "./browser.mjs";
+
+const [url, token, chromium, picture] = process.argv.slice(2);
+const FIT_WITHIN = 240_000;
+const { page, close } = await openPage(chromium, { height: 1100 });
+const seen = { errors: [] };
+page.on("pageerror", (error) => seen.errors.push(String(error)));
+
+const until = (check, argument, timeout) => page.waitForFunction(check, argument, timeout && { timeout });
+const hasText = (selector, words, timeout) =>
+  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words], timeout);
+const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas")].map((canvas) => canvas.toDataURL()));
+
+async function allMoved() {
+  const before = await canvases();
+  await until(
+    (old) => [...document.querySelectorAll("canvas")].every((canvas, k) => canvas.toDataURL() !== old[k]), before);
+  return before.length;
+}
+
+try {
+  await page.goto(`${url}#token=${token}`);
+  await hasText("#state-word", "Idle");
+  await page.check("input[value=quick]");
+  await page.fill("#specimen", "MR-0042");
+  await page.click("#start");
+  await hasText("#state-word", "Running");
+  await until(() => Number(document.querySelector("#progress").value) > 0.3, null, 60_000);
+  seen.moved = await allMoved();
+  seen.movedAgain = await allMoved();
+  seen.readings = await page.locator("#readings > div").allInnerTexts();
+  await page.screenshot({ path: picture });
+  await hasText("#state-word", "Idle", 60_000);
+  await until(() => /N \/ .*N/.test(document.querySelector("#runs")?.innerText ?? ""), null, FIT_WITHIN);
+  seen.runs = await page.locator("#runs tr").allInnerTexts();
+  seen.instruments = await page.locator("#instruments tr").allInnerTexts();
+  console.log(JSON.stringify(seen));
+} finally {
+  await close();
+}

@@ -1,11 +1,14 @@
 """Noise may be of any colour, but what bursts, beats, drifts or repeats with the stroke is none."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.random import default_rng
 from scipy.signal import lfilter
 
 from identification.gap.colour import floor_under, steady
+from identification.gap.hearing import Hearing
 from identification.gap.residual import Condition, Cycles
 from identification.gap.where import Left
 
@@ -57,3 +60,11 @@ def test_what_repeats_with_the_stroke_is_not_counted():
 )
 def test_what_is_no_noise_is_not_taken_for_it(strange):
     assert not steady(left(coloured(slow=0.0) + strange))
+
+
+@pytest.mark.parametrize(("heard", "rest", "noise"), [(2.4, 2.2, 2.2), (2.4, 2.6, 2.4), (2.4, 1.5, 2.0)])
+def test_what_was_heard_is_no_more_than_a_set_leaves_and_no_less_than_white(heard, rest, noise):
+    hearing = Hearing(2.0, ())
+    hearing.noise, hearing.carried = heard, 0.3
+    contender = SimpleNamespace(left=left(np.full(COUNT, np.hypot(rest, 0.3))))
+    assert hearing.noise_under(contender) == pytest.approx(noise)

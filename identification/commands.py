@@ -61,7 +61,7 @@ def identify(
         typer.Option(
             "--each",
             help="Every log is of a specimen of its own: a document each, named as the log, in the folder "
-            "`--out`. The preset `global` trains many of them at once.",
+            "`--out`. On an accelerator the network `global` is trained on many of them at once.",
         ),
     ] = False,
 ) -> None:

@@ -16,8 +16,9 @@ from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.recordings import Stretch
 from identification.threads import one_thread
 
-_MOST = 16
-"""Dampers in one batch: their Jacobians take some 0.3 GB each on an accelerator, with what they are made from."""
+_MOST, _ON_A_PROCESSOR = 16, 1
+"""Dampers in one batch. On an accelerator their Jacobians take some 0.3 GB each, with what they are made from; a
+processor is full with one, and the numbers of more only leave its caches."""
 
 
 def train(
@@ -85,14 +86,15 @@ def batches(problems: Sequence[Problem], settings: GlobalSettings) -> list[list[
     """Numbers of the dampers that can be trained together, batch by batch.
 
     They bring as many stretches, and as many samples in a step; how long they were recorded beyond that does not
-    matter.
+    matter. On a processor each is a batch of its own.
     """
     from identification.pinn.global_runs import batch_size
 
     alike = dict[tuple[int, int], list[int]]()
     for number, problem in enumerate(problems):
         alike.setdefault(batch_size(problem, settings), []).append(number)
-    return [some[k : k + _MOST] for some in alike.values() for k in range(0, len(some), _MOST)]
+    most = _ON_A_PROCESSOR if settings.device == "cpu" else _MOST
+    return [some[k : k + most] for some in alike.values() for k in range(0, len(some), most)]
 
 
 def _network(settings: LocalSettings | PaperSettings) -> Callable[..., tuple[Outcome, Outcome]]:

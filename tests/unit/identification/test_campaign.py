@@ -65,6 +65,7 @@ def test_the_global_network_is_trained_on_all_of_them_at_once(logs, small, monke
         return once(problems, *rest)
 
     monkeypatch.setattr(train, "train_batch", counted)
+    monkeypatch.setattr(train, "_ON_A_PROCESSOR", 16)
     found = campaign.identify_each(logs, Request(stages=("pinn", "refine"), preset=small))
     assert sizes == [2]
     first, third = found[0].fit, found[2].fit
@@ -74,10 +75,12 @@ def test_the_global_network_is_trained_on_all_of_them_at_once(logs, small, monke
     assert list(third.provenance.logs) == ["b.mcap"]
 
 
-def test_the_budget_of_a_batch_is_that_of_each_log(logs, small):
+def test_the_budget_of_a_batch_is_that_of_each_log(logs, small, monkeypatch):
+    monkeypatch.setattr(train, "_ON_A_PROCESSOR", 16)
     request = Request(settings=Settings(budget=1e-3), stages=("pinn", "refine"), preset=small)
     found = campaign.identify_each(logs, request)
     assert found[0].fit.agreement.startswith("not compared: pinn found nothing, its budget of 0.001 s")
+    assert campaign.identify_each(logs[:1], request)[0].fit.agreement.endswith("0.0005 s of processor time ended")
 
 
 def asked(logs, out, **more):

@@ -123,9 +123,13 @@ def test_an_unknown_that_is_left_alone_does_not_move():
 
 def test_dampers_go_together_that_bring_as_many_samples_and_stretches():
     short, two = problem((0.0, 0.3), 0.2), problem((0.0, 0.4), 0.5, pieces=2)
-    given = [DAMPERS[0], short, DAMPERS[1], two, DAMPERS[2]]
-    assert batches(given, SMALL) == [[0, 2, 4], [1], [3]]
-    assert batches([DAMPERS[0]] * 20, SMALL) == [list(range(16)), [16, 17, 18, 19]]
+    given, accelerated = (
+        [DAMPERS[0], short, DAMPERS[1], two, DAMPERS[2]],
+        SMALL.model_copy(update={"device": "cuda"}),
+    )
+    assert batches(given, accelerated) == [[0, 2, 4], [1], [3]]
+    assert batches([DAMPERS[0]] * 20, accelerated) == [list(range(16)), [16, 17, 18, 19]]
+    assert batches([DAMPERS[0]] * 3, SMALL) == [[0], [1], [2]], "a processor is full with one"
     assert batch_size(short, SMALL) == (380, 1)
     with pytest.raises(ValueError, match="different sizes"):
         GlobalTraining([DAMPERS[0], short], SMALL, Supervision())

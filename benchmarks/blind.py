@@ -22,7 +22,8 @@ EVIDENCE = Path(__file__).parent.parent / "docs" / "evidence"
 _HEAD = """# Recordings whose effect is withheld
 
 {count} recordings, one or two effects in each, or none, or something that no library knows. Nobody of this project
-has seen the answers; the diagnoses stand in `blind-predictions.json`. Errors are on strokes kept out of every fit.
+has seen the answers; the diagnoses stand in `blind-predictions.json`. Errors are on strokes kept out of every fit;
+"after" and shrinkage are what another run is expected to show.
 Made by
 
 ```

@@ -54,7 +54,7 @@ def place(found: Diagnosis, drive_unit: str) -> Figure | None:
 
 def _draw_errors(axes: Axes, found: Diagnosis) -> None:
     gap = found.gap
-    errors = [("refitted law", gap.before_n, _GAP)]
+    errors = [("refitted law", gap.before_n, _REST if found.verdict == "no_gap" else _GAP)]
     if gap.nominal_n is not None:
         errors.insert(0, ("given simulation", gap.nominal_n, _GAP))
     if found.effects:
@@ -73,6 +73,7 @@ def _draw_errors(axes: Axes, found: Diagnosis) -> None:
             bbox=_CLEAR,
         )
     axes.axvline(gap.noise_floor_n, color=INK, linewidth=1.2, linestyle=(0, (4, 3)))
+    axes.set_ylim(max(len(errors), 2) - 0.5, -0.5)  # a bar alone is no broader than one of two
     axes.set_xlim(0, 1.25 * max(size for _, size, _ in errors))
 
 

@@ -182,8 +182,19 @@ def envelope(time: Array, values: Array, drive: Array, bins: int = 900) -> Envel
 
 
 def draw_envelope(axes: Axes, found: Envelope, colours: DriveColours | str) -> None:
-    """An envelope as upright strokes, coloured by drive or in one colour."""
+    """An envelope as upright strokes, coloured by drive or in one colour, and a line through their middles."""
     ends = np.stack([np.stack([found.time, found.low], 1), np.stack([found.time, found.high], 1)], axis=1)
     each = colours if isinstance(colours, str) else list(colours.scale.to_rgba(found.drive))
     axes.add_collection(LineCollection(list(ends), colors=each, linewidths=0.9, capstyle="projecting"))
+    # A stroke without height is not drawn: a constant drive would not be seen at all.
+    axes.add_collection(LineCollection(list(_middles(found)), colors=each, linewidths=0.9))
     axes.autoscale_view()
+
+
+def _middles(found: Envelope) -> Array:
+    """(bins, 2, 2) from the middle of each bin to that of the next one; nowhere where time has a gap between them."""
+    points = np.stack([found.time, (found.low + found.high) / 2], axis=1)
+    after = np.roll(points, -1, axis=0)
+    steps = np.diff(found.time)
+    apart = np.append(steps > 3 * np.median(steps), True) if len(steps) else np.ones(1, bool)
+    return np.stack([points, np.where(apart[:, None], points, after)], axis=1)

@@ -7,7 +7,7 @@ from report_examples import CYCLES, prediction, series, write_log
 from bench.errors import ReportError
 from bench.recorder.reader import read_log
 from bench.report import plots
-from bench.report.drawing import MOST_POINTS, DriveColours, envelope, thinned
+from bench.report.drawing import MOST_POINTS, DriveColours, draw_envelope, envelope, new_figure, thinned
 from bench.report.recording import recording_from
 from bench.report.strokes import choose_strokes
 
@@ -86,6 +86,16 @@ def test_an_envelope_keeps_the_extremes_and_reaches_over_no_gap():
     assert found.high.max() == 9.0
     assert found.low.min() == values.min()
     assert not np.any((found.time > 1.0) & (found.time < 5.0))
+
+
+def test_a_constant_drive_is_drawn_as_a_line_and_over_no_gap():
+    time = np.concatenate([np.arange(1000) * 1e-3, 5 + np.arange(1000) * 1e-3])
+    axes = new_figure(4.0, 3.0).subplots()
+    draw_envelope(axes, envelope(time, np.full(2000, 0.3), time, bins=20), "black")
+    _, line = axes.collections
+    steps = np.array([np.ptp(path.vertices[:, 0]) for path in line.get_paths()])
+    assert steps.sum() == pytest.approx(1.8, abs=0.1)
+    assert steps.max() < 0.2
 
 
 @pytest.mark.parametrize(("draw", "labels"), [

@@ -192,7 +192,7 @@ def draw_envelope(axes: Axes, found: Envelope, colours: DriveColours | str) -> N
 
 
 def _middles(found: Envelope) -> Array:
-    """(bins, 2, 2) from the middle of each bin to that of the next one; nowhere where time has a gap between them."""
+    """(bins, 2, 2) from the middle of each bin to that of the next one; a point where time has a gap behind it."""
     points = np.stack([found.time, (found.low + found.high) / 2], axis=1)
     after = np.roll(points, -1, axis=0)
     steps = np.diff(found.time)

@@ -170,6 +170,7 @@ class Actuator:
             self._clock_asked_ns = self._clock()
             # A clock that does not answer is asked again; whether the drive is there, its heartbeat says.
             with contextlib.suppress(NoReply, BadReply, Refused):
+                # Its answer is taken from the frames by the collector, as a replay takes it.
                 self._node.number(TIME_STAMP)
         deadline = time.monotonic() + timeout
         while True:
@@ -235,6 +236,7 @@ class Actuator:
             raise Refused(f"{self._name}: the rod does not know where it is; {way} first")
         self._drive.check_no_fault()
         self._drive.lead_from_now(self._master_id, self.settings)
+        # Asked for once the drive holds the rod: without voltage the load could still move it.
         here = self.read("actuator_position").value
         self._setpoints.arm(here)
         return here
@@ -259,6 +261,7 @@ class Actuator:
 
     def rest(self) -> None:
         """End leading the rod in good order, where it stands: no voltage."""
+        # Before the stop: a setpoint carries "enable", which may take a quick stop back.
         self._setpoints.disarm()
         self._drive.switch_off()
 

@@ -29,7 +29,9 @@ _REMEMBERED = 256
 _DRIFT = 1e-4
 """Share by which the drive's clock may be slow without looking late."""
 _WRAP = 1 << 32
+"""[us] in one turn of the drive's clock."""
 _MICROSECOND = 1000
+"""[ns]"""
 _FRAME_NS = 108_000
 """[ns] that a frame of eight bytes is on a bus of 1 Mbit/s, the fastest there is: no question is quicker."""
 _CLOCK_WANTED, _CLOCK_COMES = b"\x40\x13\x10\x00", b"\x43\x13\x10\x00"
@@ -201,6 +203,8 @@ class ActuatorSamples:
             self._decode_passed()
 
     def _decode_passed(self) -> None:
+        # What is there now, and no more: frames that come meanwhile must not keep the caller.
+        # Nobody else takes any under the lock, so that `get` never waits.
         for _ in range(self._passed.qsize()):
             self._decode(self._passed.get())
 

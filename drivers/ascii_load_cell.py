@@ -92,6 +92,7 @@ class AsciiLoadCell:
         """
         self._known(channel)
         with self._reading:
+            # Put aside: only a reading from now on answers, and `acquire` wants all of them in their order.
             held, self._pending = self._pending, []
             try:
                 self._waited(_LIMITS["silence_s"])

@@ -149,6 +149,8 @@ class CanBus:
         self.check()
         messages = [can.Message(arbitration_id=one, data=data, is_extended_id=False) for one, data in frames]
         with self._sending:
+            # Stamped before it leaves: no answer may bear an earlier stamp than its question. The order has a lock
+            # of its own, for a send that does not get away must not keep those waiting who receive.
             with self._order:
                 now = self._clock()
                 for identifier, data in frames:
@@ -197,6 +199,7 @@ class CanBus:
 
     def unsubscribe(self, heard: Heard) -> None:
         """Tell it no more."""
+        # A new list: the receiving thread may just be going through the old one.
         self._heard = [other for other in self._heard if other != heard]
 
     def listen(self, tap: Tap) -> None:
@@ -208,6 +211,7 @@ class CanBus:
         for _ in range(_ATTEMPTS):
             try:
                 return self._attempt()
+            # A greeting that is spoilt fails at once and is worth another try; a silence has used up the time.
             except TimeoutError as timeout:
                 error = timeout
                 break

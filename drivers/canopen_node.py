@@ -25,6 +25,7 @@ from drivers.instrument import Clock
 # What goes wrong is raised or counted here; a library that also writes it on standard error says it twice.
 logging.getLogger("canopen").addHandler(logging.NullHandler())
 
+# The library raises one class for silence and for nonsense: these words of its own tell them apart.
 _SILENCE = "No SDO response received"
 _EMERGENCY = struct.Struct("<HB5s")
 _STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
@@ -95,9 +96,11 @@ class CanopenNode:
         self._within = self._node.sdo.RESPONSE_TIMEOUT = answer_within
         self._network.add_node(self._node)
         maps: Any = self._node.pdo
+        # From the data sheet, not from the node: nobody need be on the bus yet.
         maps.read(from_od=True)
         self.layouts = tuple(layout_of(pdo) for pdo in self._node.tpdo.values())
         """The frames that the node sends, as its data sheet maps them."""
+        # Packed and sent here: what SYNC brings into force, the library (2.4.1) leaves to a timer of its own.
         self._demanded = layout_of(self._node.rpdo[1])
         self._demands: dict[int, int] = {}
         self._access = threading.Lock()
@@ -156,6 +159,7 @@ class CanopenNode:
         Raises:
             NoReply: none came within ``within`` [s].
         """
+        # Any change counts, not a state: a node in the wrong state is still there.
         before = self._beat_ns
         self._wait(lambda: self._beat_ns != before, "a heartbeat", within)
 
@@ -219,6 +223,7 @@ class CanopenNode:
         What is not named keeps its last value.
         """
         self._demands.update(values)
+        # In one segment: a call to send costs more than what is sent (decision 0011).
         self._bus.send_together((self._demanded.identifier, self._demanded.packed(self._demands)), _SYNC)
 
     def send_sync(self) -> None:
@@ -266,11 +271,13 @@ class CanopenNode:
         """A frame came, on the receiving thread."""
         if identifier == 0x700 + self.node_id:
             with self._beat:
+                # The highest bit is no part of the state.
                 self._state, self._beat_ns = data[0] & 0x7F, received_ns
                 self.boots += self._state == 0
                 self._beat.notify_all()
         elif identifier == 0x80 + self.node_id:
             code, register, _ = _EMERGENCY.unpack(data)
+            # A new list each time: other threads go through the old one.
             self.emergencies = [*self.emergencies, Emergency(code, register, received_ns)][-_KEPT:]
         elif identifier == 0x580 + self.node_id:
             self._network.notify(identifier, bytearray(data), received_ns / 1e9)

@@ -47,6 +47,7 @@ _ONWARD = {
     DriveState.SWITCH_ON_DISABLED: SHUT_DOWN,
     DriveState.READY: SWITCH_ON,
     DriveState.SWITCHED_ON: ENABLE,
+    # Not straight back to operation: CiA 402 leaves that way to the maker and advises against it.
     DriveState.QUICK_STOP: DISABLE_VOLTAGE,
 }
 

@@ -254,6 +254,7 @@ class CoilAmplifier(ModbusInstrument):
 
     def make_safe(self) -> None:
         """Bring the output to zero by its ramp; where the wire is dead, the amplifier's watchdog does it."""
+        # Twice: after an answer that was lost the wire is opened anew, or in step again, with the next request.
         for _ in range(2):
             try:
                 # An amplifier that has nothing to abort may say so: no reason to leave its output on.
@@ -284,6 +285,7 @@ class CoilAmplifier(ModbusInstrument):
 
     def _configure(self) -> None:
         registers = self._registers
+        # In this order: while a table runs, in a fault, or at an output other than zero it refuses what follows.
         self.abort_table()
         self.reset()
         registers.write("setpoint", 0.0)

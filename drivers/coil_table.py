@@ -65,6 +65,7 @@ class StepTable:
         for start in range(0, len(words), _MOST_WRITTEN):
             line.write(self._address + start, words[start : start + _MOST_WRITTEN])
         self._registers.write("table_length", len(times))
+        # It will run with nobody looking: what went wrong on its way has to show now.
         for start in range(0, len(words), _MOST_READ):
             wanted = words[start : start + _MOST_READ]
             if line.read("holding", self._address + start, len(wanted)).words != wanted:

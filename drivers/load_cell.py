@@ -43,6 +43,7 @@ class LoadCell:
         Raises:
             OutOfRange: the instrument does not offer this rate.
         """
+        # A tare of up to full scale moves `force` by as much: its range is twice that of the cell.
         full_scale: float = _INSTRUMENT["full_scale_n"]
         self.name: Final = name
         self.channels: Final = (
@@ -94,6 +95,7 @@ class LoadCell:
         if self._line.is_open:
             with contextlib.suppress(DriverError):
                 self.stop()
+        # Not while the other thread reads: a descriptor must not vanish under it.
         with self._reading:
             self._line.close()
 
@@ -128,6 +130,7 @@ class LoadCell:
         self._known(channel)
         seen = self._newest.get(channel)
         deadline = time.monotonic() + _DEADLINES["reply_s"] + 1 / self._rate
+        # Another block, not another value: forces may repeat.
         while (block := self._newest.get(channel)) is seen or block is None:
             if time.monotonic() >= deadline:
                 raise NoReply(

@@ -85,8 +85,10 @@ class ClockReader:
         self._asked += 1
         self._due_ns = now + next((every for many, every in _AT_FIRST if self._asked < many), _PERIOD_NS)
         self._token = token()
+        # Tokens come round again, see `Dialogue`.
         self._stream.answers.pop(self._token, None)
         self._after_ns = now - (self._stream.last_ns or now)
+        # Before it is written: however long that takes, the clock is read after this.
         self._sent_ns = self._clock()
         write(encode(Request(self._token, _COMMAND, 0)))
 

@@ -83,6 +83,7 @@ class Dialogue:
             request = Request(self.token(), _COMMANDS[command], argument)
             # Tokens come round again: an answer to the one of 256 requests ago would pass for this one's.
             self._stream.answers.pop(request.token, None)
+            # Every attempt bears the same token: a late answer to the first is as good as one to the last.
             for _ in range(_DEADLINES["attempts"]):
                 self._write(encode(request))
                 if (answer := self._answer_to(request)) is not None:

@@ -132,6 +132,7 @@ class Decoder:
         return list(self._complete())
 
     def _complete(self) -> Iterator[Packet]:
+        # Sync word, length and type: before these have come, nothing can be told.
         while len(self._buffer) > 3:
             form = _FORMS.get(self._buffer[3])
             if not self._buffer.startswith(_SYNC):

@@ -162,6 +162,7 @@ class SampleStream:
         instrument that began anew: then the clock alone speaks.
         """
         if self._fresh or self.latest is None:
+            # A start begins the sequence at 0: what it lacks of that has been lost on the way.
             return 1 + sample.sequence
         steps = (sample.sequence - self.latest.sequence) % _SEQUENCES
         steps += _SEQUENCES * round((by_clock - steps) / _SEQUENCES)

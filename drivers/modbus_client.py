@@ -15,6 +15,7 @@ from drivers.modbus_address import ModbusAddress
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())  # or it writes on standard error
 
 _NEVER = 2**62
+"""Silences in a row after which the library hangs up by itself."""
 
 
 class Trace:
@@ -72,6 +73,7 @@ def client_for(address: ModbusAddress, timeout: float, trace: Trace) -> Client:
 
     A raw ``socket://`` goes through the TCP client with RTU framing: through pyserial it would come byte by byte.
     """
+    # No retries of the library's own: on RTU a late answer to the first would pass for the second's.
     client = _tcp(address, timeout, trace) or _serial(address, timeout, trace)
     # By itself the library hangs up after a few silences; when a wire is to be opened anew is our decision.
     client.set_max_no_responses(_NEVER)

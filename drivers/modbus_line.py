@@ -30,7 +30,9 @@ Table = Literal["input", "holding"]
 _READ, _WRITE = {"holding": 3, "input": 4}, {False: 6, True: 16}
 _WRITE_AND_READ = 23
 _LONGEST_FRAME = 256
+"""[bytes] of a request or an answer on a serial line."""
 _DIAGNOSTICS_UNKNOWN = bytes([0x88, 0x01])
+"""Answer of an instrument that does not know function 8: exception 1."""
 _REFUSALS = {
     1: "it does not know this function",
     2: "there is no such register",
@@ -180,9 +182,11 @@ class ModbusLine:
             answer = ask(client)
         except Exception as error:  # whatever the library makes of what came, it is translated here
             raise self._translated(error, what) from error
+        # Told to the taps before it is judged: the log keeps what was refused, too.
         self._trace.flush()
         if answer.function_code & 0x7F != function:
             raise self._bad(what, f"function {answer.function_code} answered, asked was {function}")
+        # A refusal is an answer like any other to the library: it is not raised.
         if answer.isError():
             code = answer.exception_code
             raise Refused(f"{self.name}: {what} was refused: {_REFUSALS.get(code, 'reason unknown')} ({code})")
@@ -196,6 +200,7 @@ class ModbusLine:
             return NotConnected(
                 f"{self.name}: {what}: {self.address.url} has gone; the next request opens it again"
             )
+        # The library tells of a wrong checksum as of a silence: that something was heard tells them apart.
         if heard or not isinstance(error, ModbusException):
             return self._bad(what, f"{heard} bytes came that are no whole answer")
         return NoReply(f"{self.name}: {what}: no answer within {self.patience:.3f} s; is it switched on?")

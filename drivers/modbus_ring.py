@@ -124,7 +124,9 @@ class Ring:
 
     def _take(self, blocks: list[Block]) -> bool:
         """Read the next block; whether more samples stand behind it."""
+        # From before the question: how long an answer takes must not slow the pace.
         self._next = time.monotonic() + self._every
+        # Asked for and read in one exchange: half as many requests.
         answer = self._registers.write_and_read(
             "wanted", self.decoder.wanted, self.layout.address, self.layout.length
         )
@@ -143,6 +145,7 @@ class Ring:
 
     def _accepted(self, answer: Answer) -> Taken:
         try:
+            # Both or neither: a replay begins with the first frame after this stamp.
             with self._taking:
                 self._taken_ns = answer.received_ns
                 return self.decoder.take(answer.words, answer.received_ns)

@@ -16,6 +16,7 @@ from drivers.modbus_registers import RegisterMap, Type, WordOrder, decode, words
 
 _WRAP = 2**32
 _BEHIND = 2**31
+"""A step as large, of numbers and clocks that wrap, is one backwards."""
 
 
 class Column(NamedTuple):

@@ -127,6 +127,7 @@ class _Ring:
     def _words(self, heard: bytes) -> tuple[int, ...] | None:
         """The block's words, if it was asked for and came whole, whatever stood before it."""
         question, self._question = self._question, b""
+        # Bytes before the function's code, and of the checksum behind.
         head, tail = (1, 2) if self._rtu else (7, 0)
         # On RTU an old answer, or noise, may stand before the one that the driver took: that is always the last.
         answer = heard[-(head + 2 + self._length + tail) :]

@@ -147,6 +147,7 @@ class SerialLine:
 def _port_at(address: str, baud: int, write_timeout: float) -> serial.Serial:
     """An open port; RFC 2217 in pyserial knows no deadline for writing."""
     deadline = None if address.startswith("rfc2217:") else write_timeout
+    # Exclusive: two readers of one port would share its bytes out among them.
     return serial.serial_for_url(address, baud, timeout=_PATIENCE, write_timeout=deadline, exclusive=True)
 
 

@@ -15,7 +15,9 @@ from drivers.errors import BadReply, NoReply, OutOfRange, Refused
 
 COUNT = 1e-7
 """[m] of one position count, [m/s] of one of velocity; checked against the drive's own unit objects."""
+# 402, in the lower half of the device type.
 _PROFILE = 0x192
+# As CiA 303-2 writes units: 10^-7 (F9h, an exponent of -7) metre (01h), and the same a second (03h).
 _UNITS = {0x60A8: 0xF9010000, 0x60A9: 0xF9010300}
 _STEP_WITHIN = 1.0
 """[s] for one change of state."""
@@ -55,6 +57,8 @@ class ActuatorSettings:
     """[s] for coming to rest when made safe."""
 
 
+# Not the library's own CiA 402 profile (canopen 2.4.1): it leads states by process data, which it does not send
+# where they wait for a SYNC, and a reset always takes all of its deadline.
 class ServoDrive:
     """The verbs of one drive.
 
@@ -85,6 +89,7 @@ class ServoDrive:
         node = self._node
         node.wait_for_heartbeat(_STEP_WITHIN)
         self._identify()
+        # Whoever led it before may have left it in motion.
         self.stop(settings.stop_within)
         node.command_state(127, _STEP_WITHIN)  # process data may be mapped anew in pre-operational alone
         node.set_up_process_data()
@@ -126,6 +131,7 @@ class ServoDrive:
             self._node.download(0x6040, cia402.QUICK_STOP)
         if state in (DriveState.ENABLED, DriveState.QUICK_STOP, DriveState.FAULT_REACTION):
             self._until(self._stands, within, "the rod to stand")
+        # Whoever led it falls silent now, and means to.
         self._node.download(0x1016, 0, 1)
 
     def reset(self) -> None:

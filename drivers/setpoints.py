@@ -94,7 +94,9 @@ class Setpoints:
         with self._sending:
             now = self._clock()
             self._check_led(samples)
+            # A place still to come would allow for time that has not passed.
             place = now if place_ns is None else min(place_ns, now)
+            # By its place: judged by when it leaves, one that makes up for a late one is refused as a leap.
             self._check(position, (place - self._place_ns) / 1e9, travel)
             target = round((position + origin) / COUNT)
             self._node.lead({0x6040: cia402.ENABLE, 0x6060: cia402.CYCLIC_POSITION, 0x607A: target})
@@ -135,6 +137,8 @@ class Setpoints:
     def _check(self, position: float, since: float, travel: Channel) -> None:
         """See that a setpoint lies within the travel and can be reached ``since`` [s] behind the last one."""
         travel.checked(position)
+        # A long silence excuses no leap: beyond `stale_after` the drive has stopped by itself. And it takes a
+        # cycle over each setpoint, however close upon the last one it came.
         time = max(min(since, self._settings.stale_after), self._settings.cycle)
         speed = abs(position - self._last) / time
         if speed > self._settings.top_speed:

@@ -34,6 +34,7 @@ class SocketcandBus(SocketCanDaemonBus):
         """
         # A refused connection would be tried again in a busy loop for ten seconds.
         socket.create_connection((host, port), timeout).close()
+        # The greeting waits without a deadline: only an end of its connection ends it.
         hang_up = threading.Timer(timeout, self._hang_up)
         hang_up.start()
         try:

@@ -104,12 +104,14 @@ class CanopenSlave:
         """Heartbeats, events, watchdog."""
         period = self._heartbeat_period()
         if period and now_ns >= self._next_heartbeat_ns:
+            # On a beat of its own, but no burst after a pause.
             self._next_heartbeat_ns = max(self._next_heartbeat_ns + period, now_ns)
             self._send(0x700 + self.node_id, bytes([self.state]), now_ns)
         watched = self.objects.number(0x1016, 1) & 0xFFFF
         seen = self._master_seen_ns
         if watched and seen is not None and now_ns - seen > watched * _MILLISECOND:
             self._master_seen_ns = None
+            # Told once: the watch begins anew with the next heartbeat.
             self._device.master_lost(now_ns)
         if self.state == OPERATIONAL:
             self._send_events(now_ns)
@@ -127,6 +129,7 @@ class CanopenSlave:
     def _network_command(self, command: int, now_ns: int) -> None:
         if command in _COMMANDS:
             self.state = _COMMANDS[command]
+            # What is sent on change is sent once when the node becomes operational, changed or not.
             self._events.clear()
         elif command in (129, 130):
             self._device.reset(now_ns)
@@ -146,8 +149,10 @@ class CanopenSlave:
         if self.state != OPERATIONAL or not _is_pdo(self.objects, 0x1400, identifier):
             return
         if len(data) < sum(bits for _, _, bits in _mapping(self.objects, 0x1600)) // 8:
+            # Of CiA 301: process data too short; in the register, communication.
             self.emergency(0x8210, 0x10, now_ns)
         elif self.objects.number(0x1400, 2) < _EVENT_DRIVEN:
+            # Synchronous process data come into force with the next SYNC.
             self._staged[0x1600] = data
         else:
             self._unpack(0x1600, data, now_ns)
@@ -171,6 +176,7 @@ class CanopenSlave:
             try:
                 self.objects.download(index, sub, part)
             except Abort:
+                # Of CiA 301: a protocol error; in the register, communication.
                 self.emergency(0x8200, 0x10, now_ns)
                 return
         self._device.synchronised(now_ns)

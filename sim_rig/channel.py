@@ -79,6 +79,7 @@ class ChannelStream:
         self.rate = rate
         """[Hz] readings a second."""
         self._view, self._sensor, self._drawn = view, sensor, drawn
+        # A stream of chances each: how many readings are made at a time must not change who gets which.
         self._jitter, self._white, self._shocks = random.spawn(3)
         hidden = [Filter(order=1, cutoff=1 / (2 * math.pi * view.slow))] if view.slow > _NO_LAG else []
         device = [sensor.filter] if sensor.filter else []
@@ -103,6 +104,7 @@ class ChannelStream:
             return 0
         ahead = self._sensor.delay + self._view.lag - self._drawn.offset
         ahead -= self._drawn.wander + _LARGEST_JITTER * self._sensor.jitter
+        # A reading that is due at this very instant is not put off by rounding.
         return max(math.floor((last * self._view.dt + ahead) * self.rate + 1e-6) + 1 - self._next, 0)
 
     def make(self, count: int) -> tuple[Array, Array]:

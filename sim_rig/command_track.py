@@ -61,6 +61,7 @@ class JoinedTrack:
         begin = at_ns if since_ns is None else since_ns + self._take_up
         if begin > reached:  # it stood meanwhile
             self._vertices.append((begin, last))
+        # By a nanosecond at least: `interp` needs instants that increase.
         self._vertices.append((max(end, reached + 1), value))
 
     def at(self, instants: Instants) -> Array:

@@ -59,6 +59,7 @@ def compiled(function: Function, signature: Any = None) -> Function:
 
     With a signature it is compiled at once and for that alone, else when it is called.
     """
+    # By numpy's rules a division by zero gives infinity, which the marches look for, and no exception.
     return cast(Function, numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function))
 
 

@@ -64,6 +64,7 @@ class _Grid:
         self._count += 1
         since_ns = self._count * self._period_ns
         self._origins.append(came_ns - since_ns)
+        # By the mean of them, the motion differed by 25 to 210 µm from cycle to cycle; by the earliest, by 9 µm.
         self._origin_ns += round((min(self._origins) - self._origin_ns) * _PULL)
         return self._origin_ns + since_ns
 
@@ -117,6 +118,7 @@ class Demand:
         (began, before), (place, _) = self._before, self._last
         span = (place - began) / 1e9
         self._pace = min(max((target - before) / span, -top_speed), top_speed)
+        # However late it came, it is reached from now on only: a rod cannot leap.
         reached = max(place + _BEHIND * period_ns, self._now_ns + period_ns // 4)
         begin = self._ahead[-1][0] if self._ahead else self._now_ns
         self._ahead.append((reached, before + self._pace * span))

@@ -54,6 +54,7 @@ class DriveSenses:
         times, values = self._signals.latest("actuator_position", 5, now_ns)
         if len(values) < 2 or not np.isfinite(values).all():
             return now_ns, (float(values[-1]) if len(values) else 0.0), 0.0
+        # Least squares over all of them: between two samples a millisecond apart, a step of 5 µm is 5 mm/s.
         seconds = (times - times[-1]) / 1e9
         spread = seconds - seconds.mean()
         return int(times[-1]), float(values[-1]), float(spread @ values / (spread @ spread))

@@ -146,6 +146,7 @@ class FaultProxy:
         except OSError:
             host.close()
             return
+        # Pieces pass as they came: to hold small ones back is for the schedule alone.
         for end in (host, device):
             end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             end.settimeout(_PATIENCE)

@@ -136,6 +136,7 @@ def _step(
     rates(mid, held, remembered, end, drive, late, k, p, follow, parallel, seen, scales, d)
     for j in range(STATES):
         s[j] += h / 6.0 * (a[j] + 2.0 * (b[j] + c[j]) + d[j])
+    # Once a step, by where it ended: a stage only tries, and play and iron would remember what it tried.
     if k[MEMORY] != 0.0 and s[FIELD] != field:
         remembered = memory(remembered, s[FIELD] - field)
     return float(follow(held, s[POSITION])), remembered
@@ -177,7 +178,7 @@ def _march(
     """Move the states on through M command samples, in place.
 
     Args:
-        s: (12,) states at the first instant.
+        s: (STATES,) states at the first instant.
         held: [m] where the damper stands.
         remembered: what the iron remembers.
         past: ring of the amplifier's outputs at the start of each block, long enough for the dead time.
@@ -191,7 +192,7 @@ def _march(
             start of each block.
         outputs: (M,) filled with the amplifier's output half way through each sample.
         damper: (M, 2) filled with displacement [m] and velocity [m/s] of the damper at each sample.
-        states: (M, 12) filled with the states at each sample.
+        states: (M, STATES) filled with the states at each sample.
 
     Returns:
         Where the damper stands [m], what the iron remembers, and the sample in which the motion was lost, or M.

@@ -140,6 +140,7 @@ class LiveRig:
             PlantError: the motion is not finite.
         """
         now = self._clock.now_ns()
+        # In pieces: a stop does not wait for a plant that is far behind.
         while (count := min((now - self._done) // STEP_NS, _LONGEST)) > 0 and not self._stopping.is_set():
             self._move(int(count))
         self.behind_ns = self._clock.now_ns() - self._done
@@ -182,6 +183,7 @@ class LiveRig:
         edges = self._done + STEP_NS * np.arange(count + 1)
         with self._lock:
             command, drive = self._displacement.at(edges), self._drive.at(edges[:-1])
+        # Without the lock: the instruments ask for samples meanwhile.
         truth = self._plant.play(STEP_NS * 1e-9, command, drive)
         start = (self._done - self._origin) * 1e-9
         seen = looked_at(self._scenario, truth, start, STEP_NS * 1e-9)

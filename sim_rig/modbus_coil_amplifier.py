@@ -124,6 +124,7 @@ class CoilAmplifierDevice:
         output = self.output
         if self.tripped or now < up:
             return
+        # An armed table, too: it would start while nobody is there to stop it.
         if output.level(up) or output.target or output.table in {Table.ARMED, Table.RUNNING}:
             self.tripped = True
             output.abort(up)
@@ -192,6 +193,7 @@ class CoilAmplifierDevice:
 
     def _set_ramp(self, value: float) -> None:
         now, target = self._signals.now_ns(), self.output.target
+        # From where it is now: the new slope is none of the way behind it.
         if self.output.table is not Table.RUNNING:
             self.output.go(target, now)
         self.output.ramp = value

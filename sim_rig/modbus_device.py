@@ -203,6 +203,7 @@ class SampleRing:
             # What has come since the wanted sample is enough; to look through all that is kept takes long.
             size = min(self._ring["size"], max(1, now // self._interval - self._from - self.wanted + 2))
             held = [self._signals.latest(name, size, now) for name in self._names]
+            # As far as every channel has come: a sample is whole, or not there yet.
             newest = self._number(min(int(times[-1]) for times, _ in held)) if all(len(t) for t, _ in held) else -1
             oldest = max(
                 [0, newest - self._ring["size"] + 1, *(self._number(int(t[0])) for t, _ in held if len(t))]

@@ -44,6 +44,7 @@ class _Mbap:
         return struct.pack(">HHHB", reply.number, 0, len(reply.pdu) + 1, reply.unit) + reply.pdu
 
     def corrupt(self, frame: bytes) -> bytes:
+        # In the protocol's number: there is no checksum that would tell it anywhere else.
         return frame[:3] + bytes([frame[3] ^ 1]) + frame[4:]
 
 

@@ -59,6 +59,8 @@ class _Pending:
     due: float
 
 
+# Not pymodbus's own server (3.16.1): it works on several requests of a connection at once and gives every answer
+# the number of the last, so that a delayed answer would pass for another one's.
 @dataclass
 class ModbusServer:
     """One instrument on one wire, in a thread of its own; a context manager."""
@@ -97,6 +99,7 @@ class ModbusServer:
     def listen_pty(self) -> "ModbusServer":
         """Serve on a new pty, which stays while its hosts come and go. `start` begins."""
         master, slave = os.openpty()
+        # As it is opened, a terminal sends back what it gets, and changes ends of lines.
         tty.setraw(slave)
         self._pty, self.framing, self.address = (master, slave), RTU, os.ttyname(slave)
         self._add(_Host(master))

@@ -144,6 +144,7 @@ class Plant:
 
 def blocks_in(dt: float) -> int:
     """Blocks into which a sample of dt [s] is cut: an even number, each at most an eighth of a millisecond."""
+    # Even, for the amplifier's output is read half way through a sample.
     return max(2 * math.ceil(dt / _LONGEST_BLOCK / 2 - 1e-9), 2)
 
 

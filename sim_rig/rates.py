@@ -126,6 +126,7 @@ def _move_actuator(s: Array, command: float, force: float, k: Array, rate: Array
     rate[POSITION] = s[SPEED]
     error = s[COMMAND] - s[POSITION] - k[COMPLIANCE] * force
     wanted = k[SERVO] * (k[SERVO] * error - 2.0 * k[DAMPING] * s[SPEED])
+    # The mass's force, too, holds the rod back, and is this very rate times the mass: solved for it.
     rate[SPEED] = wanted / (1.0 + k[SERVO] * k[SERVO] * k[COMPLIANCE] * k[MASS])
 
 
@@ -168,19 +169,19 @@ def rates(
     """Rates of all states, written to ``rate``.
 
     Args:
-        s: (12,) the states.
+        s: (STATES,) the states.
         held: [m] where the damper stood when the step began.
         remembered: what the iron remembered then.
         command: [m] commanded displacement now.
         drive: [V or A] commanded drive.
         late: [V or A] output as it reaches the coil after its dead time.
-        k: (23,) constants of actuator, amplifier, heat and mounting.
+        k: (CONSTANTS,) constants of actuator, amplifier, coil, heat and mounting.
         p: (14,) the parameters of the law in the paper's order.
         follow: displacement of the damper over (held, actuator) [m].
         parallel: force beside the law [N] over (displacement [m], velocity [m/s], bend of a lip [1]).
         seen: field that the damper sees over (field, remembered) [V or A].
         scales: factors of alpha, c0 and c1 over displacement, velocity and energy.
-        rate: (12,) the answer.
+        rate: (STATES,) the answer.
 
     Returns:
         Force on the load cell [N], displacement [m], velocity [m/s] and slip velocity [m/s] of the damper.

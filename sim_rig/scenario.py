@@ -168,6 +168,7 @@ def _check_effect(effect: EffectInPlay) -> None:
 
 def _within(quantities: Iterable[Quantity], values: dict[str, float], prefix: str = "") -> None:
     for q in quantities:
+        # Coordinates are computed: one at its bound may come out a last digit beyond it.
         value, rounding = values[q.symbol], 1e-9 * (abs(q.low) + abs(q.high))
         if not q.low - rounding <= value <= q.high + rounding:
             unit = "" if q.unit == "1" else f" {q.unit_for('drive')}"

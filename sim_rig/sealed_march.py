@@ -174,6 +174,7 @@ def _servo(s: Array, command: float, force: float, k: Array, rate: Array) -> Non
 @compiled
 def _passed_on(force: float, s: Array, now: Array, forms: Any, rate: Array) -> float:
     """What the force channel makes of the damper's force and of what else the cell feels [N]."""
+    # Whatever the cell feels comes first: the channel makes its own of all of that.
     now[_FORCE] = force
     for i in range(MOST_FORMS):
         if forms[1][i] == _CELL:

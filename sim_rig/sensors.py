@@ -42,6 +42,7 @@ def streams(
     """
     made, chances = {}, {}
     for place, (name, view) in enumerate(_views(scenario, step).items()):
+        # By its place: what a channel draws does not depend on what the others have drawn.
         random = np.random.default_rng([scenario.seed, place])
         sensor: Sensor = getattr(scenario.sensors, name)
         drawn = drawn_for(sensor, getattr(scenario.clocks, CHANNELS[name][1]), random)

@@ -12,7 +12,9 @@ class Pty:
 
     def __init__(self) -> None:
         self._master, self._slave = os.openpty()
+        # As it is opened, a terminal sends back what it gets, and changes ends of lines.
         tty.setraw(self._slave)
+        # An instrument does not wait for a host that reads nothing.
         os.set_blocking(self._master, False)
         self.address = os.ttyname(self._slave)
 

@@ -51,6 +51,7 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: Settings) -> None
     rig = ServedRig(scenario, clock, settings.choices, settings.faults, block)
     _ahead_of_ordinary_work()
     with rig as served:
+        # Only now: whoever waits for the file connects as soon as it is there.
         write_bench_toml(out, served.wires, scenario)
         _spare_the_wires()
         typer.echo(f"{table(served.wires)}\n{out} reaches them all; Ctrl-C ends the rig")

@@ -195,6 +195,7 @@ class SocketcandServer:
         data, notes, _, _ = connection.recvmsg(4096, socket.CMSG_SPACE(_STAMP.size))
         for level, kind, note in notes:
             if (level, kind) == (socket.SOL_SOCKET, _STAMPED):
+                # The kernel stamps by the wall's clock: only how old the stamp is can be used.
                 seconds, rest = _STAMP.unpack(note)
                 return data, self._clock.before_ns(time.time_ns() - seconds * 1_000_000_000 - rest)
         return data, self._now_ns()
@@ -205,6 +206,7 @@ class SocketcandServer:
             client.unsent += b"< ok >"
         elif words == ["rawmode"] and client.opened:
             client.unsent += b"< ok >"
+            # By itself: no frame may come in the same read as this answer, see `_QUIET`.
             client.flush()
             client.raw, client.quiet_until = True, time.monotonic() + _QUIET
         elif words[:1] == ["send"] and client.raw:

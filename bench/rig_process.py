@@ -79,6 +79,7 @@ def _run(command: list[str], progress: Callable[[float], None]) -> None:
         except (queue.Empty, subprocess.TimeoutExpired):
             raise RunError(f"the simulated rig was silent for {LONGEST_SILENCE:g} s and was stopped") from None
         finally:
+            # Harmless where it has ended; elsewhere the reader would wait for a pipe that stays open.
             process.kill()
             reader.join()
     if process.returncode != 0:

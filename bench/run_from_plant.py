@@ -136,6 +136,7 @@ def _record(
     kept_before = np.concatenate([[0], np.cumsum(whole)])
     kept_ns, kept = time_ns[whole], {name: column[whole] for name, column in values.items()}
     done = 0
+    # By the place alone: at one place they stay in the order in which they came, an end before a start.
     for sample, action in sorted(_actions(programme, found, time_ns, scenario), key=itemgetter(0)):
         # Marks count the programme's samples, of which some may have been lost.
         place = int(kept_before[sample])

@@ -52,6 +52,7 @@ def run_on_rig(
     """
     found = load_config(config)
     stopping = threading.Event()
+    # Signals first: one that comes while the wires are opened must not break off half-way.
     with stopped_by_signals(stopping), sole_agent(config), contextlib.ExitStack() as opened:
         try:
             agent = opened.enter_context(Agent(found, config))

@@ -126,6 +126,7 @@ class Agent:
 
     def _open_all(self) -> None:
         with contextlib.ExitStack() as opening:
+            # Left in the opposite order: nobody reads from a wire any more when it is closed.
             opening.enter_context(self._rig.connected())
             opening.callback(self._acquisition.stop)
             self._acquisition.start()
@@ -279,6 +280,7 @@ class Agent:
     # On the threads of wires
 
     def _take(self, batch: Batch) -> None:
+        # Judged before anything else is done with it.
         self._warden.look(batch)
         self._bench.feed(batch)
         if (log := self._runs.log) is not None:

@@ -142,6 +142,7 @@ class Publisher:
             RunError: the address cannot be had.
         """
         self._socket, self.address = _bound(zmq.PUB, address)
+        # A ZeroMQ socket must not be used by two threads at once.
         self._lock = threading.Lock()
 
     def publish(self, message: AgentStatus | Samples | AgentEvent) -> None:

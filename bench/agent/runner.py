@@ -81,6 +81,7 @@ class Runner:
             self._amplifier_rate,
         )
         run = Run(what, plan, sequencer, self._bench, self._clock, self._tell)
+        # Read now: a certificate that is missing is to be known before anything moves.
         kept = documents(what.method, self._config, self._rig, self._source)
         maps = self._acquisition.maps
         header = run_header(what.method, what.identity, self._config, self._rig, maps, self._clock())

@@ -34,6 +34,7 @@ def scan(catalogue: Catalogue, still_written: StillWritten) -> list[RunRow]:
 
 def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
     """Catalogue one log that nobody writes to any more; none where it is no log of ours or another's double."""
+    # Before it is read: what is written meanwhile shows as a change at the next look.
     stat = path.stat()
     try:
         facts = read_facts(path)

@@ -79,6 +79,7 @@ async def local_scheduler(data: Path) -> AsyncIterator[str]:
     settings = {
         # Its own pages show and change what nobody here should see or change.
         "distributed.scheduler.http.routes": [],
+        # Dask counts the failures that it forgives, not the attempts.
         "distributed.scheduler.allowed-failures": MOST_ATTEMPTS - 1,
     }
     with dask.config.set(settings):
@@ -185,6 +186,7 @@ class DaskEngine:
 
     async def _follow(self, job_id: str, future: Any) -> None:
         tell = await self._ending(job_id, future)
+        # After a lost connection the job may be followed anew, by another future.
         if self._futures.get(job_id) is future:
             del self._futures[job_id]
             if self._client is not None:

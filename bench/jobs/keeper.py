@@ -78,6 +78,7 @@ class JobKeeper:
         """End a job: at once if nobody has begun it, otherwise as soon as its worker has stopped it."""
         began = job.state == "running"
         if not began:
+            # Ended before the engine is told: a worker that begins it at this moment changes nothing any more.
             await self.cancelled(job.id)
         await self._engine.cancel(job.id, began=began)
         return await asyncio.to_thread(self._catalogue.job, job.id) or job

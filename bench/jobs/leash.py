@@ -19,6 +19,7 @@ def main(command: list[str]) -> int:
     Returns:
         Its exit status; 128 and the signal's number where a signal has ended it.
     """
+    # A group of its own, so that whatever it starts can be ended with it.
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
 
     def end(number: int = 0, frame: FrameType | None = None) -> None:

@@ -127,6 +127,7 @@ def _run(command: list[str], what: str, following: Following, deadline: float) -
     try:
         last = _follow(lines, what, following, deadline)
     finally:
+        # With the end of its input the leash ends the command, if that still runs.
         if process.stdin is not None:
             process.stdin.close()
         process.wait()

@@ -86,6 +86,7 @@ def _check_rate(segment: Segment, duration: float, rate: float) -> None:
 
 def _check_corners(name: str, ramp: Ramp, duration: float) -> None:
     way = abs(ramp.end_m - ramp.start_m)
+    # With this much the two corners meet half way, and nothing straight is left between them.
     needed = 4 * way / duration**2
     if ramp.corner_acceleration_mps2 < needed:
         raise MethodError(

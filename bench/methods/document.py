@@ -57,6 +57,7 @@ class Conditioning(Frozen):
 class Segment(Frozen):
     """One stretch of the method: a motion and a drive programme on one time base."""
 
+    # Without commas and wildcards: segments are chosen by patterns, several in a row.
     name: str = Field(min_length=1, pattern=r"^[^\s,*?\[\]/]+$", description="Its name in the log, unique.")
     motion: Motion = Field(description="The motion about the centre.")
     centre_m: float = Field(default=0.0, description="[m] the centre.")

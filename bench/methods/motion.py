@@ -54,6 +54,7 @@ class Triangle(Frozen):
 
     @model_validator(mode="after")
     def _corners_fit(self) -> Self:
+        # With this much the corners take all of each quarter cycle.
         needed = 32 * self.amplitude_m * self.frequency_hz**2
         if self.corner_acceleration_mps2 < needed:
             raise ValueError(

@@ -35,8 +35,11 @@ class Mark:
     motion: str
     drive: str
     amplitude: float | None
+    """[m] where the motion has one."""
     frequency: float | None
+    """[Hz] where the motion has one."""
     drive_value: float | None
+    """[V or A] where the drive is constant."""
     checkpoint: bool
 
 

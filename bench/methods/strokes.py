@@ -63,6 +63,7 @@ def _ramp(motion: Ramp, time: Array, duration: float) -> Kinematics:
     """Trapezoid of velocity: way = V (T - V/a), of which V is the smaller root."""
     way = abs(motion.end_m - motion.start_m)
     corner = motion.corner_acceleration_mps2
+    # Where the two corners just meet, rounding may leave the root a little less than nothing.
     velocity = corner / 2 * (duration - math.sqrt(max(duration**2 - 4 * way / corner, 0.0)))
     rounding = velocity / corner
     t = np.clip(time, 0.0, duration)

@@ -96,6 +96,7 @@ def read_csv(path: Path, headers: Mapping[str, str] | None = None, drive_kind: s
 def _lines(path: Path) -> list[str]:
     """The file's lines, of which the first is not empty."""
     try:
+        # Compressed or not is seen by the first bytes; spreadsheets put a mark before UTF-8.
         data = path.read_bytes()
         text = (gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data).decode("utf-8-sig")
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:

@@ -177,6 +177,7 @@ class LiveRecorder:
         return False
 
     def _do(self, write: _Write) -> None:
+        # However full it is: marks and events are few, and a log that lacks one cannot be understood.
         self._queue.append(("", write))
 
     # The writing thread

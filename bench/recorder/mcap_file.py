@@ -17,6 +17,7 @@ from bench.recorder.messages import PROFILE
 MAGIC = b"\x89MCAP0\r\n"
 """First and last bytes of a whole file."""
 
+# Larger chunks are read more slowly, and a kill costs more of them.
 CHUNK_SIZE = 256 * 1024
 """[byte] before compression, beyond which a chunk is closed."""
 
@@ -26,6 +27,7 @@ DAMAGE = (McapError, CRCValidationError, ZstdError, struct.error, UnicodeDecodeE
 
 def started_writer(file: IO[bytes]) -> Writer:
     """A writer of our profile whose header stands in the file."""
+    # Checksums cost no time that could be measured.
     writer = Writer(file, chunk_size=CHUNK_SIZE, compression=CompressionType.ZSTD, enable_data_crcs=True)
     writer.start(PROFILE, f"mrbench {LIBRARY_IDENTIFIER}")
     return writer

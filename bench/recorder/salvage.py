@@ -122,6 +122,7 @@ def _mend(path: Path, beside: Path) -> tuple[_Remains, int]:
     remains = _Remains()
     with file_errors(path), path.open("rb") as file, beside.open("wb") as mended:
         writer = started_writer(mended)
+        # In MCAP, schema 0 stands for none.
         schemas: dict[int, int] = {0: 0}
         channels: dict[int, int] = {}
         for record in _whole_records(path, file, remains):
@@ -139,6 +140,7 @@ def _whole_records(path: Path, file: IO[bytes], remains: _Remains) -> Iterator[M
     """Every whole record outside chunks and in them, and None where a chunk ends."""
     file.seek(0)
     try:
+        # Record by record: the library's indexed readers want the end of the file, which is missing here.
         for record in StreamReader(file, emit_chunks=True).records:
             start, remains.whole_until = remains.whole_until, file.tell()
             if isinstance(record, Header):

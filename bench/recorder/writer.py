@@ -138,6 +138,7 @@ class LogWriter:
         """
         names = checked_fields(values)
         for name in REQUIRED_FIELDS:
+            # So written, for no comparison with NaN is true.
             if not abs(values[name]) < float("inf"):
                 raise not_finite(name, values[name], time_ns)
         message = {"timestamp": _clock_fields(time_ns), **_given(names, values)}

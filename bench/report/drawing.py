@@ -159,7 +159,9 @@ class Envelope:
     time: Array
     """[s] middle of the bin."""
     low: Array
+    """In the unit of the samples."""
     high: Array
+    """In the unit of the samples."""
     drive: Array
     """[V or A] middle drive of the bin."""
     rows: npt.NDArray[np.int64]

@@ -140,6 +140,7 @@ def save(figures: dict[str, Figure], folder: Path) -> None:
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        # Without salt and date the same picture would be another file each time.
         with matplotlib.rc_context({"svg.hashsalt": "mrbench"}):
             for name, figure in figures.items():
                 (folder / f"{name}.png").write_bytes(png(figure))

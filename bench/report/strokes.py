@@ -148,6 +148,7 @@ def _step(recording: Recording) -> float:
 
 def _first_rise(time: Array, swing: Array, frequency: float) -> float:
     """When [s] a periodic motion first rises through its mean; may lie a little before its first sample."""
+    # By the phase of the whole swing: with noise on it, it passes its mean several times at each rise.
     wave = np.sum((swing - swing.mean()) * np.exp(-2j * math.pi * frequency * time))
     turns = (-0.25 - float(np.angle(wave)) / (2 * math.pi)) % 1.0
     return (turns - 1.0 if turns > 1.0 - _SLACK else turns) / frequency

@@ -54,6 +54,7 @@ def percent(share: float) -> str:
 def level(drive: float, span: float) -> str:
     """A drive [V or A], rounded to a five-hundredth of the drives' span."""
     quantum = 10.0 ** math.floor(math.log10(span / 500)) if span > 0 else 1e-4
+    # The added zero takes the sign off a negative one.
     return f"{round(drive / quantum) * quantum + 0.0:.6g}"
 
 

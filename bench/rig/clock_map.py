@@ -108,6 +108,7 @@ class ClockMap:
         Args:
             stamp: the device's clock between two instants of the bench's; the same one again tells nothing.
         """
+        # What it shows has been rounded down: it may have been further by as much as its resolution.
         low = Bound(stamp.device_ns, stamp.sent_ns - stamp.device_ns - RESOLUTION_NS)
         high = Bound(stamp.device_ns, stamp.received_ns - stamp.device_ns)
         with self._lock:

@@ -72,6 +72,7 @@ class Corridor(NamedTuple):
 
 def corridor(lows: Sequence[Bound], highs: Sequence[Bound], at: int) -> Corridor | None:
     """What all bounds leave at an instant [ns]; none where no line keeps to them all."""
+    # Relative to one of them: nanoseconds between clocks that were started months apart do not fit a double.
     origin = lows[-1].offset
     low_x, low_y = _arrays(lows, at, origin)
     high_x, high_y = _arrays(highs, at, origin)
@@ -87,8 +88,11 @@ def corridor(lows: Sequence[Bound], highs: Sequence[Bound], at: int) -> Corridor
         if possible.size:
             edges = least[possible].min(), most[possible].max(), rates[first], rates[last]
             gap = most - least
+            # Judged by the width between the bounds alone, an adapter that holds answers back decides the rate,
+            # and the force comes up to 0.5 ms off.
             late = _lateness(least - (low_y.mean() - low_x.mean() * rates), len(low_y))
             late += _lateness((high_y.mean() - high_x.mean() * rates) - most, len(high_y))
+            # Minus the logarithm of how likely each is: such delays, and clocks that differ by so much.
             best = possible[np.argmin((late + np.abs(rates) / _USUAL_RATE)[possible])]
             low, high, slowest, fastest = (float(edge) for edge in edges)
             line = origin + float(least[best])

@@ -70,4 +70,5 @@ def bring_to_rest(
         thread.join(max(0.0, begin + within - clock()))
         if thread.is_alive():
             failures[name] = f"waited {within:g} s for it to come to rest; its own watchdog has to"
+    # Copies: a thread that was given up may write into the others still.
     return Rest(dict(seconds), dict(failures))

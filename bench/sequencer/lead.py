@@ -168,6 +168,7 @@ class LeadThread:
         due = self._clock() // cycle * cycle
         try:
             while not self._stopping.is_set():
+                # From the grid, not from now: a late turn must not make all later ones late.
                 due += cycle
                 time.sleep(max(due - self._clock(), 0) * 1e-9)
                 now = self._clock()

@@ -29,7 +29,7 @@ _SPARE = 1.0
 _TABLE_WITHIN = 1.0
 """[s] for the armed table to start with the SYNC."""
 _ZERO_WITHIN = 2.0
-"""[s] for the coil to come to zero, on top of its ramp from the largest drive."""
+"""[s] for the coil to come to zero, its ramp included."""
 _ATTEMPTS = 3
 """Times that the table is armed anew where its answer came too late to hold the SYNC back for it."""
 _LONGEST_HOLD = 600.0
@@ -108,6 +108,7 @@ class Sequencer:
             hold: keep the rod led where it stands until `stop` is called without it.
         """
         self.stopped = self.stopped or why
+        # Before `_ending` is set, or the run would take this stop for a hold.
         if not hold:
             self._released.set()
         self._plan.switch_off(self._clock())
@@ -187,6 +188,7 @@ class Sequencer:
     def _begin(self, part: Passage) -> None:
         """Start motion and table with one and the same SYNC."""
         for _ in range(_ATTEMPTS):
+            # No SYNC from here on: the next one starts the armed table, and has to be that of the first setpoint.
             self._lead.hush(self._clock())
             try:
                 self._guard.permit()

@@ -149,6 +149,7 @@ async def _ended(task: "asyncio.Task[None]") -> None:
 
 def _described(app: FastAPI) -> dict[str, Any]:
     """The description with the form of problems, which no route has as its answer."""
+    # FastAPI keeps the description that it has made, and gives this very one again: what is added stays.
     if app.openapi_schema is None:
         found = FastAPI.openapi(app)
         form = problems.Problem.model_json_schema(mode="serialization")

@@ -61,6 +61,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 }
 """What any call may answer instead."""
 
+# The first that fits counts: the base of all stands last.
 _OF_BENCH: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
     (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method is refused"),
     (AgentUnreachable, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
@@ -85,6 +86,7 @@ def install(app: FastAPI) -> None:
     async def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
         return _answer(_of_validation(error))
 
+    # Starlette's, not FastAPI's own: a path that nobody serves raises it, too.
     @app.exception_handler(HTTPException)
     async def _http(request: Request, error: HTTPException) -> JSONResponse:
         status = HTTPStatus(error.status_code)

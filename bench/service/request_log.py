@@ -33,5 +33,6 @@ class RequestLog:
         finally:
             if scope["method"] not in _QUIET or status >= 400:
                 took = round(time.monotonic() - began, 4)
+                # The path alone: a query may hold the token.
                 said = {"method": scope["method"], "path": scope["path"], "status": status, "seconds": took}
                 _LOG.info("request", extra=said)

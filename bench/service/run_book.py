@@ -54,6 +54,7 @@ class RunBook:
             if mark not in self._seen:
                 async with self._one_at_a_time:
                     await (self._end(run) if run.outcome else self._begin(run))
+                # Only now: what could not be written down is tried again with the next status.
                 self._seen.add(mark)
 
     async def scan(self) -> None:

@@ -15,6 +15,7 @@ _REFUSED = 4401
 @router.websocket("/live")
 async def live(websocket: WebSocket, desk: AtDesk, token: str = "") -> None:
     """Messages `{"topic": ..., "data": ...}` of status, samples, event, job and run, until either side ends it."""
+    # Before the token is looked at: a browser is told the code only of a connection that was open.
     await websocket.accept()
     if not desk.access.allows(token):
         await websocket.close(_REFUSED, "the token is missing or wrong")

@@ -60,6 +60,7 @@ def _checked(wanted: str | dict[str, Any]) -> Method:
 
 def _start(desk: Desk, method: Method, wanted: StartRun) -> tuple[str, AgentStatus]:
     """Send the command, and wait until the agent says which run it has become."""
+    # Until the new run has its id, the agent shows the last one.
     before = desk.watch.status().run
     stamp = f"{datetime.now(UTC):%Y%m%dT%H%M%S}.{time.time_ns() // 1_000_000 % 1000:03d}Z"
     command = RunCommand(
@@ -85,6 +86,7 @@ def runs(
     before: Annotated[str | None, Query(description="`next` of the page before")] = None,
 ) -> RunPage:
     """Runs, newest first."""
+    # One more than is shown: it tells whether there is a next page.
     rows = desk.catalogue.runs(limit + 1, None if before is None else desk.run(before))
     shown = rows[:limit]
     return RunPage(items=tuple(desk.shown(*shown)), next=shown[-1].id if len(rows) > limit else None)

@@ -60,7 +60,7 @@ def witness(row: dict[str, Any], found: Found) -> dict[str, Any]:
     """What the network says of a recording, beside the refinement's row in the table of results."""
     network, refined = found.document["stages"]
     assert (network["name"], refined["name"]) == ("pinn", "refine")
-    names = ("D_y", "n", "c0_a", "c1_a", "k0", "k1")
+    names = ("D_y", "rho", "n", "F_a", "c0_a", "c1_a", "k0", "k1")
     own, fitted = network["coordinates"], found.document["coordinates"]
     return row | {
         "network": network,

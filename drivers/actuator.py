@@ -150,6 +150,7 @@ class Actuator:
     def health(self) -> Health:
         """Counts of samples, and the state in words."""
         samples = self._samples
+        # Nobody may be taking samples just now: what has passed is counted all the same (decision 0011).
         samples.catch_up()
         corrupted = samples.corrupted + self._bus.corrupted
         words = "; ".join(filter(None, [self._words, *map(str, self.faults)]))

@@ -274,6 +274,7 @@ class ActuatorSamples:
 
     def _blocks_of(self, samples: list[_Sample]) -> Iterator[Block]:
         """The three channels of every stretch without gap."""
+        # Number less place stays the same for as long as none is missing.
         for _, group in groupby(enumerate(samples), lambda it: it[1].number - it[0]):
             stretch = [sample for _, sample in group]
             stamped = [sample.device_ns for sample in stretch if sample.device_ns is not None]

@@ -149,6 +149,7 @@ class ReadingStream:
 
 def _blocks(lines: list[Line], received_ns: int) -> Iterator[Block]:
     """Blocks without gap; the untared force only where the indicator shows it."""
+    # Number less place stays the same for as long as none is missing.
     for (_, net), group in groupby(enumerate(lines), lambda it: (it[1].number - it[0], it[1].net)):
         stretch = [line for _, line in group]
         values = np.array([line.newtons for line in stretch])

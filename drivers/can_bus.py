@@ -263,6 +263,7 @@ class CanBus:
         for heard in self._heard:
             try:
                 heard(now, message.arbitration_id, data)
+            # A frame that one cannot make sense of must not be kept from the others.
             except (DriverError, ValueError, IndexError, struct.error):
                 self.corrupted += 1
 

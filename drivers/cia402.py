@@ -110,6 +110,7 @@ def active_faults(emergencies: list[Emergency]) -> tuple[Fault, ...]:
     """The faults since the drive last said that none was left."""
     faults: list[Fault] = []
     for emergency in emergencies:
+        # 00xxh of CiA 301: no fault is left.
         if emergency.code & 0xFF00 == 0:
             faults.clear()
         else:

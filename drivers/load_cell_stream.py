@@ -179,6 +179,7 @@ def _quality(sample: Sample) -> Quality:
 def _blocks(samples: list[_Numbered], received_ns: int) -> Iterator[Block]:
     """Both channels of every stretch without gap and of one quality."""
     placed = enumerate(samples)
+    # Number less place stays the same for as long as none is missing.
     for (_, quality), group in groupby(placed, lambda it: (it[1].number - it[0], _quality(it[1].sample))):
         stretch = [numbered for _, numbered in group]
         first = stretch[0].number

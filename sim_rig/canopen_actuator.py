@@ -23,6 +23,9 @@ _MILLISECOND = 1_000_000
 _BEHIND_NS = 15_000_000
 """[ns] Age of the newest position beyond which the simulation is behind, not the rod."""
 _HOMING, _CYCLIC_POSITION = 6, 8
+"""Modes of operation."""
+_NO_POSITION, _MASTER_LOST, _STALE, _ASTRAY, _OUTSIDE = 0x7320, 0x8130, 0x8250, 0x8611, 0x8612
+"""Emergency codes: position sensor, heartbeat of the master, old setpoints, following error, beyond the travel."""
 
 
 class CanopenActuator:
@@ -90,7 +93,7 @@ class CanopenActuator:
         taken_ns, position, velocity = self._senses.measured(now_ns)
         if not math.isfinite(position):
             if self.state not in (State.FAULT, State.FAULT_REACTION):
-                self.fail(0x7320, now_ns)
+                self.fail(_NO_POSITION, now_ns)
             self.objects.put(0x6041, self._statusword())  # of all that it sends, this alone is still known
             return
         self.objects.put(0x1013, self._senses.micros(taken_ns))
@@ -104,6 +107,7 @@ class CanopenActuator:
     def asked(self, index: int, now_ns: int) -> None:
         """Process data carry the instant of their position; a client that asks for the clock gets the clock."""
         if index == 0x1013:
+            # Afterwards refreshed anew: process data of this very instant carry their own stamp again.
             self.objects.put(0x1013, self._senses.micros(now_ns))
             self._refreshed_ns = -1
 
@@ -123,9 +127,9 @@ class CanopenActuator:
         """The reaction of 6007h, for a drive that is being led."""
         reaction = self.objects.number(0x6007)
         if reaction == 1 and self.state is State.ENABLED:
-            self.fail(0x8130, now_ns)
+            self.fail(_MASTER_LOST, now_ns)
         elif reaction:
-            self._abandoned(0x8130, now_ns)
+            self._abandoned(_MASTER_LOST, now_ns)
             self._go(State.SWITCH_ON_DISABLED if reaction == 2 else self.state, now_ns)
 
     def reset(self, now_ns: int) -> None:
@@ -139,6 +143,7 @@ class CanopenActuator:
         before, word = self._controlword, self.objects.number(0x6040)
         self._controlword = word
         if self.state is State.FAULT:
+            # On the rising edge of its bit alone, as CiA 402 has it.
             if word & ~before & 0x80:
                 self._clear(now_ns)
         elif self.state is not State.FAULT_REACTION:
@@ -152,6 +157,7 @@ class CanopenActuator:
             return
         if state is State.QUICK_STOP:
             self._brake()
+        # It takes hold where the rod stands, wherever the demand was left.
         elif state is State.ENABLED:
             self.demand.advance(now_ns)
             self.demand.rest(self._senses.position()[1])
@@ -200,7 +206,7 @@ class CanopenActuator:
         low, high = self.objects.number(0x607D, 1), self.objects.number(0x607D, 2)
         if self.referenced and not low <= wanted <= high:
             self._limited = True
-            self.fail(0x8612, now_ns)
+            self.fail(_OUTSIDE, now_ns)
             return
         # A motor at its limit holds what it has; it neither lets go nor goes on until the load is less.
         saturated = abs(self.objects.number(0x6077)) > self.objects.number(0x6072)
@@ -230,13 +236,13 @@ class CanopenActuator:
         elif self._away_ns is None:
             self._away_ns = now_ns
         elif now_ns - self._away_ns > self.objects.number(0x6066) * _MILLISECOND:
-            self.fail(0x8611, now_ns)
+            self.fail(_ASTRAY, now_ns)
 
     def _watch(self, now_ns: int) -> None:
         stale = self.objects.number(0x1400, 5) * _MILLISECOND
         if stale and self._setpoint_ns is not None and now_ns - self._setpoint_ns > stale:
             self._setpoint_ns = None
-            self._abandoned(0x8250, now_ns)
+            self._abandoned(_STALE, now_ns)
         if self.demand.motion is not Motion.REST:
             return
         if self._homing:
@@ -262,6 +268,7 @@ class CanopenActuator:
         self._homing, self._homed, self.referenced = False, True, True
 
     def _push(self, now_ns: int) -> None:
+        # While it follows setpoints the rig knows the way ahead, by `lead`.
         if self.demand.motion is not Motion.FOLLOW and self.demand.position != self._pushed:
             self._pushed = self.demand.position
             self._signals.command("displacement", self.demand.position, now_ns)

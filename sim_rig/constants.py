@@ -47,6 +47,7 @@ def fastest_of_the_rig(scenario: Scenario, law: Array, beside: float = 0.0) -> f
     servo = 2 * math.pi * actuator.bandwidth
     mass = actuator.stiffness / servo**2  # what a loop of this bandwidth and stiffness moves
     viscous = min(abs(law[6]) + 2 * abs(law[7]), 1e6)
+    # Twice bandwidth times damping bounds the faster root of the loop, overdamped or not.
     return float(max(1 / actuator.command_lag, 2 * servo * max(actuator.damping, 1)) + (beside + viscous) / mass)
 
 

@@ -122,6 +122,7 @@ class FaultProxy:
                     self._drop([other for other in self._pipes if other.source in (pipe.source, pipe.sink)])
 
     def _wait(self) -> float:
+        # Bytes that wait are due to the millisecond; a fault may begin a moment late.
         return _LOOK / 10 if any(pipe.waiting for pipe in self._pipes) else _LOOK
 
     def _take(self, pipe: "_Pipe") -> None:

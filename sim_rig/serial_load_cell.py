@@ -111,6 +111,7 @@ class LoadCellDevice:
             if good:
                 token, command, argument = _REQUEST.unpack(frame[4:-2])
                 answers.append(self._answer(token, command, argument, now_ns))
+        # What may be part of a request, and no more: noise must not pile up.
         self._heard = self._heard[-size:]
         return answers
 

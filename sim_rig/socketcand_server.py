@@ -166,6 +166,7 @@ class SocketcandServer:
 
     def _drop(self, client: _Client) -> None:
         client.socket.close()
+        # A new list: whoever drops one may be going through the old.
         self._clients = [other for other in self._clients if other is not client]
 
     def _accept(self) -> None:

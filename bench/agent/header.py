@@ -209,4 +209,5 @@ def force_rate(config: BenchConfig) -> float:
             return float(section.rate)
         if isinstance(section, AsciiLoadCellSection):
             break
+    # An indicator does not say how often it sends; more often than this it cannot.
     return float(max(ASCII_LOAD_CELL["instrument"]["rates_hz"]))

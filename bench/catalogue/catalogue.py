@@ -55,6 +55,7 @@ class Catalogue:
             before: only those that come after this one in the order.
         """
         query = select(RunRow).order_by(RunRow.started.desc(), RunRow.id.desc()).limit(limit)
+        # From a row, not from a count: runs that are added meanwhile shift no page.
         if before is not None:
             query = query.where(tuple_(RunRow.started, RunRow.id) < tuple_(before.started, before.id))
         with self._sessions() as session:

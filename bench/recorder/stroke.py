@@ -23,6 +23,12 @@ _STILL = 0.25
 _STEADY = 4
 """Strokes at least that repeat before they are called a sine: two cycles."""
 
+_SAME_SIZE, _SAME_PACE = 0.05, 0.04
+"""[1] by which amplitude and time of a stroke may differ from those before, and still repeat them."""
+
+_MUCH = 0.4
+"""[1] of the strokes that it touches for which a rest must last."""
+
 
 @dataclass(frozen=True)
 class Stroke:
@@ -115,11 +121,12 @@ def find_holds(
     reach = maximum_filter1d(displacement, window) - minimum_filter1d(displacement, window)
     holds = []
     for start, stop in true_runs(reach <= travel):
+        # Where the window rests, so does half of it before its middle and behind.
         start, stop = max(0, start - window // 2), min(len(displacement), stop + window // 2)
         touched = [stroke for stroke in strokes if stroke.start < stop and stroke.stop > start]
         # The turning point of a slow sine lasts for a small part of its two strokes only.
         around = max((s.stop for s in touched), default=0) - min((s.start for s in touched), default=0)
-        if stop - start >= 0.4 * around:
+        if stop - start >= _MUCH * around:
             holds.append((start, stop))
     return holds
 
@@ -145,12 +152,12 @@ def steady_runs(strokes: Sequence[Stroke]) -> list[list[Stroke]]:
 def _continues(run: Sequence[Stroke], stroke: Stroke) -> bool:
     recent = run[-4:]
     amplitude = float(np.median([s.amplitude for s in recent]))
-    if abs(stroke.amplitude - amplitude) > 0.05 * amplitude:
+    if abs(stroke.amplitude - amplitude) > _SAME_SIZE * amplitude:
         return False
     if len(recent) < 2:
         return True
     pace = (recent[-1].middle - recent[0].middle) / (len(recent) - 1)
-    return abs(stroke.middle - recent[-1].middle - pace) <= 0.04 * pace
+    return abs(stroke.middle - recent[-1].middle - pace) <= _SAME_PACE * pace
 
 
 def half_period(run: Sequence[Stroke]) -> float:

@@ -39,8 +39,6 @@ HELD = ("temperature",)
 """Channels that keep their last value; nobody waits for them."""
 _CONTEXT_NS = 60_000_000
 """[ns] of each channel that is kept behind the last bench sample."""
-_MOST = 20_000
-"""Samples of a channel that are kept at most."""
 _BATCHES = 8192
 """Batches that wait at most; what is pushed out shows as a gap in the running numbers."""
 
@@ -121,6 +119,7 @@ class Aligner:
     def _has_clock(self, instrument: str, block: Block) -> bool:
         """Whether a block's samples are wanted and have a clock; those that have none are taken at once."""
         wanted = block.channel == "force" or block.channel in LONGEST_GAP_NS
+        # Of two instruments that measure the same, the first that spoke has the channel from then on.
         if not wanted or self._source.setdefault(block.channel, instrument) != instrument:
             return False
         if block.channel == "force":
@@ -195,6 +194,7 @@ class Aligner:
         for name in LONGEST_GAP_NS:
             track = self._tracks.get(name)
             if name in columns:
+                # What a bench need not have is missed only once it has begun.
                 due = instants >= (0 if track is None or name in self._required() else track.began)
                 self._lost[name] += int(np.count_nonzero(np.isnan(columns[name]) & due))
         self._lost = +self._lost  # without those of which none are missing

@@ -57,6 +57,7 @@ class Interlocks:
     def reset(self) -> None:
         """Allow writes again."""
         self._tripped = ""
+        # What comes next is news, however soon it comes.
         self._told.clear()
 
     def expect_force(self, since_ns: int | None) -> None:

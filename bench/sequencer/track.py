@@ -120,6 +120,7 @@ class Playing:
             at_ns: bench clock [ns]; setpoints that have left already must lie before it.
             acceleration: [m/s²] that the fade keeps below, unless even the longest one does not.
         """
+        # A second stop changes nothing: to begin the fade anew would only make it longer.
         if self.fade is not None:
             return self
         at = max((at_ns - self.begin_ns) * 1e-9, 0.0)

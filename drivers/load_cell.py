@@ -93,6 +93,7 @@ class LoadCell:
     def close(self) -> None:
         """Stop the stream and close the line; harmless when repeated or when never connected."""
         if self._line.is_open:
+            # A courtesy: on a line that is dead there is nothing to stop.
             with contextlib.suppress(DriverError):
                 self.stop()
         # Not while the other thread reads: a descriptor must not vanish under it.

@@ -64,6 +64,7 @@ class SocketcandBus(SocketCanDaemonBus):
         return bool(select.select([line], [], [], 0)[0]) and not line.recv(1, socket.MSG_PEEK)
 
     def _hang_up(self) -> None:
+        # Before the library has made its socket, or connected it, there is nothing to end.
         with contextlib.suppress(OSError, KeyError):
             self._line().shutdown(socket.SHUT_RDWR)
 

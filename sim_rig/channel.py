@@ -103,6 +103,7 @@ class ChannelStream:
         if known <= _BEYOND:
             return 0
         ahead = self._sensor.delay + self._view.lag - self._drawn.offset
+        # By as much as clock and stamp can ever be ahead: no reading looks at truth that has not come.
         ahead -= self._drawn.wander + _LARGEST_JITTER * self._sensor.jitter
         # A reading that is due at this very instant is not put off by rounding.
         return max(math.floor((last * self._view.dt + ahead) * self.rate + 1e-6) + 1 - self._next, 0)

@@ -46,6 +46,7 @@ class _Host:
     heard_at: float = 0.0
 
     def send(self, data: bytes) -> None:
+        # Whoever asked may have gone: an instrument does not mind.
         with contextlib.suppress(OSError):
             os.write(self.handle, data)
 
@@ -170,6 +171,7 @@ class ModbusServer:
             data = os.read(host.handle, 4096)
         except OSError:
             data = b""
+        # A pty stays while its hosts come and go: on it, nothing to read is no end.
         if not data and host.connection is not None:
             self._remove(host)
         host.heard, host.heard_at = host.heard + data, time.monotonic()

@@ -78,6 +78,7 @@ class Scenario(Setting):
             parameter_set(damper)
         else:
             parameters = Parameters(**damper.model_dump())
+            # First these two: coordinates know nothing of the gauge A, and cannot be made with a wrong n.
             _within([q for q in PARAMETERS if q.symbol in ("A", "n")], parameters._asdict())
             _within(COORDINATES, to_coordinates(parameters)._asdict())
         return damper

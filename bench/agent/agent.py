@@ -186,6 +186,7 @@ class Agent:
                 return Answer(ok=False, error=error, status=self.status())
             self._set_state("preparing")
         if command.step in MOVING:
+            # From now on the silence of the load cell counts.
             self._interlocks.expect_force(self._clock())
         if command.step == "home":  # the reference stands beyond where a specimen may be taken; force is watched
             matrix = self._config.limits.matrix()

@@ -91,6 +91,7 @@ def _look_at(catalogue: Catalogue, path: Path, still_written: StillWritten) -> R
         known = catalogue.run_of_log(path)
         same = known is not None and (known.log_bytes, known.log_modified_ns) == (stat.st_size, stat.st_mtime_ns)
         return None if same or still_written(path) else catalogue_log(catalogue, path)
+    # Taken away between the listing and the look.
     except FileNotFoundError:
         return None
 

@@ -60,6 +60,7 @@ def _configure(folder: DemoFolder) -> None:
 
 
 def _free_ports(count: int) -> list[int]:
+    # Held at the same time: a port that was let go may be given out again at once.
     with contextlib.ExitStack() as held:
         sockets = [held.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(count)]
         return [one.getsockname()[1] for one in sockets]

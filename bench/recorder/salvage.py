@@ -155,7 +155,7 @@ def _whole_records(path: Path, file: IO[bytes], remains: _Remains) -> Iterator[M
             else:
                 yield record
         remains.whole_until = file.tell()
-    except DAMAGE:
+    except DAMAGE:  # cut off here: all that is whole has been handed on
         return
 
 

@@ -173,6 +173,7 @@ class LeadThread:
                 time.sleep(max(due - self._clock(), 0) * 1e-9)
                 now = self._clock()
                 self._note(now, (now - due) * 1e-9)
+                # All that is owed for longer would leave in one burst: the row goes on from here.
                 if now - due > _LEFT_OUT * cycle:
                     due += (now - due) // cycle * cycle
                 # Every place on the grid of cycles gets its setpoint, for a drive that is locked to SYNC counts

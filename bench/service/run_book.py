@@ -107,6 +107,7 @@ class RunBook:
         run = status.run if status else None
         if run is not None and run.outcome is None and Path(run.log) == path:
             return True
+        # The agent is there, and this known log is none that it says it writes.
         if status is not None and self._catalogue.run_of_log(path) is not None:
             return False
         # Another program may record into the folder, or an agent that cannot be asked just now.

@@ -50,6 +50,7 @@ COORDINATES: tuple[Quantity, ...] = (
     Quantity("F_b", "N/{drive}", 0.0, 20000.0, 900.0, "growth of the yield force with drive"),
     Quantity("D_y", "m", 1e-6, 5e-3, 3e-5, "slip over which the loop turns at a reversal"),
     Quantity("rho", "1", 0.02, 0.98, 0.5, "asymmetry between loading and unloading of the loop"),
+    # Below n = 1 the slope of z' over z would be infinite at z = 0.
     Quantity("n", "1", 1.0, 6.0, 2.0, "sharpness of the yield"),
     Quantity("eta", "1/s", 2.0, 2000.0, 100.0, "how fast the field follows the drive"),
     Quantity("c0_a", "N s/m", 1.0, 1e5, 1e3, "viscous damping at large velocity, zero drive"),

@@ -68,6 +68,7 @@ def hysteresis_slopes(
     """
     size = abs(z)
     power = (size + Z_GUARD) ** (n - 1)
+    # Branches are allowed here: only compiled steps ask for these slopes, one number at a time.
     slip_sign = 1.0 if slip >= 0 else -1.0
     z_sign = 1.0 if z >= 0 else -1.0
     over_slip = A - (gamma * slip_sign * z + beta * size) * power

@@ -138,6 +138,7 @@ def check_drive_range(p: Parameters, lowest: float, highest: float) -> list[str]
         ("c0", "N s/m", p.c0_a, p.c0_b),
         ("c1", "N s/m", p.c1_a, p.c1_b),
     ):
+        # Straight lines over the drive: what holds at both ends holds between them.
         for drive in (lowest, highest):
             value = base + slope * drive
             if value < 0:

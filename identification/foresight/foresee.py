@@ -89,6 +89,7 @@ def _conditions(stroke: Stroke) -> Conditions:
     drive, velocity = stroke.drive_seen, np.abs(stroke.velocity)
     changes = np.flatnonzero(np.abs(np.diff(drive)) > 1e-9)
     fast = velocity > _MOVING * float(velocity.max())
+    # Second by second: a sweep or a ramp of amplitude has peaks of many sizes.
     block = max(1, round(stroke.rate))
     peaks = [float(velocity[k : k + block].max()) for k in range(0, len(velocity) - block + 1, block)]
     steady = [peak for peak in peaks if peak > 0.2 * max(peaks)] if peaks else []
@@ -103,6 +104,7 @@ def _twin(spread: Array, i: int) -> tuple[str, float]:
     """The other coordinate that is hardest to tell from this one, and their correlation [1]."""
     sd = np.sqrt(np.diag(spread))
     correlation = spread[i] / (sd * sd[i])
+    # Its own, which is one, would win.
     correlation[i] = 0.0
     other = int(np.argmax(np.abs(correlation)))
     return COORDINATES[other].symbol, float(correlation[other])
@@ -116,6 +118,7 @@ def _best_addition(planned: Planned, assumed: Assumed, found: Array) -> StrokeTo
     for addition in planned.additions if poor.any() else ():
         both = found + information(assumed.point, addition.stroke, assumed.noise)
         after = np.sqrt(np.diag(relative_covariance(both)))
+        # Better than good earns nothing: a stroke must help where help is needed.
         gain = float(np.log(before[poor] / np.maximum(after[poor], GOOD)).sum())
         if best is None or gain > best[0]:
             best = (gain, addition, after)

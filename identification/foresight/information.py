@@ -41,7 +41,9 @@ def information(point: Coordinates, stroke: Stroke, noise: float) -> Array:
     start = slopes[:, _Y0]
     across = kept.T @ start
     own = float(start @ start)
+    # y(0) cannot have been far outside the stroke, as in the fit.
     own += 1.0 / max(float(np.ptp(stroke.displacement)) / 2.0, 1e-4) ** 2
+    # What the unknown start takes of the information (Schur).
     return np.asarray(kept.T @ kept - np.outer(across, across) / own)
 
 

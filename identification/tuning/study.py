@@ -73,6 +73,7 @@ def run(order: Order, workers: int, progress: Callable[[str], None]) -> optuna.S
     if workers == 1:
         work(order, progress)
     else:
+        # Forked, a worker would inherit the open database, and torch's threads where it is loaded.
         context = multiprocessing.get_context("spawn")
         hands = [context.Process(target=work, args=(order, None, k)) for k in range(workers)]
         for hand in hands:
@@ -96,6 +97,7 @@ def work(order: Order, progress: Callable[[str], None] | None = None, worker: in
     def value(trial: optuna.Trial) -> float:
         watched = _Watched(trial, problem.noise)
         supervision = Supervision(watched.step, watched.stop, order.budget)
+        # Trials are compared at the same processor time, since their steps cost differently.
         watched.clock = lambda: supervision.seconds
         try:
             found = train(problem, suggested(trial, preset), supervision, stretches)
@@ -103,6 +105,7 @@ def work(order: Order, progress: Callable[[str], None] | None = None, worker: in
             if watched.pruned:
                 raise optuna.TrialPruned from None
             return _FAILED
+        # A preset may set no block aside to be judged on.
         error = found.simulation.validation or found.simulation.train
         trial.set_user_attr("error", error / problem.noise)
         trial.set_user_attr("seconds", found.seconds)
@@ -112,6 +115,7 @@ def work(order: Order, progress: Callable[[str], None] | None = None, worker: in
     def said(study: optuna.Study, trial: FrozenTrial) -> None:
         if progress is not None:
             progress(_in_words(trial))
+        # Those of the other workers count, too.
         if len(study.get_trials(states=_DONE, deepcopy=False)) >= order.trials:
             study.stop()
 
@@ -146,6 +150,7 @@ def _open(order: Order, worker: int = 0) -> optuna.Study:
     study = optuna.create_study(
         storage=order.storage,
         study_name=network,
+        # A seed of its own, or all workers would try the same settings.
         sampler=optuna.samplers.TPESampler(seed=order.seed + worker, multivariate=False),
         pruner=optuna.pruners.MedianPruner(n_startup_trials=_STARTUP, n_warmup_steps=_WARM),
         load_if_exists=True,

@@ -32,6 +32,7 @@ def write_picture(path: Path, shares: dict[str, float]) -> None:
     axes.barh(names, [shares[name] for name in names], color="#31688e", height=0.6)
     axes.set_xlabel("importance [1]")
     axes.spines[["top", "right"]].set_visible(False)
+    # Without the library's version in it: the same study makes the same file.
     figure.savefig(path, dpi=90, metadata={"Software": None})
 
 

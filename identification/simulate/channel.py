@@ -93,6 +93,7 @@ def recorded(
     Returns:
         (N,) [N].
     """
+    # In the order of the chain: the channel's lag comes last and holds back all that was added before it.
     for at, form, values in setting.acting("inertia"):
         force = force + form.act(motion.a, *values)
         if J is not None:
@@ -100,6 +101,7 @@ def recorded(
             steepness = _over_acceleration(form, values, motion)
             J[:, delays] += (steepness * motion.da)[:, None]
             for early, _, _ in setting.acting("displacement_shift"):
+                # A displacement that is late is a force that is early.
                 J[:, first + early] -= steepness * motion.da
     for at, form, values in setting.acting("added_force"):
         force = force + form.act(stroke.time, stroke.drive_seen, *values)
@@ -124,6 +126,7 @@ def _lagged_with_slopes(force: Array, lag: float, h: float, J: Array | None, at:
     found = lagged(force, lag, h)
     if J is not None:
         J[:] = lagged(J, lag, h)
+        # No channel is early: at a lag of zero the difference is one-sided.
         lower = max(lag - _LAG_STEP, 0.0)
         J[:, at] = (lagged(force, lag + _LAG_STEP, h) - lagged(force, lower, h)) / (lag + _LAG_STEP - lower)
     return found

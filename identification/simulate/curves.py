@@ -41,6 +41,7 @@ def over_parameters(
 
 
 def _over(function: Callable[..., Any], values: tuple[float, ...], k: int, quantity: Quantity) -> Any:
+    # A parameter that is zero has no size of its own.
     step = _SMALL * max(abs(values[k]), 0.1 * quantity.scale)
 
     def at(times: float) -> Any:
@@ -48,6 +49,7 @@ def _over(function: Callable[..., Any], values: tuple[float, ...], k: int, quant
         moved[k] += times * step
         return np.asarray(function(*moved))
 
+    # Beyond its bound a form need not mean anything: one-sided there, of the same order.
     if values[k] - step < quantity.low:
         return (4.0 * at(1.0) - 3.0 * at(0.0) - at(2.0)) / (2.0 * step)
     return (at(1.0) - at(-1.0)) / (2.0 * step)
@@ -61,6 +63,7 @@ def over_number(function: Callable[[Array], Any], values: Array, step: float) ->
 def lagged(values: Array, lag: float, h: float) -> Array:
     """Values (N, ...) behind a first-order lag [s], exact for what goes straight from sample to sample."""
     if lag < _AT_ONCE:
+        # To first order in the lag, down to zero, where h / lag means nothing.
         return values - lag * np.gradient(values, h, axis=0)
     fade = float(np.exp(-h / lag))
     new = 1.0 - lag / h * (1.0 - fade)

@@ -17,6 +17,8 @@ from identification.simulate.setting import Setting, Stroke
 
 _AT_ONCE = 1e-6
 """[s] a second lag below which the drive passes as it is."""
+_SLOW = 1e-3
+"""[m/s] below which a damper that starts counts as resting rather than as sliding."""
 _ETA = Quantity("eta", "1/s", 0.0, math.inf, 100.0, "")
 _DELAY = Quantity("delay", "s", -math.inf, math.inf, 0.1, "")
 
@@ -45,6 +47,7 @@ def damper_field(setting: Setting, stroke: Stroke, slopes: bool = True) -> Field
         u, middle, du, dmiddle = field(stroke.drive, setting.coordinates.eta, delay, h)
         u, middle = _thinned(u, middle, stroke.drive_finer)
         du, dmiddle = _thinned(du, dmiddle, stroke.drive_finer)
+        # A late force shows an earlier field, as a late drive does: the last row is that of the delay again.
         return Field(u, middle, np.vstack([du, du[1:]]), np.vstack([dmiddle, dmiddle[1:]]), ())
     values = (setting.coordinates.eta, delay, *(v for _, _, some in coil for v in some))
     quantities = (_ETA, _DELAY, *(q for _, form, _ in coil for q in form.parameters))
@@ -105,6 +108,7 @@ def remembered(memory: Any, u: Array, *values: float) -> Array:
     found = np.zeros(len(u))
     for i in range(1, len(u)):
         change = u[i] - u[i - 1]
+        # Held levels are most of a drive and change no memory.
         found[i] = found[i - 1] if change == 0.0 else memory(found[i - 1], change, *values)
     return found
 
@@ -150,6 +154,8 @@ def _weights(eta: float, lag: float, t: float) -> tuple[float, float, float]:
         return 0.0, fade, 0.0
     slow = math.exp(-t / lag)
     difference = eta - 1.0 / lag
+    # The difference of two fades that are nearly alike would lose its digits; neither exponent below is positive,
+    # so that nothing overflows.
     if abs(difference * t) < 1e-7:
         mixed = t * slow
     elif difference > 0.0:
@@ -210,5 +216,4 @@ def _decay(
 @compiled
 def settled_hysteresis(velocity: float) -> float:
     """Hysteretic state [1] to start from at a velocity [m/s]: saturated in motion, relaxed at rest."""
-    slow = 1e-3
-    return velocity / (abs(velocity) + slow)
+    return velocity / (abs(velocity) + _SLOW)

@@ -35,7 +35,9 @@ Places = npt.NDArray[np.int64]
 """Columns of a table of slopes."""
 
 _MOST_STEPS = 64
+"""In a sample, so that no set of parameters inside the bounds can stall a fit; a plan holds bytes."""
 _STEPS_AT_TURN = 4
+"""Least number of steps in a sample in which slip or field turn."""
 _FADED = 1e-200
 """[1] slope of zeta below which it counts as none."""
 _FIELD_JUMP = 0.05
@@ -62,6 +64,7 @@ def choose_steps(
     slip_before = v0 - y_rate
     slip_after = v1 - y_rate
     travel = abs(zeta_rate) * h
+    # After a reversal zeta moves at up to twice slip / D_y, of which its rate before the turn tells nothing.
     if slip_after * zeta < 0.0:
         travel = max(travel, 2.0 * abs(slip_after) * h / s[2])
     steps = min(max(math.ceil(math.sqrt(travel / fineness)), 1), _MOST_STEPS)

@@ -42,6 +42,7 @@ def damper_motion(setting: Setting, stroke: Stroke, slopes: bool = True) -> Moti
     late = sum(values[0] for _, _, values in setting.acting("time_shift"))
     early = sum(values[0] for _, _, values in setting.acting("displacement_shift"))
     motion = _delayed(stroke, setting.force_delay + late - early)
+    # A displacement that is late shows the force's motion early: the delay's slopes with the other sign.
     for at, _, _ in setting.acting("displacement_shift"):
         motion = _with_rows(motion, -motion.dx[:1], -motion.dv[:1], (at,))
     for at, form, values in setting.acting("displacement_map"):
@@ -111,6 +112,7 @@ def _straightened(motion: Motion, form: Form, values: tuple[float, ...], at: int
 def _gain(bend: Callable[..., Any], x: Array, values: tuple[float, ...]) -> Array:
     """Gain [1] of the channel at x."""
     steepness = (bend(x + _STEP, *values) - bend(x - _STEP, *values)) / (2.0 * _STEP)
+    # A channel that stands still or runs backwards has no inverse; on the way a search may ask for one.
     return np.asarray(np.maximum(1.0 + steepness, 0.1))
 
 
@@ -119,6 +121,7 @@ _MACHINE: dict[Any, Any] = {}
 
 def machine(function: Any) -> Any:
     """The compiled form of a scalar function, made once."""
+    # Once each: a new object would be a new type to whatever takes it, which would be compiled again, too.
     if function not in _MACHINE:
         _MACHINE[function] = compiled(function)
     return _MACHINE[function]

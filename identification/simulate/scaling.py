@@ -39,6 +39,7 @@ def factors(setting: Setting, stroke: Stroke, motion: Motion, slopes: bool = Tru
     h = 1.0 / stroke.rate
     x, v = half_way(motion.x, motion.v, h)
     dx, dv = half_way(motion.dx, motion.dv, h)
+    # Nothing that scales asks for an acceleration: x fills its two places.
     middle = Motion(x, v, x, dx, dv, x, motion.columns)
     columns = tuple(at + k for at, _, values in scaling for k in range(len(values)))
     at, over = _product(scaling, motion, stroke, half=False, slopes=slopes)
@@ -102,6 +103,7 @@ def stored_energy(stroke: Stroke, recovery: float) -> Array:
         return np.zeros(len(stroke.displacement))
     h = 1.0 / stroke.rate
     fade = np.exp(-h / recovery)
+    # Exact for a power that is constant over a sample; expm1, since a recovery takes many samples.
     gain = -recovery * np.expm1(-h / recovery)
     power = np.concatenate([[0.0], 0.5 * (stroke.power[1:] + stroke.power[:-1])])
     return np.asarray(signal.lfilter([gain], [1.0, -fade], power))

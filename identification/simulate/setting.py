@@ -67,6 +67,7 @@ class Stroke:
         x, _ = hermite(self.displacement, self.velocity, i, t, h)
         v, a = hermite(self.velocity, self.acceleration, i, t, h)
         power = None if self.power is None else np.interp(place, np.arange(len(self.power)), self.power)
+        # Held between samples, as it came: its steps must not become ramps.
         drive = np.repeat(self.drive_seen, times)[: len(place)]
         return Stroke(self.rate * times, x, v, a, drive, self.start, power)
 

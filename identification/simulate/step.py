@@ -17,6 +17,7 @@ from identification.damper import law
 GAMMA = 2.0 - math.sqrt(2.0)
 """[1] where the first stage stands inside the step; makes both stages share one matrix."""
 HALF = GAMMA / 2.0
+"""[1] of the step: weight of the rates at the end of either stage."""
 WEIGHT_STAGE = 1.0 / (GAMMA * (2.0 - GAMMA))
 WEIGHT_START = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
 
@@ -24,7 +25,9 @@ STRUCTURAL = 10
 """How many structural coordinates there are."""
 
 TOLERANCE = 1e-11
+"""[1] move of zeta at which Newton's iteration of a stage ends."""
 LARGEST_MOVE = 0.5
+"""[1] largest move of zeta in one iteration; it runs from -1 to 1."""
 ITERATIONS = 40
 
 at_field = compiled_within(law.at_field)

@@ -26,6 +26,7 @@ FINENESS = 0.1
 """[1] travel of zeta above which a sample takes more steps: 4e-5 of the force's deviation at most."""
 
 _STRUCTURAL_COLUMNS = [0, 1, 2, 3, 4, 6, 7, 8, 9, 10]
+"""Of the ten structural coordinates among ``UNKNOWNS``; the others stand in the next line."""
 _ETA, _K1, _F0, _Y0, _FORCE_DELAY, _DRIVE_DELAY = 5, 11, 12, 13, 14, 15
 
 

@@ -126,6 +126,7 @@ def solve_stage(
     for _ in range(_MOST_MOVES):
         force, steep = carried(stretch, give, gap, hardening), steepness_of(stretch, give, gap, hardening)
         y, zeta, X = _solve_straight(p, g, yk, zk, Xk, w, zeta, force - steep * stretch, steep)
+        # A linear spring is straight everywhere.
         if gap == 0.0 and hardening == 0.0:
             break
         moved = g[0] - X
@@ -184,6 +185,7 @@ def start_of(p: Array, g: Array, y0: float, zeta0: float, v0: float) -> float:
     F, c0, _ = law_at(p, g)
     load = F * zeta0 + c0 * v0 + g[5] - p[F0]
     X = g[0]
+    # k1 pulls where the damper stands: each round leaves k1 times the give of the error, a small part.
     for _ in range(_MOST_MOVES):
         X = g[0] - _stretched(load + p[K1] * X, p[GIVE], p[GAP], p[HARDENING])
     return float(X)

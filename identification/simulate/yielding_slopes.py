@@ -97,6 +97,7 @@ def _record(
     row: Array, S: Array, J: Array, f: Array, over: Array, stretch: float, stretching: float, p: Array
 ) -> None:
     """Write the slopes of the force at one sample into its row."""
+    # The film feels the damper's velocity, which the state moves through the slopes of its rates.
     steep, film = steepness_of(stretch, p[GIVE], p[GAP], p[HARDENING]), p[FILM]
     for j in range(len(row)):
         X_rate = J[2, 0] * S[0, j] + J[2, 1] * S[1, j] + J[2, 2] * S[2, j] + f[2, j]

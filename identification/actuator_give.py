@@ -32,14 +32,17 @@ def give_under_load(stretch: Stretch, weights: Array, noise: float) -> Array:
     """What the displacement follows of the force (N,) [m]; zeros where it follows nothing."""
     x, rate = stretch.displacement, stretch.rate
     nothing = np.zeros(len(x))
+    # So many gains would follow the noise of fewer samples.
     if len(x) < 50 * len(_LAGS):
         return nothing
     swift, penalty = _swift(x, weights, rate, noise)
     shifts = np.unique(np.rint(_LAGS * rate).astype(int))
     reach = int(np.max(np.abs(shifts))) + 1
     force = _blurred(stretch.force, int(shifts[1] - shifts[0]))
+    # The same smoother on both: what it takes from the displacement it takes from the force as well.
     driver = force - smoothed(force, np.ones(len(x)), penalty, nothing[3:])
     rows = np.arange(reach, len(x) - reach, max(1, len(x) // 100_000))
+    # The rows of a stumble, and those whose lags reach into it, tell nothing.
     rows = rows[minimum_filter1d(weights, 2 * reach + 1)[rows] > 0.0]
     lagged = np.stack([driver[rows - shift] for shift in shifts])
     gains, chance = _followed(lagged, swift[rows], reach)
@@ -63,6 +66,7 @@ def _swift(values: Array, weights: Array, rate: float, noise: float) -> tuple[Ar
         blocks = (np.arange(len(values)) / block).astype(np.intp)
         cutoffs = best_cutoffs(values, weights, nothing, blocks, rate, noise)
         penalty = np.full(len(nothing), float(stiffness(float(np.quantile(cutoffs, 0.5, method="lower")), rate)))
+        # Smoothed once: what gives way stands out more clearly against that (decision 0012).
         return (values - smoothed(values, weights, penalty, nothing)) * weights, penalty
 
     if not weights.all():
@@ -79,15 +83,18 @@ def _followed(lagged: Array, swift: Array, reach: int) -> tuple[Array, float]:
     A knock moves rod and force by itself. It is known by what no gain explains, and what lies around it by then
     tells nothing of the actuator either.
     """
+    # Before any gain is known, what stands out may be the force's own doing: at first only that is left out.
     rest, sound = swift, np.ones(len(swift), bool)
     for round_ in range(_ROUNDS):
         off = np.abs(rest) > _KNOCK * np.quantile(np.abs(rest), 0.95)
         sound = ~off if round_ == 0 else minimum_filter1d(~off, 2 * reach + 1)
         known = lagged[:, sound]
+        # Neighbouring lags are nearly alike: along what the rows cannot tell apart the gains stay smallest.
         gains = np.linalg.lstsq(known @ known.T, known @ swift[sound], rcond=1e-10)[0]
         rest = swift - gains @ lagged
     explained = float(gains @ (known @ swift[sound]))
     left = float(np.sum(swift[sound] ** 2))
+    # Noise alone lets every gain explain one part in len(swift).
     return np.asarray(gains), explained * len(swift[sound]) / max(len(gains) * left, 1e-300)
 
 

@@ -37,6 +37,7 @@ def _fingerprint() -> str:
     return digest.hexdigest()[:16]
 
 
+# Before anything is compiled: numba asks for the folder when a function is decorated.
 numba.config.CACHE_DIR = str(  # type: ignore[attr-defined]  # made by numba when it is imported
     cache_folder().resolve() / "compiled" / _fingerprint()
 )
@@ -44,6 +45,7 @@ numba.config.CACHE_DIR = str(  # type: ignore[attr-defined]  # made by numba whe
 
 def compiled(function: Function) -> Function:
     """The function as machine code, kept on disk between processes; it releases the interpreter's lock."""
+    # Dividing by zero gives inf, as in numpy: an unstable trial point costs infinity and stops no search.
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
 
 

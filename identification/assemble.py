@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
+from typing import Any
 
 import numpy as np
 import orjson
@@ -85,6 +86,7 @@ def _clock_spread(recording: Recording) -> float:
     """Standard deviation [s] of a channel delay: as mapped on a bench, else half the shortest sample."""
     if recording.metadata["run"].get("source") == "run":
         return max(_MAPPED, _largest_skew(_clocks(recording)))
+    # An import says nothing of its clocks.
     return 0.5 / max(s.rate for s in recording.stretches)
 
 
@@ -99,9 +101,18 @@ def _largest_skew(clocks: Mapping[str, str]) -> float:
 
     Each says within how much it was mapped, in 95 of 100 samples; two of them stand between two channels.
     """
-    known = [facts for words in clocks.values() if isinstance(facts := orjson.loads(words), dict)]
+    known = [_facts(words) for words in clocks.values()]
     left = sorted(facts.get("skew_s") or 0.0 for facts in known if _TIMED & set(facts.get("channels", ())))
     return float(np.hypot(left[-2], left[-1])) / 2 if len(left) > 1 else 0.0
+
+
+def _facts(words: str) -> dict[str, Any]:
+    """What a log says of one clock; nothing where it says it in words for a person."""
+    try:
+        facts = orjson.loads(words)
+    except orjson.JSONDecodeError:
+        return {}
+    return facts if isinstance(facts, dict) else {}
 
 
 def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> Assembled:
@@ -147,6 +158,7 @@ def _without_lost(stretch: Stretch, lost: BoolArray, notes: list[str]) -> Stretc
 
 
 def _piece(stretch: Stretch, stroke: Stroke, fitted: BoolArray) -> Piece:
+    # Strokes are slow: the displacement's filter counts as a delay. The force's is simulated (decision 0004).
     displacement_lag = stretch.displacement_delay + filter_lag(stretch.displacement_filter)
     return Piece(
         name=stretch.name,

@@ -69,7 +69,9 @@ def force_spread(fit: Fit, model: "Model", piece: Piece, found: Predicted, noise
     known = np.zeros((count, count)) if fit.covariance is None else np.array(fit.covariance)
     variance = np.einsum("ij,jk,ik->i", slopes[:, :count], known, slopes[:, :count])
     prior = np.array([fit.nuisances.force_delay.prior_sd, fit.nuisances.drive_delay.prior_sd])
+    # Each log has delays of its own: what the fit found of them on others says no more here than their prior.
     variance += ((slopes[:, _DELAYS] * prior) ** 2).sum(axis=1)
+    # Where nothing is uncertain, rounding may leave less than zero.
     return Spread(np.sqrt(np.maximum(variance, 0.0)), noise)
 
 

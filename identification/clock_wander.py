@@ -57,6 +57,7 @@ def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
     wander = _likeliest(bends, H[free], gradient[inside], inside, problem.delay_prior)
     if not wander:
         return minimum, 0.0
+    # The bends are eliminated (Schur), each held by the wander that was found likeliest.
     held = bends.own + np.eye(len(bends.own)) / wander**2
     left = H - bends.shared @ np.linalg.solve(held, bends.shared.T)
     pull = gradient - bends.shared @ np.linalg.solve(held, bends.gradient)
@@ -80,6 +81,7 @@ def _bends(problem: Problem, unknowns: Array) -> _Bends:
     own, shared, gradients = [], [], []
     for i, piece in enumerate(problem.pieces):
         r, J = problem.residuals(unknowns, i)
+        # The fit counts its delay in deviations of the prior; a bend is in seconds.
         bent = _hats(len(r), piece.stroke.rate) * (J[:, COORDINATE_COUNT] / problem.delay_prior)[:, None]
         rows = np.zeros((len(unknowns), bent.shape[1]))
         rows[problem.columns(i)] = J.T @ bent
@@ -101,11 +103,13 @@ def _likeliest(bends: _Bends, H: Array, gradient: Array, inside: BoolArray, most
     shared = bends.shared[inside]
     solved = np.linalg.solve(H, np.column_stack([shared, gradient]))
     information = bends.own - shared.T @ solved[:, :-1]
+    # In these directions the bends are independent: one decomposition serves every trial.
     size, turned = np.linalg.eigh(information)
     seen = size > _SEEN * size[-1]
     size, slope = size[seen], (turned.T @ (bends.gradient - shared.T @ solved[:, -1]))[seen]
     trials = np.concatenate([[0.0], np.geomspace(_LEAST, max(most, 2.0 * _LEAST), _TRIALS)])
     grown = 1.0 + trials[:, None] ** 2 * size
+    # Twice the negative logarithm of the likelihood, up to what no wander changes.
     unlikely = np.sum(np.log(grown) + slope**2 / (size * grown), axis=1)
     best = int(np.argmin(unlikely))
     return float(trials[best]) if unlikely[0] - unlikely[best] > _CHANCE else 0.0

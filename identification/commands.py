@@ -66,6 +66,7 @@ def identify(
     ] = False,
 ) -> None:
     """Find the damper's parameters in recordings, each with an interval and what it means."""
+    # Inside the command, as everywhere here: `--help` must not wait for numba and scipy (decision 0006).
     from identification.assemble import HoldOut
     from identification.document_file import check_place, write_document
     from identification.errors import IdentificationError

@@ -47,5 +47,6 @@ def best_cutoffs(
         penalty = np.full(len(expected), float(stiffness(cutoff, rate)))
         left = np.diff(values - smoothed(values, weights, penalty, expected, twice=twice)) ** 2
         cost[:] = np.bincount(regions[1:], both * left, count)
+        # A loose smoother leaves less because it follows the noise: what it follows is put on its bill.
         cost += 2.0 * noise**2 * sizes * kept_noise(cutoff, rate, twice=twice)
     return np.asarray(trials[np.argmin(costs, axis=0)])

@@ -29,6 +29,7 @@ def write_document(out: Path, document: Document) -> None:
         return
     partial = out.with_name(out.name + ".partial")
     try:
+        # A document that is there is whole: readers and later calls may rely on it.
         partial.write_text(text, encoding="utf-8")
         partial.replace(out)
     except OSError as error:

@@ -24,11 +24,13 @@ def drive_noise(drive: Array) -> float:
     as much within three samples as it is noisy looks noisier than it is.
     """
     changes = np.diff(drive, 2)
+    # 0.6745: median of a Gaussian's magnitude; 6 = 1 + 4 + 1: variance of its second difference.
     return float(np.median(np.abs(changes))) / 0.6745 / np.sqrt(6.0) if len(changes) else 0.0
 
 
 def drive_steps(drive: Array) -> Indices:
     """The first sample behind every step of a measured drive (N,) that stands out of its noise."""
+    # A drive without noise, such as a command, steps wherever it changes at all.
     jumps = np.abs(np.diff(drive)) > max(_JUMP * drive_noise(drive), 1e-12)
     return np.asarray(np.flatnonzero(jumps) + 1)
 
@@ -54,6 +56,7 @@ def drive_bins(drive: Array, most: int = 8) -> list[tuple[float, Indices]]:
     span = float(np.ptp(drive))
     if span < 1e-9:
         return [(float(drive[0]), np.arange(len(drive)))]
+    # A staircase keeps to few levels, noise within 2 % of its range; what passes between two goes to the nearest.
     coarse = np.round((drive - drive.min()) / (0.02 * span))
     levels, counts = np.unique(coarse, return_counts=True)
     frequent = levels[counts >= 0.01 * len(drive)]

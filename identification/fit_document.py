@@ -107,6 +107,7 @@ def _each_log(
 ) -> dict[str, dict[str, Estimate]]:
     """What each log behind the first has of its own, by the log's name."""
     sd = np.sqrt(np.maximum(np.diag(found.unknowns), 0.0))
+    # One iterator for all logs, and second in zip: no place is taken where a log's names have ended.
     places = iter(range(problem.first_own, problem.first_own + problem.own_count))
     return {
         name: {

@@ -30,6 +30,7 @@ class LowPass:
     def apply(self, values: Array) -> Array:
         """Values ((N - 1) finer + 1,) or (..., U) behind the filter, settled at their first, at the N samples."""
         numerator, denominator = self._coefficients
+        # As if the first force had stood for ever: a filter from zero would ring at the start of every stretch.
         settled = signal.lfilter_zi(numerator, denominator)
         start = settled if values.ndim == 1 else settled[:, None]
         found: Array = signal.lfilter(numerator, denominator, values, axis=0, zi=start * values[:1])[0]
@@ -40,6 +41,7 @@ class LowPass:
         """Numerator and denominator of the Butterworth filter at the finer rate."""
         analogue = signal.butter(self.reported.order, 2 * np.pi * self.reported.cutoff, analog=True)
         numerator, denominator, _ = signal.cont2discrete(analogue, 1 / (self.rate * self.finer), method="foh")
+        # cont2discrete returns the numerator as a matrix of one row.
         return np.ravel(numerator), np.ravel(denominator)
 
 

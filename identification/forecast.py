@@ -38,6 +38,7 @@ def planned_strokes(method: str, command: tuple[str, ...] = COMPILE) -> Planned:
     with TemporaryDirectory(prefix="mrbench-") as folder:
         samples = Path(folder) / "planned.npz"
         words = [*command, method, "--dry-run", "--planned", str(samples)]
+        # A process, since nothing of the bench is imported here (decision 0009).
         try:
             done = subprocess.run(words, capture_output=True, text=True, timeout=_LONGEST, check=False)
         except (OSError, subprocess.TimeoutExpired) as error:

@@ -100,8 +100,10 @@ def steady_cycles(values: Array, weights: Array, rate: float, frequency: float, 
     """
     if len(values) * frequency < _FEWEST_CYCLES * rate:
         return None
+    # Six samples a cycle of the highest harmonic used here, and 3000 in all, fix frequency and steadiness.
     stride = max(1, min(len(values) // 3000, int(rate / (24.0 * frequency))))
     start, stop, frequency, off = _steady(values[::stride], weights[::stride], rate / stride, frequency, noise)
+    # A stumble begins and ends somewhere between two thinned samples.
     off = maximum_filter1d(off, 3)
     start, stop = start * stride, min(stop * stride, len(values))
     if (stop - start) * frequency < _FEWEST_CYCLES * rate - 1.0:
@@ -151,8 +153,10 @@ def _significant(
     amplitudes = _regress(basis, values, weights)
     waves = amplitudes[2:].reshape(-1, 2)
     power = np.sum(waves**2, axis=1)
+    # Noise alone gives a cosine and a sine 2 noise² / N each.
     kept = power > _CHANCE * 4.0 * noise**2 / max(float(np.sum(weights)), 1.0)
     kept[0] = True
+    # Over whole cycles the orders are all but orthogonal: those that stay need no second regression.
     amplitudes[2:] = (waves * kept[:, None]).ravel()
     return tuple(int(k) + 1 for k in np.flatnonzero(kept)), np.asarray(amplitudes @ basis)
 
@@ -165,6 +169,7 @@ def _steady(
     Grown from the middle: the cycles that keep to what is fitted there, but for stumbles.
     """
     middle, reach = len(values) // 2, max(len(values) // 4, int(rate / frequency))
+    # A soft start stands at an end of the segment: its middle is the surest part.
     start, stop = max(middle - reach, 0), min(middle + reach, len(values))
     stumbled = np.zeros(len(values), bool)
     for _ in range(_ROUNDS):
@@ -183,6 +188,7 @@ def _extended(
     values: Array, weights: Array, rate: float, frequency: float, start: int, stop: int
 ) -> tuple[float, Array]:
     """Frequency [Hz] refined by Gauss-Newton between two samples, and what few harmonics leave everywhere [m]."""
+    # Counted from the middle, where an error of the frequency is no error of the phases.
     place: Array = np.arange(float(len(values))) - 0.5 * (start + stop)
     inside = slice(start, stop)
     angle = 2.0 * np.pi * place[inside] / rate
@@ -193,6 +199,7 @@ def _extended(
         turned = basis[2:].reshape(_FEW, 2, -1)[:, ::-1].reshape(2 * _FEW, -1)
         slope = (amplitudes[2:] * orders * np.tile([-1.0, 1.0], _FEW)) @ turned * angle
         change = _regress(np.vstack([basis, slope]), values[inside], weights[inside])[-1]
+        # Far from the achieved frequency a whole step may go astray.
         frequency += float(np.clip(change, -0.05 * frequency, 0.05 * frequency))
     basis = _basis(place, _FEW, frequency / rate)
     amplitudes = _regress(basis[:, inside], values[inside], weights[inside])
@@ -224,6 +231,7 @@ def _run_of_cycles(rest: Array, stumbled: BoolArray, cycle: float, limit: float)
 
 def _basis(place: Array, highest: int, step: float) -> Array:
     """(2 + 2 highest, N): one, a slope, then cosine and sine of each order; step is in cycles a sample."""
+    # Powers of one turn: far cheaper than a cosine and a sine for every order.
     turn = np.exp(2j * np.pi * step * place)
     basis = np.empty((2 + 2 * highest, len(place)))
     basis[0], basis[1] = 1.0, place / max(abs(float(place[0])), 1.0)

@@ -161,9 +161,11 @@ def _refined(
     share = 0.5 if "pinn" in request.stages else 1.0
     settings = replace(request.settings, budget=None if budget is None else share * budget)
     minimum = refine(problem.quicker(), settings, progress)
+    # The way goes over the samples alone; filter and play count at its end only (decision 0004).
     polish = replace(settings, restarts=0)
     scatter, notes = None, tuple[str, ...]()
     if _ratio(problem, minimum) > MISFIT:
+        # The misfit outweighs what noise of the motion does: that is not played again (decision 0005).
         problem = replace(problem, noise=problem.noise * _ratio(problem, minimum))
         minimum = refine(problem, polish, progress, minimum.unknowns)
     else:
@@ -171,6 +173,7 @@ def _refined(
         minimum = refine(problem, polish, progress, minimum.unknowns)
         played = play_noise(problem, stretches, minimum, request.settings.seed)
         minimum, scatter = without_pull(problem, minimum, played.pull), played.scatter
+        # Last of all: the minimum carries what the bends leave of the information; evaluated anew it would not.
         minimum, wander = without_wander(problem, minimum)
         notes = wander_in_words(wander)
     found = covariance(problem, minimum, scatter)
@@ -255,11 +258,13 @@ def fit_problem(assembled: Assembled, delay_prior: float | None = None) -> Probl
         assembled: the recordings.
         delay_prior: deviation of the channel delays beyond what the log reports [s]; None takes its clocks.
     """
+    # What is held out must not widen the range of drives in which a damper is sought.
     fitted = [p.stroke.drive[p.train > 0] for p in assembled.pieces]
     drives = np.concatenate(fitted)
     prior = assembled.delay_prior if delay_prior is None else delay_prior
     pieces = tuple(p for p in assembled.pieces if p.train.any())
     space = SearchSpace(*_range(drives), lowest_k0=_lowest_k0(pieces))
+    # Delays are counted in deviations of their prior; with none at all they would have no unit.
     return Problem(pieces, space, assembled.floor.noise, max(prior, 1e-9))
 
 

@@ -46,6 +46,7 @@ def recall(sha256: str) -> RawLog | None:
         with entry.open("rb") as file, np.load(file, allow_pickle=False) as kept:
             said = json.loads(str(kept["said"]))
             samples = dict(zip(said["names"], kept["columns"], strict=True))
+        # What was asked for last is to go last; reading alone does not touch this time.
         os.utime(entry)
         return RawLog(samples, said["segments"], said["metadata"])
     except _DAMAGED:
@@ -63,6 +64,7 @@ def keep(sha256: str, raw: RawLog, largest: int = _LARGEST) -> None:
     said = {"names": list(raw.samples), "segments": raw.segments, "metadata": raw.metadata}
     with contextlib.suppress(OSError):
         folder().mkdir(parents=True, exist_ok=True)
+        # Written beside and moved into place: another process finds a whole entry or none.
         with tempfile.NamedTemporaryFile(dir=folder(), suffix=".part", delete=False) as file:
             np.savez(file, columns=np.stack(list(raw.samples.values())), said=np.array(json.dumps(said)))
         Path(file.name).replace(folder() / f"{sha256}.{_FORM}.npz")

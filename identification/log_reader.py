@@ -118,6 +118,7 @@ def _message_blocks(
             topics[record.id] = record.topic
         elif isinstance(record, Metadata):
             metadata[record.name] = dict(record.metadata)
+        # A writer may leave messages outside of any chunk.
         elif isinstance(record, Message):
             loose.append(_Message(record.channel_id, record.log_time, record.data))
     yield loose
@@ -143,6 +144,7 @@ def _in_chunk(chunk: Chunk, topics: dict[int, str]) -> list[_Message]:
 
 
 def _of_topic(messages: list[_Message], topics: dict[int, str], topic: str) -> list[_Message]:
+    # Complete for these messages: a channel stands before its first message in every log.
     numbers = {number for number, name in topics.items() if name == topic}
     return [message for message in messages if message.channel in numbers]
 
@@ -151,6 +153,7 @@ def _columns(messages: list[_Message]) -> Columns:
     """One column a field, and `time` [ns]; NaN where a message lacks a field."""
     rows = orjson.loads(b"[" + b",".join([message.body for message in messages]) + b"]")
     names = dict.fromkeys(name for row in rows for name in row if name != "timestamp")
+    # numpy makes NaN of None here.
     columns = {name: np.array([row.get(name) for row in rows], float) for name in names}
     return columns | {"time": np.array([message.time for message in messages], np.int64)}
 
@@ -159,6 +162,7 @@ def _joined(blocks: list[Columns], segments: list[dict[str, Any]], metadata: dic
     """All chunks in order of time, each instant once; a field that a chunk lacks is NaN there."""
     nanoseconds, order = np.unique(np.concatenate([block["time"] for block in blocks]), return_index=True)
     names = dict.fromkeys(name for block in blocks for name in block if name != "time")
+    # Taken off as integers: nanoseconds since 1970 have more digits than a float.
     samples = {"time": (nanoseconds - nanoseconds[0]) * 1e-9}
     for name in names:
         parts = [block.get(name, np.full(len(block["time"]), np.nan)) for block in blocks]

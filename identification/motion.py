@@ -32,6 +32,8 @@ _WHOLE_RUN = 0.9
 """[1] share of a run that must be steady, else its segments are fitted one by one."""
 _END = 1.5
 """How much looser the smoother is at an end of the stretch: with 2, noise there is up to half as much again."""
+_USUAL, _LEFT = 0.99, 0.92476
+"""[1] part of the fourth differences that is not a knock, and mean square of that part of a Gaussian's."""
 
 
 class Motion(NamedTuple):
@@ -65,6 +67,7 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
     """
     weights = stretch.measured.astype(float)
     noise = recorded_noise(stretch)
+    # A stumble hides from the regression what gives way under the load, so it is looked for first (decision 0013).
     stumbled = _roughly_stumbled(stretch, weights, noise)
     give = give_under_load(stretch, np.where(stumbled, 0.0, weights), noise)
     gives = bool(np.any(give))
@@ -78,6 +81,7 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
             # Beside a stumble, what a stiff smoother makes of that is no fault of the motion there.
             calm = trial(stretch.displacement, np.where(parts.stumbled, 0.0, weights), twice=True)
             cutoff = np.where(parts.stumbled, cutoff, calm[parts.regions])
+    # A third difference spans four samples; its cutoff is that of the second.
     penalty = stiffness(_looser_at_the_ends(cutoff, stretch.rate)[1:-2], stretch.rate)
     displacement = smoothed(stretch.displacement, weights, penalty, expected, twice=True)
     velocity, from_record = _better_velocity(stretch, displacement)
@@ -109,11 +113,12 @@ def displacement_noise(displacement: Array, measured: BoolArray, stride: int = 1
     over samples that lie ``stride`` apart.
     """
     apart = [slice(k * stride, len(displacement) - (4 - k) * stride) for k in range(5)]
+    # 70 = 1 + 16 + 36 + 16 + 1: variance of the fourth difference of white noise.
     whole = np.all([measured[part] for part in apart], axis=0)
     fourth = np.sum([c * displacement[part] for c, part in zip((1, -4, 6, -4, 1), apart, strict=True)], axis=0)
     squares = fourth[whole] ** 2 / 70.0
-    usual = squares[squares <= np.quantile(squares, 0.99)]
-    return float(np.sqrt(np.mean(usual) / 0.92476))
+    usual = squares[squares <= np.quantile(squares, _USUAL)]
+    return float(np.sqrt(np.mean(usual) / _LEFT))
 
 
 def _roughly_stumbled(stretch: Stretch, weights: Array, noise: float) -> BoolArray:
@@ -185,6 +190,7 @@ def _cut(wave: Harmonics, segment: Segment) -> Harmonics:
 def _expected(give: Array, waves: list[Harmonics], unknown: int) -> Array:
     """(N-3,) third differences [m] that what is known lets one expect; the force before the start is not."""
     expected = np.diff(give, 3)
+    # There the lags reach beyond the recorded force.
     expected[:unknown] = expected[len(expected) - unknown :] = 0.0
     for wave in waves:
         expected[wave.start : wave.stop - 3] += np.diff(wave.values, 3)

@@ -85,6 +85,7 @@ def _steps(wrong: Problem, minimum: Minimum, slopes: Sequence[Array], inside: Bo
         places = wrong.columns(i)
         gradients[0, places] += J.T @ r
         gradients[1, places] += own.T @ r
+        # The fit's own information, priors too, with the replayed motion's rows for those of the fitted one.
         H[np.ix_(places, places)] += own.T @ own - J.T @ J
     free = np.ix_(inside, inside)
     plain = np.linalg.solve(minimum.evaluation.hessian[free], -gradients[0, inside])

@@ -71,6 +71,7 @@ def stumbles(stretch: Stretch, off: Array) -> list[Indices]:
     seams = {s.start for s in stretch.segments} & {s.stop for s in stretch.segments}
     steps = _around(seams | set(drive_steps(stretch.drive).tolist()), len(off), reach)
     runs = _unbroken(_widened(off > 0.0, reach))
+    # The runs were widened: a stumble itself begins a reach later.
     begins = [min(run[0] + reach, len(off) - 1) for run in runs]
     most = MOST_GIVE * _size(stretch)
     return [run for run, at in zip(runs, begins, strict=True) if not steps[at] or off[run].max() > most]
@@ -94,6 +95,7 @@ def _around(edges: set[int], count: int, reach: int) -> BoolArray:
 
 def _regions(waves: list[Harmonics], joints: BoolArray, stumbled: list[Indices]) -> Indices:
     """(N,) what each sample belongs to: 0 a joint, 1 and on a wave, then what lies between, then stumbles."""
+    # In this order: a joint cuts into the wave beside it, a stumble into both.
     regions = np.full(len(joints), -1)
     for k, wave in enumerate(waves):
         regions[wave.start : wave.stop] = 1 + k

@@ -50,7 +50,9 @@ def predict_piece(
         free_offset: also fit a constant force.
     """
     y0, offset = float(piece.stroke.displacement.mean()), 0.0
+    # y(0) fades over seconds: filter and play within a sample have no say in it.
     quick = piece.quicker()
+    # A stretch that is held out whole still needs its y(0).
     weight = piece.train if piece.train.any() else np.ones(len(piece.force))
     for _ in range(_ROUNDS):
         force, slopes = quick.recorded(piece_setting(piece, point, delays, y0, effects), slopes=True)

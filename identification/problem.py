@@ -22,7 +22,7 @@ from identification.search_space import SearchSpace
 from identification.simulate import UNKNOWNS, ActiveEffect, Setting, Stroke, simulate
 
 COORDINATE_COUNT = len(Coordinates._fields)
-_Y0_SCALE = 1e-3
+Y0_SCALE = 1e-3
 """[m] what a change of order one of a y(0) unknown means."""
 _Y0_STROKES = 1.0
 """[1] standard deviation of y(0) about the middle of the motion, in half strokes."""
@@ -82,6 +82,7 @@ class Piece:
     def coarser(self, times: int) -> "Piece":
         """The same at every so many samples: too few for a filter, of which only the delay remains."""
         stroke = self.stroke.coarser(times)
+        # The stroke ends on a whole step and may have dropped the last samples.
         thin = slice(0, len(stroke.displacement) * times, times)
         late = self.force_delay + filter_lag(self.low_pass.reported if self.low_pass else None)
         return replace(
@@ -102,6 +103,7 @@ class Piece:
 
     @cached_property
     def _finer_strokes(self) -> dict[int, Stroke]:
+        # No field: `replace` makes a piece without it, and a changed stroke never meets those of another.
         return {}
 
 
@@ -142,6 +144,7 @@ class Problem:
     @property
     def free(self) -> BoolArray:
         """(U,) True where an unknown is free."""
+        # A drive that never changes shows no delay.
         delays = [True, not self.space.one_drive]
         rest = len(self.pieces) + self.effect_count + self.own_count
         return np.concatenate([self.space.free, delays, np.ones(rest, bool)])
@@ -189,7 +192,7 @@ class Problem:
 
     def start(self, coordinates: Coordinates) -> Array:
         """(U,) unknowns at a point, delays as known, y(0) where the inner displacement would come to rest."""
-        y0 = [p.stroke.displacement.mean() / _Y0_SCALE for p in self.pieces]
+        y0 = [p.stroke.displacement.mean() / Y0_SCALE for p in self.pieces]
         own = [e.to_search(e.form.starts[0]) for e in self.effects]
         alike = np.zeros(self.own_count)
         return np.concatenate([self.space.to_search(coordinates), np.zeros(2), y0, *own, alike])
@@ -216,7 +219,7 @@ class Problem:
         force_delay, drive_delay = unknowns[COORDINATE_COUNT:_SHARED] * self.delay_prior
         return Setting(
             self.space.to_coordinates(unknowns[:COORDINATE_COUNT]),
-            y0=float(unknowns[_SHARED + piece]) * _Y0_SCALE,
+            y0=float(unknowns[_SHARED + piece]) * Y0_SCALE,
             force_delay=p.force_delay + float(force_delay),
             drive_delay=p.drive_delay + float(drive_delay),
             effects=self.active_effects(unknowns),
@@ -255,6 +258,8 @@ class Problem:
         pulled = weight * (unknowns - centre)
         hessian, gradient, cost = np.diag(weight**2), weight * pulled, float(pulled @ pulled)
         for i in range(len(self.pieces)):
+            # The chain rule acts on the small product, not on every row. Search numbers are scaled well enough for
+            # normal equations (condition 7.5, decision 0002).
             D = self._scales(unknowns, i)
             weight, r, J = self._raw(unknowns, i)
             columns = self.columns(i)
@@ -279,8 +284,8 @@ class Problem:
         stroke = max(float(np.ptp(p.stroke.displacement)) for p in self.pieces) / 2.0
         means = np.array([p.stroke.displacement.mean() for p in self.pieces])
         rest, own = np.zeros(COORDINATE_COUNT), np.zeros(self.effect_count)
-        centre = np.concatenate([rest, [0.0, 0.0], means / _Y0_SCALE, own])
-        held = np.full(len(means), _Y0_SCALE / (_Y0_STROKES * stroke))
+        centre = np.concatenate([rest, [0.0, 0.0], means / Y0_SCALE, own])
+        held = np.full(len(means), Y0_SCALE / (_Y0_STROKES * stroke))
         alike = np.zeros(self.own_count)
         return np.concatenate([centre, alike]), np.concatenate([rest, [1.0, 1.0], held, own, alike + 1.0])
 
@@ -296,7 +301,7 @@ class Problem:
         D[:COORDINATE_COUNT, :COORDINATE_COUNT] = self.space.slopes(unknowns[:COORDINATE_COUNT])
         D[UNKNOWNS.index("force_delay"), COORDINATE_COUNT] = self.delay_prior
         D[UNKNOWNS.index("drive_delay"), COORDINATE_COUNT + 1] = self.delay_prior
-        D[UNKNOWNS.index("y0"), _SHARED] = _Y0_SCALE
+        D[UNKNOWNS.index("y0"), _SHARED] = Y0_SCALE
         at = self.first_effect
         for e in self.effects:
             own = np.arange(at, at + len(e.quantities)) - self.first_effect

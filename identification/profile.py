@@ -45,6 +45,7 @@ class _Held:
         """The cost with the pull towards the target, and without."""
         plain = self.problem.evaluate(unknowns)
         q = unknowns[:COORDINATE_COUNT]
+        # Held by a stiff spring: a coordinate may mix two search numbers, neither of which could be fixed for it.
         off = self.problem.space.to_coordinates(q)[self.index] - self.target
         slope = np.zeros(len(unknowns))
         slope[:COORDINATE_COUNT] = self.problem.space.slopes(q)[self.index]
@@ -81,6 +82,7 @@ def profile_intervals(
             if spread[i, i] <= 0.0 or plain[i, i] <= 0.0:
                 continue
             progress(f"profile of {name}", float(np.sqrt(best.evaluation.cost / quick.samples)) * quick.noise)
+            # Widths are sought on the quicker problem, the place is the fit's.
             low, high = (_end(quick, best, i, s * np.sqrt(spread[i, i]), plain[i, i]) - centre[i] for s in (-1, 1))
             quantity = COORDINATES[i]
             intervals[name] = (
@@ -108,6 +110,7 @@ def _end(problem: Problem, best: Minimum, index: int, deviation: float, plain: f
     for _ in range(_POINTS):
         held = _Held(problem, index, centre + reach, _STIFF / np.sqrt(plain))
         unknowns, cost = _settle(held, unknowns)
+        # Its root grows straight with the distance where the cost is a parabola, so that one step mostly arrives.
         risen = np.sqrt(max(cost - best.evaluation.cost, 1e-12) / allowed)
         moved = space.to_coordinates(unknowns[:COORDINATE_COUNT])[index] - centre
         if abs(risen - 1.0) < _CLOSE or not np.isfinite(risen):

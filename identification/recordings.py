@@ -236,6 +236,7 @@ def _continuous(raw: RawLog, said: _Said, name: str, rows: npt.NDArray[np.int64]
     if len(rows) < _FEWEST:
         return []
     steps = np.diff(raw.samples["time"][rows])
+    # The median: a break must not lengthen the usual step by which it is known.
     breaks = np.flatnonzero(steps > (_FILLED + _JUMP) * np.median(steps)) + 1
     pieces = [piece for piece in np.split(rows, breaks) if len(piece) >= _FEWEST]
     return [_stretch(raw, said, name, piece) for piece in pieces]
@@ -256,6 +257,7 @@ def _stretch(raw: RawLog, said: _Said, name: str, rows: npt.NDArray[np.int64]) -
         rate=float((len(time) - 1) / (time[-1] - time[0])),
         displacement=channel("displacement"),
         force=channel("force"),
+        # A drive steps; a cubic would overshoot there.
         drive=channel("coil_drive", order=1),
         velocity=channel("velocity") if said.velocity_measured else None,
         segments=_segments(raw, name, time),
@@ -272,6 +274,7 @@ def _stretch(raw: RawLog, said: _Said, name: str, rows: npt.NDArray[np.int64]) -
 def _uniform(time: Array) -> tuple[Array, npt.NDArray[np.int64]]:
     """A uniform time base [s] from the first to the last instant, and the place of each instant in it."""
     steps = np.diff(time)
+    # The mean: a median of coarse time stamps is off by their step, and that adds up over the recording.
     usual = float(np.mean(steps[steps < _JUMP * np.median(steps)]))
     count = round((time[-1] - time[0]) / usual) + 1
     uniform = np.linspace(time[0], time[-1], count)
@@ -283,12 +286,14 @@ def _onto(uniform: Array, time: Array, values: Array, order: int) -> Array:
     step = uniform[1] - uniform[0]
     if len(uniform) == len(time) and np.max(np.abs(time - uniform)) <= _JITTER * step:
         return values
+    # Only the three channels that every log has are known to be whole; another may lack samples of its own.
     known = np.isfinite(values)
     return np.asarray(make_interp_spline(time[known], values[known], k=order)(uniform))
 
 
 def _segments(raw: RawLog, name: str, time: Array) -> tuple[Segment, ...]:
     """The segments of a recording, as far as they lie in a stretch of it."""
+    # The nearest sample counts: a segment begins at an instant of its own.
     half = 0.5 * (time[1] - time[0])
     ends = {said["index"]: said["time"] for said in raw.segments if said["phase"] == "end"}
     segments = []

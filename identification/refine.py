@@ -124,6 +124,7 @@ def descend(problem: Problem, start: Array, iterations: int, progress: Progress)
     damping, scale = 1e-2, np.zeros(len(start))
     free = problem.free & ~problem.delays
     for iteration in range(iterations):
+        # The largest curvature met so far (Moré 1978): an unknown that no longer shows is not flung away.
         scale = np.maximum(scale, np.diag(here.hessian))
         step = bounded_step(problem, here, free, damping * np.maximum(scale, 1e-12 * scale.max()), unknowns)
         gain = -float(2.0 * here.gradient @ step + step @ here.hessian @ step)
@@ -138,6 +139,7 @@ def descend(problem: Problem, start: Array, iterations: int, progress: Progress)
             unknowns, here = unknowns + step, there
             damping = max(damping / 5.0, 1e-9)
             progress("refine", problem.noise * float(np.sqrt(here.cost / problem.samples)))
+        # So little is left to gain that jumps between two plans of steps may outweigh it (decision 0003).
         elif gain < 100.0 * small or damping > 1e8:
             return Minimum(unknowns, here, iteration, converged=True)
         else:

@@ -67,6 +67,7 @@ def _factorise(bands: Array, weights: Array, penalty: Array) -> None:
         second[j] += 3.0 * q
         second[j + 1] += 3.0 * q
         third[j] -= q
+    # Positive definite: no rows need to change places, and the bands stay three wide.
     for i in range(count):
         low1, low2, low3 = first[i] / main[i], second[i] / main[i], third[i] / main[i]
         main[i + 1] -= low1 * first[i]
@@ -83,6 +84,7 @@ def _solved(bands: Array, right: Array, push: Array) -> Array:
     """The signal (N,) that answers a right side (N,) and pushes (N-3,) on the third differences: down, then up."""
     main, first, second, third = bands
     count = len(right)
+    # Three more, as in the factors, so that the last rows need no case of their own.
     found = np.zeros(count + 3)
     found[:count] = right
     for j in range(count - 3):
@@ -121,6 +123,7 @@ def kept_noise(cutoff: float, rate: float, *, twice: bool = False) -> float:
 def derivative(values: Array, rate: float) -> Array:
     """First derivative [unit/s] of a smooth signal (N,) [unit]; one-sided formulas of equal order at the ends."""
     slope = np.convolve(values, _DERIVATIVE[::-1], "same")
+    # The convolution takes what lies beyond the ends for zero.
     places = np.arange(7.0)
     for k in range(3):
         row = _weights(places - k)

@@ -100,6 +100,8 @@ def _regression(pieces: Sequence[Piece]) -> Array:
         rows.append(np.column_stack([sign, u * sign, v, u * v, p.stroke.displacement[fast], np.ones(len(fast))]))
         forces.append(p.force[fast])
     table = np.vstack(rows)
+    # Columns of one size, so that the limit below means the same for metres and for volts. With one drive two
+    # pairs of columns are alike, and the smallest answer shares between them.
     size = np.maximum(np.sqrt((table**2).mean(axis=0)), 1e-12)
     found: Array = np.linalg.lstsq(table / size, np.concatenate(forces), rcond=1e-8)[0] / size
     return found

@@ -25,7 +25,7 @@ _COLOURED = 1.5
 """[1] mean ratio of sandwich to plain variance above which the misfit counts as coloured."""
 _KNOWN = 0.5
 """[1] relative standard deviation below which a number counts as identifiable."""
-_SEEN = 1e-2
+SEEN = 1e-2
 """[1] least information on an unknown of order one: below it the noise would have to be ten times less."""
 _Z95, _Z99 = 1.959964, 2.575829
 _CORRELATED = 0.9
@@ -53,9 +53,10 @@ def covariance(problem: Problem, minimum: Minimum, scatter: Array | None = None)
         scatter: (U, U) what the noise of the motion adds, if it was played again.
     """
     p = minimum.unknowns
-    seen = np.diag(minimum.evaluation.hessian) > _SEEN
+    seen = np.diag(minimum.evaluation.hessian) > SEEN
     inside = problem.inside(p) & seen
     H = minimum.evaluation.hessian[np.ix_(inside, inside)]
+    # A diagonal of ones: the limit below then judges directions and not the units of the unknowns.
     size = np.sqrt(np.diag(H))
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv(H / np.outer(size, size), rcond=1e-13) / np.outer(size, size)
@@ -63,6 +64,7 @@ def covariance(problem: Problem, minimum: Minimum, scatter: Array | None = None)
     scores = _block_scores(problem, p)[:, inside]
     sandwich = inverse @ (scores.T @ scores) @ inverse
     ratio = np.diag(sandwich) / np.maximum(np.diag(plain), 1e-300)
+    # By the mean over many: one ratio alone, of so few blocks, varies by chance.
     coloured = bool(ratio[: min(COORDINATE_COUNT, len(ratio))].mean() > _COLOURED)
     widen = np.sqrt(np.maximum(ratio, 1.0)) if coloured else np.ones(len(ratio))
     found = np.zeros((len(p), len(p)))

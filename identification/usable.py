@@ -128,6 +128,7 @@ def _mended(stretch: Stretch, log: str, notes: list[str]) -> Stretch:
 
 def _noise(values: Array) -> float:
     """Standard deviation of white noise in a signal (N,), by the median of its fourth differences."""
+    # 0.6745: median of a Gaussian's magnitude; 70: variance of its fourth difference.
     return float(np.median(np.abs(np.diff(values, 4)))) / 0.6745 / np.sqrt(70.0) if len(values) > 4 else 0.0
 
 
@@ -142,16 +143,19 @@ def _jumps(values: Array) -> BoolArray:
     off = np.zeros(len(values))
     off[1:-1] = values[1:-1] - 0.5 * (values[:-2] + values[2:])
     size = np.abs(off)
+    # The neighbours of a jump leave their lines, too, by half as much: only the largest of the three is broken.
     largest = size >= np.maximum(np.roll(size, 1), np.roll(size, -1))
     return _beyond(size, _SPIKE * _noise(values), off) & largest
 
 
 def _beyond(off: Array, least: float, values: Array) -> BoolArray:
     """Where something is off by more than the least, and by more than the values spread around it."""
+    # A coarse converter may show no noise at all: two of its steps are no spike yet.
     steps = np.diff(np.unique(values[:5000]))
     least = max(least, 2.0 * float(np.min(steps, initial=np.inf, where=steps > 0)))
     if not np.isfinite(least) or not (off > least).any():
         return np.zeros(len(values), bool)
+    # Quartiles: the spike itself must not widen the spread that it is measured by.
     upper, lower = (percentile_filter(values, part, _WIDER, mode="nearest") for part in (75, 25))
     return np.asarray(off > least + _STEEP * (upper - lower))
 
@@ -171,6 +175,7 @@ def _clipped(force: Array) -> BoolArray:
     found, extremes = np.zeros(len(force), bool), (force.min(), force.max())
     for start, _ in _long_runs(force, _CLIPPED):
         if force[start] in extremes:
+            # Once a run shows the limit, single samples there are clipped as well.
             found |= force == force[start]
     return found
 

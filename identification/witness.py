@@ -14,19 +14,15 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import IdentificationError
 from identification.prediction import predict_piece
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COORDINATE_COUNT, Y0_SCALE, Problem
 from identification.recordings import Stretch
 from identification.refine import Minimum
 from identification.results import Errors, Stage
-from identification.uncertainty import Covariance, coordinate_estimates
+from identification.uncertainty import SEEN, Covariance, coordinate_estimates
 
 if TYPE_CHECKING:
     from identification.pinn.result import PinnResult
     from identification.pinn.settings import GlobalSettings, LocalSettings, PaperSettings
-
-_BOUND = 1e-9
-_SEEN = 1e-2
-"""[1] least information on an unknown of order one, as for the refinement."""
 
 Progress = Callable[[str, float], None]
 
@@ -131,16 +127,13 @@ def as_minimum(problem: Problem, found: "PinnResult") -> tuple[Minimum, Covarian
     y0 = [predict_piece(p, found.coordinates, found.delays).y0 for p in problem.pieces]
     unknowns = problem.start(found.coordinates)
     unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] = np.array(found.delays) / problem.delay_prior
-    unknowns[COORDINATE_COUNT + 2 : COORDINATE_COUNT + 2 + len(y0)] = np.array(y0) / 1e-3
+    unknowns[COORDINATE_COUNT + 2 : COORDINATE_COUNT + 2 + len(y0)] = np.array(y0) / Y0_SCALE
     minimum = Minimum(unknowns, problem.evaluate(unknowns), found.steps, converged=found.accepted)
-    low, high = problem.bounds()
-    free = problem.free
     spread = np.zeros((len(unknowns), len(unknowns)))
     if found.covariance is not None:
         spread[: len(found.covariance), : len(found.covariance)] = found.covariance
-    seen = free & (np.diag(minimum.evaluation.hessian) > _SEEN)
-    inside = seen & (unknowns > low + _BOUND) & (unknowns < high - _BOUND)
-    return minimum, Covariance(spread, seen, inside, coloured=False)
+    seen = problem.free & (np.diag(minimum.evaluation.hessian) > SEEN)
+    return minimum, Covariance(spread, seen, seen & problem.inside(unknowns), coloured=False)
 
 
 def stage_entry(found: "PinnResult", hidden: set[str], held_out: float | None, unit: str) -> Stage:

@@ -134,6 +134,13 @@ def test_a_delay_beyond_the_clocks_is_said_in_the_result():
     assert "ms behind the displacement" in found.result
 
 
+def test_a_clock_that_is_described_in_words_widens_no_delay():
+    mapped = {name: f'{{"skew_s": 6e-5, "channels": ["{name}"]}}' for name in ("force", "displacement")}
+    log = recording(SLOW)
+    said = replace(log, metadata={**log.metadata, "clocks": {**mapped, "thermometer": "stamped on receipt"}})
+    assert assemble([said]).delay_prior == pytest.approx(np.hypot(6e-5, 6e-5) / 2)
+
+
 def test_a_law_that_cannot_follow_is_said_in_the_result():
     bent = [replace(s, force=s.force + 80.0 * np.sign(s.displacement)) for s in (SLOW, FAST)]
     assert "times the noise floor" in identify([recording(*bent)]).result

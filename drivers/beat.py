@@ -8,6 +8,7 @@ millisecond later; then each of those who take what has come has a place of its 
 from typing import NamedTuple
 
 _MILLISECOND = 1_000_000
+"""[ns]"""
 
 
 class Beat(NamedTuple):

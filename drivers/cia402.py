@@ -12,6 +12,7 @@ from drivers.canopen_node import Emergency
 DISABLE_VOLTAGE, QUICK_STOP, SHUT_DOWN, SWITCH_ON, ENABLE = 0x00, 0x02, 0x06, 0x07, 0x0F
 START_HOMING = 0x1F
 RESET_FAULT = 0x80
+"""Controlwords."""
 HOMING, CYCLIC_POSITION = 6, 8
 """Modes of operation."""
 HOMING_ATTAINED, HOMING_ERROR, REFERENCED = 0x1000, 0x2000, 0x8000

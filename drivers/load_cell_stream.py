@@ -20,6 +20,7 @@ _COUNTS_PER_NEWTON = float(CONTRACT["instrument"]["counts_per_newton"])
 _FULL_SCALE = CONTRACT["instrument"]["full_scale_n"] * _COUNTS_PER_NEWTON
 """[counts]"""
 _SEQUENCES = 1 << 16
+"""In one turn of the sequence."""
 _TICKS = 1 << 32
 """[us] in one turn of the instrument's clock."""
 

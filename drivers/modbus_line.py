@@ -29,6 +29,7 @@ from drivers.modbus_client import Client, Trace, client_for, something_waits
 Table = Literal["input", "holding"]
 _READ, _WRITE = {"holding": 3, "input": 4}, {False: 6, True: 16}
 _WRITE_AND_READ = 23
+"""Codes of functions."""
 _LONGEST_FRAME = 256
 """[bytes] of a request or an answer on a serial line."""
 _DIAGNOSTICS_UNKNOWN = bytes([0x88, 0x01])

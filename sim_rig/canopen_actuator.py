@@ -20,6 +20,7 @@ _EDS = Path(__file__).parents[1] / "drivers" / "wire" / "actuator.eds"
 _COUNT = 1e-7
 """[m] of one count, also [m/s] and [m/s²]."""
 _MILLISECOND = 1_000_000
+"""[ns]"""
 _BEHIND_NS = 15_000_000
 """[ns] Age of the newest position beyond which the simulation is behind, not the rod."""
 _HOMING, _CYCLIC_POSITION = 6, 8

@@ -19,8 +19,11 @@ Send = Callable[[int, bytes, int], None]
 PRE_OPERATIONAL, OPERATIONAL, STOPPED = 127, 5, 4
 _COMMANDS = {1: OPERATIONAL, 2: STOPPED, 128: PRE_OPERATIONAL}
 _NOT_VALID = 1 << 31
+"""Of an identifier: its process data are not in use."""
 _EVENT_DRIVEN = 254
+"""Least transmission type of what does not wait for a SYNC."""
 _MILLISECOND = 1_000_000
+"""[ns]"""
 
 
 class Device(Protocol):

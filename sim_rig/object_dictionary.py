@@ -19,6 +19,7 @@ ABORT_TOO_HIGH = 0x06090031
 ABORT_TOO_LOW = 0x06090032
 ABORT_COMMAND = 0x05040001
 ABORT_TOGGLE = 0x05030000
+"""Reasons of CiA 301 for an access that is broken off."""
 
 _LAYOUTS = {0x02: "<b", 0x03: "<h", 0x04: "<i", 0x05: "<B", 0x06: "<H", 0x07: "<I"}
 _SECTION = re.compile(r"^([0-9A-Fa-f]{4})(?:[Ss]ub([0-9A-Fa-f]+))?$")

@@ -31,6 +31,7 @@ from sim_rig.settings import Sensor
 from sim_rig.socketcand_server import SocketcandServer
 
 _SYNC = 0x80
+"""Identifier of its frame."""
 _LONGEST_UP = 3_600_000_000_000
 """[ns] that an instrument may have been switched on before the rig's clock began."""
 

@@ -25,6 +25,7 @@ LIVE_PERIOD = 0.1
 LIVE_RATE = 250.0
 """[Hz] of the samples in them, at most."""
 _JOIN = 2.0
+"""[s] for the thread to end."""
 
 
 class BenchThread:

@@ -15,7 +15,9 @@ _GAP, _REST, _PALE = "#b5473c", "#3f7d58", "#c9ced4"
 _CLEAR = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
 """Behind a figure that the line of the floor may cross."""
 _PHASES = 8
+"""Parts of a cycle that are told apart."""
 _MOST_ROWS = 18
+"""Conditions shown, those with the largest gap."""
 
 Numbers = npt.NDArray[np.float64]
 

@@ -14,6 +14,7 @@ _STILL = ("hold", "other")
 _ALIKE = 1.2
 """[1] ratio of two amplitudes or frequencies up to which they are one stroke at several drives."""
 _CYCLES = 2
+"""Shown of a steady stroke over time, at most."""
 _SLACK = 0.03
 """[1] part of a cycle that may be missing from a whole one."""
 _WINDOW, _CROSSINGS = 4.0, 20

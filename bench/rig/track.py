@@ -13,6 +13,7 @@ Numbers = npt.NDArray[np.float64]
 _MOST = 20_000
 """Samples that are kept at most."""
 _NEVER = 1 << 62
+"""[ns] of the bench clock, later than any sample."""
 
 
 class Track:

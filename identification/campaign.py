@@ -1,6 +1,6 @@
 """Fits of many logs, each of a specimen of its own; networks that can be trained together are."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,7 +38,7 @@ def places(logs: Sequence[Path], folder: Path) -> list[Path]:
 
 def identify_each(
     logs: Sequence[Path], request: Request, progress: Progress = lambda what, error: None
-) -> list[Each]:
+) -> Iterator[Each]:
     """Identify the damper behind each of many logs.
 
     A log that cannot be fitted does not hold up the others.
@@ -47,13 +47,16 @@ def identify_each(
         logs: each of another specimen.
         request: what is asked of every fit; a budget is that of one log.
         progress: told what is being done and the force error so far [N].
+
+    Yields:
+        What became of a log as soon as that is known, so that nothing is lost of a campaign that is ended early:
+        first those that cannot be fitted, then the others, batch by batch of those that are trained together.
     """
-    ready = [_prepared(log, request) for log in logs]
-    testimonies = _together(ready, request, progress)
-    return [
-        _concluded(log, one, request, progress, testimony)
-        for log, one, testimony in zip(logs, ready, testimonies, strict=True)
-    ]
+    ready = {log: _prepared(log, request) for log in logs}
+    yield from (Each(log, None, str(why)) for log, why in ready.items() if isinstance(why, IdentificationError))
+    usable = [(log, one) for log, one in ready.items() if isinstance(one, Prepared)]
+    for number, testimony in _together([one for _, one in usable], request, progress):
+        yield _concluded(*usable[number], request, progress, testimony)
 
 
 def _prepared(log: Path, request: Request) -> Prepared | IdentificationError:
@@ -65,28 +68,18 @@ def _prepared(log: Path, request: Request) -> Prepared | IdentificationError:
 
 
 def _together(
-    ready: Sequence[Prepared | IdentificationError], request: Request, progress: Progress
-) -> list[Testimony | None]:
-    """The network's answer for each log, where many can be trained at once."""
-    found: list[Testimony | None] = [None] * len(ready)
-    usable = {k: one.problem for k, one in enumerate(ready) if isinstance(one, Prepared)}
-    if "pinn" in request.stages:
-        seed, budget = request.settings.seed, request.network_budget
-        answers = train_together(list(usable.values()), request.preset, seed, budget, progress)
-        for k, testimony in zip(usable, answers, strict=True):
-            found[k] = testimony
-    return found
+    ready: Sequence[Prepared], request: Request, progress: Progress
+) -> Iterator[tuple[int, Testimony | None]]:
+    """Number and network's answer of each; None where it is trained alone, or not at all."""
+    if "pinn" not in request.stages:
+        return ((k, None) for k in range(len(ready)))
+    problems = [one.problem for one in ready]
+    return train_together(problems, request.preset, request.settings.seed, request.network_budget, progress)
 
 
 def _concluded(
-    log: Path,
-    ready: Prepared | IdentificationError,
-    request: Request,
-    progress: Progress,
-    testimony: Testimony | None,
+    log: Path, ready: Prepared, request: Request, progress: Progress, testimony: Testimony | None
 ) -> Each:
-    if isinstance(ready, IdentificationError):
-        return Each(log, None, str(ready))
     try:
         with breakdown_in_words():
             return Each(log, conclude(ready, request, progress, testimony))

@@ -106,15 +106,17 @@ def _each(logs: "Sequence[Path]", folder: Path, request: "Request") -> None:
     if str(folder) == "-":
         raise IdentificationError("--out -: with --each there are several documents; name a folder for them")
     check_place(folder)
-    outs = places(logs, folder)
+    outs = dict(zip(logs, places(logs, folder), strict=True))
     folder.mkdir(exist_ok=True)
+    failed: list[str] = []
     with progress_on_terminal("identify") as progress:
-        found = identify_each(logs, request, progress)
-    for out, one in zip(outs, found, strict=True):
-        if one.fit is not None:
-            write_document(out, one.fit)
-            _say_fit(out, one.fit)
-    if failed := [f"{one.log.name}: {one.why_not}" for one in found if one.fit is None]:
+        for one in identify_each(logs, request, progress):
+            if one.fit is None:
+                failed.append(f"{one.log.name}: {one.why_not}")
+            else:
+                write_document(outs[one.log], one.fit)
+                _say_fit(outs[one.log], one.fit)
+    if failed:
         raise IdentificationError(f"{len(failed)} of {len(logs)} logs have no fit: {'; '.join(failed)}")
 
 

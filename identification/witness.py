@@ -4,7 +4,7 @@ Nothing of the refinement enters the training and nothing of the training the re
 compared. The networks are loaded here and only when the stage runs; the local one needs no torch.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -69,8 +69,8 @@ def train_stage(
 
 def train_together(
     problems: Sequence[Problem], preset: str, seed: int, budget: float | None, progress: Progress
-) -> list[Testimony | None]:
-    """Train the network of a preset on many dampers at once; None for each where it is trained alone.
+) -> Iterator[tuple[int, Testimony | None]]:
+    """Train the network of a preset on many dampers, as many at once as go together.
 
     Args:
         problems: what is fitted, one a damper.
@@ -79,21 +79,23 @@ def train_together(
         budget: [s] of processor time for each damper; None for as long as it takes.
         progress: told of every step.
 
+    Yields:
+        The number of a damper and its answer, batch by batch; None for one that is to be trained alone.
+
     Raises:
         IdentificationError: as for one damper.
     """
     from identification.pinn.settings import GlobalSettings
 
     settings = _settings(preset, seed)
-    found: list[Testimony | None] = [None] * len(problems)
-    if isinstance(settings, GlobalSettings):
-        from identification.pinn.train import batches
+    if not isinstance(settings, GlobalSettings):
+        yield from ((k, None) for k in range(len(problems)))
+        return
+    from identification.pinn.train import batches
 
-        for batch in batches(problems, settings):
-            some = [problems[k] for k in batch]
-            for k, testimony in zip(batch, _batch(some, settings, budget, progress), strict=True):
-                found[k] = testimony
-    return found
+    for batch in batches(problems, settings):
+        some = [problems[k] for k in batch]
+        yield from zip(batch, _batch(some, settings, budget, progress), strict=True)
 
 
 def _batch(

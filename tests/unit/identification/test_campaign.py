@@ -47,8 +47,12 @@ def small(tmp_path):
     return str(place)
 
 
+def fits(found):
+    return [one.fit for one in found if one.fit is not None]
+
+
 def test_every_log_gets_the_fit_that_it_would_get_alone_and_its_own_error(logs):
-    first, second, third = campaign.identify_each(logs, Request())
+    second, first, third = campaign.identify_each(logs, Request())
     assert first.fit.coordinates == fitted("refine").coordinates
     assert third.fit.coordinates == identify([weaker()], Request()).coordinates
     assert third.fit.coordinates["F_a"].value == pytest.approx(0.6 * LABORATORY.F_a, rel=0.15)
@@ -66,9 +70,8 @@ def test_the_global_network_is_trained_on_all_of_them_at_once(logs, small, monke
 
     monkeypatch.setattr(train, "train_batch", counted)
     monkeypatch.setattr(train, "_ON_A_PROCESSOR", 16)
-    found = campaign.identify_each(logs, Request(stages=("pinn", "refine"), preset=small))
+    first, third = fits(campaign.identify_each(logs, Request(stages=("pinn", "refine"), preset=small)))
     assert sizes == [2]
-    first, third = found[0].fit, found[2].fit
     assert [stage.name for stage in first.stages] == ["pinn", "refine"]
     assert first.stages[0].note.startswith("all layers trained")
     assert first.stages[0].coordinates["F_a"].value != third.stages[0].coordinates["F_a"].value
@@ -78,9 +81,11 @@ def test_the_global_network_is_trained_on_all_of_them_at_once(logs, small, monke
 def test_the_budget_of_a_batch_is_that_of_each_log(logs, small, monkeypatch):
     monkeypatch.setattr(train, "_ON_A_PROCESSOR", 16)
     request = Request(settings=Settings(budget=1e-3), stages=("pinn", "refine"), preset=small)
-    found = campaign.identify_each(logs, request)
-    assert found[0].fit.agreement.startswith("not compared: pinn found nothing, its budget of 0.001 s")
-    assert campaign.identify_each(logs[:1], request)[0].fit.agreement.endswith("0.0005 s of processor time ended")
+    assert fits(campaign.identify_each(logs, request))[0].agreement.startswith(
+        "not compared: pinn found nothing, its budget of 0.001 s"
+    )
+    (alone,) = fits(campaign.identify_each(logs[:1], request))
+    assert alone.agreement.endswith("0.0005 s of processor time ended")
 
 
 def asked(logs, out, **more):
@@ -94,6 +99,20 @@ def test_the_command_writes_what_can_be_fitted_and_names_what_cannot(logs, tmp_p
         asked(logs, tmp_path / "fits")
     assert sorted(p.name for p in (tmp_path / "fits").iterdir()) == ["a.json", "b.json"]
     assert read_fit(tmp_path / "fits" / "b.json").rmse_n.train == pytest.approx(0.6 * NOISE, rel=0.03)
+
+
+def test_what_is_done_is_kept_where_a_campaign_is_ended_early(logs, tmp_path, monkeypatch):
+    once = campaign.conclude
+
+    def ended_at_b(ready, *rest):
+        if ready.problem.pieces[0].force.std() < 0.8 * recording().stretches[0].force.std():
+            raise KeyboardInterrupt
+        return once(ready, *rest)
+
+    monkeypatch.setattr(campaign, "conclude", ended_at_b)
+    with pytest.raises(KeyboardInterrupt):
+        asked(logs, tmp_path / "fits")
+    assert [p.name for p in (tmp_path / "fits").iterdir()] == ["a.json"]
 
 
 @pytest.mark.parametrize(

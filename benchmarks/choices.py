@@ -38,6 +38,7 @@ def steps() -> None:
     """Steps at reversals (decision 0003) against the same number in every sample."""
     c, moved = to_coordinates(parameter_set("spencer_1997").parameters), constant(0.015, 2.5, 100.0, 1.5)
     count = len(moved.drive) - 1
+    # The truth of this table; how near it is to LSODA at 1e-11, `simulation` prints.
     exact = simulate(Setting(c), moved, np.full(count, 200, np.uint8)).force
     print("steps in a sample: spencer_1997 at 1.5 V, 15 mm 2.5 Hz, 100 s at 1 kHz")
     for label, fineness, each in (
@@ -56,6 +57,7 @@ def delays() -> None:
     c, moved = laboratory(), constant(0.015, 2.0, 10.0, 0.5)
     late = 0.5 / moved.rate
     dense = simulate(Setting(c), moved.finer(DENSE)).force
+    # A delayed motion stands still before its first sample: the start is no part of the comparison.
     rows = np.arange(200, len(moved.drive))
     exact = dense[rows * DENSE - DENSE // 2]
     plain = simulate(Setting(c), moved).force

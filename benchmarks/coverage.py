@@ -54,6 +54,7 @@ def deviations(fit: Fit, true: Coordinates) -> dict[str, float]:
     for name, e in fit.coordinates.items():
         if e.identifiable and e.ci99 is not None:
             value = getattr(true, name)
+            # Intervals may be lopsided: the side on which the truth lies counts.
             half = e.ci99[1] - e.value if value > e.value else e.value - e.ci99[0]
             found[name] = 2.576 * (value - e.value) / half
     return found

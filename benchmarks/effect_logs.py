@@ -25,6 +25,7 @@ def scenario(effect: str, size: float) -> dict[str, Any]:
         return {"schema": "mrbench.scenario/1", "description": "the default rig", "damper": "laboratory"}
     document: dict[str, Any] = json.loads(files("sim_rig.scenarios").joinpath(f"{effect}.json").read_text("utf-8"))
     (entry,) = document["effects"]
+    # What may be zero is a size; a length, a speed or a time may not.
     sizes = {q.symbol for q in EFFECTS[effect].form(entry.get("form")).parameters if q.low <= 0.0}
     entry["parameters"] = {k: v * size if k in sizes else v for k, v in entry["parameters"].items()}
     return document

@@ -37,6 +37,7 @@ def random_damper(seed: int) -> Coordinates:
 
 def recorded(c: Coordinates, strokes: list[Stroke], seed: int) -> tuple[list[np.ndarray], float]:
     """Forces with white noise of one per cent of their deviation [N], and that noise."""
+    # Finer steps than the fit takes, so that the error of its own is among what it has to bear.
     forces = [simulate(Setting(c), s, fineness=0.005).force for s in strokes]
     noise = 0.01 * float(np.concatenate(forces).std())
     random = np.random.default_rng(1000 + seed)
@@ -65,6 +66,7 @@ def fit(c: Coordinates, seed: int) -> tuple[float, float]:
 def run() -> None:
     """Print times and unseen errors."""
     default = to_coordinates(parameter_set("laboratory").parameters)
+    # Once unmeasured: the first call compiles.
     fit(default, 0)
     spent, ratio = min(fit(default, seed) for seed in range(5))
     print("fit: 56 000 samples in memory, no guess, compiled code warm")

@@ -27,6 +27,7 @@ def run() -> None:
         "coil_voltage": 0.3 + 1e-3 * random.standard_normal(SAMPLES),
     }
     with TemporaryDirectory() as folder:
+        # An empty cache, or the first reading would be a later one.
         os.environ["MRBENCH_CACHE"] = str(Path(folder) / "cache")
         log = Path(folder) / "run.mcap"
         began = time.process_time()

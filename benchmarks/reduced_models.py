@@ -50,6 +50,7 @@ class Reduced(Problem):
 def recorded(amplitude: float, frequency: float, seed: int) -> Piece:
     """A stroke of the damper with white noise."""
     moved = stroke(amplitude, frequency, RISING)
+    # Finer steps than the fit takes, so that it does not meet its own.
     force = simulate(Setting(TRUE), moved, fineness=0.005).force
     force = force + NOISE * np.random.default_rng(seed).standard_normal(len(force))
     return Piece("stroke", moved, force, np.ones(len(force)))

@@ -79,6 +79,7 @@ def fitted(c: Coordinates, seed: int) -> dict[str, Any]:
 def dampers(first: int = 0, last: int = DAMPERS, results: Path | None = None) -> None:
     """Fit random dampers; with a file, results are kept a line each and the table is of all in it."""
     done = kept.rows(results)
+    # Once unmeasured: the first call compiles.
     fitted(to_coordinates(parameter_set("laboratory").parameters), 0)
     for seed in sorted(set(range(first, last)) - {row["seed"] for row in done}):
         done.append(fitted(random_damper(seed), seed))
@@ -142,6 +143,7 @@ def _beside_scipy(share: float) -> None:
     problem = problem_of(default, 0, ((amplitude, frequency),), FEW)
     piece, ours = problem.pieces[0], refine(problem)
     start = ours.unknowns + share * (starting_points(problem)[0] - ours.unknowns)
+    # scipy's way has no delays to find: the easier search.
     moving = np.flatnonzero(problem.free & ~problem.delays)
     low, high = (bound[moving] for bound in problem.bounds())
     start[moving] = np.clip(start[moving], low + 1e-6, high - 1e-6)
@@ -152,9 +154,11 @@ def _beside_scipy(share: float) -> None:
         unknowns[moving] = values
         setting = problem.setting(unknowns, 0)
         force = scipy_force(setting.coordinates, setting.y0, piece, amplitude, frequency)
+        # At an unstable point a large misfit turns the search round instead of ending it.
         return np.nan_to_num((force - piece.force) / problem.noise, nan=1e3)
 
     def arrived(intermediate_result: OptimizeResult) -> None:
+        # least_squares counts half the squares.
         if 2.0 * intermediate_result.cost <= goal:
             raise StopIteration
 

@@ -86,6 +86,7 @@ def _noisy(stretch: Stretch, random: np.random.Generator) -> Stretch:
 def run(method: str, first: int, last: int, results: Path) -> None:
     """Fit the replicas from ``first`` up to, not including, ``last`` that are not in the file yet."""
     known = {row["seed"] for row in kept.rows(results)}
+    # Some replicas share a recording, and so its clock errors and zero shifts.
     for base in sorted({seed // SHARED for seed in range(first, last) if seed not in known}):
         with TemporaryDirectory() as folder:
             recording, true, _ = record(method, base, Path(folder), str(without_noise(Path(folder))))
@@ -150,6 +151,7 @@ def table(results: Path) -> None:
         )
     for level, hits in inside.items():
         every = np.concatenate(hits)
+        # Coordinates of one fit miss together: what varies freely is the share inside from replica to replica.
         error = 100 * np.std([np.mean([h[k] for h in hits if len(h) == len(found)]) for k in range(len(found))])
         print(
             f"pooled {level} %: {100 * every.mean():.1f} % of {len(every)} "

@@ -62,6 +62,7 @@ def run() -> None:
     c = to_coordinates(parameter_set("spencer_1997").parameters)
     t, x, v, a = sine(AMPLITUDE, FREQUENCY, SECONDS)
     stroke = Stroke(1000.0, x, v, a, np.full(len(t), DRIVE))
+    # The same start as the product's (settled_hysteresis), or the first stroke would differ.
     reference = Reference(c, [0.0, v[0] / (v[0] + 1e-3)])
     exact = simulate(Setting(c), stroke, np.full(len(t) - 1, 200, np.uint8)).force
     check = reference.by_odeint(2.0, 1e-11)

@@ -56,8 +56,10 @@ def _watched(
     processes: dict[str, "subprocess.Popen[bytes]"], until: "subprocess.Popen[bytes]"
 ) -> dict[str, float]:
     """Share of a core [1] that each process takes from the tenth second on until one of them ends."""
+    # Imports and connecting are over by then; what is measured is the stroking.
     time.sleep(10.0)
     begin, began = time.monotonic(), {name: _cpu(process) for name, process in processes.items()}
+    # A process that has ended has no times left to read: the last ones before that count.
     latest, end = dict(began), begin
     while until.poll() is None:
         time.sleep(0.5)
@@ -70,6 +72,7 @@ def _watched(
 
 def _cpu(process: "subprocess.Popen[bytes]") -> float:
     """Processor time [s] of a process so far."""
+    # Fields behind the name, which may itself hold spaces and brackets: utime and stime are the 14th and 15th.
     words = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(words[11]) + int(words[12])) / _TICKS
 

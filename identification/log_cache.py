@@ -72,7 +72,7 @@ def keep(sha256: str, raw: RawLog, largest: int = _LARGEST) -> None:
 
 
 def _make_room(largest: int) -> None:
-    """Remove the least recently used entries beyond the size allowed, and what interrupted writers left."""
+    """Remove the least recently used entries beyond the size allowed; what a broken writer left is one, too."""
     entries = sorted(folder().iterdir(), key=lambda entry: entry.stat().st_mtime, reverse=True)
     total = 0
     for entry in entries:

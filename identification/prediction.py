@@ -18,6 +18,7 @@ from identification.simulate import UNKNOWNS, ActiveEffect, Setting
 
 _Y0 = UNKNOWNS.index("y0")
 _ROUNDS = 2
+"""Of Gauss-Newton: the force is nearly linear in y(0)."""
 
 
 @dataclass(frozen=True)

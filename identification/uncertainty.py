@@ -60,6 +60,7 @@ def covariance(problem: Problem, minimum: Minimum, scatter: Array | None = None)
     size = np.sqrt(np.diag(H))
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv(H / np.outer(size, size), rcond=1e-13) / np.outer(size, size)
+    # A fit that happens to leave less than the noise does not narrow them.
     plain = inverse * max(1.0, minimum.evaluation.cost / problem.samples)
     scores = _block_scores(problem, p)[:, inside]
     sandwich = inverse @ (scores.T @ scores) @ inverse
@@ -195,6 +196,7 @@ def _estimate(
 def _interval(value: float, sd: float, z: float, positive: bool) -> tuple[float, float]:
     """Interval of z deviations; on the logarithm where the number cannot be negative."""
     if positive:
+        # e^50 bounds nothing any more; far beyond it exp would overflow.
         factor = float(np.exp(min(z * sd / value, 50.0)))
         return value / factor, value * factor
     return value - z * sd, value + z * sd

@@ -49,6 +49,7 @@ def information(point: Coordinates, stroke: Stroke, noise: float) -> Array:
 
 def relative_covariance(found: Array) -> Array:
     """(13, 13) covariance of the coordinates, in their sizes, from the information of all strokes (15, 15)."""
+    # The delays count in deviations of what is known of them, so that their prior is one.
     prior = np.concatenate([np.full(len(COORDINATES), _LOOSE**-2), [1.0, 1.0]])
     count = len(COORDINATES)
     return np.asarray(np.linalg.inv(found + np.diag(prior))[:count, :count])

@@ -67,6 +67,7 @@ def simulate(
 
 def connection_of(setting: Setting) -> Array:
     """(4,) give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper; zero where rigid."""
+    # Without any the sum over no rows is zero, which is rigid.
     parts = [form.act(*values) for _, form, values in setting.acting("connection")]
     return np.asarray(np.sum(np.array(parts, float).reshape(-1, 4), axis=0))
 

@@ -155,6 +155,7 @@ def _open(order: Order, worker: int = 0) -> optuna.Study:
         pruner=optuna.pruners.MedianPruner(n_startup_trials=_STARTUP, n_warmup_steps=_WARM),
         load_if_exists=True,
     )
+    # Values of other logs or of another preset would not compare.
     asked = {"logs": [str(log) for log in order.logs], "preset": order.preset}
     if not study.user_attrs:
         for name, given in asked.items():

@@ -5,7 +5,6 @@ for it.
 """
 
 import contextlib
-import os
 import select
 import socket
 import threading
@@ -39,7 +38,7 @@ class SocketcandBus(SocketCanDaemonBus):
         hang_up.start()
         try:
             client: Any = super()
-            client.__init__(channel, host, port, tcp_tune=os.name == "posix")
+            client.__init__(channel, host, port, tcp_tune=hasattr(socket, "TCP_QUICKACK"))
         except BaseException:
             self._line().close()
             raise

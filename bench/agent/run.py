@@ -72,7 +72,7 @@ def order(command: RunCommand, rig: Rig, specimen: str, folder: Path) -> Order:
     first = after_segment(programme, command.resume_after) if command.resume_after else 0
     passages(programme, rig.amplifier.table_capacity, first)
     identity = Identity(command.specimen or specimen, command.operator, datetime.now(UTC))
-    path = Path(command.log) if command.log else folder / f"{identity.run_id(method).replace(':', '')}.mcap"
+    path = Path(command.log) if command.log else folder / f"{identity.run_id(method)}.mcap"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

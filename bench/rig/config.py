@@ -24,6 +24,9 @@ from bench.faults import first_fault
 from bench.methods.frozen import Frozen
 from bench.safety.limits import Action, Matrix
 
+_SLOWEST_RAMP = 20.0
+"""[V/s or A/s] The amplifier's most, 24 V, comes to zero in 1.2 s: a run's end and every stop wait for that."""
+
 
 class ActuatorSection(Frozen):
     """A servo drive: CANopen, CiA 402."""
@@ -112,8 +115,8 @@ class CoilAmplifierSection(ModbusSection):
 
     driver: Literal["coil_amplifier"]
     mode: Literal["voltage", "current"] = Field(default="voltage", description="what it holds at its setpoint")
-    ramp: PositiveFloat = Field(
-        default=100.0, description="[V/s or A/s] towards a setpoint and, in a stop, to zero"
+    ramp: float = Field(
+        default=100.0, ge=_SLOWEST_RAMP, description="[V/s or A/s] towards a setpoint and, in a stop, to zero"
     )
     watchdog: float = Field(
         default=0.5, ge=0.05, le=10, description="[s] of silence after which it ramps to zero by itself"

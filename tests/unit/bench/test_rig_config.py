@@ -55,6 +55,12 @@ def test_a_real_bench_is_built_without_opening_anything(tmp_path):
     assert not any(one.instrument.health().connected for one in rig.named)
 
 
+def test_a_ramp_that_a_stop_could_not_wait_for_is_refused(tmp_path):
+    text = REAL.replace('mode = "current"', 'mode = "current"\nramp = 1.0')
+    with pytest.raises(ConfigError, match=r"ramp.*20"):
+        load_config(written(tmp_path, text))
+
+
 def test_a_drive_waits_longer_for_an_agent_without_priority(tmp_path):
     config = load_config(written(tmp_path, REAL))
     assert build_rig(config, lambda: 0, prompt=False).actuator.settings.stale_after == STALE_WITHOUT_PRIORITY

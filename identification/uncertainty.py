@@ -25,6 +25,8 @@ _COLOURED = 1.5
 """[1] mean ratio of sandwich to plain variance above which the misfit counts as coloured."""
 _KNOWN = 0.5
 """[1] relative standard deviation below which a number counts as identifiable."""
+_OF_THE_DRIVE = ("F_b", "c0_b", "c1_b", "eta", "alpha_b")
+"""What only a drive that changes can show."""
 SEEN = 1e-2
 """[1] least information on an unknown of order one: below it the noise would have to be ten times less."""
 _Z95, _Z99 = 1.959964, 2.575829
@@ -169,8 +171,13 @@ def _estimate(
 ) -> Estimate:
     """A number with its intervals and what to say of it."""
     unit = quantity.unit_for(drive_unit)
-    if hidden or not np.isfinite(sd):
-        note = f"{quantity.meaning}: cannot be seen, the drive never changes in these strokes"
+    if hidden:
+        steady = quantity.symbol in _OF_THE_DRIVE
+        why = "the drive never changes in these strokes" if steady else "nothing in these strokes depends on it"
+        note = f"{quantity.meaning}: cannot be seen, {why}"
+        return Estimate(value=value, unit=unit, ci95=None, identifiable=False, note=note)
+    if not np.isfinite(sd):
+        note = f"{quantity.meaning}: how far it may be off is not known, for the fit has no covariance here"
         return Estimate(value=value, unit=unit, ci95=None, identifiable=False, note=note)
     if at_bound:
         note = f"{quantity.meaning}: stands at the edge of its range, so the law cannot follow these strokes here"

@@ -6,7 +6,6 @@ hysteretic variable turns: the number is chosen on the first march from how far 
 as a plan, so that later marches with slopes or with nearby coordinates are smooth in them.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +18,8 @@ from identification.simulate.step import (
     STRUCTURAL,
     WEIGHT_STAGE,
     WEIGHT_START,
-    at_field,
     between,
+    choose_steps,
     first_stage,
     rate_slopes,
     rates,
@@ -34,43 +33,8 @@ Plan = npt.NDArray[np.uint8]
 Places = npt.NDArray[np.int64]
 """Columns of a table of slopes."""
 
-_MOST_STEPS = 64
-"""In a sample, so that no set of parameters inside the bounds can stall a fit; a plan holds bytes."""
-_STEPS_AT_TURN = 4
-"""Least number of steps in a sample in which slip or field turn."""
 _FADED = 1e-200
 """[1] slope of zeta below which it counts as none."""
-_FIELD_JUMP = 0.05
-"""[1] relative change of the yield force in one sample above which the field counts as turning."""
-
-
-@compiled_within
-def choose_steps(
-    fineness: float,
-    s: Array,
-    h: float,
-    v0: float,
-    v1: float,
-    u0: float,
-    u1: float,
-    y_rate: float,
-    zeta: float,
-    zeta_rate: float,
-) -> int:
-    """Steps for one sample: the root of zeta's travel over ``fineness``; a few more where slip or field turn.
-
-    The root, because the error of a step falls with its third power: many small travels add up as one large.
-    """
-    slip_before = v0 - y_rate
-    slip_after = v1 - y_rate
-    travel = abs(zeta_rate) * h
-    # After a reversal zeta moves at up to twice slip / D_y, of which its rate before the turn tells nothing.
-    if slip_after * zeta < 0.0:
-        travel = max(travel, 2.0 * abs(slip_after) * h / s[2])
-    steps = min(max(math.ceil(math.sqrt(travel / fineness)), 1), _MOST_STEPS)
-    turns = slip_before * slip_after <= 0.0
-    jumps = abs(s[1] * (u1 - u0)) > _FIELD_JUMP * abs(at_field(s[0], s[1], u0))
-    return max(steps, _STEPS_AT_TURN) if turns or jumps else steps
 
 
 @compiled_within

@@ -1,4 +1,4 @@
-"""One implicit step of the damper, and the slopes of its rates.
+"""One implicit step of the damper, how many of them a sample takes, and the slopes of its rates.
 
 TR-BDF2 (Bank et al. 1985): a trapezoidal stage to gamma h, then a second-order backward difference to h. It is
 L-stable, which the law needs: at a reversal the hysteretic variable relaxes at some 2e4 1/s. In the regular
@@ -29,6 +29,12 @@ TOLERANCE = 1e-11
 LARGEST_MOVE = 0.5
 """[1] largest move of zeta in one iteration; it runs from -1 to 1."""
 ITERATIONS = 40
+_MOST_STEPS = 64
+"""In a sample, so that no set of parameters inside the bounds can stall a fit; a plan holds bytes."""
+_STEPS_AT_TURN = 4
+"""Least number of steps in a sample in which slip or field turn."""
+_FIELD_JUMP = 0.05
+"""[1] relative change of the yield force in one sample above which the field counts as turning."""
 
 at_field = compiled_within(law.at_field)
 inner_velocity = compiled_within(law.inner_velocity)
@@ -64,6 +70,35 @@ def rates(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> tupl
     """Rates y' [m/s] and zeta' [1/s]."""
     y_rate = _y_rate(s, x, v, u, y, zeta)
     return y_rate, hysteresis_rate(v - y_rate, zeta, 1.0 / s[2], s[3] / s[2], (1.0 - s[3]) / s[2], s[4])
+
+
+@compiled_within
+def choose_steps(
+    fineness: float,
+    s: Array,
+    h: float,
+    v0: float,
+    v1: float,
+    u0: float,
+    u1: float,
+    y_rate: float,
+    zeta: float,
+    zeta_rate: float,
+) -> int:
+    """Steps for one sample: the root of zeta's travel over ``fineness``; a few more where slip or field turn.
+
+    The root, because the error of a step falls with its third power: many small travels add up as one large.
+    """
+    slip_before = v0 - y_rate
+    slip_after = v1 - y_rate
+    travel = abs(zeta_rate) * h
+    # After a reversal zeta moves at up to twice slip / D_y, of which its rate before the turn tells nothing.
+    if slip_after * zeta < 0.0:
+        travel = max(travel, 2.0 * abs(slip_after) * h / s[2])
+    steps = min(max(math.ceil(math.sqrt(travel / fineness)), 1), _MOST_STEPS)
+    turns = slip_before * slip_after <= 0.0
+    jumps = abs(s[1] * (u1 - u0)) > _FIELD_JUMP * abs(at_field(s[0], s[1], u0))
+    return max(steps, _STEPS_AT_TURN) if turns or jumps else steps
 
 
 @compiled_within

@@ -19,7 +19,7 @@ from identification.arrays import Array, compiled
 from identification.damper.effects import connection
 from identification.simulate.curves import half_way
 from identification.simulate.inputs import Field
-from identification.simulate.kernel import Plan, choose_steps
+from identification.simulate.kernel import Plan
 from identification.simulate.motion import Motion
 from identification.simulate.scaling import Factors
 from identification.simulate.step import (
@@ -31,6 +31,7 @@ from identification.simulate.step import (
     WEIGHT_STAGE,
     WEIGHT_START,
     at_field,
+    choose_steps,
     hysteresis_rate,
     hysteresis_slopes,
     through_middle,

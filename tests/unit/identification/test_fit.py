@@ -237,6 +237,15 @@ def test_an_interval_never_leaves_what_is_possible():
     assert n.ci95[1] == pytest.approx(1.1 * np.exp(1.96 * 0.2 / 1.1), rel=1e-4)
 
 
+def test_what_cannot_be_seen_says_why():
+    spread = np.diag([np.nan, *np.full(COORDINATE_COUNT - 1, 1e-6)])
+    said = coordinate_estimates(LABORATORY, spread, {"eta", "k1"}, set(), "V")
+    assert said["eta"].note.endswith("cannot be seen, the drive never changes in these strokes")
+    assert said["k1"].note.endswith("cannot be seen, nothing in these strokes depends on it")
+    assert "no covariance" in said["F_a"].note
+    assert [said[name].ci95 for name in ("eta", "k1", "F_a")] == [None] * 3
+
+
 def test_a_delay_that_only_its_prior_holds_has_no_interval():
     unseen, seen = (delay_estimate(1e-5, 2e-5, 2e-5, seen=s) for s in (False, True))
     assert unseen.ci95 is None

@@ -85,13 +85,13 @@ def identify(
     held = HoldOut(_words(hold_out), hold_out_after)
     request = Request(held, delay_prior, Settings(seed=seed, budget=budget), asked, preset, own, profile)
     if each:
-        return _each(logs, out, request)
+        _each(logs, out, request)
+        return
     check_place(out)
     with progress_on_terminal("identify") as progress:
         found = fit([load(log) for log in logs], request, progress)
     write_document(out, found)
     _say_fit(out, found)
-    return None
 
 
 def _each(logs: "Sequence[Path]", folder: Path, request: "Request") -> None:

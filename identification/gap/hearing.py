@@ -15,6 +15,7 @@ from identification.gap.carried import carried, replayed
 from identification.gap.colour import floor_under
 from identification.gap.contender import Contender
 from identification.gap.judge import Judge
+from identification.gap.residual import by_piece
 from identification.problem import Piece, Problem
 from identification.recordings import Stretch
 
@@ -87,8 +88,7 @@ class Hearing:
 
     def _carried(self, contender: Contender, full: Problem, draws: int) -> Array:
         if len(self._replays) < draws:
-            edges = np.cumsum([len(p.force) for p in full.pieces])[:-1]
-            forces = np.split(contender.left.simulated, edges)
+            forces = by_piece(contender.left.simulated, full.pieces)
             missing = range(len(self._replays), draws)
             self._replays += replayed(self.stretches, full.pieces, forces, self.noise, self.seed, missing)
         problem = full.with_effects(contender.fit.effects)

@@ -9,9 +9,10 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.assemble import Assembled
 from identification.gap.held_out import Again, HeldOut, Shrinkage, held_out_cycles, shrinkage
-from identification.gap.residual import Cycles, cut_cycles
+from identification.gap.residual import Cycles, by_piece, cut_cycles
 from identification.gap.stumbles import left_out
 from identification.gap.where import Left
+from identification.prediction import rmse
 from identification.problem import Piece
 
 _MOVED = 0.1
@@ -67,8 +68,7 @@ class Judge:
 
     def masks(self) -> list[Array]:
         """(N,) of each piece: 1.0 where a sample is fitted."""
-        edges = np.cumsum([len(p.force) for p in self.pieces])[:-1]
-        return [part.astype(float) for part in np.split(self.seen, edges)]
+        return [part.astype(float) for part in by_piece(self.seen, self.pieces)]
 
     def fitted_pieces(self) -> tuple[Piece, ...]:
         """The pieces with what is kept out of every fit unmarked."""
@@ -88,7 +88,7 @@ class Judge:
 
     def rmse(self, left: Left) -> tuple[float, float]:
         """RMSE [N] on seen and on unseen strokes."""
-        return _rms(left.residual[self.seen]), _rms(left.residual[self.unseen])
+        return rmse(left.residual[self.seen]), rmse(left.residual[self.unseen])
 
     def shrunk(self, before: Left, after: Left, noise: float, carried: Array) -> Shrinkage:
         """How far the gap is to shrink on another run.
@@ -117,7 +117,3 @@ def _once_moved(piece: Piece) -> Piece:
     away = np.abs(x - x[0]) > _MOVED * 0.5 * np.ptp(x)
     count = int(np.argmax(away)) if away.any() else 0
     return replace(piece, train=np.where(np.arange(len(x)) < count, 0.0, piece.train))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))

@@ -17,6 +17,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.gap.explain import JointFit
+from identification.prediction import rmse
 from identification.problem import COORDINATE_COUNT
 from identification.simulate import UNKNOWNS, ActiveEffect, Setting, Stroke, simulate
 
@@ -86,7 +87,7 @@ def best_segment(rivals: Sequence[Rival], law: Coordinates, limits: Limits, nois
         weights = np.array([a.rival.probability * b.rival.probability + 1e-12 for a, b in pairs])
         score = float(np.average([_told_apart(a, b, noise) for a, b in pairs], weights=weights))
         if np.isfinite(score) and (best is None or score > best.detectability):
-            size = float(np.sqrt(np.average([_rms(a.force - b.force) ** 2 for a, b in pairs], weights=weights)))
+            size = float(np.sqrt(np.average([rmse(a.force - b.force) ** 2 for a, b in pairs], weights=weights)))
             best = Choice(segment, [list(r.names) for r in rivals], size, score)
     return best
 
@@ -136,7 +137,7 @@ class _Answer:
         own = range(len(UNKNOWNS), found.slopes.shape[1])
         columns = [*range(COORDINATE_COUNT), *own, UNKNOWNS.index("y0")]
         slopes = np.column_stack([found.slopes[:, columns], np.ones(len(found.force))])
-        blur = math.hypot(noise, math.sqrt(rival.left) * _rms(found.force - plain))
+        blur = math.hypot(noise, math.sqrt(rival.left) * rmse(found.force - plain))
         return _Answer(rival, found.force, slopes, blur)
 
 
@@ -145,10 +146,6 @@ def _told_apart(one: _Answer, other: _Answer, noise: float) -> float:
     difference = one.force - other.force
     left = min(_left(difference / noise, answer.slopes / noise, answer.rival) for answer in (one, other))
     return left * noise / max(one.blur, other.blur)
-
-
-def _rms(force: Array) -> float:
-    return float(np.sqrt(np.mean(force**2)))
 
 
 def _left(difference: Array, J: Array, held: Rival) -> float:

@@ -6,6 +6,7 @@ whole cycles anew, because within a cycle the misfit of neighbouring samples is 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +15,19 @@ from identification.arrays import Array, BoolArray
 from identification.problem import Piece
 from identification.recordings import Segment, Stretch
 
+Number = TypeVar("Number", bound=np.generic)
+
 _BLOCK = 1.0
 """[s] length of a block where the motion does not repeat."""
 _NEARLY = 0.1
 """[cycles] that a segment may lack of another whole one."""
 _PERIODIC = ("sine", "triangle")
+
+
+def by_piece(values: npt.NDArray[Number], pieces: Sequence[Piece]) -> list[npt.NDArray[Number]]:
+    """Values (N,) of all pieces one after the other, cut up: (N,) of each."""
+    edges = np.cumsum([len(p.force) for p in pieces])[:-1]
+    return np.split(values, edges)
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from identification.gap.hum import strongest_line
 from identification.gap.judge import Judge
 from identification.gap.plausible import plausibility
 from identification.gap.posterior import Candidate
+from identification.gap.residual import by_piece
 from identification.gap.screen import ALWAYS, Gain, every_choice, promise, screen, worth_fitting
 from identification.problem import Problem
 from identification.start import starting_points
@@ -178,9 +179,8 @@ class Search:
 
     def _polished(self, contender: Contender) -> Contender:
         """The same set, fitted on all samples."""
-        edges = np.cumsum([len(p.force) for p in self.full.pieces])[:-1]
         for _ in range(_ROUNDS):
-            simulated = np.split(contender.left.simulated, edges)
+            simulated = by_piece(contender.left.simulated, self.full.pieces)
             fit = fit_on_all(self.full, contender.fit, simulated, _POLISHED)
             contender = self.judged(fit)
             if abs(contender.seen - fit.rmse) < _HELD * self.floor:

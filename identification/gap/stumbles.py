@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
-from identification.gap.residual import Cycles
+from identification.gap.residual import Cycles, by_piece
 from identification.problem import Piece
 
 Indices = npt.NDArray[np.intp]
@@ -70,9 +70,8 @@ def _not_only_at_the_ends(bad: BoolArray, cycles: Cycles) -> BoolArray:
 
 
 def _without(pieces: Sequence[Piece], cycles: Cycles, bad: BoolArray) -> tuple[Piece, ...]:
-    edges = np.cumsum([len(p.force) for p in pieces])[:-1]
     inside = np.where(cycles.cycle >= 0, bad[cycles.cycle], False)
-    parts = np.split(inside, edges)
+    parts = by_piece(inside, pieces)
     return tuple(replace(p, train=np.where(m, 0.0, p.train)) for p, m in zip(pieces, parts, strict=True))
 
 

@@ -11,6 +11,7 @@ from identification.gap.contender import Contender
 from identification.gap.documents import DriveKind, Twin, TwinEffect
 from identification.gap.judge import Judge
 from identification.gap.model import named_effects
+from identification.gap.residual import by_piece
 from identification.motion import recorded_noise
 from identification.prediction import normalised, per_drive, rmse
 from identification.problem import COORDINATE_COUNT
@@ -72,8 +73,7 @@ def baseline_fit(
     coordinates = coordinate_estimates(
         plain.fit.coordinates, spread, set(names[~seen]), set(names[seen & ~inside]), unit
     )
-    edges = np.cumsum([len(p.force) for p in judge.pieces])[:-1]
-    errors = [-part for part in np.split(plain.left.residual, edges)]
+    errors = [-part for part in by_piece(plain.left.residual, judge.pieces)]
     return Fit(
         specimen=assembled.recordings[0].metadata["run"].get("specimen", ""),
         drive_kind=assembled.recordings[0].drive_kind,

@@ -7,12 +7,12 @@ import shutil
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 from urllib.request import Request, urlopen
 
 import pytest
 import yaml
+from live_bench import until
 from test_page import CHROMIUM, FOLDER, NODE, browser_test
 from test_service import PATIENCE, PROMPT, TINY
 
@@ -93,18 +93,10 @@ def address(folder):
             stack.callback(process.wait, PATIENCE)
             stack.callback(process.terminate)
             if name == "sim":
-                until(lambda: (folder / "bench.toml").is_file(), folder)
+                until(lambda: (folder / "bench.toml").is_file(), PATIENCE)
         text = folder / "service.log"
-        until(lambda: "#token=" in text.read_text(), folder)
+        until(lambda: "#token=" in text.read_text(), PATIENCE)
         yield re.search(r"(http://127\.0\.0\.1:\d+/)#token=(\S+)", text.read_text()).groups()
-
-
-def until(condition, folder):
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        said = {log.name: log.read_text()[-300:] for log in folder.glob("*.log")}
-        assert time.monotonic() < deadline, said
-        time.sleep(0.1)
 
 
 @pytest.mark.wire
@@ -114,9 +106,9 @@ def test_processes_of_the_file_record_and_identify(address, folder):
         with urlopen(Request(f"{address[0]}api/v1/{path}", body, headers), timeout=30) as answer:
             return json.load(answer)
 
-    until(lambda: call("agent")["state"] == "idle", folder)
+    until(lambda: call("agent")["state"] == "idle", PATIENCE)
     begun = call("runs", json.dumps({"method": TINY}).encode())["id"]
-    until(lambda: [job["state"] for job in call(f"runs/{begun}")["jobs"]] == ["done"], folder)
+    until(lambda: [job["state"] for job in call(f"runs/{begun}")["jobs"]] == ["done"], PATIENCE)
     assert call(f"runs/{begun}")["outcome"] == "clean"
     assert call(f"runs/{begun}/fit")["schema"] == "mrbench.fit/1"
 

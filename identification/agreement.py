@@ -12,7 +12,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 
-_AGREE = 2.9
+AGREE = 2.9
 """[1] deviations up to which two values count as the same: 95 % of the largest of a dozen lie below."""
 
 
@@ -31,7 +31,7 @@ class Agreement:
     @property
     def agrees(self) -> bool:
         """Whether no coordinate differs by more than chance lets the largest of them."""
-        return all(value <= _AGREE for value in self.deviations.values())
+        return all(value <= AGREE for value in self.deviations.values())
 
     def words(self) -> str:
         """In a sentence for a person."""
@@ -40,7 +40,7 @@ class Agreement:
         worst = f"{self.worst} by {self.deviations[self.worst]:.2g} deviations"
         if self.agrees:
             return f"agree: pinn and refine differ most in {worst}"
-        apart = [name for name, value in self.deviations.items() if value > _AGREE]
+        apart = [name for name, value in self.deviations.items() if value > AGREE]
         return (
             f"disagree in {', '.join(apart)}, most in {worst}: the law lacks something, or a stage has gone "
             "astray; trust neither interval there"

@@ -175,6 +175,11 @@ class Problem:
         return _SHARED + len(self.pieces)
 
     @property
+    def shared(self) -> list[int]:
+        """Places of the unknowns that all pieces share: q, the two delays, effects."""
+        return [*range(_SHARED), *range(self.first_effect, self.first_own)]
+
+    @property
     def delays(self) -> BoolArray:
         """(U,) True for the two delays."""
         mask = np.zeros(self.first_own + self.own_count, bool)

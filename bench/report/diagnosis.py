@@ -83,6 +83,12 @@ class NextStroke(Part):
     separates: list[list[str]]
 
 
+class Witness(Part):
+    """What the network says of the named effects."""
+
+    said: str
+
+
 class Diagnosis(Part):
     """A diagnosis, as far as a report shows it."""
 
@@ -96,6 +102,7 @@ class Diagnosis(Part):
     where: Where
     next_stroke: NextStroke | None = None
     explanation: str
+    witness: Witness | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -139,6 +146,7 @@ def context(found: Diagnosis, drive_unit: str) -> dict[str, Any]:
         "effects": [_effect_row(effect) for effect in found.effects],
         "sets": _set_rows(found),
         "next": _next_words(found.next_stroke, drive_unit),
+        "witness": found.witness.said if found.witness else "",
         "notes": found.notes,
     }
 

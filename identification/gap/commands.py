@@ -21,6 +21,13 @@ def diagnose(
     twin: Annotated[
         Path | None, typer.Option(help="Where the scenario goes that plays the damper with what was found.")
     ] = None,
+    witness: Annotated[
+        bool,
+        typer.Option(
+            "--witness",
+            help="Also train a network with the named effects in its residual, and say whether it finds the same.",
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Of the scattered starts.")] = 1,
 ) -> None:
     """Say where simulation and recording differ, which effect is missing, and how far adding it closes the gap."""
@@ -36,7 +43,7 @@ def diagnose(
             check_place(place)
     given = None if model is None else read_model(model)
     with progress_on_terminal("diagnose") as progress:
-        found = answer([load(log) for log in logs], given, seed=seed, progress=progress)
+        found = answer([load(log) for log in logs], given, seed=seed, witness=witness, progress=progress)
     write_document(out, found.diagnosis)
     if twin is not None:
         write_document(twin, found.twin)

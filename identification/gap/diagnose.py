@@ -12,6 +12,7 @@ from identification.gap.model import Model
 from identification.gap.posterior import Odds, odds
 from identification.gap.report import MOST_TIED, TIED, Answer, Report
 from identification.gap.search import Search
+from identification.gap.witness import hear
 from identification.identify import fit_problem
 from identification.problem import Piece, Problem
 from identification.recordings import Recording
@@ -35,6 +36,7 @@ def diagnose(
     model: Model | None = None,
     *,
     seed: int = 1,
+    witness: bool = False,
     progress: Progress = lambda what, error: None,
 ) -> Answer:
     """Diagnose the gap between the law and recordings of one damper.
@@ -43,12 +45,13 @@ def diagnose(
         recordings: one or several logs of one specimen.
         model: a simulation whose own gap is reported too.
         seed: of everything that chance decides.
+        witness: whether a network is trained with the effects that are named, to see whether it agrees.
         progress: told what is fitted and the force error on unseen strokes so far [N].
 
     Raises:
         NothingToFit: too little, clipped, of different specimens, or no damper's force and motion.
     """
-    return diagnose_prepared(prepare(recordings), model, seed=seed, progress=progress)
+    return diagnose_prepared(prepare(recordings), model, seed=seed, witness=witness, progress=progress)
 
 
 @dataclass(frozen=True)
@@ -83,6 +86,7 @@ def diagnose_prepared(
     model: Model | None = None,
     *,
     seed: int = 1,
+    witness: bool = False,
     progress: Progress = lambda what, error: None,
 ) -> Answer:
     """``diagnose`` for recordings that are prepared already."""
@@ -92,7 +96,13 @@ def diagnose_prepared(
     search = Search(problem, judge, hearing, progress)
     with one_thread():
         search.run()
-        return Report(assembled, judge, search, _final_odds(search), model, prepared.notes, seed).answer()
+        answer = Report(assembled, judge, search, _final_odds(search), model, prepared.notes, seed).answer()
+        named = answer.diagnosis.effects if witness else []
+        if not named:
+            return answer
+        fit = search.found[frozenset(effect.name for effect in named)].fit
+        said = hear(fit, problem.with_effects(fit.effects), assembled.drive_unit, seed, progress)
+    return replace(answer, diagnosis=answer.diagnosis.model_copy(update={"witness": said}))
 
 
 def _final_odds(search: Search) -> Odds:

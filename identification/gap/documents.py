@@ -112,6 +112,17 @@ class NextStroke(Document):
     )
 
 
+class Witness(Document):
+    """What the network says that has the named effects as terms of its residual and simulates nothing."""
+
+    agrees: bool | None = Field(
+        description="whether everything that both know lies within the intervals; null where it was not heard"
+    )
+    effects: dict[str, dict[str, EffectValue]] = Field(description="its own parameters, by effect and name")
+    seconds: float = Field(description="processor time of its training, in s")
+    said: str = Field(description="in a sentence for a person")
+
+
 class Diagnosis(Document):
     """The answer on the sim-to-real gap."""
 
@@ -125,6 +136,7 @@ class Diagnosis(Document):
     where: Where
     next_stroke: NextStroke | None = Field(description="null when nothing is open")
     explanation: str = Field(description="two sentences for a person")
+    witness: Witness | None = Field(default=None, description="null unless it was asked for and effects are named")
     notes: list[str] = Field(default=[], description="what the recording cannot show, in words")
     provenance: Provenance
 

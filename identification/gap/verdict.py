@@ -56,7 +56,7 @@ def named_effects(
             q.symbol: EffectValue(
                 value=value,
                 unit=q.unit_for(drive_unit),
-                ci95=_interval(value, deviations[q.symbol], q.low, q.high),
+                ci95=interval(value, deviations[q.symbol], q.low, q.high),
             )
             for q, value in zip(choice.quantities, active.values, strict=True)
         }
@@ -74,7 +74,7 @@ def named_effects(
     return sorted(named, key=lambda e: -e.share)
 
 
-def _interval(value: float, deviation: float, low: float, high: float) -> tuple[float, float]:
+def interval(value: float, deviation: float, low: float, high: float) -> tuple[float, float]:
     """95 % interval inside the bounds; on the logarithm where the value cannot be zero."""
     if not np.isfinite(deviation):
         return min(low, value), max(high, value)

@@ -130,5 +130,12 @@ def summary(diagnosis: Diagnosis) -> str:
     shrunk = "" if gap.shrinkage is None else f", shrinkage {gap.shrinkage:.2f}"
     return (
         f"{diagnosis.verdict}: {names}; held-out force error {gap.before_n:.3g} to {gap.after_n:.3g} N, "
-        f"noise floor {gap.noise_floor_n:.3g} N{shrunk}"
+        f"noise floor {gap.noise_floor_n:.3g} N{shrunk}{_witnessed(diagnosis)}"
     )
+
+
+def _witnessed(diagnosis: Diagnosis) -> str:
+    if diagnosis.witness is None:
+        return ""
+    said = diagnosis.witness.said
+    return f". {said}".removesuffix(".")

@@ -36,6 +36,8 @@ _TAIL = 1e-7
 class Learned:
     """One piece as the network sees it."""
 
+    number: int
+    """Its place in the problem."""
     piece: Piece
     inputs: Inputs
     span: Span
@@ -72,14 +74,14 @@ class Learned:
 
 def learned(problem: Problem, *, thin: int = 1) -> list[Learned]:
     """The pieces of a problem, each from its first to its last fitted sample."""
-    return [_learned(piece, thin) for piece in problem.pieces]
+    return [_learned(number, piece, thin) for number, piece in enumerate(problem.pieces)]
 
 
-def _learned(piece: Piece, thin: int) -> Learned:
+def _learned(number: int, piece: Piece, thin: int) -> Learned:
     inputs = Inputs(piece)
     at = np.flatnonzero(piece.train) * inputs.h - piece.force_delay
     span = Span(max(float(at[0]), 0.0), min(float(at[-1]), inputs.duration))
-    return Learned(piece, inputs, span, thin)
+    return Learned(number, piece, inputs, span, thin)
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,8 @@ class Batch:
     """(K,) [m/s] that a violation of the hysteresis is measured by."""
     motion: tuple[Array, Array]
     """(K, M) displacement [m] and velocity [m/s], the latter as the residual is asked for."""
+    samples: Indices
+    """(K, S) their places in the recording."""
     sample_time: Array
     """(K, S) [s] of the motion that each recorded force belongs to."""
     sample_rate: Array
@@ -168,6 +172,7 @@ def _batch(
     samples = _samples(source, elements, late)
     sample_time: Array = np.asarray(samples * source.inputs.h - late - source.lag)
     sample_rate, sample_change, before = _at_samples(source, network, elements, samples, late)
+    inside = np.clip(samples, 0, len(source.piece.force) - 1)
     lengths = np.array([e.memory.length for e in elements]) / source.inputs.h
     values = network.layer.values(nodes)
     tests = _tests(values, network.layer.slopes(nodes), np.sqrt(quadrature)[:, None])
@@ -186,12 +191,13 @@ def _batch(
         share=np.sqrt(quadrature * np.maximum(lengths, 1.0)[:, None]),
         slip_velocity=np.array([e.slip_velocity for e in elements]),
         motion=motion,
+        samples=inside,
         sample_time=sample_time,
         sample_rate=sample_rate,
         sample_change=sample_change,
         before=before,
         sample_motion=source.inputs.motion(sample_time),
-        force=source.piece.force[np.clip(samples, 0, len(source.piece.force) - 1)],
+        force=source.piece.force[inside],
         counts=_counts(source, elements, samples, late),
     )
 

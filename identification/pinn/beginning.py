@@ -83,6 +83,8 @@ class Start(NamedTuple):
     coordinates: Coordinates
     misfit: float
     """[N] that a damper without memory leaves on most samples."""
+    effects: Array
+    """(P,) search numbers of the effects beside the law."""
 
 
 def starts(problem: Problem) -> Iterator[Start]:
@@ -90,9 +92,16 @@ def starts(problem: Problem) -> Iterator[Start]:
     found = _memoryless(problem)
     slip = _yield_displacement(problem, found)
     misfit = _usual_misfit(problem, found)
-    for dashpot, rise, factor in _FACTORS:
+    for number, (dashpot, rise, factor) in enumerate(_FACTORS):
         c1 = (found.c1[0] * dashpot / rise, found.c1[1] * dashpot * rise)
-        yield Start(_coordinates(problem, found._replace(c1=c1), slip * factor), misfit)
+        coordinates = _coordinates(problem, found._replace(c1=c1), slip * factor)
+        yield Start(coordinates, misfit, _effects(problem, number))
+
+
+def _effects(problem: Problem, number: int) -> Array:
+    """Search numbers (P,) of the effects, which have starts of their own; most begin with no size at all."""
+    own = [e.to_search(e.form.starts[number % len(e.form.starts)]) for e in problem.effects]
+    return np.concatenate([np.empty(0), *own])
 
 
 def _usual_misfit(problem: Problem, found: Memoryless) -> float:
@@ -186,11 +195,17 @@ def _coordinates(problem: Problem, found: Memoryless, slip: float) -> Coordinate
 
 
 class FirstStates:
-    """States of one piece as its recorded force shows them, for a damper with these coordinates."""
+    """States of one piece as its recorded force shows them, for a damper with these coordinates.
 
-    def __init__(self, source: Learned, c: Coordinates) -> None:
+    Args:
+        source: the piece.
+        c: of the damper.
+        beside: force [N] (N,) that effects add.
+    """
+
+    def __init__(self, source: Learned, c: Coordinates, beside: Array | float = 0.0) -> None:
         piece, inputs = source.piece, source.inputs
-        force = smoothed_force(piece.force, piece.stroke.rate)
+        force = smoothed_force(piece.force - beside, piece.stroke.rate)
         self.time: Array = np.asarray(np.arange(len(force)) * inputs.h - piece.force_delay)
         x, v = inputs.motion(self.time)
         u = inputs.field(self.time, c.eta, piece.drive_delay).u

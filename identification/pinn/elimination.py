@@ -1,8 +1,9 @@
 """One Gauss-Newton step over all weights and parameters, by orthogonal factorisations only.
 
 The heads inside an element appear in its own rows alone, so they are eliminated there (variable projection, Golub
-and Pereyra 1973); the nodes form a chain in each piece and go one after the other; what is left are fifteen
-columns for the unknowns that all share. Normal equations would square a condition number that is large already.
+and Pereyra 1973); the nodes form a chain in each piece and go one after the other; what is left are the columns of
+the unknowns that all share: fifteen, and the parameters of effects beside the law. Normal equations would square a
+condition number that is large already.
 """
 
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from scipy.linalg import solve_triangular
 
 from identification.arrays import Array, BoolArray
 from identification.pinn.batches import Batch
-from identification.pinn.local_rows import UNKNOWNS, Rows
+from identification.pinn.local_rows import Rows
 from identification.pinn.mesh import Heads, Mesh
 
 _RIDGE = 1e-6
@@ -35,28 +36,28 @@ class Factorised:
     """All rows of one linearisation, with everything but the shared unknowns eliminated."""
 
     triangle: Array
-    """(R, 16) rows over the shared unknowns, right-hand side last."""
+    """(R, C + 1) rows over the C shared unknowns, right-hand side last."""
     inner: list[Array]
-    """Of each batch: (K, I, I + 4 + 15 + 1) triangular rows of its inner heads."""
+    """Of each batch: (K, I, I + 4 + C + 1) triangular rows of its inner heads."""
     nodes: list[list[Array]]
-    """Of each piece: (2, 2 + 2 + 15 + 1) rows of each node over itself, the next one and the shared unknowns."""
+    """Of each piece: (2, 2 + 2 + C + 1) rows of each node over itself, the next one and the shared unknowns."""
 
     def information(self) -> Array:
-        """(15, 15) of the shared unknowns, heads marginalised."""
-        R = self.triangle[:, :UNKNOWNS]
+        """(C, C) of the shared unknowns, heads marginalised."""
+        R = self.triangle[:, :-1]
         return np.asarray(R.T @ R)
 
     def step(self, free: BoolArray, damping: Array, low: Array, high: Array) -> Array:
-        """(15,) of the shared unknowns; one that would leave its range goes to the edge, and the others know.
+        """(C,) of the shared unknowns; one that would leave its range goes to the edge, and the others know.
 
         Args:
-            free: (15,) which may move.
-            damping: (15,) added to the information's diagonal.
-            low: (15,) furthest down that each may go.
-            high: (15,) furthest up.
+            free: (C,) which may move.
+            damping: (C,) added to the information's diagonal.
+            low: (C,) furthest down that each may go.
+            high: (C,) furthest up.
         """
-        found, moving = np.zeros(UNKNOWNS), free.copy()
-        for _ in range(UNKNOWNS):
+        found, moving = np.zeros(len(free)), free.copy()
+        for _ in range(len(free)):
             found[moving] = self._unbounded(found, moving, damping)
             outside = moving & ((found < low) | (found > high))
             if not outside.any():
@@ -100,8 +101,8 @@ def factorise(
     """Eliminate all heads from the rows of one linearisation."""
     inner, rest = [], {}
     for batch, row in zip(batches, rows, strict=True):
-        R = _eliminated(row)
         count = 2 * heads.inner_z.shape[1]
+        R = _eliminated(row, heads.inner_z.shape[1] + 2)
         inner.append(R[:, :count])
         rest.update(dict(zip(batch.elements.tolist(), R[:, count:, count:], strict=True)))
     triangles, nodes = [], []
@@ -116,12 +117,11 @@ def factorise(
     return Factorised(_triangle(np.vstack(triangles)), inner, nodes)
 
 
-def _eliminated(row: Rows) -> Array:
+def _eliminated(row: Rows, rank: int) -> Array:
     """(K, C, C) triangle over inner heads, nodes, shared unknowns and right-hand side of each element."""
     if row.slopes is None:
         raise AssertionError("rows without slopes cannot be factorised")
     elements, count, columns = row.slopes.shape
-    rank = (columns - UNKNOWNS) // 2
     held = 2 * rank
     z, y, shared = np.arange(2, rank), np.arange(rank + 2, 2 * rank), np.arange(2 * rank, columns)
     order = np.concatenate([z, y, [0, rank, 1, rank + 1], shared])
@@ -139,7 +139,7 @@ def _triangle(rows: Array) -> Array:
 
 def _along_the_chain(elements: Sequence[Array], pulled: float, prior: NodePrior) -> tuple[Array, list[Array]]:
     """What a piece says of the shared unknowns, and the rows that give its nodes back."""
-    width = _NODES + UNKNOWNS + 1
+    width = elements[0].shape[1]
     carry = np.zeros((1, width))
     carry[0, 1], carry[0, -1] = 1.0 / prior.deviation, pulled
     nodes = []

@@ -40,42 +40,70 @@ def hysteresis_slopes(p: Values, log: Callable[[Number], Number]) -> dict[str, N
 
 def balance(p: Values) -> Number:
     """Violation [N] of eq. 4, times c0 + c1."""
-    F, c0, c1 = (law.at_field(p[f"{name}_a"], p[f"{name}_b"], p["u"]) for name in ("F", "c0", "c1"))
+    F, c0, c1 = (_at_field(p, name) for name in ("F", "c0", "c1"))
     return (c0 + c1) * (p["y_rate"] - law.inner_velocity(p["x"], p["v"], p["y"], p["z"], F, c0, c1, p["k0"]))
 
 
 def balance_slopes(p: Values) -> dict[str, Number]:
     """Slopes of the violation of eq. 4."""
-    z, u, rate, slip = p["z"], p["u"], p["y_rate"], p["v"] - p["y_rate"]
+    u, rate = p["u"], p["y_rate"]
+    z, slip, inner = _factor(p, "F") * p["z"], _factor(p, "c0") * (p["v"] - rate), _factor(p, "c1") * rate
     return {
-        "z": -law.at_field(p["F_a"], p["F_b"], u),
+        "z": -_at_field(p, "F"),
         "y": p["k0"] + 0.0 * z,
-        "y_rate": law.at_field(p["c0_a"] + p["c1_a"], p["c0_b"] + p["c1_b"], u),
-        "u": p["c1_b"] * rate - p["c0_b"] * slip - p["F_b"] * z,
+        "y_rate": _at_field(p, "c0") + _at_field(p, "c1"),
+        "u": p["c1_b"] * inner - p["c0_b"] * slip - p["F_b"] * z,
         "F_a": -z,
         "F_b": -u * z,
         "c0_a": -slip,
         "c0_b": -u * slip,
-        "c1_a": rate,
-        "c1_b": u * rate,
+        "c1_a": inner,
+        "c1_b": u * inner,
         "k0": p["y"] - p["x"],
     }
 
 
+def balance_slopes_over_inputs(p: Values) -> dict[str, Number]:
+    """And over what effects may change: the damper's motion, and the factors of F, c0 and c1."""
+    F, c0, c1 = (law.at_field(p[f"{name}_a"], p[f"{name}_b"], p["u"]) for name in ("F", "c0", "c1"))
+    return {
+        "x": 0.0 * p["z"] - p["k0"],
+        "v": -_at_field(p, "c0") + 0.0 * p["z"],
+        "F_factor": -F * p["z"],
+        "c0_factor": -c0 * (p["v"] - p["y_rate"]),
+        "c1_factor": c1 * p["y_rate"],
+    }
+
+
+def _at_field(p: Values, name: str) -> Number:
+    """F [N], c0 or c1 [N s/m] at the field, where effects scale it with their factor."""
+    return _factor(p, name) * law.at_field(p[f"{name}_a"], p[f"{name}_b"], p["u"])
+
+
+def _factor(p: Values, name: str) -> Number:
+    return p.get(f"{name}_factor", 1.0)
+
+
 def force(p: Values) -> Number:
-    """Force [N] of eq. 2."""
-    return law.force(p["y_rate"], p["x"], law.at_field(p["c1_a"], p["c1_b"], p["u"]), p["k1"], 0.0) - p["f0"]
+    """Force [N] of eq. 2, and what acts beside it."""
+    return law.force(p["y_rate"], p["x"], _at_field(p, "c1"), p["k1"], 0.0) - p["f0"] + p.get("beside", 0.0)
 
 
 def force_slopes(p: Values) -> dict[str, Number]:
     """Slopes of the force."""
-    rate, u = p["y_rate"], p["u"]
+    u, rate, inner = p["u"], p["y_rate"], _factor(p, "c1") * p["y_rate"]
     return {
-        "y_rate": law.at_field(p["c1_a"], p["c1_b"], u),
+        "y_rate": _at_field(p, "c1"),
         "x": p["k1"] + 0.0 * rate,
-        "u": p["c1_b"] * rate,
-        "c1_a": rate,
-        "c1_b": u * rate,
+        "u": p["c1_b"] * inner,
+        "c1_a": inner,
+        "c1_b": u * inner,
         "k1": p["x"],
         "f0": 0.0 * rate - 1.0,
     }
+
+
+def force_slopes_over_inputs(p: Values) -> dict[str, Number]:
+    """And over what effects may change: the factor of c1, and the force beside the law."""
+    rate = p["y_rate"]
+    return {"c1_factor": law.at_field(p["c1_a"], p["c1_b"], p["u"]) * rate, "beside": 0.0 * rate + 1.0}

@@ -11,9 +11,10 @@ from identification.damper.coordinates import Coordinates
 from identification.force_channel import filter_lag
 from identification.pinn.batches import Learned, learned, make_batches
 from identification.pinn.beginning import FirstStates, Start
+from identification.pinn.effect_terms import Acting, active, lateness
 from identification.pinn.elimination import Factorised, NodePrior, factorise
 from identification.pinn.hidden_layer import HiddenLayer
-from identification.pinn.local_rows import UNKNOWNS, LocalLoss, Rows, Weights
+from identification.pinn.local_rows import LocalLoss, Rows, Weights
 from identification.pinn.mesh import Y_UNIT, Heads, LocalNetwork, SlipVelocity, States, make_mesh
 from identification.pinn.quadrature import gauss_points
 from identification.pinn.result import Moment
@@ -21,6 +22,8 @@ from identification.pinn.settings import Level, LocalSettings
 from identification.pinn.supervision import Supervision
 from identification.problem import COORDINATE_COUNT, Piece, Problem
 
+_EFFECTS = COORDINATE_COUNT + 2
+"""First of the effects' unknowns."""
 _LARGEST_STEP = 0.7
 """[1] largest change of a search number in one step."""
 _SHORTER, _TRIES = 0.4, 8
@@ -57,17 +60,17 @@ class Trained:
     """A network, its parameters and how sure they are."""
 
     unknowns: Array
-    """(15,) search numbers and delays."""
+    """(C,) search numbers, delays and parameters of effects: all that the pieces share."""
     network: LocalNetwork
     information: Array
-    """(15, 15) of the last factorisation, in units of the noise it was weighed with."""
+    """(C, C) of the last factorisation, in units of the noise it was weighed with."""
     misfit: Misfit
     steps: int
 
     def covariance(self, problem: Problem) -> Array:
-        """(15, 15) of the shared unknowns; zero rows where one is not free."""
-        free = problem.free[:UNKNOWNS]
-        found = np.zeros((UNKNOWNS, UNKNOWNS))
+        """(C, C) of the shared unknowns; zero rows where one is not free."""
+        free = problem.free[problem.shared]
+        found = np.zeros((len(free), len(free)))
         found[np.ix_(free, free)] = np.linalg.pinv(self.information[np.ix_(free, free)], rcond=1e-13)
         return found
 
@@ -77,7 +80,7 @@ class LocalTraining:
 
     def __init__(self, problem: Problem, settings: LocalSettings, supervision: Supervision, start: Start) -> None:
         self.problem, self.settings, self.supervision = problem, settings, supervision
-        self.unknowns = np.concatenate([problem.space.to_search(start.coordinates), np.zeros(2)])
+        self.unknowns = np.concatenate([problem.space.to_search(start.coordinates), np.zeros(2), start.effects])
         self.noise = max(problem.noise, start.misfit)
         self.steps = 0
         self.history: list[Moment] = []
@@ -85,13 +88,14 @@ class LocalTraining:
         self.size = settings.layers[0]
         self.network = self._first(problem)
         self.misfit = Misfit(np.inf, np.inf, np.inf, 0.0)
-        self.information = np.zeros((UNKNOWNS, UNKNOWNS))
+        self.information = np.zeros((len(self.unknowns), len(self.unknowns)))
 
     def _first(self, problem: Problem) -> LocalNetwork:
         """States as the recorded force shows them to a damper with the present coordinates."""
         c = problem.space.to_coordinates(self.unknowns[:COORDINATE_COUNT])
         pieces = learned(coarse(problem))
-        first = [FirstStates(p, c) for p in pieces]
+        acting = Acting(problem, pieces, self.unknowns) if problem.effects else None
+        first = [FirstStates(p, c, acting.along(p).values["beside"] if acting else 0.0) for p in pieces]
         slips = [f.slip_velocity() for f in first]
         return self._on_mesh(pieces, slips, None, self._layer(), lambda i, t: first[i].at(t))
 
@@ -171,17 +175,18 @@ class LocalTraining:
         for number in range(self.settings.multipliers):
             for _ in range(_WAITING_AGAIN if number else _WAITING):
                 pull = loss.rows(self.unknowns, self.network.heads, weights, pull, slopes=False)
-                self._descend(loss, weights, np.zeros(UNKNOWNS, bool), 2, 0.0, pull)
+                self._descend(loss, weights, np.zeros(len(self.unknowns), bool), 2, 0.0, pull)
             self._descend(loss, weights, free, 4, 0.0, pull)
         self.information = self._factorised(loss, weights, pull)[0].information()
 
     def _free(self, level: Level, number: int, again: int) -> BoolArray:
-        """(15,) which shared unknowns may move."""
-        free = self.problem.free[:UNKNOWNS].copy()
+        """(C,) which shared unknowns may move."""
+        free = self.problem.free[self.problem.shared]
         first = number == 0 and again == 0
         held = [name in level.held or (name == "eta" and first) for name in Coordinates._fields]
         free[:COORDINATE_COUNT] &= ~np.array(held)
-        free[COORDINATE_COUNT:] &= number > 0
+        free[COORDINATE_COUNT:_EFFECTS] &= number > 0
+        free[_EFFECTS:] &= not first
         return free
 
     def _descend(
@@ -191,8 +196,8 @@ class LocalTraining:
         """Gauss-Newton on heads and shared unknowns together."""
         for _ in range(steps):
             factorised, cost = self._factorised(loss, weights, pull)
-            low, high = (bound[:UNKNOWNS] - self.unknowns for bound in self.problem.bounds())
-            step = factorised.step(free, np.full(UNKNOWNS, damping), low, high)
+            low, high = (bound[self.problem.shared] - self.unknowns for bound in self.problem.bounds())
+            step = factorised.step(free, np.full(len(free), damping), low, high)
             heads = factorised.heads(step, self.network.mesh, loss.batches)
             fall = self._along(loss, weights, pull, step, heads, cost)
             self.steps += 1
@@ -221,7 +226,7 @@ class LocalTraining:
         cost: float,
     ) -> float:
         """As far along a step as the cost falls; how far it fell."""
-        share = min(1.0, _LARGEST_STEP / max(float(np.abs(step[:COORDINATE_COUNT]).max()), 1e-12))
+        share = min(1.0, _LARGEST_STEP / max(self._length(step), 1e-12))
         for _ in range(_TRIES):
             unknowns = self.unknowns + share * step
             moved = self.network.heads.moved(heads, share)
@@ -232,8 +237,15 @@ class LocalTraining:
             share *= _SHORTER
         return 0.0
 
+    def _length(self, step: Array) -> float:
+        """Of a step of the shared unknowns (C,), in units of a search number."""
+        whole = np.zeros(self.problem.first_own)
+        whole[self.problem.shared] = step
+        return self.problem.step_length(whole)
+
     def _loss(self, problem: Problem, pieces: Sequence[Learned]) -> LocalLoss:
         delay = float(self.unknowns[COORDINATE_COUNT]) * problem.delay_prior
+        delay += lateness(active(problem, self.unknowns))
         batches = make_batches(pieces, self.network, delay, self.size.points, self.settings.residual)
         return LocalLoss(problem, batches, delay)
 
@@ -254,7 +266,7 @@ class LocalTraining:
         layer: HiddenLayer, states: Callable[[int, Array], States],
     ) -> LocalNetwork:  # fmt: skip
         c = self.problem.space.to_coordinates(self.unknowns[:COORDINATE_COUNT])
-        late = float(self.unknowns[-1]) * self.problem.delay_prior
+        late = float(self.unknowns[COORDINATE_COUNT + 1]) * self.problem.delay_prior
         mesh = make_mesh(
             [p.inputs for p in pieces], [p.span for p in pieces], slips, c.D_y, c.eta,
             [p.piece.drive_delay + late for p in pieces],
@@ -266,15 +278,15 @@ class LocalTraining:
 def _cost(rows: Sequence[Rows], unknowns: Array) -> float:
     """[1] of all rows and of the delays' priors."""
     total = sum(float((row.all**2).sum()) for row in rows) + float(
-        unknowns[COORDINATE_COUNT:] @ unknowns[COORDINATE_COUNT:]
+        unknowns[COORDINATE_COUNT:_EFFECTS] @ unknowns[COORDINATE_COUNT:_EFFECTS]
     )
     return total if np.isfinite(total) else np.inf
 
 
 def _with_delay_priors(found: Factorised, unknowns: Array) -> Factorised:
-    table = np.zeros((2, UNKNOWNS + 1))
+    table = np.zeros((2, len(unknowns) + 1))
     table[0, COORDINATE_COUNT], table[1, COORDINATE_COUNT + 1] = 1.0, 1.0
-    table[:, -1] = -unknowns[COORDINATE_COUNT:]
+    table[:, -1] = -unknowns[COORDINATE_COUNT:_EFFECTS]
     return replace(found, triangle=np.vstack([found.triangle, table]))
 
 

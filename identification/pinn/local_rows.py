@@ -15,17 +15,15 @@ from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.pinn import law_rows
 from identification.pinn.batches import Batch
-from identification.pinn.inputs import Field
+from identification.pinn.effect_terms import Acting, Driven, active, lateness, over_search
 from identification.pinn.mesh import Y_UNIT, Heads
 from identification.problem import COORDINATE_COUNT, Problem
 
-UNKNOWNS = COORDINATE_COUNT + 2
-"""Search numbers, and the delays of force and drive channel in units of their prior."""
 Z_SCALE, BALANCE_SCALE = 0.7, 10.0
 """[1] a hysteresis residual of this part of the slip velocity at breakthrough, and a balance residual of ten times
 the force noise, weigh as much as one deviation of a sample."""
 _ETA = Coordinates._fields.index("eta")
-_FORCE_DELAY, _DRIVE_DELAY = COORDINATE_COUNT, COORDINATE_COUNT + 1
+_FORCE_DELAY, _DRIVE_DELAY, _EFFECTS = COORDINATE_COUNT, COORDINATE_COUNT + 1, COORDINATE_COUNT + 2
 
 
 class Weights(NamedTuple):
@@ -47,7 +45,7 @@ class Rows:
     misfit: Array
     """(K, S)"""
     slopes: Array | None = None
-    """(K, 2 rank + S, 2 rank + 15) over the heads of z, of y, and the unknowns that all share."""
+    """(K, 2 rank + S, 2 rank + C) over the heads of z, of y, and the C unknowns that all share."""
 
     @property
     def all(self) -> Array:
@@ -72,6 +70,10 @@ class _Point(NamedTuple):
     """[s] beyond what the instruments report and the batches were made with."""
     drive_delay: float
     """[s] beyond what the instruments report."""
+    over_values: Array
+    """(P,) slopes of the effects' parameters over their search numbers."""
+    acting: Acting | None
+    """The effects; None where there are none."""
 
 
 class _Part(NamedTuple):
@@ -80,17 +82,17 @@ class _Part(NamedTuple):
     value: Array
     over: dict[str, Array]
     """Empty unless asked for."""
-    field: Field
+    driven: Driven
 
 
 @dataclass(frozen=True)
 class LocalLoss:
-    """What the local network is trained on."""
+    """What the local network is trained on; its unknowns are those that all pieces of the problem share."""
 
     problem: Problem
     batches: Sequence[Batch]
     made_with: float
-    """[s] force delay that the batches' grids were made with."""
+    """[s] force delay, with that of the effects, that the batches' grids were made with."""
 
     def rows(
         self, unknowns: Array, heads: Heads, weights: Weights, pull: Sequence[Rows] | None = None, *, slopes: bool
@@ -98,7 +100,7 @@ class LocalLoss:
         """The rows of every batch.
 
         Args:
-            unknowns: (15,)
+            unknowns: (C,) that all elements share.
             heads: of all elements.
             weights: of the parts.
             pull: residuals of the law that multipliers add, one for each batch.
@@ -110,9 +112,15 @@ class LocalLoss:
 
     def _point(self, unknowns: Array) -> _Point:
         q, space = unknowns[:COORDINATE_COUNT], self.problem.space
-        force_delay, drive_delay = unknowns[COORDINATE_COUNT:] * self.problem.delay_prior
+        late, drive_delay = (float(d) for d in unknowns[COORDINATE_COUNT:_EFFECTS] * self.problem.delay_prior)
+        over_values, acting = np.empty(0), None
+        if self.problem.effects:
+            sources = {b.source.number: b.source for b in self.batches}
+            acting = Acting(self.problem, list(sources.values()), unknowns)
+            late += lateness(active(self.problem, unknowns))
+            over_values = over_search(self.problem, unknowns[_EFFECTS:])
         return _Point(
-            space.to_coordinates(q), space.slopes(q), float(force_delay) - self.made_with, float(drive_delay)
+            space.to_coordinates(q), space.slopes(q), late - self.made_with, drive_delay, over_values, acting
         )
 
     def residuals(self, unknowns: Array, heads: Heads) -> Iterator[tuple[Array, Array, Array]]:
@@ -145,7 +153,7 @@ class LocalLoss:
     def _law(self, b: Batch, point: _Point, heads: Heads, slopes: bool) -> tuple[_Part, _Part]:
         """Residuals of eqs. 3 and 4 at a batch's points."""
         z, y = heads.of(b.left, b.elements)
-        field = _field(b, b.time, point)
+        driven = _driven_at_points(b, point)
         values = point.coordinates._asdict() | {
             "z": z @ b.values.T,
             "z_rate": _head(b.slopes, z),
@@ -153,32 +161,35 @@ class LocalLoss:
             "y_rate": _head(b.slopes, y) * Y_UNIT,
             "x": b.motion[0],
             "v": b.motion[1],
-            "u": field.u,
-        }
+            "u": driven.field.u,
+        } | driven.values  # fmt: skip
+        over = law_rows.hysteresis_slopes(values, np.log) if slopes else {}
+        over_too = law_rows.balance_slopes(values) if slopes else {}
+        if slopes and point.acting:
+            over["v"] = -over["y_rate"]
+            over_too |= law_rows.balance_slopes_over_inputs(values)
         return (
-            _Part(
-                law_rows.hysteresis(values), law_rows.hysteresis_slopes(values, np.log) if slopes else {}, field
-            ),
-            _Part(law_rows.balance(values), law_rows.balance_slopes(values) if slopes else {}, field),
+            _Part(law_rows.hysteresis(values), over, driven),
+            _Part(law_rows.balance(values), over_too, driven),
         )
 
     def _force(self, b: Batch, point: _Point, heads: Heads, slopes: bool) -> _Part:
         """The network's force at a batch's samples, as the channel records it."""
         _, y = heads.of(b.left, b.elements)
-        shift = point.force_delay
-        x, v = b.sample_motion
-        field = _field(b, b.sample_time - shift, point)
+        driven = _driven_at_samples(b, point)
         change = _head(b.sample_change, y) * Y_UNIT
         values = point.coordinates._asdict() | {
-            "y_rate": _head(b.sample_rate, y) * Y_UNIT - shift * change + b.before,
-            "x": x - shift * v,
-            "u": field.u,
-        }
+            "y_rate": _head(b.sample_rate, y) * Y_UNIT - point.force_delay * change + b.before,
+            "u": driven.field.u,
+        } | driven.values  # fmt: skip
         if not slopes:
-            return _Part(law_rows.force(values), {}, field)
+            return _Part(law_rows.force(values), {}, driven)
         over = law_rows.force_slopes(values)
-        over["time"] = over["y_rate"] * change + over["x"] * v
-        return _Part(law_rows.force(values), over, field)
+        if point.acting:
+            over |= law_rows.force_slopes_over_inputs(values)
+        # A force that comes late shows an older motion and an older field.
+        driven.over["y_rate"] = -driven.later[:, None, None] * change
+        return _Part(law_rows.force(values), over, driven)
 
     def _slopes(
         self, b: Batch, point: _Point, parts: tuple[_Part, _Part, _Part], scales: tuple[Array, Array, Array]
@@ -190,36 +201,52 @@ class LocalLoss:
         )
         points, rank = b.values.shape
         z, y = slice(rank), slice(rank, 2 * rank)
-        law = np.zeros((2, len(b.elements), points, 2 * rank + UNKNOWNS))
+        shared = _EFFECTS + len(point.over_values)
+        law = np.zeros((2, len(b.elements), points, 2 * rank + shared))
         law[0, ..., z] = hysteresis["z"][..., None] * b.values + hysteresis["z_rate"][..., None] * b.slopes
         law[0, ..., y] = Y_UNIT * hysteresis["y_rate"][..., None] * b.slopes
         law[1, ..., z] = balance["z"][..., None] * b.values
         law[1, ..., y] = Y_UNIT * (balance["y"][..., None] * b.values + balance["y_rate"][..., None] * b.slopes)
-        samples = np.zeros((len(b.elements), b.counts.shape[1], 2 * rank + UNKNOWNS))
+        samples = np.zeros((len(b.elements), b.counts.shape[1], 2 * rank + shared))
         rate = b.sample_rate - point.force_delay * b.sample_change if point.force_delay else b.sample_rate
         samples[..., y] = Y_UNIT * force["y_rate"][..., None] * rate
         for table, over, part in zip((*law, samples), (hysteresis, balance, force), parts, strict=True):
-            table[..., 2 * rank :] = self._shared(over, part.field, point)
+            table[..., 2 * rank :] = self._shared(over, part.driven, point)
         return np.concatenate([*(b.asked.T @ law), samples], 1)
 
-    def _shared(self, over: dict[str, Array], field: Field, point: _Point) -> Array:
-        """(K, M, 15) slopes over the unknowns that all elements share."""
-        table = np.zeros((*field.u.shape, UNKNOWNS))
+    def _shared(self, over: dict[str, Array], driven: Driven, point: _Point) -> Array:
+        """(K, M, C) slopes over the unknowns that all elements share."""
+        table = np.zeros((*driven.field.u.shape, _EFFECTS + len(point.over_values)))
         for i, name in enumerate(Coordinates._fields):
             if name in over:
                 table[..., i] = over[name]
         if "u" in over:
-            late = over["u"] * field.over_delay
-            table[..., _ETA] = over["u"] * field.over_eta
-            table[..., _DRIVE_DELAY] = self.problem.delay_prior * late
-            # A force that comes late shows an older motion and an older field.
-            table[..., _FORCE_DELAY] = self.problem.delay_prior * (late - over["time"]) if "time" in over else 0.0
+            table[..., _ETA] = over["u"] * driven.field.over_eta
+            table[..., _DRIVE_DELAY] = self.problem.delay_prior * over["u"] * driven.field.over_delay
+        for name in driven.over.keys() & over.keys():
+            late, *own = driven.over[name]
+            table[..., _FORCE_DELAY] += self.problem.delay_prior * over[name] * late
+            for k, row in enumerate(own):
+                table[..., _EFFECTS + k] += over[name] * row * point.over_values[k]
         table[..., :COORDINATE_COUNT] = table[..., :COORDINATE_COUNT] @ point.over_search
         return table
 
 
-def _field(b: Batch, time: Array, point: _Point) -> Field:
-    return b.source.inputs.field(time, point.coordinates.eta, b.source.piece.drive_delay + point.drive_delay)
+def _driven_at_points(b: Batch, point: _Point) -> Driven:
+    if point.acting:
+        return point.acting.at_points(b)
+    field = b.source.inputs.field(b.time, point.coordinates.eta, b.source.piece.drive_delay + point.drive_delay)
+    return Driven(field, {}, {}, np.ones(1))
+
+
+def _driven_at_samples(b: Batch, point: _Point) -> Driven:
+    if point.acting:
+        return point.acting.at_samples(b)
+    x, v = b.sample_motion
+    late = b.source.piece.drive_delay + point.drive_delay
+    field = b.source.inputs.field(b.sample_time - point.force_delay, point.coordinates.eta, late)
+    over = {"x": -v[None], "u": field.over_delay[None]}
+    return Driven(field, {"x": x - point.force_delay * v}, over, np.ones(1))
 
 
 def _head(functions: Array, heads: Array) -> Array:

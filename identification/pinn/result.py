@@ -9,6 +9,7 @@ from identification.arrays import Array
 from identification.damper.coordinates import Coordinates, to_parameters
 from identification.damper.parameters import Parameters
 from identification.problem import COORDINATE_COUNT
+from identification.simulate import ActiveEffect
 
 
 class Moment(NamedTuple):
@@ -39,9 +40,9 @@ class Outcome:
     """What one of the networks found."""
 
     unknowns: Array
-    """(15,) search numbers, delays in units of their prior."""
+    """(C,) search numbers, delays in units of their prior, search numbers of the effects."""
     covariance: Array | None
-    """(15, 15) of them from the last factorisation; None where the method gives none."""
+    """(C, C) of them from the last factorisation; None where the method gives none."""
     forces: tuple[Array, ...]
     """(N,) of each piece: the network's own force [N], as the channel records it; NaN where it knows nothing."""
     accepted: bool
@@ -59,11 +60,15 @@ class PinnResult:
     network: str
     coordinates: Coordinates
     covariance: Array | None
-    """(15, 15) of search numbers and delays, the latter in units of their prior; None where there is none."""
+    """(C, C) of search numbers, delays in units of their prior, and effects; None where there is none."""
     coordinate_covariance: Array | None
     """(13, 13)"""
     delays: tuple[float, float]
     """[s] of force and drive channel, beyond what the instruments report."""
+    effects: tuple[ActiveEffect, ...]
+    """What acts beside the law."""
+    effect_deviations: Array
+    """(P,) standard deviations [SI] of their parameters, one effect after the other; NaN where none are known."""
     reconstruction: Errors
     """The network's own force. It says little of the parameters."""
     simulation: Errors

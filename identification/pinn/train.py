@@ -6,6 +6,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
+from identification.errors import IdentificationError
+from identification.pinn.effect_terms import active, effect_deviations, refuse_strangers
 from identification.pinn.local_runs import train_local
 from identification.pinn.result import Errors, Outcome, PinnResult
 from identification.pinn.settings import GlobalSettings, LocalSettings, PaperSettings
@@ -14,6 +16,7 @@ from identification.pinn.supervision import Supervision
 from identification.prediction import predict_piece, rmse
 from identification.problem import COORDINATE_COUNT, Piece, Problem
 from identification.recordings import Stretch
+from identification.simulate import ActiveEffect
 from identification.threads import one_thread
 
 _MOST, _ON_A_PROCESSOR = 16, 1
@@ -39,7 +42,9 @@ def train(
 
     Raises:
         Stopped: before anything was found.
+        IdentificationError: an effect that this network cannot take in.
     """
+    _refuse_strange(problem, settings)
     if isinstance(settings, GlobalSettings):
         return train_batch([problem], settings, supervision)[0]
     supervision = supervision or Supervision()
@@ -97,6 +102,14 @@ def batches(problems: Sequence[Problem], settings: GlobalSettings) -> list[list[
     return [some[k : k + most] for some in alike.values() for k in range(0, len(some), most)]
 
 
+def _refuse_strange(problem: Problem, settings: LocalSettings | GlobalSettings | PaperSettings) -> None:
+    if problem.effects and not isinstance(settings, LocalSettings):
+        raise IdentificationError(
+            f"the {settings.network} network knows the law alone; say --preset local, which takes effects into it"
+        )
+    refuse_strangers(problem)
+
+
 def _network(settings: LocalSettings | PaperSettings) -> Callable[..., tuple[Outcome, Outcome]]:
     """The training of a kind of network; the other one stays unloaded, and torch with it."""
     if isinstance(settings, LocalSettings):
@@ -115,20 +128,21 @@ def _judged(
     """The outcome with its errors; ``blind`` is the one that had not seen the blocks set aside."""
     # y(0) is a parameter too: it must not be fitted to the blocks that judge it.
     seen = problem.without(held)
-    point, delays = _resolved(problem, outcome)
-    simulated, judged = (
-        tuple(predict_piece(p, *_resolved(problem, one)).force for p in seen.pieces) for one in (outcome, blind)
-    )
-    q, covariance = outcome.unknowns[:COORDINATE_COUNT], None
+    point, delays, effects = _resolved(problem, outcome)
+    simulated, judged = (_simulated(seen, one) for one in (outcome, blind))
+    q, covariance, own = outcome.unknowns[:COORDINATE_COUNT], None, np.full(problem.effect_count, np.nan)
     if outcome.covariance is not None:
         D = problem.space.slopes(q)
         covariance = D @ outcome.covariance[:COORDINATE_COUNT, :COORDINATE_COUNT] @ D.T
+        own = effect_deviations(problem, outcome.unknowns, outcome.covariance)
     return PinnResult(
         network=network,
         coordinates=point,
         covariance=outcome.covariance,
         coordinate_covariance=covariance,
         delays=delays,
+        effects=effects,
+        effect_deviations=own,
         reconstruction=_errors(problem.pieces, held, outcome.forces, blind.forces),
         simulation=_errors(problem.pieces, held, simulated, judged),
         reconstructed=outcome.forces,
@@ -141,10 +155,18 @@ def _judged(
     )
 
 
-def _resolved(problem: Problem, outcome: Outcome) -> tuple[Coordinates, tuple[float, float]]:
+def _simulated(problem: Problem, outcome: Outcome) -> tuple[Array, ...]:
+    """The law's own force [N] (N,) of each piece."""
+    point, delays, effects = _resolved(problem, outcome)
+    return tuple(predict_piece(p, point, delays, effects=effects).force for p in problem.pieces)
+
+
+def _resolved(
+    problem: Problem, outcome: Outcome
+) -> tuple[Coordinates, tuple[float, float], tuple[ActiveEffect, ...]]:
     point = problem.space.to_coordinates(outcome.unknowns[:COORDINATE_COUNT])
-    force, drive = outcome.unknowns[COORDINATE_COUNT:] * problem.delay_prior
-    return point, (float(force), float(drive))
+    force, drive = outcome.unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] * problem.delay_prior
+    return point, (float(force), float(drive)), active(problem, outcome.unknowns)
 
 
 def _errors(

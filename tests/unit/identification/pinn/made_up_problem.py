@@ -24,14 +24,17 @@ FILTER = ChannelFilter("butterworth", 2, 120.0)
 
 
 @cache
-def problem(levels=(0.0, 0.3, 0.5), seconds=1.5, seed=1, low_pass=False, pieces=1) -> Problem:
-    """One sine, some seconds at each level of the drive, noise of one per cent on the force."""
-    made = [_piece(levels, seconds, seed + k, low_pass) for k in range(pieces)]
+def problem(levels=(0.0, 0.3, 0.5), seconds=1.5, seed=1, low_pass=False, pieces=1, effects=()) -> Problem:
+    """One sine, some seconds at each level of the drive, noise of one per cent on the force.
+
+    Effects are at work in the recording; the problem itself knows the law alone.
+    """
+    made = [_piece(levels, seconds, seed + k, low_pass, effects) for k in range(pieces)]
     noise = 0.01 * float(np.std(made[0].force))
     return Problem(tuple(made), SearchSpace(min(levels), max(levels)), noise, 1e-4)
 
 
-def _piece(levels, seconds, seed, low_pass) -> Piece:
+def _piece(levels, seconds, seed, low_pass, effects) -> Piece:
     t = np.arange(round(seconds * len(levels) * RATE)) / RATE
     w = 2 * np.pi * FREQUENCY
     x = AMPLITUDE * np.sin(w * t)
@@ -39,7 +42,7 @@ def _piece(levels, seconds, seed, low_pass) -> Piece:
     stroke = Stroke(RATE, x, AMPLITUDE * w * np.cos(w * t), -w * w * x, drive)
     channel = LowPass(FILTER, RATE) if low_pass else None
     clean = Piece(f"piece {seed}", stroke, np.zeros(len(t)), np.ones(len(t)), low_pass=channel)
-    force, _ = clean.recorded(Setting(TRUTH))
+    force, _ = clean.recorded(Setting(TRUTH, effects=effects))
     force = force + 0.01 * force.std() * np.random.default_rng(seed).standard_normal(len(t))
     train = np.ones(len(t))
     train[:20] = 0.0

@@ -12,12 +12,14 @@ from identification.pinn import law_rows
 from identification.pinn.batches import learned
 from identification.pinn.elimination import NodePrior, factorise
 from identification.pinn.global_loss import GlobalLoss, Recorded, Samples
-from identification.pinn.local_rows import UNKNOWNS, LocalLoss, Weights
+from identification.pinn.local_rows import LocalLoss, Weights
 from identification.pinn.mesh import Heads
 from identification.pinn.mlp import Network
 from identification.pinn.quadrature import gauss_points
+from identification.problem import COORDINATE_COUNT
 
 STEP = 1e-6
+UNKNOWNS = COORDINATE_COUNT + 2
 FAR = np.full(UNKNOWNS, np.inf)
 
 

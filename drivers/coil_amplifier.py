@@ -228,14 +228,6 @@ class CoilAmplifier(ModbusInstrument):
         """
         self._table.command("arm")
 
-    def start_table(self) -> None:
-        """Start the armed table now, for benches whose amplifier sees no SYNC.
-
-        Raises:
-            NotConnected, NoReply, BadReply, Refused: it may not have started; `table` says.
-        """
-        self._table.command("start")
-
     def abort_table(self) -> None:
         """Stop the table; the output stays where it is.
 

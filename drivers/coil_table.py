@@ -71,8 +71,8 @@ class StepTable:
             if line.read("holding", self._address + start, len(wanted)).words != wanted:
                 raise BadReply(f"{line.name}: its step table does not read as written; upload it again")
 
-    def command(self, what: Literal["abort", "arm", "start"]) -> None:
-        """Abort, arm or start it.
+    def command(self, what: Literal["abort", "arm"]) -> None:
+        """Abort or arm it; what starts it is the trigger.
 
         Raises:
             NotConnected, NoReply, BadReply, Refused: not confirmed.

@@ -230,10 +230,6 @@ class CoilAmplifierDevice:
             if not self._mode or self._fault or self.tripped or self._table_state() == Table.RUNNING:
                 raise Illegal(_STATE)
             self.output.arm(self._checked_steps())
-        elif value == commands["start"]:
-            if self.output.table is not Table.ARMED:
-                raise Illegal(_STATE)
-            self.output.trigger(now)
         else:
             raise Illegal(_VALUE)
 

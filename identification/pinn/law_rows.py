@@ -47,7 +47,7 @@ def balance(p: Values) -> Number:
 def balance_slopes(p: Values) -> dict[str, Number]:
     """Slopes of the violation of eq. 4."""
     u, rate = p["u"], p["y_rate"]
-    z, slip, inner = _factor(p, "F") * p["z"], _factor(p, "c0") * (p["v"] - rate), _factor(p, "c1") * rate
+    z, slip, inner = _scaled(p, "F", p["z"]), _scaled(p, "c0", p["v"] - rate), _scaled(p, "c1", rate)
     return {
         "z": -_at_field(p, "F"),
         "y": p["k0"] + 0.0 * z,
@@ -76,22 +76,25 @@ def balance_slopes_over_inputs(p: Values) -> dict[str, Number]:
 
 
 def _at_field(p: Values, name: str) -> Number:
-    """F [N], c0 or c1 [N s/m] at the field, where effects scale it with their factor."""
-    return _factor(p, name) * law.at_field(p[f"{name}_a"], p[f"{name}_b"], p["u"])
+    """F [N], c0 or c1 [N s/m] at the field."""
+    return _scaled(p, name, law.at_field(p[f"{name}_a"], p[f"{name}_b"], p["u"]))
 
 
-def _factor(p: Values, name: str) -> Number:
-    return p.get(f"{name}_factor", 1.0)
+def _scaled(p: Values, name: str, value: Number) -> Number:
+    """A value times the factor that effects give F, c0 or c1."""
+    factor = p.get(f"{name}_factor")
+    return value if factor is None else factor * value
 
 
 def force(p: Values) -> Number:
     """Force [N] of eq. 2, and what acts beside it."""
-    return law.force(p["y_rate"], p["x"], _at_field(p, "c1"), p["k1"], 0.0) - p["f0"] + p.get("beside", 0.0)
+    found = law.force(p["y_rate"], p["x"], _at_field(p, "c1"), p["k1"], 0.0) - p["f0"]
+    return found + p["beside"] if "beside" in p else found
 
 
 def force_slopes(p: Values) -> dict[str, Number]:
     """Slopes of the force."""
-    u, rate, inner = p["u"], p["y_rate"], _factor(p, "c1") * p["y_rate"]
+    u, rate, inner = p["u"], p["y_rate"], _scaled(p, "c1", p["y_rate"])
     return {
         "y_rate": _at_field(p, "c1"),
         "x": p["k1"] + 0.0 * rate,

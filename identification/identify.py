@@ -113,15 +113,14 @@ def prepare(recordings: Sequence[Recording], request: Request) -> Prepared:
 def conclude(prepared: Prepared, request: Request, progress: Progress, testimony: Testimony | None = None) -> Fit:
     """The fit of recordings that can be used; the network is trained, unless its testimony is there already."""
     assembled, problem, stretches = prepared.assembled, prepared.problem, prepared.stretches
-    # The network knows one damper in one condition; it is no witness where each log has its own.
-    if testimony is None and "pinn" in request.stages and not request.own:
+    if testimony is None and "pinn" in request.stages:
         testimony = _trained(problem, stretches, request, progress)
     if "refine" in request.stages:
         found = _refined(assembled, problem, stretches, request, progress)
-        assembled = under_conditions(assembled, found.problem, found.minimum)
         end = _compared(assembled, found, testimony) if testimony else found
     else:
         end = _network_alone(assembled, problem, testimony)
+    assembled = under_conditions(assembled, problem, end.minimum.unknowns[problem.shared])
     fit = fit_document(assembled, end, _provenance(assembled, request, problem))
     if request.profile:
         fit = _profiled(fit, end, progress)
@@ -178,7 +177,7 @@ def _refined(
         notes = wander_in_words(wander)
     found = covariance(problem, minimum, scatter)
     seconds = time.process_time() - began
-    error = _train_error(under_conditions(assembled, problem, minimum), problem, minimum)
+    error = _train_error(under_conditions(assembled, problem, minimum.unknowns[problem.shared]), problem, minimum)
     stage = Stage(name="refine", seconds=round(seconds, 3), rmse_n=error, iterations=minimum.iterations)
     return Ending(problem, minimum, found, (stage,), notes=notes)
 
@@ -194,7 +193,7 @@ def _network_alone(assembled: Assembled, problem: Problem, testimony: Testimony 
         raise IdentificationError(f"pinn found nothing: {why}; raise --budget or say --stages refine")
     minimum, found = as_minimum(problem, testimony.found)
     why_not = "" if testimony.found.accepted else testimony.found.note
-    return Ending(problem, minimum, found, (_stage(assembled, found, testimony.found),), why_not=why_not)
+    return Ending(problem, minimum, found, (_stage(assembled, problem, found, testimony.found),), why_not=why_not)
 
 
 def _compared(assembled: Assembled, found: Ending, testimony: Testimony) -> Ending:
@@ -210,12 +209,13 @@ def _compared(assembled: Assembled, found: Ending, testimony: Testimony) -> Endi
         set(Coordinates._fields) - hidden - at_bound,
     )  # fmt: skip
     said = agreement.words() if network.accepted else f"{agreement.words()} (pinn: {network.note})"
-    stages = (_stage(assembled, found.covariance, network), *found.stages)
+    stages = (_stage(assembled, found.problem, found.covariance, network), *found.stages)
     return replace(found, stages=stages, agreement=agreement, said=said)
 
 
-def _stage(assembled: Assembled, found: Covariance, network: "PinnResult") -> Stage:
-    errors = simulated_errors(assembled, network.coordinates, network.delays)
+def _stage(assembled: Assembled, problem: Problem, found: Covariance, network: "PinnResult") -> Stage:
+    own = under_conditions(assembled, problem, network.unknowns)
+    errors = simulated_errors(own, network.coordinates, network.delays)
     held, _ = of_samples(assembled, errors, held=True)
     hidden, _ = unseen(found)
     return stage_entry(network, hidden, rmse(held) if len(held) else None, assembled.drive_unit)
@@ -229,11 +229,11 @@ def _train_error(assembled: Assembled, problem: Problem, minimum: Minimum) -> fl
     return rmse(of_samples(assembled, errors, held=False)[0])
 
 
-def under_conditions(assembled: Assembled, problem: Problem, minimum: Minimum) -> Assembled:
-    """The pieces under what each log was found to have of its own."""
+def under_conditions(assembled: Assembled, problem: Problem, shared: Array) -> Assembled:
+    """The pieces under what each log was found to have of its own, at unknowns (C,) that no piece has alone."""
     if not problem.own:
         return assembled
-    found = {p.log: problem.piece(minimum.unknowns, i).condition for i, p in enumerate(problem.pieces)}
+    found = {p.log: problem.condition(shared, i) for i, p in enumerate(problem.pieces)}
     pieces = tuple(replace(p, condition=found.get(p.log, p.condition)) for p in assembled.pieces)
     return replace(assembled, pieces=pieces)
 

@@ -176,8 +176,28 @@ class Problem:
 
     @property
     def shared(self) -> list[int]:
-        """Places of the unknowns that all pieces share: q, the two delays, effects."""
-        return [*range(_SHARED), *range(self.first_effect, self.first_own)]
+        """(C,) places of the unknowns that no piece has alone: q, the two delays, effects, each log's own."""
+        return [*range(_SHARED), *range(self.first_effect, self.first_own + self.own_count)]
+
+    @property
+    def shared_priors(self) -> Array:
+        """(C,) weights of the priors of these; all are centred on zero."""
+        return self._priors()[1][self.shared]
+
+    def condition(self, shared: Array, piece: int) -> Condition:
+        """What a piece's log has of its own at the shared unknowns (C,)."""
+        unknowns = np.zeros(self.first_own + self.own_count)
+        unknowns[self.shared] = shared
+        return self.piece(unknowns, piece).condition
+
+    def own_slopes(self, shared: Array, piece: int) -> Array:
+        """(13, O) change of a piece's coordinates over all that logs have of their own, at the shared unknowns."""
+        found = np.zeros((COORDINATE_COUNT, self.own_count))
+        if places := self._own_places(self.pieces[piece]):
+            coordinates = self.space.to_coordinates(shared[:COORDINATE_COUNT])
+            at = [place - self.first_own for place in places]
+            found[:, at] = self.condition(shared, piece).own_slopes(self.own, coordinates)
+        return found
 
     @property
     def delays(self) -> BoolArray:

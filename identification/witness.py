@@ -58,9 +58,11 @@ def train_stage(
         IdentificationError: there is no such preset, or its network needs torch, which is not installed.
     """
     from identification.pinn.supervision import Stopped, Supervision
-    from identification.pinn.train import train
+    from identification.pinn.train import train, why_not
 
     settings = _settings(preset, seed)
+    if why := why_not(problem, settings):
+        return Testimony(None, why)
     try:
         return Testimony(train(problem, settings, Supervision(progress, budget=budget), stretches), "")
     except Stopped as stopped:
@@ -126,14 +128,15 @@ def _settings(preset: str, seed: int) -> "LocalSettings | GlobalSettings | Paper
 
 def as_minimum(problem: Problem, found: "PinnResult") -> tuple[Minimum, Covariance]:
     """The network's parameters in the form of a descent's end, for a fit that rests on the network alone."""
-    y0 = [predict_piece(p, found.coordinates, found.delays).y0 for p in problem.pieces]
     unknowns = problem.start(found.coordinates)
-    unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] = np.array(found.delays) / problem.delay_prior
+    unknowns[problem.shared] = found.unknowns
+    pieces = [problem.piece(unknowns, i) for i in range(len(problem.pieces))]
+    y0 = [predict_piece(p, found.coordinates, found.delays, effects=found.effects).y0 for p in pieces]
     unknowns[COORDINATE_COUNT + 2 : COORDINATE_COUNT + 2 + len(y0)] = np.array(y0) / Y0_SCALE
     minimum = Minimum(unknowns, problem.evaluate(unknowns), found.steps, converged=found.accepted)
     spread = np.zeros((len(unknowns), len(unknowns)))
     if found.covariance is not None:
-        spread[: len(found.covariance), : len(found.covariance)] = found.covariance
+        spread[np.ix_(problem.shared, problem.shared)] = found.covariance
     seen = problem.free & (np.diag(minimum.evaluation.hessian) > SEEN)
     return minimum, Covariance(spread, seen, seen & problem.inside(unknowns), coloured=False)
 

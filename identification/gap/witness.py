@@ -15,11 +15,10 @@ from identification.damper.parameters import Quantity
 from identification.gap.documents import EffectValue, Witness
 from identification.gap.explain import JointFit
 from identification.gap.verdict import interval
-from identification.pinn.effect_terms import takes
 from identification.pinn.result import PinnResult
 from identification.pinn.settings import read_settings
 from identification.pinn.supervision import Supervision
-from identification.pinn.train import train
+from identification.pinn.train import train, why_not
 from identification.problem import Problem
 from identification.uncertainty import coordinate_covariance
 
@@ -36,9 +35,10 @@ def hear(fit: JointFit, problem: Problem, drive_unit: str, seed: int, progress: 
         seed: of the network's weights.
         progress: told of every step.
     """
-    if why := _not_heard(problem):
+    settings = read_settings("local").model_copy(update={"seed": seed})
+    if why := why_not(problem, settings):
         return _silent(why)
-    found = train(problem, read_settings("local").model_copy(update={"seed": seed}), Supervision(progress))
+    found = train(problem, settings, Supervision(progress))
     if not found.accepted:
         return _silent(f"it did not arrive: {found.note}", found.seconds)
     apart = _coordinates_apart(fit, found) | {
@@ -49,16 +49,6 @@ def hear(fit: JointFit, problem: Problem, drive_unit: str, seed: int, progress: 
         effects.setdefault(p.effect, {})[p.quantity.symbol] = p.document(drive_unit)
     agrees = max(apart.values()) <= AGREE
     return Witness(agrees=agrees, effects=effects, seconds=found.seconds, said=_said(apart))
-
-
-def _not_heard(problem: Problem) -> str:
-    """Why the network cannot speak of a problem; empty where it can."""
-    strange = [f"{c.name} ({c.form_name})" for c in problem.effects if not takes(c.form)]
-    if strange:
-        return f"{strange[0]} makes the damper's own motion or the channel's lag a state of its own"
-    if problem.own:
-        return "it knows one zero of the load cell, and here each log has its own; diagnose one log at a time"
-    return ""
 
 
 def _silent(why: str, seconds: float = 0.0) -> Witness:

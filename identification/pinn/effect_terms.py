@@ -15,7 +15,6 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.effects import Action, Form
 from identification.effect_choice import EffectChoice
-from identification.errors import IdentificationError
 from identification.pinn.batches import Batch, Learned
 from identification.pinn.inputs import Field
 from identification.problem import COORDINATE_COUNT, Problem
@@ -60,27 +59,13 @@ def takes(form: Form) -> bool:
     return form.acts not in _BEYOND
 
 
-def refuse_strangers(problem: Problem) -> None:
-    """Refuse effects that the network cannot take in.
-
-    Raises:
-        IdentificationError: one of them is such.
-    """
-    for choice in problem.effects:
-        if not takes(choice.form):
-            raise IdentificationError(
-                f"{choice.name} ({choice.form_name}) cannot be a term of the network's residual: there the damper "
-                "moves otherwise than the actuator, or its force is lagged; fit it by simulation (--stages refine)"
-            )
-
-
 class Acting:
     """The effects of a problem at one point, seen along each of its pieces.
 
     Args:
         problem: with the effects.
         sources: its pieces as the network sees them.
-        unknowns: (15 + P,) shared by all elements.
+        unknowns: (C,) shared by all elements.
     """
 
     def __init__(self, problem: Problem, sources: Sequence[Learned], unknowns: Array) -> None:
@@ -114,27 +99,28 @@ class Acting:
 
 
 def active(problem: Problem, unknowns: Array) -> tuple[ActiveEffect, ...]:
-    """The effects at the shared unknowns (15 + P,)."""
-    return tuple(c.active(numbers) for c, numbers in _each(problem, unknowns[_COMMON:]))
+    """The effects at the shared unknowns (C,)."""
+    return tuple(c.active(numbers) for c, numbers in _each(problem, unknowns))
 
 
 def effect_deviations(problem: Problem, unknowns: Array, covariance: Array) -> Array:
-    """(P,) standard deviations [SI] of the effects' parameters, from a covariance (15 + P, 15 + P)."""
+    """(P,) standard deviations [SI] of the effects' parameters, from a covariance (C, C)."""
     if not problem.effects:
         return np.empty(0)
-    spread = np.sqrt(np.maximum(np.diag(covariance)[_COMMON:], 0.0))
-    return spread * over_search(problem, unknowns[_COMMON:])
+    own = np.diag(covariance)[_COMMON : _COMMON + problem.effect_count]
+    return np.sqrt(np.maximum(own, 0.0)) * over_search(problem, unknowns)
 
 
-def over_search(problem: Problem, numbers: Array) -> Array:
-    """(P,) slopes of all parameters of the effects over their search numbers (P,)."""
-    return np.concatenate([c.slopes(own) for c, own in _each(problem, numbers)])
+def over_search(problem: Problem, unknowns: Array) -> Array:
+    """(P,) slopes of all parameters of the effects over their search numbers, at the shared unknowns (C,)."""
+    return np.concatenate([c.slopes(numbers) for c, numbers in _each(problem, unknowns)])
 
 
-def _each(problem: Problem, numbers: Array) -> Iterator[tuple[EffectChoice, Array]]:
-    at = 0
+def _each(problem: Problem, unknowns: Array) -> Iterator[tuple[EffectChoice, Array]]:
+    """The effects with their search numbers among the shared unknowns (C,)."""
+    at = _COMMON
     for choice in problem.effects:
-        yield choice, numbers[at : at + len(choice.quantities)]
+        yield choice, unknowns[at : at + len(choice.quantities)]
         at += len(choice.quantities)
 
 

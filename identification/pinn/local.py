@@ -60,7 +60,7 @@ class Trained:
     """A network, its parameters and how sure they are."""
 
     unknowns: Array
-    """(C,) search numbers, delays and parameters of effects: all that the pieces share."""
+    """(C,) search numbers, delays, effects, what logs have of their own: all that no piece has alone."""
     network: LocalNetwork
     information: Array
     """(C, C) of the last factorisation, in units of the noise it was weighed with."""
@@ -80,7 +80,9 @@ class LocalTraining:
 
     def __init__(self, problem: Problem, settings: LocalSettings, supervision: Supervision, start: Start) -> None:
         self.problem, self.settings, self.supervision = problem, settings, supervision
-        self.unknowns = np.concatenate([problem.space.to_search(start.coordinates), np.zeros(2), start.effects])
+        self.unknowns = np.concatenate(
+            [problem.space.to_search(start.coordinates), np.zeros(2), start.effects, np.zeros(problem.own_count)]
+        )
         self.noise = max(problem.noise, start.misfit)
         self.steps = 0
         self.history: list[Moment] = []
@@ -95,7 +97,14 @@ class LocalTraining:
         c = problem.space.to_coordinates(self.unknowns[:COORDINATE_COUNT])
         pieces = learned(coarse(problem))
         acting = Acting(problem, pieces, self.unknowns) if problem.effects else None
-        first = [FirstStates(p, c, acting.along(p).values["beside"] if acting else 0.0) for p in pieces]
+        first = [
+            FirstStates(
+                p,
+                problem.condition(self.unknowns, p.number).of(c),
+                acting.along(p).values["beside"] if acting else 0.0,
+            )
+            for p in pieces
+        ]
         slips = [f.slip_velocity() for f in first]
         return self._on_mesh(pieces, slips, None, self._layer(), lambda i, t: first[i].at(t))
 
@@ -214,7 +223,19 @@ class LocalTraining:
         rows = loss.rows(self.unknowns, self.network.heads, weights, pull, slopes=True)
         priors = [_node_prior(p) for p in loss.problem.pieces]
         found = factorise(rows, loss.batches, self.network.mesh, self.network.heads, priors)
-        return _with_delay_priors(found, self.unknowns), _cost(rows, self.unknowns)
+        return self._with_priors(found), self._cost(rows, self.unknowns)
+
+    def _with_priors(self, found: Factorised) -> Factorised:
+        """With what is known of the shared unknowns beforehand."""
+        held = self.problem.shared_priors
+        table = np.column_stack([np.diag(held), -held * self.unknowns])[held > 0.0]
+        return replace(found, triangle=np.vstack([found.triangle, table]))
+
+    def _cost(self, rows: Sequence[Rows], unknowns: Array) -> float:
+        """[1] of all rows and of the priors."""
+        pulled = self.problem.shared_priors * unknowns
+        total = sum(float((row.all**2).sum()) for row in rows) + float(pulled @ pulled)
+        return total if np.isfinite(total) else np.inf
 
     def _along(
         self,
@@ -230,7 +251,7 @@ class LocalTraining:
         for _ in range(_TRIES):
             unknowns = self.unknowns + share * step
             moved = self.network.heads.moved(heads, share)
-            there = _cost(loss.rows(unknowns, moved, weights, pull, slopes=False), unknowns)
+            there = self._cost(loss.rows(unknowns, moved, weights, pull, slopes=False), unknowns)
             if there < cost:
                 self.unknowns, self.network = unknowns, replace(self.network, heads=moved)
                 return cost - there
@@ -239,7 +260,7 @@ class LocalTraining:
 
     def _length(self, step: Array) -> float:
         """Of a step of the shared unknowns (C,), in units of a search number."""
-        whole = np.zeros(self.problem.first_own)
+        whole = np.zeros(self.problem.first_own + self.problem.own_count)
         whole[self.problem.shared] = step
         return self.problem.step_length(whole)
 
@@ -273,21 +294,6 @@ class LocalTraining:
         )  # fmt: skip
         network = before or LocalNetwork(layer, mesh, Heads.nothing())
         return network.fitted(mesh, states, gauss_points(self.size.points)[0])
-
-
-def _cost(rows: Sequence[Rows], unknowns: Array) -> float:
-    """[1] of all rows and of the delays' priors."""
-    total = sum(float((row.all**2).sum()) for row in rows) + float(
-        unknowns[COORDINATE_COUNT:_EFFECTS] @ unknowns[COORDINATE_COUNT:_EFFECTS]
-    )
-    return total if np.isfinite(total) else np.inf
-
-
-def _with_delay_priors(found: Factorised, unknowns: Array) -> Factorised:
-    table = np.zeros((2, len(unknowns) + 1))
-    table[0, COORDINATE_COUNT], table[1, COORDINATE_COUNT + 1] = 1.0, 1.0
-    table[:, -1] = -unknowns[COORDINATE_COUNT:_EFFECTS]
-    return replace(found, triangle=np.vstack([found.triangle, table]))
 
 
 def _misfit(loss: LocalLoss, unknowns: Array, heads: Heads) -> Misfit:

@@ -61,11 +61,11 @@ class Rows:
 
 
 class _Point(NamedTuple):
-    """The shared unknowns, resolved."""
+    """The shared unknowns as one log has them, resolved."""
 
     coordinates: Coordinates
     over_search: Array
-    """(13, 13) slopes of the coordinates over the search numbers."""
+    """(13, 13 + O) slopes of the coordinates over the search numbers, and over what logs have of their own."""
     force_delay: float
     """[s] beyond what the instruments report and the batches were made with."""
     drive_delay: float
@@ -106,9 +106,28 @@ class LocalLoss:
             pull: residuals of the law that multipliers add, one for each batch.
             slopes: also the Jacobian.
         """
-        point = self._point(unknowns)
+        points = self._points(unknowns)
         pulls: Sequence[Rows | None] = pull or [None] * len(self.batches)
-        return [self._rows(b, point, heads, weights, p, slopes) for b, p in zip(self.batches, pulls, strict=True)]
+        return [
+            self._rows(b, point, heads, weights, p, slopes)
+            for b, point, p in zip(self.batches, points, pulls, strict=True)
+        ]
+
+    def _points(self, unknowns: Array) -> list[_Point]:
+        """The shared unknowns as the log of each batch has them."""
+        point = self._point(unknowns)
+        if not self.problem.own:
+            return [point] * len(self.batches)
+        logs = {b.source.number: self._of_log(point, unknowns, b.source.number) for b in self.batches}
+        return [logs[b.source.number] for b in self.batches]
+
+    def _of_log(self, point: _Point, unknowns: Array, piece: int) -> _Point:
+        condition = self.problem.condition(unknowns, piece)
+        over_search = condition.chained(point.over_search.T).T
+        own = self.problem.own_slopes(unknowns, piece)
+        return point._replace(
+            coordinates=condition.of(point.coordinates), over_search=np.hstack([over_search, own])
+        )
 
     def _point(self, unknowns: Array) -> _Point:
         q, space = unknowns[:COORDINATE_COUNT], self.problem.space
@@ -118,15 +137,14 @@ class LocalLoss:
             sources = {b.source.number: b.source for b in self.batches}
             acting = Acting(self.problem, list(sources.values()), unknowns)
             late += lateness(active(self.problem, unknowns))
-            over_values = over_search(self.problem, unknowns[_EFFECTS:])
+            over_values = over_search(self.problem, unknowns)
         return _Point(
             space.to_coordinates(q), space.slopes(q), late - self.made_with, drive_delay, over_values, acting
         )
 
     def residuals(self, unknowns: Array, heads: Heads) -> Iterator[tuple[Array, Array, Array]]:
         """Of each batch, without weights: eq. 3 [m/s] and eq. 4 [N] at the points, force [N] at the samples."""
-        point = self._point(unknowns)
-        for b in self.batches:
+        for b, point in zip(self.batches, self._points(unknowns), strict=True):
             hysteresis, balance = self._law(b, point, heads, slopes=False)
             yield hysteresis.value, balance.value, self._force(b, point, heads, slopes=False).value - b.force
 
@@ -201,7 +219,7 @@ class LocalLoss:
         )
         points, rank = b.values.shape
         z, y = slice(rank), slice(rank, 2 * rank)
-        shared = _EFFECTS + len(point.over_values)
+        shared = len(self.problem.shared)
         law = np.zeros((2, len(b.elements), points, 2 * rank + shared))
         law[0, ..., z] = hysteresis["z"][..., None] * b.values + hysteresis["z_rate"][..., None] * b.slopes
         law[0, ..., y] = Y_UNIT * hysteresis["y_rate"][..., None] * b.slopes
@@ -216,19 +234,22 @@ class LocalLoss:
 
     def _shared(self, over: dict[str, Array], driven: Driven, point: _Point) -> Array:
         """(K, M, C) slopes over the unknowns that all elements share."""
-        table = np.zeros((*driven.field.u.shape, _EFFECTS + len(point.over_values)))
+        table = np.zeros((*driven.field.u.shape, len(self.problem.shared)))
+        coordinates = np.zeros((*driven.field.u.shape, COORDINATE_COUNT))
         for i, name in enumerate(Coordinates._fields):
             if name in over:
-                table[..., i] = over[name]
+                coordinates[..., i] = over[name]
         if "u" in over:
-            table[..., _ETA] = over["u"] * driven.field.over_eta
+            coordinates[..., _ETA] = over["u"] * driven.field.over_eta
             table[..., _DRIVE_DELAY] = self.problem.delay_prior * over["u"] * driven.field.over_delay
         for name in driven.over.keys() & over.keys():
             late, *own = driven.over[name]
             table[..., _FORCE_DELAY] += self.problem.delay_prior * over[name] * late
             for k, row in enumerate(own):
                 table[..., _EFFECTS + k] += over[name] * row * point.over_values[k]
-        table[..., :COORDINATE_COUNT] = table[..., :COORDINATE_COUNT] @ point.over_search
+        searched = coordinates @ point.over_search
+        table[..., :COORDINATE_COUNT] = searched[..., :COORDINATE_COUNT]
+        table[..., _EFFECTS + len(point.over_values) :] = searched[..., COORDINATE_COUNT:]
         return table
 
 

@@ -25,7 +25,8 @@ def recorded_force(
         unknowns: (C,) shared unknowns.
         problem: what they are unknowns of.
     """
-    c = problem.space.to_coordinates(unknowns[:COORDINATE_COUNT])
+    shared = problem.space.to_coordinates(unknowns[:COORDINATE_COUNT])
+    c = problem.condition(unknowns, number).of(shared)
     force_delay, drive_delay = (float(d) for d in unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2])
     piece, h = source.piece, source.inputs.h
     late = piece.force_delay + force_delay * problem.delay_prior + lateness(active(problem, unknowns))

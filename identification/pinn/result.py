@@ -40,7 +40,7 @@ class Outcome:
     """What one of the networks found."""
 
     unknowns: Array
-    """(C,) search numbers, delays in units of their prior, search numbers of the effects."""
+    """(C,) search numbers, delays in units of their prior, effects, what logs have of their own."""
     covariance: Array | None
     """(C, C) of them from the last factorisation; None where the method gives none."""
     forces: tuple[Array, ...]
@@ -59,8 +59,11 @@ class PinnResult:
 
     network: str
     coordinates: Coordinates
+    unknowns: Array
+    """(C,) shared by all pieces: search numbers, delays in units of their prior, effects, what logs have of their
+    own."""
     covariance: Array | None
-    """(C, C) of search numbers, delays in units of their prior, and effects; None where there is none."""
+    """(C, C) of them; None where there is none."""
     coordinate_covariance: Array | None
     """(13, 13)"""
     delays: tuple[float, float]

@@ -1,13 +1,14 @@
 """Training of a chosen network on a problem, and the two figures that it is judged by."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError
-from identification.pinn.effect_terms import active, effect_deviations, refuse_strangers
+from identification.pinn.effect_terms import active, effect_deviations, takes
 from identification.pinn.local_runs import train_local
 from identification.pinn.result import Errors, Outcome, PinnResult
 from identification.pinn.settings import GlobalSettings, LocalSettings, PaperSettings
@@ -44,7 +45,8 @@ def train(
         Stopped: before anything was found.
         IdentificationError: an effect that this network cannot take in.
     """
-    _refuse_strange(problem, settings)
+    if why := why_not(problem, settings):
+        raise IdentificationError(why)
     if isinstance(settings, GlobalSettings):
         return train_batch([problem], settings, supervision)[0]
     supervision = supervision or Supervision()
@@ -102,12 +104,18 @@ def batches(problems: Sequence[Problem], settings: GlobalSettings) -> list[list[
     return [some[k : k + most] for some in alike.values() for k in range(0, len(some), most)]
 
 
-def _refuse_strange(problem: Problem, settings: LocalSettings | GlobalSettings | PaperSettings) -> None:
-    if problem.effects and not isinstance(settings, LocalSettings):
-        raise IdentificationError(
-            f"the {settings.network} network knows the law alone; say --preset local, which takes effects into it"
+def why_not(problem: Problem, settings: LocalSettings | GlobalSettings | PaperSettings) -> str:
+    """Why a network cannot learn a problem, in words; empty where it can."""
+    if not isinstance(settings, LocalSettings):
+        words = f"the {settings.network} network knows the law alone, of one damper in one condition"
+        return f"{words}; say --preset local" if problem.effects or problem.own else ""
+    strange = [f"{c.name} ({c.form_name})" for c in problem.effects if not takes(c.form)]
+    if strange:
+        return (
+            f"{strange[0]} makes the damper's own motion, or what the force channel remembers, a state that the "
+            "network does not have; fit it by simulation"
         )
-    refuse_strangers(problem)
+    return ""
 
 
 def _network(settings: LocalSettings | PaperSettings) -> Callable[..., tuple[Outcome, Outcome]]:
@@ -138,6 +146,7 @@ def _judged(
     return PinnResult(
         network=network,
         coordinates=point,
+        unknowns=outcome.unknowns,
         covariance=outcome.covariance,
         coordinate_covariance=covariance,
         delays=delays,
@@ -156,9 +165,10 @@ def _judged(
 
 
 def _simulated(problem: Problem, outcome: Outcome) -> tuple[Array, ...]:
-    """The law's own force [N] (N,) of each piece."""
+    """The law's own force [N] (N,) of each piece, under the condition of its log."""
     point, delays, effects = _resolved(problem, outcome)
-    return tuple(predict_piece(p, point, delays, effects=effects).force for p in problem.pieces)
+    pieces = (replace(p, condition=problem.condition(outcome.unknowns, i)) for i, p in enumerate(problem.pieces))
+    return tuple(predict_piece(p, point, delays, effects=effects).force for p in pieces)
 
 
 def _resolved(

@@ -30,6 +30,7 @@ def day(name, made, condition):
 
 
 MONDAY = recording(stretch("slow", 0.010, 1.0, 1), stretch("fast", 0.005, 2.5, 2))
+MONDAY_AGAIN = day("again.mcap", stretch("later", 0.012, 1.5, 3), Condition())
 FRIDAY = day("friday.mcap", stretch("later", 0.012, 1.5, 3), Condition(SHIFT, WARMER))
 
 
@@ -43,6 +44,28 @@ def test_what_a_log_has_of_its_own_is_found_and_the_damper_with_it():
     assert fit.coordinates["c0_a"].value == pytest.approx(LABORATORY.c0_a, rel=0.02)
     assert fit.notes == []
     assert fit.provenance.settings["free"] == "offset,viscosity"
+
+
+def test_the_network_alone_finds_it_too():
+    fit = identify([MONDAY, FRIDAY], Request(own=("offset", "viscosity"), stages=("pinn",)))
+    own = fit.nuisances.each_log["friday.mcap"]
+    assert own["offset"].ci99[0] < SHIFT < own["offset"].ci99[1]
+    assert own["viscosity"].ci99[0] < WARMER < own["viscosity"].ci99[1]
+    assert fit.rmse_n.train == pytest.approx(NOISE, rel=0.03)
+    (stage,) = fit.stages
+    assert stage.simulated_n.validation == pytest.approx(NOISE, rel=0.1)
+
+
+def test_the_network_is_a_witness_where_logs_differ():
+    fit = identify([MONDAY, FRIDAY], Request(own=("offset", "viscosity"), stages=("pinn", "refine")))
+    assert fit.agreement.startswith("agree: pinn and refine")
+
+
+def test_a_network_that_knows_one_condition_says_so_and_the_fit_goes_on():
+    request = Request(own=("offset",), stages=("pinn", "refine"), preset="paper")
+    fit = identify([MONDAY, MONDAY_AGAIN], request)
+    assert "one damper in one condition" in fit.agreement
+    assert fit.rmse_n.train == pytest.approx(NOISE, rel=0.03)
 
 
 def test_without_it_the_fit_says_which_log_does_not_belong():

@@ -73,8 +73,8 @@ def test_it_says_why_it_cannot_speak_of_a_mounting_that_moves(prepared, name):
     assert said.effects == {}
 
 
-def test_it_says_why_it_cannot_speak_of_several_recordings(prepared):
-    given = diagnosed_problem(prepared.assembled, prepared.judge.fitted_pieces())
-    said = heard(replace(given, own=("offset",)).with_effects((EffectChoice.of("seal_friction"),)), None)
-    assert said.agrees is None
-    assert "one log at a time" in said.said
+def test_it_knows_that_every_run_has_another_zero_of_the_load_cell():
+    shifted = run(lambda x, v: rubbing(x, v) + 8.0, seed=1)
+    said = diagnose([run(rubbing), shifted], witness=True).diagnosis.witness
+    assert said.agrees, said.said
+    assert said.effects["seal_friction"]["sliding"].value == pytest.approx(25.0, rel=0.1)

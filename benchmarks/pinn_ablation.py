@@ -6,14 +6,11 @@ python -m benchmarks.pinn_ablation weight rank      some of them
 
 import sys
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, nullcontext
 from typing import NamedTuple
-from unittest.mock import patch
 
 import numpy as np
 
 from benchmarks.pinn_cases import LABORATORY, Score, noisy_problem, try_out
-from identification.pinn.local import LocalTraining
 from identification.pinn.settings import LayerSize, Level, LocalSettings, read_settings
 
 SEEDS = (1, 3, 5)
@@ -29,15 +26,16 @@ class Row(NamedTuple):
     words: str
     changes: dict[str, object]
     preset: str = "local"
-    patched: bool = False
-    """Elements and inputs by the stroke's own velocity in place of the slip's."""
     motion: str = ""
     """How the motion of a displacement with noise is had; without one it is known."""
 
 
 def _rows() -> Iterator[Row]:
     yield Row("slip", "as shipped: elements by the slip", {})
-    yield Row("slip", "elements by the turns of the stroke", {}, patched=True)
+    yield Row("slip", "elements by the turns of the stroke", {"features": "stroke"})
+    yield Row("slip", "elements by the slip, plain time in them", {"features": "time"})
+    for activation in ("tanh", "sine", "gaussian"):
+        yield Row("activation", activation, {"activation": activation})
     yield Row("network", "one network, all layers trained (global)", {}, preset="global")
     for meshes in (1, 2, 3, 10):
         levels = (_FIRST.model_copy(update={"meshes": min(meshes, 3)}), _last(meshes=meshes, settled=0.0))
@@ -70,13 +68,6 @@ def _weighed(weight: float, multipliers: int) -> dict[str, object]:
     return {"levels": (_FIRST, _last(physics=weight)), "multipliers": multipliers, "layers": _LOCAL.layers[:1]}
 
 
-def _by_the_stroke() -> AbstractContextManager[object]:
-    def velocity(self: LocalTraining, number: int, source: object) -> object:
-        return lambda time: source.inputs.motion(time)[1]  # type: ignore[attr-defined]
-
-    return patch.object(LocalTraining, "_slip", velocity)
-
-
 def _score(row: Row, seed: int) -> Score:
     given = noisy_problem(seed, row.motion) if row.motion else None
     return try_out(row.preset, LABORATORY, seed, given=given, **row.changes)
@@ -89,8 +80,7 @@ def run(groups: tuple[str, ...] = ()) -> None:
     for row in _rows():
         if groups and row.group not in groups:
             continue
-        with _by_the_stroke() if row.patched else nullcontext():
-            scores = [_score(row, seed) for seed in SEEDS]
+        scores = [_score(row, seed) for seed in SEEDS]
         pooled = "/".join(f"{s.pooled:.2g}" for s in scores)
         unseen = "/".join(f"{s.ratio:.4g}" for s in scores)
         own = "/".join(f"{s.reconstruction:.3g}" for s in scores)

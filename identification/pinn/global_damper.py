@@ -5,6 +5,7 @@ many as alone.
 """
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from identification.pinn.beginning import FirstStates, starts
 from identification.pinn.global_inputs import Shown, network_inputs
 from identification.pinn.global_loss import Recorded
 from identification.pinn.mesh import Y_UNIT, Indices, SlipVelocity
+from identification.pinn.settings import GROUPS, Group
 from identification.problem import COORDINATE_COUNT, Problem
 
 _DENSER = 4.0
@@ -28,8 +30,8 @@ _NARROW = -4
 class DamperInTraining:
     """Recordings of a damper, its coordinates and inputs as they stand."""
 
-    def __init__(self, problem: Problem, seed: int) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, seed: int, features: Sequence[Group] = GROUPS) -> None:
+        self.problem, self.features = problem, features
         self.pieces = learned(problem)
         self.random = np.random.default_rng(seed)
         self.times = [_sample_times(p) for p in self.pieces]
@@ -37,7 +39,7 @@ class DamperInTraining:
         self.q = problem.space.to_search(first)
         self._states = [FirstStates(p, first) for p in self.pieces]
         self._slips = [s.slip_velocity() for s in self._states]
-        raw = network_inputs(self.pieces, self.times, self._slips, first)
+        raw = self._raw(self.times, first)
         self._centre, self._spread = raw.value.mean(0), np.maximum(raw.value.std(0), 1e-9)
         self.shown = self._scaled(raw)
 
@@ -80,18 +82,20 @@ class DamperInTraining:
             _interpolated(t, p.inputs.motion(t)[1] - y_rate[a:b])
             for t, p, (a, b) in zip(self.times, self.pieces, itertools.pairwise(edges), strict=True)
         ]
-        self.shown = self._scaled(network_inputs(self.pieces, self.times, self._slips, self.coordinates))
+        self.shown = self._scaled(self._raw(self.times, self.coordinates))
 
     def shown_at(self, piece: int, time: Array) -> tuple[Shown, slice]:
         """Inputs at times [s] of one piece, and the rows in which they stand."""
         times = [time if k == piece else t[:1] for k, t in enumerate(self.times)]
-        shown = self._scaled(network_inputs(self.pieces, times, self._slips, self.coordinates))
+        shown = self._scaled(self._raw(times, self.coordinates))
         return shown, slice(piece, piece + len(time))
 
     def drawn(self, size: int) -> tuple[Array, ...]:
         """So many samples, as ``Samples`` holds them: more where z runs, with weights that undo that."""
-        rate = np.abs(self.shown.rate[:, _NARROW])
-        chance = 1.0 + _DENSER * (rate > _FAST * np.median(rate))
+        chance = np.ones(len(self.shown.rate))
+        if "memory" in self.features:
+            rate = np.abs(self.shown.rate[:, _NARROW])
+            chance += _DENSER * (rate > _FAST * np.median(rate))
         chance /= chance.sum()
         at = np.sort(self.random.choice(len(chance), size, replace=False, p=chance))
         undo = np.clip(1.0 / (chance[at] * len(chance)), 0.3, 2.0)
@@ -101,6 +105,9 @@ class DamperInTraining:
         numbers = np.repeat(np.arange(len(self.times)), [len(t) for t in self.times])
         shown = (part[at] for part in self.shown)
         return numbers[at], np.concatenate(self.times)[at], *shown, *columns, np.sqrt(undo / undo.mean())
+
+    def _raw(self, times: Sequence[Array], c: Coordinates) -> Shown:
+        return network_inputs(self.pieces, times, self._slips, c, self.features)
 
     def _scaled(self, raw: Shown) -> Shown:
         return Shown((raw.value - self._centre) / self._spread, raw.rate / self._spread)

@@ -5,7 +5,7 @@ centred where the slip breaks through; those that are odd in the direction carry
 of one half stroke is that at the beginning of the next.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from identification.pinn.batches import Learned
 from identification.pinn.memory_input import MemoryInput, after_reversal, anywhere
 from identification.pinn.mesh import SlipVelocity
 from identification.pinn.reversals import reversals
+from identification.pinn.settings import GROUPS, Group
 
 _LAG_RATES = (400.0, 200.0, 100.0)
 """[1/s] of the lagged drives."""
@@ -26,6 +27,10 @@ _FADES = 2.0
 _SLIP_POINTS = 150
 
 
+Columns = list[tuple[Array, Array]]
+"""Inputs (N,) and their rates [1/s]."""
+
+
 class Shown(NamedTuple):
     """Inputs (N, I) at some times of all pieces, and their rates [1/s]."""
 
@@ -34,8 +39,9 @@ class Shown(NamedTuple):
 
 
 def network_inputs(
-    pieces: Sequence[Learned], times: Sequence[Array], slips: Sequence[SlipVelocity], c: Coordinates
-) -> Shown:
+    pieces: Sequence[Learned], times: Sequence[Array], slips: Sequence[SlipVelocity], c: Coordinates,
+    features: Sequence[Group] = GROUPS,
+) -> Shown:  # fmt: skip
     """Inputs of all pieces, one below the other.
 
     Args:
@@ -43,34 +49,53 @@ def network_inputs(
         times: (N,) of each [s].
         slips: slip velocity of each.
         c: present coordinates.
+        features: groups that are shown.
     """
-    shown = [
-        _of_piece(source, time, slip, c, number, len(pieces))
-        for number, (source, time, slip) in enumerate(zip(pieces, times, slips, strict=True))
-    ]
+    shown = []
+    for number, (source, time, slip) in enumerate(zip(pieces, times, slips, strict=True)):
+        groups = _of_piece(source, time, slip, c, number, len(pieces))
+        columns = [column for name in GROUPS if name in features for column in groups[name]()]
+        shown.append(Shown(*(np.column_stack(part) for part in zip(*columns, strict=True))))
     return Shown(np.vstack([s.value for s in shown]), np.vstack([s.rate for s in shown]))
 
 
-def _of_piece(source: Learned, time: Array, slip: SlipVelocity, c: Coordinates, number: int, count: int) -> Shown:
+def _of_piece(
+    source: Learned, time: Array, slip: SlipVelocity, c: Coordinates, number: int, count: int
+) -> dict[Group, Callable[[], Columns]]:
+    """Each group's columns, made when asked for."""
+    return {
+        "motion": lambda: _of_motion(source, time),
+        "drive": lambda: _of_drive(source, time),
+        "time": lambda: _of_time(time - source.span.start, source.span.end - source.span.start, number, count),
+        "memory": lambda: _memory(source, time, slip, c),
+    }
+
+
+def _of_motion(source: Learned, time: Array) -> Columns:
+    """Place, speed and two of their products."""
     inputs, h = source.inputs, source.inputs.h
     x, v = inputs.motion(time)
     a = (inputs.motion(time + 0.5 * h)[1] - inputs.motion(time - 0.5 * h)[1]) / h
-    stroke = float(np.abs(source.piece.stroke.displacement - source.piece.stroke.displacement.mean()).max())
+    middle = source.piece.stroke.displacement.mean()
+    stroke = float(np.abs(source.piece.stroke.displacement - middle).max())
     usual = inputs.usual_velocity
-    place, speed = (x - source.piece.stroke.displacement.mean()) / stroke, v / usual
-    columns = [(place, v / stroke), (speed, a / usual)]
-    columns.append((place * speed, v / stroke * speed + place * a / usual))
-    columns.append((place**2, 2.0 * place * v / stroke))
-    for rate in _LAG_RATES:
-        lagged = inputs.field(time, rate, source.piece.drive_delay).u
-        held = inputs.drive(time, source.piece.drive_delay)
-        columns.append((lagged, -rate * (lagged - held)))
-    columns += _of_time(time - source.span.start, source.span.end - source.span.start, number, count)
-    columns += _memory(source, time, slip, c)
-    return Shown(np.column_stack([value for value, _ in columns]), np.column_stack([rate for _, rate in columns]))
+    place, speed = (x - middle) / stroke, v / usual
+    return [
+        (place, v / stroke),
+        (speed, a / usual),
+        (place * speed, v / stroke * speed + place * a / usual),
+        (place**2, 2.0 * place * v / stroke),
+    ]
 
 
-def _of_time(since: Array, length: float, number: int, count: int) -> list[tuple[Array, Array]]:
+def _of_drive(source: Learned, time: Array) -> Columns:
+    """The drive as fields of several rates would follow it."""
+    held = source.inputs.drive(time, source.piece.drive_delay)
+    fields = [(rate, source.inputs.field(time, rate, source.piece.drive_delay).u) for rate in _LAG_RATES]
+    return [(lagged, -rate * (lagged - held)) for rate, lagged in fields]
+
+
+def _of_time(since: Array, length: float, number: int, count: int) -> Columns:
     """Time and its fading, apart for each piece, for each has forgotten another start."""
     one, zero = np.ones_like(since), np.zeros_like(since)
     columns = []
@@ -83,7 +108,7 @@ def _of_time(since: Array, length: float, number: int, count: int) -> list[tuple
     return columns
 
 
-def _memory(source: Learned, time: Array, slip: SlipVelocity, c: Coordinates) -> list[tuple[Array, Array]]:
+def _memory(source: Learned, time: Array, slip: SlipVelocity, c: Coordinates) -> Columns:
     """Eight functions of the way through the loop."""
     grid = np.arange(source.span.start, source.span.end, source.inputs.h)
     edges = np.concatenate([[source.span.start], reversals(grid, slip(grid), c.D_y), [source.span.end]])

@@ -54,12 +54,12 @@ class GlobalTraining:
 
     def __init__(self, problems: Sequence[Problem], settings: GlobalSettings, supervision: Supervision) -> None:
         self.settings, self.supervision = settings, supervision
-        self.dampers = [DamperInTraining(problem, settings.seed) for problem in problems]
+        self.dampers = [DamperInTraining(problem, settings.seed, settings.features) for problem in problems]
         sizes = {batch_size(d.problem, settings) for d in self.dampers}
         if len(sizes) > 1:
             raise ValueError(f"dampers of different sizes {sorted(sizes)} in one batch")
         self.samples = min(settings.samples, *(d.size[0] for d in self.dampers))
-        self.network = Network([self.dampers[0].size[1], settings.width, settings.width, 2])
+        self.network = Network([self.dampers[0].size[1], *[settings.width] * settings.layers, 2])
         self.weights = self.network.begin(settings.seed, settings.device).repeat(len(problems), 1)
         self.descent, self.done = Levenberg(self.weights, len(problems)), 0
         self.history: list[list[Moment]] = [[] for _ in problems]

@@ -139,7 +139,7 @@ class LocalTraining:
         return self._trained()
 
     def _layer(self) -> HiddenLayer:
-        return HiddenLayer(self.size.units, self.size.rank, self.settings.seed)
+        return HiddenLayer(self.size.units, self.size.rank, self.settings.seed, self.settings.activation)
 
     def _on_same_mesh(self, layer: HiddenLayer) -> LocalNetwork:
         """The same states on another hidden layer."""
@@ -278,6 +278,8 @@ class LocalTraining:
 
     def _slip(self, number: int, source: Learned) -> SlipVelocity:
         """The network's own, seen at each sample: finer would cost much and move no reversal."""
+        if self.settings.features == "stroke":
+            return lambda time: source.inputs.motion(time)[1]
         grid = np.arange(source.span.start, source.span.end + source.inputs.h, min(source.inputs.h, _FINE))
         slip = source.inputs.motion(grid)[1] - self.network.inner_velocity(number, grid)
         return lambda time: np.interp(time, grid, slip)
@@ -290,7 +292,7 @@ class LocalTraining:
         late = float(self.unknowns[COORDINATE_COUNT + 1]) * self.problem.delay_prior
         mesh = make_mesh(
             [p.inputs for p in pieces], [p.span for p in pieces], slips, c.D_y, c.eta,
-            [p.piece.drive_delay + late for p in pieces],
+            [p.piece.drive_delay + late for p in pieces], stretched=self.settings.features != "time",
         )  # fmt: skip
         network = before or LocalNetwork(layer, mesh, Heads.nothing())
         return network.fitted(mesh, states, gauss_points(self.size.points)[0])

@@ -16,6 +16,8 @@ _ENTERS, _CENTRE, _LEAVES = 0.7, 1.3, 2.0
 """[1] slip since the reversal over the yield displacement."""
 _REACHED = 0.9
 """[1] of the slip in an element, at which the breakthrough ends at the latest."""
+_PLAIN = 5.0
+"""[1] of an element, from which width on nothing is stretched."""
 _NARROWEST = 5e-4
 """[s] no recording resolves less."""
 
@@ -74,3 +76,8 @@ def after_step(length: float, eta: float) -> MemoryInput:
 def anywhere(length: float) -> MemoryInput:
     """The map for an element that begins where nothing happens."""
     return MemoryInput(length, 0.0, length)
+
+
+def plain(length: float) -> MemoryInput:
+    """Time itself, to a hundredth."""
+    return MemoryInput(length, 0.0, _PLAIN * length)

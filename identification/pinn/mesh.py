@@ -15,7 +15,7 @@ import numpy.typing as npt
 from identification.arrays import Array
 from identification.pinn.hidden_layer import HiddenLayer
 from identification.pinn.inputs import Inputs
-from identification.pinn.memory_input import MemoryInput, after_reversal, after_step, anywhere
+from identification.pinn.memory_input import MemoryInput, after_reversal, after_step, anywhere, plain
 from identification.pinn.reversals import reversals
 
 Indices = npt.NDArray[np.int64]
@@ -96,6 +96,8 @@ def make_mesh(
     yield_displacement: float,
     eta: float,
     drive_delays: Sequence[float],
+    *,
+    stretched: bool = True,
 ) -> Mesh:
     """Elements between reversals of the slip and steps of the drive, for the present state of the network.
 
@@ -106,6 +108,7 @@ def make_mesh(
         yield_displacement: [m].
         eta: rate of the field [1/s].
         drive_delays: by which the drive arrives late in each piece [s].
+        stretched: whether the input follows the breakthrough; else it is time.
     """
     elements: list[Element] = []
     turns = []
@@ -122,7 +125,8 @@ def make_mesh(
         ]
         paces = _paces(kinds[:-1], memories, yield_displacement, given.usual_velocity)
         for start, memory, pace in zip(edges[:-1], memories, paces, strict=True):
-            elements.append(Element(piece, start, memory, node, pace))
+            shown = memory if stretched else plain(memory.length)
+            elements.append(Element(piece, start, shown, node, pace))
             node += 1
         node += 1
     return Mesh(tuple(elements), tuple(turns))

@@ -1,11 +1,12 @@
 """How the networks are trained: presets in JSON, read into frozen settings."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from identification.errors import IdentificationError
+from identification.pinn.activations import Activation
 
 PRESETS = Path(__file__).parent / "presets"
 """Where the presets lie that ship with the product."""
@@ -13,6 +14,14 @@ PRESETS = Path(__file__).parent / "presets"
 
 Residual = Literal["points", "means", "weak"]
 """How the law is asked for in an element: at points, in the mean, or in the mean without the stroke's velocity."""
+
+
+Features = Literal["slip", "time", "stroke"]
+"""What an element is shown: time stretched around the breakthrough, from one turn of the slip to the next; plain
+time in these elements; or time stretched by the turns of the stroke, as if no inner damper were known of."""
+Group = Literal["motion", "drive", "time", "memory"]
+"""Inputs of the global network that belong together."""
+GROUPS: tuple[Group, ...] = get_args(Group)
 
 
 class CommonSettings(BaseModel):
@@ -47,7 +56,7 @@ class LayerSize(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    units: int = Field(default=120, ge=8, description="tanh units")
+    units: int = Field(default=120, ge=8, description="of the hidden layer")
     rank: int = Field(default=36, ge=6, description="functions kept of them")
     points: int = Field(default=72, ge=8, description="per element where the law is asked for")
 
@@ -58,6 +67,12 @@ class LocalSettings(CommonSettings):
     network: Literal["local"] = "local"
     layers: tuple[LayerSize, ...] = Field(
         min_length=1, description="the hidden layer, and richer ones for as long as the law is not kept"
+    )
+    activation: Activation = Field(default="tanh", description="what a unit makes of its input")
+    features: Features = Field(
+        default="slip",
+        description="input of an element: time stretched where the `slip` breaks through, plain `time`, or "
+        "elements and input by the `stroke` in place of the slip",
     )
     kept: float = Field(
         default=5e-4,
@@ -83,7 +98,14 @@ class GlobalSettings(TorchSettings):
     """One ordinary network, all of its layers trained by Gauss-Newton."""
 
     network: Literal["global"] = "global"
-    width: int = Field(default=20, ge=2, description="tanh units of each of the two hidden layers")
+    width: int = Field(default=20, ge=2, description="tanh units of each hidden layer")
+    layers: int = Field(default=2, ge=1, description="hidden ones")
+    features: tuple[Group, ...] = Field(
+        default=GROUPS,
+        min_length=1,
+        description="inputs: `motion` and its products, the `drive` lagged, `time`, and the `memory` of where in "
+        "its loop the hysteresis is",
+    )
     samples: int = Field(default=3600, ge=100, description="in one batch")
     physics: tuple[float, float] = Field(default=(3.0, 30.0), description="first and last weight of the law")
     steps: int = Field(default=280, ge=10, description="of Gauss-Newton")

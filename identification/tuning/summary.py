@@ -46,15 +46,16 @@ def page(study: optuna.Study, settings: str, shares: dict[str, float], picture: 
         f"# Tuning of the {study.study_name} network",
         "",
         f"{len(trials)} trials, {len(ended)} to their end, {pruned} pruned; "
-        f"preset `{study.user_attrs['preset']}`. Best: trial {best.number}, simulated error "
-        f"{_attribute(best, 'error')} of the noise on blocks that it was not trained on, in "
-        f"{_attribute(best, 'seconds')} s of processor time.",
+        f"preset `{study.user_attrs['preset']}`, which is trial 0. Best: trial {best.number}, simulated error "
+        f"{_attribute(best, 'error')} of the noise on blocks that it was not trained on, parameters "
+        f"{_attribute(best, 'offset')} deviations from the best simulated fit, {_attribute(best, 'seconds')} s of "
+        f"processor time; means over {len(study.user_attrs['logs'])} logs.",
         "",
         "```json",
         settings,
         "```",
         "",
-        *_table(ended[:_SHOWN]),
+        *_table(ended[:_SHOWN] + [t for t in ended[_SHOWN:] if t.number == 0]),
     ]
     if shares:
         lines += ["", "| setting | importance |", "| --- | ---: |"]
@@ -66,11 +67,13 @@ def page(study: optuna.Study, settings: str, shares: dict[str, float], picture: 
 
 def _table(trials: list[optuna.trial.FrozenTrial]) -> list[str]:
     names = list(trials[0].params)
-    head = ["| trial | error over noise | s | " + " | ".join(f"`{name}`" for name in names) + " |"]
-    head.append("| ---: | ---: | ---: |" + " ---: |" * len(names))
+    varied = " | ".join(f"`{name}`" for name in names)
+    head = [f"| trial | value | error over noise | offset | s | {varied} |"]
+    head.append("| ---: | ---: | ---: | ---: | ---: |" + " ---: |" * len(names))
     for t in trials:
         values = " | ".join(_short(t.params[name]) for name in names)
-        head.append(f"| {t.number} | {_attribute(t, 'error')} | {_attribute(t, 'seconds')} | {values} |")
+        measured = " | ".join(_attribute(t, name) for name in ("error", "offset", "seconds"))
+        head.append(f"| {t.number} | {_value(t):.4f} | {measured} | {values} |")
     return head
 
 

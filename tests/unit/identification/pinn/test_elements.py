@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from made_up_problem import RATE, TRUTH, network_on, problem
 
+from identification.pinn.activations import ACTIVATIONS
+from identification.pinn.beginning import FirstStates
 from identification.pinn.hidden_layer import HiddenLayer
 from identification.pinn.inputs import Inputs
-from identification.pinn.memory_input import MemoryInput, after_reversal
+from identification.pinn.memory_input import MemoryInput, after_reversal, plain
+from identification.pinn.mesh import make_mesh
 from identification.pinn.quadrature import gauss_points
 from identification.pinn.reversals import reversals, turning_points
 from identification.pinn.split import validation_masks
@@ -34,6 +37,12 @@ def test_the_memory_input_is_finest_where_the_slip_breaks_through():
     slip = 0.04 * 0.3 / np.pi * (1 - np.cos(np.pi * time / 0.3))
     assert np.interp(memory.centre, time, slip) == pytest.approx(1.3e-4, rel=1e-2)
     assert time[np.argmax(memory.at(time)[1])] == pytest.approx(memory.centre, abs=2e-4)
+
+
+def test_a_plain_input_is_time_to_a_hundredth():
+    value, rate, _ = plain(0.2).at(np.linspace(0.0, 0.2, 11))
+    assert value == pytest.approx(np.linspace(0.0, 1.0, 11), abs=1e-2)
+    assert rate == pytest.approx(5.0, rel=0.03)
 
 
 def test_reversals_are_those_of_the_slip_and_creeping_about_zero_is_none():
@@ -76,12 +85,21 @@ def test_the_velocity_of_the_network_is_the_rate_of_its_displacement():
     assert found == pytest.approx(network.at(0, time).y_rate, rel=1e-5, abs=1e-7)
 
 
+def test_an_element_that_is_shown_plain_time_turns_where_the_slip_does():
+    given = problem()
+    network, loss = network_on(given)
+    source = loss.batches[0].source
+    slip = FirstStates(source, TRUTH).slip_velocity()
+    mesh = make_mesh([source.inputs], [source.span], [slip], TRUTH.D_y, TRUTH.eta, [0.0], stretched=False)
+    for bare, full in zip(mesh.elements, network.mesh.elements, strict=True):
+        assert (bare.start, bare.slip_velocity) == (full.start, full.slip_velocity)
+        assert bare.memory == plain(full.memory.length)
+
+
 def test_a_new_mesh_moves_with_the_slip_and_keeps_the_states():
     given = problem()
     network, loss = network_on(given, rank=24, points=40)
     sources = [loss.batches[0].source]
-
-    from identification.pinn.mesh import make_mesh
 
     def later(time):
         return sources[0].inputs.motion(time - 0.003)[1]
@@ -101,8 +119,9 @@ def test_the_hidden_layer_has_two_nodal_functions_and_the_rest_vanish_at_both_en
     assert ends == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_functions_of_the_hidden_layer_come_with_their_derivatives():
-    layer = HiddenLayer(60, 12, 3)
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_the_functions_of_the_hidden_layer_come_with_their_derivatives(activation):
+    layer = HiddenLayer(60, 12, 3, activation)
     place = np.linspace(0.05, 0.95, 9)
     slopes, curvatures = layer.slopes_and_curvatures(place)
     assert slopes == pytest.approx(layer.slopes(place), rel=1e-12)

@@ -2,13 +2,15 @@
 
     python -m benchmarks pinn                     all parts; takes hours on a busy machine
     python -m benchmarks.pinn local dampers       some of them
+    python -m benchmarks.pinn local dampers --preset tuned.json
 
+The first three parts take another preset of the local network.
 `MRBENCH_SHARED` names the folder with the recordings of real dampers; without it that part is left out.
 """
 
 import os
-import sys
-from collections.abc import Callable
+from argparse import ArgumentParser
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -53,22 +55,22 @@ def _summary(scores: list[Score], ratio: float, pooled: float, seconds: float) -
          f"{max(s.seconds for s in scores):.1f} s")  # fmt: skip
 
 
-def local() -> None:
-    """Preset local, six voltages."""
-    scores = {seed: try_out("local", LABORATORY, seed) for seed in range(SEEDS)}
-    _summary(_table("local, six voltages (12 s)", scores), 1.005, 1.5, 5.0)
+def local(preset: str = "local") -> None:
+    """Preset local or another of its network, six voltages."""
+    scores = {seed: try_out(preset, LABORATORY, seed) for seed in range(SEEDS)}
+    _summary(_table(f"{preset}, six voltages (12 s)", scores), 1.005, 1.5, 5.0)
 
 
-def pairs() -> None:
-    """Preset local, four pairs of amplitude and frequency."""
-    scores = {seed: try_out("local", LABORATORY, seed, pairs=True) for seed in range(SEEDS)}
-    _summary(_table("local, four pairs (56 s)", scores), 1.005, 1.5, 30.0)
+def pairs(preset: str = "local") -> None:
+    """The same, four pairs of amplitude and frequency."""
+    scores = {seed: try_out(preset, LABORATORY, seed, pairs=True) for seed in range(SEEDS)}
+    _summary(_table(f"{preset}, four pairs (56 s)", scores), 1.005, 1.5, 30.0)
 
 
-def dampers() -> None:
-    """Preset local, random dampers."""
-    scores = {seed: try_out("local", random_damper(seed), seed) for seed in range(DAMPERS)}
-    found = _table("local, random dampers, six voltages", scores)
+def dampers(preset: str = "local") -> None:
+    """The same, random dampers."""
+    scores = {seed: try_out(preset, random_damper(seed), seed) for seed in range(DAMPERS)}
+    found = _table(f"{preset}, random dampers, six voltages", scores)
     _summary(found, 1.02, 2.5, 30.0)
     taken = [s for s in found if s.accepted]
     line("accepted by the network's own judgement", len(taken), f"of {len(found)}", "")
@@ -150,17 +152,24 @@ def real() -> None:
             line(f"{name}: held-out error of pinn over that of refine", errors[0] / errors[1], "x", "at most 1.05")
 
 
+OF_PRESET: dict[str, Callable[[str], None]] = {"local": local, "pairs": pairs, "dampers": dampers}
 PARTS: dict[str, Callable[[], None]] = {
-    "local": local, "pairs": pairs, "dampers": dampers, "global": globally, "many": many, "paper": paper,
-    "displacement": displacement, "real": real,
+    "global": globally, "many": many, "paper": paper, "displacement": displacement, "real": real,
 }  # fmt: skip
 
 
-def run(names: tuple[str, ...] = tuple(PARTS)) -> None:
-    """Print the parts asked for."""
-    for name in names:
-        PARTS[name]()
+def run(names: Sequence[str] = (), preset: str = "local") -> None:
+    """Print the parts asked for, or all."""
+    for name in names or (*OF_PRESET, *PARTS):
+        if name in OF_PRESET:
+            OF_PRESET[name](preset)
+        else:
+            PARTS[name]()
 
 
 if __name__ == "__main__":
-    run(tuple(sys.argv[1:]) or tuple(PARTS))
+    asked = ArgumentParser()
+    asked.add_argument("names", nargs="*", metavar="PART", help=", ".join([*OF_PRESET, *PARTS]))
+    asked.add_argument("--preset", default="local")
+    given = asked.parse_args()
+    run(given.names, given.preset)

@@ -7,7 +7,9 @@ import typer
 
 
 def tune(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="Logs to train on, each a damper of its own.")],
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs to train on, each a damper of its own.")
+    ],
     out: Annotated[
         Path, typer.Option("--out", metavar="PRESET.json", help="The tuned preset; a summary stands beside it.")
     ],
@@ -15,7 +17,9 @@ def tune(
         str, typer.Option(help="Where it starts from: `local`, `global`, `paper`, or a settings file.")
     ] = "local",
     trials: Annotated[int, typer.Option(min=1, help="Trials in all, earlier calls included.")] = 30,
-    budget: Annotated[float, typer.Option(metavar="SECONDS", min=1.0, help="Processor time of one training.")] = 60.0,
+    budget: Annotated[
+        float, typer.Option(metavar="SECONDS", min=1.0, help="Processor time of one training.")
+    ] = 60.0,
     price: Annotated[
         float, typer.Option(metavar="SHARE", min=0.0, help="What a second adds to the value.")
     ] = 0.001,

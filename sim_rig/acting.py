@@ -2,14 +2,15 @@
 
 from identification.damper.effects import EFFECTS, Action, Form
 from sim_rig.compiled import (
-    OfThree,
+    OfFour,
     OfTwo,
     Scales,
     chain_of,
     nothing,
-    of_all_three,
+    of_all_but_third,
     of_energy,
     of_first,
+    of_first_three,
     of_first_two,
     of_motion,
     product_of,
@@ -52,15 +53,25 @@ class Effects:
         dead, lag, part, layers = acting[0] if acting else (0.0, 0.0, 1.0, 1)
         return float(dead), float(lag), float(part), float(layers)
 
-    def parallel(self) -> OfThree:
-        """Force beside the law [N] over displacement [m], velocity [m/s] and the bend of a seal's lip [1]."""
+    def parallel(self) -> OfFour:
+        """Force [N] over displacement [m], velocity [m/s], bend of a lip [1] and displacement that follows [m]."""
         plain = [of_first_two(form.act, values) for form, values in self.that("parallel_force")]
-        return sum_of(plain + [of_all_three(form.act, values) for form, values in self.that("dragging_force")])
+        bent = [of_first_three(form.act, values) for form, values in self.that("dragging_force")]
+        relaxed = [of_all_but_third(form.act, values) for form, values in self.that("relaxing_force")]
+        return sum_of(plain + bent + relaxed)
 
     def bristles(self) -> float:
         """Rate [1/m] over the way with which a seal's lip bends."""
-        for form, values in self.that("dragging_force"):
-            return 1.0 / values[[q.symbol for q in form.parameters].index("bend")]
+        return self._rate("dragging_force", "bend")
+
+    def exchange(self) -> float:
+        """Rate [1/s] with which gas takes the temperature of its wall."""
+        return self._rate("relaxing_force", "exchange")
+
+    def _rate(self, acts: Action, constant: str) -> float:
+        """Rate of the effect that acts so: one over its time constant [s], or length [m]; 0 without one."""
+        for form, values in self.that(acts):
+            return 1.0 / values[[q.symbol for q in form.parameters].index(constant)]
         return 0.0
 
     def follow(self) -> OfTwo:
@@ -90,6 +101,4 @@ class Effects:
 
     def cooling(self) -> float:
         """Rate [1/s] with which the energy leaves the damper."""
-        for form, values in self.that("softening"):
-            return 1.0 / values[[q.symbol for q in form.parameters].index("recovery")]
-        return 0.0
+        return self._rate("softening", "recovery")

@@ -34,8 +34,8 @@ Array: TypeAlias = npt.NDArray[np.float64]
 OfTwo: TypeAlias = Callable[[float, float], float]
 """A compiled function of two numbers that the plant takes as an argument."""
 
-OfThree: TypeAlias = Callable[[float, float, float], float]
-"""The same of three numbers."""
+OfFour: TypeAlias = Callable[[float, float, float, float], float]
+"""The same of four numbers."""
 
 Scales: TypeAlias = Callable[[float, float, float], tuple[float, float, float]]
 """A compiled function of displacement [m], velocity [m/s] and energy [J]: factors of alpha, c0 and c1."""
@@ -45,9 +45,9 @@ Function = TypeVar("Function", bound=Callable[..., object])
 _OF_TWO = numba.float64(numba.float64, numba.float64)
 OF_TWO = numba.types.FunctionType(_OF_TWO)
 """The type of ``OfTwo`` in explicit signatures: one compiled plant then takes any of them."""
-_OF_THREE = numba.float64(numba.float64, numba.float64, numba.float64)
-OF_THREE = numba.types.FunctionType(_OF_THREE)
-"""The type of ``OfThree``."""
+_OF_FOUR = numba.float64(numba.float64, numba.float64, numba.float64, numba.float64)
+OF_FOUR = numba.types.FunctionType(_OF_FOUR)
+"""The type of ``OfFour``."""
 _THREE = numba.types.UniTuple(numba.float64, 3)  # type: ignore[no-untyped-call]
 _SCALES = _THREE(numba.float64, numba.float64, numba.float64)
 SCALES = numba.types.FunctionType(_SCALES)
@@ -89,24 +89,34 @@ def of_first(act: Callable[..., Any], values: Sequence[float]) -> OfTwo:
     return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(acts))
 
 
-def of_first_two(act: Callable[..., Any], values: Sequence[float]) -> OfThree:
-    """A form of two numbers with its parameters fixed, as a compiled function that leaves its third argument."""
+def of_first_two(act: Callable[..., Any], values: Sequence[float]) -> OfFour:
+    """A form of two numbers with its parameters fixed, as a compiled function that leaves two more."""
     form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
 
-    def acts(one: float, two: float, three: float) -> float:
+    def acts(one: float, two: float, three: float, four: float) -> float:
         return float(form(one, two, *fixed))
 
-    return cast(OfThree, numba.njit(_OF_THREE, nogil=True, error_model="numpy")(acts))
+    return cast(OfFour, numba.njit(_OF_FOUR, nogil=True, error_model="numpy")(acts))
 
 
-def of_all_three(act: Callable[..., Any], values: Sequence[float]) -> OfThree:
-    """A form of three numbers with its parameters fixed, as a compiled function."""
+def of_first_three(act: Callable[..., Any], values: Sequence[float]) -> OfFour:
+    """A form of three numbers with its parameters fixed, as a compiled function that leaves the fourth."""
     form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
 
-    def acts(one: float, two: float, three: float) -> float:
+    def acts(one: float, two: float, three: float, four: float) -> float:
         return float(form(one, two, three, *fixed))
 
-    return cast(OfThree, numba.njit(_OF_THREE, nogil=True, error_model="numpy")(acts))
+    return cast(OfFour, numba.njit(_OF_FOUR, nogil=True, error_model="numpy")(acts))
+
+
+def of_all_but_third(act: Callable[..., Any], values: Sequence[float]) -> OfFour:
+    """A form of three numbers with its parameters fixed, as a compiled function that leaves the third of four."""
+    form, fixed = numba.njit(nogil=True, error_model="numpy")(act), tuple(values)
+
+    def acts(one: float, two: float, three: float, four: float) -> float:
+        return float(form(one, two, four, *fixed))
+
+    return cast(OfFour, numba.njit(_OF_FOUR, nogil=True, error_model="numpy")(acts))
 
 
 def of_energy(act: Callable[..., Any], values: Sequence[float]) -> Scales:
@@ -157,23 +167,23 @@ def _after(one: OfTwo, other: OfTwo) -> OfTwo:
     return cast(OfTwo, numba.njit(_OF_TWO, nogil=True, error_model="numpy")(chained))
 
 
-def sum_of(functions: Sequence[OfThree]) -> OfThree:
-    """The sum of compiled functions of the same three arguments; nothing adds up to zero."""
+def sum_of(functions: Sequence[OfFour]) -> OfFour:
+    """The sum of compiled functions of the same four arguments; nothing adds up to zero."""
     return reduce(_plus, functions) if functions else no_force
 
 
-def _plus(one: OfThree, other: OfThree) -> OfThree:
-    def both(first: float, second: float, third: float) -> float:
-        return one(first, second, third) + other(first, second, third)
+def _plus(one: OfFour, other: OfFour) -> OfFour:
+    def both(first: float, second: float, third: float, fourth: float) -> float:
+        return one(first, second, third, fourth) + other(first, second, third, fourth)
 
-    return cast(OfThree, numba.njit(_OF_THREE, nogil=True, error_model="numpy")(both))
+    return cast(OfFour, numba.njit(_OF_FOUR, nogil=True, error_model="numpy")(both))
 
 
 def _nothing(first: float, second: float) -> float:
     return 0.0
 
 
-def _no_force(x: float, velocity: float, bent: float) -> float:
+def _no_force(x: float, velocity: float, bent: float, followed: float) -> float:
     return 0.0
 
 
@@ -191,7 +201,7 @@ def _second(first: float, second: float) -> float:
 
 nothing: OfTwo = compiled(_nothing, _OF_TWO)
 """Iron that remembers nothing."""
-no_force: OfThree = compiled(_no_force, _OF_THREE)
+no_force: OfFour = compiled(_no_force, _OF_FOUR)
 """No force beside the law."""
 rigid: OfTwo = compiled(_second, _OF_TWO)
 """A mounting without play: the damper is where the actuator is."""

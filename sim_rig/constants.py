@@ -6,7 +6,7 @@ import numpy as np
 
 from sim_rig import states as at
 from sim_rig.acting import Effects
-from sim_rig.compiled import Array, OfThree
+from sim_rig.compiled import Array, OfFour
 from sim_rig.scenario import Scenario
 
 _NO_LAG = 2e-5
@@ -59,7 +59,8 @@ def of_the_plant(scenario: Scenario, law: Array, effects: Effects) -> Array:
     k[at.SECOND_LAG] = 1.0 / lag if lag > _NO_LAG else 0.0
     k[at.BRISTLES] = effects.bristles()
     k[at.EVER_PRESENT] = fastest_of_the_rig(scenario, law, _steepest(effects.parallel()))
-    k[at.EVER_PRESENT] += k[at.SECOND_LAG]
+    k[at.EXCHANGE] = effects.exchange()
+    k[at.EVER_PRESENT] += k[at.SECOND_LAG] + k[at.EXCHANGE]
     k[at.EVER_PRESENT] += _SWIFT * k[at.BRISTLES]
     k[at.PLAY] = bool(effects.that("displacement_follower"))
     k[[at.GIVE, at.GAP, at.HARDENING, at.FILM]] = effects.connection()
@@ -69,9 +70,10 @@ def of_the_plant(scenario: Scenario, law: Array, effects: Effects) -> Array:
     return k
 
 
-def _steepest(parallel: OfThree) -> float:
+def _steepest(parallel: OfFour) -> float:
     """Largest slope of the forces beside the law over the velocity [N s/m], near rest."""
     speeds = np.geomspace(1e-5, 1.0, 60)
     return max(
-        float(abs(parallel(0.0, v * 1.01, 1.0) - parallel(0.0, v * 0.99, 1.0)) / (0.02 * v)) for v in speeds
+        float(abs(parallel(0.0, v * 1.01, 1.0, 0.0) - parallel(0.0, v * 0.99, 1.0, 0.0)) / (0.02 * v))
+        for v in speeds
     )

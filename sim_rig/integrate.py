@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from identification.damper.effects import connection
-from sim_rig.compiled import OF_THREE, OF_TWO, SCALES, Array, OfThree, OfTwo, Scales, compiled
+from sim_rig.compiled import OF_FOUR, OF_TWO, SCALES, Array, OfFour, OfTwo, Scales, compiled
 from sim_rig.compiled_law import at_field
 from sim_rig.rates import AHEAD, rates
 from sim_rig.states import (
@@ -111,7 +111,7 @@ def _step(
     k: Array,
     p: Array,
     follow: OfTwo,
-    parallel: OfThree,
+    parallel: OfFour,
     seen: OfTwo,
     memory: OfTwo,
     scales: Scales,
@@ -165,7 +165,7 @@ def _march(
     k: Array,
     p: Array,
     follow: OfTwo,
-    parallel: OfThree,
+    parallel: OfFour,
     seen: OfTwo,
     memory: OfTwo,
     scales: Scales,
@@ -232,7 +232,7 @@ def _march(
 _ROW, _TABLE, _NUMBER = numba.float64[::1], numba.float64[:, ::1], numba.float64
 _SIGNATURE = (
     *(_ROW, _NUMBER, _NUMBER, _ROW, numba.int64, _ROW, _ROW, _NUMBER, numba.int64, _ROW, _ROW),
-    *(OF_TWO, OF_THREE, OF_TWO, OF_TWO, SCALES, _ROW, _ROW, _ROW, _TABLE, _TABLE),
+    *(OF_TWO, OF_FOUR, OF_TWO, OF_TWO, SCALES, _ROW, _ROW, _ROW, _TABLE, _TABLE),
 )
 march = compiled(_march, _SIGNATURE)
 """``_march`` compiled when first imported, once for every kind of effect."""

@@ -128,7 +128,7 @@ class Plant:
         place = displacement
         # The droop changes the load but little: each round leaves less than a hundredth of what was missing.
         for _ in range(3):
-            load = stiffness * (place - rest) + self._parallel(place, 0.0, 0.0)
+            load = stiffness * (place - rest) + self._parallel(place, 0.0, 0.0, place)
             place = displacement - self._constants[at.COMPLIANCE] * load
         if not math.isfinite(place):
             raise PlantError(f"the specimen has no finite force at rest at {displacement:.4g} m")
@@ -136,7 +136,7 @@ class Plant:
         carrying = self._constants[[at.GIVE, at.GAP, at.HARDENING]]
         behind = place - stretched(load, *carrying) if carrying[0] > 0.0 else place
         states[[at.COMMAND, at.POSITION, at.Y]] = displacement, place, behind
-        states[at.BEHIND] = behind
+        states[[at.BEHIND, at.FOLLOWED]] = behind
         states[[at.FIELD, at.OUTPUT, at.LAGGED, at.TWICE]] = drive
         states[at.TEMPERATURE] = self._constants[at.AMBIENT]
         return states, place

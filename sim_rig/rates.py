@@ -7,7 +7,7 @@ between command samples.
 """
 
 from identification.damper.effects import connection
-from sim_rig.compiled import Array, OfThree, OfTwo, Scales, compiled, inlined
+from sim_rig.compiled import Array, OfFour, OfTwo, Scales, compiled, inlined
 from sim_rig.compiled_law import at_field, damper_force, field_rate, hysteresis_rate, inner_velocity
 from sim_rig.states import (
     AMBIENT,
@@ -22,8 +22,10 @@ from sim_rig.states import (
     DAMPING,
     DEAD_TIME,
     ENERGY,
+    EXCHANGE,
     FIELD,
     FILM,
+    FOLLOWED,
     GAP,
     GIVE,
     HARDENING,
@@ -65,18 +67,18 @@ def _damper_motion(position: float, speed: float, held: float, play: float, foll
 
 @compiled
 def _damper_force(
-    s: Array, x: float, v: float, u: float, p: Array, parallel: OfThree, scales: Scales
+    s: Array, x: float, v: float, u: float, p: Array, parallel: OfFour, scales: Scales
 ) -> tuple[float, float]:
     """Force of the damper [N] and y' [m/s] at displacement x [m], velocity v [m/s] and the field seen."""
     a, b, c = scales(x, v, s[ENERGY])
     alpha, c0, c1 = a * at_field(p[0], p[1], u), b * at_field(p[6], p[7], u), c * at_field(p[8], p[9], u)
     y_rate = inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
-    return damper_force(y_rate, x, c1, p[11], p[13]) + parallel(x, v, s[BENT]), y_rate
+    return damper_force(y_rate, x, c1, p[11], p[13]) + parallel(x, v, s[BENT], s[FOLLOWED]), y_rate
 
 
 @inlined
 def _excess(
-    v: float, s: Array, load: float, film: float, u: float, p: Array, parallel: OfThree, scales: Scales
+    v: float, s: Array, load: float, film: float, u: float, p: Array, parallel: OfFour, scales: Scales
 ) -> float:
     """Force [N] by which damper and film, at a velocity [m/s], resist more than the load of the fixture."""
     return _damper_force(s, s[BEHIND], v, u, p, parallel, scales)[0] + film * v - load
@@ -84,7 +86,7 @@ def _excess(
 
 @compiled
 def _balanced_velocity(
-    s: Array, load: float, film: float, guess: float, u: float, p: Array, parallel: OfThree, scales: Scales
+    s: Array, load: float, film: float, guess: float, u: float, p: Array, parallel: OfFour, scales: Scales
 ) -> float:
     """Velocity [m/s] at which damper and film resist with the load [N] of the fixture, by brackets and secants."""
     width = 1e-3
@@ -161,7 +163,7 @@ def rates(
     k: Array,
     p: Array,
     follow: OfTwo,
-    parallel: OfThree,
+    parallel: OfFour,
     seen: OfTwo,
     scales: Scales,
     rate: Array,
@@ -178,7 +180,8 @@ def rates(
         k: (CONSTANTS,) constants of actuator, amplifier, coil, heat and mounting.
         p: (14,) the parameters of the law in the paper's order.
         follow: displacement of the damper over (held, actuator) [m].
-        parallel: force beside the law [N] over (displacement [m], velocity [m/s], bend of a lip [1]).
+        parallel: force beside the law [N] over (displacement [m], velocity [m/s], bend of a lip [1], displacement
+            that follows [m]).
         seen: field that the damper sees over (field, remembered) [V or A].
         scales: factors of alpha, c0 and c1 over displacement, velocity and energy.
         rate: (STATES,) the answer.
@@ -200,6 +203,7 @@ def rates(
     rate[Y], rate[BEHIND] = y_rate, v
     rate[Z] = hysteresis_rate(slip, s[Z], p[5], p[2], p[3], p[12])
     rate[BENT] = k[BRISTLES] * (v - abs(v) * s[BENT])
+    rate[FOLLOWED] = k[EXCHANGE] * (x - s[FOLLOWED])
     _move_actuator(s, command, force, k, rate)
     _drive_coil(s, drive, late, p[4], k, rate)
     _heat(s, abs(force * v), k, rate)

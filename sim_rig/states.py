@@ -1,12 +1,16 @@
 """States and constants of the motion: what stands where in their arrays."""
 
-STATES = 13
+STATES = 14
 """Command behind the lag [m], actuator position [m] and velocity [m/s], y [m], z [m], field u, amplifier output
 [both V or A], temperature [degC], drive behind a second lag [V or A], energy in the damper [J], displacement of
-the damper behind a fixture that gives way [m], bend of a seal's lip [1], drive behind two such lags [V or A]."""
-COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND, BENT, TWICE = range(STATES)
+the damper behind a fixture that gives way [m], bend of a seal's lip [1], drive behind two such lags [V or A],
+displacement at which the gas had the temperature of its wall [m]."""
+(
+    *(COMMAND, POSITION, SPEED, Y, Z, FIELD, OUTPUT, TEMPERATURE, LAGGED, ENERGY, BEHIND, BENT, TWICE),
+    FOLLOWED,
+) = range(STATES)
 
-CONSTANTS = 24
+CONSTANTS = 25
 """Rates and weights of everything but the law, in the order of the names below."""
 (
     LAG,  # [1/s] rate of the command's lag
@@ -33,4 +37,5 @@ CONSTANTS = 24
     FILM,  # [N s/m] in that gap
     BRISTLES,  # [1/m] rate over the way with which a seal's lip bends, 0 without one
     LAYERS,  # second lags in a row, one or two
+    EXCHANGE,  # [1/s] rate with which gas takes the temperature of its wall, 0 without
 ) = range(CONSTANTS)

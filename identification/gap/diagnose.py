@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from identification.assemble import Assembled, assemble
 from identification.gap.checks import enough_cycles, one_specimen, sliding_recorded, without_clipping
 from identification.gap.floor import Floor
+from identification.gap.further import look_further
 from identification.gap.hearing import Hearing
 from identification.gap.judge import Judge
 from identification.gap.model import Model
@@ -27,6 +28,9 @@ _REPEATS = 1.1
 """[1] ratio of cycle-to-cycle over high-frequency floor above which something does not repeat."""
 _MOST_POLISHED = 6
 """Sets that are fitted on all samples because the one before them came out worse there."""
+
+_FURTHER = 2
+"""Effects that are added to the likeliest set at most once it has been fitted in full."""
 
 Progress = Callable[[str, float], None]
 
@@ -117,6 +121,11 @@ def _final_odds(search: Search) -> Odds:
         likeliest = found.ranked()[0][0]
         if likeliest in search.complete:
             break
+        search.polish(likeliest)
+    for _ in range(_FURTHER):
+        if not look_further(search, likeliest):
+            break
+        likeliest = odds(search.candidates(), search.full.samples).ranked()[0][0]
         search.polish(likeliest)
     return odds(search.candidates(), search.full.samples)
 

@@ -28,10 +28,11 @@ def leave_out(search: "Search") -> None:
     best = sorted((c for c in search.found.values() if len(c.names) > 1), key=search.left_of)[:_TAKEN_BACK]
     for contender in best:
         for choice in contender.fit.effects:
-            _left_out(search, contender, choice)
+            left_out(search, contender, choice)
 
 
-def _left_out(search: "Search", contender: Contender, choice: EffectChoice) -> Contender:
+def left_out(search: "Search", contender: Contender, choice: EffectChoice) -> Contender:
+    """A set fitted again without one of its effects."""
     rest = tuple(c for c in contender.fit.effects if c != choice)
     return search.fit(rest, None, [without(contender.fit.problem, contender.fit.minimum.unknowns, choice)])
 
@@ -53,7 +54,7 @@ def exchange(search: "Search") -> None:
 
 def _replace(search: "Search", best: Contender, choice: EffectChoice) -> None:
     """Fit the most promising effects in the place of one."""
-    rest = search.found.get(best.names - {choice.name}) or _left_out(search, best, choice)
+    rest = search.found.get(best.names - {choice.name}) or left_out(search, best, choice)
     gains = search.screened(rest, best.names)
     for gain in worth_fitting(gains, _EXCHANGED):
         if rest.names | {gain.choice.name} not in search.found:

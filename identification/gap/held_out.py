@@ -53,6 +53,8 @@ class Shrinkage:
     value: float | None
     """[1] none where there is no gap to shrink."""
     ci95: tuple[float, float] | None
+    worth: float | None = None
+    """[1] what is expected to be closed of the whole run's gap, were this very run made again."""
 
 
 class HeldOut(NamedTuple):
@@ -62,6 +64,8 @@ class HeldOut(NamedTuple):
     """Sum of squared residuals without effects [N²]."""
     after: Array
     """The same with them."""
+    elsewhere: Array
+    """The same without those that belong to this run, such as waves of a zero."""
     counts: Array
     """Samples."""
     segment: Indices
@@ -82,10 +86,12 @@ class Again(NamedTuple):
 def shrinkage(held: HeldOut, noise: float, again: Again, strokes: int) -> Shrinkage:
     """How far the gap shrinks on another run of the same damper: its expectation, with an interval.
 
-    Two things are left there. The error of the form is that of the held-out cycles beyond both noises: their
+    Three things are left there. The error of the form is that of the held-out cycles beyond both noises: their
     conditions are drawn anew, and their cycles, it is never below zero, and it is another one on other strokes,
-    the more so the fewer strokes the recording has. The motion of another run carries its own noise into the
-    force, most where it is known from one side only; no fit looks at these instants, but every run has them.
+    the more so the fewer strokes the recording has. Of many strokes those kept out are a sample, and their mean is
+    what others leave on average, however widely these differ; of few they are none, and others leave more. The
+    motion of another run carries its own noise into the force, most where it is known from one side only; no fit
+    looks at these instants, but every run has them. And what belongs to this run alone is not there.
 
     Args:
         held: the held-out cycles.
@@ -103,28 +109,39 @@ def shrinkage(held: HeldOut, noise: float, again: Again, strokes: int) -> Shrink
     value = 1.0 - float(lost.mean())
     low, high = np.quantile(1.0 - lost, [0.025, 0.975])
     expected = math.sqrt(noise**2 + (1.0 - value) * (before - noise**2))
-    return Shrinkage(math.sqrt(before), expected, value, (min(float(low), value), max(float(high), value)))
+    interval = (min(float(low), value), max(float(high), value))
+    return Shrinkage(math.sqrt(before), expected, value, interval, _worth(after, noise, again))
+
+
+def _worth(after: float, noise: float, again: Again) -> float:
+    """Part [1] of the whole run's gap that a set is expected to close where the run is made again."""
+    left = max(after - noise**2 - again.held, 0.0) + float(again.runs.mean())
+    return 1.0 - left / max(again.before - noise**2, 1e-2 * noise**2)
 
 
 def _lost(held: HeldOut, noise: float, again: Again, strokes: int) -> Array:
     """(draws,) parts of the gap [1] that other runs would leave."""
     random = np.random.default_rng(0)
-    before, after = _drawn(held, random)
+    before, after, elsewhere = _drawn(held, random)
     gap = np.maximum(before - noise**2, 1e-2 * noise**2)
     form = np.maximum(after - noise**2 - again.held, 0.0) / gap
     spread = _FORM + _FEW_STROKES / max(strokes, 1)
-    form *= np.exp(spread * random.standard_normal(_DRAWS))
+    form *= np.exp(spread * random.standard_normal(_DRAWS) - 0.5 * _FORM**2)
     size = (again.before - noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
-    return np.asarray(form + random.choice(again.runs, _DRAWS) / np.maximum(size, 1e-2 * noise**2))
+    motion = random.choice(again.runs, _DRAWS) / np.maximum(size, 1e-2 * noise**2)
+    return np.asarray(form + motion + (elsewhere - after) / gap)
 
 
-def _drawn(held: HeldOut, random: np.random.Generator) -> tuple[Array, Array]:
-    """Mean squares (draws,) [N²] without and with effects: segments drawn anew, then cycles within each."""
+def _drawn(held: HeldOut, random: np.random.Generator) -> Array:
+    """(3, draws) mean squares [N²] without effects, with them, and elsewhere.
+
+    Segments are drawn anew, then cycles within each.
+    """
     names, place = np.unique(held.segment, return_inverse=True)
     members = [np.flatnonzero(place == k) for k in range(len(names))]
-    means = np.empty((2, _DRAWS))
+    sums, means = np.stack(held[:3]), np.empty((3, _DRAWS))
     for draw in range(_DRAWS):
         chosen = random.integers(0, len(names), len(names))
         rows = np.concatenate([random.choice(members[k], len(members[k])) for k in chosen])
-        means[:, draw] = np.array([held.before[rows].sum(), held.after[rows].sum()]) / held.counts[rows].sum()
-    return means[0], means[1]
+        means[:, draw] = sums[:, rows].sum(axis=1) / held.counts[rows].sum()
+    return means

@@ -11,6 +11,7 @@ effects hardly ever do.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,6 +45,15 @@ _RARE = 0.3
 """[1] weight of an effect of the second list."""
 
 
+class Shown(NamedTuple):
+    """What places say of a set over another one that has an effect less."""
+
+    beside: frozenset[str]
+    """The other set."""
+    log_odds: float
+    """Natural logarithm, before the freedom of the effect is paid for."""
+
+
 @dataclass(frozen=True)
 class Candidate:
     """A set of effects and what it leaves."""
@@ -53,6 +63,8 @@ class Candidate:
     """[1] excess of its squared error over the floor's variance, the worse of seen and unseen strokes."""
     weight: float = 1.0
     """[1] how plausible the sizes of its effects are."""
+    shown: Shown | None = None
+    """What places say of it, where it was looked at."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +94,7 @@ def odds(candidates: Sequence[Candidate], samples: int) -> Odds:
     """
     whole = max(next(c.left for c in candidates if not c.names), 0.0)
     grain = _GRAIN + _SAMPLES / max(samples, 1) + _FORM * whole
-    scores = {
-        c.names: _log_prior(c.names) + math.log(c.weight) - _POWER * math.log(max(c.left, 0.0) + grain)
-        for c in candidates
-    }
+    scores = _scores(candidates, grain)
     unsure = _UNSURE_FLOOR + _UNSURE * math.sqrt(2.0 / max(samples, 1))
     likeliest = max(candidates, key=lambda c: scores[c.names])
     unknown = _log_prior(likeliest.names) + math.log(_UNKNOWN)
@@ -97,6 +106,22 @@ def odds(candidates: Sequence[Candidate], samples: int) -> Odds:
     doubt = (_DOUBT + _DOUBT_OF_REST * rest) * (1.0 - float(shares[list(scores).index(frozenset())]))
     known = (1.0 - doubt) * shares[:-1]
     return Odds(dict(zip(scores, map(float, known), strict=True)), 1.0 - float(known.sum()))
+
+
+def _scores(candidates: Sequence[Candidate], grain: float) -> dict[frozenset[str], float]:
+    """Logarithms of the odds of sets, from all that they leave and from what places say, whichever says more."""
+    prior = {c.names: _log_prior(c.names) + math.log(c.weight) for c in candidates}
+    scores = {c.names: prior[c.names] - _POWER * math.log(max(c.left, 0.0) + grain) for c in candidates}
+    told = [(c.names, c.shown) for c in candidates if c.shown]
+    for names, (beside, log_odds) in sorted(told, key=lambda one: len(one[0])):
+        scores[names] = max(scores[names], scores[beside] + log_odds + prior[names] - prior[beside])
+    return scores
+
+
+def price(names: frozenset[str]) -> float:
+    """Logarithm of the odds that one usual effect more has to bring beside a set."""
+    more = names | {next(name for name in USUAL if name not in names)}
+    return _log_prior(names) - _log_prior(more)
 
 
 def _log_prior(names: frozenset[str]) -> float:

@@ -11,13 +11,14 @@ from identification.gap.black_box import explainable, history
 from identification.gap.checks import blind_spots
 from identification.gap.contender import Contender
 from identification.gap.documents import STAGES, Diagnosis, Gap, NextStroke, Twin, Verdict, Where
+from identification.gap.held_out import Shrinkage
 from identification.gap.judge import Judge
 from identification.gap.model import Model
 from identification.gap.next_stroke import Limits, Rival, best_segment, information
 from identification.gap.posterior import Odds, stage_odds
 from identification.gap.search import Search
 from identification.gap.twin import baseline_fit, twin_of
-from identification.gap.verdict import alternatives, named_effects, shares, verdict_on
+from identification.gap.verdict import alternatives, named_effects, shares, verdict_on, without_promise
 from identification.gap.where import drift, gap_map, harmonics
 from identification.gap.words import explanation, nearest
 from identification.results import Provenance
@@ -56,9 +57,13 @@ class Report:
         named = self.search.found[likeliest]
         floor = self.search.floor
         verdict = verdict_on(plain, named, floor, self.odds)
-        if verdict in ("no_gap", "unexplained"):
+        shrunk = self._shrunk(plain, named)
+        if named.names and shrunk.worth is not None and shrunk.worth < 0.0:
+            verdict = without_promise(plain, floor)
+        if named.names and verdict in ("no_gap", "unexplained"):
             named, likeliest = plain, frozenset()
-        gap = self._gap(verdict, plain, named)
+            shrunk = self._shrunk(plain, plain)
+        gap = self._gap(verdict, plain, named, shrunk)
         where = self._where(plain, floor)
         parts = shares(self.search.found, likeliest, sorted(likeliest))
         effects = named_effects(named, self.odds, parts, self.assembled.drive_unit)
@@ -94,12 +99,16 @@ class Report:
             return []
         return [nearest(sorted(best.names), plain.unseen, best.unseen, self.search.floor)]
 
-    def _gap(self, verdict: Verdict, plain: Contender, named: Contender) -> Gap:
+    def _shrunk(self, plain: Contender, named: Contender) -> Shrinkage:
+        """How far a set shrinks the gap."""
         hearing = self.search.hearing
-        noise = hearing.noise_under(named)
         nowhere = np.zeros((1, len(self.judge.force)))
         carried = hearing.other_runs(named, self.search.full) if named.names else nowhere
-        shrunk = self.judge.shrunk(plain.left, named.left, noise, carried)
+        noise = hearing.noise_under(named)
+        return self.judge.shrunk(plain.left, named.left, noise, carried, named.fit.active)
+
+    def _gap(self, verdict: Verdict, plain: Contender, named: Contender, shrunk: Shrinkage) -> Gap:
+        noise = self.search.hearing.noise_under(named)
         nothing = verdict == "no_gap"
         return Gap(
             before_n=shrunk.before,

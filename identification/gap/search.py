@@ -25,7 +25,7 @@ from identification.gap.hearing import NOTHING, Hearing
 from identification.gap.hum import strongest_line
 from identification.gap.judge import Judge
 from identification.gap.plausible import plausibility
-from identification.gap.posterior import Candidate
+from identification.gap.posterior import Candidate, Shown
 from identification.gap.residual import by_piece
 from identification.gap.screen import ALWAYS, Gain, every_choice, promise, screen, worth_fitting
 from identification.problem import Problem
@@ -88,6 +88,8 @@ class Search:
     found: dict[frozenset[str], Contender] = field(default_factory=dict)
     complete: set[frozenset[str]] = field(default_factory=set)
     """Sets that were fitted on all samples."""
+    shown: dict[frozenset[str], Shown] = field(default_factory=dict)
+    """What places say of one effect more."""
     began: float = field(default_factory=time.process_time)
     """[s] of processor time."""
 
@@ -138,7 +140,7 @@ class Search:
 
     def at_floor(self, contender: Contender) -> bool:
         """Whether nothing is left to look for."""
-        return self.left_of(contender) < _ENOUGH + _ENOUGH_OF_WHOLE * max(self._none_left, 0.0)
+        return self.left_of(contender) < _ENOUGH + _ENOUGH_OF_WHOLE * max(self.none_left, 0.0)
 
     def best(self) -> Contender:
         """What leaves least."""
@@ -151,7 +153,12 @@ class Search:
         floor, none = min(self.floor, lowest), self.found[frozenset()]
         x = np.concatenate([p.stroke.displacement for p in self.full.pieces])
         return [
-            Candidate(names, c.share_of(none, floor), math.prod(plausibility(e, x) for e in c.fit.active))
+            Candidate(
+                names,
+                c.share_of(none, floor),
+                math.prod(plausibility(e, x) for e in c.fit.active),
+                self.shown.get(names),
+            )
             for names, c in self.found.items()
         ]
 
@@ -223,7 +230,7 @@ class Search:
     def _may_help(self, parent: Contender, name: str) -> bool:
         """Whether an effect is tried beside others without a promise: not where alone it took nothing away."""
         alone = self.found.get(frozenset({name}))
-        return not parent.names or alone is None or self.left_of(alone) < _HELPS * self._none_left
+        return not parent.names or alone is None or self.left_of(alone) < _HELPS * self.none_left
 
     def _try_always(self, parent: Contender, gains: Sequence[Gain]) -> None:
         """Fit a set with an effect whose promise says little, with its richer forms where the first has shown."""
@@ -237,8 +244,8 @@ class Search:
                 return
 
     @property
-    def _none_left(self) -> float:
-        """What the law alone leaves [1]."""
+    def none_left(self) -> float:
+        """What the law alone leaves beyond the floor [1]."""
         return self.left_of(self.found[frozenset()])
 
     def fit_beside(self, parent: Contender, gain: Gain, values: Sequence[tuple[float, ...]]) -> Contender:

@@ -44,6 +44,11 @@ def verdict_on(plain: Contender, named: Contender, floor: float, odds: Odds) -> 
     return "partly_explained"
 
 
+def without_promise(plain: Contender, floor: float) -> Verdict:
+    """The answer where the likeliest set is expected to make another run worse: it is not named."""
+    return "no_gap" if max(plain.seen, plain.unseen) < _AT_FLOOR * floor else "unexplained"
+
+
 def named_effects(
     contender: Contender, odds: Odds, shares: Mapping[str, float], drive_unit: str
 ) -> list[NamedEffect]:

@@ -22,18 +22,21 @@ _STILL = 1e-6
 """[m] to either side that a lip does not feel: the noise of a rest would wear away what it keeps."""
 
 
-def beside(setting: Setting, motion: Motion) -> Array:
-    """(N,) sum of the forces beside the law [N]."""
+def beside(setting: Setting, motion: Motion, h: float) -> Array:
+    """(N,) sum of the forces beside the law [N]; samples are h [s] apart."""
     total = np.zeros(len(motion.x))
     for _, form, values in setting.acting("parallel_force"):
         total += form.act(motion.x, motion.v, *values)
-    for _, form, values in setting.acting("dragging_force"):
-        total += _dragging(form, motion.x, motion.v, *values)
+    for _, form, values in setting.acting("dragging_force", "relaxing_force"):
+        total += _remembering(form, h, motion.x, motion.v, *values)
     return total
 
 
-def _dragging(form: Form, x: Array, v: Array, *values: float) -> Array:
-    """(N,) force [N] beside the law of a form that remembers the way."""
+def _remembering(form: Form, h: float, x: Array, v: Array, *values: float) -> Array:
+    """(N,) force [N] beside the law of a form that remembers the way, or follows it in time."""
+    if form.acts == "relaxing_force":
+        exchange = values[[q.symbol for q in form.parameters].index("exchange")]
+        return np.asarray(form.act(x, v, lagged(x, exchange, h), *values))
     return np.asarray(form.act(x, v, remembered(machine(form.memory), _felt(x, _STILL), *values), *values))
 
 
@@ -48,7 +51,7 @@ def _felt(x: Array, still: float) -> Array:
     return found
 
 
-def beside_slopes(setting: Setting, motion: Motion) -> tuple[Array, list[tuple[int, Array]]]:
+def beside_slopes(setting: Setting, motion: Motion, h: float) -> tuple[Array, list[tuple[int, Array]]]:
     """Slopes of ``beside`` over the motion's unknowns (M, N), and over parameters by their columns."""
     moving, own = np.zeros_like(motion.dx), []
     for at, form, values in setting.acting("parallel_force"):
@@ -56,19 +59,19 @@ def beside_slopes(setting: Setting, motion: Motion) -> tuple[Array, list[tuple[i
         moving += over_x * motion.dx + over_v * motion.dv
         rows = over_parameters(partial(form.act, motion.x, motion.v), values, form.parameters)
         own += [(at + k, np.broadcast_to(row, len(motion.x))) for k, row in enumerate(rows)]
-    for at, form, values in setting.acting("dragging_force"):
+    for at, form, values in setting.acting("dragging_force", "relaxing_force"):
         moving += np.stack(
-            [_along(form, values, motion, dx, dv) for dx, dv in zip(motion.dx, motion.dv, strict=True)]
+            [_along(form, h, values, motion, dx, dv) for dx, dv in zip(motion.dx, motion.dv, strict=True)]
         )
-        whole = partial(_dragging, form, motion.x, motion.v)
+        whole = partial(_remembering, form, h, motion.x, motion.v)
         own += [(at + k, row) for k, row in enumerate(over_parameters(whole, values, form.parameters))]
     return moving, own
 
 
-def _along(form: Form, values: tuple[float, ...], motion: Motion, dx: Array, dv: Array) -> Array:
+def _along(form: Form, h: float, values: tuple[float, ...], motion: Motion, dx: Array, dv: Array) -> Array:
     """(N,) slope of a force that remembers the way, over an unknown that moves the motion by dx and dv."""
     step = _DISPLACEMENT_STEP / max(float(np.abs(dx).max()), 1e-9)
-    ahead, back = (_dragging(form, motion.x + s * dx, motion.v + s * dv, *values) for s in (step, -step))
+    ahead, back = (_remembering(form, h, motion.x + s * dx, motion.v + s * dv, *values) for s in (step, -step))
     return np.asarray((ahead - back) / (2.0 * step))
 
 

@@ -82,7 +82,8 @@ class _Chain:
         self._motion, self._field, self._scales = motion, field, scales
         self._s = np.array([setting.coordinates[i] for i in _STRUCTURAL_COLUMNS])
         self._zeta0 = inputs.settled_hysteresis(motion.v[0])
-        self._beside = channel.beside(setting, motion)
+        self._h = 1.0 / stroke.rate
+        self._beside = channel.beside(setting, motion, self._h)
         extra = (*field.columns, -1, *motion.columns, *scales.columns)
         self._columns = [_ETA, _DRIVE_DELAY, *(_FORCE_DELAY if at < 0 else len(UNKNOWNS) + at for at in extra)]
 
@@ -90,7 +91,7 @@ class _Chain:
         """Trajectory and slopes (N, U) where the damper moves with the actuator."""
         c, motion, field, scales = self._setting.coordinates, self._motion, self._field, self._scales
         c1 = c.c1_a + c.c1_b * field.u
-        h, y0 = 1.0 / self._stroke.rate, self._setting.y0
+        y0, h = self._setting.y0, self._h
         inner = (motion.x, motion.v, field.u, field.middle, scales.at, scales.middle, h, y0, self._zeta0, fineness)
         J = None
         if slopes:
@@ -114,7 +115,7 @@ class _Chain:
         J[:, _K1] = self._motion.x
         J[:, _F0] = -1.0
         moving = [_FORCE_DELAY, *(len(UNKNOWNS) + at for at in self._motion.columns)]
-        over_motion, own = channel.beside_slopes(self._setting, self._motion)
+        over_motion, own = channel.beside_slopes(self._setting, self._motion, self._h)
         rows = self._setting.coordinates.k1 * self._motion.dx + over_motion
         for column, row in zip(moving, rows, strict=True):
             J[:, column] += row
@@ -131,14 +132,14 @@ class _Chain:
         self, plan: Plan, carrying: Array, fineness: float, slopes: bool
     ) -> tuple[Trajectory, Array | None]:
         """Trajectory and slopes (N, U) behind a connection: its give, gap, hardening and film (4,)."""
-        c, h = self._setting.coordinates, 1.0 / self._stroke.rate
+        c, h = self._setting.coordinates, self._h
         g = yielding.inputs_of(self._motion, self._field, self._scales, self._beside, h)
         fixed = np.array([*self._s, c.k1, c.f0, *carrying])
         start = np.array([self._setting.y0, self._zeta0, self._motion.v[0]])
         if not slopes:
             y, zeta, force = yielding.march(fixed, *g, h, start, fineness, plan)
             return Trajectory(force, y, zeta, self._field.u, plan), None
-        over_motion, own = channel.beside_slopes(self._setting, self._motion)
+        over_motion, own = channel.beside_slopes(self._setting, self._motion, self._h)
         rows = yielding.derivatives_of(self._motion, self._field, self._scales, over_motion, own, h)
         y, zeta, force, partial = yielding_slopes.march_with_slopes(fixed, *g, h, start, fineness, plan, *rows)
         J = self._empty()

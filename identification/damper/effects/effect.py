@@ -23,6 +23,7 @@ Action = Literal[
     "softening",
     "parallel_force",
     "dragging_force",
+    "relaxing_force",
     "displacement_follower",
     "connection",
     "inertia",
@@ -45,6 +46,8 @@ Action = Literal[
 - ``parallel_force``: displacement, velocity of the damper -> force beside the law [N].
 - ``dragging_force``: displacement, velocity of the damper, remembered [1] -> force beside the law [N]; with
   ``memory`` over (remembered, change of the displacement), which never depends on how a change is cut.
+- ``relaxing_force``: displacement, velocity of the damper, displacement that follows it with the time constant
+  ``exchange`` among the parameters [s] -> force beside the law [N].
 - ``displacement_follower``: where the damper stood, where the actuator is [m] -> where the damper stands [m].
 - ``connection``: () -> give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper; those of
   several add up.
@@ -72,6 +75,8 @@ class Form(NamedTuple):
     """The form as a plain function: its arguments follow from ``acts``."""
     memory: Callable[..., Any] | None = None
     """What is remembered after a change, of forms with memory."""
+    lasts: bool = True
+    """Whether it is the same in every run of the damper: a wandering zero wanders otherwise in the next."""
 
 
 class Effect(NamedTuple):

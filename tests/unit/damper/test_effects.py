@@ -80,6 +80,20 @@ def test_the_turned_gas_spring_is_the_recording_turned_round():
     np.testing.assert_allclose(other(X, 0.0, 90.0, 0.05), -one(-X, 0.0, 90.0, 0.05))
 
 
+def test_gas_is_isothermal_where_its_heat_has_left_and_adiabatic_where_it_has_not():
+    force = act("gas_spring", "heat_to_wall")
+    slow, fast = force(-0.01, 0.0, -0.01, 90.0, 0.05, 0.3), force(-0.01, 0.0, 0.0, 90.0, 0.05, 0.3)
+    assert slow == pytest.approx(-90.0 * (1.0 / 0.8 - 1.0))
+    assert fast == pytest.approx(-90.0 * (0.8**-1.4 - 1.0))
+    turned = act("gas_spring", "heat_to_wall_turned")
+    assert turned(0.01, 0.0, 0.0, 90.0, 0.05, 0.3) == pytest.approx(-fast)
+
+
+def test_waves_of_a_zero_belong_to_their_run_and_a_warm_up_does_not():
+    assert [form.name for form in EFFECTS["force_drift"].forms if form.lasts] == ["settling"]
+    assert all(form.lasts for name, e in EFFECTS.items() for form in e.forms if name != "force_drift")
+
+
 @pytest.mark.parametrize("form", ["stribeck", "stribeck_gentle"])
 def test_friction_dissipates_and_peaks_near_rest(form):
     force = act("seal_friction", form)

@@ -20,7 +20,12 @@ MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
         "partly_slow": (0.03, 0.4),
         "deeply_slow": (0.02, 0.4),
     },
-    "gas_spring": {"polytropic": (90.0, 0.05), "polytropic_turned": (90.0, 0.05)},
+    "gas_spring": {
+        "polytropic": (90.0, 0.05),
+        "polytropic_turned": (90.0, 0.05),
+        "heat_to_wall": (90.0, 0.05, 0.3),
+        "heat_to_wall_turned": (90.0, 0.05, 0.3),
+    },
     "seal_friction": {
         "stribeck": (20.0, 10.0, 0.015),
         "stribeck_gentle": (20.0, 10.0, 0.015),

@@ -114,6 +114,6 @@ def test_a_lip_keeps_its_force_through_the_noise_of_a_rest():
     noise = 3e-7 * np.random.default_rng(0).standard_normal(4000)
     x = np.concatenate([np.linspace(0.0, 1e-3, 1000), 1e-3 + noise])
     motion = Motion(x, *np.zeros((2, len(x))), *np.zeros((3, 0, len(x))), ())
-    force = beside(seal, motion)[1000:]
+    force = beside(seal, motion, 1e-3)[1000:]
     assert force[-500:].mean() == pytest.approx(force[:500].mean(), rel=0.03)
     assert force.mean() > 5.0

@@ -1,6 +1,6 @@
 import pytest
 
-from identification.gap.posterior import Candidate, odds, stage_odds
+from identification.gap.posterior import Candidate, Shown, odds, price, stage_odds
 
 SAMPLES = 70_000
 
@@ -57,3 +57,16 @@ def test_stages_follow_the_effects():
     stages = stage_odds(found, ("coil", "damper", "mounting", "force_channel", "displacement_channel"))
     assert max(stages, key=stages.get) == "damper"
     assert all(0.0 <= share <= 1.0 for share in stages.values())
+
+
+def with_places(log_odds):
+    first, both = frozenset({"end_stop"}), frozenset({"end_stop", "coil_lag"})
+    known = candidates(none=30.0, end_stop=0.7)
+    return odds([*known, Candidate(both, 0.6, shown=Shown(first, log_odds))], SAMPLES).ranked()[0][0]
+
+
+def test_a_second_effect_that_many_places_show_is_named_though_the_sum_hardly_changes():
+    paid = price(frozenset({"end_stop"}))
+    assert with_places(paid + 1.0) == frozenset({"end_stop", "coil_lag"})
+    assert with_places(paid - 1.0) == frozenset({"end_stop"})
+    assert price(frozenset({"end_stop", "coil_lag"})) > paid > 0.0

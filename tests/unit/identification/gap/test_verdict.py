@@ -6,7 +6,7 @@ import pytest
 
 from identification.gap.contender import Contender
 from identification.gap.posterior import Odds
-from identification.gap.verdict import verdict_on
+from identification.gap.verdict import verdict_on, without_promise
 
 FLOOR = 2.0
 
@@ -52,3 +52,8 @@ def test_nothing_named_is_no_gap_unless_something_unknown_is_likely():
 def test_a_gap_on_the_fitted_strokes_alone_is_one():
     assert word(("coil_lag",), 1.005, 1.0, plain=(1.08, 1.0)) == "explained"
     assert word(("coil_lag",), 1.005, 1.0, plain=(1.02, 1.0)) == "no_gap"
+
+
+def test_what_would_make_another_run_worse_leaves_a_gap_only_where_there_is_one():
+    assert without_promise(contender((), 1.005, 1.025), FLOOR) == "no_gap"
+    assert without_promise(contender((), 1.3, 1.02), FLOOR) == "unexplained"

@@ -67,6 +67,16 @@ def test_a_scenario_is_a_model_with_its_effects(tmp_path):
     assert read_model(by_numbers).point == pytest.approx(model.point)
 
 
+def test_a_twin_keeps_the_waves_of_a_zero_to_the_logs_that_it_was_made_from(tmp_path):
+    drift = {"name": "force_drift", "form": "swinging", "parameters": {"cosine": 8.0, "sine": 0.0, "period": 60.0}}
+    mass = {"name": "moving_mass", "form": "rigid", "parameters": {"mass": 2.0}}
+    twin = read_model(scenario(tmp_path, effects=[drift, mass], provenance={"logs": {"run.mcap": "abc"}}))
+    assert named_effects(twin.in_run("abc").effects) == [drift, mass]
+    assert named_effects(twin.in_run("def").effects) == [mass]
+    plain = read_model(scenario(tmp_path, effects=[drift]))
+    assert named_effects(plain.in_run("def").effects) == [drift]
+
+
 @pytest.mark.parametrize(
     "changed",
     [

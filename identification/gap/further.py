@@ -1,0 +1,55 @@
+"""One effect more beside the likeliest set, once that has been fitted on all samples.
+
+The search goes forward on thinned samples and ends where the error of a form could hide all that is left. Here the
+set stands as well as it can, and what the most promising further effects explain is weighed place by place. An
+effect's error of form is best taken up by its kin, which act over the same thing: of those no place can tell.
+"""
+
+from typing import TYPE_CHECKING
+
+from identification.gap.exchange import left_out
+from identification.gap.places import evidence, most
+from identification.gap.posterior import Shown, price
+from identification.gap.screen import worth_fitting
+
+if TYPE_CHECKING:
+    from identification.gap.search import Search
+
+_KIN = (
+    {"gas_spring", "end_stop", "side_load_friction", "displacement_nonlinearity"},
+    {"seal_friction", "orifice_turbulence", "shear_thinning", "direction_asymmetry"},
+    {"field_saturation", "magnetic_remanence", "coil_crosstalk"},
+    {"moving_mass", "force_delay", "force_filter", "displacement_delay"},
+    {"clevis_backlash", "fixture_compliance"},
+    {"viscous_heating", "force_drift"},
+)
+"""Effects that act over displacement, velocity, field, acceleration, load and time."""
+_TRIED = 2
+"""Effects that are fitted beside it."""
+_MOST = 3
+"""Effects that a set may have."""
+_EXPLAINS = 0.2
+"""[1] part of the gap that a set may leave, for what is left to be sought in one effect more."""
+
+
+def look_further(search: "Search", names: frozenset[str]) -> bool:
+    """Fit the most promising further effects beside a set; whether one of them pays for its freedom."""
+    known = search.found[names]
+    worth = most(known.left, search.floor) > price(names) and search.left_of(known) < _EXPLAINS * search.none_left
+    if not names or len(names) >= _MOST or not worth or search.late:
+        return False
+    kin = set[str]().union(*(alike for alike in _KIN if names & alike))
+    for gain in worth_fitting(search.screened(known, names | kin), _TRIED):
+        more = names | {gain.choice.name}
+        if more not in search.complete:
+            search.fit_beside(known, gain, [])
+            search.polish(more)
+        search.shown[more] = Shown(names, evidence(known.left, search.found[more].left))
+    paying = [
+        more for more, shown in search.shown.items() if shown.beside == names and shown.log_odds > price(names)
+    ]
+    for more in paying:
+        for choice in search.found[more].fit.effects:
+            if more - {choice.name} not in search.found:
+                left_out(search, search.found[more], choice)
+    return bool(paying)

@@ -4,8 +4,9 @@ A polytropic spring about its rest length L: force = -F_g ((1 + x/L)^-kappa - 1)
 (x < 0); in a recording with the sense turned round it stiffens the other way.
 
 Gas that is compressed fast is warm, and gives its heat to the wall within a time constant (Pourmovahed and
-Otis 1990, for accumulators): adiabatic in fast strokes, isothermal in slow ones, with a loop of its own between.
-It is compressed adiabatically from a volume at which it had the wall's temperature; that volume follows the real one.
+Otis 1990, for accumulators): adiabatic in fast strokes, isothermal in slow ones, with a loop of its own
+between. It is compressed adiabatically from a volume at which it had the wall's temperature, and that volume
+follows the real one.
 """
 
 from typing import Any

@@ -120,6 +120,7 @@ def test_asymmetry_adds_to_extension_what_it_takes_from_compression():
 def test_heat_softens_the_oil_and_in_one_form_the_yield_too():
     assert act("viscous_heating")(500.0, 2e-3, 100.0) == pytest.approx((1.0, 0.5, 0.5))
     assert act("viscous_heating", "whole")(500.0, 2e-3, 100.0) == pytest.approx((0.5, 0.5, 0.5))
+    assert act("viscous_heating", "partly")(500.0, 2e-3, 100.0, 0.5) == pytest.approx((0.5**0.5, 0.5, 0.5))
 
 
 def test_an_end_stop_is_silent_inside_its_gap_and_pushes_back_beyond():

@@ -33,7 +33,7 @@ MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
     },
     "orifice_turbulence": {"quadratic": (1500.0,), "power": (15.0, 1.7)},
     "direction_asymmetry": {"shares": (0.08, 0.15, 0.012), "one_way": (120.0, 8.0, 0.01)},
-    "viscous_heating": {"viscosity": (2e-3, 40.0), "whole": (5e-4, 40.0)},
+    "viscous_heating": {"viscosity": (2e-3, 40.0), "whole": (5e-4, 40.0), "partly": (1e-3, 40.0, 0.4)},
     "end_stop": {
         "both_ends": (2e4, 0.01, 1e-3),
         "extended_end": (2e4, 0.01, 1e-3),

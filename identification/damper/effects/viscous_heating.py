@@ -1,7 +1,8 @@
 """Oil that gets thinner as it warms: the damper softens with the energy that it has dissipated.
 
-The energy leaves to the room with a time constant. What is left of it softens: factor 1 / (1 + s E). The yield force
-of the particles falls less with the temperature than the viscosity of the oil: not at all, as much, or in part.
+The energy leaves to the room with a time constant. What is left of it softens: factor 1 / (1 + s E). The yield
+force of the particles falls less with the temperature than the viscosity of the oil: not at all, as much, or in
+part.
 """
 
 from typing import Any

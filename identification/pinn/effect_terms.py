@@ -184,11 +184,12 @@ class _PieceTerms:
     def _beside(self, motion: Motion, moving: tuple[int, ...]) -> tuple[Array, Array]:
         """Force [N] (N,) beside the law and in the channel, and its slopes (1 + P, N)."""
         setting, stroke = self._setting, self._source.piece.stroke
-        over_motion, own = beside_slopes(setting, motion)
+        h = 1.0 / stroke.rate
+        over_motion, own = beside_slopes(setting, motion, h)
         J = self._placed(moving, over_motion)
         for at, row in own:
             J[1 + at] += row
-        force = recorded(setting, stroke, motion, beside(setting, motion), J.T, 1, [0, *self._late])
+        force = recorded(setting, stroke, motion, beside(setting, motion, h), J.T, 1, [0, *self._late])
         return force, J
 
     def _along_halves(self) -> Driven:

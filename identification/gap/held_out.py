@@ -129,7 +129,9 @@ def _lost(held: HeldOut, noise: float, again: Again, strokes: int) -> Array:
     form *= np.exp(spread * random.standard_normal(_DRAWS) - 0.5 * _FORM**2)
     size = (again.before - noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
     motion = random.choice(again.runs, _DRAWS) / np.maximum(size, 1e-2 * noise**2)
-    return np.asarray(form + motion + (elsewhere - after) / gap)
+    # The law alone meets a wave there as well, whatever of this one it has taken up: none is lost twice.
+    passing = np.clip((elsewhere - after) / gap, 0.0, np.maximum(1.0 - form, 0.0))
+    return np.asarray(form + motion + passing)
 
 
 def _drawn(held: HeldOut, random: np.random.Generator) -> Array:

@@ -157,6 +157,8 @@ def test_what_belongs_to_this_run_is_missed_in_others():
     lasting, gone = (shrinkage(s, NOISE, again(), strokes=5) for s in (strokes, passing))
     assert gone.value == pytest.approx(lasting.value - 0.49, abs=0.03)
     assert gone.worth == pytest.approx(lasting.worth)
+    more = strokes._replace(elsewhere=3.0 * strokes.before)
+    assert shrinkage(more, NOISE, again(), strokes=5).value == pytest.approx(0.0, abs=0.01)
 
 
 def test_a_motion_that_makes_more_than_the_gap_leaves_a_set_without_worth():

@@ -47,6 +47,13 @@ def test_an_explanation_has_figures_units_the_cause_and_what_to_check():
     assert text.count(". ") == 1
 
 
+def test_waves_of_a_zero_are_said_to_belong_to_their_run():
+    drift = MASS.model_copy(update={"name": "force_drift", "form": "swinging"})
+    text = explanation("explained", GAP.model_copy(update={"train_after_n": 2.6}), [drift], [], "")
+    assert "to 2.6 N in this run, to which the waves belong" in text
+    assert "in this run" not in explanation("explained", GAP, [MASS], [], "")
+
+
 def test_what_nothing_explains_says_where_it_is_largest():
     text = explanation("unexplained", GAP, [], [], "What remains is largest at 0.5 V.")
     assert "no known effect" in text

@@ -16,14 +16,14 @@ if TYPE_CHECKING:
     from identification.gap.search import Search
 
 _KIN = (
+    {"clevis_backlash", "fixture_compliance", "end_stop", "side_load_friction"},
     {"gas_spring", "end_stop", "side_load_friction", "displacement_nonlinearity"},
     {"seal_friction", "orifice_turbulence", "shear_thinning", "direction_asymmetry"},
     {"field_saturation", "magnetic_remanence", "coil_crosstalk"},
     {"moving_mass", "force_delay", "force_filter", "displacement_delay"},
-    {"clevis_backlash", "fixture_compliance"},
     {"viscous_heating", "force_drift"},
 )
-"""Effects that act over displacement, velocity, field, acceleration, load and time."""
+"""Effects that act where a stroke turns, over displacement, velocity, field, acceleration and time."""
 _TRIED = 2
 """Effects that are fitted beside it."""
 _MOST = 3

@@ -16,8 +16,8 @@ from identification.gap.where import Left
 
 _PLACE = 0.4
 """[s] length of a place: less than a stroke, more than a field takes to settle."""
-_COUNTS = 2.0
-"""[1] independent samples that a place stands for: the size of what a form leaves there, and its course."""
+_COUNTS = 1.6
+"""[1] independent samples that a place stands for; chosen between what a true effect and another's kin brought."""
 _HALF = 0.5
 """[1] part of a place that has to be valid."""
 

@@ -10,7 +10,7 @@ The first three parts take another preset of the local network.
 
 import os
 from argparse import ArgumentParser
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -36,12 +36,15 @@ _HEAD = "  {:>6} {:>10} {:>10} {:>9} {:>9} {:>12} {:>12}".format(
 )
 
 
-def _table(title: str, scores: dict[int, Score]) -> list[Score]:
-    print(f"{title}\n{_HEAD}")
-    for seed, s in scores.items():
+def _table(title: str, scores: Iterable[tuple[int, Score]]) -> list[Score]:
+    """Scores by their seeds, each printed as it comes."""
+    print(f"{title}\n{_HEAD}", flush=True)
+    found = []
+    for seed, s in scores:
         word = "yes" if s.accepted else "no"
         print(_ROW.format(seed, s.ratio, s.pooled, s.seconds, word, s.reconstruction, s.simulation), flush=True)
-    return list(scores.values())
+        found.append(s)
+    return found
 
 
 def _summary(scores: list[Score], ratio: float, pooled: float, seconds: float) -> None:
@@ -57,19 +60,19 @@ def _summary(scores: list[Score], ratio: float, pooled: float, seconds: float) -
 
 def local(preset: str = "local") -> None:
     """Preset local or another of its network, six voltages."""
-    scores = {seed: try_out(preset, LABORATORY, seed) for seed in range(SEEDS)}
+    scores = ((seed, try_out(preset, LABORATORY, seed)) for seed in range(SEEDS))
     _summary(_table(f"{preset}, six voltages (12 s)", scores), 1.005, 1.5, 5.0)
 
 
 def pairs(preset: str = "local") -> None:
     """The same, four pairs of amplitude and frequency."""
-    scores = {seed: try_out(preset, LABORATORY, seed, pairs=True) for seed in range(SEEDS)}
+    scores = ((seed, try_out(preset, LABORATORY, seed, pairs=True)) for seed in range(SEEDS))
     _summary(_table(f"{preset}, four pairs (56 s)", scores), 1.005, 1.5, 30.0)
 
 
 def dampers(preset: str = "local") -> None:
     """The same, random dampers."""
-    scores = {seed: try_out(preset, random_damper(seed), seed) for seed in range(DAMPERS)}
+    scores = ((seed, try_out(preset, random_damper(seed), seed)) for seed in range(DAMPERS))
     found = _table(f"{preset}, random dampers, six voltages", scores)
     _summary(found, 1.02, 2.5, 30.0)
     taken = [s for s in found if s.accepted]
@@ -79,7 +82,7 @@ def dampers(preset: str = "local") -> None:
 
 def globally() -> None:
     """Preset global, six voltages."""
-    scores = {seed: try_out("global", LABORATORY, seed) for seed in range(SEEDS)}
+    scores = ((seed, try_out("global", LABORATORY, seed)) for seed in range(SEEDS))
     _summary(_table("global, six voltages (12 s)", scores), 1.03, 4.0, 120.0)
 
 
@@ -95,16 +98,16 @@ def many() -> None:
         words = f"{count} at once, {STEPS} of {settings.steps} steps: {together:.1f} s; one by one {alone:.1f} s"
         line(words, together / alone, "x", "")
     problems = [problem_of(LABORATORY, seed) for seed in range(SEEDS)]
-    scores = {
-        seed: score(found, LABORATORY, problems[seed], problems[seed], seed)
+    scores = (
+        (seed, score(found, LABORATORY, problems[seed], problems[seed], seed))
         for seed, found in enumerate(train_batch(problems, settings))
-    }
+    )
     _summary(_table("global, six voltages, ten seeds of noise in one batch", scores), 1.03, 4.0, 120.0)
 
 
 def paper() -> None:
     """Preset paper, six voltages."""
-    scores = {seed: try_out("paper", LABORATORY, seed) for seed in range(2)}
+    scores = ((seed, try_out("paper", LABORATORY, seed)) for seed in range(2))
     _table("paper, six voltages (12 s)", scores)
 
 

@@ -28,7 +28,8 @@ def identify(
         ),
     ] = "pinn,refine",
     preset: Annotated[
-        str, typer.Option(help="How the network is trained: `local`, `global`, `paper`, or a settings file.")
+        str,
+        typer.Option(help="How the network is trained: `local`, `tuned`, `global`, `paper`, or a settings file."),
     ] = "local",
     hold_out: Annotated[
         str,

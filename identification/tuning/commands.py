@@ -14,7 +14,7 @@ def tune(
         Path, typer.Option("--out", metavar="PRESET.json", help="The tuned preset; a summary stands beside it.")
     ],
     preset: Annotated[
-        str, typer.Option(help="Where it starts from: `local`, `global`, `paper`, or a settings file.")
+        str, typer.Option(help="Where it starts from: `local`, `tuned`, `global`, `paper`, or a settings file.")
     ] = "local",
     trials: Annotated[int, typer.Option(min=1, help="Trials in all, earlier calls included.")] = 30,
     budget: Annotated[

@@ -167,7 +167,7 @@ class _Watched:
     def step(self, what: str, error: float) -> None:
         """Tell the force error [N] of the network now, once a moment."""
         moment = int(self.clock() / _MOMENT)
-        if moment > self._last and error == error:  # a NaN says nothing
+        if moment > self._last and np.isfinite(error):  # what is not yet known says nothing
             self._last = moment
             self._trial.report(error / self._noise, self._first + moment)
 

@@ -29,7 +29,7 @@ def identify(
     ] = "pinn,refine",
     preset: Annotated[
         str,
-        typer.Option(help="How the network is trained: `local`, `tuned`, `global`, `paper`, or a settings file."),
+        typer.Option(help="The network: `local`, `tuned`, `global`, `paper`, or a settings file."),
     ] = "local",
     hold_out: Annotated[
         str,

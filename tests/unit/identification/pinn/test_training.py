@@ -254,5 +254,5 @@ def test_wrong_settings_are_refused_with_their_place(tmp_path, settings, why):
 
 
 def test_an_unknown_preset_is_refused_with_those_there_are():
-    with pytest.raises(IdentificationError, match=r"neither a preset .global, local, paper. nor a file"):
+    with pytest.raises(IdentificationError, match=r"neither a preset .global, local, paper, tuned. nor a file"):
         read_settings("locl")

@@ -34,22 +34,35 @@ _EXPLAINS = 0.2
 
 def look_further(search: "Search", names: frozenset[str]) -> bool:
     """Fit the most promising further effects beside a set; whether one of them pays for its freedom."""
-    known = search.found[names]
-    worth = most(known.left, search.floor) > price(names) and search.left_of(known) < _EXPLAINS * search.none_left
-    if not names or len(names) >= _MOST or not worth or search.late:
+    if not _worth_a_look(search, names):
         return False
+    known = search.found[names]
     kin = set[str]().union(*(alike for alike in _KIN if names & alike))
+    paid = []
     for gain in worth_fitting(search.screened(known, names | kin), _TRIED):
         more = names | {gain.choice.name}
         if more not in search.complete:
             search.fit_beside(known, gain, [])
             search.polish(more)
         search.shown[more] = Shown(names, evidence(known.left, search.found[more].left))
-    paying = [
-        more for more, shown in search.shown.items() if shown.beside == names and shown.log_odds > price(names)
-    ]
-    for more in paying:
-        for choice in search.found[more].fit.effects:
-            if more - {choice.name} not in search.found:
-                left_out(search, search.found[more], choice)
-    return bool(paying)
+        paid += [more] if search.shown[more].log_odds > price(names) else []
+    for more in paid:
+        _fit_parts(search, more)
+    return bool(paid)
+
+
+def _worth_a_look(search: "Search", names: frozenset[str]) -> bool:
+    """Whether one effect more could pay for its freedom, beside a set that explains the most of the gap."""
+    if not 0 < len(names) < _MOST or search.late:
+        return False
+    known = search.found[names]
+    explains = search.left_of(known) < _EXPLAINS * search.none_left
+    return explains and most(known.left, search.floor) > price(names)
+
+
+def _fit_parts(search: "Search", names: frozenset[str]) -> None:
+    """Fit a set without each of its effects, as far as that has not been done."""
+    whole = search.found[names]
+    for choice in whole.fit.effects:
+        if names - {choice.name} not in search.found:
+            left_out(search, whole, choice)

@@ -29,7 +29,7 @@ def predict_log(fit: Fit | Model, recording: Recording, *, free_offset: bool = F
     Returns:
         The errors, and recorded beside simulated force.
     """
-    model = model_of_fit(fit) if isinstance(fit, Fit) else fit.in_run(recording.sha256)
+    model = model_of_fit(fit) if isinstance(fit, Fit) else fit
     # By content: a log that was copied or renamed is still one that the fit saw.
     seen = isinstance(fit, Fit) and recording.sha256 in fit.provenance.logs.values()
     assembled = assemble([recording], _held_out_in(fit) if seen and isinstance(fit, Fit) else HoldOut())

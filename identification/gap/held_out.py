@@ -64,8 +64,6 @@ class HeldOut(NamedTuple):
     """Sum of squared residuals without effects [N²]."""
     after: Array
     """The same with them."""
-    elsewhere: Array
-    """The same without those that belong to this run, such as waves of a zero."""
     counts: Array
     """Samples."""
     segment: Indices
@@ -86,12 +84,12 @@ class Again(NamedTuple):
 def shrinkage(held: HeldOut, noise: float, again: Again, strokes: int) -> Shrinkage:
     """How far the gap shrinks on another run of the same damper: its expectation, with an interval.
 
-    Three things are left there. The error of the form is that of the held-out cycles beyond both noises: their
+    Two things are left there. The error of the form is that of the held-out cycles beyond both noises: their
     conditions are drawn anew, and their cycles, it is never below zero, and it is another one on other strokes,
     the more so the fewer strokes the recording has. Of many strokes those kept out are a sample, and their mean is
     what others leave on average, however widely these differ; of few they are none, and others leave more. The
     motion of another run carries its own noise into the force, most where it is known from one side only; no fit
-    looks at these instants, but every run has them. And what belongs to this run alone is not there.
+    looks at these instants, but every run has them.
 
     Args:
         held: the held-out cycles.
@@ -122,26 +120,21 @@ def _worth(after: float, noise: float, again: Again) -> float:
 def _lost(held: HeldOut, noise: float, again: Again, strokes: int) -> Array:
     """(draws,) parts of the gap [1] that other runs would leave."""
     random = np.random.default_rng(0)
-    before, after, elsewhere = _drawn(held, random)
+    before, after = _drawn(held, random)
     gap = np.maximum(before - noise**2, 1e-2 * noise**2)
     form = np.maximum(after - noise**2 - again.held, 0.0) / gap
     spread = _FORM + _FEW_STROKES / max(strokes, 1)
     form *= np.exp(spread * random.standard_normal(_DRAWS) - 0.5 * _FORM**2)
     size = (again.before - noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
     motion = random.choice(again.runs, _DRAWS) / np.maximum(size, 1e-2 * noise**2)
-    # The law alone meets a wave there as well, whatever of this one it has taken up: none is lost twice.
-    passing = np.clip((elsewhere - after) / gap, 0.0, np.maximum(1.0 - form, 0.0))
-    return np.asarray(form + motion + passing)
+    return np.asarray(form + motion)
 
 
 def _drawn(held: HeldOut, random: np.random.Generator) -> Array:
-    """(3, draws) mean squares [N²] without effects, with them, and elsewhere.
-
-    Segments are drawn anew, then cycles within each.
-    """
+    """(2, draws) mean squares [N²] without and with effects: segments drawn anew, then cycles within each."""
     names, place = np.unique(held.segment, return_inverse=True)
     members = [np.flatnonzero(place == k) for k in range(len(names))]
-    sums, means = np.stack(held[:3]), np.empty((3, _DRAWS))
+    sums, means = np.stack(held[:2]), np.empty((2, _DRAWS))
     for draw in range(_DRAWS):
         chosen = random.integers(0, len(names), len(names))
         rows = np.concatenate([random.choice(members[k], len(members[k])) for k in chosen])

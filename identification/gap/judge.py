@@ -14,7 +14,6 @@ from identification.gap.stumbles import left_out
 from identification.gap.where import Left
 from identification.prediction import rmse
 from identification.problem import Piece
-from identification.simulate import ActiveEffect
 
 _MOVED = 0.1
 """[1] of the half stroke that the damper has to move before its force is looked at."""
@@ -91,9 +90,7 @@ class Judge:
         """RMSE [N] on seen and on unseen strokes."""
         return rmse(left.residual[self.seen]), rmse(left.residual[self.unseen])
 
-    def shrunk(
-        self, before: Left, after: Left, noise: float, carried: Array, effects: Sequence[ActiveEffect]
-    ) -> Shrinkage:
+    def shrunk(self, before: Left, after: Left, noise: float, carried: Array) -> Shrinkage:
         """How far the gap is to shrink on another run.
 
         Args:
@@ -101,32 +98,17 @@ class Judge:
             noise: of the recorded force [N].
             carried: (runs, N) squared change [N²] of the force simulated with effects, as the noise of the motion
                 of other runs makes it.
-            effects: those of ``after``.
         """
-        residuals = (before.residual, after.residual, self._elsewhere(after, effects))
-        sums = [self.cycles.sums(residual**2, self.unseen) for residual in residuals]
+        sums = [self.cycles.sums(left.residual**2, self.unseen) for left in (before, after)]
         counts = self.cycles.sums(np.ones(len(self.force)), self.unseen)
         there = counts > 0
-        kept = [s[there] for s in sums]
-        held = HeldOut(kept[0], kept[1], kept[2], counts[there], self.cycles.segment[there])
+        held = HeldOut(sums[0][there], sums[1][there], counts[there], self.cycles.segment[there])
         again = Again(
             float(carried[:, self.unseen].mean()),
             carried[:, self.recorded].mean(axis=1),
             float(np.mean(before.residual[self.recorded] ** 2)),
         )
         return shrinkage(held, noise, again, self.cycles.strokes)
-
-    def _elsewhere(self, left: Left, effects: Sequence[ActiveEffect]) -> Array:
-        """(N,) residual [N] without the effects that belong to this run alone."""
-        passing = [e for e in effects if not e.form.lasts]
-        if not passing:
-            return left.residual
-        forces = [
-            sum(e.form.act(p.stroke.time, p.stroke.drive_seen, *e.values) for e in passing) for p in self.pieces
-        ]
-        residual = left.residual + np.concatenate(forces)
-        # The zero of every run is another one, and no gap.
-        return np.asarray(residual - residual[self.usable].mean())
 
 
 def _once_moved(piece: Piece) -> Piece:

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,14 +30,6 @@ class Model:
     """[s] residual lags of the force and drive channel that came with a fit or a twin."""
     baseline: Fit | None = None
     """Of a twin: the fit without effects."""
-    logs: frozenset[str] = frozenset()
-    """Of a twin: SHA-256 of the logs that it was made from."""
-
-    def in_run(self, log: str) -> "Model":
-        """The model for a log of this SHA-256: what belongs to the runs of a twin is no part of others."""
-        if not self.logs or log in self.logs:
-            return self
-        return replace(self, effects=tuple(e for e in self.effects if e.form.lasts))
 
     def force_on(self, piece: Piece) -> Array:
         """Simulated force (N,) [N] of a stretch; only y(0) is found on it, by Gauss-Newton."""
@@ -102,8 +94,7 @@ def _of_scenario(content: dict[str, Any]) -> Model:
     # its parameters were fitted beside the lags of its bench, and leave more without them.
     found = content.get("nuisances")
     lags = (0.0, 0.0) if found is None else _lags(Nuisances.model_validate(found))
-    logs = frozenset[str](content.get("provenance", {}).get("logs", {}).values())
-    return Model(to_coordinates(parameters), effects, lags, baseline, logs)
+    return Model(to_coordinates(parameters), effects, lags, baseline)
 
 
 def _active(entry: dict[str, Any]) -> ActiveEffect:

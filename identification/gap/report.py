@@ -105,7 +105,7 @@ class Report:
         nowhere = np.zeros((1, len(self.judge.force)))
         carried = hearing.other_runs(named, self.search.full) if named.names else nowhere
         noise = hearing.noise_under(named)
-        return self.judge.shrunk(plain.left, named.left, noise, carried, named.fit.active)
+        return self.judge.shrunk(plain.left, named.left, noise, carried)
 
     def _gap(self, verdict: Verdict, plain: Contender, named: Contender, shrunk: Shrinkage) -> Gap:
         noise = self.search.hearing.noise_under(named)

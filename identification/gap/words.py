@@ -73,7 +73,7 @@ def explanation(
     )
     if verdict == "unexplained":
         return f"{start}, and no known effect explains it. {rest}"
-    return f"{start}; {_said(effects)} {_shrunk(gap, effects)}. {_next(verdict, effects, alternatives, rest)}"
+    return f"{start}; {_said(effects)} {_shrunk(gap, len(effects))}. {_next(verdict, effects, alternatives, rest)}"
 
 
 def nearest(names: Sequence[str], before: float, after: float, floor: float) -> str:
@@ -103,16 +103,11 @@ def _sizes(effect: NamedEffect) -> str:
     return f"{EFFECTS[effect.name].meaning}; {', '.join(values)}"
 
 
-def _shrunk(gap: Gap, effects: Sequence[NamedEffect]) -> str:
-    makes, closes = ("brings", "closes") if len(effects) == 1 else ("together bring", "close")
+def _shrunk(gap: Gap, count: int) -> str:
+    makes, closes = ("brings", "closes") if count == 1 else ("together bring", "close")
     if gap.shrinkage is None:
         return f"{makes} it to {gap.after_n:.3g} N"
     closed = min(gap.shrinkage, 1.0)
-    if not all(EFFECTS[e.name].form(e.form).lasts for e in effects):
-        return (
-            f"{makes} it to {gap.train_after_n:.3g} N in this run, to which the waves belong, and {closes} "
-            f"{100 * closed:.0f} % of the gap of another"
-        )
     return f"{makes} it to {gap.after_n:.3g} N and {closes} {100 * closed:.0f} % of the gap"
 
 

@@ -75,8 +75,6 @@ class Form(NamedTuple):
     """The form as a plain function: its arguments follow from ``acts``."""
     memory: Callable[..., Any] | None = None
     """What is remembered after a change, of forms with memory."""
-    lasts: bool = True
-    """Whether it is the same in every run of the damper: a wandering zero wanders otherwise in the next."""
 
 
 class Effect(NamedTuple):

@@ -1,7 +1,7 @@
 """A force channel whose zero wanders: warming electronics, a cell that creeps.
 
 Either the zero settles towards another value, or it swings slowly, or it wanders: a wave with five overtones. All
-stay bounded for all time. A channel warms up in every run alike; a wave belongs to the run on which it was fitted.
+stay bounded for all time.
 """
 
 from typing import Any
@@ -63,7 +63,6 @@ FORCE_DRIFT = Effect(
             ),
             ((0.0, 0.0, 25.0), (0.0, 0.0, 50.0), (0.0, 0.0, 100.0), (0.0, 0.0, 250.0)),
             swinging,
-            lasts=False,
         ),
         Form(
             "wandering",
@@ -71,7 +70,6 @@ FORCE_DRIFT = Effect(
             (*_PARTS, Quantity("period", "s", 60.0, 3000.0, 100.0, "period of the slowest wave")),
             ((0.0,) * 12 + (70.0,), (0.0,) * 12 + (140.0,)),
             wandering,
-            lasts=False,
         ),
     ),
 )

@@ -89,25 +89,6 @@ def test_gas_is_isothermal_where_its_heat_has_left_and_adiabatic_where_it_has_no
     assert turned(0.01, 0.0, 0.0, 90.0, 0.05, 0.3) == pytest.approx(-fast)
 
 
-def test_waves_of_a_zero_belong_to_their_run_and_a_warm_up_does_not():
-    assert [form.name for form in EFFECTS["force_drift"].forms if form.lasts] == ["settling"]
-    assert all(form.lasts for name, e in EFFECTS.items() for form in e.forms if name != "force_drift")
-
-
-@pytest.mark.parametrize("form", ["stribeck", "stribeck_gentle"])
-def test_friction_dissipates_and_peaks_near_rest(form):
-    force = act("seal_friction", form)
-    assert force(0.0, 0.003, 20.0, 10.0, 0.015) > force(0.0, 0.2, 20.0, 10.0, 0.015) > 19.9
-    np.testing.assert_allclose(force(0.0, -V, 20.0, 10.0, 0.015), -force(0.0, V, 20.0, 10.0, 0.015))
-
-
-@pytest.mark.parametrize(("form", "values"), [("quadratic", (1000.0,)), ("power", (10.0, 2.0))])
-def test_turbulence_grows_with_the_square_of_the_speed(form, values):
-    force = act("orifice_turbulence", form)
-    assert force(0.0, 0.1, *values) == pytest.approx(10.0)
-    assert force(0.0, -0.2, *values) == pytest.approx(-40.0)
-
-
 def test_asymmetry_adds_to_extension_what_it_takes_from_compression():
     alpha, c0, c1 = act("direction_asymmetry")(0.0, np.array([-0.2, 0.2]), 0.1, 0.2, 0.01)
     np.testing.assert_allclose(alpha, [0.9, 1.1], rtol=1e-3)

@@ -47,13 +47,6 @@ def test_an_explanation_has_figures_units_the_cause_and_what_to_check():
     assert text.count(". ") == 1
 
 
-def test_waves_of_a_zero_are_said_to_belong_to_their_run():
-    drift = MASS.model_copy(update={"name": "force_drift", "form": "swinging"})
-    text = explanation("explained", GAP.model_copy(update={"train_after_n": 2.6}), [drift], [], "")
-    assert "to 2.6 N in this run, to which the waves belong" in text
-    assert "in this run" not in explanation("explained", GAP, [MASS], [], "")
-
-
 def test_what_nothing_explains_says_where_it_is_largest():
     text = explanation("unexplained", GAP, [], [], "What remains is largest at 0.5 V.")
     assert "no known effect" in text
@@ -72,31 +65,6 @@ def test_a_scenario_is_a_model_with_its_effects(tmp_path):
     assert model.baseline is None
     by_numbers = scenario(tmp_path, damper=PARAMETER_SETS["laboratory"].parameters._asdict())
     assert read_model(by_numbers).point == pytest.approx(model.point)
-
-
-def test_a_twin_keeps_the_waves_of_a_zero_to_the_logs_that_it_was_made_from(tmp_path):
-    drift = {"name": "force_drift", "form": "swinging", "parameters": {"cosine": 8.0, "sine": 0.0, "period": 60.0}}
-    mass = {"name": "moving_mass", "form": "rigid", "parameters": {"mass": 2.0}}
-    twin = read_model(scenario(tmp_path, effects=[drift, mass], provenance={"logs": {"run.mcap": "abc"}}))
-    assert named_effects(twin.in_run("abc").effects) == [drift, mass]
-    assert named_effects(twin.in_run("def").effects) == [mass]
-    plain = read_model(scenario(tmp_path, effects=[drift]))
-    assert named_effects(plain.in_run("def").effects) == [drift]
-
-
-@pytest.mark.parametrize(
-    "changed",
-    [
-        {"schema": "mrbench.method/1"},
-        {"damper": "no such damper"},
-        {"effects": [{"name": "gremlins", "parameters": {}}]},
-        {"effects": [{"name": "moving_mass", "parameters": {}}]},
-    ],
-)
-def test_what_is_no_model_is_refused_in_one_line(tmp_path, changed):
-    with pytest.raises(IdentificationError, match=r"scenario\.json: .*give a fit, a twin or a scenario") as caught:
-        read_model(scenario(tmp_path, **changed))
-    assert "\n" not in str(caught.value)
 
 
 def test_a_missing_file_is_said(tmp_path):

@@ -10,12 +10,13 @@ from identification.assemble import assemble
 from identification.damper.coordinates import Coordinates, to_coordinates
 from identification.damper.parameter_sets import parameter_set
 from identification.identify import fit_problem
+from identification.piece import Piece
 from identification.pinn.result import PinnResult
 from identification.pinn.settings import read_settings
 from identification.pinn.supervision import Supervision
 from identification.pinn.train import train
 from identification.prediction import predict_piece, rmse
-from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.problem import COORDINATE_COUNT, Problem
 from identification.recordings import Recording, Stretch
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, Stroke, simulate

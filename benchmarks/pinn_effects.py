@@ -17,12 +17,13 @@ from benchmarks.fitting import RISING, SHUFFLED, TRAINING, UNSEEN, stroke
 from benchmarks.pinn_cases import LABORATORY
 from identification.damper.effects import EFFECTS, USUAL
 from identification.effect_choice import EffectChoice
+from identification.piece import Piece
 from identification.pinn.effect_terms import takes
 from identification.pinn.result import PinnResult
 from identification.pinn.settings import read_settings
 from identification.pinn.train import train
 from identification.prediction import predict_piece, rmse
-from identification.problem import Piece, Problem
+from identification.problem import Problem
 from identification.search_space import SearchSpace
 from identification.simulate import ActiveEffect, Setting
 

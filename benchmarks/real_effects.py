@@ -24,7 +24,6 @@ from identification.gap.diagnose import diagnosed_problem
 from identification.gap.explain import Effort, JointFit, fit_with
 from identification.gap.judge import Judge
 from identification.prediction import normalised, predict_piece, rmse
-from identification.problem import COORDINATE_COUNT
 from identification.recordings import load
 
 _TEST = ("5mm_4Hz", "25mm_0.5Hz")
@@ -88,7 +87,7 @@ def _import(files: Sequence[Path], log: Path) -> None:
 def errors(fit: JointFit, seen: Assembled, unseen: Assembled) -> dict[str, Any]:
     """Errors of a fit on fitted and on unseen strokes, and its effects."""
     point, active = fit.coordinates, fit.active
-    delays = fit.minimum.unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] * fit.problem.delay_prior
+    delays = fit.problem.further_delays(fit.minimum.unknowns)
     by_file, rest, force = {}, [], []
     for piece in unseen.pieces:
         whole = replace(piece, train=np.ones(len(piece.force)))

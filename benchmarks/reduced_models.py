@@ -14,8 +14,9 @@ from benchmarks.fitting import RISING, stroke
 from identification.arrays import Array, BoolArray
 from identification.damper.coordinates import Coordinates, to_coordinates
 from identification.damper.parameter_sets import parameter_set
+from identification.piece import Piece
 from identification.prediction import predict_piece, rmse
-from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.problem import COORDINATE_COUNT, Problem
 from identification.refine import Settings, refine
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, simulate

@@ -24,8 +24,9 @@ from identification.damper import law
 from identification.damper.coordinates import Coordinates, to_coordinates
 from identification.damper.parameter_sets import parameter_set
 from identification.foresight.information import sizes
+from identification.piece import Piece
 from identification.prediction import predict_piece, rmse
-from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.problem import COORDINATE_COUNT, Problem
 from identification.refine import refine
 from identification.search_space import SearchSpace
 from identification.start import starting_points

@@ -70,18 +70,8 @@ The named set is in bold where it is the true one. "Shrinkage" is claimed / that
 {rows}
 """
 
-_BEFORE = """| asked | wanted | seed 2077, 170 cases | seed 3011, 230 cases |
-| --- | --- | --- | --- |
-| right set named first, large, rich methods | 97 % | 24 of 25 | 26 of 33 |
-| right set named first, small, rich methods | 85 % | 26 of 28 | 33 of 33 |
-| truth among the named and three alternatives, rich methods | 98 % | 51 of 53 | 63 of 66 |
-| truth among the named and three alternatives, all methods | 98 % | 75 of 78 | 93 of 100 |
-| effects named where nothing is | at most 2 in 100 | 0 of 78 | 2 of 100 |
-| unknown effects blamed on no known one | 27 of 30 | 22 of 23 | 30 of 30 |
-| claimed shrinkage within 5 points, rich | 95 % | 15 of 20 (from case_089 on) | 40 of 54 |
-| claimed shrinkage within 5 points, poor | 95 % | 7 of 9 (from case_089 on) | 15 of 23 |
-| truth named after the proposed stroke was made, poor methods | 90 % | 2 of 4 | 4 of 7 |
-| same answer over the wires | 10 of 10 | 8 of 9 | not measured |"""
+_BEFORE = Path(__file__).with_name("trial_before.md")
+"""What earlier seeds came to, each with the code of its day."""
 
 
 class Beside(NamedTuple):
@@ -110,7 +100,7 @@ def page(whole: Trial, drawn: int, beside: Beside) -> str:
         since=beside.anew and f" --from {beside.anew}",
         table=table(told),
         care="\n".join(f"- {line}" for line in (*_care(honest, drawn), *beside.notes)),
-        before=_BEFORE,
+        before=_BEFORE.read_text().strip(),
         rows="\n".join(map(_row, honest)),
     )
 

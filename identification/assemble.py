@@ -14,7 +14,7 @@ from identification.errors import NothingToFit
 from identification.force_channel import LowPass, filter_lag
 from identification.gap.floor import Floor, combine_floors, measure_floor
 from identification.motion import estimate_motion
-from identification.problem import Piece
+from identification.piece import Piece
 from identification.recordings import Recording, Stretch
 from identification.simulate import Stroke
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper.coordinates import COORDINATES
+from identification.piece import Piece
 from identification.prediction import Predicted, piece_setting
-from identification.problem import Piece
 from identification.results import Band, Fit
 from identification.simulate import UNKNOWNS
 

@@ -5,7 +5,7 @@ another zero. So each log behind the first may have an offset of the force, and 
 c1), as the viscosity changes with temperature.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,11 +45,6 @@ class Condition:
             return shared
         damping = {name: getattr(shared, name) * self.viscosity for name in _DAMPING}
         return shared._replace(f0=shared.f0 + self.offset, **damping)
-
-    def own_slopes(self, names: Sequence[str], shared: Coordinates) -> Array:
-        """(13, len(names)) change of this log's coordinates over each of its own unknowns."""
-        columns = [self.chained(OWN[name].slopes(shared)[None])[0] for name in names]
-        return np.stack(columns, axis=1) if columns else np.empty((len(shared), 0))
 
     def chained(self, slopes: Array) -> Array:
         """Slopes (N, U) over the shared coordinates, from those over this log's."""

@@ -11,7 +11,7 @@ from identification.assemble import Assembled
 from identification.condition import OWN
 from identification.damper.coordinates import Coordinates
 from identification.prediction import normalised, per_drive, predict_piece, rmse
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COMMON_COUNT, COORDINATE_COUNT, Problem
 from identification.refine import Minimum
 from identification.results import Delay, Errors, Estimate, Fit, NoiseFloor, Nuisances, Provenance, Stage
 from identification.uncertainty import (
@@ -22,6 +22,7 @@ from identification.uncertainty import (
     own_estimate,
     parameter_estimates,
     strong_correlations,
+    unseen,
 )
 
 MISFIT = 1.2
@@ -89,7 +90,7 @@ def fit_document(assembled: Assembled, end: Ending, provenance: Provenance) -> F
 
 
 def _nuisances(problem: Problem, minimum: Minimum, found: Covariance) -> Nuisances:
-    delays = slice(COORDINATE_COUNT, COORDINATE_COUNT + 2)
+    delays = slice(COORDINATE_COUNT, COMMON_COUNT)
     prior = problem.delay_prior
     values = minimum.unknowns[delays] * prior
     sd = np.sqrt(np.diag(found.unknowns)[delays]) * prior
@@ -116,13 +117,6 @@ def _each_log(
         }
         for name in (names[1:] if problem.own else ())
     }
-
-
-def unseen(found: Covariance) -> tuple[set[str], set[str]]:
-    """Coordinates that these strokes cannot show, and those that stand at a bound."""
-    names = np.array(Coordinates._fields)
-    seen, inside = found.seen[:COORDINATE_COUNT], found.inside[:COORDINATE_COUNT]
-    return set(names[~seen]), set(names[seen & ~inside])
 
 
 def simulated_errors(assembled: Assembled, point: Coordinates, delays: tuple[float, float]) -> list[Array]:

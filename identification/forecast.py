@@ -12,8 +12,8 @@ from identification.bands import band, force_spread, limits, record_noise, shown
 from identification.errors import IdentificationError
 from identification.foresight.planned import Planned, read_planned
 from identification.gap.model import model_of_fit
+from identification.piece import Piece
 from identification.prediction import Predicted, piece_setting
-from identification.problem import Piece
 from identification.results import Fit, Forecast, Provenance
 from identification.series import Series
 

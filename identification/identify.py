@@ -8,30 +8,25 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.agreement import compare
 from identification.arrays import Array
 from identification.assemble import Assembled, HoldOut, assemble
 from identification.breakdown import breakdown_in_words
 from identification.clock_wander import wander_in_words, without_wander
-from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError
-from identification.fit_document import MISFIT, Ending, fit_document, of_samples, simulated_errors, unseen
+from identification.fit_document import MISFIT, Ending, fit_document, of_samples, simulated_errors
 from identification.motion_noise import play_noise, with_motion, without_pull
+from identification.piece import Piece
 from identification.prediction import rmse
-from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.problem import COORDINATE_COUNT, Problem
 from identification.profile import profile_intervals
 from identification.recordings import Recording, Stretch
 from identification.refine import Minimum, Settings, refine
 from identification.results import Fit, Provenance, Stage
 from identification.search_space import SearchSpace
 from identification.start import sliding_damping
-from identification.uncertainty import (
-    Covariance,
-    coordinate_covariance,
-    covariance,
-)
+from identification.uncertainty import Covariance, covariance, unseen
 from identification.usable import strangers, usable
-from identification.witness import Testimony, as_minimum, deviations, stage_entry, train_stage
+from identification.witness import Testimony, agreement_with, as_minimum, stage_entry, train_stage
 
 if TYPE_CHECKING:
     from identification.pinn.result import PinnResult
@@ -201,13 +196,7 @@ def _compared(assembled: Assembled, found: Ending, testimony: Testimony) -> Endi
     network = testimony.found
     if network is None:
         return replace(found, said=f"not compared: pinn found nothing, {testimony.why_not}")
-    point = found.problem.space.to_coordinates(found.minimum.unknowns[:COORDINATE_COUNT])
-    spread = coordinate_covariance(found.problem, found.minimum, found.covariance)
-    hidden, at_bound = unseen(found.covariance)
-    agreement = compare(
-        network.coordinates, network.deviations, point, deviations(spread),
-        set(Coordinates._fields) - hidden - at_bound,
-    )  # fmt: skip
+    agreement = agreement_with(network, found.problem, found.minimum, found.covariance)
     said = agreement.words() if network.accepted else f"{agreement.words()} (pinn: {network.note})"
     stages = (_stage(assembled, found.problem, found.covariance, network), *found.stages)
     return replace(found, stages=stages, agreement=agreement, said=said)
@@ -224,8 +213,7 @@ def _stage(assembled: Assembled, problem: Problem, found: Covariance, network: "
 def _train_error(assembled: Assembled, problem: Problem, minimum: Minimum) -> float:
     """Simulated force error [N] on the fitted samples at the end of a descent."""
     point = problem.space.to_coordinates(minimum.unknowns[:COORDINATE_COUNT])
-    force, drive = minimum.unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] * problem.delay_prior
-    errors = simulated_errors(assembled, point, (float(force), float(drive)))
+    errors = simulated_errors(assembled, point, problem.further_delays(minimum.unknowns))
     return rmse(of_samples(assembled, errors, held=False)[0])
 
 

@@ -21,7 +21,8 @@ from scipy.special import stdtrit
 from identification.arrays import Array, BoolArray
 from identification.drive import drive_noise, steady_levels
 from identification.motion import estimate_motion, recorded_noise
-from identification.problem import Piece, Problem
+from identification.piece import Piece
+from identification.problem import Problem
 from identification.recordings import Stretch
 from identification.refine import Minimum
 

@@ -12,7 +12,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.drive import drive_bins
-from identification.problem import Piece
+from identification.piece import Piece
 from identification.results import DriveError
 from identification.simulate import UNKNOWNS, ActiveEffect, Setting
 

@@ -7,104 +7,30 @@ Effects beside the law bring their parameters as further unknowns, behind all ot
 each further log has of its own, where that is asked for.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.condition import OWN, SAME, Condition
+from identification.condition import OWN, Condition
 from identification.damper.coordinates import Coordinates
 from identification.effect_choice import EffectChoice
-from identification.force_channel import LowPass, filter_lag
+from identification.piece import Piece
 from identification.search_space import SearchSpace
-from identification.simulate import UNKNOWNS, ActiveEffect, Setting, Stroke, simulate
+from identification.simulate import UNKNOWNS, ActiveEffect, Setting
 
 COORDINATE_COUNT = len(Coordinates._fields)
 Y0_SCALE = 1e-3
 """[m] what a change of order one of a y(0) unknown means."""
 _Y0_STROKES = 1.0
 """[1] standard deviation of y(0) about the middle of the motion, in half strokes."""
-_SHARED = COORDINATE_COUNT + 2
-"""Unknowns that all pieces share: the search numbers and the two delays."""
-_MOST_FOR_PLAY = 8
-"""Times a thinned rate at which play is still looked at."""
+COMMON_COUNT = COORDINATE_COUNT + 2
+"""Unknowns that come first and that all pieces share: the search numbers and the two delays."""
 _AT_BOUND = 1e-9
 """[1] of a search number within which an unknown stands at a bound."""
 _FAR = 10.0
 """[1] change of an effect's size, in its usual unit, that counts like one of a search number."""
-
-
-@dataclass(frozen=True)
-class Piece:
-    """One continuous stretch as the fit sees it."""
-
-    name: str
-    stroke: Stroke
-    force: Array
-    """(N,) recorded force [N]."""
-    train: Array
-    """(N,) 1.0 where the sample is fitted, 0.0 where it is held out or was not measured."""
-    force_delay: float = 0.0
-    """[s] known lag of the force channel behind the displacement channel."""
-    drive_delay: float = 0.0
-    """[s] known further lag of the force channel behind the drive channel."""
-    low_pass: LowPass | None = None
-    """What the force channel does to the force, beside delaying it."""
-    finer_for_play: int = 4
-    """Times the rate at which play in the mounting is looked at."""
-    log: int = 0
-    """Which of the logs it comes from."""
-    condition: Condition = SAME
-    """What that log has of its own."""
-
-    def recorded(self, setting: Setting, *, slopes: bool = False) -> tuple[Array, Array]:
-        """Force [N] (N,) as the channel would record it, and its slopes (N, unknowns) if asked for."""
-        force, J = self._recorded(replace(setting, coordinates=self.condition.of(setting.coordinates)), slopes)
-        return force, self.condition.chained(J) if slopes else J
-
-    def _recorded(self, setting: Setting, slopes: bool) -> tuple[Array, Array]:
-        if self.low_pass is not None:
-            found = simulate(setting, self._finer(self.low_pass.finer), slopes=slopes)
-            passed = self.low_pass.apply(found.force)
-            return passed, self.low_pass.apply(found.slopes) if slopes else found.slopes
-        # Play begins and ends within a sample, and the damper's velocity jumps there.
-        times = self.finer_for_play if setting.acting("displacement_follower") else 1
-        found = simulate(setting, self._finer(times), slopes=slopes)
-        return found.force[::times], found.slopes[::times]
-
-    def quicker(self) -> "Piece":
-        """The same with filter and play looked at in the samples only: a good way near, a little beside."""
-        low_pass = replace(self.low_pass, finer=1) if self.low_pass else None
-        return replace(self, low_pass=low_pass, finer_for_play=1)
-
-    def coarser(self, times: int) -> "Piece":
-        """The same at every so many samples: too few for a filter, of which only the delay remains."""
-        stroke = self.stroke.coarser(times)
-        # The stroke ends on a whole step and may have dropped the last samples.
-        thin = slice(0, len(stroke.displacement) * times, times)
-        late = self.force_delay + filter_lag(self.low_pass.reported if self.low_pass else None)
-        return replace(
-            self,
-            stroke=stroke,
-            force=self.force[thin],
-            train=self.train[thin],
-            low_pass=None,
-            force_delay=late,
-            finer_for_play=min(times * self.finer_for_play, _MOST_FOR_PLAY),
-        )
-
-    def _finer(self, times: int) -> Stroke:
-        """The stroke at a higher rate, made once."""
-        if times not in self._finer_strokes:
-            self._finer_strokes[times] = self.stroke.finer(times)
-        return self._finer_strokes[times]
-
-    @cached_property
-    def _finer_strokes(self) -> dict[int, Stroke]:
-        # No field: `replace` makes a piece without it, and a changed stroke never meets those of another.
-        return {}
 
 
 @dataclass(frozen=True)
@@ -172,38 +98,44 @@ class Problem:
     @property
     def first_effect(self) -> int:
         """Place of the effects' first unknown."""
-        return _SHARED + len(self.pieces)
+        return COMMON_COUNT + len(self.pieces)
 
     @property
     def shared(self) -> list[int]:
         """(C,) places of the unknowns that no piece has alone: q, the two delays, effects, each log's own."""
-        return [*range(_SHARED), *range(self.first_effect, self.first_own + self.own_count)]
+        return [*range(COMMON_COUNT), *range(self.first_effect, self.first_own + self.own_count)]
 
     @property
     def shared_priors(self) -> Array:
         """(C,) weights of the priors of these; all are centred on zero."""
         return self._priors()[1][self.shared]
 
-    def condition(self, shared: Array, piece: int) -> Condition:
-        """What a piece's log has of its own at the shared unknowns (C,)."""
+    def whole(self, shared: Array) -> Array:
+        """(U,) unknowns from the shared ones (C,); what a piece has alone stands at zero."""
         unknowns = np.zeros(self.first_own + self.own_count)
         unknowns[self.shared] = shared
-        return self.piece(unknowns, piece).condition
+        return unknowns
 
-    def own_slopes(self, shared: Array, piece: int) -> Array:
-        """(13, O) change of a piece's coordinates over all that logs have of their own, at the shared unknowns."""
+    def condition(self, shared: Array, piece: int) -> Condition:
+        """What a piece's log has of its own at the shared unknowns (C,)."""
+        return self.piece(self.whole(shared), piece).condition
+
+    def own_slopes(self, unknowns: Array, piece: int) -> Array:
+        """(13, O) change of a piece's coordinates over all that logs have of their own, before its ``chained``.
+
+        ``unknowns`` may be all (U,) or the shared ones (C,): the coordinates come first in both.
+        """
         found = np.zeros((COORDINATE_COUNT, self.own_count))
-        if places := self._own_places(self.pieces[piece]):
-            coordinates = self.space.to_coordinates(shared[:COORDINATE_COUNT])
-            at = [place - self.first_own for place in places]
-            found[:, at] = self.condition(shared, piece).own_slopes(self.own, coordinates)
+        coordinates = self.space.to_coordinates(unknowns[:COORDINATE_COUNT])
+        for name, place in zip(self.own, self._own_places(self.pieces[piece]), strict=False):
+            found[:, place - self.first_own] = OWN[name].slopes(coordinates)
         return found
 
     @property
     def delays(self) -> BoolArray:
         """(U,) True for the two delays."""
         mask = np.zeros(self.first_own + self.own_count, bool)
-        mask[COORDINATE_COUNT:_SHARED] = True
+        mask[COORDINATE_COUNT:COMMON_COUNT] = True
         return mask
 
     def bounds(self) -> tuple[Array, Array]:
@@ -231,22 +163,35 @@ class Problem:
         sizes = np.where(logarithmic, own, own / _FAR)
         return float(max(np.abs(step[:COORDINATE_COUNT]).max(), sizes.max()))
 
+    def further_delays(self, unknowns: Array) -> tuple[float, float]:
+        """[s] of the force and of the drive channel beyond what is known, at all unknowns or the shared ones."""
+        force, drive = unknowns[COORDINATE_COUNT:COMMON_COUNT] * self.delay_prior
+        return float(force), float(drive)
+
     def active_effects(self, unknowns: Array) -> tuple[ActiveEffect, ...]:
         """The effects with their values."""
-        starts = np.cumsum([self.first_effect, *(len(e.quantities) for e in self.effects)])
-        return tuple(
-            e.active(unknowns[at : at + len(e.quantities)]) for at, e in zip(starts, self.effects, strict=False)
-        )
+        return tuple(e.active(unknowns[own]) for e, own in self.effect_places())
+
+    def effect_slopes(self, unknowns: Array) -> Array:
+        """(P,) slopes of the effects' parameters over their search numbers."""
+        return np.concatenate([np.empty(0), *(e.slopes(unknowns[own]) for e, own in self.effect_places())])
+
+    def effect_places(self) -> Iterator[tuple[EffectChoice, slice]]:
+        """The effects with the places of their unknowns."""
+        at = self.first_effect
+        for effect in self.effects:
+            yield effect, slice(at, at + len(effect.quantities))
+            at += len(effect.quantities)
 
     def setting(self, unknowns: Array, piece: int) -> Setting:
         """What a piece is simulated with."""
         p = self.pieces[piece]
-        force_delay, drive_delay = unknowns[COORDINATE_COUNT:_SHARED] * self.delay_prior
+        force_delay, drive_delay = self.further_delays(unknowns)
         return Setting(
             self.space.to_coordinates(unknowns[:COORDINATE_COUNT]),
-            y0=float(unknowns[_SHARED + piece]) * Y0_SCALE,
-            force_delay=p.force_delay + float(force_delay),
-            drive_delay=p.drive_delay + float(drive_delay),
+            y0=float(unknowns[COMMON_COUNT + piece]) * Y0_SCALE,
+            force_delay=p.force_delay + force_delay,
+            drive_delay=p.drive_delay + drive_delay,
             effects=self.active_effects(unknowns),
         )
 
@@ -270,7 +215,7 @@ class Problem:
     def columns(self, piece: int) -> list[int]:
         """Places of the unknowns that a piece depends on: q, the two delays, its own y(0), effects, its log's."""
         effects = range(self.first_effect, self.first_effect + self.effect_count)
-        return [*range(_SHARED), _SHARED + piece, *effects, *self._own_places(self.pieces[piece])]
+        return [*range(COMMON_COUNT), COMMON_COUNT + piece, *effects, *self._own_places(self.pieces[piece])]
 
     def residuals(self, unknowns: Array, piece: int) -> tuple[Array, Array]:
         """Residuals (N,) of a piece and their slopes (N, 16 + P) over its ``columns``; zero where not fitted."""
@@ -326,15 +271,12 @@ class Problem:
         D[:COORDINATE_COUNT, :COORDINATE_COUNT] = self.space.slopes(unknowns[:COORDINATE_COUNT])
         D[UNKNOWNS.index("force_delay"), COORDINATE_COUNT] = self.delay_prior
         D[UNKNOWNS.index("drive_delay"), COORDINATE_COUNT + 1] = self.delay_prior
-        D[UNKNOWNS.index("y0"), _SHARED] = Y0_SCALE
-        at = self.first_effect
-        for e in self.effects:
-            own = np.arange(at, at + len(e.quantities)) - self.first_effect
-            D[len(UNKNOWNS) + own, _SHARED + 1 + own] = e.slopes(unknowns[at : at + len(own)])
-            at += len(own)
-        for k in range(len(self._own_places(self.pieces[piece]))):
-            shared = self.space.to_coordinates(unknowns[:COORDINATE_COUNT])
-            D[:COORDINATE_COUNT, _SHARED + 1 + self.effect_count + k] = OWN[self.own[k]].slopes(shared)
+        D[UNKNOWNS.index("y0"), COMMON_COUNT] = Y0_SCALE
+        behind = COMMON_COUNT + 1 + self.effect_count
+        D[len(UNKNOWNS) :, COMMON_COUNT + 1 : behind] = np.diag(self.effect_slopes(unknowns))
+        if places := self._own_places(self.pieces[piece]):
+            own = [place - self.first_own for place in places]
+            D[:COORDINATE_COUNT, behind:] = self.own_slopes(unknowns, piece)[:, own]
         return D
 
     def quicker(self) -> "Problem":

@@ -12,7 +12,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
-from identification.problem import Piece, Problem
+from identification.piece import Piece
+from identification.problem import Problem
 
 _FAST = 0.25
 """[1] fraction of a piece's peak velocity above which the hysteretic variable counts as saturated."""

@@ -90,6 +90,13 @@ def _block_scores(problem: Problem, unknowns: Array) -> Array:
     return np.vstack(rows)
 
 
+def unseen(found: Covariance) -> tuple[set[str], set[str]]:
+    """Coordinates that these strokes cannot show, and those that stand at a bound."""
+    names = np.array(Coordinates._fields)
+    seen, inside = found.seen[:COORDINATE_COUNT], found.inside[:COORDINATE_COUNT]
+    return set(names[~seen]), set(names[seen & ~inside])
+
+
 def coordinate_covariance(problem: Problem, minimum: Minimum, found: Covariance) -> Array:
     """(13, 13) covariance of the coordinates."""
     q = minimum.unknowns[:COORDINATE_COUNT]

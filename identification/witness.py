@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.agreement import Agreement, compare
+from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError
 from identification.prediction import predict_piece
-from identification.problem import COORDINATE_COUNT, Y0_SCALE, Problem
+from identification.problem import COMMON_COUNT, COORDINATE_COUNT, Y0_SCALE, Problem
 from identification.recordings import Stretch
 from identification.refine import Minimum
 from identification.results import Errors, Stage
-from identification.uncertainty import SEEN, Covariance, coordinate_estimates
+from identification.uncertainty import SEEN, Covariance, coordinate_covariance, coordinate_estimates, unseen
 
 if TYPE_CHECKING:
     from identification.pinn.result import PinnResult
@@ -132,13 +133,22 @@ def as_minimum(problem: Problem, found: "PinnResult") -> tuple[Minimum, Covarian
     unknowns[problem.shared] = found.unknowns
     pieces = [problem.piece(unknowns, i) for i in range(len(problem.pieces))]
     y0 = [predict_piece(p, found.coordinates, found.delays, effects=found.effects).y0 for p in pieces]
-    unknowns[COORDINATE_COUNT + 2 : COORDINATE_COUNT + 2 + len(y0)] = np.array(y0) / Y0_SCALE
+    unknowns[COMMON_COUNT : COMMON_COUNT + len(y0)] = np.array(y0) / Y0_SCALE
     minimum = Minimum(unknowns, problem.evaluate(unknowns), found.steps, converged=found.accepted)
     spread = np.zeros((len(unknowns), len(unknowns)))
     if found.covariance is not None:
         spread[np.ix_(problem.shared, problem.shared)] = found.covariance
     seen = problem.free & (np.diag(minimum.evaluation.hessian) > SEEN)
     return minimum, Covariance(spread, seen, seen & problem.inside(unknowns), coloured=False)
+
+
+def agreement_with(network: "PinnResult", problem: Problem, minimum: Minimum, found: Covariance) -> Agreement:
+    """How far the network's coordinates lie from those at a descent's end, where the strokes show them at all."""
+    point = problem.space.to_coordinates(minimum.unknowns[:COORDINATE_COUNT])
+    spread = np.diag(coordinate_covariance(problem, minimum, found))
+    hidden, at_bound = unseen(found)
+    known = set(Coordinates._fields) - hidden - at_bound
+    return compare(network.coordinates, network.deviations, point, np.sqrt(np.maximum(spread, 0.0)), known)
 
 
 def stage_entry(found: "PinnResult", hidden: set[str], held_out: float | None, unit: str) -> Stage:
@@ -157,8 +167,3 @@ def stage_entry(found: "PinnResult", hidden: set[str], held_out: float | None, u
         reconstructed_n=Errors(train=own.train, validation=own.validation, held_out=None),
         coordinates=estimates,
     )
-
-
-def deviations(spread: Array) -> Array:
-    """(13,) standard deviations from a covariance (13, 13)."""
-    return np.sqrt(np.maximum(np.diag(spread), 0.0))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.signal import lfilter
 
 from identification.arrays import Array, BoolArray
-from identification.problem import Piece
+from identification.piece import Piece
 
 Indices = npt.NDArray[np.intp]
 

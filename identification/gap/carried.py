@@ -13,7 +13,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.motion import recorded_noise
 from identification.motion_noise import with_motion
-from identification.problem import Piece, Problem
+from identification.piece import Piece
+from identification.problem import Problem
 from identification.recordings import Stretch
 
 

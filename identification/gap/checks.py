@@ -9,7 +9,7 @@ from identification.arrays import Array, BoolArray
 from identification.errors import NothingToFit
 from identification.gap.floor import Floor
 from identification.gap.residual import Cycles
-from identification.problem import Piece
+from identification.piece import Piece
 from identification.recordings import Recording, Stretch
 
 _FEWEST_CYCLES = 4

@@ -15,7 +15,8 @@ from identification.gap.report import MOST_TIED, TIED, Answer, Report
 from identification.gap.search import Search
 from identification.gap.witness import hear
 from identification.identify import fit_problem
-from identification.problem import Piece, Problem
+from identification.piece import Piece
+from identification.problem import Problem
 from identification.recordings import Recording
 from identification.threads import one_thread
 from identification.usable import refuse_useless

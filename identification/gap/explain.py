@@ -96,13 +96,11 @@ class JointFit:
     def deviations(self) -> dict[str, dict[str, float]]:
         """Standard deviations of these parameters [SI]; infinite where the strokes say nothing."""
         sd = np.sqrt(np.diag(self.covariance.unknowns))
-        seen, at, found = self.covariance.inside, self.problem.first_effect, {}
-        for choice in self.effects:
-            own = slice(at, at + len(choice.quantities))
+        seen, found = self.covariance.inside, {}
+        for choice, own in self.problem.effect_places():
             scaled = sd[own] * choice.slopes(self.minimum.unknowns[own])
             known = np.where(seen[own], scaled, np.inf)
             found[choice.name] = {q.symbol: float(s) for q, s in zip(choice.quantities, known, strict=True)}
-            at = own.stop
         return found
 
     @cached_property

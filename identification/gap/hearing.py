@@ -16,7 +16,8 @@ from identification.gap.colour import floor_under
 from identification.gap.contender import Contender
 from identification.gap.judge import Judge
 from identification.gap.residual import by_piece
-from identification.problem import Piece, Problem
+from identification.piece import Piece
+from identification.problem import Problem
 from identification.recordings import Stretch
 
 NOTHING = 1.008

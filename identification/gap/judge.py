@@ -12,8 +12,8 @@ from identification.gap.held_out import Again, HeldOut, Shrinkage, held_out_cycl
 from identification.gap.residual import Cycles, by_piece, cut_cycles
 from identification.gap.stumbles import left_out
 from identification.gap.where import Left
+from identification.piece import Piece
 from identification.prediction import rmse
-from identification.problem import Piece
 
 _MOVED = 0.1
 """[1] of the half stroke that the damper has to move before its force is looked at."""

@@ -14,8 +14,8 @@ from identification.damper.effects import EFFECTS
 from identification.damper.parameter_sets import PARAMETER_SETS
 from identification.damper.parameters import Parameters
 from identification.errors import IdentificationError
+from identification.piece import Piece
 from identification.prediction import Predicted, predict_piece
-from identification.problem import Piece
 from identification.results import Fit, Nuisances
 from identification.simulate import ActiveEffect
 

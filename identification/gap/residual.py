@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
-from identification.problem import Piece
+from identification.piece import Piece
 from identification.recordings import Segment, Stretch
 
 Number = TypeVar("Number", bound=np.generic)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
 from identification.gap.residual import Cycles, by_piece
-from identification.problem import Piece
+from identification.piece import Piece
 
 Indices = npt.NDArray[np.intp]
 

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.agreement import AGREE, compare
-from identification.damper.coordinates import Coordinates
+from identification.agreement import AGREE, Agreement
 from identification.damper.parameters import Quantity
 from identification.gap.documents import EffectValue, Witness
 from identification.gap.explain import JointFit
@@ -20,7 +19,7 @@ from identification.pinn.settings import read_settings
 from identification.pinn.supervision import Supervision
 from identification.pinn.train import train, why_not
 from identification.problem import Problem
-from identification.uncertainty import coordinate_covariance
+from identification.witness import agreement_with
 
 Progress = Callable[[str, float], None]
 
@@ -41,14 +40,16 @@ def hear(fit: JointFit, problem: Problem, drive_unit: str, seed: int, progress: 
     found = train(problem, settings, Supervision(progress))
     if not found.accepted:
         return _silent(f"it did not arrive: {found.note}", found.seconds)
-    apart = _coordinates_apart(fit, found) | {
-        f"{p.effect}.{p.quantity.symbol}": p.apart for p in _parameters(fit, found) if np.isfinite(p.apart)
-    }
+    parameters = list(_parameters(fit, found))
+    sizes = {f"{p.effect}.{p.quantity.symbol}": p.apart for p in parameters if np.isfinite(p.apart)}
+    law = agreement_with(found, fit.problem, fit.minimum, fit.covariance)
+    together = Agreement(law.deviations | sizes)
+    if not together.deviations:
+        return _silent("these strokes fix no value that both could know", found.seconds)
     effects: dict[str, dict[str, EffectValue]] = {}
-    for p in _parameters(fit, found):
+    for p in parameters:
         effects.setdefault(p.effect, {})[p.quantity.symbol] = p.document(drive_unit)
-    agrees = max(apart.values()) <= AGREE
-    return Witness(agrees=agrees, effects=effects, seconds=found.seconds, said=_said(apart))
+    return Witness(agrees=together.agrees, effects=effects, seconds=found.seconds, said=_said(together))
 
 
 def _silent(why: str, seconds: float = 0.0) -> Witness:
@@ -81,19 +82,11 @@ def _parameters(fit: JointFit, found: PinnResult) -> Iterator[_Parameter]:
             yield _Parameter(name, q, value, deviation, abs(value - fit.values[name][q.symbol]) / spread)
 
 
-def _coordinates_apart(fit: JointFit, found: PinnResult) -> dict[str, float]:
-    """How far the coordinates that both know lie apart, in deviations."""
-    spread = coordinate_covariance(fit.problem, fit.minimum, fit.covariance)
-    known = {name for name, inside in zip(Coordinates._fields, fit.covariance.inside, strict=False) if inside}
-    own = np.sqrt(np.maximum(np.diag(spread), 0.0))
-    return compare(found.coordinates, found.deviations, fit.coordinates, own, known).deviations
-
-
-def _said(apart: dict[str, float]) -> str:
-    worst = max(apart, key=apart.__getitem__)
+def _said(together: Agreement) -> str:
+    apart, worst = together.deviations, together.worst
     who = "A network with the same effects in its residual, which simulates nothing,"
     words = f"most in {worst}, by {apart[worst]:.2g} deviations"
-    if apart[worst] <= AGREE:
+    if together.agrees:
         return f"{who} agrees; they differ {words}."
     beyond = ", ".join(name for name, value in apart.items() if value > AGREE)
     return f"{who} finds other values of {beyond} ({words}): trust neither interval there."

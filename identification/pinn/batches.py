@@ -16,11 +16,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from identification.arrays import Array
 from identification.force_channel import LowPass
+from identification.piece import Piece
 from identification.pinn.inputs import Inputs
 from identification.pinn.mesh import Element, Indices, LocalNetwork, Mesh, Span
 from identification.pinn.quadrature import gauss_points, slopes_by_parts
 from identification.pinn.settings import Residual
-from identification.problem import Piece, Problem
+from identification.problem import Problem
 
 _ALIKE = 1.35
 """[1] ratio of sample counts up to which elements share a batch."""

@@ -6,18 +6,18 @@ state of the law enters, and nothing is simulated. Where the damper's own motion
 past, in a mounting with give or play, it would be a third state of the network: such effects it does not take.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.damper.effects import Action, Form
-from identification.effect_choice import EffectChoice
 from identification.pinn.batches import Batch, Learned
 from identification.pinn.inputs import Field
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COMMON_COUNT, COORDINATE_COUNT, Problem
 from identification.simulate import ActiveEffect, Setting, Stroke
 from identification.simulate.channel import beside, beside_slopes, recorded
 from identification.simulate.inputs import damper_field
@@ -26,7 +26,6 @@ from identification.simulate.scaling import factors
 
 _BEYOND: tuple[Action, ...] = ("displacement_follower", "connection", "force_lag")
 """Play and give, and a lag that would have to pass the network's force, too."""
-_COMMON = COORDINATE_COUNT + 2
 _FACTORS = ("F_factor", "c0_factor", "c1_factor")
 
 Rows = dict[str, Array]
@@ -70,8 +69,10 @@ class Acting:
 
     def __init__(self, problem: Problem, sources: Sequence[Learned], unknowns: Array) -> None:
         coordinates = problem.space.to_coordinates(unknowns[:COORDINATE_COUNT])
-        effects = active(problem, unknowns)
-        force, drive = (float(d) for d in unknowns[COORDINATE_COUNT:_COMMON] * problem.delay_prior)
+        effects = problem.active_effects(problem.whole(unknowns))
+        force, drive = problem.further_delays(unknowns)
+        self.lateness = lateness(effects)
+        """[s] by which the effects make the force later than the motion as it was recorded."""
         self._along = {
             s.number: _PieceTerms(
                 Setting(
@@ -98,30 +99,10 @@ class Acting:
         return self._along[source.number].samples
 
 
-def active(problem: Problem, unknowns: Array) -> tuple[ActiveEffect, ...]:
-    """The effects at the shared unknowns (C,)."""
-    return tuple(c.active(numbers) for c, numbers in _each(problem, unknowns))
-
-
 def effect_deviations(problem: Problem, unknowns: Array, covariance: Array) -> Array:
     """(P,) standard deviations [SI] of the effects' parameters, from a covariance (C, C)."""
-    if not problem.effects:
-        return np.empty(0)
-    own = np.diag(covariance)[_COMMON : _COMMON + problem.effect_count]
-    return np.sqrt(np.maximum(own, 0.0)) * over_search(problem, unknowns)
-
-
-def over_search(problem: Problem, unknowns: Array) -> Array:
-    """(P,) slopes of all parameters of the effects over their search numbers, at the shared unknowns (C,)."""
-    return np.concatenate([c.slopes(numbers) for c, numbers in _each(problem, unknowns)])
-
-
-def _each(problem: Problem, unknowns: Array) -> Iterator[tuple[EffectChoice, Array]]:
-    """The effects with their search numbers among the shared unknowns (C,)."""
-    at = _COMMON
-    for choice in problem.effects:
-        yield choice, unknowns[at : at + len(choice.quantities)]
-        at += len(choice.quantities)
+    own = np.diag(covariance)[COMMON_COUNT : COMMON_COUNT + problem.effect_count]
+    return np.sqrt(np.maximum(own, 0.0)) * problem.effect_slopes(problem.whole(unknowns))
 
 
 def lateness(effects: Sequence[ActiveEffect]) -> float:
@@ -138,7 +119,6 @@ class _PieceTerms:
         self._count = 1 + sum(len(e.values) for e in setting.effects)
         self._late = [1 + at for at, _, _ in setting.acting("time_shift")]
         self._early = [1 + at for at, _, _ in setting.acting("displacement_shift")]
-        self.samples, self._halves = self._along_samples(), self._along_halves()
 
     def at_samples(self, b: Batch) -> Driven:
         """Where the force was recorded; what is interpolated is nothing."""
@@ -161,7 +141,8 @@ class _PieceTerms:
         early = sum(values[0] for _, _, values in self._setting.acting("displacement_shift"))
         return b.source.inputs.field(b.time, self._setting.coordinates.eta, self._setting.drive_delay + early)
 
-    def _along_samples(self) -> Driven:
+    @cached_property
+    def samples(self) -> Driven:
         """Inputs as they were when each sample's force acted."""
         setting, stroke = self._setting, self._source.piece.stroke
         motion = damper_motion(setting, stroke)
@@ -192,20 +173,21 @@ class _PieceTerms:
         force = recorded(setting, stroke, motion, beside(setting, motion, h), J.T, 1, [0, *self._late])
         return force, J
 
-    def _along_halves(self) -> Driven:
+    @cached_property
+    def _halves(self) -> Driven:
         """Inputs on the displacement channel's own time, at the samples and half way between them."""
         stroke = self._source.piece.stroke
         setting = replace(self._setting, force_delay=-lateness(self._setting.effects))
         motion, field = damper_motion(setting, stroke), damper_field(setting, stroke)
         scales = factors(setting, stroke, motion)
-        u, over_u = _halves(field.u, field.middle), _halves(field.du, field.dmiddle)
+        u, over_u = _interleaved(field.u, field.middle), _interleaved(field.du, field.dmiddle)
         over = {"u": self._placed(tuple(1 + at for at in field.columns), over_u[2:-1])}
         over["u"][self._early] = over_u[1]
         values = {}
         if scales.at.shape[1]:
-            values = dict(zip(_FACTORS, _halves(scales.at, scales.middle), strict=True))
+            values = dict(zip(_FACTORS, _interleaved(scales.at, scales.middle), strict=True))
             columns = [1 + at for at in (*motion.columns, *scales.columns)]
-            rows = self._placed(columns, _halves(scales.over, scales.over_middle)[1:].swapaxes(0, 1))
+            rows = self._placed(columns, _interleaved(scales.over, scales.over_middle)[1:].swapaxes(0, 1))
             # The motion of this time does not move with a shift of the channel.
             rows[:, self._early] = 0.0
             over |= dict(zip(_FACTORS, rows, strict=True))
@@ -236,7 +218,7 @@ class _PieceTerms:
         return table
 
 
-def _halves(at: Array, middle: Array) -> Array:
+def _interleaved(at: Array, middle: Array) -> Array:
     """Values (..., N) at the samples and (..., N - 1) half way between them, together (..., 2N - 1)."""
     found = np.empty((*at.shape[:-1], 2 * at.shape[-1] - 1))
     found[..., ::2], found[..., 1::2] = at, middle

@@ -118,7 +118,7 @@ def factorise(
 
 
 def _eliminated(row: Rows, rank: int) -> Array:
-    """(K, C, C) triangle over inner heads, nodes, shared unknowns and right-hand side of each element."""
+    """(K, W, W) triangles of the elements; columns: inner heads, nodes, shared unknowns, right-hand side."""
     if row.slopes is None:
         raise AssertionError("rows without slopes cannot be factorised")
     elements, count, columns = row.slopes.shape

@@ -28,7 +28,7 @@ from identification.pinn.reconstruct import recorded_force
 from identification.pinn.result import Moment, Outcome
 from identification.pinn.settings import GlobalSettings
 from identification.pinn.supervision import Stopped, Supervision
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COMMON_COUNT, COORDINATE_COUNT, Problem
 
 _PRETRAINING, _REFRESH = 25, 6
 """Steps on the first states; steps between two refreshments of inputs and batch."""
@@ -193,12 +193,12 @@ class GlobalTraining:
 
     def _outcome(self, number: int, spread: Array, said: str) -> Outcome:
         damper, found = self.dampers[number], self.history[number][-1]
-        unknowns = np.concatenate([damper.q, np.zeros(2)])
+        unknowns = np.concatenate([damper.q, np.zeros(COMMON_COUNT - COORDINATE_COUNT)])
         velocity = partial(self.inner_velocity, number)
         forces = tuple(
             recorded_force(p, i, velocity, unknowns, damper.problem) for i, p in enumerate(damper.pieces)
         )
-        covariance = np.zeros((COORDINATE_COUNT + 2,) * 2)  # the delays are not fitted
+        covariance = np.zeros((COMMON_COUNT, COMMON_COUNT))  # the delays are not fitted
         covariance[:COORDINATE_COUNT, :COORDINATE_COUNT] = spread
         ratio = found.force / damper.problem.noise
         accepted = not said and ratio <= _REACHED

@@ -11,7 +11,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.signal import lfilter
 
 from identification.arrays import Array
-from identification.problem import Piece
+from identification.piece import Piece
 
 _STEP = 0.02
 """[1] of the drive's range: a larger change between two samples is a step."""

@@ -9,9 +9,10 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.damper.coordinates import Coordinates
 from identification.force_channel import filter_lag
+from identification.piece import Piece
 from identification.pinn.batches import Learned, learned, make_batches
 from identification.pinn.beginning import FirstStates, Start
-from identification.pinn.effect_terms import Acting, active, lateness
+from identification.pinn.effect_terms import Acting, lateness
 from identification.pinn.elimination import Factorised, NodePrior, factorise
 from identification.pinn.hidden_layer import HiddenLayer
 from identification.pinn.local_rows import LocalLoss, Rows, Weights
@@ -20,10 +21,8 @@ from identification.pinn.quadrature import gauss_points
 from identification.pinn.result import Moment
 from identification.pinn.settings import Level, LocalSettings
 from identification.pinn.supervision import Supervision
-from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.problem import COMMON_COUNT, COORDINATE_COUNT, Problem
 
-_EFFECTS = COORDINATE_COUNT + 2
-"""First of the effects' unknowns."""
 _LARGEST_STEP = 0.7
 """[1] largest change of a search number in one step."""
 _SHORTER, _TRIES = 0.4, 8
@@ -194,8 +193,8 @@ class LocalTraining:
         first = number == 0 and again == 0
         held = [name in level.held or (name == "eta" and first) for name in Coordinates._fields]
         free[:COORDINATE_COUNT] &= ~np.array(held)
-        free[COORDINATE_COUNT:_EFFECTS] &= number > 0
-        free[_EFFECTS:] &= not first
+        free[COORDINATE_COUNT:COMMON_COUNT] &= number > 0
+        free[COMMON_COUNT:] &= not first
         return free
 
     def _descend(
@@ -260,13 +259,11 @@ class LocalTraining:
 
     def _length(self, step: Array) -> float:
         """Of a step of the shared unknowns (C,), in units of a search number."""
-        whole = np.zeros(self.problem.first_own + self.problem.own_count)
-        whole[self.problem.shared] = step
-        return self.problem.step_length(whole)
+        return self.problem.step_length(self.problem.whole(step))
 
     def _loss(self, problem: Problem, pieces: Sequence[Learned]) -> LocalLoss:
-        delay = float(self.unknowns[COORDINATE_COUNT]) * problem.delay_prior
-        delay += lateness(active(problem, self.unknowns))
+        delay, _ = problem.further_delays(self.unknowns)
+        delay += lateness(problem.active_effects(problem.whole(self.unknowns)))
         batches = make_batches(pieces, self.network, delay, self.size.points, self.settings.residual)
         return LocalLoss(problem, batches, delay)
 
@@ -289,7 +286,7 @@ class LocalTraining:
         layer: HiddenLayer, states: Callable[[int, Array], States],
     ) -> LocalNetwork:  # fmt: skip
         c = self.problem.space.to_coordinates(self.unknowns[:COORDINATE_COUNT])
-        late = float(self.unknowns[COORDINATE_COUNT + 1]) * self.problem.delay_prior
+        _, late = self.problem.further_delays(self.unknowns)
         mesh = make_mesh(
             [p.inputs for p in pieces], [p.span for p in pieces], slips, c.D_y, c.eta,
             [p.piece.drive_delay + late for p in pieces], stretched=self.settings.features != "time",

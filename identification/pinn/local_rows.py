@@ -15,15 +15,15 @@ from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.pinn import law_rows
 from identification.pinn.batches import Batch
-from identification.pinn.effect_terms import Acting, Driven, active, lateness, over_search
+from identification.pinn.effect_terms import Acting, Driven
 from identification.pinn.mesh import Y_UNIT, Heads
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COMMON_COUNT, COORDINATE_COUNT, Problem
 
 Z_SCALE, BALANCE_SCALE = 0.7, 10.0
 """[1] a hysteresis residual of this part of the slip velocity at breakthrough, and a balance residual of ten times
 the force noise, weigh as much as one deviation of a sample."""
 _ETA = Coordinates._fields.index("eta")
-_FORCE_DELAY, _DRIVE_DELAY, _EFFECTS = COORDINATE_COUNT, COORDINATE_COUNT + 1, COORDINATE_COUNT + 2
+_FORCE_DELAY, _DRIVE_DELAY = COORDINATE_COUNT, COORDINATE_COUNT + 1
 
 
 class Weights(NamedTuple):
@@ -123,21 +123,19 @@ class LocalLoss:
 
     def _of_log(self, point: _Point, unknowns: Array, piece: int) -> _Point:
         condition = self.problem.condition(unknowns, piece)
-        over_search = condition.chained(point.over_search.T).T
-        own = self.problem.own_slopes(unknowns, piece)
+        common = np.hstack([point.over_search, self.problem.own_slopes(unknowns, piece)])
         return point._replace(
-            coordinates=condition.of(point.coordinates), over_search=np.hstack([over_search, own])
+            coordinates=condition.of(point.coordinates), over_search=condition.chained(common.T).T
         )
 
     def _point(self, unknowns: Array) -> _Point:
         q, space = unknowns[:COORDINATE_COUNT], self.problem.space
-        late, drive_delay = (float(d) for d in unknowns[COORDINATE_COUNT:_EFFECTS] * self.problem.delay_prior)
-        over_values, acting = np.empty(0), None
+        late, drive_delay = self.problem.further_delays(unknowns)
+        over_values, acting = self.problem.effect_slopes(self.problem.whole(unknowns)), None
         if self.problem.effects:
             sources = {b.source.number: b.source for b in self.batches}
             acting = Acting(self.problem, list(sources.values()), unknowns)
-            late += lateness(active(self.problem, unknowns))
-            over_values = over_search(self.problem, unknowns)
+            late += acting.lateness
         return _Point(
             space.to_coordinates(q), space.slopes(q), late - self.made_with, drive_delay, over_values, acting
         )
@@ -206,8 +204,8 @@ class LocalLoss:
         if point.acting:
             over |= law_rows.force_slopes_over_inputs(values)
         # A force that comes late shows an older motion and an older field.
-        driven.over["y_rate"] = -driven.later[:, None, None] * change
-        return _Part(law_rows.force(values), over, driven)
+        late = {"y_rate": -driven.later[:, None, None] * change}
+        return _Part(law_rows.force(values), over, driven._replace(over=driven.over | late))
 
     def _slopes(
         self, b: Batch, point: _Point, parts: tuple[_Part, _Part, _Part], scales: tuple[Array, Array, Array]
@@ -235,7 +233,7 @@ class LocalLoss:
     def _shared(self, over: dict[str, Array], driven: Driven, point: _Point) -> Array:
         """(K, M, C) slopes over the unknowns that all elements share."""
         table = np.zeros((*driven.field.u.shape, len(self.problem.shared)))
-        coordinates = np.zeros((*driven.field.u.shape, COORDINATE_COUNT))
+        coordinates = table[..., :COORDINATE_COUNT]
         for i, name in enumerate(Coordinates._fields):
             if name in over:
                 coordinates[..., i] = over[name]
@@ -246,10 +244,10 @@ class LocalLoss:
             late, *own = driven.over[name]
             table[..., _FORCE_DELAY] += self.problem.delay_prior * over[name] * late
             for k, row in enumerate(own):
-                table[..., _EFFECTS + k] += over[name] * row * point.over_values[k]
+                table[..., COMMON_COUNT + k] += over[name] * row * point.over_values[k]
         searched = coordinates @ point.over_search
-        table[..., :COORDINATE_COUNT] = searched[..., :COORDINATE_COUNT]
-        table[..., _EFFECTS + len(point.over_values) :] = searched[..., COORDINATE_COUNT:]
+        coordinates[...] = searched[..., :COORDINATE_COUNT]
+        table[..., COMMON_COUNT + len(point.over_values) :] = searched[..., COORDINATE_COUNT:]
         return table
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.motion_noise import with_motion
+from identification.piece import Piece
 from identification.pinn.batches import learned
 from identification.pinn.beginning import starts
 from identification.pinn.local import LocalTraining, Trained
@@ -18,7 +19,7 @@ from identification.pinn.reconstruct import recorded_force
 from identification.pinn.result import Outcome
 from identification.pinn.settings import LocalSettings
 from identification.pinn.supervision import Stopped, Supervision
-from identification.problem import Piece, Problem
+from identification.problem import Problem
 from identification.recordings import Stretch
 
 _REACHED = 1.015

@@ -9,7 +9,7 @@ from identification.damper import law
 from identification.damper.coordinates import Coordinates
 from identification.pinn import law_rows
 from identification.pinn.batches import Learned
-from identification.pinn.effect_terms import Acting, active, lateness
+from identification.pinn.effect_terms import Acting, lateness
 from identification.problem import COORDINATE_COUNT, Problem
 
 
@@ -27,9 +27,9 @@ def recorded_force(
     """
     shared = problem.space.to_coordinates(unknowns[:COORDINATE_COUNT])
     c = problem.condition(unknowns, number).of(shared)
-    force_delay, drive_delay = (float(d) for d in unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2])
+    force_delay, drive_delay = problem.further_delays(unknowns)
     piece, h = source.piece, source.inputs.h
-    late = piece.force_delay + force_delay * problem.delay_prior + lateness(active(problem, unknowns))
+    late = piece.force_delay + force_delay + lateness(problem.active_effects(problem.whole(unknowns)))
     time = np.arange((len(piece.force) - 1) * source.finer + 1) * h / source.finer - late
     inside = np.clip(time, source.span.start, source.span.end)
     y_rate, passed = inner_velocity(number, inside), piece.low_pass.apply if piece.low_pass else _as_it_is
@@ -37,7 +37,7 @@ def recorded_force(
         recorded = _with_effects(source, passed(y_rate), c, Acting(problem, [source], unknowns))
     else:
         x, _ = source.inputs.motion(inside)
-        u = source.inputs.field(inside, c.eta, piece.drive_delay + drive_delay * problem.delay_prior).u
+        u = source.inputs.field(inside, c.eta, piece.drive_delay + drive_delay).u
         recorded = passed(law.force(y_rate, x, law.at_field(c.c1_a, c.c1_b, u), c.k1, 0.0) - c.f0)
     known = (time >= source.span.start - h) & (time <= source.span.end + h)
     return np.where(known[:: source.finer], recorded, np.nan)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.problem import Piece
+from identification.piece import Piece
 
 _BLOCKS = 50
 """Blocks of a piece, if they are not shorter than ``_SHORTEST``."""

@@ -8,14 +8,15 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.coordinates import Coordinates
 from identification.errors import IdentificationError
-from identification.pinn.effect_terms import active, effect_deviations, takes
+from identification.piece import Piece
+from identification.pinn.effect_terms import effect_deviations, takes
 from identification.pinn.local_runs import train_local
 from identification.pinn.result import Errors, Outcome, PinnResult
 from identification.pinn.settings import GlobalSettings, LocalSettings, PaperSettings
 from identification.pinn.split import validation_masks
 from identification.pinn.supervision import Supervision
 from identification.prediction import predict_piece, rmse
-from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.problem import COORDINATE_COUNT, Problem
 from identification.recordings import Stretch
 from identification.simulate import ActiveEffect
 from identification.threads import one_thread
@@ -175,8 +176,8 @@ def _resolved(
     problem: Problem, outcome: Outcome
 ) -> tuple[Coordinates, tuple[float, float], tuple[ActiveEffect, ...]]:
     point = problem.space.to_coordinates(outcome.unknowns[:COORDINATE_COUNT])
-    force, drive = outcome.unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] * problem.delay_prior
-    return point, (float(force), float(drive)), active(problem, outcome.unknowns)
+    whole = problem.whole(outcome.unknowns)
+    return point, problem.further_delays(whole), problem.active_effects(whole)
 
 
 def _errors(

@@ -8,7 +8,7 @@ grows with the square of the offset over the number of samples.
 import numpy as np
 
 from identification.pinn.result import PinnResult
-from identification.problem import COORDINATE_COUNT, Problem
+from identification.problem import COMMON_COUNT, COORDINATE_COUNT, Problem
 
 _FARTHEST = 100.0
 """[1] deviations beyond which it no longer matters how many: the step says little there."""
@@ -17,7 +17,7 @@ _FARTHEST = 100.0
 def offset(problem: Problem, found: PinnResult) -> float:
     """[1] root mean square of that step's coordinates, each in its standard deviation."""
     unknowns = problem.start(found.coordinates)
-    unknowns[COORDINATE_COUNT : COORDINATE_COUNT + 2] = np.array(found.delays) / problem.delay_prior
+    unknowns[COORDINATE_COUNT:COMMON_COUNT] = np.array(found.delays) / problem.delay_prior
     there = problem.evaluate(unknowns)
     if not np.isfinite(there.cost):
         return _FARTHEST

@@ -7,8 +7,9 @@ import pytest
 
 from identification.damper.coordinates import Coordinates, to_coordinates
 from identification.damper.parameter_sets import parameter_set
+from identification.piece import Piece
 from identification.prediction import predict_piece, rmse
-from identification.problem import COORDINATE_COUNT, Piece, Problem
+from identification.problem import COORDINATE_COUNT, Problem
 from identification.refine import Settings, descend, refine
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, Stroke, simulate

@@ -15,8 +15,9 @@ from identification.force_channel import LowPass, filter_lag
 from identification.identify import Request, identify
 from identification.motion import recorded_noise
 from identification.motion_noise import play_noise, with_motion, without_pull
+from identification.piece import Piece
 from identification.predict import predict_log
-from identification.problem import Piece, Problem
+from identification.problem import Problem
 from identification.recordings import ChannelFilter, Recording, Segment, Stretch
 from identification.refine import refine
 from identification.results import Fit

@@ -12,7 +12,8 @@ from identification.effect_choice import EffectChoice
 from identification.gap.explain import Effort, fit_with
 from identification.gap.screen import every_choice, screen
 from identification.identify import fit_problem
-from identification.problem import Piece, Problem
+from identification.piece import Piece
+from identification.problem import Problem
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, Stroke, simulate
 

@@ -12,7 +12,7 @@ from identification.gap.diagnose import diagnosed_problem
 from identification.gap.judge import Judge
 from identification.gap.residual import cut_cycles
 from identification.gap.stumbles import cycle_to_cycle, left_out
-from identification.problem import Piece
+from identification.piece import Piece
 from identification.recordings import Segment
 from identification.simulate import Stroke
 from identification.start import starting_points

@@ -7,13 +7,14 @@ import numpy as np
 from identification.damper.coordinates import to_coordinates
 from identification.damper.parameter_sets import parameter_set
 from identification.force_channel import LowPass
+from identification.piece import Piece
 from identification.pinn.batches import learned, make_batches
 from identification.pinn.beginning import FirstStates
 from identification.pinn.hidden_layer import HiddenLayer
 from identification.pinn.local_rows import LocalLoss
 from identification.pinn.mesh import Heads, LocalNetwork, make_mesh
 from identification.pinn.quadrature import gauss_points
-from identification.problem import Piece, Problem
+from identification.problem import Problem
 from identification.recordings import ChannelFilter
 from identification.search_space import SearchSpace
 from identification.simulate import Setting, Stroke

@@ -41,11 +41,11 @@ class Effects:
         """Sum of what those give that are a single number: a delay [s], a lag [s], a give [m/N]."""
         return float(sum(form.act(*values) for form, values in self.that(acts)))
 
-    def connection(self) -> tuple[float, float, float, float]:
-        """Give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper."""
+    def connection(self) -> tuple[float, float, float, float, float]:
+        """What carries the damper, as ``Form`` says of "connection"."""
         parts = [form.act(*values) for form, values in self.that("connection")]
-        give, gap, hardening, film = (float(sum(part[k] for part in parts)) for k in range(4))
-        return give, gap, hardening, film
+        give, gap, hardening, film, inside = (float(sum(part[k] for part in parts)) for k in range(5))
+        return give, gap, hardening, film, inside
 
     def coil(self) -> tuple[float, float, float, float]:
         """From output to field: dead time [s], second lag [s], part behind it [1], such lags in a row [1]."""

@@ -63,7 +63,7 @@ def of_the_plant(scenario: Scenario, law: Array, effects: Effects) -> Array:
     k[at.EVER_PRESENT] += k[at.SECOND_LAG] + k[at.EXCHANGE]
     k[at.EVER_PRESENT] += _SWIFT * k[at.BRISTLES]
     k[at.PLAY] = bool(effects.that("displacement_follower"))
-    k[[at.GIVE, at.GAP, at.HARDENING, at.FILM]] = effects.connection()
+    k[[at.GIVE, at.GAP, at.HARDENING, at.FILM, at.INSIDE]] = effects.connection()
     k[at.MASS] = sum(form.act(1.0, *values) for form, values in effects.that("inertia"))
     k[at.COOLING] = effects.cooling()
     k[at.MEMORY] = bool(effects.that("field_memory"))

@@ -66,7 +66,7 @@ def _stiffness(s: Array, slip: float, drive: float, k: Array, p: Array) -> float
     moving = s[OUTPUT] != drive
     if k[GIVE] > 0.0:
         c0, c1 = abs(at_field(p[6], p[7], s[FIELD])), abs(at_field(p[8], p[9], s[FIELD]))
-        stiff = steepness(s[POSITION] - s[BEHIND], k[GIVE], 0.0, k[HARDENING])
+        stiff = steepness(s[POSITION] - s[BEHIND], k[GIVE], 0.0, k[HARDENING], 0.0)
         inner += (tangent + stiff) / c0 + stiff / c1
     return float(hysteresis + inner + servo + k[EVER_PRESENT] + (k[AMPLIFIER] if moving else 0.0))
 

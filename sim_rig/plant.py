@@ -133,7 +133,7 @@ class Plant:
         if not math.isfinite(place):
             raise PlantError(f"the specimen has no finite force at rest at {displacement:.4g} m")
         states = np.zeros(at.STATES)
-        carrying = self._constants[[at.GIVE, at.GAP, at.HARDENING]]
+        carrying = self._constants[[at.GIVE, at.GAP, at.HARDENING, at.INSIDE]]
         behind = place - stretched(load, *carrying) if carrying[0] > 0.0 else place
         states[[at.COMMAND, at.POSITION, at.Y]] = displacement, place, behind
         states[[at.BEHIND, at.FOLLOWED]] = behind

@@ -31,6 +31,7 @@ from sim_rig.states import (
     HARDENING,
     HEAT_CAPACITY,
     HEAT_LOSS,
+    INSIDE,
     LAG,
     LAGGED,
     LAYERS,
@@ -192,7 +193,7 @@ def rates(
     x, v = _damper_motion(s[POSITION], s[SPEED], held, k[PLAY], follow)
     u = seen(s[FIELD], remembered)
     if k[GIVE] > 0.0:
-        load = carried(x - s[BEHIND], k[GIVE], k[GAP], k[HARDENING])
+        load = carried(x - s[BEHIND], k[GIVE], k[GAP], k[HARDENING], k[INSIDE])
         x, load, film = s[BEHIND], load + k[FILM] * v, k[FILM]
         v = _balanced_velocity(s, load, film, v, u, p, parallel, scales)
         force, y_rate = _damper_force(s, x, v, u, p, parallel, scales)

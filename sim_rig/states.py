@@ -10,7 +10,7 @@ displacement at which the gas had the temperature of its wall [m]."""
     FOLLOWED,
 ) = range(STATES)
 
-CONSTANTS = 25
+CONSTANTS = 26
 """Rates and weights of everything but the law, in the order of the names below."""
 (
     LAG,  # [1/s] rate of the command's lag
@@ -35,6 +35,7 @@ CONSTANTS = 25
     GAP,  # [m] of the connection between load cell and damper
     HARDENING,  # [1/m²] of the same
     FILM,  # [N s/m] in that gap
+    INSIDE,  # [1] stiffness in that gap over that outside
     BRISTLES,  # [1/m] rate over the way with which a seal's lip bends, 0 without one
     LAYERS,  # second lags in a row, one or two
     EXCHANGE,  # [1/s] rate with which gas takes the temperature of its wall, 0 without

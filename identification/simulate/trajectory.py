@@ -25,6 +25,8 @@ from identification.simulate.step import STRUCTURAL
 FINENESS = 0.1
 """[1] travel of zeta above which a sample takes more steps: 4e-5 of the force's deviation at most."""
 
+_CARRYING = yielding.FIXED - STRUCTURAL - 2
+"""Numbers of a connection."""
 _STRUCTURAL_COLUMNS = [0, 1, 2, 3, 4, 6, 7, 8, 9, 10]
 """Of the ten structural coordinates among ``UNKNOWNS``; the others stand in the next line."""
 _ETA, _K1, _F0, _Y0, _FORCE_DELAY, _DRIVE_DELAY = 5, 11, 12, 13, 14, 15
@@ -66,10 +68,10 @@ def simulate(
 
 
 def connection_of(setting: Setting) -> Array:
-    """(4,) give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper; zero where rigid."""
+    """(5,) what carries the damper, as ``Form`` says of "connection"; zero where rigid."""
     # Without any the sum over no rows is zero, which is rigid.
     parts = [form.act(*values) for _, form, values in setting.acting("connection")]
-    return np.asarray(np.sum(np.array(parts, float).reshape(-1, 4), axis=0))
+    return np.asarray(np.sum(np.array(parts, float).reshape(-1, _CARRYING), axis=0))
 
 
 class _Chain:
@@ -131,7 +133,7 @@ class _Chain:
     def yielding(
         self, plan: Plan, carrying: Array, fineness: float, slopes: bool
     ) -> tuple[Trajectory, Array | None]:
-        """Trajectory and slopes (N, U) behind a connection: its give, gap, hardening and film (4,)."""
+        """Trajectory and slopes (N, U) behind a connection (5,)."""
         c, h = self._setting.coordinates, self._h
         g = yielding.inputs_of(self._motion, self._field, self._scales, self._beside, h)
         fixed = np.array([*self._s, c.k1, c.f0, *carrying])
@@ -147,9 +149,9 @@ class _Chain:
         J[:, [_K1, _F0]] = partial[:, STRUCTURAL : STRUCTURAL + 2]
         for at, form, values in self._setting.acting("connection"):
             for k, row in enumerate(over_parameters(form.act, values, form.parameters)):
-                J[:, len(UNKNOWNS) + at + k] += partial[:, STRUCTURAL + 2 : STRUCTURAL + 6] @ row
-        J[:, _Y0] = partial[:, STRUCTURAL + 6]
+                J[:, len(UNKNOWNS) + at + k] += partial[:, STRUCTURAL + 2 : yielding.FIXED] @ row
+        J[:, _Y0] = partial[:, yielding.FIXED]
         columns = [*self._columns, *(len(UNKNOWNS) + at for at, _ in own)]
-        J[:, columns] = partial[:, STRUCTURAL + 7 :]
+        J[:, columns] = partial[:, yielding.FIXED + 1 :]
         self._add_shifts(J)
         return Trajectory(force, y, zeta, self._field.u, plan), J

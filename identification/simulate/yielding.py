@@ -9,8 +9,9 @@ so that each implicit stage of a linear spring is linear in y and X and leaves o
 rigid fixture; one with a gap, or one that hardens, is taken straight about where it stands until it stands there.
 The force on the cell is what the connection carries. Forces beside the law are taken at the actuator's motion.
 
-``p`` below holds 16 fixed numbers: the ten structural coordinates, k1, f0, and give, gap, hardening and film of
-the connection; ``g`` the seven inputs at one instant: x, u, factors of alpha, c0, c1, force beside the law, x'.
+``p`` below holds 17 fixed numbers: the ten structural coordinates, k1, f0, and give, gap, hardening, film and
+stiffness in the gap of the connection; ``g`` the seven inputs at one instant: x, u, factors of alpha, c0, c1,
+force beside the law, x'.
 """
 
 import numpy as np
@@ -37,8 +38,8 @@ from identification.simulate.step import (
     through_middle,
 )
 
-FIXED, INPUTS = 16, 7
-K1, F0, GIVE, GAP, HARDENING, FILM = 10, 11, 12, 13, 14, 15
+FIXED, INPUTS = 17, 7
+K1, F0, GIVE, GAP, HARDENING, FILM, INSIDE = 10, 11, 12, 13, 14, 15, 16
 _MOST_MOVES = 12
 """Times that a connection is taken straight anew in one stage."""
 _NEAR = 1e-8
@@ -112,7 +113,7 @@ def _rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple[float, 
 @compiled
 def left_over(p: Array, g: Array, X: float, held: float, c0: float, c1: float) -> float:
     """The force R that is left for the dashpot c1; ``held`` is what hysteresis and k0 hold of it."""
-    spring = carried(g[0] - X, p[GIVE], p[GAP], p[HARDENING]) - p[K1] * X + p[F0] - g[5]
+    spring = carried(g[0] - X, p[GIVE], p[GAP], p[HARDENING], p[INSIDE]) - p[K1] * X + p[F0] - g[5]
     film = p[FILM]
     return float((spring + film * (g[6] + held / c0)) / (1.0 + film * (1.0 / c0 + 1.0 / c1)))
 
@@ -122,17 +123,18 @@ def solve_stage(
     p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, X: float
 ) -> tuple[float, float, float]:
     """State at the end of a stage: state = known + w * rates(state), by Newton from ``zeta`` and ``X``."""
-    give, gap, hardening = p[GIVE], p[GAP], p[HARDENING]
+    give, gap, hardening, inside = p[GIVE], p[GAP], p[HARDENING], p[INSIDE]
     stretch, y = g[0] - X, yk
     for _ in range(_MOST_MOVES):
-        force, steep = carried(stretch, give, gap, hardening), steepness_of(stretch, give, gap, hardening)
+        force = carried(stretch, give, gap, hardening, inside)
+        steep = steepness_of(stretch, give, gap, hardening, inside)
         y, zeta, X = _solve_straight(p, g, yk, zk, Xk, w, zeta, force - steep * stretch, steep)
         # A linear spring is straight everywhere.
         if gap == 0.0 and hardening == 0.0:
             break
         moved = g[0] - X
         straight = force + steep * (moved - stretch)
-        if abs(carried(moved, give, gap, hardening) - straight) < _NEAR * (1.0 + abs(straight)):
+        if abs(carried(moved, give, gap, hardening, inside) - straight) < _NEAR * (1.0 + abs(straight)):
             break
         stretch = _next_stretch(stretch, moved, 0.5 * gap)
     return y, zeta, X
@@ -188,7 +190,7 @@ def start_of(p: Array, g: Array, y0: float, zeta0: float, v0: float) -> float:
     X = g[0]
     # k1 pulls where the damper stands: each round leaves k1 times the give of the error, a small part.
     for _ in range(_MOST_MOVES):
-        X = g[0] - _stretched(load + p[K1] * X, p[GIVE], p[GAP], p[HARDENING])
+        X = g[0] - _stretched(load + p[K1] * X, p[GIVE], p[GAP], p[HARDENING], p[INSIDE])
     return float(X)
 
 
@@ -199,7 +201,7 @@ def march(
     """States and force along a recording.
 
     Args:
-        p: (16,) fixed numbers.
+        p: (17,) fixed numbers.
         at, middle: (7, N) and (7, N-1) inputs.
         h: [s] time between samples.
         start: y [m], zeta [1] and velocity of the actuator [m/s] at the first sample.
@@ -257,4 +259,4 @@ def steps_of(
 @compiled
 def on_cell(p: Array, g: Array, X: float, X_rate: float) -> float:
     """What the connection carries [N]."""
-    return float(carried(g[0] - X, p[GIVE], p[GAP], p[HARDENING]) + p[FILM] * (g[6] - X_rate))
+    return float(carried(g[0] - X, p[GIVE], p[GAP], p[HARDENING], p[INSIDE]) + p[FILM] * (g[6] - X_rate))

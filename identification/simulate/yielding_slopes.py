@@ -21,6 +21,7 @@ from identification.simulate.yielding import (
     GIVE,
     HARDENING,
     INPUTS,
+    INSIDE,
     K1,
     backward,
     carried,
@@ -54,7 +55,7 @@ def march_with_slopes(
         over, over_middle: (E, 7, N) and (E, 7, N-1) derivatives of the inputs over further unknowns.
 
     Returns:
-        y [m], zeta [1], force [N], each (N,), and slopes (N, 16 + 1 + E): the fixed numbers, y0, the further ones.
+        y [m], zeta [1], force [N], each (N,), and slopes (N, 17 + 1 + E): the fixed numbers, y0, the further ones.
     """
     count, extra = at.shape[1], len(over)
     columns = FIXED + 1 + extra
@@ -98,31 +99,33 @@ def _record(
 ) -> None:
     """Write the slopes of the force at one sample into its row."""
     # The film feels the damper's velocity, which the state moves through the slopes of its rates.
-    steep, film = steepness_of(stretch, p[GIVE], p[GAP], p[HARDENING]), p[FILM]
+    steep, film = steepness_of(stretch, p[GIVE], p[GAP], p[HARDENING], p[INSIDE]), p[FILM]
     for j in range(len(row)):
         X_rate = J[2, 0] * S[0, j] + J[2, 1] * S[1, j] + J[2, 2] * S[2, j] + f[2, j]
         row[j] = -S[2, j] * steep - film * X_rate
     for e in range(len(over)):
         row[FIXED + 1 + e] += over[e, 0] * steep + film * over[e, 6]
     row[FILM] += stretching
-    over_give, over_gap, over_hardening = _over_connection(stretch, p)
+    over_give, over_gap, over_hardening, over_inside = _over_connection(stretch, p)
     row[GIVE] += over_give
     row[GAP] += over_gap
     row[HARDENING] += over_hardening
+    row[INSIDE] += over_inside
 
 
 @compiled
-def _over_connection(stretch: float, p: Array) -> tuple[float, float, float]:
-    """Slopes of what the connection carries over its give, gap and hardening."""
-    give, gap, hardening = p[GIVE], p[GAP], p[HARDENING]
+def _over_connection(stretch: float, p: Array) -> tuple[float, float, float, float]:
+    """Slopes of what the connection carries over its give, gap, hardening and stiffness in the gap."""
+    give, gap, hardening, inside = p[GIVE], p[GAP], p[HARDENING], p[INSIDE]
     half = 0.5 * gap
-    bent = stretch - min(max(stretch, -half), half)
-    over_give = -carried(stretch, give, gap, hardening) / give
+    free = min(max(stretch, -half), half)
+    bent = stretch - free
+    over_give = -carried(stretch, give, gap, hardening, inside) / give
     if bent == 0.0:
-        return over_give, 0.0, 0.0
+        return over_give, 0.0, 0.0, free / give
     side = 0.5 if bent > 0.0 else -0.5
-    over_gap = side * (connection.FILM / give - steepness_of(stretch, give, gap, hardening))
-    return over_give, over_gap, bent**3 / give
+    over_gap = side * ((connection.FILM + inside) / give - steepness_of(stretch, give, gap, hardening, inside))
+    return over_give, over_gap, bent**3 / give, free / give
 
 
 @compiled
@@ -146,15 +149,16 @@ def _backward_slopes(w: float, f: Array, S1: Array, S: Array) -> None:
 def _start_slopes(p: Array, g: Array, zeta0: float, v0: float, X: float, over: Array, S: Array) -> None:
     """Slopes of where the damper stands at first, written into S."""
     u = g[1]
-    give = 1.0 / steepness_of(g[0] - X, p[GIVE], p[GAP], p[HARDENING])
+    give = 1.0 / steepness_of(g[0] - X, p[GIVE], p[GAP], p[HARDENING], p[INSIDE])
     stiff = 1.0 + give * p[K1]
     S[2, 0], S[2, 1] = -give * g[2] * zeta0 / stiff, -give * u * g[2] * zeta0 / stiff
     S[2, 5], S[2, 6] = -give * g[3] * v0 / stiff, -give * u * g[3] * v0 / stiff
     S[2, K1], S[2, F0] = -give * X / stiff, give / stiff
-    over_give, over_gap, over_hardening = _over_connection(g[0] - X, p)
+    over_give, over_gap, over_hardening, over_inside = _over_connection(g[0] - X, p)
     S[2, GIVE] = give * over_give / stiff
     S[2, GAP] = give * over_gap / stiff
     S[2, HARDENING] = give * over_hardening / stiff
+    S[2, INSIDE] = give * over_inside / stiff
     for e in range(len(over)):
         d = over[e, :, 0]
         change = (g[2] * p[1] * zeta0 + g[3] * p[6] * v0) * d[1] + d[5]
@@ -179,7 +183,7 @@ def _slopes(
     """Rates of y, zeta and X; their slopes over the state into J (3, 3), over all else into f (3, columns)."""
     F, c0, c1 = law_at(p, g)
     k0 = p[9]
-    steep = steepness_of(g[0] - X, p[GIVE], p[GAP], p[HARDENING])
+    steep = steepness_of(g[0] - X, p[GIVE], p[GAP], p[HARDENING], p[INSIDE])
     held = F * zeta + k0 * (X - y)
     R = left_over(p, g, X, held, c0, c1)
     y_rate, slip = R / c1, (R - held) / c0
@@ -270,10 +274,11 @@ def _over_fixed(
     f[1, 9] = -(X - y) / c0
     f[0, K1], f[1, K1] = -X / c1, -X / c0
     f[0, F0], f[1, F0] = 1.0 / c1, 1.0 / c0
-    over_give, over_gap, over_hardening = _over_connection(g[0] - X, p)
+    over_give, over_gap, over_hardening, over_inside = _over_connection(g[0] - X, p)
     f[0, GIVE], f[1, GIVE] = over_give / c1, over_give / c0
     f[0, GAP], f[1, GAP] = over_gap / c1, over_gap / c0
     f[0, HARDENING], f[1, HARDENING] = over_hardening / c1, over_hardening / c0
+    f[0, INSIDE], f[1, INSIDE] = over_inside / c1, over_inside / c0
     stretching = g[6] - slip - y_rate
     f[0, FILM], f[1, FILM] = stretching / c1, stretching / c0
 

@@ -19,13 +19,13 @@ def follow(held: Any, x: Any, gap: Any) -> Any:
 
 
 def pin(gap: Any, softness: Any) -> Any:
-    """Give [m/N], gap [m], hardening [1/m²] and film [N s/m] of the connection."""
-    return softness * gap, gap, 0.0, 0.0
+    """What the connection is: see ``connection.carried``; nothing is carried in the gap."""
+    return softness * gap, gap, 0.0, 0.0, 0.0
 
 
 def greased(gap: Any, softness: Any, film: Any) -> Any:
     """The same with grease in the gap."""
-    return softness * gap, gap, 0.0, film
+    return softness * gap, gap, 0.0, film, 0.0
 
 
 CLEVIS_BACKLASH = Effect(

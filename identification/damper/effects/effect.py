@@ -49,8 +49,8 @@ Action = Literal[
 - ``relaxing_force``: displacement, velocity of the damper, displacement that follows it with the time constant
   ``exchange`` among the parameters [s] -> force beside the law [N].
 - ``displacement_follower``: where the damper stood, where the actuator is [m] -> where the damper stands [m].
-- ``connection``: () -> give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper; those of
-  several add up.
+- ``connection``: () -> give [m/N], gap [m], hardening [1/m²] and film [N s/m] of what carries the damper, and
+  stiffness inside the gap over that outside [1]; those of several add up.
 - ``inertia``: acceleration of the actuator [m/s^2] -> force between load cell and damper [N].
 - ``time_shift``: () -> time by which the force channel is late [s].
 - ``force_lag``: () -> time constant of a lag in the force channel [s].

@@ -1,8 +1,9 @@
 """A fixture that gives way: a spring between load cell and damper, in series with it.
 
 The damper stands behind by the stretch of the spring, and its force depends on where and how fast it moves: the
-two are solved together. A spring of screws and plates hardens as its gaps close. Give in front of the load cell is
-no effect: the displacement is measured behind it.
+two are solved together. A spring of screws and plates hardens as its gaps close, little by little or all at once:
+a joint that was tightened badly is soft until its faces touch. Give in front of the load cell is no effect: the
+displacement is measured behind it.
 """
 
 from typing import Any
@@ -12,13 +13,18 @@ from identification.damper.parameters import Quantity
 
 
 def linear(compliance: Any) -> Any:
-    """Give [m/N], gap [m], hardening [1/m²] and film [N s/m] of the connection."""
-    return compliance, 0.0, 0.0, 0.0
+    """Give [m/N], gap [m], hardening [1/m²], film [N s/m] and stiffness in the gap [1] of the connection."""
+    return compliance, 0.0, 0.0, 0.0, 0.0
 
 
 def hardening(compliance: Any, hardening: Any) -> Any:
     """The same of a spring that hardens."""
-    return compliance, 0.0, hardening, 0.0
+    return compliance, 0.0, hardening, 0.0, 0.0
+
+
+def closing(compliance: Any, touching: Any, ratio: Any) -> Any:
+    """The same of a joint that is soft until its faces touch."""
+    return compliance / ratio, 2.0 * touching, 0.0, 0.0, 1.0 / ratio
 
 
 FIXTURE_COMPLIANCE = Effect(
@@ -42,6 +48,17 @@ FIXTURE_COMPLIANCE = Effect(
             ),
             ((1e-7, 1e7), (4e-7, 1e7)),
             hardening,
+        ),
+        Form(
+            "closing",
+            "connection",
+            (
+                Quantity("compliance", "m/N", 0.0, 1e-4, 1e-6, "give of the fixture before its faces touch"),
+                Quantity("touching", "m", 1e-6, 1e-2, 1e-4, "stretch at which they touch"),
+                Quantity("ratio", "1", 1.0, 6.0, 1.0, "what the fixture is stiffer then"),
+            ),
+            ((1e-7, 5e-5, 2.0), (4e-7, 1e-4, 2.5)),
+            closing,
         ),
     ),
 )

@@ -1,4 +1,4 @@
-"""What stands between load cell and damper: a joint that closes is soft at first, stiffer then, and never jumps."""
+"""Between load cell and damper: a joint that closes is soft at first, then stiffer, and never jumps."""
 
 import numpy as np
 import pytest

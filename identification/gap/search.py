@@ -9,7 +9,7 @@ worth a full fit.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -234,12 +234,15 @@ class Search:
 
     def _try_always(self, parent: Contender, gains: Sequence[Gain]) -> None:
         """Fit a set with an effect whose promise says little, with its richer forms where the first has shown."""
+        simpler: dict[str, float] = {}
         for gain in gains:
             if parent.names and gain.choice.form.acts == "displacement_follower":
                 continue  # its contacts ask for a high rate, and a free pin shows beside others as well
             if self.late or self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
                 return
-            with_it = self.fit_beside(parent, gain, gain.choice.form.starts)
+            starts = [*_begun_with(simpler, gain.choice), *gain.choice.form.starts]
+            with_it = self.fit_beside(parent, gain, starts)
+            simpler = with_it.fit.values[gain.choice.name]
             if self.left_of(with_it) > _SHOWN * self.left_of(parent):
                 return
 
@@ -286,3 +289,12 @@ class Search:
             if known.fit.converged or self.late:
                 return
             self.fit(known.fit.effects, None, [known.fit.minimum.unknowns])
+
+
+def _begun_with(simpler: Mapping[str, float], choice: EffectChoice) -> list[tuple[float, ...]]:
+    """Starts of a richer form at what a simpler one has found of the parameters that both have."""
+    if not simpler:
+        return []
+    symbols = [q.symbol for q in choice.quantities]
+    starts = {tuple(simpler.get(s, v) for s, v in zip(symbols, at, strict=True)) for at in choice.form.starts}
+    return sorted(starts)

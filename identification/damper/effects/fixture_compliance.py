@@ -22,9 +22,9 @@ def hardening(compliance: Any, hardening: Any) -> Any:
     return compliance, 0.0, hardening, 0.0, 0.0
 
 
-def closing(compliance: Any, touching: Any, ratio: Any) -> Any:
+def closing(compliance: Any, load: Any, ratio: Any) -> Any:
     """The same of a joint that is soft until its faces touch."""
-    return compliance / ratio, 2.0 * touching, 0.0, 0.0, 1.0 / ratio
+    return compliance / ratio, 2.0 * compliance * load, 0.0, 0.0, 1.0 / ratio
 
 
 FIXTURE_COMPLIANCE = Effect(
@@ -54,10 +54,10 @@ FIXTURE_COMPLIANCE = Effect(
             "connection",
             (
                 Quantity("compliance", "m/N", 0.0, 1e-4, 1e-6, "give of the fixture before its faces touch"),
-                Quantity("touching", "m", 1e-6, 1e-2, 1e-4, "stretch at which they touch"),
+                Quantity("load", "N", 0.1, 1e5, 100.0, "load under which they touch"),
                 Quantity("ratio", "1", 1.0, 6.0, 1.0, "what the fixture is stiffer then"),
             ),
-            ((1e-7, 5e-5, 2.0), (4e-7, 1e-4, 2.5)),
+            ((5e-8, 100.0, 2.0), (4e-7, 100.0, 2.0), (4e-7, 500.0, 2.0)),
             closing,
         ),
     ),

@@ -40,7 +40,7 @@ MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
         "compressed_end": (2e4, 0.01, 1e-3),
     },
     "clevis_backlash": {"play": (2e-4,), "free_pin": (1e-4, 2e-4), "greased_pin": (2e-4, 1e-4, 5e3)},
-    "fixture_compliance": {"linear": (1e-6,), "stiffening": (1e-6, 3e6), "closing": (1e-6, 1e-4, 2.5)},
+    "fixture_compliance": {"linear": (1e-6,), "stiffening": (1e-6, 3e6), "closing": (1e-6, 100.0, 2.5)},
     "moving_mass": {"rigid": (4.0,)},
     "force_delay": {"pure_delay": (0.0021,)},
     "force_drift": {

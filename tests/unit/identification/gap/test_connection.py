@@ -6,13 +6,14 @@ import pytest
 from identification.damper.effects import EFFECTS
 from identification.damper.effects.connection import carried, steepness, stretched
 
-COMPLIANCE, TOUCHING, RATIO = 4e-7, 1e-4, 2.5
+COMPLIANCE, LOAD, RATIO = 4e-7, 250.0, 2.5
+TOUCHING = COMPLIANCE * LOAD
 CLOSING = EFFECTS["fixture_compliance"].form("closing")
 
 
 def joint():
     """Give, gap, hardening and stiffness in the gap of a joint that closes."""
-    give, gap, hardening, _, inside = CLOSING.act(COMPLIANCE, TOUCHING, RATIO)
+    give, gap, hardening, _, inside = CLOSING.act(COMPLIANCE, LOAD, RATIO)
     return give, gap, hardening, inside
 
 
@@ -36,7 +37,7 @@ def test_the_stretch_under_a_load_carries_that_load(force):
 
 
 def test_with_a_ratio_of_one_it_is_the_linear_spring():
-    give, gap, hardening, _, inside = CLOSING.act(COMPLIANCE, TOUCHING, 1.0)
+    give, gap, hardening, _, inside = CLOSING.act(COMPLIANCE, LOAD, 1.0)
     stretch = np.linspace(-3.0, 3.0, 13) * TOUCHING
     forces = [carried(s, give, gap, hardening, inside) for s in stretch]
     assert forces == pytest.approx(list(stretch / COMPLIANCE), rel=1e-3)

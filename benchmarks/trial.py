@@ -107,7 +107,7 @@ def page(whole: Trial, drawn: int, beside: Beside) -> str:
 
 def _bars(found: Scores, cases: Sequence[CaseAnswer], beside: Beside) -> Iterable[tuple[str, str, str]]:
     """What is asked of the diagnosis, what is wanted, and what was found."""
-    known = [case for case in cases if case.kind not in ("nothing", "unknown")]
+    known = [case for case in cases if case.kind not in ("nothing", "unknown") and not case.over_wires]
     later = scores([case for case in cases if case.id >= beside.anew]) if beside.anew else None
     for size, wanted in (("large", "97 %"), ("small", "85 %")):
         yield f"right set named first, {size}, rich methods", wanted, _said(found.named_first[f"{size} rich"])

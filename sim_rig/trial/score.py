@@ -20,8 +20,9 @@ NOTHING = "(nothing)"
 
 
 def scores(cases: Sequence[CaseAnswer]) -> Scores:
-    """All scores of these cases."""
-    answered = [case for case in cases if case.failure is None]
+    """All scores of these cases; what was recorded over wires once more counts there alone."""
+    once = [case for case in cases if not case.over_wires]
+    answered = [case for case in once if case.failure is None]
     nothing = [case for case in answered if case.kind == "nothing"]
     unknown = [case for case in answered if case.kind == "unknown"]
     alone = [case for case in answered if len(case.truth) == 1]
@@ -33,7 +34,7 @@ def scores(cases: Sequence[CaseAnswer]) -> Scores:
         no_gap_on_nothing=share(c.verdict == "no_gap" for c in nothing),
         unknown_left_unknown=share(not _names(c) for c in unknown),
         stage_right=share(c.stage == _stage_of(c) for c in alone),
-        failures=len(cases) - len(answered),
+        failures=len(once) - len(answered),
         log_score=fmean(math.log(c.probability_of_truth) for c in answered) if answered else None,
         calibration=_first_choices(answered),
         effect_calibration=bins((p, name in c.truth) for c in answered for name, p in c.odds.items()),
@@ -62,9 +63,9 @@ def groups(cases: Sequence[CaseAnswer]) -> dict[str, list[CaseAnswer]]:
         "large poor": lambda case: (case.magnitude, case.method) == ("large", "poor"),
         "small poor": lambda case: (case.magnitude, case.method) == ("small", "poor"),
         "coloured noise": lambda case: case.noise == "coloured",
-        "over wires": lambda case: case.over_wires,
     }
-    return {name: [case for case in known if test(case)] for name, test in tests.items()}
+    found = {name: [case for case in known if not case.over_wires and test(case)] for name, test in tests.items()}
+    return found | {"over wires": [case for case in known if case.over_wires]}
 
 
 def share(hits: Iterable[bool]) -> Share:

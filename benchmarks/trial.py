@@ -100,7 +100,7 @@ def page(whole: Trial, drawn: int, beside: Beside) -> str:
         since=beside.anew and f" --from {beside.anew}",
         table=table(told),
         care="\n".join(f"- {line}" for line in (*_care(honest, drawn), *beside.notes)),
-        before=_BEFORE.read_text().strip(),
+        before=_BEFORE.read_text(encoding="utf-8").strip(),
         rows="\n".join(map(_row, honest)),
     )
 

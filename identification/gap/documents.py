@@ -45,15 +45,15 @@ class Gap(Document):
 
     before_n: float = Field(description="RMSE of the refitted law without effects, in N")
     after_n: float = Field(
-        description="RMSE with the named effects in N, to be expected of another run: what the held-out strokes "
-        "leave, and noise of that run's motion; `before_n` where none is named"
+        description="RMSE with the named effects in N, to be expected of another run: what the strokes leave "
+        "beyond the floor, and noise of that run's motion; `before_n` where none is named"
     )
     noise_floor_n: float = Field(description="noise of the recorded force in N, one figure for both")
     shrinkage: float | None = Field(
         description="1 - (after² - floor²)/(before² - floor²); null where before is within 2 % of the floor"
     )
     shrinkage_ci95: tuple[float, float] | None = Field(
-        description="95 % interval for other runs: held-out conditions and cycles drawn anew, "
+        description="95 % interval for other runs: conditions and cycles drawn anew, "
         "noise of the motion and error of the form allowed for"
     )
     nominal_n: float | None = Field(default=None, description="RMSE of the given simulation in N; null without")

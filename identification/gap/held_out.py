@@ -57,8 +57,8 @@ class Shrinkage:
     """[1] what is expected to be closed of the whole run's gap, were this very run made again."""
 
 
-class HeldOut(NamedTuple):
-    """The held-out cycles, (cycles,) each."""
+class Judged(NamedTuple):
+    """The cycles of a recording, fitted or kept out, (cycles,) each."""
 
     before: Array
     """Sum of squared residuals without effects [N²]."""
@@ -68,42 +68,51 @@ class HeldOut(NamedTuple):
     """Samples."""
     segment: Indices
     """Which segment each belongs to."""
+    held: BoolArray
+    """True where it was kept out of every fit."""
+
+    def means(self) -> tuple[float, float]:
+        """Mean squares [N²] without and with effects on the cycles kept out."""
+        total = float(self.counts[self.held].sum())
+        return float(self.before[self.held].sum()) / total, float(self.after[self.held].sum()) / total
 
 
 class Again(NamedTuple):
     """The strokes played once more, with the noise of the motion drawn anew and nothing else changed."""
 
+    cycles: float
+    """Mean squared change of the simulated force [N²] on all cycles that are judged."""
     held: float
-    """Mean squared change of the simulated force [N²] on the held-out cycles."""
+    """The same on those kept out."""
     runs: Array
     """(runs,) the same over everything that was recorded, first instants and ends as well."""
     before: float
     """Mean squared residual without effects [N²] over everything that was recorded."""
 
 
-def shrinkage(held: HeldOut, noise: float, again: Again, strokes: int) -> Shrinkage:
+def shrinkage(judged: Judged, noise: float, again: Again, strokes: int) -> Shrinkage:
     """How far the gap shrinks on another run of the same damper: its expectation, with an interval.
 
-    Two things are left there. The error of the form is that of the held-out cycles beyond both noises: their
-    conditions are drawn anew, and their cycles, it is never below zero, and it is another one on other strokes,
-    the more so the fewer strokes the recording has. Of many strokes those kept out are a sample, and their mean is
-    what others leave on average, however widely these differ; of few they are none, and others leave more. The
-    motion of another run carries its own noise into the force, most where it is known from one side only; no fit
-    looks at these instants, but every run has them.
+    Two things are left there. The error of the form is that of all cycles beyond both noises, fitted ones too: a
+    fit of two dozen numbers hides next to nothing of a form's error on the strokes that it saw, and the few kept
+    out are a small sample. Their conditions are drawn anew, and their cycles, it is never below zero, and it is
+    another one on other strokes, the more so the fewer strokes the recording has. Many strokes are a sample, and
+    their mean is what others leave on average, however widely these differ; few are none, and others leave more.
+    The motion of another run carries its own noise into the force, most where it is known from one side only; no
+    fit looks at these instants, but every run has them.
 
     Args:
-        held: the held-out cycles.
+        judged: the cycles.
         noise: of the recorded force [N].
         again: the strokes played once more with the effects.
         strokes: how many of different amplitude or frequency were recorded.
     """
-    total = float(held.counts.sum())
-    before, after = (float(s.sum()) / total for s in held[:2])
+    before, after = judged.means()
     if before < (_NEAR_FLOOR * noise) ** 2:
         return Shrinkage(math.sqrt(before), math.sqrt(after), None, None)
-    if held.before is held.after or np.array_equal(held.before, held.after):
+    if judged.before is judged.after or np.array_equal(judged.before, judged.after):
         return Shrinkage(math.sqrt(before), math.sqrt(after), 0.0, (0.0, 0.0))
-    lost = _lost(held, noise, again, strokes)
+    lost = _lost(judged, noise, again, strokes)
     value = 1.0 - float(lost.mean())
     low, high = np.quantile(1.0 - lost, [0.025, 0.975])
     expected = math.sqrt(noise**2 + (1.0 - value) * (before - noise**2))
@@ -112,17 +121,20 @@ def shrinkage(held: HeldOut, noise: float, again: Again, strokes: int) -> Shrink
 
 
 def _worth(after: float, noise: float, again: Again) -> float:
-    """Part [1] of the whole run's gap that a set is expected to close where the run is made again."""
+    """Part [1] of the whole run's gap that a set is expected to close where the run is made again.
+
+    ``after`` [N²] is of the cycles kept out: whoever fits too much does harm there.
+    """
     left = max(after - noise**2 - again.held, 0.0) + float(again.runs.mean())
     return 1.0 - left / max(again.before - noise**2, 1e-2 * noise**2)
 
 
-def _lost(held: HeldOut, noise: float, again: Again, strokes: int) -> Array:
+def _lost(judged: Judged, noise: float, again: Again, strokes: int) -> Array:
     """(draws,) parts of the gap [1] that other runs would leave."""
     random = np.random.default_rng(0)
-    before, after = _drawn(held, random)
+    before, after = _drawn(judged, random)
     gap = np.maximum(before - noise**2, 1e-2 * noise**2)
-    form = np.maximum(after - noise**2 - again.held, 0.0) / gap
+    form = np.maximum(after - noise**2 - again.cycles, 0.0) / gap
     spread = _FORM + _FEW_STROKES / max(strokes, 1)
     form *= np.exp(spread * random.standard_normal(_DRAWS) - 0.5 * _FORM**2)
     size = (again.before - noise**2) * np.exp(_SIZE * random.standard_normal(_DRAWS))
@@ -130,13 +142,13 @@ def _lost(held: HeldOut, noise: float, again: Again, strokes: int) -> Array:
     return np.asarray(form + motion)
 
 
-def _drawn(held: HeldOut, random: np.random.Generator) -> Array:
+def _drawn(judged: Judged, random: np.random.Generator) -> Array:
     """(2, draws) mean squares [N²] without and with effects: segments drawn anew, then cycles within each."""
-    names, place = np.unique(held.segment, return_inverse=True)
+    names, place = np.unique(judged.segment, return_inverse=True)
     members = [np.flatnonzero(place == k) for k in range(len(names))]
-    sums, means = np.stack(held[:2]), np.empty((2, _DRAWS))
+    sums, means = np.stack(judged[:2]), np.empty((2, _DRAWS))
     for draw in range(_DRAWS):
         chosen = random.integers(0, len(names), len(names))
         rows = np.concatenate([random.choice(members[k], len(members[k])) for k in chosen])
-        means[:, draw] = sums[:, rows].sum(axis=1) / held.counts[rows].sum()
+        means[:, draw] = sums[:, rows].sum(axis=1) / judged.counts[rows].sum()
     return means

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.assemble import Assembled
-from identification.gap.held_out import Again, HeldOut, Shrinkage, held_out_cycles, shrinkage
+from identification.gap.held_out import Again, Judged, Shrinkage, held_out_cycles, shrinkage
 from identification.gap.residual import Cycles, by_piece, cut_cycles
 from identification.gap.stumbles import left_out
 from identification.gap.where import Left
@@ -99,16 +99,21 @@ class Judge:
             carried: (runs, N) squared change [N²] of the force simulated with effects, as the noise of the motion
                 of other runs makes it.
         """
-        sums = [self.cycles.sums(left.residual**2, self.unseen) for left in (before, after)]
-        counts = self.cycles.sums(np.ones(len(self.force)), self.unseen)
-        there = counts > 0
-        held = HeldOut(sums[0][there], sums[1][there], counts[there], self.cycles.segment[there])
+        judged = self._judged(before, after)
         again = Again(
+            float(carried[:, self.usable].mean()),
             float(carried[:, self.unseen].mean()),
             carried[:, self.recorded].mean(axis=1),
             float(np.mean(before.residual[self.recorded] ** 2)),
         )
-        return shrinkage(held, noise, again, self.cycles.strokes)
+        return shrinkage(judged, noise, again, self.cycles.strokes)
+
+    def _judged(self, before: Left, after: Left) -> Judged:
+        """The cycles that have samples to judge."""
+        sums = [self.cycles.sums(left.residual**2, self.usable) for left in (before, after)]
+        counts = self.cycles.sums(np.ones(len(self.force)), self.usable)
+        there = counts > 0
+        return Judged(sums[0][there], sums[1][there], counts[there], self.cycles.segment[there], self.held[there])
 
 
 def _once_moved(piece: Piece) -> Piece:

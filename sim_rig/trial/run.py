@@ -6,7 +6,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPool
 from importlib.metadata import version
 from multiprocessing import get_context
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar, get_args
 
 import orjson
 from pydantic import ValidationError
@@ -135,7 +135,7 @@ def _predict(folder: TrialFolder, case: TrueCase, name: str) -> None:
     if not files.unseen.exists():
         partial = files.unseen.with_suffix(".partial.mcap")
         partial.unlink(missing_ok=True)
-        method = folder.method(f"unseen_{case.damper}_{case.variant}")
+        method = folder.method(f"unseen_{case.method}_{case.damper}_{case.variant}")
         _record_from_plant(method, files.scenario, case.seed + UNSEEN_SEED, partial)
         partial.replace(files.unseen)
     try:
@@ -146,9 +146,8 @@ def _predict(folder: TrialFolder, case: TrueCase, name: str) -> None:
 
 
 def _write_methods(folder: TrialFolder, seed: int) -> None:
-    kinds: tuple[Kind, ...] = ("rich", "poor", "unseen")
     for size in SIZES:
-        for kind in kinds:
+        for kind in get_args(Kind):
             for variant in range(VARIANTS):
                 name = f"{kind}_{size}_{variant}"
                 document = method_document(name, size, strokes(kind, size, seed, variant))

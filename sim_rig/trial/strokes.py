@@ -1,17 +1,17 @@
-"""The methods of a trial: rich ones, poor ones, and one that no diagnosis sees.
+"""The methods of a trial: rich ones, poor ones, and for each kind others that no diagnosis sees.
 
 Each is a document that the bench compiles, and beside it the same strokes as samples, from which the sizes of the
 effects are chosen; the bench's own fades and rests differ from those by less than matters there.
 """
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from sim_rig.compiled import Array
 from sim_rig.trial.specimens import SIZES
 
-Kind = Literal["rich", "poor", "unseen"]
+Kind = Literal["rich", "poor", "unseen_poor", "unseen_rich"]
 RATE = 1000.0
 """[Hz] of commands and log."""
 FADE = 0.5
@@ -38,13 +38,14 @@ class Stroke(NamedTuple):
 def strokes(kind: Kind, size: str, seed: int, variant: int) -> tuple[Stroke, ...]:
     """The segments of a method for a damper of a size."""
     chance = np.random.default_rng(
-        [seed, 12, list(SIZES).index(size), variant, ("rich", "poor", "unseen").index(kind)]
+        [seed, 12, list(SIZES).index(size), variant, get_args(Kind).index(kind)]
     )
     if kind == "poor":
         return (_sine(chance, size, 0.85, 1.5, 6, 5),)
-    if kind == "unseen":
+    if kind == "unseen_poor":
         return (_sine(chance, size, 0.65, 1.1, 4, 4), _sine(chance, size, 0.95, 1.7, 5, 4))
     pause = Stroke(0.0, 1.0, 4.0, (0.0,))
+    # Amplitudes, frequencies and the order of the drives of a run that no diagnosis sees are others.
     return (
         _sine(chance, size, 0.45, 2.6, 7, 4),
         _sine(chance, size, 1.0, 0.6, 2, 3),

@@ -5,8 +5,8 @@ from typing import Any
 from identification.damper.parameters import Quantity
 from sim_rig.scenarios.sealed.form import STRETCH, STRETCH_RATE, Form, Place
 
-STIFFNESS, DENT = 5e7, 5e-6
-"""[N/m] of pin on eye at a dent [m]."""
+STIFFNESS, DENT = 3e8, 5e-6
+"""[N/m] of pin on eye at a dent [m]: without a gap next to nothing may be left, or the truth is give, not play."""
 LOSS = 30.0
 """[s/m] damping of the contact over its force."""
 THIN = 0.05

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from identification.gap.held_out import Again, HeldOut, held_out_cycles, shrinkage
+from identification.gap.held_out import Again, Judged, held_out_cycles, shrinkage
 from identification.gap.residual import cut_cycles
 from identification.gap.where import Left, drift, gap_map, harmonics
 from identification.recordings import Segment, Stretch
@@ -105,20 +105,20 @@ def test_drift_of_mean_and_size_and_a_free_line_are_told_apart():
     assert humming.line_n == pytest.approx(3.0, rel=0.1)
 
 
-def held_out(before, after, segments=5):
-    counts = np.full(len(before), 500.0)
-    return HeldOut(counts * before, counts * after, counts, np.arange(len(before)) * segments // len(before))
+def judged(before, after, segments=5):
+    counts, segment = np.full(len(before), 500.0), np.arange(len(before)) * segments // len(before)
+    return Judged(counts * before, counts * after, counts, segment, segment % 4 == 2)
 
 
 def gap_of(left, share, random, cycles=30):
     """Mean squares of cycles without and with effects that leave a share of the gap."""
     excess = left * random.uniform(0.5, 1.5, cycles)
-    return held_out(NOISE**2 + excess, NOISE**2 + share * excess * random.uniform(0.7, 1.3, cycles))
+    return judged(NOISE**2 + excess, NOISE**2 + share * excess * random.uniform(0.7, 1.3, cycles))
 
 
 def again(*runs, held=0.0, before=9.0):
     """Mean squares [N²] that other runs' motion carries into the force, and the gap of the whole run."""
-    return Again(held, np.array(runs or (0.0,)), NOISE**2 + before)
+    return Again(held, held, np.array(runs or (0.0,)), NOISE**2 + before)
 
 
 def test_shrinkage_has_an_interval_that_holds_it():
@@ -146,8 +146,24 @@ def test_few_strokes_and_a_noisy_motion_lower_the_claim_and_widen_the_interval()
 
 
 def test_strokes_that_differ_widely_are_no_reason_to_claim_less():
-    alike = held_out(np.full(30, NOISE**2 + 9.0), np.full(30, NOISE**2 + 0.9))
+    alike = judged(np.full(30, NOISE**2 + 9.0), np.full(30, NOISE**2 + 0.9))
     assert shrinkage(alike, NOISE, again(), strokes=50).value == pytest.approx(0.9, abs=0.01)
+
+
+def test_one_bad_stroke_among_those_kept_out_is_one_of_all():
+    strokes = gap_of(9.0, 0.02, default_rng(2))
+    bad = strokes._replace(after=np.where(strokes.held, strokes.counts * NOISE**2 + 2700.0, strokes.after))
+    kept_out = 1.0 - bad.means()[1] / 9.0 + NOISE**2 / 9.0
+    found = shrinkage(bad, NOISE, again(), strokes=5)
+    assert found.value > kept_out + 0.3
+    assert found.ci95[0] < kept_out
+
+
+def test_a_set_that_does_harm_on_the_strokes_kept_out_has_no_worth():
+    strokes = gap_of(9.0, 0.02, default_rng(2))
+    harm = strokes._replace(after=np.where(strokes.held, strokes.before + 1000.0, strokes.after))
+    assert shrinkage(harm, NOISE, again(), strokes=5).worth < 0.0
+    assert shrinkage(strokes, NOISE, again(), strokes=5).worth > 0.9
 
 
 def test_a_motion_that_makes_more_than_the_gap_leaves_a_set_without_worth():
@@ -157,7 +173,7 @@ def test_a_motion_that_makes_more_than_the_gap_leaves_a_set_without_worth():
     assert shrinkage(strokes, NOISE, again(0.2 * gap, before=gap), strokes=1).worth > 0.0
 
 
-def test_noise_of_the_motion_on_the_held_out_cycles_is_no_error_of_the_form():
+def test_noise_of_the_motion_on_the_cycles_is_no_error_of_the_form():
     strokes = gap_of(9.0, 0.1, default_rng(2))
     plain, known = (shrinkage(strokes, NOISE, again(0.5, held=held), strokes=5) for held in (0.0, 0.5))
     assert known.value > plain.value + 0.03
@@ -172,6 +188,6 @@ def test_chance_below_the_floor_is_no_more_than_the_whole_gap():
 
 
 def test_at_the_floor_there_is_nothing_to_shrink():
-    found = shrinkage(held_out(np.full(30, NOISE**2 * 1.02), np.full(30, NOISE**2)), NOISE, again(), strokes=5)
+    found = shrinkage(judged(np.full(30, NOISE**2 * 1.02), np.full(30, NOISE**2)), NOISE, again(), strokes=5)
     assert found.value is None
     assert found.ci95 is None

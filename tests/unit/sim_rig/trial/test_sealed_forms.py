@@ -148,6 +148,12 @@ def test_play_lets_the_damper_stand_while_the_pin_crosses(stroke):
     assert 0.45 * gap < np.max(np.abs(behind)) < 0.6 * gap
 
 
+def test_without_its_gap_a_pin_gives_way_by_less_than_any_play(stroke):
+    truth = played(SealedPlant, rig(usual("squeeze_film", gap=1e-9)), stroke)
+    behind = truth.position[:: blocks_in(1e-3)] - truth.damper_displacement
+    assert np.max(np.abs(behind)) < 4e-6
+
+
 def test_a_bending_fixture_lets_the_damper_stay_behind_by_what_the_force_asks(stroke):
     give = 2e-7
     truth = played(SealedPlant, rig(usual("closing_joint", give=give, closes=1.0)), stroke)

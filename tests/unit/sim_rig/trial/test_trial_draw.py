@@ -1,4 +1,5 @@
 from collections import Counter
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ from sim_rig.trial import draw as drawing
 from sim_rig.trial.calibrate import Bench, sized
 from sim_rig.trial.draw import KNOWN, RATIOS, UNKNOWN, Drawn, draw, draw_grid, settle
 from sim_rig.trial.specimens import SIZES, specimen
-from sim_rig.trial.strokes import RATE, duration, method_document, samples, strokes
+from sim_rig.trial.strokes import RATE, Kind, duration, method_document, samples, strokes
 from sim_rig.trial.values import drawn_values, measures
 
 
@@ -74,7 +75,7 @@ def test_a_grid_takes_every_effect_through_every_size():
     assert {case.kind for case in cases} == {"single"}
 
 
-@pytest.mark.parametrize("kind", ["rich", "poor", "unseen"])
+@pytest.mark.parametrize("kind", get_args(Kind))
 @pytest.mark.parametrize("size", SIZES)
 def test_methods_stay_within_what_the_damper_stands_and_two_minutes(kind, size):
     planned = strokes(kind, size, 4, 1)
@@ -85,9 +86,15 @@ def test_methods_stay_within_what_the_damper_stands_and_two_minutes(kind, size):
     assert len(displacement) == len(drive) + 1
     assert duration(planned) < 120
     moving = [stroke for stroke in planned if stroke.amplitude]
-    assert len({stroke.frequency for stroke in moving}) == {"rich": 5, "poor": 1, "unseen": 2}[kind]
+    assert len({stroke.frequency for stroke in moving}) == {"poor": 1, "unseen_poor": 2}.get(kind, 5)
     names = [segment["name"] for segment in method_document("m", size, planned)["segments"]]
     assert len(set(names)) == len(names)
+
+
+def test_a_run_that_no_diagnosis_sees_has_other_strokes():
+    for method in ("rich", "poor"):
+        seen, unseen = strokes(method, "middle", 4, 1), strokes(f"unseen_{method}", "middle", 4, 1)
+        assert not {s.frequency for s in seen if s.amplitude} & {s.frequency for s in unseen if s.amplitude}
 
 
 def test_a_damper_follows_from_its_seed_and_is_none_that_ships():

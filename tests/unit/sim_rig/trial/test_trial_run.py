@@ -161,7 +161,7 @@ def test_the_twin_predicts_a_run_that_the_diagnosis_never_saw(folder, three, tmp
     assert {Path(words[-5]).parent.name for words in asked} == {"unseen"}
     first = answer(folder, plan).cases[0]
     assert first.true_shrinkage == 1.0
-    assert folder.files("case_000").unseen.read_text().startswith("unseen_small_0.json case_000.json")
+    assert folder.files("case_000").unseen.read_text().startswith("unseen_rich_small_0.json case_000.json")
 
 
 def test_some_cases_go_once_more_over_wires(folder, three, tmp_path, monkeypatch):

@@ -37,9 +37,7 @@ class Stroke(NamedTuple):
 
 def strokes(kind: Kind, size: str, seed: int, variant: int) -> tuple[Stroke, ...]:
     """The segments of a method for a damper of a size."""
-    chance = np.random.default_rng(
-        [seed, 12, list(SIZES).index(size), variant, get_args(Kind).index(kind)]
-    )
+    chance = np.random.default_rng([seed, 12, list(SIZES).index(size), variant, get_args(Kind).index(kind)])
     if kind == "poor":
         return (_sine(chance, size, 0.85, 1.5, 6, 5),)
     if kind == "unseen_poor":

@@ -16,7 +16,6 @@ from functools import cached_property
 import numpy as np
 
 from identification.arrays import Array
-from identification.damper.effects import EFFECTS
 from identification.effect_choice import EffectChoice
 from identification.gap.contender import Contender
 from identification.gap.exchange import exchange, leave_out
@@ -27,14 +26,13 @@ from identification.gap.judge import Judge
 from identification.gap.plausible import plausibility
 from identification.gap.posterior import Candidate, Shown
 from identification.gap.residual import by_piece
-from identification.gap.screen import ALWAYS, Gain, every_choice, promise, screen, worth_fitting
+from identification.gap.screen import ALWAYS, Gain, promise, worth_fitting
+from identification.gap.screenings import SCREEN_RATE, Screenings
 from identification.problem import Problem
 from identification.start import starting_points
 
 _THIN_RATE = 250.0
-"""[Hz] below which recordings are not thinned."""
-_SCREEN_RATE = 125.0
-"""[Hz] of the first look, and of long recordings."""
+"""[Hz] below which recordings are not thinned; long ones are, down to the rate of a screening."""
 _MANY = 15_000
 """[samples] above which a recording is thinned further."""
 _FITTED = (6, 4, 2)
@@ -92,6 +90,7 @@ class Search:
     """What places say of one effect more."""
     began: float = field(default_factory=time.process_time)
     """[s] of processor time."""
+    _screenings: Screenings = field(default_factory=Screenings)
 
     def run(self) -> None:
         """Fit what is worth it; ``found`` holds the best of each set."""
@@ -198,7 +197,7 @@ class Search:
     def _thin(self) -> Problem:
         rate = max(p.stroke.rate for p in self.full.pieces)
         samples = sum(len(p.force) for p in self.full.pieces)
-        times = min(max(rate / _THIN_RATE, samples / _MANY), rate / _SCREEN_RATE)
+        times = min(max(rate / _THIN_RATE, samples / _MANY), rate / SCREEN_RATE)
         return self.full.quicker().coarser(max(1, round(times)))
 
     def _grow(self, parent: Contender, count: int) -> None:
@@ -222,10 +221,7 @@ class Search:
 
     def screened(self, parent: Contender, without: frozenset[str]) -> list[Gain]:
         """What every further effect promises beside a set; those named are not looked at."""
-        thin = self._thin
-        rate = max(p.stroke.rate for p in thin.pieces)
-        choices = every_choice([n for n in EFFECTS if n not in without])
-        return screen(thin, parent.fit, choices, max(1, round(rate / _SCREEN_RATE)), self._line(parent))
+        return self._screenings.beside(parent, without, self.left_of(parent), self._thin, self._line)
 
     def _may_help(self, parent: Contender, name: str) -> bool:
         """Whether an effect is tried beside others without a promise: not where alone it took nothing away."""

@@ -17,7 +17,7 @@ _MOST = 0.9
 _AT_FLOOR = 1.03
 """[1] RMSE over the floor at which nothing is left to explain."""
 _UNLIKELY = 0.5
-"""[1] probability of something unknown above which the gap is not called explained."""
+"""[1] probability of something unknown from which on a gap without a known cause is one."""
 _ALTERNATIVES = 3
 _POSSIBLE = 0.01
 """[1] probability below which a set is no alternative."""
@@ -25,6 +25,8 @@ _POSSIBLE = 0.01
 
 def verdict_on(plain: Contender, named: Contender, floor: float, odds: Odds) -> Verdict:
     """The answer in a word; what counts is the worse of seen and unseen strokes.
+
+    A set that leaves a gap is not named where something unknown is likelier than it.
 
     Args:
         plain: the law alone.
@@ -36,7 +38,7 @@ def verdict_on(plain: Contender, named: Contender, floor: float, odds: Odds) -> 
     if nothing or (not named.names and odds.unknown < _UNLIKELY):
         return "no_gap"
     taken = 1.0 - named.share_of(plain, floor) / max(plain.excess(floor), 1e-12)
-    unknown = odds.unknown > _UNLIKELY
+    unknown = odds.unknown > odds.sets[named.names]
     if not named.names or taken < _NOTHING_KNOWN or (unknown and taken < _MOST):
         return "unexplained"
     if max(named.seen, named.unseen) < _AT_FLOOR * floor or (taken > _MOST and not unknown):

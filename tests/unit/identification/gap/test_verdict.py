@@ -43,6 +43,14 @@ def test_a_set_that_hides_the_gap_on_one_side_alone_does_not_explain_it(seen, un
     assert word(("force_drift",), seen, unseen, unknown=0.9) == "unexplained"
 
 
+@pytest.mark.parametrize(
+    ("named", "unknown", "said"), [(0.25, 0.48, "unexplained"), (0.48, 0.25, "partly_explained")]
+)
+def test_what_something_unknown_is_likelier_than_is_not_named(named, unknown, said):
+    chosen, plain = contender(("fixture_compliance",), 1.6, 1.6), contender((), 3.0, 3.0)
+    assert verdict_on(plain, chosen, FLOOR, Odds({chosen.names: named}, unknown)) == said
+
+
 def test_nothing_named_is_no_gap_unless_something_unknown_is_likely():
     assert word((), 1.005, 1.02, plain=(1.005, 1.02)) == "no_gap"
     assert word((), 3.0, 3.0, unknown=0.9) == "unexplained"

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from identification.assemble import Assembled, assemble
 from identification.gap.checks import enough_cycles, one_specimen, sliding_recorded, without_clipping
+from identification.gap.exchange import exchange_mounting
 from identification.gap.floor import Floor
 from identification.gap.further import look_further
 from identification.gap.hearing import Hearing
@@ -128,6 +129,7 @@ def _final_odds(search: Search) -> Odds:
             break
         likeliest = odds(search.candidates(), search.full.samples).ranked()[0][0]
         search.polish(likeliest)
+    exchange_mounting(search, likeliest)
     return odds(search.candidates(), search.full.samples)
 
 

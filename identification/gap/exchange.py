@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from identification.effect_choice import EffectChoice
 from identification.gap.contender import Contender
-from identification.gap.screen import worth_fitting
+from identification.gap.screen import ALWAYS, worth_fitting
 from identification.gap.unknowns import without
 
 if TYPE_CHECKING:
@@ -50,6 +50,24 @@ def exchange(search: "Search") -> None:
             _replace(search, best, choice)
         if search.left_of(search.best()) > _BETTER * before:
             return
+
+
+def exchange_mounting(search: "Search", names: frozenset[str]) -> None:
+    """Fit play in the place of give in a set, or give in that of play, on all samples.
+
+    Neither promises anything by a linear look, and each takes up the most of the other: what stands in a set may
+    only have been tried first.
+    """
+    for given, other in (ALWAYS, ALWAYS[::-1]):
+        twin = names - {given} | {other}
+        if given not in names or other in names or len(names) < 2 or twin in search.complete:
+            continue
+        known = search.found[names]
+        choice = next(c for c in known.fit.effects if c.name == given)
+        rest = search.found.get(names - {given}) or left_out(search, known, choice)
+        search.fit_mounting(rest, search.screened(rest, names), other)
+        if twin in search.found:
+            search.polish(twin)
 
 
 def _replace(search: "Search", best: Contender, choice: EffectChoice) -> None:

@@ -212,12 +212,16 @@ class Search:
                 return
             self.fit_beside(parent, gain, [])
         for name in ALWAYS:
-            mine = [g for g in gains if g.choice.name == name]
             if self._may_help(parent, name):
-                # A pin that the damper follows and one that lies free differ: neither speaks for the other.
-                for acts in dict.fromkeys(g.choice.form.acts for g in mine):
-                    alike = [g for g in mine if g.choice.form.acts == acts]
-                    self._try_always(parent, sorted(alike, key=lambda g: len(g.choice.quantities)))
+                self.fit_mounting(parent, gains, name)
+
+    def fit_mounting(self, parent: Contender, gains: Sequence[Gain], name: str) -> None:
+        """Fit a set with play or give, whatever that promises; with richer forms where simpler ones show."""
+        mine = [g for g in gains if g.choice.name == name]
+        # A pin that the damper follows and one that lies free differ: neither speaks for the other.
+        for acts in dict.fromkeys(g.choice.form.acts for g in mine):
+            alike = [g for g in mine if g.choice.form.acts == acts]
+            self._try_always(parent, sorted(alike, key=lambda g: len(g.choice.quantities)))
 
     def screened(self, parent: Contender, without: frozenset[str]) -> list[Gain]:
         """What every further effect promises beside a set; those named are not looked at."""

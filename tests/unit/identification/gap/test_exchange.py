@@ -3,9 +3,10 @@
 from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from identification.effect_choice import EffectChoice
-from identification.gap.exchange import exchange, leave_out
+from identification.gap.exchange import exchange, exchange_mounting, leave_out
 from identification.gap.screen import Gain
 
 ENOUGH = 0.01
@@ -16,6 +17,7 @@ class MadeUpSearch:
 
     def __init__(self, left, late=False):
         self._left, self.late, self.found, self.asked = left, late, {}, []
+        self.complete = set()
 
     def left_of(self, contender):
         return self._left(contender.names)
@@ -42,6 +44,12 @@ class MadeUpSearch:
         names = sorted({"gas_spring", "end_stop", "coil_lag", "moving_mass", "force_drift"} - without)
         looks = [(1.0 - self._left(parent.names | {n}), n) for n in names]
         return [Gain(EffectChoice.of(n), g, g, np.empty(0)) for g, n in sorted(looks, reverse=True)]
+
+    def fit_mounting(self, parent, gains, name):
+        self.fit((*parent.fit.effects, EffectChoice.of(name)))
+
+    def polish(self, names):
+        self.complete.add(names)
 
     def fit_beside(self, parent, gain, values):
         return self.fit((*parent.fit.effects, gain.choice))
@@ -81,3 +89,24 @@ def test_nothing_is_tried_at_the_floor_or_when_time_is_up():
     at_floor = searched(left_by(truth, {}), "gas_spring", "moving_mass")
     late = searched(left_by(truth, {}), "end_stop", "coil_lag", late=True)
     assert len(at_floor.asked) == len(late.asked) == 3
+
+
+@pytest.mark.parametrize(
+    ("given", "other"),
+    [("clevis_backlash", "fixture_compliance"), ("fixture_compliance", "clevis_backlash")],
+)
+def test_play_is_tried_in_the_place_of_give_and_give_in_that_of_play(given, other):
+    search = searched(left_by(frozenset({other, "gas_spring"}), {other: given}), "gas_spring", given)
+    exchange_mounting(search, frozenset({"gas_spring", given}))
+    assert search.best().names == {"gas_spring", other}
+    assert search.complete == {frozenset({"gas_spring", other})}
+
+
+@pytest.mark.parametrize(
+    "named", [("gas_spring", "coil_lag"), ("clevis_backlash",), ("clevis_backlash", "fixture_compliance")]
+)
+def test_a_set_without_a_mounting_to_exchange_stays_as_it_is(named):
+    search = searched(left_by(frozenset(named), {}), *named)
+    before = list(search.asked)
+    exchange_mounting(search, frozenset(named))
+    assert search.asked == before

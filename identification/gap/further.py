@@ -36,24 +36,32 @@ def look_further(search: "Search", names: frozenset[str]) -> bool:
     """Fit the most promising further effects beside a set; whether one of them pays for its freedom."""
     if not _worth_a_look(search, names):
         return False
-    known = search.found[names]
     kin = set[str]().union(*(alike for alike in _KIN if names & alike))
     paid = []
-    for gain in worth_fitting(search.screened(known, names | kin), _TRIED):
-        more = names | {gain.choice.name}
-        if more not in search.complete:
-            search.fit_beside(known, gain, [])
-            search.polish(more)
-        search.shown[more] = Shown(names, evidence(known.left, search.found[more].left))
+    for more in _with_one_more(search, names, names | kin):
+        search.polish(more)
+        search.shown[more] = Shown(names, evidence(search.found[names].left, search.found[more].left))
         paid += [more] if search.shown[more].log_odds > price(names) else []
     for more in paid:
         _fit_parts(search, more)
     return bool(paid)
 
 
+def _with_one_more(search: "Search", names: frozenset[str], without: frozenset[str]) -> list[frozenset[str]]:
+    """Sets with the most promising effects beside a set, and the best that the search has grown from it."""
+    known, sets = search.found[names], []
+    for gain in worth_fitting(search.screened(known, without), _TRIED):
+        sets.append(names | {gain.choice.name})
+        if sets[-1] not in search.complete:
+            search.fit_beside(known, gain, [])
+    grown = [n for n in search.found if len(n) == len(names) + 1 and names < n and not (n - names) & without]
+    best = sorted(grown, key=lambda n: search.left_of(search.found[n]))[:1]
+    return list(dict.fromkeys([*sets, *best]))
+
+
 def _worth_a_look(search: "Search", names: frozenset[str]) -> bool:
     """Whether one effect more could pay for its freedom, beside a set that explains the most of the gap."""
-    if not 0 < len(names) < _MOST or search.late:
+    if not 0 < len(names) < _MOST:
         return False
     known = search.found[names]
     explains = search.left_of(known) < _EXPLAINS * search.none_left

@@ -212,7 +212,7 @@ class Search:
                 return
             self.fit_beside(parent, gain, [])
         for name in ALWAYS:
-            if self._may_help(parent, name):
+            if not self.late and self._may_help(parent, name):
                 self.fit_mounting(parent, gains, name)
 
     def fit_mounting(self, parent: Contender, gains: Sequence[Gain], name: str) -> None:
@@ -238,7 +238,7 @@ class Search:
         for gain in gains:
             if parent.names and gain.choice.form.acts == "displacement_follower":
                 continue  # its contacts ask for a high rate, and a free pin shows beside others as well
-            if self.late or self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
+            if self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
                 return
             starts = [*_begun_with(simpler, gain.choice), *gain.choice.form.starts]
             with_it = self.fit_beside(parent, gain, starts)

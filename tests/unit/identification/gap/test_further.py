@@ -21,8 +21,8 @@ FORM = np.where(TIME < 6.0, 2.0, 0.0)
 class FurtherSearch:
     """Sets whose names say what they leave: the lag of a coil leaves nothing after the steps of a drive."""
 
-    def __init__(self, late=False):
-        self.late, self.floor, self.none_left = late, FLOOR, 30.0
+    def __init__(self):
+        self.floor, self.none_left = FLOOR, 30.0
         self.found, self.complete, self.shown, self.without = {}, set(), {}, None
 
     def add(self, names):
@@ -65,18 +65,24 @@ def test_an_effect_that_many_places_show_pays_and_its_parts_are_fitted(further):
     assert frozenset({"coil_lag"}) in further.found
 
 
+def test_what_the_search_has_grown_already_is_asked_too(further):
+    names, more = frozenset({"end_stop"}), frozenset({"end_stop", "seal_friction"})
+    further.add(more)
+    look_further(further, names)
+    assert more in further.complete
+    assert more in further.shown
+
+
 def test_kin_of_what_is_named_are_not_asked(further):
     look_further(further, frozenset({"end_stop"}))
     assert {"end_stop", "gas_spring", "clevis_backlash"} <= further.without
     assert "coil_lag" not in further.without
 
 
-@pytest.mark.parametrize("why", ["late", "nothing is named", "three are named", "most of the gap is left"])
+@pytest.mark.parametrize("why", ["nothing is named", "three are named", "most of the gap is left"])
 def test_nothing_further_is_looked_for(further, why):
     names = frozenset({"end_stop"})
     match why:
-        case "late":
-            further.late = True
         case "nothing is named":
             names = frozenset()
         case "three are named":

@@ -81,6 +81,11 @@ class Assembled:
         """[s] how well the channels' clocks are known against each other."""
         return max(_clock_spread(r) for r in self.recordings)
 
+    @property
+    def clock_skew(self) -> float:
+        """[s] the same as far as the logs say it of clocks that they have followed; 0 where they say nothing."""
+        return max(_largest_skew(_clocks(r)) for r in self.recordings)
+
 
 def _clock_spread(recording: Recording) -> float:
     """Standard deviation [s] of a channel delay: as mapped on a bench, else half the shortest sample."""

@@ -67,6 +67,27 @@ def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
     return replace(minimum, unknowns=unknowns, evaluation=replace(minimum.evaluation, hessian=left)), wander
 
 
+def bent_away(problem: Problem, unknowns: Array, spread: float) -> tuple[list[Array], float]:
+    """What a delay of the force that bends adds to the residuals, where it leaves least; and how far it bends.
+
+    Args:
+        problem: with all samples marked that are to be looked at.
+        unknowns: (U,) of a fit.
+        spread: to which the clocks are known [s], one deviation: it holds the bends.
+
+    Returns:
+        (N,) of each piece, in units of the noise; and the root mean square of the bends [s].
+    """
+    added, bends = [], []
+    for i, piece in enumerate(problem.pieces):
+        r, J = problem.residuals(unknowns, i)
+        bent = _hats(len(r), piece.stroke.rate) * (J[:, COORDINATE_COUNT] / problem.delay_prior)[:, None]
+        held = bent.T @ bent + np.eye(bent.shape[1]) / spread**2
+        bends.append(-np.linalg.solve(held, bent.T @ r))
+        added.append(bent @ bends[-1])
+    return added, float(np.sqrt(np.mean(np.concatenate(bends) ** 2)))
+
+
 def wander_in_words(wander: float) -> tuple[str, ...]:
     """What a person should know of a wander [s]; nothing of a small one."""
     if wander < _TOLD:

@@ -11,7 +11,7 @@ from identification.gap.further import look_further
 from identification.gap.hearing import Hearing
 from identification.gap.judge import Judge
 from identification.gap.model import Model
-from identification.gap.posterior import Odds, odds
+from identification.gap.posterior import Odds
 from identification.gap.report import MOST_TIED, TIED, Answer, Report
 from identification.gap.search import Search
 from identification.gap.witness import hear
@@ -31,6 +31,8 @@ _REPEATS = 1.1
 _MOST_POLISHED = 6
 """Sets that are fitted on all samples because the one before them came out worse there."""
 
+_BLAMED = 0.5
+"""[1] probability of something unknown from which on the best known set is fitted in full before that is said."""
 _FURTHER = 2
 """Effects that are added to the likeliest set at most once it has been fitted in full."""
 
@@ -99,10 +101,11 @@ def diagnose_prepared(
     assembled, judge = prepared.assembled, prepared.judge
     problem = diagnosed_problem(assembled, judge.fitted_pieces())
     hearing = Hearing(white_floor(assembled.floor), assembled.stretches, seed)
-    search = Search(problem, judge, hearing, progress)
+    search = Search(problem, judge, hearing, _wandering(assembled), progress)
     with one_thread():
         search.run()
-        answer = Report(assembled, judge, search, _final_odds(search), model, prepared.notes, seed).answer()
+        found, notes = _final_odds(search), [*prepared.notes, *search.notes]
+        answer = Report(assembled, judge, search, found, model, notes, seed).answer()
         named = answer.diagnosis.effects if witness else []
         if not named:
             return answer
@@ -111,15 +114,22 @@ def diagnose_prepared(
     return replace(answer, diagnosis=answer.diagnosis.model_copy(update={"witness": said}))
 
 
+def _wandering(assembled: Assembled) -> float:
+    """[s] to which the logs say that their clocks are known, where that is worse than is taken for granted."""
+    return assembled.clock_skew if assembled.clock_skew > _CLOCKS else 0.0
+
+
 def _final_odds(search: Search) -> Odds:
     """Odds of the sets, those that count fitted on all samples, with each of their effects left out, too."""
-    found = odds(search.candidates(), search.full.samples)
+    found = search.odds()
     likely = [names for names, p in found.ranked()[:MOST_TIED] if p > TIED]
+    if found.unknown > _BLAMED:
+        likely.append(search.best().names)
     parts = {names - {name} for names in likely[:1] if len(names) > 1 for name in names}
     for names in {frozenset[str](), *likely, *(p for p in parts if p in search.found)}:
         search.polish(names)
     for _ in range(_MOST_POLISHED):
-        found = odds(search.candidates(), search.full.samples)
+        found = search.odds()
         likeliest = found.ranked()[0][0]
         if likeliest in search.complete:
             break
@@ -127,10 +137,10 @@ def _final_odds(search: Search) -> Odds:
     for _ in range(_FURTHER):
         if not look_further(search, likeliest):
             break
-        likeliest = odds(search.candidates(), search.full.samples).ranked()[0][0]
+        likeliest = search.odds().ranked()[0][0]
         search.polish(likeliest)
     exchange_mounting(search, likeliest)
-    return odds(search.candidates(), search.full.samples)
+    return search.odds()
 
 
 def white_floor(floor: Floor) -> float:

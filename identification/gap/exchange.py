@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from identification.effect_choice import EffectChoice
 from identification.gap.contender import Contender
+from identification.gap.mountings import fit_mounting
 from identification.gap.screen import ALWAYS, worth_fitting
 from identification.gap.unknowns import without
 
@@ -65,7 +66,7 @@ def exchange_mounting(search: "Search", names: frozenset[str]) -> None:
         known = search.found[names]
         choice = next(c for c in known.fit.effects if c.name == given)
         rest = search.found.get(names - {given}) or left_out(search, known, choice)
-        search.fit_mounting(rest, search.screened(rest, names), other)
+        fit_mounting(search, rest, search.screened(rest, names), other)
         if twin in search.found:
             search.polish(twin)
 

@@ -24,6 +24,8 @@ _KIN = (
     {"viscous_heating", "force_drift"},
 )
 """Effects that act where a stroke turns, over displacement, velocity, field, acceleration and time."""
+_KINSHIP = 8.0
+"""[1] natural logarithm of the odds that kin has to bring beyond others: an error of form brought up to six."""
 _TRIED = 2
 """Effects that are fitted beside it."""
 _MOST = 3
@@ -40,7 +42,8 @@ def look_further(search: "Search", names: frozenset[str]) -> bool:
     paid = []
     for more in _with_one_more(search, names, names | kin):
         search.polish(more)
-        search.shown[more] = Shown(names, evidence(search.found[names].left, search.found[more].left))
+        told = evidence(search.found[names].left, search.found[more].left)
+        search.shown[more] = Shown(names, told - (_KINSHIP if more & kin - names else 0.0))
         paid += [more] if search.shown[more].log_odds > price(names) else []
     for more in paid:
         _fit_parts(search, more)
@@ -54,7 +57,7 @@ def _with_one_more(search: "Search", names: frozenset[str], without: frozenset[s
         sets.append(names | {gain.choice.name})
         if sets[-1] not in search.complete:
             search.fit_beside(known, gain, [])
-    grown = [n for n in search.found if len(n) == len(names) + 1 and names < n and not (n - names) & without]
+    grown = [n for n in search.found if len(n) == len(names) + 1 and names < n]
     best = sorted(grown, key=lambda n: search.left_of(search.found[n]))[:1]
     return list(dict.fromkeys([*sets, *best]))
 

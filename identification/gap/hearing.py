@@ -54,6 +54,11 @@ class Hearing:
         """[N] noise of the recorded force, and of the motion carried into it."""
         return math.hypot(self.noise, self.carried or 0.0)
 
+    @property
+    def colour(self) -> float:
+        """[1] part of the noise's variance that is not white."""
+        return 1.0 - (self.white / self.noise) ** 2
+
     def listen(self, contender: Contender, full: Problem, judge: Judge) -> None:
         """Raise the floor to what a set leaves, as far as that is noise, of the motion or not white.
 

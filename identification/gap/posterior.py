@@ -25,10 +25,14 @@ _GRAIN = 0.004
 """[1] excess variance over the floor's that means nothing: noise of the motion carried by the fit."""
 _SAMPLES = 10.0
 """[samples] the grain of a short recording: this over its length."""
+_COLOURED = 0.05
+"""[1] the same of a noise that is slow: for the part of its variance that is."""
 _FORM = 0.01
 """[1] part of the whole gap that the right effect leaves because its form is not exact."""
 _UNKNOWN_FORM = 0.2
 """[1] part of the whole gap that known effects leave of an unknown one, at best."""
+_CLEAR = 1.0
+"""[1] whole gap from which on a set that leaves more of it than the right ones do is not the whole truth."""
 _UNSURE_FLOOR = 0.03
 """[1] excess over the floor's variance that noise of the motion explains."""
 _UNSURE = 3.0
@@ -85,20 +89,22 @@ class Odds:
         return sorted(self.sets.items(), key=lambda item: -item[1])
 
 
-def odds(candidates: Sequence[Candidate], samples: int) -> Odds:
+def odds(candidates: Sequence[Candidate], samples: int, colour: float = 0.0) -> Odds:
     """Probabilities of sets of effects, and of none of them.
 
     Args:
         candidates: every set that was fitted, the empty one among them.
         samples: fitted samples.
+        colour: part of the noise's variance [1] that is not white: what is slow goes up and down by chance.
     """
     whole = max(next(c.left for c in candidates if not c.names), 0.0)
-    grain = _GRAIN + _SAMPLES / max(samples, 1) + _FORM * whole
-    scores = _scores(candidates, grain)
+    grain = _GRAIN + _SAMPLES / max(samples, 1) + _COLOURED * colour + _FORM * whole
+    scores = _scores(candidates, grain, whole)
     unsure = _UNSURE_FLOOR + _UNSURE * math.sqrt(2.0 / max(samples, 1))
     likeliest = max(candidates, key=lambda c: scores[c.names])
     unknown = _log_prior(likeliest.names) + math.log(_UNKNOWN)
     unknown -= _POWER * math.log(_UNKNOWN_FORM * whole + grain + unsure)
+    unknown -= _incomplete(likeliest, whole)
     # An unknown effect is a rival only as far as the known ones leave something that the floor cannot explain.
     weight = _logistic(likeliest.left - unsure, 0.25 * unsure)
     shares = _normalised(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
@@ -108,14 +114,21 @@ def odds(candidates: Sequence[Candidate], samples: int) -> Odds:
     return Odds(dict(zip(scores, map(float, known), strict=True)), 1.0 - float(known.sum()))
 
 
-def _scores(candidates: Sequence[Candidate], grain: float) -> dict[frozenset[str], float]:
+def _scores(candidates: Sequence[Candidate], grain: float, whole: float) -> dict[frozenset[str], float]:
     """Logarithms of the odds of sets, from all that they leave and from what places say, whichever says more."""
     prior = {c.names: _log_prior(c.names) + math.log(c.weight) for c in candidates}
-    scores = {c.names: prior[c.names] - _POWER * math.log(max(c.left, 0.0) + grain) for c in candidates}
+    lost = {c.names: _POWER * math.log(max(c.left, 0.0) + grain) + _incomplete(c, whole) for c in candidates}
+    scores = {names: prior[names] - lost[names] for names in prior}
     told = [(c.names, c.shown) for c in candidates if c.shown]
     for names, (beside, log_odds) in sorted(told, key=lambda one: len(one[0])):
         scores[names] = max(scores[names], scores[beside] + log_odds + prior[names] - prior[beside])
     return scores
+
+
+def _incomplete(candidate: Candidate, whole: float) -> float:
+    """What a set loses beside other known ones for leaving more of a clear gap than any right one does."""
+    beyond = candidate.left / (_UNKNOWN_FORM * whole) if whole > _CLEAR else 0.0
+    return _POWER * math.log(max(beyond, 1.0))
 
 
 def price(names: frozenset[str]) -> float:

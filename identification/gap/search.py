@@ -9,7 +9,7 @@ worth a full fit.
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,14 +17,16 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.effect_choice import EffectChoice
+from identification.gap.clocks import nothing_but_clocks, steadied
 from identification.gap.contender import Contender
 from identification.gap.exchange import exchange, leave_out
 from identification.gap.explain import Effort, JointFit, fit_on_all, fit_with
 from identification.gap.hearing import NOTHING, Hearing
 from identification.gap.hum import strongest_line
 from identification.gap.judge import Judge
+from identification.gap.mountings import fit_mounting, may_help
 from identification.gap.plausible import plausibility
-from identification.gap.posterior import Candidate, Shown
+from identification.gap.posterior import Candidate, Odds, Shown, odds
 from identification.gap.residual import by_piece
 from identification.gap.screen import ALWAYS, Gain, promise, worth_fitting
 from identification.gap.screenings import SCREEN_RATE, Screenings
@@ -41,8 +43,6 @@ _LARGE, _MORE = 2.0, 10
 """[1] excess from which on a step from the law's own fit tells little, and effects fitted beside none then."""
 _PATIENCE = 60.0
 """[s] of processor time after which no further set is begun."""
-_SLIGHT = 0.02
-"""[1] excess below which no play is looked for beside other effects."""
 _BEAM = (2, 1)
 """Sets that are taken further, of one and of two effects."""
 _WORTH = 0.9
@@ -57,10 +57,6 @@ _SMALL = 0.05
 """[1] excess up to which an effect has to promise a fair part of it, to be worth a fit."""
 _FAIR = 0.15
 """[1] that part."""
-_SHOWN = 0.8
-"""[1] part of the excess that the simplest form of play or give may leave, for richer ones to be tried."""
-_HELPS = 0.97
-"""[1] part of the excess that play or give may leave alone, to be tried beside other effects too."""
 _POLISHED, _ROUNDS = 15, 3
 """Most steps on all samples, and how often what they hold is taken anew."""
 _HELD = 1e-3
@@ -82,6 +78,8 @@ class Search:
     judge: Judge
     hearing: Hearing
     """What counts as noise so far."""
+    clocks: float = 0.0
+    """[s] to which the log says that its channels' clocks are known; 0 where that is good enough."""
     progress: Progress = lambda what, error: None
     found: dict[frozenset[str], Contender] = field(default_factory=dict)
     complete: set[frozenset[str]] = field(default_factory=set)
@@ -90,13 +88,15 @@ class Search:
     """What places say of one effect more."""
     began: float = field(default_factory=time.process_time)
     """[s] of processor time."""
+    notes: list[str] = field(default_factory=list)
+    """What a person should know of the way, in words."""
     _screenings: Screenings = field(default_factory=Screenings)
 
     def run(self) -> None:
         """Fit what is worth it; ``found`` holds the best of each set."""
         none = self.fit((), effort=_PLAIN)
         self.hearing.listen(none, self.full, self.judge)
-        if self.at_floor(none) or self._nothing(none):
+        if self.at_floor(none) or self._nothing(none) or self._clocks_explain(none):
             return
         beam = [none]
         for size, count in enumerate(_FITTED, 1):
@@ -117,6 +117,17 @@ class Search:
     def _nothing(self, none: Contender) -> bool:
         """Whether the law alone stands so near the floor that nothing is looked for."""
         return max(none.seen, none.unseen) < NOTHING * self.floor
+
+    def _clocks_explain(self, none: Contender) -> bool:
+        """Whether nothing is left once the force's delay may bend as far as the log's clocks allow."""
+        if not self.clocks:
+            return False
+        steady, wander = steadied(none, self.full, self.judge, self.clocks)
+        if self._nothing(steady):
+            self.found[steady.names] = steady
+            self.complete.add(steady.names)
+            self.notes.append(nothing_but_clocks(wander))
+        return steady.names in self.complete
 
     @property
     def late(self) -> bool:
@@ -160,6 +171,10 @@ class Search:
             )
             for names, c in self.found.items()
         ]
+
+    def odds(self) -> Odds:
+        """Of the sets that were fitted."""
+        return odds(self.candidates(), self.full.samples, self.hearing.colour)
 
     def fit(
         self,
@@ -212,39 +227,12 @@ class Search:
                 return
             self.fit_beside(parent, gain, [])
         for name in ALWAYS:
-            if not self.late and self._may_help(parent, name):
-                self.fit_mounting(parent, gains, name)
-
-    def fit_mounting(self, parent: Contender, gains: Sequence[Gain], name: str) -> None:
-        """Fit a set with play or give, whatever that promises; with richer forms where simpler ones show."""
-        mine = [g for g in gains if g.choice.name == name]
-        # A pin that the damper follows and one that lies free differ: neither speaks for the other.
-        for acts in dict.fromkeys(g.choice.form.acts for g in mine):
-            alike = [g for g in mine if g.choice.form.acts == acts]
-            self._try_always(parent, sorted(alike, key=lambda g: len(g.choice.quantities)))
+            if not self.late and may_help(self, parent, name):
+                fit_mounting(self, parent, gains, name)
 
     def screened(self, parent: Contender, without: frozenset[str]) -> list[Gain]:
         """What every further effect promises beside a set; those named are not looked at."""
         return self._screenings.beside(parent, without, self.left_of(parent), self._thin, self._line)
-
-    def _may_help(self, parent: Contender, name: str) -> bool:
-        """Whether an effect is tried beside others without a promise: not where alone it took nothing away."""
-        alone = self.found.get(frozenset({name}))
-        return not parent.names or alone is None or self.left_of(alone) < _HELPS * self.none_left
-
-    def _try_always(self, parent: Contender, gains: Sequence[Gain]) -> None:
-        """Fit a set with an effect whose promise says little, with its richer forms where the first has shown."""
-        simpler: dict[str, float] = {}
-        for gain in gains:
-            if parent.names and gain.choice.form.acts == "displacement_follower":
-                continue  # its contacts ask for a high rate, and a free pin shows beside others as well
-            if self.at_floor(self.best()) or self.left_of(parent) < _SLIGHT:
-                return
-            starts = [*_begun_with(simpler, gain.choice), *gain.choice.form.starts]
-            with_it = self.fit_beside(parent, gain, starts)
-            simpler = with_it.fit.values[gain.choice.name]
-            if self.left_of(with_it) > _SHOWN * self.left_of(parent):
-                return
 
     @property
     def none_left(self) -> float:
@@ -289,12 +277,3 @@ class Search:
             if known.fit.converged or self.late:
                 return
             self.fit(known.fit.effects, None, [known.fit.minimum.unknowns])
-
-
-def _begun_with(simpler: Mapping[str, float], choice: EffectChoice) -> list[tuple[float, ...]]:
-    """Starts of a richer form at what a simpler one has found of the parameters that both have."""
-    if not simpler:
-        return []
-    symbols = [q.symbol for q in choice.quantities]
-    starts = {tuple(simpler.get(s, v) for s, v in zip(symbols, at, strict=True)) for at in choice.form.starts}
-    return sorted(starts)

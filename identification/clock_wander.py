@@ -57,18 +57,13 @@ def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
     wander = _likeliest(bends, H[free], gradient[inside], inside, problem.delay_prior)
     if not wander:
         return minimum, 0.0
-    # The bends are eliminated (Schur), each held by the wander that was found likeliest.
-    held = bends.own + np.eye(len(bends.own)) / wander**2
-    left = H - bends.shared @ np.linalg.solve(held, bends.shared.T)
-    pull = gradient - bends.shared @ np.linalg.solve(held, bends.gradient)
-    unknowns = minimum.unknowns.copy()
-    unknowns[inside] -= np.linalg.solve(left[free], pull[inside])
-    unknowns = np.clip(unknowns, *problem.bounds())
+    left, step = _step(bends, H, gradient, inside, wander)
+    unknowns = np.clip(minimum.unknowns + step, *problem.bounds())
     return replace(minimum, unknowns=unknowns, evaluation=replace(minimum.evaluation, hessian=left)), wander
 
 
 def bent_away(problem: Problem, unknowns: Array, spread: float) -> tuple[list[Array], float]:
-    """What a delay of the force that bends adds to the residuals, where it leaves least; and how far it bends.
+    """What is added to the residuals where the delay bends and the unknowns follow; and how far it bends.
 
     Args:
         problem: with all samples marked that are to be looked at.
@@ -78,14 +73,31 @@ def bent_away(problem: Problem, unknowns: Array, spread: float) -> tuple[list[Ar
     Returns:
         (N,) of each piece, in units of the noise; and the root mean square of the bends [s].
     """
-    added, bends = [], []
+    bends, here = _bends(problem, unknowns), problem.evaluate(unknowns)
+    _, step = _step(bends, here.hessian, here.gradient, problem.inside(unknowns), spread)
+    bent = -np.linalg.solve(_held(bends, spread), bends.gradient + bends.shared.T @ step)
+    added, start = [], 0
     for i, piece in enumerate(problem.pieces):
         r, J = problem.residuals(unknowns, i)
-        bent = _hats(len(r), piece.stroke.rate) * (J[:, COORDINATE_COUNT] / problem.delay_prior)[:, None]
-        held = bent.T @ bent + np.eye(bent.shape[1]) / spread**2
-        bends.append(-np.linalg.solve(held, bent.T @ r))
-        added.append(bent @ bends[-1])
-    return added, float(np.sqrt(np.mean(np.concatenate(bends) ** 2)))
+        hats = _hats(len(r), piece.stroke.rate)
+        own = bent[start : start + hats.shape[1]]
+        added.append(J @ step[problem.columns(i)] + (hats @ own) * J[:, COORDINATE_COUNT] / problem.delay_prior)
+        start += len(own)
+    return added, float(np.sqrt(np.mean(bent**2)))
+
+
+def _step(bends: _Bends, H: Array, gradient: Array, inside: BoolArray, wander: float) -> tuple[Array, Array]:
+    """The information (U, U) that the bends leave of the unknowns, and the step (U,) of these beside them."""
+    # The bends are eliminated (Schur), each held by the wander.
+    shared = np.linalg.solve(_held(bends, wander), bends.shared.T)
+    left, pull = H - bends.shared @ shared, gradient - shared.T @ bends.gradient
+    step = np.zeros(len(H))
+    step[inside] = -np.linalg.solve(left[np.ix_(inside, inside)], pull[inside])
+    return left, step
+
+
+def _held(bends: _Bends, wander: float) -> Array:
+    return np.asarray(bends.own + np.eye(len(bends.own)) / wander**2)
 
 
 def wander_in_words(wander: float) -> tuple[str, ...]:

@@ -73,6 +73,15 @@ def test_what_the_search_has_grown_already_is_asked_too(further, monkeypatch):
     assert further.complete == {more}
 
 
+def test_kin_that_the_search_has_grown_has_to_bring_more(further, monkeypatch):
+    names, kin = frozenset({"force_filter"}), frozenset({"force_filter", "moving_mass"})
+    monkeypatch.setattr(further, "screened", lambda parent, without: [])
+    for some in (names, kin):
+        further.add(some)
+    look_further(further, names)
+    assert further.shown[kin].log_odds == pytest.approx(-8.0)
+
+
 def test_kin_of_what_is_named_are_not_asked(further):
     look_further(further, frozenset({"end_stop"}))
     assert {"end_stop", "gas_spring", "clevis_backlash"} <= further.without

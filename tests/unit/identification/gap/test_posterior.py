@@ -47,6 +47,18 @@ def test_two_that_fit_alike_share_the_odds():
     assert found.of_effect("force_delay") > 0.3
 
 
+def test_a_little_more_of_slow_noise_is_no_second_effect():
+    found = candidates(none=0.3, mains_hum=0.012, force_drift__mains_hum=0.0)
+    assert odds(found, SAMPLES).ranked()[0][0] == frozenset({"force_drift", "mains_hum"})
+    assert odds(found, SAMPLES, colour=0.3).ranked()[0][0] == frozenset({"mains_hum"})
+
+
+@pytest.mark.parametrize(("whole", "more"), [(4.5, True), (0.45, False)])
+def test_of_a_clear_gap_what_leaves_the_half_is_not_the_whole_truth(whole, more):
+    three = candidates(end_stop=0.5 * whole, coil_lag__end_stop__force_delay=0.085 * whole, none=whole)
+    assert (len(odds(three, SAMPLES).ranked()[0][0]) == 3) == more
+
+
 def test_what_no_effect_explains_is_unknown():
     found = odds(candidates(none=8.0, gas_spring=5.0, end_stop=6.0), SAMPLES)
     assert found.unknown > 0.8

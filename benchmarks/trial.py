@@ -25,8 +25,6 @@ _CLEAR = 1.2
 """[1] refitted law over the floor from which on a shrinkage is asked for."""
 _WITHIN = 0.05
 """[1] by which a claimed shrinkage may be off."""
-_HELD_OUT = 0.25
-"""[1] part of a recording that no fit sees."""
 _ALIKE = 2.63
 """[1] sum of the squared correlations of neighbouring fourth differences of white noise."""
 _PAGE = """# The diagnosis on sealed scenarios
@@ -199,9 +197,8 @@ def _close(cases: Sequence[CaseAnswer], method: str, chance: Mapping[str, float]
 def _chance(folder: TrialFolder, cases: Iterable[CaseAnswer]) -> dict[str, float]:
     """[1] deviation that white noise gives to claimed less true shrinkage, by the name of the case.
 
-    The mean square of N samples of noise varies by the root of 2 / N of itself; a quarter of the recording was
-    kept out. The floor comes from fourth differences of the whole recording, neighbours of which are alike.
-    Coloured noise comes on top.
+    The mean square of N samples of noise varies by the root of 2 / N of itself. The floor comes from fourth
+    differences, neighbours of which are alike. Coloured noise comes on top.
     """
     found = {}
     for case in cases:
@@ -209,7 +206,7 @@ def _chance(folder: TrialFolder, cases: Iterable[CaseAnswer]) -> dict[str, float
         if twin and prediction and case.true_shrinkage is not None and case.before_over_floor:
             noise = twin["sensors"]["force"]["noise"]
             own = sum(one["samples"] for one in twin["baseline"]["per_drive"])
-            claimed = (2.0 / (_HELD_OUT * own) + 2.0 * _ALIKE / own) / (case.before_over_floor**2 - 1.0) ** 2
+            claimed = 2.0 * (1.0 + _ALIKE) / own / (case.before_over_floor**2 - 1.0) ** 2
             true = 2.0 / prediction["samples"] / ((prediction["before_n"] / noise) ** 2 - 1.0) ** 2
             found[case.id] = math.sqrt(claimed + true)
     return found

@@ -11,7 +11,10 @@ def table(trial: Trial) -> str:
     s = trial.scores
     wires = sum(case.over_wires for case in trial.cases)
     again = f" and {wires} of them once more over wires" if wires else ""
-    lines = [f"{len(trial.cases) - wires} cases{again}, seed {trial.seed}, sealed {trial.sealed_sha256[:16]}...", ""]
+    lines = [
+        f"{len(trial.cases) - wires} cases{again}, seed {trial.seed}, sealed {trial.sealed_sha256[:16]}...",
+        "",
+    ]
     lines += ["right set named first / among the alternatives too"]
     rows = [(name, _share(first), _share(s.among[name])) for name, first in s.named_first.items() if first.of]
     lines += _columns(rows)

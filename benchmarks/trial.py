@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import orjson
 
+from benchmarks.trial_alike import claimed_cases, shrunk_there
 from benchmarks.trial_next import open_cases, second_answer
 from sim_rig.trial.answer import CaseAnswer, Scores, Share, Trial
 from sim_rig.trial.folder import TrialFolder
@@ -36,6 +37,7 @@ diagnosed from its log alone, then unsealed. [How it works](../explanation/blind
 ```
 {command}
 python -m benchmarks.trial_next trial.json
+python -m benchmarks.trial_alike trial.json
 python -m benchmarks.trial trial.json{since}
 ```
 
@@ -80,6 +82,8 @@ class Beside(NamedTuple):
     chance: Mapping[str, float]
     """[1] by which noise alone moves claimed from true shrinkage, one deviation, case by case."""
     notes: Sequence[str] = ()
+    alike: Share | None = None
+    """Claims of poor methods that came true on another run of their kind."""
     anew: str = ""
     """The first case whose shrinkage was claimed as it is now; claims before were learnt from, and stand apart."""
 
@@ -118,6 +122,8 @@ def _bars(found: Scores, cases: Sequence[CaseAnswer], beside: Beside) -> Iterabl
     yield "effects named where nothing is", "at most 2 in 100", _said(found.false_alarms)
     yield "unknown effects blamed on no known one", "27 of 30", _said(found.unknown_left_unknown)
     yield from _claims(cases, beside)
+    if beside.alike and beside.alike.of:
+        yield "claimed shrinkage within 5 points on another run of its kind, poor", "–", _said(beside.alike)
     yield "truth named after the proposed stroke was made, poor methods", "90 %", _said(beside.next_strokes)
     yield "same answer over the wires", "10 of 10", _said(_same_over_wires(cases))
 
@@ -194,6 +200,13 @@ def _close(cases: Sequence[CaseAnswer], method: str, chance: Mapping[str, float]
     return share(_off(case) <= max(_WITHIN, 2.0 * (chance or {}).get(case.id, 0.0)) for case in there)
 
 
+def _alike(folder: TrialFolder, cases: Iterable[CaseAnswer]) -> Share:
+    """Claims of poor methods that came true on another run of their kind, of cases with a clear gap."""
+    there = {case.id: shrunk_there(folder, case) for case in claimed_cases(folder)}
+    found = [case.model_copy(update={"true_shrinkage": there[case.id]}) for case in cases if case.id in there]
+    return _close(found, "poor")
+
+
 def _chance(folder: TrialFolder, cases: Iterable[CaseAnswer]) -> dict[str, float]:
     """[1] deviation that white noise gives to claimed less true shrinkage, by the name of the case.
 
@@ -266,7 +279,9 @@ def main() -> None:
     wires = max((int(name.split("_")[1]) + 1 for name in twice), default=0)
     plan = Plan(seal.cases, seal.seed, seal.draw, 1, wires, DIAGNOSE)
     whole = answer(folder, plan)
-    beside = Beside(_came_true(folder), _chance(folder, whole.cases), asked.note, asked.anew)
+    beside = Beside(
+        _came_true(folder), _chance(folder, whole.cases), asked.note, _alike(folder, whole.cases), asked.anew
+    )
     asked.page.write_text(page(whole, seal.cases, beside), encoding="utf-8")
 
 

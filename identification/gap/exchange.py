@@ -1,8 +1,8 @@
 """The best sets once more: with each of their effects left out, and with others in its place.
 
-A search that goes forward keeps what came first. What a second effect seems to gain may only be that the search
-for the first one had stopped short; and an effect that came first because two others together look like it would
-stay.
+A search that goes forward keeps what came first, and of play and give the one that it happened to try. What a
+second effect seems to gain may only be that the search for the first one had stopped short; and an effect that
+came first because two others together look like it would stay.
 """
 
 from typing import TYPE_CHECKING

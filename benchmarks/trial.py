@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import orjson
 
 from benchmarks.trial_alike import claimed_cases, shrunk_there
-from benchmarks.trial_next import open_cases, second_answer
+from benchmarks.trial_next import open_cases, sealed, second_answer
 from sim_rig.trial.answer import CaseAnswer, Scores, Share, Trial
 from sim_rig.trial.folder import TrialFolder
 from sim_rig.trial.run import DIAGNOSE, WIRES, Plan
@@ -272,9 +272,7 @@ def main() -> None:
     options.add_argument("--from", dest="anew", default="", help="first case whose shrinkage is claimed as now")
     asked = options.parse_args()
     folder = TrialFolder(asked.trial)
-    seal = folder.seal()
-    if seal is None:
-        raise SystemExit(f"{asked.trial}: no trial has been sealed there; run `mrbench trial` first")
+    seal = sealed(folder)
     twice = [path.name for path in (folder.root / "diagnoses").glob(f"*{WIRES}.outcome.json")]
     wires = max((int(name.split("_")[1]) + 1 for name in twice), default=0)
     plan = Plan(seal.cases, seal.seed, seal.draw, 1, wires, DIAGNOSE)

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import orjson
 
-from sim_rig.trial.calibrate import floor
+from benchmarks.trial_next import sealed
 from sim_rig.trial.folder import TrialFolder
 from sim_rig.trial.processes import MRBENCH, CommandFailedError, call
 from sim_rig.trial.strokes import method_document, strokes
 from sim_rig.trial.truth import TrueCase, read_sealed
-from sim_rig.trial.unseal import true_shrinkage, unsealed
+from sim_rig.trial.unseal import force_noise, true_shrinkage, unsealed
 
 SEED = 15_485_863
 """Added to the seeds of the trial's strokes and of a case's run."""
@@ -24,10 +24,7 @@ SEED = 15_485_863
 
 def claimed_cases(folder: TrialFolder) -> Iterator[TrueCase]:
     """Cases with effects under a poor method for which a diagnosis claims a shrinkage."""
-    seal = folder.seal()
-    if seal is None:
-        raise SystemExit(f"{folder.root}: no trial has been sealed there; run `mrbench trial` first")
-    for case in read_sealed(folder.truth, seal.sha256).cases:
+    for case in read_sealed(folder.truth, sealed(folder).sha256).cases:
         if case.method == "poor" and case.effects and folder.files(case.id).twin.exists():
             found = unsealed(folder, case, case.id)
             if found.claimed_shrinkage and found.named and found.named.effects:
@@ -42,8 +39,7 @@ def prediction(folder: TrialFolder, case: str) -> Path:
 def shrunk_there(folder: TrialFolder, case: TrueCase) -> float | None:
     """Shrinkage [1] on that run; None where it has not been made, or there is nothing to shrink."""
     path = prediction(folder, case.id)
-    noise = floor(case.damper, case.scenario["sensors"]["force"])
-    return true_shrinkage(orjson.loads(path.read_bytes()), noise) if path.exists() else None
+    return true_shrinkage(orjson.loads(path.read_bytes()), force_noise(case)) if path.exists() else None
 
 
 def make(folder: TrialFolder, case: TrueCase, seed: int) -> None:
@@ -66,10 +62,10 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("trial", type=Path, help="the answer of `mrbench trial`; its folder stands beside it")
     folder = TrialFolder(options.parse_args().trial)
-    seal = folder.seal()
+    seed = sealed(folder).seed
     for case in claimed_cases(folder):
         try:
-            make(folder, case, seal.seed if seal else 0)
+            make(folder, case, seed)
         except CommandFailedError as error:
             print(f"{case.id}: {error}", flush=True)
 

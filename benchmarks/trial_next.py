@@ -13,7 +13,7 @@ from typing import Any
 import orjson
 
 from sim_rig.trial.answer import CaseAnswer
-from sim_rig.trial.folder import TrialFolder
+from sim_rig.trial.folder import Seal, TrialFolder
 from sim_rig.trial.processes import MRBENCH, CommandFailedError, call
 from sim_rig.trial.run import DIAGNOSE
 from sim_rig.trial.truth import TrueCase, read_sealed
@@ -23,12 +23,17 @@ SEED = 104_729
 """Added to a case's seed for the run on the proposed stroke."""
 
 
-def open_cases(folder: TrialFolder) -> Iterator[tuple[TrueCase, CaseAnswer]]:
-    """Cases with known effects under a poor method whose diagnosis proposed a stroke."""
+def sealed(folder: TrialFolder) -> Seal:
+    """What the folder of a trial was sealed with."""
     seal = folder.seal()
     if seal is None:
         raise SystemExit(f"{folder.root}: no trial has been sealed there; run `mrbench trial` first")
-    for case in read_sealed(folder.truth, seal.sha256).cases:
+    return seal
+
+
+def open_cases(folder: TrialFolder) -> Iterator[tuple[TrueCase, CaseAnswer]]:
+    """Cases with known effects under a poor method whose diagnosis proposed a stroke."""
+    for case in read_sealed(folder.truth, sealed(folder).sha256).cases:
         if case.method == "poor" and case.kind in ("single", "pair", "triple") and folder.outcome(case.id):
             found = unsealed(folder, case, case.id)
             if found.failure is None and _proposed(folder, case.id) is not None:

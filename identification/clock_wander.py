@@ -7,6 +7,7 @@ where the likelihood of its residuals is greatest with the bends integrated out 
 The unknowns follow by one Gauss-Newton step from which the knots are eliminated; their intervals grow with them.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -50,7 +51,7 @@ def without_wander(problem: Problem, minimum: Minimum) -> tuple[Minimum, float]:
         problem: what was minimised.
         minimum: where.
     """
-    bends = _bends(problem, minimum.unknowns)
+    bends = _bends(problem, minimum.unknowns, _both(problem, minimum.unknowns))
     H, gradient = minimum.evaluation.hessian, minimum.evaluation.gradient
     inside = problem.inside(minimum.unknowns)
     free = np.ix_(inside, inside)
@@ -73,12 +74,12 @@ def bent_away(problem: Problem, unknowns: Array, spread: float) -> tuple[list[Ar
     Returns:
         (N,) of each piece, in units of the noise; and the root mean square of the bends [s].
     """
-    bends, here = _bends(problem, unknowns), problem.evaluate(unknowns)
+    both, here = _both(problem, unknowns), problem.evaluate(unknowns)
+    bends = _bends(problem, unknowns, both)
     _, step = _step(bends, here.hessian, here.gradient, problem.inside(unknowns), spread)
     bent = -np.linalg.solve(_held(bends, spread), bends.gradient + bends.shared.T @ step)
     added, start = [], 0
-    for i, piece in enumerate(problem.pieces):
-        r, J = problem.residuals(unknowns, i)
+    for i, (piece, (r, J)) in enumerate(zip(problem.pieces, both, strict=True)):
         hats = _hats(len(r), piece.stroke.rate)
         own = bent[start : start + hats.shape[1]]
         added.append(J @ step[problem.columns(i)] + (hats @ own) * J[:, COORDINATE_COUNT] / problem.delay_prior)
@@ -110,10 +111,14 @@ def wander_in_words(wander: float) -> tuple[str, ...]:
     )
 
 
-def _bends(problem: Problem, unknowns: Array) -> _Bends:
+def _both(problem: Problem, unknowns: Array) -> list[tuple[Array, Array]]:
+    """Residuals (N,) and slopes (N, C) of each piece, in units of the noise."""
+    return [problem.residuals(unknowns, i) for i in range(len(problem.pieces))]
+
+
+def _bends(problem: Problem, unknowns: Array, both: Sequence[tuple[Array, Array]]) -> _Bends:
     own, shared, gradients = [], [], []
-    for i, piece in enumerate(problem.pieces):
-        r, J = problem.residuals(unknowns, i)
+    for i, (piece, (r, J)) in enumerate(zip(problem.pieces, both, strict=True)):
         # The fit counts its delay in deviations of the prior; a bend is in seconds.
         bent = _hats(len(r), piece.stroke.rate) * (J[:, COORDINATE_COUNT] / problem.delay_prior)[:, None]
         rows = np.zeros((len(unknowns), bent.shape[1]))

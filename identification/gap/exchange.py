@@ -65,15 +65,20 @@ def exchange_mounting(search: "Search", names: frozenset[str]) -> None:
             continue
         known = search.found[names]
         choice = next(c for c in known.fit.effects if c.name == given)
-        rest = search.found.get(names - {given}) or left_out(search, known, choice)
+        rest = _rest(search, known, choice)
         fit_mounting(search, rest, search.screened(rest, names), other)
         if twin in search.found:
             search.polish(twin)
 
 
+def _rest(search: "Search", contender: Contender, choice: EffectChoice) -> Contender:
+    """A set without one of its effects, as it is known or else fitted."""
+    return search.found.get(contender.names - {choice.name}) or left_out(search, contender, choice)
+
+
 def _replace(search: "Search", best: Contender, choice: EffectChoice) -> None:
     """Fit the most promising effects in the place of one."""
-    rest = search.found.get(best.names - {choice.name}) or left_out(search, best, choice)
+    rest = _rest(search, best, choice)
     gains = search.screened(rest, best.names)
     for gain in worth_fitting(gains, _EXCHANGED):
         if rest.names | {gain.choice.name} not in search.found:

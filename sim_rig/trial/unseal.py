@@ -51,7 +51,7 @@ def judged(
         failure = outcome.failure or "its diagnosis cannot be read"
         return CaseAnswer(**base, failure=failure, right=False, among=False, probability_of_truth=LEAST)
     said = _said(diagnosis)
-    shrunk = None if prediction is None else true_shrinkage(prediction, _noise(case))
+    shrunk = None if prediction is None else true_shrinkage(prediction, force_noise(case))
     return CaseAnswer(**base, **said, failure=None, true_shrinkage=shrunk, **_verdict_on(case, said))
 
 
@@ -109,7 +109,7 @@ def true_shrinkage(prediction: dict[str, Any], noise: float) -> float | None:
     return float(1 - (after**2 - noise**2) / (before**2 - noise**2))
 
 
-def _noise(case: TrueCase) -> float:
+def force_noise(case: TrueCase) -> float:
     """Noise of the recorded force [N], white and coloured."""
     return floor(case.damper, case.scenario["sensors"]["force"])
 

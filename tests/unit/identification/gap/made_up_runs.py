@@ -20,6 +20,11 @@ STROKES = ((0.012, 1.0, 2.0), (0.006, 3.0, 1.0), (0.01, 2.0, 1.0))
 DRIVES = (0.0, 0.2, 0.4, 0.5, 0.3, 0.1)
 
 
+def stiffening(x: Array, v: Array) -> Array:
+    """Force [N] of gas that is compressed at negative displacement, isothermal and not polytropic."""
+    return -60.0 * (1.0 / (1.0 + x / 0.03) - 1.0)
+
+
 def run(
     beside: Callable[[Array, Array], Array] | None = None, specimen: str = "LAB-001", seed: int = 0
 ) -> Recording:

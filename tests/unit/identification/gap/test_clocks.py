@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import orjson
 import pytest
-from made_up_runs import NOISE, run
+from made_up_runs import NOISE, run, stiffening
 
 from identification.assemble import assemble
 from identification.gap.clocks import steadied
@@ -26,11 +26,6 @@ def wandering(recording, skew=SKEW):
     said = {name: orjson.dumps(one).decode() for name, one in facts.items()}
     metadata = {**recording.metadata, "clock_skew": said}
     return replace(recording, stretches=(replace(made, force=force),), metadata=metadata)
-
-
-def stiffening(x, v):
-    """Gas that is compressed at negative displacement."""
-    return -60.0 * (1.0 / (1.0 + x / 0.03) - 1.0)
 
 
 def test_the_log_says_how_well_its_clocks_are_known():

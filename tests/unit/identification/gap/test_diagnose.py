@@ -3,7 +3,7 @@ import json
 import jsonschema
 import numpy as np
 import pytest
-from made_up_runs import NOISE, run
+from made_up_runs import NOISE, run, stiffening
 
 from identification import schemas
 from identification.errors import NothingToFit
@@ -11,11 +11,6 @@ from identification.gap.diagnose import diagnose, prepare
 from identification.gap.documents import STAGES
 from identification.gap.model import read_model
 from sim_rig.scenario import parse_scenario
-
-
-def stiffening(x, v):
-    """Gas that is compressed at negative displacement, isothermal and not polytropic."""
-    return -60.0 * (1.0 / (1.0 + x / 0.03) - 1.0)
 
 
 @pytest.fixture(scope="module")

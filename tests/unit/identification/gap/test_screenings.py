@@ -1,3 +1,5 @@
+"""A screening is made once for a set, as long as the set leaves what it left."""
+
 from types import SimpleNamespace
 
 import pytest

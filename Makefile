@@ -3,15 +3,21 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+RESULTS := build/results
+# CI sets this to --fail-on-skip: there, what the tests need is installed.
+TEST_OPTIONS ?=
 
-.PHONY: help install demo test wire check bench clean
+.PHONY: help install demo test unit wire check coverage faults bench clean
 
 help:
-	@echo "make demo   records six voltages on the simulated rig, identifies the damper, writes the report"
-	@echo "make test   style, types, import contracts and the test suite"
-	@echo "make wire   the drivers against the simulated instruments over their real protocols"
-	@echo "make check  style, types and import contracts only"
-	@echo "make bench  the benchmarks, as ratios against baselines of the same run"
+	@echo "make demo      records six voltages on the simulated rig, identifies the damper, writes the report"
+	@echo "make test      style, types, import contracts, all tests and the wire tests, one closing line"
+	@echo "make unit      all tests but those on wires"
+	@echo "make wire      the drivers against the simulated instruments over their real protocols"
+	@echo "make check     style, types, import contracts and the structure of the packages"
+	@echo "make coverage  branch coverage of all tests, wire tests counted"
+	@echo "make faults    plants 100 faults and counts those that make a test fail"
+	@echo "make bench     the benchmarks, as ratios against baselines of the same run"
 
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -31,14 +37,28 @@ check: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --no-cache
+	$(BIN)/pytest -q tests/contracts/test_packages.py
 
-test: check
-	$(BIN)/pytest -n 2
+unit: $(READY)
+	@rm -rf $(RESULTS) && mkdir -p $(RESULTS)
+	$(BIN)/pytest -n 2 --junitxml=$(RESULTS)/unit.xml $(TEST_OPTIONS)
 
 # In real time: what a busy machine has made late is tried once more, alone.
 wire: $(READY)
-	$(BIN)/pytest -m wire || $(BIN)/pytest -m wire --last-failed --last-failed-no-failures none
+	@mkdir -p $(RESULTS) && rm -f $(RESULTS)/wire*.xml
+	$(BIN)/pytest -m wire --junitxml=$(RESULTS)/wire.xml $(TEST_OPTIONS) || \
+		$(BIN)/pytest -m wire --junitxml=$(RESULTS)/wire_again.xml --last-failed --last-failed-no-failures none $(TEST_OPTIONS)
+
+test: check unit wire
+	@$(BIN)/pytest -m slow --collect-only -q > $(RESULTS)/slow.txt || true
+	@$(BIN)/python -m tests.summary $(RESULTS)/unit.xml $(RESULTS)/wire*.xml --deselected $(RESULTS)/slow.txt
+
+coverage: $(READY)
+	$(BIN)/python -m benchmarks.quality.branch_coverage
+
+faults: $(READY)
+	$(BIN)/python -m benchmarks.quality.planted_faults
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks

@@ -1,1 +1,3 @@
 """Runs tests, keeps their records, serves people."""
+
+__all__: list[str] = []

@@ -1,7 +1,7 @@
-"""The `mrbench` command: a thin dispatcher.
+"""The `mrbench` command: a dispatcher.
 
-Each room declares its commands in the entry-point group ``mrbench.commands``; a command's module is imported
-when it is called or listed, so no room is loaded for another's sake.
+Each package declares its commands in the entry-point group ``mrbench.commands``. A command's module is imported
+only if the command is called or listed, so that no command waits for the imports of another.
 """
 
 import os
@@ -11,6 +11,8 @@ from typing import Annotated
 
 import typer
 
+from bench.planned_strokes import accept_methods
+
 GROUP = "mrbench.commands"
 _EXTRAS = {
     "numba": "identification",
@@ -18,17 +20,17 @@ _EXTRAS = {
     "torch": "identification",
     "pyarrow": "export",
 }
-"""Packages that a small installation leaves out, and the extra that brings them."""
+"""Extra that installs each package which a minimal installation lacks."""
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(requested: bool) -> None:
+    if requested:
         typer.echo(f"mrbench {version('mrbench')}")
         raise typer.Exit
 
 
-def _application(commands: EntryPoints) -> typer.Typer:
-    """The command line with these commands; each is a plain function that typer reads."""
+def _make_application(commands: EntryPoints) -> typer.Typer:
+    """Return the command line with these commands; each is a plain function that typer reads."""
     app = typer.Typer(
         name="mrbench",
         no_args_is_help=True,
@@ -47,23 +49,23 @@ def _application(commands: EntryPoints) -> typer.Typer:
         """Test bench for magnetorheological dampers: records, identifies, diagnoses."""
 
     for command in sorted(commands, key=lambda entry: entry.name):
-        app.command(command.name)(command.load())
+        app.command(command.name)(accept_methods(command.name, command.load()))
     return app
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run one command; exit 0 with the answer, 1 with one line on what could not be done, 2 on misuse.
+    """Run one command: exit 0 on success, 1 with a one-line error message, 2 on misuse.
 
-    A room's own errors carry ``exit_code``; anything else is a defect and keeps its traceback.
+    Expected errors carry ``exit_code``. Any other exception is an internal error and keeps its traceback.
     """
-    # The matrices here are small: a second thread of the BLAS library spins more than it multiplies.
+    # The matrices are small: a second thread of the BLAS library costs more time than it saves.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    words = sys.argv[1:] if arguments is None else arguments
+    arguments = sys.argv[1:] if arguments is None else arguments
     commands = entry_points(group=GROUP)
-    # Loading all of them takes longer than most of them take: only the one that was called, if there is one.
-    called = commands.select(name=words[0]) if words else commands
+    # Loading all commands takes longer than most of them run, so only the called one is loaded.
+    called = commands.select(name=arguments[0]) if arguments else commands
     try:
-        _application(called or commands)(args=words, prog_name="mrbench")
+        _make_application(called or commands)(args=arguments, prog_name="mrbench")
     except ModuleNotFoundError as error:
         if error.name not in _EXTRAS:
             raise

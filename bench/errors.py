@@ -1,44 +1,44 @@
 """Errors of the bench.
 
 BenchError
-├── MethodError      a method document asks for what cannot be compiled or exceeds its own limits
-├── ConfigError      bench.toml does not describe a bench
-├── RunError         a run could not be carried out
-│   └── Interlocked  an interlock forbids what was to be sent
-├── AgentUnreachable the rig agent does not answer
-├── LogError         a log cannot be read, written or mended
-├── RecordingError   a recording made elsewhere cannot be taken in
-└── ReportError      a report or a demo cannot be made
+├── MethodError            a method cannot be compiled or exceeds its own limits
+├── ConfigError            bench.toml is not a valid configuration
+├── RunError               a run failed or could not be started
+│   └── InterlockError     an interlock refused a command
+├── AgentUnreachableError  the rig agent does not reply
+├── LogError               a log cannot be read, written or repaired
+├── RecordingError         a recording cannot be imported
+└── ReportError            a report or a demo cannot be made
 
-Each message says what failed, the value and the limit with unit, and what to do. ``exit_code`` tells the
-command line that the message is for a person and needs no traceback.
+Each message states what failed, the value and the limit with unit, and what to do. ``exit_code`` marks an error
+whose message is for a person: the command line prints it without a traceback.
 """
 
 
 class BenchError(Exception):
-    """Base of everything that the bench raises on purpose."""
+    """Base class of all errors that the bench raises on purpose."""
 
     exit_code = 1
 
 
 class MethodError(BenchError):
-    """A method asks for what cannot be compiled, or exceeds its own limits."""
+    """A method cannot be compiled or exceeds its own limits."""
 
 
 class RunError(BenchError):
-    """A run could not be carried out."""
+    """A run failed or could not be started."""
 
 
-class AgentUnreachable(BenchError):  # noqa: N818 - reads as the sentence it makes
-    """The rig agent does not answer."""
+class AgentUnreachableError(BenchError):
+    """The rig agent does not reply."""
 
 
 class LogError(BenchError):
-    """A log cannot be read, written or mended."""
+    """A log cannot be read, written or repaired."""
 
 
 class RecordingError(BenchError):
-    """A recording made elsewhere cannot be taken in."""
+    """A recording cannot be imported."""
 
 
 class ReportError(BenchError):
@@ -46,8 +46,8 @@ class ReportError(BenchError):
 
 
 class ConfigError(BenchError):
-    """``bench.toml`` does not describe a bench."""
+    """``bench.toml`` is not a valid configuration."""
 
 
-class Interlocked(RunError):  # noqa: N818 - reads as the sentence it makes
-    """An interlock forbids what was to be sent."""
+class InterlockError(RunError):
+    """An interlock refused a command."""

@@ -1,20 +1,20 @@
-"""A progress bar on standard error, where a person can see it."""
+"""Progress callback, and a progress bar on standard error."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeAlias
+
+Progress: TypeAlias = Callable[[float], None]
+"""Callback that receives the completed share, 0 to 1."""
 
 
 @contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[float], None]]:
-    """A bar from 0 to 1; silent where standard error is no terminal.
-
-    Args:
-        what: a word or two beside the bar.
-    """
+def show_progress(label: str) -> Iterator[Progress]:
+    """Show a progress bar from 0 to 1 while the context lasts; silent if standard error is not a terminal."""
+    from rich import progress as rich_progress
     from rich.console import Console
-    from rich.progress import Progress
 
     console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=1.0)
+    with rich_progress.Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=1.0)
         yield lambda share: bar.update(task, completed=share)

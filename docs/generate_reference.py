@@ -1,9 +1,11 @@
-"""Fills the generated parts of docs/reference from the code: commands, fields, parameters, effects.
+"""Generator of the reference: JSON Schemas, OpenAPI description, and tables in the pages.
 
-``python docs/generate_reference.py`` rewrites what stands between ``<!-- generated: NAME -->`` and
-``<!-- end -->`` in every page there; a test compares. All else in those pages is written by hand.
+``python docs/generate_reference.py`` writes all files of `docs/reference` that follow from the code. These are one
+JSON Schema for each document and log message, the OpenAPI description of the REST interface, and in the pages
+everything between ``<!-- generated: NAME -->`` and ``<!-- end -->``. Tests compare the files with `make_files`.
 """
 
+import json
 import re
 import types
 from collections.abc import Callable, Iterable, Iterator
@@ -14,164 +16,210 @@ from typing import Any, Literal, Union, get_args, get_origin
 import typer
 from pydantic import BaseModel
 
-from bench.recorder.messages import EVENT, SAMPLE, SEGMENT, message_schema
-from identification.damper.coordinates import COORDINATES
+from bench.config import BenchConfig
+from bench.log import MESSAGES, TOPIC_FAMILIES, make_message_schema
+from bench.methods import Envelope, Method
+from bench.service.application import create_app
+from identification.damper import COORDINATES, PARAMETERS, Quantity
 from identification.damper.effects import EFFECTS
-from identification.damper.parameters import PARAMETERS, Quantity
-from identification.gap.documents import Diagnosis
-from identification.results import Delay, Estimate, Fit, Prediction
+from identification.documents import (
+    Delay,
+    DesignReport,
+    Diagnosis,
+    Estimate,
+    Fit,
+    Forecast,
+    Prediction,
+    Trend,
+)
+from sim_rig.scenario import Scenario
+from sim_rig.trial.scoring import TrialReport
 
 FOLDER = Path(__file__).parent / "reference"
-PART = re.compile(r"(<!-- generated: ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+
+DOCUMENTS: dict[str, type[BaseModel]] = {
+    "bench": BenchConfig,
+    "diagnosis": Diagnosis,
+    "envelope": Envelope,
+    "fit": Fit,
+    "forecast": Forecast,
+    "foresight": DesignReport,
+    "method": Method,
+    "prediction": Prediction,
+    "scenario": Scenario,
+    "trend": Trend,
+    "trial": TrialReport,
+}
+"""Type of each document by the name of its schema file."""
+
+LOG_MESSAGES: dict[str, str] = {
+    model.__name__.lower(): topic for topic, model in {**MESSAGES, **TOPIC_FAMILIES}.items()
+}
+"""Topic or topic prefix of each log message by the name of its schema file."""
+
+_GENERATED_PART = re.compile(r"(<!-- generated: ([\w ]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+_REPEATED_TYPES = (Estimate, Delay)
+"""Types of many keys, whose own keys are listed once in a separate table."""
+_TYPE_NAMES = {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): "null"}
 
 
-def filled(page: str) -> str:
-    """The page with every generated part as the code has it now."""
-    return PART.sub(lambda found: f"{found[1]}\n{PARTS[found[2]]()}\n\n{found[3]}", page)
+def make_files() -> dict[Path, str]:
+    """Return the text of every generated file; pages contain hand-written parts as well."""
+    schemas = {FOLDER / "schemas" / f"{name}.json": make_schema(name) for name in (*DOCUMENTS, *LOG_MESSAGES)}
+    pages = {path: fill_page(path.read_text(encoding="utf-8")) for path in sorted(FOLDER.glob("*.md"))}
+    return {**schemas, FOLDER / "openapi.json": _format_json(create_app().openapi()), **pages}
 
 
-def commands() -> str:
-    """Every command with its arguments and options."""
+def make_schema(name: str) -> str:
+    """Return the JSON Schema of a document or log message as text."""
+    if name in LOG_MESSAGES:
+        return _format_json(make_message_schema(LOG_MESSAGES[name]))
+    schema = DOCUMENTS[name].model_json_schema(by_alias=True)
+    return _format_json({"$schema": "https://json-schema.org/draft/2020-12/schema", **schema})
+
+
+def _format_json(content: dict[str, Any]) -> str:
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def fill_page(page: str) -> str:
+    """Return a page with its generated parts made from the code."""
+    return _GENERATED_PART.sub(lambda match: f"{match[1]}\n{PARTS[match[2]]()}\n\n{match[3]}", page)
+
+
+def describe_commands() -> str:
+    """Describe every command with its arguments and options."""
     app = typer.Typer()
     for entry in entry_points(group="mrbench.commands"):
         app.command(entry.name)(entry.load())
     app.callback()(lambda: None)
     group: Any = typer.main.get_command(app)
-    return "\n\n".join(_command(name, command) for name, command in sorted(group.commands.items()))
+    return "\n\n".join(_describe_command(name, command) for name, command in sorted(group.commands.items()))
 
 
-def _command(name: str, command: Any) -> str:
+def _describe_command(name: str, command: Any) -> str:
     arguments = [p for p in command.params if p.param_type_name == "argument"]
     options = [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
-    words = [_placeholder(p) for p in arguments]
-    words += [f"{p.opts[0]}{_value(p)}" for p in options if p.required]
-    words += [f"[{p.opts[0]}{_value(p)}]" for p in options if not p.required]
-    rows = [(f"`{_placeholder(p)}`", p.help) for p in arguments]
-    rows += [(f"`{p.opts[0]}{_value(p)}`", f"{p.help}{_default(p)}") for p in options]
-    said = command.help.replace("\n\n", "\0").replace("\n", " ").replace("\0", "\n\n")
-    usage = f"```text\nmrbench {name} {' '.join(words)}\n```"
-    return f"## {name}\n\n{said}\n\n{usage}\n\n{table(('', ''), rows)}"
+    usage = [_format_argument(p) for p in arguments]
+    usage += [f"{p.opts[0]}{_format_value(p)}" for p in options if p.required]
+    usage += [f"[{p.opts[0]}{_format_value(p)}]" for p in options if not p.required]
+    rows = [(f"`{_format_argument(p)}`", p.help) for p in arguments]
+    rows += [(f"`{p.opts[0]}{_format_value(p)}`", f"{p.help}{_format_default(p)}") for p in options]
+    text = command.help.replace("\n\n", "\0").replace("\n", " ").replace("\0", "\n\n")
+    block = f"```text\nmrbench {name} {' '.join(usage)}\n```"
+    return f"## {name}\n\n{text}\n\n{block}\n\n{make_table(('', ''), rows)}"
 
 
-def _placeholder(parameter: Any) -> str:
-    plain = str(parameter.metavar or parameter.name.upper()).rstrip(".")
-    return f"{plain}..." if parameter.nargs == -1 else plain
+def _format_argument(parameter: Any) -> str:
+    text = str(parameter.metavar or parameter.name.upper()).rstrip(".")
+    return f"{text}..." if parameter.nargs == -1 else text
 
 
-def _value(parameter: Any) -> str:
+def _format_value(parameter: Any) -> str:
     if getattr(parameter, "is_flag", False):
         return ""
     return f" {parameter.metavar or parameter.name.rstrip('_').rsplit('_')[-1].upper()}"
 
 
-def _default(parameter: Any) -> str:
-    shown = (
-        not parameter.required and parameter.default not in (None, "", False) and not callable(parameter.default)
-    )
-    return f" By default `{parameter.default}`." if shown else ""
+def _format_default(parameter: Any) -> str:
+    default = parameter.default
+    has_default = not parameter.required and default not in (None, "", False) and not callable(default)
+    return f" By default `{default}`." if has_default else ""
 
 
-def quantities(of: Iterable[Quantity]) -> str:
-    """Symbol, unit, bounds and meaning, of parameters or coordinates."""
-    rows = ((f"`{q.symbol}`", q.unit_for("drive"), f"{q.low:g} … {q.high:g}", q.meaning) for q in of)
-    return table(("", "unit", "bounds of the search", "meaning"), rows)
+def describe_quantities(quantities: Iterable[Quantity]) -> str:
+    """Describe parameters or coordinates by symbol, unit, bounds and meaning."""
+    rows = ((f"`{q.symbol}`", q.format_unit("drive"), f"{q.low:g} … {q.high:g}", q.meaning) for q in quantities)
+    return make_table(("", "unit", "bounds of the search", "meaning"), rows)
 
 
-def effects() -> str:
-    """Every effect with its place, its forms and their parameters."""
+def describe_effects() -> str:
+    """Describe every effect with its stage, its forms and their parameters."""
     parts = []
     for effect in EFFECTS.values():
         parts.append(f"## {effect.name}\n\nStage `{effect.stage}`: {effect.meaning}.")
         for form in effect.forms:
-            parts.append(f"Form `{form.name}`, acts as `{form.acts}`:\n\n{quantities(form.parameters)}")
+            table = describe_quantities(form.parameters)
+            parts.append(f"Form `{form.name}`, acts as `{form.action}`:\n\n{table}")
     return "\n\n".join(parts)
 
 
-def messages() -> str:
-    """The fields of every message of a log."""
+def describe_messages() -> str:
+    """Describe the fields of the messages that every log has."""
     parts = []
-    for topic in (SAMPLE, SEGMENT, EVENT):
-        schema = message_schema(topic)
-        fields = schema["properties"] | {
-            name.strip("^$"): field for name, field in schema.get("patternProperties", {}).items()
-        }
-        must = schema["required"]
+    for topic in MESSAGES:
+        schema = make_message_schema(topic)
+        nullable = {name.strip("^$"): field for name, field in schema.get("patternProperties", {}).items()}
         rows = (
-            (f"`{name}`", "always" if name in must else "where known", field["description"])
-            for name, field in fields.items()
+            (f"`{name}`", "always" if name in schema["required"] else "if known", field["description"])
+            for name, field in (schema["properties"] | nullable).items()
         )
-        parts.append(f"### {topic}\n\n{schema['description']}\n\n{table(('field', '', ''), rows)}")
+        parts.append(f"### {topic}\n\n{schema['description']}\n\n{make_table(('field', '', ''), rows)}")
     return "\n\n".join(parts)
 
 
-def fields(of: type[BaseModel]) -> str:
-    """Every key of a document, those inside others with a dot between."""
-    return table(("key", "holds", "meaning"), _rows(of, ""))
+def describe_fields(model: type[BaseModel]) -> str:
+    """Describe every key of a document; keys of nested objects are separated by dots."""
+    return make_table(("key", "holds", "meaning"), _make_field_rows(model, ""))
 
 
-def _rows(of: type[BaseModel], before: str) -> Iterator[tuple[str, str, str]]:
-    for name, field in of.model_fields.items():
-        key, inner = f"{before}{field.alias or name}", _model_in(field.annotation)
-        said = field.description or (inner.__doc__ or "").split("\n")[0] if inner else field.description or ""
-        yield f"`{key}`", _holds(field.annotation), said
-        if inner is not None and inner not in SHOWN_ONCE:
-            yield from _rows(inner, f"{key}{_step(field.annotation)}")
+def _make_field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str, str]]:
+    for name, field in model.model_fields.items():
+        key, inner = f"{prefix}{field.alias or name}", _find_model(field.annotation)
+        inner_text = (inner.__doc__ or "").split("\n")[0] if inner else ""
+        yield f"`{key}`", _format_type(field.annotation), field.description or inner_text
+        if inner is not None and inner not in _REPEATED_TYPES:
+            yield from _make_field_rows(inner, f"{key}{_format_separator(field.annotation)}")
 
 
-SHOWN_ONCE = (Estimate, Delay)
-"""Types that stand at many keys; the page shows their own keys in a table of their own."""
-PLAIN = {float: "number", int: "whole number", str: "text", bool: "true or false", type(None): "null"}
-"""Types in a reader's words."""
-
-
-def _model_in(annotation: Any) -> type[BaseModel] | None:
+def _find_model(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _model_in(part)) is not None), None)
+    return next((model for part in get_args(annotation) if (model := _find_model(part)) is not None), None)
 
 
-def _step(annotation: Any) -> str:
+def _format_separator(annotation: Any) -> str:
     return {list: "[].", dict: ".NAME."}.get(get_origin(annotation), ".")
 
 
-def _holds(annotation: Any) -> str:
-    origin, inside = get_origin(annotation), get_args(annotation)
+def _format_type(annotation: Any) -> str:
+    origin, arguments = get_origin(annotation), get_args(annotation)
     if origin in (Union, types.UnionType):
-        return " or ".join(_holds(part) for part in inside)
+        return " or ".join(_format_type(part) for part in arguments)
     if origin is Literal:
-        return ", ".join(f"`{value}`" for value in inside)
+        return ", ".join(f"`{value}`" for value in arguments)
     if origin is tuple:
         return "[lowest, highest]"
     if origin is list:
-        return f"list of {_holds(inside[0])}"
+        return f"list of {_format_type(arguments[0])}"
     if origin is dict:
-        return f"{_holds(inside[1])} by name"
-    if annotation in SHOWN_ONCE:
+        return f"{_format_type(arguments[1])} by name"
+    if annotation in _REPEATED_TYPES:
         return f"[{annotation.__name__}](#{annotation.__name__.lower()})"
-    return PLAIN.get(annotation, "object")
+    return _TYPE_NAMES.get(annotation, "object")
 
 
-def table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
-    """A Markdown table."""
+def make_table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
+    """Return a Markdown table."""
     lines = [heads, ("---",) * len(heads), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 
 
 PARTS: dict[str, Callable[[], str]] = {
-    "commands": commands,
-    "parameters": lambda: quantities(PARAMETERS),
-    "coordinates": lambda: quantities(COORDINATES),
-    "effects": effects,
-    "messages": messages,
-    "fit": lambda: fields(Fit),
-    "prediction": lambda: fields(Prediction),
-    "diagnosis": lambda: fields(Diagnosis),
-    "estimate": lambda: fields(Estimate),
-    "delay": lambda: fields(Delay),
+    "commands": describe_commands,
+    "parameters": lambda: describe_quantities(PARAMETERS),
+    "coordinates": lambda: describe_quantities(COORDINATES),
+    "effects": describe_effects,
+    "messages": describe_messages,
+    "fit": lambda: describe_fields(Fit),
+    "prediction": lambda: describe_fields(Prediction),
+    "diagnosis": lambda: describe_fields(Diagnosis),
+    "estimate": lambda: describe_fields(Estimate),
+    "delay": lambda: describe_fields(Delay),
 }
-"""What can stand between the marks, by its name."""
+"""Function that makes each generated part of a page."""
 
 
 if __name__ == "__main__":
-    for path in sorted(FOLDER.glob("*.md")):
-        path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
+    for path, text in make_files().items():
+        path.write_text(text, encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Typed channels: what an instrument measures or takes, with unit, range and access."""
+"""Typed channels, and the readings, sample blocks and frames that instruments exchange with the bench."""
 
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -6,93 +6,93 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drivers.errors import OutOfRange
+from drivers.errors import OutOfRangeError
 
 Access = Literal["read", "write", "read_write"]
 Quality = Literal["good", "uncertain", "bad"]
-"""good: checked on the wire and in range; uncertain: no checksum or clock vouches for it; bad: do not use."""
+"""good: checked on the wire and in range; uncertain: without checksum or clock, or doubted; bad: unusable."""
 
-Numbers = npt.NDArray[np.float64]
-Times = npt.NDArray[np.int64]
+Array = npt.NDArray[np.float64]
+TimeArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One quantity of an instrument."""
+    """One quantity that an instrument measures or sets."""
 
     name: str
     """Name in logs and documents, such as ``force``."""
     unit: str
-    """SI unit of every value that passes through this channel; the wire's own unit stays in the driver."""
+    """SI unit of every value of this channel. The unit on the wire stays inside the driver."""
     low: float
-    """Least value that is meaningful, in ``unit``."""
+    """Smallest meaningful value, in ``unit``."""
     high: float
-    """Largest value that is meaningful, in ``unit``."""
+    """Largest meaningful value, in ``unit``."""
     access: Access
     meaning: str
-    """One line for a person."""
+    """Description in one line."""
 
-    def checked(self, value: float) -> float:
-        """The value, if it may be written.
+    def validate(self, value: float) -> float:
+        """Return the value if it may be written.
 
         Raises:
-            OutOfRange: it lies outside the channel's range, or is no number.
+            OutOfRangeError: the value is outside the channel's range, or NaN.
         """
         if not self.low <= value <= self.high:
-            raise OutOfRange(
-                f"{self.name}: {value:.6g} {self.unit} lies outside {self.low:.6g} to {self.high:.6g} "
+            raise OutOfRangeError(
+                f"{self.name}: {value:.6g} {self.unit} is outside {self.low:.6g} to {self.high:.6g} "
                 f"{self.unit}; nothing was sent"
             )
         return value
 
 
 class Reading(NamedTuple):
-    """One value that was asked for."""
+    """One value that was requested."""
 
     value: float
-    """In the channel's unit."""
+    """Value in the channel's unit."""
     received_ns: int
-    """Bench clock when the answer was complete [ns]."""
+    """Bench clock when the reply was complete [ns]."""
     device_ns: int | None
-    """The instrument's own clock at the conversion [ns]; none where it has none."""
+    """Device clock at the conversion [ns]; none if the instrument has no clock."""
     raw: float
-    """What stood on the wire, in the wire's own unit."""
+    """Number on the wire, in the unit of the wire."""
     quality: Quality
 
 
-class Block(NamedTuple):
-    """Samples of one channel that came together; arrays (samples,)."""
+class SampleBlock(NamedTuple):
+    """Consecutive samples of one channel that arrived together; arrays (samples,)."""
 
     channel: str
     first: int
-    """Running number of the first sample since the stream began; a gap to the block before counts lost ones."""
-    device_ns: Times | None
-    """The instrument's own clock at each conversion [ns]; none where it has none."""
+    """Running number of the first sample since the stream began; a gap between blocks counts lost samples."""
+    device_ns: TimeArray | None
+    """Device clock at each conversion [ns]; none if the instrument has no clock."""
     received_ns: int
-    """Bench clock when the last byte came [ns]."""
-    values: Numbers
-    """In the channel's unit."""
-    raw: Numbers
-    """What stood on the wire."""
+    """Bench clock when the last byte arrived [ns]."""
+    values: Array
+    """Values in the channel's unit."""
+    raw: Array
+    """Numbers on the wire."""
     quality: Quality
 
 
-class Stamp(NamedTuple):
-    """The instrument's clock beside the bench's: it was read between the two."""
+class ClockReading(NamedTuple):
+    """Device clock, read between two instants of the bench clock."""
 
     device_ns: int
-    """The instrument's clock, unwrapped [ns]."""
+    """Device clock without its wraps [ns]."""
     sent_ns: int
-    """Bench clock when the question went out [ns]."""
+    """Bench clock when the request was sent [ns]."""
     received_ns: int
-    """Bench clock when the answer was complete [ns]."""
+    """Bench clock when the reply was complete [ns]."""
 
 
 class Frame(NamedTuple):
-    """What passed on the wire, for the log and for replay."""
+    """Bytes that passed on the wire, for the log and for replay."""
 
     received_ns: int
     """Bench clock [ns]."""
     sent: bool
-    """True for what the driver sent."""
+    """Whether the driver sent the frame; otherwise it received it."""
     data: bytes

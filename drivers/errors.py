@@ -1,38 +1,38 @@
 """Errors of the drivers.
 
 DriverError
-├── NotConnected     used before `connect`, or the wire has gone
-├── NoReply          the instrument was silent for longer than its deadline
-├── BadReply         what came is no valid answer: frame, checksum, sequence, unexpected length
-├── Refused          the instrument answered, and the answer is no: exception, abort, fault state
-└── OutOfRange       a value outside the range of its channel; nothing was sent
+├── NotConnectedError    used before `connect`, or the wire is gone
+├── NoReplyError         no reply within the deadline
+├── InvalidReplyError    wrong frame, checksum, sequence or length
+├── RefusedError         exception, abort or fault state in the reply
+└── OutOfRangeError      value outside the range of its channel; nothing was sent
 
-Nothing of the libraries underneath escapes: their errors are translated here, with the cause kept. Each message
-says which instrument, what was asked, what came or for how long nothing came, and what to do.
+Errors of the libraries are translated into these and chained as their cause. Each message names the instrument,
+the request, the reply or the time waited for it, and what to do.
 """
 
 
 class DriverError(Exception):
-    """Base of everything that a driver raises on purpose."""
+    """Base class of all errors that drivers raise."""
 
     exit_code = 1
 
 
-class NotConnected(DriverError):  # noqa: N818 - reads as the sentence it makes
-    """Used before `connect`, or the wire has gone."""
+class NotConnectedError(DriverError):
+    """The driver was used before `connect`, or the wire is gone."""
 
 
-class NoReply(DriverError):  # noqa: N818
-    """The instrument was silent for longer than its deadline."""
+class NoReplyError(DriverError):
+    """The instrument did not reply within the deadline."""
 
 
-class BadReply(DriverError):  # noqa: N818
-    """What came is no valid answer."""
+class InvalidReplyError(DriverError):
+    """The received bytes are not a valid reply."""
 
 
-class Refused(DriverError):  # noqa: N818
-    """The instrument answered, and the answer is no."""
+class RefusedError(DriverError):
+    """The instrument replied with an exception, an abort or a fault state."""
 
 
-class OutOfRange(DriverError):  # noqa: N818
-    """A value outside the range of its channel; nothing was sent."""
+class OutOfRangeError(DriverError):
+    """The value is outside the range of its channel; nothing was sent."""

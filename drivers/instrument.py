@@ -1,39 +1,38 @@
-"""What every instrument can do, whatever its wire.
+"""Interface of all instruments: a few typed channels and a few methods, the same on every wire.
 
-An instrument is a handful of typed channels and a few verbs. A driver is one file that turns them into its
-protocol; the agent runs one thread a wire that calls ``acquire`` again and again. Time is the bench clock, handed
-in as a function, so that a test can step it.
+The agent runs one thread per wire, which calls `Instrument.acquire` repeatedly. Times refer to the bench clock,
+which is passed in as a function, so that a test can step it.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from drivers.channel import Block, Channel, Frame, Reading
+from drivers.channel import Channel, Frame, Reading, SampleBlock
 
 Clock = Callable[[], int]
-"""The bench clock [ns], monotonic."""
-Tap = Callable[[Frame], None]
-"""Told of every frame, received and sent."""
+"""Bench clock [ns], monotonic."""
+FrameListener = Callable[[Frame], None]
+"""Function that is called with every frame sent and received."""
 
 
 @dataclass(frozen=True)
 class Health:
-    """What an instrument's wire has been through since it was connected."""
+    """Counts since an instrument was connected, and its state."""
 
     connected: bool
     received: int
-    """Frames or replies taken."""
+    """Frames or replies received."""
     lost: int
-    """Samples that the sequence says were made but never came."""
+    """Samples that were taken by the instrument, as their sequence shows, but never arrived."""
     corrupted: int
-    """Frames whose checksum or form was wrong; none of their content was used."""
+    """Frames with a wrong checksum or format. None of their content was used."""
     resynchronised: int
-    """Times that the stream had to be found again."""
+    """Times that the start of a frame had to be searched for."""
     last_ns: int | None
-    """Bench clock of the last good frame [ns]."""
-    words: str
-    """State for a person, empty where all is well."""
+    """Bench clock at the last good frame [ns]."""
+    message: str
+    """Description of what is wrong; empty if nothing is."""
 
 
 class Instrument(Protocol):
@@ -45,46 +44,46 @@ class Instrument(Protocol):
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """What it measures and takes."""
+        """Channels that it measures and sets."""
 
     def connect(self) -> None:
-        """Open the wire, check who answers, bring it to a known state.
+        """Open the wire, check the instrument's identity and bring it to a known state.
 
         Raises:
-            NotConnected: the wire cannot be opened.
-            NoReply, BadReply, Refused: it opens, but the instrument does not answer as itself.
+            NotConnectedError: the wire cannot be opened.
+            NoReplyError, InvalidReplyError, RefusedError: the expected instrument does not reply.
         """
 
     def close(self) -> None:
-        """Leave the instrument safe and the wire closed; harmless when repeated or when never connected."""
+        """Leave the instrument safe and close the wire. May be repeated, and called without `connect`."""
 
-    def acquire(self, timeout: float) -> list[Block]:
-        """Samples that came since the last call, waiting up to ``timeout`` [s] for the first; empty if none.
+    def acquire(self, timeout: float) -> list[SampleBlock]:
+        """Return the samples since the last call, waiting up to ``timeout`` [s] for the first; empty if none.
 
-        Some milliseconds of samples are taken together, so that it may last so much longer (`drivers.beat`).
+        Some milliseconds of samples are read together, so the call may take that much longer (`drivers.polling`).
 
         Raises:
-            NotConnected: the wire has gone, an instrument that is asked has not answered for a second, or it has
-                started anew and must be connected again. One that speaks unasked and falls silent raises nothing:
-                its silence shows in `health`, and the interlocks judge the age of what came last.
-            NoReply: it is there no more, though its wire is: no heartbeat.
+            NotConnectedError: the wire is gone, or a polled instrument has not replied for a second or has
+                restarted. An instrument that sends unrequested and falls silent raises nothing: its silence shows
+                in `get_health`, and the interlocks check the age of its latest sample.
+            NoReplyError: the wire is there, but the instrument's heartbeat is not.
         """
 
     def read(self, channel: str) -> Reading:
-        """Ask for one value now."""
+        """Request one value now."""
 
     def write(self, channel: str, value: float) -> None:
         """Set one value, in the channel's unit.
 
         Raises:
-            OutOfRange: nothing was sent.
+            OutOfRangeError: nothing was sent.
         """
 
     def make_safe(self) -> None:
-        """Bring it to rest by its own safest way, within its own deadline; never raises for a dead wire."""
+        """Bring the instrument to rest within its own deadline. Raises nothing, even if the wire is gone."""
 
-    def health(self) -> Health:
-        """Counts and state."""
+    def get_health(self) -> Health:
+        """Return counts and state."""
 
-    def listen(self, tap: Tap) -> None:
-        """Tell ``tap`` of every frame from now on."""
+    def add_listener(self, listener: FrameListener) -> None:
+        """Call ``listener`` with every frame from now on."""

@@ -1,4 +1,4 @@
-"""The arrays of this room and the one place where functions are compiled."""
+"""Array types, and just-in-time compilation with a cache on disk."""
 
 import hashlib
 import os
@@ -12,57 +12,59 @@ import numpy.typing as npt
 from platformdirs import user_cache_dir
 
 Array: TypeAlias = npt.NDArray[np.float64]
-"""Real numbers in SI units; the docstring at hand gives shape and unit."""
+"""Real numbers in SI units; docstrings state shape and unit."""
 
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
-"""A mask over the same samples or unknowns."""
+"""Mask over samples or unknowns."""
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
-def cache_folder() -> Path:
-    """Where this room keeps what it can make again; the variable MRBENCH_CACHE moves it."""
+def find_cache_folder() -> Path:
+    """Return the folder of all caches; the environment variable MRBENCH_CACHE overrides it."""
     return Path(os.environ.get("MRBENCH_CACHE") or user_cache_dir("mrbench"))
 
 
-def _fingerprint() -> str:
-    """Of every source of this room: compiled code is kept for exactly this physics and no other.
+def _hash_sources() -> str:
+    """Return the hash of all compiled sources: the physics of the damper and its simulation.
 
-    The compiler's own cache looks at one file at a time and would not see that the law, which is compiled into
-    its callers, has changed in another.
+    The compiler's own cache checks one file at a time. It would miss a change of the law, which is compiled into
+    callers in other files.
     """
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
+    folder, digest = Path(__file__).parent, hashlib.sha256()
+    sources = [path for name in ("damper", "simulate") for path in (folder / name).rglob("*.py")]
+    for source in sorted([Path(__file__), *sources]):
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 
 
-# Before anything is compiled: numba asks for the folder when a function is decorated.
-numba.config.CACHE_DIR = str(  # type: ignore[attr-defined]  # made by numba when it is imported
-    cache_folder().resolve() / "compiled" / _fingerprint()
+# Set before anything is compiled, because numba reads the folder when a function is decorated.
+numba.config.CACHE_DIR = str(  # type: ignore[attr-defined]  # defined by numba on import
+    find_cache_folder().resolve() / "compiled" / _hash_sources()
 )
 
 
-def compiled(function: Function) -> Function:
-    """The function as machine code, kept on disk between processes; it releases the interpreter's lock."""
-    # Dividing by zero gives inf, as in numpy: an unstable trial point costs infinity and stops no search.
+def njit_cached(function: Function) -> Function:
+    """Compile a function with a cache on disk; it releases the interpreter's lock."""
+    # Division by zero gives inf, as in numpy: an unstable trial point has infinite cost and stops no search.
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
-def compiled_within(function: Function) -> Function:
-    """The same for what a march asks at every step: it becomes a part of its caller, without the cost of a call.
+def njit_inline(function: Function) -> Function:
+    """Compile a function that is called at every integration step, and inline it into its callers.
 
-    Dividing by one number several times may become one division; nothing else is reordered.
+    Several divisions by one number may become one division. Nothing else is reordered.
     """
-    found = numba.njit(
+    compiler = numba.njit(
         cache=True, nogil=True, error_model="numpy", fastmath={"arcp", "contract"}, forceinline=True
     )
-    return cast(Function, found(function))
+    return cast(Function, compiler(function))
 
 
-def compiled_anew(function: Function) -> Function:
-    """The same for a function that takes another one, made anew in every process.
+def njit_uncached(function: Function) -> Function:
+    """Compile a function that takes another function, anew in every process.
 
-    The compiler cannot keep such a function on disk: once two arguments were met, it fails on one that is gone.
+    The compiler cannot cache such a function on disk: after two different arguments it fails on one that no longer
+    exists.
     """
     return cast(Function, numba.njit(nogil=True, error_model="numpy")(function))

@@ -1,24 +1,32 @@
-"""Progress of a fit, on a terminal only."""
+"""Progress of a computation, shown on a terminal."""
 
 import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TypeAlias
 
-from rich.console import Console
+Progress: TypeAlias = Callable[[str, float], None]
+"""Receives a message and the present force error [N], which is not finite while there is none."""
+
+
+def ignore_progress(message: str, error: float) -> None:
+    """Discard a progress report."""
 
 
 @contextmanager
-def progress_on_terminal(title: str) -> Iterator[Callable[[str, float], None]]:
-    """A live line with the force error [N] on standard error; silent where that is no terminal."""
+def show_progress(title: str) -> Iterator[Progress]:
+    """Yield a progress callback that updates one line on standard error, or does nothing without a terminal."""
+    # Imported here because every fit imports this module and only commands need a console.
+    from rich.console import Console
+
     console = Console(file=sys.stderr)
     if not console.is_terminal:
-        yield lambda what, error: None
+        yield ignore_progress
         return
     with console.status(title) as status:
-        yield lambda what, error: status.update(f"{title}: {what}{_force_error(error)}")
+        yield lambda message, error: status.update(f"{title}: {message}{_describe_force_error(error)}")
 
 
-def _force_error(error: float) -> str:
-    """The force error [N] in words, once there is one."""
+def _describe_force_error(error: float) -> str:
     return f", force error {error:.3g} N" if math.isfinite(error) else ""

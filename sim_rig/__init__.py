@@ -1,1 +1,3 @@
-"""Plays the hardware: the specimen, its sensors and their faults."""
+"""Simulated rig: specimen, actuator, sensors and their faults, on files or on wires."""
+
+__all__: list[str] = []

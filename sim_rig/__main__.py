@@ -1,15 +1,15 @@
-"""The rig's own command line: ``python -m sim_rig``."""
+"""Command line of the simulated rig: ``python -m sim_rig``."""
 
 import json
 import sys
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
 from sim_rig.commands import sim
 from sim_rig.errors import SimRigError
-from sim_rig.scenario import load_scenario, scenario_schema
+from sim_rig.scenario import load_scenario
 
 app = typer.Typer(
     add_completion=False, no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None
@@ -18,48 +18,38 @@ app = typer.Typer(
 
 @app.callback()
 def _rig() -> None:
-    """The simulated rig: plays a damper with its actuator and sensors."""
+    """Simulate a damper with its actuator and sensors."""
 
 
 @app.command()
 def play(
     scenario: Annotated[str, typer.Option(help="Name of a shipped scenario, or a file.")],
     commands: Annotated[Path, typer.Option(help="Commands: npz with time, displacement, drive.")],
-    out: Annotated[Path, typer.Option(help="Channels as recorded: npz.")],
-    seed: Annotated[int | None, typer.Option(min=0, help="In place of the scenario's own.")] = None,
-    truth: Annotated[Path | None, typer.Option(help="Also the hidden truth, for tests only: npz.")] = None,
+    out: Annotated[Path, typer.Option(help="Recorded channels: npz.")],
+    seed: Annotated[int | None, typer.Option(min=0, help="Replaces the seed of the scenario.")] = None,
+    truth: Annotated[Path | None, typer.Option(help="Also write the hidden truth, for tests only: npz.")] = None,
 ) -> None:
     """Play commands from a file, faster than real time."""
-    from sim_rig import play as playing  # the compiler is loaded only where something is to be played
+    from sim_rig import offline_run
 
-    chosen = load_scenario(scenario)
+    loaded = load_scenario(scenario)
     if seed is not None:
-        chosen = chosen.model_copy(update={"seed": seed})
-    played = playing.play(chosen, playing.read_commands(commands), _say)
-    playing.write_channels(out, chosen, played)
+        loaded = loaded.model_copy(update={"seed": seed})
+    result = offline_run.run_offline(loaded, offline_run.read_commands(commands), _print_progress)
+    offline_run.write_channels(out, loaded, result)
     if truth is not None:
-        playing.write_truth(truth, chosen, played)
+        offline_run.write_truth(truth, loaded, result)
 
 
 app.command("serve")(sim)
 
 
-@app.command()
-def schema(
-    document: Annotated[Literal["scenario", "trial"], typer.Argument(help="Which document.")] = "scenario",
-) -> None:
-    """Print the JSON Schema of a document."""
-    from sim_rig.trial.answer import trial_schema
-
-    typer.echo(trial_schema() if document == "trial" else scenario_schema(), nl=False)
-
-
-def _say(done: float) -> None:
-    typer.echo(json.dumps({"progress": round(done, 4)}), err=True)
+def _print_progress(fraction: float) -> None:
+    typer.echo(json.dumps({"progress": round(fraction, 4)}), err=True)
 
 
 def main() -> None:
-    """Run one command; exit 1 with one line on what could not be done, 2 on misuse."""
+    """Run one command; exit with 1 and one line for an error, with 2 for misuse."""
     try:
         app(prog_name="python -m sim_rig")
     except (SimRigError, OSError) as error:

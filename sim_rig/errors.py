@@ -1,28 +1,28 @@
 """Errors of the simulated rig.
 
 SimRigError
-├── ScenarioError   a scenario cannot be read, or asks for what does not exist or lies out of bounds
-├── CommandsError   the commands to play are no uniform record of displacement and drive
+├── ScenarioError   a scenario cannot be read, or contains something unknown or out of bounds
+├── CommandsError   the commands to play are not a uniform record of displacement and drive
 ├── PlantError      the specimen of the scenario has no finite motion under these commands
-├── WireError       a wire of the rig cannot be opened, or nobody can be told where it is
-└── TrialError      a blind trial cannot go on: its seal is broken, or what it needs cannot be recorded
+├── WireError       a wire of the rig cannot be opened, or its address cannot be published
+└── TrialError      a blind trial cannot continue: its seal is broken, or a recording failed
 
 ``exit_code`` tells the command line that the message is for a person and needs no traceback.
 """
 
 
 class SimRigError(Exception):
-    """Base of everything that the simulated rig raises on purpose."""
+    """Base of every error that the simulated rig raises on purpose."""
 
     exit_code = 1
 
 
 class ScenarioError(SimRigError):
-    """A scenario cannot be read, or asks for what does not exist or lies out of bounds."""
+    """A scenario cannot be read, or contains something unknown or out of bounds."""
 
 
 class CommandsError(SimRigError):
-    """The commands to play are no uniform record of displacement and drive."""
+    """The commands to play are not a uniform record of displacement and drive."""
 
 
 class PlantError(SimRigError):
@@ -30,8 +30,8 @@ class PlantError(SimRigError):
 
 
 class WireError(SimRigError):
-    """A wire of the rig cannot be opened, or nobody can be told where it is."""
+    """A wire of the rig cannot be opened, or its address cannot be published."""
 
 
 class TrialError(SimRigError):
-    """A blind trial cannot go on: its seal is broken, or what it needs cannot be recorded."""
+    """A blind trial cannot continue: its seal is broken, or a recording failed."""

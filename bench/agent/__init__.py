@@ -1,1 +1,11 @@
-"""The rig agent: the one process that touches the instruments, and how others speak with it."""
+"""Rig agent: the one process that owns the instruments of a bench and executes runs."""
+
+from bench.agent.agent import Agent
+from bench.agent.ownership import acquire_agent_lock
+from bench.agent.server import serve_agent
+
+__all__ = [
+    "Agent",
+    "acquire_agent_lock",
+    "serve_agent",
+]

@@ -1,8 +1,8 @@
-"""The rig agent: owns instruments, interlocks, sequencer and recorder; nothing else writes to a wire.
+"""Rig agent: owns instruments, interlocks, sequencer and recorder; nothing else writes to a wire.
 
-Its state is one of idle, preparing, running, stopping, tripped. Samples come on one thread a wire and are judged
-by the interlocks there and then; a thread of its own brings them onto one time base, records and publishes them. A
-run is carried out by a thread of its own, its setpoints by another that does nothing else.
+The agent is idle, preparing, running, stopping or tripped. Samples arrive on one thread per wire, where the
+interlocks check them at once. The recording thread aligns, records and publishes them. A run has a thread of its
+own, and its setpoints have another.
 """
 
 import contextlib
@@ -15,257 +15,241 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from bench.agent.bench_clock import BenchClock
-from bench.agent.bench_thread import BenchThread
-from bench.agent.header import force_rate
-from bench.agent.instrument_status import instrument_status
-from bench.agent.messages import (
+from bench.agent.instrument_status import make_instrument_status
+from bench.agent.run_executor import RunExecutor
+from bench.agent.run_slot import RunSlot
+from bench.agent.setup_step import SetupExecutor
+from bench.agent.supervisor import SafetySupervisor
+from bench.agent_protocol import (
     AgentEvent,
     AgentState,
     AgentStatus,
-    Answer,
     PrepareCommand,
+    Reply,
     RunCommand,
     RunStatus,
     Samples,
 )
-from bench.agent.preparation import Preparation
-from bench.agent.runner import Runner
-from bench.agent.runs import Runs
-from bench.agent.steps import MOVING
-from bench.agent.warden import Warden
+from bench.config import BenchConfig
 from bench.errors import BenchError, LogError
-from bench.methods.compile import BETWEEN
-from bench.rig.acquisition import Acquisition, Batch
-from bench.rig.alignment import Aligner
-from bench.rig.config import BenchConfig
-from bench.rig.instruments import build_rig
-from bench.rig.priority import (
-    HASTE,
+from bench.methods import NO_SEGMENT
+from bench.recorder import RecordingThread, find_force_rate
+from bench.rig import (
+    PRIORITY_STEP,
+    Acquisition,
+    Aligner,
+    Batch,
+    build_rig,
+    check_priority,
     freeze_memory,
-    ordinary_priority,
-    priority_refused,
     raise_priority,
-    with_priority,
+    reset_priority,
+    run_with_priority,
 )
-from bench.safety.interlocks import Interlocks
-from bench.safety.limits import Action
-from bench.sequencer.move_rod import move_rod
-from drivers.channel import Frame
-from drivers.errors import DriverError
+from bench.safety import Action, Interlocks
+from bench.sequencer import move_rod
+from drivers import DriverError, Frame
 
-Publish: TypeAlias = Callable[[AgentStatus | Samples | AgentEvent], None]
+MessageSink: TypeAlias = Callable[[AgentStatus | Samples | AgentEvent], None]
 
 _STATUS_PERIOD = 0.25
-"""[s] between two statuses where nothing changes."""
-_SWITCH = 2e-4
-"""[s] after which a thread that computes lets another one go on: setpoints do not wait for a summary."""
-_END_WITHIN = 20.0
-"""[s] for a run to end in good order when the agent is shut down."""
+"""[s] Longest interval between two published statuses."""
+_SWITCH_INTERVAL = 2e-4
+"""[s] Time after which a computing thread yields the interpreter, so that setpoints are not delayed by it."""
+_SHUTDOWN_TIMEOUT = 20.0
+"""[s] Time for a run to stop when the agent is shut down."""
 
 
 class Agent:
-    """The agent; a context manager that holds all wires open.
+    """Rig agent; a context manager that keeps all wires open.
 
     Args:
-        config: of the bench.
-        source: its file, kept in every log; logs go beside it.
-        publish: takes what is published, from any thread; must not wait.
+        config: configuration of the bench.
+        source: file of the configuration, attached to every log; logs are stored beside it.
+        publish: receives the published messages from any thread; must not wait.
     """
 
     def __init__(
-        self, config: BenchConfig, source: Path | None = None, publish: Publish = lambda message: None
+        self, config: BenchConfig, source: Path | None = None, publish: MessageSink = lambda message: None
     ) -> None:
-        """Build everything; no wire is opened yet.
+        """Build everything without opening a wire.
 
         Raises:
             DriverError: a driver refuses a setting.
         """
         self._config, self._publish = config, publish
         self._clock = BenchClock()
-        self._no_priority = priority_refused()
-        self._rig = build_rig(config, self._clock, prompt=not self._no_priority)
-        self._interlocks = Interlocks(config.limits.matrix(), self._rig.drive_channel)
+        self._priority_warning = check_priority()
+        self._rig = build_rig(config, self._clock, realtime=not self._priority_warning)
+        self._interlocks = Interlocks(config.limits.make_limit_matrix(), self._rig.drive_channel)
         actuator = self._rig.actuator
         self._acquisition = Acquisition(
-            {one.name: one.instrument for one in self._rig.named},
-            self._take,
-            self._instrument_failed,
+            {one.name: one.instrument for one in self._rig.instruments},
+            self._on_batch,
+            self._on_instrument_failed,
             idle={actuator.name: actuator},
         )
-        self._warden = Warden(
-            self._rig, self._interlocks, self._clock, self._acquisition.maps, self._tell, self._stop_moving
+        self._supervisor = SafetySupervisor(
+            self._rig, self._interlocks, self._clock, self._acquisition.maps, self._report_event, self._stop_moving
         )
         aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
-        self._bench = BenchThread(aligner, force_rate(config), publish, self._beat, self._log_failed)
-        self._runner = Runner(
-            config, source, self._rig, self._interlocks, self._warden, self._acquisition, self._bench, self._clock,
-            self._tell,
+        self._recording_thread = RecordingThread(
+            aligner, find_force_rate(config), publish, self._on_cycle, self._on_log_failed
+        )
+        self._executor = RunExecutor(
+            config, source, self._rig, self._interlocks, self._supervisor, self._acquisition,
+            self._recording_thread, self._clock, self._report_event,
         )  # fmt: skip
         self._lock = threading.RLock()
         self._state: AgentState = "idle"
-        self._preparation = Preparation(self._rig, self._move, self._tell, self._prepared)
-        self._runs = Runs(self._lock, self._runner.carry_out, self._ended)
-        self._told: tuple[AgentState, str] | None = None
-        self._told_at = 0.0
-        self._open = contextlib.ExitStack()
-        for one in self._rig.named:
-            one.instrument.listen(partial(self._keep, one.name))
+        self._setup = SetupExecutor(
+            self._rig, self._interlocks, self._clock, self._move, self._report_event, self._on_setup_ended
+        )
+        self._run_slot = RunSlot(self._lock, self._executor.execute, self._on_run_ended)
+        self._published_state: tuple[AgentState, str] | None = None
+        self._published_at = 0.0
+        self._open_resources = contextlib.ExitStack()
+        for one in self._rig.instruments:
+            one.instrument.add_listener(partial(self._on_frame, one.name))
 
     def __enter__(self) -> "Agent":
         """Open all wires and begin to read.
 
         Raises:
-            DriverError: an instrument does not answer as itself; nothing stays open.
+            DriverError: an instrument does not reply as expected; all wires are closed again.
         """
-        sys.setswitchinterval(_SWITCH)
-        with_priority(self._open_all)
+        sys.setswitchinterval(_SWITCH_INTERVAL)
+        run_with_priority(self._open_all)
         freeze_memory()
-        # Whoever asks for the status holds the interpreter: put aside meanwhile, it would hold up the setpoints.
-        raise_priority(-HASTE)
+        # This thread makes the statuses. Suspended while it holds the interpreter, it would delay the setpoints.
+        raise_priority(-PRIORITY_STEP)
         return self
 
     def _open_all(self) -> None:
         with contextlib.ExitStack() as opening:
-            # Left in the opposite order: nobody reads from a wire any more when it is closed.
-            opening.enter_context(self._rig.connected())
+            # Closed in reverse order, so that no thread reads from a wire when it is closed.
+            opening.enter_context(self._rig.connect_all())
             opening.callback(self._acquisition.stop)
             self._acquisition.start()
-            opening.enter_context(self._bench)
-            self._acquisition.reconnect = True
-            self._runner.opened_ns = self._clock()
-            self._open = opening.pop_all()
+            opening.enter_context(self._recording_thread)
+            self._acquisition.enable_reconnection()
+            self._executor.note_connection()
+            self._open_resources = opening.pop_all()
 
     def __exit__(self, *_: object) -> None:
         self.shut_down()
-        self._open.close()
-        ordinary_priority()
+        self._open_resources.close()
+        reset_priority()
 
     # Commands
 
-    def status(self) -> AgentStatus:
-        """All that the agent says of itself."""
+    def get_status(self) -> AgentStatus:
+        """Return the state of the agent, its instruments and its runs."""
         with self._lock:
-            state, finished = self._state, self._runs.finished
+            state, finished = self._state, self._run_slot.finished
         return AgentStatus(
             state=state,
-            trip=self._interlocks.tripped,
-            mounting=self._rig.actuator.mounting.value,
-            step=self._preparation.status,
-            run=self._runs.status(),
+            trip=self._interlocks.trip_reason,
+            reference_state=self._rig.actuator.reference_state.value,
+            step=self._setup.status,
+            run=self._run_slot.get_status(),
             finished=finished,
-            instruments=tuple(instrument_status(one, self._acquisition, self._clock) for one in self._rig.named),
-            warnings=self._warnings(),
+            instruments=tuple(
+                make_instrument_status(one, self._acquisition, self._clock) for one in self._rig.instruments
+            ),
+            warnings=self._collect_warnings(),
             drive_kind=self._rig.drive_kind,
             drive_unit=self._rig.drive_unit,
         )
 
-    def run_status(self) -> RunStatus | None:
-        """The run that goes on, or the last one; none before the first."""
-        return self._runs.status()
+    def get_run_status(self) -> RunStatus | None:
+        """Return the status of the run in progress or of the latest run; None before the first."""
+        return self._run_slot.get_status()
 
-    def run(self, command: RunCommand) -> Answer:
-        """Begin a run; answered as soon as it is accepted."""
+    def run(self, command: RunCommand) -> Reply:
+        """Start a run; reply as soon as it is accepted."""
         with self._lock:
-            if error := self._not_ready():
-                return Answer(ok=False, error=error, status=self.status())
+            if obstacle := self._find_start_obstacle():
+                return Reply(ok=False, error=obstacle, status=self.get_status())
             self._set_state("preparing")
-        # Without the lock: a method takes its time to compile, and the state keeps everybody else out.
+        # Without the lock, because compiling takes time; the state excludes other commands.
         try:
-            self._runs.begin(*self._runner.made(command))
-        except Exception as found:
-            self._set_state("idle", instead_of=("preparing",))
-            if not isinstance(found, BenchError | DriverError):
+            self._run_slot.start(self._executor.prepare(command))
+        except Exception as error:
+            self._set_state("idle", expected=("preparing",))
+            if not isinstance(error, BenchError | DriverError):
                 raise
-            return Answer(ok=False, error=str(found), status=self.status())
-        return Answer(ok=True, status=self.status())
+            return Reply(ok=False, error=str(error), status=self.get_status())
+        return Reply(ok=True, status=self.get_status())
 
-    def prepare(self, command: PrepareCommand) -> Answer:
-        """Carry out one step before a run; answered when it is done, or after a moment while it goes on."""
+    def prepare(self, command: PrepareCommand) -> Reply:
+        """Start a setup step; reply when it is done, or after a moment while it continues."""
         with self._lock:
-            if error := self._not_ready():
-                return Answer(ok=False, error=error, status=self.status())
+            if obstacle := self._find_start_obstacle():
+                return Reply(ok=False, error=obstacle, status=self.get_status())
             self._set_state("preparing")
-        if command.step in MOVING:
-            # From now on the silence of the load cell counts.
-            self._interlocks.expect_force(self._clock())
-        if command.step == "home":  # the reference stands beyond where a specimen may be taken; force is watched
-            matrix = self._config.limits.matrix()
-            self._interlocks.matrix = {name: steps for name, steps in matrix.items() if name != "displacement"}
-        begun = self._preparation.begin(command.step, command.position_m or 0.0)
-        failed = begun.outcome == "failed"
-        return Answer(ok=not failed, error=begun.words if failed else "", status=self.status())
+        status = self._setup.start(command.step, command.position_m or 0.0)
+        failed = status.outcome == "failed"
+        return Reply(ok=not failed, error=status.message if failed else "", status=self.get_status())
 
-    def _move(self, target: float, ending: threading.Event) -> None:
-        """Lead the rod to a place [m] where no run does."""
-        move_rod(self._rig.actuator, self._interlocks.permit, self._clock, self._runner.set_led, target, ending)
-
-    def _prepared(self) -> None:
-        self._interlocks.expect_force(None)
-        self._interlocks.matrix = self._config.limits.matrix()
-        self._set_state("idle", instead_of=("preparing",))
-
-    def stop(self) -> Answer:
-        """End the run, or a step before one, in good order; harmless when nothing runs."""
-        self._tell("command", "stop")
+    def stop(self) -> Reply:
+        """Stop a run or a setup step softly; harmless if nothing is in progress."""
+        self._report_event("command", "stop")
         self._stop_moving("stopped on request", False)
-        return Answer(ok=True, status=self.status())
+        return Reply(ok=True, status=self.get_status())
 
-    def reset(self) -> Answer:
-        """Take back a trip whose cause has gone; nothing moves."""
-        self._tell("command", "reset")
-        error = self._not_resettable() or self._taken_back()
-        return Answer(ok=not error, error=error, status=self.status())
+    def reset(self) -> Reply:
+        """Reset a trip whose cause is removed; nothing moves."""
+        self._report_event("command", "reset")
+        error = self._find_reset_obstacle() or self._reset_trip()
+        return Reply(ok=not error, error=error, status=self.get_status())
 
     def shut_down(self) -> None:
-        """End run or step in good order and bring everything to rest; harmless when repeated."""
+        """Stop a run or setup step softly and bring everything to rest; harmless if repeated."""
         self._stop_moving("the agent was shut down", False)
-        self._preparation.wait(_END_WITHIN)
-        self._runs.wait(_END_WITHIN)
+        self._setup.wait(_SHUTDOWN_TIMEOUT)
+        self._run_slot.wait(_SHUTDOWN_TIMEOUT)
 
     def wait(self, timeout: float) -> bool:
-        """Wait [s] for the run to end; whether it has."""
-        return self._runs.wait(timeout)
+        """Wait for the run to end, up to a timeout [s]; return whether there is none in progress."""
+        return self._run_slot.wait(timeout)
 
     # States
 
-    def _not_ready(self) -> str:
-        """Why no run can begin; empty where one can."""
+    def _set_state(self, state: AgentState, expected: tuple[AgentState, ...] | None = None) -> None:
+        """Change the state; only from one of the expected states, if they are given."""
+        with self._lock:
+            if state == self._state or (expected is not None and self._state not in expected):
+                return
+            self._state = state
+        self._report_event("state", f"agent {state}")
+
+    def _find_start_obstacle(self) -> str:
+        """Return the reason why nothing can be started; empty if it can."""
+        if self._state == "tripped":
+            reason = self._interlocks.trip_reason
+            return f"the agent is tripped ({reason}); nothing was started; remove the cause, then reset"
         if self._state != "idle":
-            why = f" ({self._interlocks.tripped}); find the cause, then reset" if self._state == "tripped" else ""
-            return f"the agent is {self._state}{why}; nothing was started"
-        down = ", ".join(self._acquisition.down)
-        return f"{down} does not answer; nothing was started; see its wire" if down else ""
+            return f"the agent is {self._state}; nothing was started; wait for its end, or stop it"
+        return self._describe_failed_instruments("nothing was started; check its wire")
 
-    def _ended(self, status: RunStatus) -> None:
-        """A run is over, whatever it was that ended it."""
-        self._set_state("tripped" if self._interlocks.tripped else "idle")
-        self._tell("run_finished", f"{status.id}: {status.outcome} {status.reason}".strip())
-
-    def _stop_moving(self, why: str, hold: bool) -> None:
-        """End a run, or a step before one, in good order; from any thread, harmless where nothing goes on."""
-        run = self._runs.current
-        if run is not None:
-            run.sequencer.stop(why, hold)
-        if self._interlocks.tripped:
-            self._set_state("tripped")
-        elif run is not None:
-            self._set_state("stopping", instead_of=("preparing", "running"))
-        else:
-            self._preparation.stop(why)
-
-    def _not_resettable(self) -> str:
-        """Why a trip cannot be taken back now; empty where it can."""
+    def _find_reset_obstacle(self) -> str:
+        """Return the reason why a trip cannot be reset; empty if it can."""
         if self._state not in ("tripped", "idle"):
             return f"the agent is {self._state}; stop it first"
-        if self._runs.current is not None or self._preparation.going:
-            return "what was tripped has not ended yet; try again in a moment"
-        down = ", ".join(self._acquisition.down) if self._state == "tripped" else ""
-        return f"{down} does not answer; see its wire, then reset" if down else ""
+        if self._run_slot.current is not None or self._setup.is_running:
+            return "the tripped run or step has not ended yet; try again in a moment"
+        return self._describe_failed_instruments("check its wire, then reset") if self._state == "tripped" else ""
 
-    def _taken_back(self) -> str:
-        """Take a trip back; why not, where an instrument refuses.
+    def _describe_failed_instruments(self, consequence: str) -> str:
+        failed = ", ".join(self._acquisition.failed_instruments)
+        return f"{failed} does not reply; {consequence}" if failed else ""
 
-        The lock is not held meanwhile: instruments take their time, and nothing else leads out of a trip.
+    def _reset_trip(self) -> str:
+        """Reset a trip; return the error of an instrument that refuses, else an empty text.
+
+        The lock is not held meanwhile, because the replies of instruments take time. No other command leaves the
+        state after a trip.
         """
         if self._state == "idle":
             return ""
@@ -278,64 +262,88 @@ class Agent:
         self._set_state("idle")
         return ""
 
+    def _stop_moving(self, reason: str, hold: bool) -> None:
+        """Stop a run or setup step softly; from any thread, harmless if nothing is in progress."""
+        run = self._run_slot.current
+        if run is not None:
+            run.sequencer.stop(reason, hold)
+        if self._interlocks.trip_reason:
+            self._set_state("tripped")
+        elif run is not None:
+            self._set_state("stopping", expected=("preparing", "running"))
+        else:
+            self._setup.stop(reason)
+
+    def _move(self, target: float, stop_requested: threading.Event) -> None:
+        """Move the rod to a position [m] without a run."""
+        move_rod(
+            self._rig.actuator,
+            self._interlocks.permit,
+            self._clock,
+            self._acquisition.set_externally_triggered,
+            target,
+            stop_requested,
+        )
+
+    def _on_setup_ended(self) -> None:
+        self._set_state("idle", expected=("preparing",))
+
+    def _on_run_ended(self, status: RunStatus) -> None:
+        self._set_state("tripped" if self._interlocks.trip_reason else "idle")
+        self._report_event("run_finished", f"{status.id}: {status.outcome} {status.reason}".strip())
+
     # On the threads of wires
 
-    def _take(self, batch: Batch) -> None:
-        # Judged before anything else is done with it.
-        self._warden.look(batch)
-        self._bench.feed(batch)
-        if (log := self._runs.log) is not None:
-            log.blocks(batch.instrument, batch.blocks)
+    def _on_batch(self, batch: Batch) -> None:
+        # Before everything else, so that limits are checked without delay.
+        self._supervisor.on_samples(batch)
+        self._recording_thread.feed(batch)
+        if (log := self._run_slot.log) is not None:
+            log.write_blocks(batch.instrument, batch.blocks)
 
-    def _keep(self, name: str, frame: Frame) -> None:
-        if (log := self._runs.log) is not None:
-            log.frame(name, frame)
+    def _on_frame(self, name: str, frame: Frame) -> None:
+        if (log := self._run_slot.log) is not None:
+            log.write_frame(name, frame)
 
-    def _instrument_failed(self, name: str, error: DriverError) -> None:
-        driver = next(one.driver for one in self._rig.named if one.name == name)
-        moves = self._runs.current is not None or self._preparation.moving
-        action = self._config.silence.action(driver) if moves else Action.INDICATE
-        self._warden.act(action, str(error))
+    def _on_instrument_failed(self, name: str, error: DriverError) -> None:
+        driver = next(one.driver for one in self._rig.instruments if one.name == name)
+        is_in_use = self._run_slot.current is not None or self._setup.is_moving
+        action = self._config.silence.get_action(driver) if is_in_use else Action.INDICATE
+        self._supervisor.apply(action, str(error))
 
-    def _log_failed(self, error: LogError) -> None:
-        self._warden.act(Action.CONTROLLED_STOP, str(error))
+    # On the recording thread
 
-    # What is said
+    def _on_log_failed(self, error: LogError) -> None:
+        self._supervisor.apply(Action.CONTROLLED_STOP, str(error))
 
-    def _beat(self) -> None:
-        """Every turn of the bench thread."""
-        self._warden.tick()
-        run, now = self._runs.current, time.monotonic()
+    def _on_cycle(self) -> None:
+        self._supervisor.on_timer()
+        run, now = self._run_slot.current, time.monotonic()
         segment = ""
         if run is not None:
-            _, index = run.plan.progress(self._clock())
-            segment = "" if index == BETWEEN else run.what.programme.segments[index].name
-            # The way to where the method begins is no part of it.
-            if any(entry.passage for entry in run.plan.entries):
-                self._set_state("running", instead_of=("preparing",))
-        if (self._state, segment) != self._told or now - self._told_at >= _STATUS_PERIOD:
-            self._told, self._told_at = (self._state, segment), now
-            self._publish(self.status())
+            _, index = run.history.find_progress(self._clock())
+            segment = "" if index == NO_SEGMENT else run.request.programme.segments[index].name
+            if run.history.has_started:
+                self._set_state("running", expected=("preparing",))
+        if (self._state, segment) != self._published_state or now - self._published_at >= _STATUS_PERIOD:
+            self._published_state, self._published_at = (self._state, segment), now
+            self._publish(self.get_status())
 
-    def _set_state(self, state: AgentState, instead_of: tuple[AgentState, ...] | None = None) -> None:
-        """Change the state, where it is one of those that are given."""
-        with self._lock:
-            if state == self._state or (instead_of is not None and self._state not in instead_of):
-                return
-            self._state = state
-        self._tell("state", f"agent {state}")
+    # Reports
 
-    def _tell(self, kind: str, text: str, time_ns: int | None = None, **more: Any) -> None:
-        """An event, into the log that is open, with what more is known of it, and to whoever listens."""
-        moment = self._clock() if time_ns is None else time_ns
-        if (log := self._runs.log) is not None:
-            log.event(moment, kind, text, **more)
-        self._publish(AgentEvent(time_ns=moment, kind=kind, text=text))
+    def _report_event(self, kind: str, text: str, time_ns: int | None = None, **details: Any) -> None:
+        """Write an event to the open log, with its details, and publish it."""
+        event_ns = self._clock() if time_ns is None else time_ns
+        if (log := self._run_slot.log) is not None:
+            log.write_event(event_ns, kind, text, **details)
+        self._publish(AgentEvent(time_ns=event_ns, kind=kind, text=text))
 
-    def _warnings(self) -> tuple[str, ...]:
-        # What every thread was refused is said once, with what follows from it.
-        found = [sentence for sentence in self._acquisition.warnings if sentence != self._no_priority]
-        if self._no_priority:
-            stale = self._rig.actuator.settings.stale_after
-            found.append(f"{self._no_priority}; the drive stops by itself {stale:g} s after the last setpoint")
-        return tuple(found)
+    def _collect_warnings(self) -> tuple[str, ...]:
+        # Every thread reports the same missing priority, so it is listed once, with its consequence.
+        warnings = [warning for warning in self._acquisition.warnings if warning != self._priority_warning]
+        if self._priority_warning:
+            timeout = self._rig.actuator.settings.setpoint_timeout
+            warnings.append(
+                f"{self._priority_warning}; the drive stops by itself {timeout:g} s after the last setpoint"
+            )
+        return tuple(warnings)

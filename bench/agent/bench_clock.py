@@ -1,14 +1,14 @@
-"""The clock that everything in a log is said by."""
+"""Bench clock: the clock of every recorded time."""
 
 import time
 
 
 class BenchClock:
-    """The bench clock [ns]: monotonic, zero when the agent starts."""
+    """Bench clock [ns]: monotonic, zero when the agent starts."""
 
     def __init__(self) -> None:
-        self._began = time.monotonic_ns()
+        self._start_ns = time.monotonic_ns()
 
     def __call__(self) -> int:
-        """Now."""
-        return time.monotonic_ns() - self._began
+        """Return the time now [ns]."""
+        return time.monotonic_ns() - self._start_ns

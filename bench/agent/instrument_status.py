@@ -1,32 +1,32 @@
-"""What the agent says of one instrument and its wire."""
+"""Status message of one instrument and its wire."""
 
-from collections.abc import Callable
-
-from bench.agent.messages import InstrumentStatus
-from bench.rig.acquisition import Acquisition
-from bench.rig.instruments import Named
+from bench.agent_protocol import InstrumentStatus
+from bench.rig import Acquisition, RegisteredInstrument
+from drivers import Clock
 
 
-def instrument_status(one: Named, acquisition: Acquisition, clock: Callable[[], int]) -> InstrumentStatus:
-    """Its health, and how well its clock is known.
+def make_instrument_status(
+    registered: RegisteredInstrument, acquisition: Acquisition, clock: Clock
+) -> InstrumentStatus:
+    """Describe the health of an instrument and the accuracy of its clock map.
 
     Args:
-        one: the instrument.
-        acquisition: that reads it.
-        clock: of the bench [ns].
+        registered: the instrument.
+        acquisition: reads the instrument.
+        clock: bench clock [ns].
     """
-    health, map_ = one.instrument.health(), acquisition.maps[one.name]
-    down = one.name in acquisition.down
+    health, clock_map = registered.instrument.get_health(), acquisition.maps[registered.name]
+    has_failed = registered.name in acquisition.failed_instruments
     return InstrumentStatus(
-        name=one.name,
-        driver=one.driver,
-        address=one.address,
-        connected=health.connected and not down,
+        name=registered.name,
+        driver=registered.driver,
+        address=registered.address,
+        connected=health.connected and not has_failed,
         received=health.received,
         lost=health.lost,
         corrupted=health.corrupted,
         resynchronised=health.resynchronised,
         age_s=None if health.last_ns is None else (clock() - health.last_ns) * 1e-9,
-        skew_s=map_.skew() if map_.known else None,
-        words=health.words or ("does not answer" if down else ""),
+        clock_error_bound_s=clock_map.compute_error_bound() if clock_map.is_known else None,
+        message=health.message or ("does not reply" if has_failed else ""),
     )

@@ -1,4 +1,4 @@
-"""One agent a bench: whoever has it keeps others away from its wires."""
+"""Lock that admits one agent per bench."""
 
 import contextlib
 import fcntl
@@ -9,17 +9,17 @@ from bench.errors import RunError
 
 
 @contextlib.contextmanager
-def sole_agent(config: Path) -> Iterator[None]:
-    """Have a bench for oneself, as long as the block lasts or the process lives.
+def acquire_agent_lock(config: Path) -> Iterator[None]:
+    """Lock a bench for the duration of a block, or until the process ends.
 
-    A second agent would find most wires free: a CAN bus and Modbus TCP take several hosts, and to connect there
-    means to stop the drive and to bring the coil to zero in the middle of the first one's run.
+    A second agent would find most wires free, because a CAN bus and Modbus TCP accept several hosts. By
+    connecting, it would stop the drive and set the coil to zero in the middle of the first agent's run.
 
     Args:
         config: ``bench.toml`` of the bench.
 
     Raises:
-        RunError: another process has it.
+        RunError: another process holds the lock.
     """
     with config.open("rb") as file:
         try:
@@ -29,6 +29,6 @@ def sole_agent(config: Path) -> Iterator[None]:
                 f"{config}: another rig agent has this bench; end it, or let it do the work (mrbench prepare, the "
                 "page, or REST)"
             ) from None
-        except OSError:  # a file system without locks, such as some of networks: then nobody can be kept away
+        except OSError:  # a file system without locks, such as some network file systems: no protection there
             pass
         yield

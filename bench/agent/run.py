@@ -1,208 +1,162 @@
-"""One run: what was asked for, who carries it out, what became of it."""
+"""One run: its playback, its recording and its result."""
 
 import contextlib
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 
-from bench.agent.bench_thread import BenchThread
-from bench.agent.header import LogFacts
-from bench.agent.messages import RunCommand, RunOutcome, RunStatus
-from bench.agent.recording import Recording
-from bench.errors import BenchError, RunError
-from bench.methods import Method, Programme, compile_method
-from bench.methods.compile import BETWEEN
-from bench.methods.document import method_of
-from bench.recorder.live import LiveRecorder
-from bench.rig.clock_map import ClockMap
-from bench.rig.instruments import Rig
-from bench.run_from_plant import Identity
-from bench.sequencer.passages import after_segment, passages
-from bench.sequencer.plan import RunPlan
-from bench.sequencer.sequencer import Sequencer
-from drivers.errors import DriverError
+from bench.agent.run_request import RunRequest
+from bench.agent_protocol import RunOutcome, RunStatus
+from bench.errors import BenchError
+from bench.methods import NO_SEGMENT
+from bench.recorder import EventReporter, LiveRecorder, LogMetadata, RecordingThread, RunRecorder
+from bench.rig import ClockMap
+from bench.sequencer import CommandHistory, Sequencer
+from drivers import Clock, DriverError
 
-_LAST_SAMPLES = 2.0
-"""[s] for the samples of a run's last moment to come; the LVDT's take tens of milliseconds."""
-_AFTER = 0.2
-"""[s] that are recorded after everything has come to rest."""
-_LOOK = 0.02
-"""[s] between two looks while waiting."""
-
-
-@dataclass(frozen=True)
-class Order:
-    """What is to be run, checked as far as that goes before anything moves."""
-
-    programme: Programme
-    first: int
-    """Sample of the programme to begin with."""
-    identity: Identity
-    path: Path
-    """The log."""
-
-    @property
-    def method(self) -> Method:
-        """The method that is run."""
-        return self.programme.method
-
-
-def order(command: RunCommand, rig: Rig, specimen: str, folder: Path) -> Order:
-    """What a command asks for.
-
-    Args:
-        command: as it came.
-        rig: on which it is to run.
-        specimen: that is mounted, where the command does not say.
-        folder: where logs go.
-
-    Raises:
-        MethodError: the method is none, or cannot be compiled within its limits.
-        RunError: this bench cannot run it, or there is no place for the log.
-    """
-    programme = compile_method(method_of(command.method, "what was sent"))
-    method = programme.method
-    if method.drive_kind != rig.drive_kind:
-        raise RunError(
-            f"method {method.name} drives by {method.drive_kind}, this bench by {rig.drive_kind}; take another "
-            "method, or set the mode of the coil amplifier in bench.toml"
-        )
-    first = after_segment(programme, command.resume_after) if command.resume_after else 0
-    passages(programme, rig.amplifier.table_capacity, first)
-    identity = Identity(command.specimen or specimen, command.operator, datetime.now(UTC))
-    path = Path(command.log) if command.log else folder / f"{identity.run_id(method)}.mcap"
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise RunError(f"{path.parent}: logs cannot go there ({error.strerror}); choose another folder") from None
-    return Order(programme, first, identity, path)
+_FINAL_SAMPLES_TIMEOUT = 2.0
+"""[s] Time for the last samples of a run to arrive; those of the LVDT take tens of milliseconds."""
+_POST_RUN_TIME = 0.2
+"""[s] Time that is recorded after everything is at rest."""
+_POLL_PERIOD = 0.02
+"""[s] Interval of polling while waiting."""
 
 
 class Run:
     """One run on the rig.
 
     Args:
-        what: is to be run.
-        plan: what is commanded when.
-        sequencer: plays it.
-        bench: records it.
-        clock: of the bench [ns].
-        tell: told of what happens: kind, words, bench clock [ns].
+        request: the run to execute.
+        history: commands of the run.
+        sequencer: plays the programme.
+        recording_thread: records the samples.
+        clock: bench clock [ns].
+        report_event: receives the events of the run.
     """
 
     def __init__(
         self,
-        what: Order,
-        plan: RunPlan,
+        request: RunRequest,
+        history: CommandHistory,
         sequencer: Sequencer,
-        bench: BenchThread,
-        clock: Callable[[], int],
-        tell: Callable[[str, str, int], None],
+        recording_thread: RecordingThread,
+        clock: Clock,
+        report_event: EventReporter,
     ) -> None:
-        self.what, self.plan, self.sequencer = what, plan, sequencer
-        self.log: LiveRecorder | None = None
-        self._bench, self._clock, self._tell = bench, clock, tell
+        self.request, self.history, self.sequencer = request, history, sequencer
+        self._recording_thread, self._clock, self._report_event = recording_thread, clock, report_event
+        self._log: LiveRecorder | None = None
         self._reason = ""
         self._outcome: RunOutcome | None = None
         self._lost: dict[str, int] = {}
         self._started = datetime.now(UTC)
 
-    def carry_out(
-        self,
-        facts: LogFacts,
-        settled: Callable[[], str],
-        maps: Mapping[str, ClockMap],
+    @property
+    def log(self) -> LiveRecorder | None:
+        """Log of the run while it is open."""
+        return self._log
+
+    def execute(
+        self, metadata: LogMetadata, wait_until_stopped: Callable[[], str], maps: Mapping[str, ClockMap]
     ) -> None:
-        """Play and record it; returns when everything is at rest and the log is closed.
+        """Play and record the run; return when everything is at rest and the log is closed.
 
         Args:
-            facts: what the log says beside what happens in it.
-            settled: waits until a trip has done its work, and says why it tripped; empty where it did not.
-            maps: of the instruments' clocks, by name.
+            metadata: content of the log apart from samples, marks and events.
+            wait_until_stopped: waits for the end of a trip; returns its reason, empty without a trip.
+            maps: clock maps of the instruments by name.
         """
         try:
-            self.log = LiveRecorder(self.what.path, facts.header, maps=maps)
+            self._log = LiveRecorder(self.request.path, metadata.header, maps=maps)
         except BenchError as error:
-            self._outcome, self._reason = "incomplete", str(error)
+            self.fail(str(error))
             return
+        failure = self._try_play(metadata, self._log)
+        # A trip also makes the setpoints fail, so its reason comes first.
+        self._reason = wait_until_stopped() or failure or self.sequencer.stop_reason
+        self._await_samples(self._clock() + round(_POST_RUN_TIME * 1e9))
         try:
-            self._play(facts)
-        except (BenchError, DriverError) as error:
-            self._reason = str(error)
-        except Exception as error:  # the log is closed and the next run waits, whatever happened
-            self._reason = f"the run failed: {error!r}; this is a defect"
-        tripped = settled()
-        # A trip makes setpoints fail, and those end the run: of several reasons it is the first.
-        self._reason = tripped or self._reason or self.sequencer.stopped
-        self._await_samples(self._clock() + round(_AFTER * 1e9))
-        try:
-            self._close(facts.clocks)
-        except Exception as error:  # without an outcome the run would seem to go on for ever
-            self._reason = f"its log does not end in good order: {error!r}; this is a defect"
-            self._outcome = "incomplete"
-            log, self.log = self.log, None
-            if log is not None:
-                with contextlib.suppress(Exception):
-                    log.close("incomplete", self._reason)
+            self._close(self._log, metadata.describe_clocks)
+        except Exception as error:  # without an outcome the run would seem to be in progress
+            self.fail(
+                f"the log could not be finalised: {error!r}; repair it with mrbench salvage; "
+                "internal error, please report"
+            )
 
-    def status(self) -> RunStatus:
-        """How far it is."""
-        what, method = self.what, self.what.method
-        elapsed, segment = self.plan.progress(self._clock())
-        over = self._outcome is not None
+    def fail(self, reason: str) -> None:
+        """End the run as incomplete and close its log; without effect if the run has an outcome."""
+        if self._outcome is not None:
+            return
+        self._reason = reason
+        log, self._log = self._log, None
+        if log is not None:
+            with contextlib.suppress(Exception):
+                self._lost = self._recording_thread.finish_recording()
+            with contextlib.suppress(Exception):
+                log.close("incomplete", reason)
+        self._outcome = "incomplete"
+
+    def get_status(self) -> RunStatus:
+        """Return progress or result."""
+        request, method = self.request, self.request.method
+        elapsed, segment = self.history.find_progress(self._clock())
+        is_over = self._outcome is not None
         return RunStatus(
-            id=what.identity.run_id(method),
+            id=request.identity.make_run_id(method.name),
             method=method.name,
-            specimen=what.identity.specimen,
-            operator=what.identity.operator,
-            log=str(what.path),
+            specimen=request.identity.specimen,
+            operator=request.identity.operator,
+            log=str(request.path),
             started=self._started.isoformat(),
-            duration_s=what.programme.duration,
+            duration_s=request.programme.duration,
             elapsed_s=elapsed,
-            segment="" if over or segment == BETWEEN else what.programme.segments[segment].name,
+            segment="" if is_over or segment == NO_SEGMENT else request.programme.segments[segment].name,
             outcome=self._outcome,
-            reason=self._reason if over else "",
-            lost=self._lost if over else self._bench.lost(),
+            reason=self._reason if is_over else "",
+            lost=self._lost if is_over else self._recording_thread.count_lost(),
         )
 
-    def _play(self, facts: LogFacts) -> None:
-        if self.log is None:
-            return
-        for document in [*facts.documents, facts.decoders()]:
-            self.log.attach(document.name, document.media_type, document.data)
-        programme, name = self.what.programme, self.what.method.name
-        self._bench.record(Recording(self.log, programme, self.plan, self._tell_at, self._clock()))
-        resumed = f" from {programme.time[self.what.first]:.1f} s on" if self.what.first else ""
-        self._tell("state", f"run of method {name} started{resumed}", self._clock())
-        self.sequencer.run(programme, self.what.first)
+    def _try_play(self, metadata: LogMetadata, log: LiveRecorder) -> str:
+        """Play the run; return the reason of a failure, empty without one."""
+        try:
+            self._play(metadata, log)
+        except (BenchError, DriverError) as error:
+            return str(error)
+        except Exception as error:  # whatever happened, the log is closed and the next run can begin
+            return f"the run failed: {error!r}; internal error, please report"
+        return ""
 
-    def _tell_at(self, time_ns: int, kind: str, text: str) -> None:
-        self._tell(kind, text, time_ns)
+    def _play(self, metadata: LogMetadata, log: LiveRecorder) -> None:
+        for attachment in [*metadata.attachments, metadata.describe_decoders()]:
+            log.attach(attachment.name, attachment.media_type, attachment.data)
+        programme, first = self.request.programme, self.request.first_sample
+        self._recording_thread.start_recording(
+            RunRecorder(log, programme, self.history, self._report_event, self._clock())
+        )
+        resumed = f" from {programme.time[first]:.1f} s on" if first else ""
+        self._report_event("state", f"run of method {self.request.method.name} started{resumed}")
+        self.sequencer.run(programme, first)
 
     def _await_samples(self, until_ns: int) -> None:
-        """Until samples of the last moment have come; where a channel is dead, they will not."""
-        deadline = time.monotonic() + _LAST_SAMPLES
-        while self._bench.newest_ns < until_ns and time.monotonic() < deadline:
-            time.sleep(_LOOK)
+        """Wait for samples up to an instant [ns]; if a channel has failed, until the timeout."""
+        deadline = time.monotonic() + _FINAL_SAMPLES_TIMEOUT
+        while self._recording_thread.newest_ns < until_ns and time.monotonic() < deadline:
+            time.sleep(_POLL_PERIOD)
 
-    def _close(self, clocks: Callable[[], dict[str, str]]) -> None:
-        if self.log is None:
-            return
-        self._tell("state", "run finished" if not self._reason else f"run ended: {self._reason}", self._clock())
-        lost = self._bench.finish()
+    def _close(self, log: LiveRecorder, describe_clocks: Callable[[], dict[str, str]]) -> None:
+        self._report_event("state", "run finished" if not self._reason else f"run ended: {self._reason}")
+        lost = self._recording_thread.finish_recording()
         for channel, count in lost.items():
-            self.log.lost(channel, count)
-        lost = {**lost, **self.log.dropped}
+            log.count_lost(channel, count)
+        lost = {**lost, **log.dropped_counts}
         outcome: RunOutcome = "incomplete"
         try:
-            self.log.clocks(clocks())
-            closed = self.log.close("incomplete" if self._reason else None, self._reason)
+            log.write_clocks(describe_clocks())
+            closed = log.close("incomplete" if self._reason else None, self._reason)
             outcome = "incomplete" if closed == "truncated" else closed
         except BenchError as error:
             self._reason = str(error)
-        # The outcome last: who sees one takes all else for final.
         self._lost = lost
+        # Last, because a status with an outcome is taken as final.
         self._outcome = outcome
-        self.log = None
+        self._log = None

@@ -1,4 +1,4 @@
-"""Opens the database of a catalogue and brings its tables to this version."""
+"""Connection to the database of a catalogue, with the migration of its tables to this version."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,22 +13,22 @@ from sqlalchemy.exc import SQLAlchemyError
 from bench.catalogue.errors import CatalogueError
 
 _PRAGMAS = ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON", "busy_timeout=5000")
-"""With a write-ahead log, readers never wait for a writer; a kill loses nothing that was committed."""
+"""SQLite settings. With a write-ahead log readers never wait for a writer, and a kill loses no committed data."""
 
 
-def sqlite_url(path: Path) -> str:
-    """The address of an SQLite file."""
+def make_sqlite_url(path: Path) -> str:
+    """Return the address of an SQLite file."""
     return f"sqlite:///{path}"
 
 
 def open_database(url: str) -> Engine:
-    """Connect and run the migrations that the database lacks.
+    """Connect to a database and run the migrations that it lacks.
 
     Args:
-        url: as SQLAlchemy has it, such as ``sqlite:///runs/catalogue.db`` or ``postgresql+psycopg://…``.
+        url: SQLAlchemy address, such as ``sqlite:///runs/catalogue.db`` or ``postgresql+psycopg://…``.
 
     Raises:
-        CatalogueError: it cannot be opened, is no database, or was made by a later version.
+        CatalogueError: the database cannot be opened, is not a database, or was written by a later version.
     """
     try:
         engine = create_engine(url)
@@ -37,10 +37,12 @@ def open_database(url: str) -> Engine:
         try:
             _migrate(engine)
         except BaseException:
-            engine.dispose()  # or its connections, and an SQLite file's lock, stay until chance collects them
+            engine.dispose()  # otherwise connections and the lock of an SQLite file stay until garbage collection
             raise
     except CommandError as error:
-        raise CatalogueError(f"the catalogue {url} is of a later version ({error}); take that mrbench") from error
+        raise CatalogueError(
+            f"the catalogue {url} was written by a later version ({error}); use that version of mrbench"
+        ) from error
     except (SQLAlchemyError, ImportError) as error:
         raise CatalogueError(f"the catalogue {url} cannot be opened: {str(error).splitlines()[0]}") from error
     return engine

@@ -1,7 +1,7 @@
-"""The catalogue's own error."""
+"""Error of the catalogue."""
 
 from bench.errors import BenchError
 
 
 class CatalogueError(BenchError):
-    """The catalogue cannot be opened, or is of another version."""
+    """The catalogue cannot be opened or has a later version."""

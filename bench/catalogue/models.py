@@ -7,36 +7,36 @@ from sqlalchemy import JSON, BigInteger, DateTime, Dialect, Enum, ForeignKey, In
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
-RunState: TypeAlias = Literal["running", "ended", "cut_off"]
-"""cut_off: the log has no end and nobody writes to it any more."""
+RunState: TypeAlias = Literal["running", "ended", "truncated"]
+"""truncated: the log has no end and is no longer being written."""
 RunOutcome: TypeAlias = Literal["clean", "lossy", "truncated", "incomplete"]
 JobState: TypeAlias = Literal["queued", "running", "done", "failed", "cancelled"]
-UNFINISHED: tuple[JobState, ...] = ("queued", "running")
-"""States of a job that a worker still owes an answer."""
+UNFINISHED_STATES: tuple[JobState, ...] = ("queued", "running")
+"""States of a job that is not finished."""
 
 
 class UtcTime(TypeDecorator[datetime]):
-    """A time that is UTC on both sides, also in databases that keep no time zone."""
+    """Column type for a UTC time, also in databases that store no time zone."""
 
     impl = DateTime
     cache_ok = True
 
     def process_bind_param(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """To the database: UTC without its mark."""
+        """Convert a time to UTC without time zone, for the database."""
         return None if value is None else value.astimezone(UTC).replace(tzinfo=None)
 
     def process_result_value(self, value: datetime | None, dialect: Dialect) -> datetime | None:
-        """From the database: marked as UTC."""
+        """Add the time zone UTC to a time from the database."""
         return None if value is None else value.replace(tzinfo=UTC)
 
 
-def _words(of: Any) -> Enum:
-    """A column that holds one of some words, kept as text without a constraint, so that words may be added."""
-    return Enum(*get_args(of), native_enum=False, create_constraint=False, length=16)
+def _make_enum_column(literal: Any) -> Enum:
+    """Return a column type for the values of a Literal, stored as text without constraint so that it can grow."""
+    return Enum(*get_args(literal), native_enum=False, create_constraint=False, length=16)
 
 
 class Base(DeclarativeBase):
-    """Ground of all tables."""
+    """Base class of all tables."""
 
 
 class RunRow(Base):
@@ -52,23 +52,23 @@ class RunRow(Base):
     source: Mapped[str] = mapped_column(Text, default="run")
     """``run``, or ``import`` for a recording made elsewhere."""
     started: Mapped[datetime] = mapped_column(UtcTime)
-    """UTC; of an import that does not say, when its log was written."""
+    """UTC; for an import without this information, the time at which its log was written."""
     duration_s: Mapped[float | None] = mapped_column(default=None)
-    """[s] recorded; while the run goes on, planned."""
-    state: Mapped[RunState] = mapped_column(_words(RunState), index=True)
-    outcome: Mapped[RunOutcome | None] = mapped_column(_words(RunOutcome), default=None)
+    """Recorded time [s]; while the run is in progress, the planned time."""
+    state: Mapped[RunState] = mapped_column(_make_enum_column(RunState), index=True)
+    outcome: Mapped[RunOutcome | None] = mapped_column(_make_enum_column(RunOutcome), default=None)
     reason: Mapped[str] = mapped_column(Text, default="")
-    """Why the outcome is not clean."""
+    """Reason of an outcome other than `clean`."""
     log: Mapped[str] = mapped_column(Text, unique=True)
-    """From the data folder, or absolute where it lies elsewhere."""
+    """Path of the log relative to the data folder, or absolute if it is outside."""
     log_bytes: Mapped[int | None] = mapped_column(BigInteger, default=None)
     log_modified_ns: Mapped[int | None] = mapped_column(BigInteger, default=None)
     log_sha256: Mapped[str | None] = mapped_column(Text, default=None)
-    """Of the whole log, once it has ended."""
+    """Hash of the complete log, once the run has ended."""
 
 
 class JobRow(Base):
-    """One piece of work on a run."""
+    """One identification of a run by a worker."""
 
     __tablename__ = "jobs"
 
@@ -76,19 +76,19 @@ class JobRow(Base):
     run_id: Mapped[str] = mapped_column(ForeignKey("runs.id"), index=True)
     kind: Mapped[str] = mapped_column(Text, default="identify")
     key: Mapped[str] = mapped_column(Text, index=True)
-    """Of the content: the same log with the same settings has the same key."""
+    """Hash of log and settings: equal jobs have equal keys."""
     settings: Mapped[dict[str, Any]] = mapped_column(JSON)
-    state: Mapped[JobState] = mapped_column(_words(JobState), index=True)
+    state: Mapped[JobState] = mapped_column(_make_enum_column(JobState), index=True)
     attempts: Mapped[int] = mapped_column(default=0)
-    """Times that a worker began."""
+    """Number of times that a worker started the job."""
     created: Mapped[datetime] = mapped_column(UtcTime)
     started: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     finished: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
-    doing: Mapped[str] = mapped_column(Text, default="")
-    """What it says of itself."""
+    activity: Mapped[str] = mapped_column("doing", Text, default="")
+    """What the running job does at present. The column keeps the name `doing` of older versions."""
     error: Mapped[str] = mapped_column(Text, default="")
-    """Why it has failed."""
+    """Reason of a failure."""
     result: Mapped[str | None] = mapped_column(Text, default=None)
-    """Folder of fit and report, from the data folder or absolute."""
+    """Folder of fit and report, relative to the data folder or absolute."""
     summary: Mapped[dict[str, Any] | None] = mapped_column(JSON, default=None)
-    """The fit in short."""
+    """Result, force error and noise floor of the fit."""

@@ -1,1 +1,3 @@
-"""The bench's own commands, one file each; heavy imports happen when they are called."""
+"""Commands of the bench, one module each. Heavy imports happen inside the functions, so that `--help` is fast."""
+
+__all__: list[str] = []

@@ -1,4 +1,4 @@
-"""``mrbench demo``: from the simulated rig to a report, as a person would do it."""
+"""``mrbench demo``: a complete test on the simulated rig, from recording to report."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,20 +8,21 @@ import typer
 
 def demo(
     quick: Annotated[
-        bool, typer.Option("--quick", help="A shorter method, and no second recording of unseen strokes.")
+        bool, typer.Option("--quick", help="Use a shorter method, and record no validation strokes.")
     ] = False,
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where everything goes.")] = Path("runs/demo"),
-    serve: Annotated[bool, typer.Option("--serve", help="Leave the bench up in the end, with its page.")] = False,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for all results.")] = Path("runs/demo"),
+    serve: Annotated[
+        bool, typer.Option("--serve", help="Keep the bench and its page running afterwards.")
+    ] = False,
 ) -> None:
-    """Bring up a simulated bench and show all of it at work.
+    """Start a simulated bench and demonstrate a complete test.
 
-    It records six drives over its wires, identifies the damper, predicts strokes that the fit never saw, looks for
-    what the simulation lacks, and writes a report.
+    Records strokes at six drives over the instruments' wires, identifies the damper, predicts validation strokes,
+    diagnoses the sim-to-real gap, and writes a report.
     """
     from rich.console import Console
 
-    from bench.demo.demo import Demo
-    from bench.demo.folder import DemoFolder
+    from bench.demo import Demo, DemoFolder
 
     folder = DemoFolder(out, "quick", None) if quick else DemoFolder(out, "six_voltages", "validation")
-    Demo(folder, Console(stderr=True)).carry_out(Console(), serve=serve)
+    Demo(folder, Console(stderr=True)).run(Console(), serve=serve)

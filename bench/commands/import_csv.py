@@ -1,4 +1,4 @@
-"""``mrbench import``: recordings made elsewhere become a log."""
+"""``mrbench import``: a log from recordings of another test bench."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,35 +8,37 @@ import typer
 
 def import_csv(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE", help="CSV files, plain or .gz; each is a stretch of its own.")
+        list[Path], typer.Argument(metavar="FILE", help="CSV files, plain or .gz; each becomes one stretch.")
     ],
-    out: Annotated[Path, typer.Option(metavar="LOG", help="The log to write.")],
+    out: Annotated[Path, typer.Option(metavar="LOG", help="Log to write.")],
     column: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=HEADER", help="The file's own header for one of our columns; once for each."),
+        typer.Option(metavar="NAME=HEADER", help="Header in the file for column NAME; may be given repeatedly."),
     ] = None,
     drive_kind: Annotated[
         str | None,
         typer.Option(
-            metavar="KIND", help="driver_command_v (taken for volts), coil_v or coil_a (taken for ampere)."
+            metavar="KIND",
+            help="driver_command_v (default for volts), coil_v or coil_a (default for amperes).",
         ),
     ] = None,
-    specimen: Annotated[str, typer.Option(metavar="NAME", help="The damper, with its serial number.")] = "unknown",
+    specimen: Annotated[
+        str, typer.Option(metavar="NAME", help="Damper under test, with its serial number.")
+    ] = "unknown",
 ) -> None:
-    """Turn recordings made elsewhere into a log.
+    """Write recordings of another test bench to a log.
 
-    Columns: time_s, displacement_m, force_n, one of voltage_v or current_a, and if there velocity_mps and
-    temperature_c, in SI units; displacement positive where the damper extends, force positive in tension.
-    Segments are found where drive, amplitude or frequency change.
+    Columns, in SI units: time_s, displacement_m, force_n, one of voltage_v or current_a, and optionally
+    velocity_mps and temperature_c. Displacement is positive in extension, force in tension. A new segment begins
+    where drive, amplitude or frequency change.
     """
-    from bench.recorder.csv_file import DRIVE_KINDS, NAMES
-    from bench.recorder.importing import import_recordings
+    from bench.csv_import import COLUMN_NAMES, DRIVE_KINDS, import_recordings
 
     headers: dict[str, str] = {}
     for pair in column or []:
         name, equals, header = pair.partition("=")
-        if name not in NAMES or not equals or not header:
-            raise typer.BadParameter(f"{pair!r} is not NAME=HEADER with NAME one of {', '.join(NAMES)}")
+        if name not in COLUMN_NAMES or not equals or not header:
+            raise typer.BadParameter(f"{pair!r} is not NAME=HEADER with NAME one of {', '.join(COLUMN_NAMES)}")
         headers[name] = header
     if drive_kind is not None and drive_kind not in DRIVE_KINDS:
         raise typer.BadParameter(f"{drive_kind!r} is not one of {', '.join(DRIVE_KINDS)}")

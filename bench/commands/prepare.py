@@ -1,13 +1,13 @@
-"""``mrbench prepare``: what a technician does before a run."""
+"""``mrbench prepare``: setup steps before a run."""
 
 from pathlib import Path
 from typing import Annotated, cast, get_args
 
 import typer
 
-from bench.agent.steps import Step
+from bench.setup_steps import SetupStep
 
-_STEPS = ", ".join(get_args(Step))
+_STEPS = ", ".join(get_args(SetupStep))
 
 
 def prepare(
@@ -17,28 +17,26 @@ def prepare(
         typer.Option(
             "--to",
             metavar="METRES",
-            help="Where `move` goes [m], from the specimen's middle, or from home before there is one.",
+            help="Target of `move` [m], relative to the specimen's centre, or to home before `centre`.",
         ),
     ] = None,
-    config: Annotated[Path, typer.Option(metavar="FILE", help="The bench whose agent is asked.")] = Path(
-        "bench.toml"
-    ),
+    config: Annotated[Path, typer.Option(metavar="FILE", help="Configuration of the bench.")] = Path("bench.toml"),
 ) -> None:
-    """Do what comes before a run: home, move, clamp, centre, tare.
+    """Execute a setup step before a run: home, move, mount, centre, unmount, tare, clear-tare.
 
-    The agent that runs (`mrbench rig` or `mrbench serve`) does it.
+    The rig agent that is running executes it (`mrbench rig` or `mrbench serve`).
 
-    home seeks the reference and goes to the middle of the travel; it is refused with a specimen clamped. move goes
-    where --to says. mount and unmount say that a specimen has been clamped or unclamped. centre makes the place
-    where the rod stands the zero of positions. tare takes the present force off, clear-tare does so no more.
-    Ctrl-C brings the rod to rest.
+    home finds the reference and moves to the middle of the travel; it is refused while a specimen is clamped. move
+    moves the rod to --to. mount and unmount record that a specimen has been clamped or unclamped. centre makes the
+    present position the zero of positions. tare subtracts the present force from now on, clear-tare ends that.
+    Ctrl-C stops the rod.
     """
-    from bench.agent.prepare import prepare_through_agent
+    from bench.agent_protocol import request_setup_step
 
-    if step not in get_args(Step):
-        raise typer.BadParameter(f"there is no step {step}; there are {_STEPS}")
+    if step not in get_args(SetupStep):
+        raise typer.BadParameter(f"unknown step {step}; the steps are {_STEPS}")
     if step == "move" and to is None:
-        raise typer.BadParameter("say where the rod is to go: --to METRES")
+        raise typer.BadParameter("move needs a target position: --to METRES")
     if step != "move" and to is not None:
-        raise typer.BadParameter(f"--to says where move goes; {step} takes none")
-    typer.echo(prepare_through_agent(config, cast(Step, step), to))
+        raise typer.BadParameter(f"--to is the target of move; {step} takes no position")
+    typer.echo(request_setup_step(config, cast(SetupStep, step), to))

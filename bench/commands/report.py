@@ -1,4 +1,4 @@
-"""``mrbench report``: one self-contained page of a run."""
+"""``mrbench report``: a run as one self-contained HTML page."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,43 +7,40 @@ import typer
 
 
 def report(
-    log: Annotated[Path, typer.Argument(help="The recording.", metavar="LOG")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")],
+    log: Annotated[Path, typer.Argument(help="Recording to report on.", metavar="LOG")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Page to write.")],
     fit: Annotated[
         Path | None,
-        typer.Option(metavar="FIT", help="A fit made by `identify`; without it the recording alone is shown."),
+        typer.Option(metavar="FIT", help="Fit written by `identify`; without it only the recording is shown."),
     ] = None,
     diagnosis: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIAGNOSIS", help="A diagnosis made by `diagnose`: what is missing in the simulation."
-        ),
+        typer.Option(metavar="DIAGNOSIS", help="Diagnosis of the sim-to-real gap, written by `diagnose`."),
     ] = None,
     plots: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Also write the plots there, as SVG and PNG.")
+        Path | None, typer.Option(metavar="DIR", help="Also write the plots to this folder, as SVG and PNG.")
     ] = None,
 ) -> None:
-    """Write one self-contained page of a recording.
+    """Write a report on a recording as one self-contained HTML page.
 
-    It shows recorded over simulated force, errors, parameters with intervals, and says in words what falls short.
+    The page shows recorded over simulated force, errors, and parameters with intervals, and names deficiencies.
     """
     import shlex
     from datetime import UTC, datetime
 
-    from bench.recorder.replacement import replacing
-    from bench.report.page import figures, gather, render
-    from bench.report.plots import save
+    from bench.log import write_atomically
+    from bench.report import gather, make_figures, render, save_figures
 
     if str(out) == "-":
-        raise typer.BadParameter("a page goes to a file: --out report.html")
-    words = ["mrbench", "report", str(log), *(["--fit", str(fit)] if fit else [])]
-    words += [*(["--diagnosis", str(diagnosis)] if diagnosis else []), "--out", str(out)]
-    words += ["--plots", str(plots)] if plots else []
-    found = gather(log, fit, diagnosis)
-    drawn = figures(found)
-    page = render(found, drawn, shlex.join(words), datetime.now(UTC))
+        raise typer.BadParameter("a page cannot be printed; give a file: --out report.html")
+    command = ["mrbench", "report", str(log), *(["--fit", str(fit)] if fit else [])]
+    command += [*(["--diagnosis", str(diagnosis)] if diagnosis else []), "--out", str(out)]
+    command += ["--plots", str(plots)] if plots else []
+    content = gather(log, fit, diagnosis)
+    figures = make_figures(content)
+    page = render(content, figures, shlex.join(command), datetime.now(UTC))
     if plots is not None:
-        save(drawn, plots)
-    with replacing(out) as partial:
+        save_figures(figures, plots)
+    with write_atomically(out) as partial:
         partial.write_text(page, encoding="utf-8")
-    typer.echo(f"{out}: {len(page) / 1e6:.1f} MB, {len(drawn)} plots", err=True)
+    typer.echo(f"{out}: {len(page) / 1e6:.1f} MB, {len(figures)} plots", err=True)

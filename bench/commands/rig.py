@@ -1,4 +1,4 @@
-"""`mrbench rig`: the rig agent as a process of its own."""
+"""`mrbench rig`: the rig agent as a process."""
 
 from pathlib import Path
 from typing import Annotated
@@ -8,19 +8,20 @@ import typer
 
 def rig(
     config: Annotated[
-        Path, typer.Option(metavar="FILE", help="Which instruments there are, and how they are reached.")
+        Path, typer.Option(metavar="FILE", help="Configuration: instruments and their addresses.")
     ] = Path("bench.toml"),
     commands: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="ZeroMQ address for commands, else as configured.")
+        str | None, typer.Option(metavar="ADDRESS", help="ZeroMQ address for commands, instead of the configured.")
     ] = None,
     samples: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="ZeroMQ address that publishes, else as configured.")
+        str | None,
+        typer.Option(metavar="ADDRESS", help="ZeroMQ address for published samples, instead of the configured."),
     ] = None,
 ) -> None:
-    """Own the instruments of a bench and do what others ask of it.
+    """Control the instruments of a bench, and execute the commands of `mrbench prepare` and of the service.
 
-    Until Ctrl-C or SIGTERM; others are `mrbench prepare` and the service.
+    Runs until Ctrl-C or SIGTERM.
     """
-    from bench.agent.serve import serve_agent
+    from bench.agent import serve_agent
 
     serve_agent(config, commands, samples, lambda line: typer.echo(line), lambda line: typer.echo(line, err=True))

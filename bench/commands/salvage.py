@@ -1,4 +1,4 @@
-"""``mrbench salvage``: repairs a log whose recorder was killed."""
+"""``mrbench salvage``: repair of a truncated log."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,19 +7,19 @@ import typer
 
 
 def salvage(
-    log: Annotated[Path, typer.Argument(metavar="LOG", help="The broken log.")],
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Truncated log.")],
     out: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Where the mended log goes; by default it replaces the broken one, kept as LOG.broken.",
+            help="Repaired log; by default it replaces the truncated one, which is kept as LOG.broken.",
         ),
     ] = None,
 ) -> None:
-    """Repair a truncated log and say what was lost.
+    """Repair a log whose recorder was killed, and report the lost samples.
 
-    Every closed chunk is kept. A log that is whole is left untouched.
+    All closed chunks are kept. A complete log is not changed.
     """
-    from bench.recorder.salvage import salvage as mend
+    from bench.log import salvage_log
 
-    typer.echo(str(mend(log, out)))
+    typer.echo(str(salvage_log(log, out)))

@@ -1,4 +1,4 @@
-"""``mrbench worker``: carries out identification jobs, on this or another machine."""
+"""``mrbench worker``: a process that executes identification jobs, on this or another machine."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,22 +9,25 @@ import typer
 def worker(
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="The scheduler; by default that of the service on --data."),
+        typer.Option(metavar="ADDRESS", help="Scheduler; by default that of the service that uses --data."),
     ] = None,
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
     nice: Annotated[
         int,
         typer.Option(
-            min=0, max=19, envvar="MRBENCH_NICE", help="How far it stands back; less than 19 only where no rig is."
+            min=0,
+            max=19,
+            envvar="MRBENCH_NICE",
+            help="Niceness of the process; use less than 19 only on a machine without a rig.",
         ),
     ] = 19,
 ) -> None:
-    """Carry out identification jobs, one at a time.
+    """Execute identification jobs, one at a time, at the lowest priority.
 
-    At the lowest priority, until the scheduler goes.
+    Ends when the scheduler ends.
     """
-    from bench.jobs.worker import run_worker, scheduler_of
-    from bench.service.log_lines import log_to_stderr
+    from bench.jobs import find_scheduler, run_worker
+    from bench.log_lines import log_to_stderr
 
     log_to_stderr()
-    run_worker(scheduler or scheduler_of(data), nice)
+    run_worker(scheduler or find_scheduler(data), nice)

@@ -1,1 +1,9 @@
-"""The demonstration: every process of a bench, one recording over the wires, fit and report."""
+"""Demonstration: all processes of a bench, recordings over the wires, fit, diagnosis and report."""
+
+from bench.demo.demo import Demo
+from bench.demo.folder import DemoFolder
+
+__all__ = [
+    "Demo",
+    "DemoFolder",
+]

@@ -1,4 +1,4 @@
-"""The steps of the demo, in the order in which a laboratory would take them."""
+"""Steps of the demonstration, in the order of a laboratory test."""
 
 import contextlib
 import signal
@@ -7,78 +7,80 @@ from collections.abc import Iterator
 
 from rich.console import Console
 
-from bench.child_process import MRBENCH
+from bench.demo.api_client import ApiClient
 from bench.demo.folder import DemoFolder
-from bench.demo.processes import processes
+from bench.demo.processes import start_processes
 from bench.demo.recording import await_fit, record
-from bench.demo.rest import Rest
 from bench.demo.summary import summarise
 from bench.errors import ReportError, RunError
-from bench.progress import progress_bar
+from bench.processes import MRBENCH_COMMAND
+from bench.progress import show_progress
 
 
 class Demo:
     """One demonstration.
 
     Args:
-        folder: what is recorded, and where everything goes.
-        says: where each step is announced.
+        folder: methods to record and files to write.
+        progress_console: console for the name of each step.
     """
 
-    def __init__(self, folder: DemoFolder, says: Console) -> None:
-        self._folder, self._says = folder, says
-        self._step, self._steps = 0, 4 if folder.unseen is None else 7
+    def __init__(self, folder: DemoFolder, progress_console: Console) -> None:
+        self._folder, self._progress_console = folder, progress_console
+        self._step, self._steps = 0, 4 if folder.validation_method is None else 7
 
-    def carry_out(self, console: Console, *, serve: bool) -> None:
-        """Do everything, and say in short what came out.
+    def run(self, console: Console, *, serve: bool) -> None:
+        """Execute all steps and print a summary.
 
         Args:
-            console: where the results go.
-            serve: whether the service stays up until Ctrl-C.
+            console: console for the results.
+            serve: whether the service keeps running until Ctrl-C.
 
         Raises:
-            ReportError: the folder cannot be made.
-            RunError: a process, a run or a command failed; the message says which and why.
+            ReportError: the folder cannot be created.
+            RunError: a process, a run or a command failed; the message names it and the reason.
         """
         self._make_folder()
-        self._announce("bring up simulated rig, agent, service and worker")
-        with _ended_in_order(), processes(self._folder) as page:
-            rest = Rest(page)
-            self._stroke(rest)
+        self._announce("start simulated rig, agent, service and worker")
+        with _handle_termination(), start_processes(self._folder) as page:
+            api = ApiClient(page)
+            self._record_and_fit(api)
             if self._folder.diagnosis is not None:
-                self._announce("look for what the simulation lacks")
-                _mrbench("diagnose", self._folder.log, "--out", self._folder.diagnosis)
+                self._announce("diagnose the sim-to-real gap")
+                _run_mrbench("diagnose", self._folder.log, "--out", self._folder.diagnosis)
             self._announce("write the report")
-            self._report()
+            self._write_report()
             summarise(self._folder, console)
             if serve:
-                console.print(f"\nthe bench stays up: {page}\nCtrl-C ends it", soft_wrap=True, highlight=False)
-                _until_interrupted()
+                console.print(
+                    f"\nthe bench keeps running: {page}\nCtrl-C stops it", soft_wrap=True, highlight=False
+                )
+                _wait_for_interrupt()
 
-    def _stroke(self, rest: Rest) -> None:
-        """Record and identify; then record what the fit never saw, and predict it."""
+    def _record_and_fit(self, api: ApiClient) -> None:
+        """Record and identify; then record validation strokes and predict them."""
         folder = self._folder
-        run = self._recorded(rest, folder.method)
-        rest.download(f"/runs/{run}/log", folder.log)
+        run = self._record(api, folder.method)
+        api.download(f"/runs/{run}/log", folder.log)
         self._announce("identify the damper")
-        await_fit(rest, run)
-        rest.download(f"/runs/{run}/fit", folder.fit)
-        if folder.unseen is not None and folder.unseen_log is not None:
-            run = self._recorded(rest, folder.unseen)
-            rest.download(f"/runs/{run}/log", folder.unseen_log)
-            self._announce("predict the strokes that the fit never saw")
-            _mrbench("predict", folder.fit, folder.unseen_log, "--out", folder.prediction)
+        await_fit(api, run)
+        api.download(f"/runs/{run}/fit", folder.fit)
+        if folder.validation_method is not None and folder.validation_log is not None:
+            run = self._record(api, folder.validation_method)
+            api.download(f"/runs/{run}/log", folder.validation_log)
+            self._announce("predict the validation strokes")
+            _run_mrbench("predict", folder.fit, folder.validation_log, "--out", folder.prediction)
 
-    def _recorded(self, rest: Rest, method: str) -> str:
+    def _record(self, api: ApiClient, method: str) -> str:
         self._announce(f"record {method} over the wires")
-        with progress_bar(method) as progress:
-            return record(rest, method, progress, lambda text: self._says.print(text, highlight=False))
+        with show_progress(method) as progress:
+            return record(api, method, progress, lambda text: self._progress_console.print(text, highlight=False))
 
-    def _report(self) -> None:
+    def _write_report(self) -> None:
         folder = self._folder
-        diagnosed = () if folder.diagnosis is None else ("--diagnosis", folder.diagnosis)
-        _mrbench(
-            "report", folder.log, "--fit", folder.fit, *diagnosed, "--out", folder.report, "--plots", folder.plots
+        diagnosis = () if folder.diagnosis is None else ("--diagnosis", folder.diagnosis)
+        _run_mrbench(
+            "report", folder.log, "--fit", folder.fit, *diagnosis, "--out", folder.report, "--plots", folder.plots
         )
 
     def _make_folder(self) -> None:
@@ -86,28 +88,28 @@ class Demo:
             self._folder.path.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise ReportError(
-                f"{self._folder.path}: cannot be made ({error.strerror}); give another --out"
+                f"{self._folder.path}: cannot be created ({error.strerror}); give another --out"
             ) from error
 
-    def _announce(self, what: str) -> None:
+    def _announce(self, step: str) -> None:
         self._step += 1
-        self._says.print(f"{self._step}/{self._steps} {what}", highlight=False)
+        self._progress_console.print(f"{self._step}/{self._steps} {step}", highlight=False)
 
 
-def _mrbench(*words: object) -> None:
-    """Call a command as a person would; it shows its own progress, and says itself why it fails."""
-    if subprocess.run([*MRBENCH, *map(str, words)], check=False).returncode != 0:
-        raise RunError(f"mrbench {words[0]} failed; its line above says why")
+def _run_mrbench(*arguments: object) -> None:
+    """Run a command as a process; it shows its own progress and error message."""
+    if subprocess.run([*MRBENCH_COMMAND, *map(str, arguments)], check=False).returncode != 0:
+        raise RunError(f"mrbench {arguments[0]} failed; see its message above")
 
 
-def _until_interrupted() -> None:
+def _wait_for_interrupt() -> None:
     with contextlib.suppress(KeyboardInterrupt):
         signal.pause()
 
 
 @contextlib.contextmanager
-def _ended_in_order() -> Iterator[None]:
-    """Let SIGTERM do what Ctrl-C does: the processes of the bench are ended before this one."""
+def _handle_termination() -> Iterator[None]:
+    """Make SIGTERM act like Ctrl-C, so that the processes of the bench end before this one."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         yield

@@ -1,4 +1,4 @@
-"""What the demo leaves in its folder."""
+"""Files of the demonstration."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -6,60 +6,60 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class DemoFolder:
-    """What is recorded, and where everything goes."""
+    """Methods to record, and paths of all results."""
 
     path: Path
     method: str
-    """Identified."""
-    unseen: str | None
-    """Method of a second recording that the fit never sees; none to leave it out."""
+    """Method of the recording for the fit."""
+    validation_method: str | None
+    """Method of the validation strokes; None to record none."""
 
     @property
     def log(self) -> Path:
-        """The recording that is identified."""
+        """Recording for the fit."""
         return self.path / f"{self.method}.mcap"
 
     @property
-    def unseen_log(self) -> Path | None:
-        """The recording that is only predicted."""
-        return None if self.unseen is None else self.path / f"{self.unseen}.mcap"
+    def validation_log(self) -> Path | None:
+        """Recording of the validation strokes."""
+        return None if self.validation_method is None else self.path / f"{self.validation_method}.mcap"
 
     @property
     def fit(self) -> Path:
-        """The identified damper."""
+        """Fit document."""
         return self.path / "fit.json"
 
     @property
     def prediction(self) -> Path:
-        """How well the fit repeats the unseen strokes."""
+        """Prediction of the validation strokes."""
         return self.path / "prediction.json"
 
     @property
     def diagnosis(self) -> Path | None:
-        """What is missing in the simulation; left out of the short demo, for it may take a minute."""
-        return None if self.unseen is None else self.path / "diagnosis.json"
+        """Diagnosis document; None in the short demo, because a diagnosis may take a minute."""
+        return None if self.validation_method is None else self.path / "diagnosis.json"
 
     @property
     def report(self) -> Path:
-        """The page."""
+        """Report page."""
         return self.path / "report.html"
 
     @property
     def plots(self) -> Path:
-        """The page's pictures."""
+        """Folder of the report's plots."""
         return self.path / "plots"
 
     @property
     def rig(self) -> Path:
-        """Where the simulated rig says how it is reached."""
+        """Configuration that the simulated rig writes, with the addresses of its instruments."""
         return self.path / "rig.toml"
 
     @property
     def config(self) -> Path:
-        """The bench's configuration: the rig, and where the agent listens."""
+        """Configuration of the bench: the instruments, and the addresses of the agent."""
         return self.path / "bench.toml"
 
     @property
     def data(self) -> Path:
-        """The service's folder."""
+        """Data folder of the service."""
         return self.path / "service"

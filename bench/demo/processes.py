@@ -1,4 +1,4 @@
-"""The processes of the demo: the simulated rig, and a service that starts agent and worker itself."""
+"""Processes of the demonstration: the simulated rig, and a service that starts agent and worker."""
 
 import contextlib
 import socket
@@ -7,93 +7,97 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from bench.agent.link import AgentClient
-from bench.agent.messages import ShutDownCommand, StatusCommand
-from bench.child_process import MRBENCH, end
+from bench.agent_protocol import AgentClient, ShutDownCommand, StatusCommand
+from bench.config import load_config
 from bench.demo.folder import DemoFolder
-from bench.errors import AgentUnreachable, RunError
-from bench.rig.config import load_config
+from bench.errors import AgentUnreachableError, RunError
+from bench.processes import MRBENCH_COMMAND, terminate
 
-_UP_WITHIN = 120.0
-"""[s] for a process to be ready; the rig compiles at its first start."""
-_THERE_WITHIN = 2.0
-"""[s] for an agent to say that it is there."""
-_DOWN_WITHIN = 30.0
-"""[s] for a process to end in good order."""
-_LOOK = 0.1
-"""[s] between two looks."""
+_START_TIMEOUT = 120.0
+"""Longest time [s] until a process is ready; the rig compiles code when it is first started."""
+_STATUS_TIMEOUT = 2.0
+"""Longest time [s] until an agent replies."""
+_STOP_TIMEOUT = 30.0
+"""Longest time [s] until a process ends by itself."""
+_POLL_PERIOD = 0.1
+"""Time [s] between two checks."""
 
 
 @contextlib.contextmanager
-def processes(folder: DemoFolder) -> Iterator[str]:
-    """Simulated rig, agent, service and worker, as long as the context lasts.
+def start_processes(folder: DemoFolder) -> Iterator[str]:
+    """Run simulated rig, agent, service and worker while the context lasts.
 
     Args:
-        folder: where they leave their files and their words.
+        folder: folder for their files and output.
 
     Yields:
-        The page's address, token included.
+        Address of the page, with the token.
 
     Raises:
-        RunError: one of them does not come up; its last words are in the message.
+        RunError: a process does not start; the message contains its last output line.
     """
-    with contextlib.ExitStack() as running:
-        with contextlib.suppress(OSError):  # where it stays, the rig says that it cannot write there
-            folder.rig.unlink(missing_ok=True)  # an earlier demo's would lead the agent to ports that are closed
-        rig = running.enter_context(_process(["sim", "--out", str(folder.rig)], folder.path / "rig.log"))
-        _await(rig, folder.path / "rig.log", folder.rig.is_file)
+    with contextlib.ExitStack() as stack:
+        # The file of an earlier demo contains closed ports. If it cannot be deleted, the rig reports that itself.
+        with contextlib.suppress(OSError):
+            folder.rig.unlink(missing_ok=True)
+        rig = stack.enter_context(_start_process(["sim", "--out", str(folder.rig)], folder.path / "rig.log"))
+        _wait_until_ready(rig, folder.path / "rig.log", folder.rig.is_file)
         _configure(folder)
-        running.callback(_end_agent, folder.config)
-        # The demo talks to the service as the page does; a token of an earlier demo cannot be had any more.
-        words = ["serve", "--config", str(folder.config), "--data", str(folder.data), "--port", "0", "--new-token"]
-        said = folder.path / "service.log"
-        service = running.enter_context(_process(words, said))
-        _await(service, said, lambda: "#token=" in said.read_text("utf-8"))
-        yield next(line for line in said.read_text("utf-8").splitlines() if "#token=" in line)
+        stack.callback(_shut_down_agent, folder.config)
+        # The token of an earlier demo is not stored anywhere, so a new one is needed.
+        serve = ["serve", "--config", str(folder.config), "--data", str(folder.data), "--port", "0", "--new-token"]
+        output = folder.path / "service.log"
+        service = stack.enter_context(_start_process(serve, output))
+        _wait_until_ready(service, output, lambda: "#token=" in output.read_text("utf-8"))
+        yield next(line for line in output.read_text("utf-8").splitlines() if "#token=" in line)
 
 
 def _configure(folder: DemoFolder) -> None:
-    """The rig's configuration, with free ports for the agent: another agent may hold the usual ones."""
-    commands, samples = _free_ports(2)
+    """Write the configuration with free ports for the agent: another agent may use the default ones."""
+    commands, samples = _find_free_ports(2)
     agent = f'\n[agent]\ncommands = "tcp://127.0.0.1:{commands}"\nsamples = "tcp://127.0.0.1:{samples}"\n'
     folder.config.write_text(folder.rig.read_text("utf-8") + agent, "utf-8")
 
 
-def _free_ports(count: int) -> list[int]:
-    # Held at the same time: a port that was let go may be given out again at once.
-    with contextlib.ExitStack() as held:
-        sockets = [held.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(count)]
-        return [one.getsockname()[1] for one in sockets]
+def _find_free_ports(count: int) -> list[int]:
+    # All are open at the same time: a closed port can be assigned again at once.
+    with contextlib.ExitStack() as stack:
+        sockets = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(count)]
+        return [listener.getsockname()[1] for listener in sockets]
 
 
 @contextlib.contextmanager
-def _process(words: list[str], said: Path) -> Iterator["subprocess.Popen[bytes]"]:
-    """A command in a session of its own: Ctrl-C is for the demo, which ends its processes in their order."""
-    with said.open("wb") as out:
+def _start_process(arguments: list[str], output: Path) -> Iterator["subprocess.Popen[bytes]"]:
+    """Run a command in a separate session: Ctrl-C reaches only the demo, which ends its processes in order."""
+    with output.open("wb") as file:
         process = subprocess.Popen(
-            [*MRBENCH, *words], stdin=subprocess.DEVNULL, stdout=out, stderr=out, start_new_session=True
+            [*MRBENCH_COMMAND, *arguments],
+            stdin=subprocess.DEVNULL,
+            stdout=file,
+            stderr=file,
+            start_new_session=True,
         )
     try:
         yield process
     finally:
-        end(process, _DOWN_WITHIN)
+        terminate(process, _STOP_TIMEOUT)
 
 
-def _await(process: "subprocess.Popen[bytes]", said: Path, ready: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + _UP_WITHIN
-    while not ready():
+def _wait_until_ready(process: "subprocess.Popen[bytes]", output: Path, is_ready: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + _START_TIMEOUT
+    while not is_ready():
         if process.poll() is not None:
-            lines = said.read_text("utf-8", errors="replace").strip().splitlines()
-            raise RunError(f"a process of the demo ended at once: {lines[-1] if lines else 'without a word'}")
+            lines = output.read_text("utf-8", errors="replace").strip().splitlines()
+            raise RunError(f"a process of the demo ended at once: {lines[-1] if lines else 'without a message'}")
         if time.monotonic() > deadline:
-            raise RunError(f"a process of the demo was not ready within {_UP_WITHIN:g} s; see {said}")
-        time.sleep(_LOOK)
+            raise RunError(f"a process of the demo was not ready within {_START_TIMEOUT:g} s; see {output}")
+        time.sleep(_POLL_PERIOD)
 
 
-def _end_agent(config: Path) -> None:
-    """End the agent, which outlives a service that was killed; one that ended in good order has ended it."""
+def _shut_down_agent(config: Path) -> None:
+    """Shut down the agent if it is still running: it continues when its service is killed."""
     agent = load_config(config).agent
     client = AgentClient(agent.commands, agent.samples)
-    with contextlib.suppress(AgentUnreachable):
-        client.send(StatusCommand(), _THERE_WITHIN)
-        client.send(ShutDownCommand(), _DOWN_WITHIN)
+    with contextlib.suppress(AgentUnreachableError):
+        client.send(StatusCommand(), _STATUS_TIMEOUT)
+        client.send(ShutDownCommand(), _STOP_TIMEOUT)

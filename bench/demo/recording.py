@@ -1,83 +1,87 @@
-"""One run by way of the service: started, followed to its end, and to the end of its identification."""
+"""Recording of a run through the service, and waiting for its identification."""
 
 import time
 from collections.abc import Callable
 from typing import Any
 
-from bench.demo.rest import Rest
+from bench.demo.api_client import ApiClient
 from bench.errors import RunError
+from bench.progress import Progress
 
-_LOOK = 0.25
-"""[s] between two looks."""
-_SPARE = 60.0
-"""[s] that a run may take beyond its plan."""
-_IDENTIFIED_WITHIN = 900.0
-"""[s]"""
-_ATTEMPTS = 3
-"""Runs of a method: where a busy machine holds up rig or bench for too long, the interlocks rightly end one."""
-_OVER = ("done", "failed", "cancelled")
+_POLL_PERIOD = 0.25
+"""Time [s] between two requests."""
+_RUN_MARGIN = 60.0
+"""Time [s] that a run may last beyond its planned duration."""
+_FIT_TIMEOUT = 900.0
+"""Longest time [s] of an identification."""
+_MAX_ATTEMPTS = 3
+"""Largest number of runs of a method: on a busy machine late setpoints can make the interlocks end a run."""
+_FINAL_STATES = ("done", "failed", "cancelled")
 
 
-class RunSpoiledError(RunError):
-    """A run has ended, but not cleanly."""
+class UncleanRunError(RunError):
+    """The outcome of a run is not `clean`."""
 
 
 def record(
-    rest: Rest, method: str, progress: Callable[[float], None], tell: Callable[[str], None] = lambda text: None
+    api: ApiClient,
+    method: str,
+    progress: Progress,
+    on_retry: Callable[[str], None] = lambda message: None,
 ) -> str:
-    """Run a method, once more where the run was spoiled.
+    """Run a method, and repeat it if the run is not clean.
 
     Args:
-        rest: the service.
-        method: a shipped one.
-        progress: told the share done, 0 to 1.
-        tell: told why it is run once more.
+        api: client of the service.
+        method: name of a shipped method.
+        progress: receives the completed share.
+        on_retry: receives the reason of a repetition.
 
     Returns:
         Id of the run.
 
     Raises:
-        RunError: it could not be started, was never recorded cleanly, or does not end.
+        RunError: the run could not be started, was never clean, or does not end.
     """
-    for attempt in range(1, _ATTEMPTS):
+    for attempt in range(1, _MAX_ATTEMPTS):
         try:
-            return _run(rest, method, progress)
-        except RunSpoiledError as spoiled:
-            tell(f"{spoiled}; once more ({attempt + 1} of {_ATTEMPTS})")
-            rest.post("/agent/reset", {})
-    return _run(rest, method, progress)
+            return _run(api, method, progress)
+        except UncleanRunError as error:
+            on_retry(f"{error}; attempt {attempt + 1} of {_MAX_ATTEMPTS}")
+            api.post("/agent/reset", {})
+    return _run(api, method, progress)
 
 
-def _run(rest: Rest, method: str, progress: Callable[[float], None]) -> str:
-    run = rest.post("/runs", {"method": method, "operator": "demo"})
-    deadline = time.monotonic() + (run["duration_s"] or 0.0) + _SPARE
+def _run(api: ApiClient, method: str, progress: Progress) -> str:
+    run = api.post("/runs", {"method": method, "operator": "demo"})
+    deadline = time.monotonic() + (run["duration_s"] or 0.0) + _RUN_MARGIN
     while run["state"] == "running":
         if time.monotonic() > deadline:
-            raise RunError(f"the run of {method} has not ended {_SPARE:g} s after its plan")
-        if done := run["progress"]:
-            progress(done["elapsed_s"] / done["duration_s"])
-        time.sleep(_LOOK)
-        run = rest.get(f"/runs/{run['id']}")
+            raise RunError(f"the run of {method} has not ended {_RUN_MARGIN:g} s after its planned end")
+        if state := run["progress"]:
+            progress(state["elapsed_s"] / state["duration_s"])
+        time.sleep(_POLL_PERIOD)
+        run = api.get(f"/runs/{run['id']}")
     if run["outcome"] != "clean":
-        raise RunSpoiledError(f"the run of {method} is {run['outcome'] or run['state']}: {run['reason']}")
+        raise UncleanRunError(f"the run of {method} is {run['outcome'] or run['state']}: {run['reason']}")
     return str(run["id"])
 
 
-def await_fit(rest: Rest, run_id: str) -> None:
-    """Wait for the worker.
+def await_fit(api: ApiClient, run_id: str) -> None:
+    """Wait for the identification of a run.
 
     Raises:
-        RunError: the identification failed, or takes too long.
+        RunError: the identification failed or takes too long.
     """
-    deadline = time.monotonic() + _IDENTIFIED_WITHIN
-    while not (job := _identification(rest, run_id)) or job["state"] not in _OVER:
+    deadline = time.monotonic() + _FIT_TIMEOUT
+    while not (job := _find_identification(api, run_id)) or job["state"] not in _FINAL_STATES:
         if time.monotonic() > deadline:
-            raise RunError(f"the identification of {run_id} has not ended within {_IDENTIFIED_WITHIN:g} s")
-        time.sleep(_LOOK)
+            raise RunError(f"the identification of {run_id} has not ended within {_FIT_TIMEOUT:g} s")
+        time.sleep(_POLL_PERIOD)
     if job["state"] != "done":
         raise RunError(f"the identification of {run_id} {job['state']}: {job['error']}")
 
 
-def _identification(rest: Rest, run_id: str) -> dict[str, Any] | None:
-    jobs: list[dict[str, Any]] = rest.get(f"/runs/{run_id}")["jobs"]
+def _find_identification(api: ApiClient, run_id: str) -> dict[str, Any] | None:
+    jobs: list[dict[str, Any]] = api.get(f"/runs/{run_id}")["jobs"]
     return jobs[-1] if jobs else None

@@ -1,4 +1,4 @@
-"""The function that the engine runs in a worker's thread: an order carried out, with its ties to the scheduler."""
+"""Dask task that executes one job in a worker, with progress messages and cancellation through the scheduler."""
 
 import os
 import time
@@ -6,34 +6,35 @@ from typing import Any
 
 from distributed import Event, get_worker
 
-from bench.jobs.order import Order, Summary
-from bench.jobs.work import Following, carry_out
+from bench.jobs.job_spec import FitSummary, JobSpec
+from bench.jobs.work import JobCallbacks, execute_job
 
 TOPIC = "mrbench-jobs"
-"""Where workers say what they do: `{"job": id, "doing": words}`, the words empty when they begin."""
+"""Topic for progress: `{"job": id, "activity": message}`; the message is empty when a worker starts a job."""
 
 
 _EVENT: Any = Event
 """Untyped in dask."""
 
 
-def cancel_flag(job_id: str) -> str:
-    """Name of the flag that asks a job to end; dask forgets a cancelled task, but does not stop it."""
+def make_cancel_flag(job_id: str) -> str:
+    """Return the name of the flag that cancels a job; dask forgets a cancelled task but does not stop it."""
     return f"mrbench-cancel-{job_id}"
 
 
-def carry_out_order(order: Order) -> Summary:
-    """Carry out an order in a worker.
+def run_dask_task(spec: JobSpec) -> FitSummary:
+    """Execute a job in a worker.
 
     Raises:
-        JobError: the work could not be done.
-        JobCancelledError: its flag was raised.
+        JobError: the job failed.
+        JobCancelledError: the cancel flag was set.
     """
     worker = get_worker()
-    flag: Any = _EVENT(cancel_flag(order.job_id))
+    flag: Any = _EVENT(make_cancel_flag(spec.job_id))
 
-    def say(words: str) -> None:
-        worker.log_event(TOPIC, {"job": order.job_id, "doing": words, "worker": os.getpid(), "at": time.time()})
+    def report(message: str) -> None:
+        content = {"job": spec.job_id, "activity": message, "worker": os.getpid(), "at": time.time()}
+        worker.log_event(TOPIC, content)
 
-    say("")
-    return carry_out(order, Following(say, flag.is_set))
+    report("")
+    return execute_job(spec, JobCallbacks(report, flag.is_set))

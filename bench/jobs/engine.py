@@ -1,4 +1,4 @@
-"""The engine behind the jobs: what the service asks of it, and how dask does it."""
+"""Engine that executes jobs: its interface to the service, and the implementation with dask."""
 
 import asyncio
 import contextlib
@@ -11,145 +11,146 @@ import dask
 from distributed import Client, Event, KilledWorker, Scheduler
 from distributed.client import FutureCancelledError
 
-from bench.jobs.dask_task import TOPIC, cancel_flag, carry_out_order
+from bench.jobs.dask_task import TOPIC, make_cancel_flag, run_dask_task
 from bench.jobs.errors import JobCancelledError, JobError, WorkerError
-from bench.jobs.order import Order, Summary
+from bench.jobs.job_spec import FitSummary, JobSpec
 
 LOOPBACK = "127.0.0.1"
-MOST_ATTEMPTS = 3
-"""[1] times that a job begins before it has failed."""
-_PATIENCE = 10.0
-"""[s] for a scheduler to answer."""
-_LOOK_EVERY = 2.0
-"""[s] between two looks whether the scheduler is still there."""
+MAX_ATTEMPTS = 3
+"""Number of times that a job is started before it counts as failed."""
+_CONNECT_TIMEOUT = 10.0
+"""Time [s] within which a scheduler must reply."""
+_POLL_PERIOD = 2.0
+"""Time [s] between two checks of the connection to the scheduler."""
 _LOG = logging.getLogger(__name__)
 _CLIENT: Any = Client
 _EVENT: Any = Event
 """Both untyped in dask."""
 
 
-class Listener(Protocol):
-    """Who is told what becomes of orders; called in the event loop."""
+class JobListener(Protocol):
+    """Receiver of the progress and results of jobs; called in the event loop."""
 
-    async def began(self, job_id: str) -> None:
-        """A worker has begun it."""
+    async def on_started(self, job_id: str) -> None:
+        """Handle the start of a job by a worker."""
 
-    async def says(self, job_id: str, words: str) -> None:
-        """It says what it is doing."""
+    async def on_progress(self, job_id: str, message: str) -> None:
+        """Handle a progress message."""
 
-    async def done(self, job_id: str, summary: Summary) -> None:
-        """It is done."""
+    async def on_done(self, job_id: str, summary: FitSummary) -> None:
+        """Handle the result of a job."""
 
-    async def failed(self, job_id: str, why: str) -> None:
-        """It could not be done."""
+    async def on_failed(self, job_id: str, reason: str) -> None:
+        """Handle the failure of a job."""
 
-    async def cancelled(self, job_id: str) -> None:
-        """It has ended because somebody wanted it."""
+    async def on_cancelled(self, job_id: str) -> None:
+        """Handle the end of a cancelled job."""
 
-    async def connected(self) -> None:
-        """A scheduler is there, new or again: everything unfinished is to be submitted."""
+    async def on_connected(self) -> None:
+        """Handle a new or restored connection to a scheduler: submit all unfinished jobs."""
 
 
-class Engine(Protocol):
-    """Carries out orders somewhere; forgets everything when it ends."""
+class JobEngine(Protocol):
+    """Executor of jobs; keeps nothing when it ends."""
 
-    async def start(self, listener: Listener) -> None:
-        """Begin to listen."""
+    async def start(self, listener: JobListener) -> None:
+        """Connect and start to report to a listener."""
 
-    async def submit(self, order: Order) -> None:
-        """Take an order; one of the same key that is on its way already is not begun twice."""
+    async def submit(self, spec: JobSpec) -> None:
+        """Submit a job; one with the key of a job in progress is not started twice."""
 
-    async def cancel(self, job_id: str, *, began: bool) -> None:
-        """End an order, also one that a worker has begun."""
+    async def cancel(self, job_id: str, *, started: bool) -> None:
+        """Cancel a job, also one that a worker has started."""
 
-    async def words(self) -> str:
-        """``ok``, or what is missing."""
+    async def describe_state(self) -> str:
+        """Return ``ok`` or what is missing."""
 
     async def close(self) -> None:
-        """Let go; nobody is told any more."""
+        """Disconnect; the listener is not called any more."""
 
 
 @contextlib.asynccontextmanager
-async def local_scheduler(data: Path) -> AsyncIterator[str]:
-    """A scheduler on the loopback interface; its address stands in the data folder meanwhile.
+async def start_local_scheduler(data: Path) -> AsyncIterator[str]:
+    """Run a scheduler on the loopback interface, and write its address to the data folder meanwhile.
 
     Raises:
         WorkerError: it cannot listen.
     """
     settings = {
-        # Its own pages show and change what nobody here should see or change.
+        # The scheduler's own web pages would give access to its data without a token.
         "distributed.scheduler.http.routes": [],
-        # Dask counts the failures that it forgives, not the attempts.
-        "distributed.scheduler.allowed-failures": MOST_ATTEMPTS - 1,
+        # Dask counts tolerated failures, not attempts.
+        "distributed.scheduler.allowed-failures": MAX_ATTEMPTS - 1,
     }
     with dask.config.set(settings):
-        # It opens a port for pages in any case; this keeps it off the one that everybody knows.
+        # The scheduler opens a port for web pages in any case; port 0 avoids the well-known default.
         pages = f"{LOOPBACK}:0"
         scheduler = Scheduler(host=LOOPBACK, port=0, protocol="tcp", dashboard_address=pages, dashboard=False)
     try:
         await scheduler
     except OSError as error:
-        raise WorkerError(f"no scheduler for jobs can listen at {LOOPBACK}: {error}") from error
-    place = scheduler_file(data)
+        raise WorkerError(f"the job scheduler cannot listen at {LOOPBACK}: {error}") from error
+    address_file = get_scheduler_file(data)
     try:
-        place.write_text(scheduler.address, encoding="utf-8")
+        address_file.write_text(scheduler.address, encoding="utf-8")
         yield scheduler.address
     finally:
-        place.unlink(missing_ok=True)
+        address_file.unlink(missing_ok=True)
         await scheduler.close()
 
 
-def scheduler_file(data: Path) -> Path:
-    """The file that names the scheduler of the service that works on a data folder."""
+def get_scheduler_file(data: Path) -> Path:
+    """Return the file with the scheduler's address in a data folder."""
     return data / "scheduler.address"
 
 
 class DaskEngine:
-    """Orders as dask tasks under their content's key."""
+    """Engine that runs jobs as dask tasks under the key of their content."""
 
     def __init__(self, address: str) -> None:
-        """Know the scheduler; nothing is sent yet."""
+        """Set the scheduler's address; `start` connects."""
         self._address = address
         self._client: Any = None
-        self._listener: Listener | None = None
+        self._listener: JobListener | None = None
         self._futures: dict[str, Any] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
-    async def start(self, listener: Listener) -> None:
-        """Connect, and again whenever the scheduler comes back."""
+    async def start(self, listener: JobListener) -> None:
+        """Connect, and reconnect whenever the scheduler is restarted."""
         self._listener = listener
         await self._connect()
-        self._spawn(self._stay_connected())
+        self._start_task(self._stay_connected())
 
-    async def submit(self, order: Order) -> None:
-        """Hand an order to the scheduler and follow it."""
-        if self._client is None or order.job_id in self._futures:  # without a scheduler: `connected` asks again
+    async def submit(self, spec: JobSpec) -> None:
+        """Submit a job to the scheduler and follow it."""
+        # Without a scheduler nothing is lost: `on_connected` submits the job again.
+        if self._client is None or spec.job_id in self._futures:
             return
-        future = self._client.submit(carry_out_order, order, key=order.key, pure=True)
-        self._futures[order.job_id] = future
-        self._spawn(self._follow(order.job_id, future))
+        future = self._client.submit(run_dask_task, spec, key=spec.key, pure=True)
+        self._futures[spec.job_id] = future
+        self._start_task(self._follow_job(spec.job_id, future))
 
-    async def cancel(self, job_id: str, *, began: bool) -> None:
-        """Raise the flag; a task that waits still is forgotten at once."""
+    async def cancel(self, job_id: str, *, started: bool) -> None:
+        """Set the cancel flag; a task that was not started is removed at once."""
         future = self._futures.get(job_id)
         if self._client is None or future is None:
             return
-        await self._flag(job_id).set()
-        if not began:
+        await self._get_cancel_event(job_id).set()
+        if not started:
             await self._client.cancel(future)
 
-    async def words(self) -> str:
-        """``ok`` if a worker is there."""
+    async def describe_state(self) -> str:
+        """Return ``ok`` if a worker is connected, otherwise what is missing."""
         if self._client is None:
             return f"no scheduler at {self._address}"
         try:
             workers = await asyncio.wait_for(self._client.nthreads(), 1.0)
         except (TimeoutError, OSError, ValueError):
-            return f"the scheduler at {self._address} does not answer"
+            return f"the scheduler at {self._address} does not reply"
         return "ok" if workers else "no worker; start one: mrbench worker"
 
     async def close(self) -> None:
-        """End what listens; tasks of another's scheduler go on there."""
+        """Disconnect; the tasks continue on a scheduler that was not started here."""
         for task in list(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
@@ -159,70 +160,76 @@ class DaskEngine:
 
     async def _connect(self) -> None:
         try:
-            client = await _CLIENT(self._address, asynchronous=True, timeout=_PATIENCE, set_as_default=False)
+            client = await _CLIENT(
+                self._address, asynchronous=True, timeout=_CONNECT_TIMEOUT, set_as_default=False
+            )
         except (OSError, TimeoutError, ValueError) as error:
             _LOG.warning("scheduler_absent", extra={"address": self._address, "why": str(error)})
             return
         client.subscribe_topic(TOPIC, self._on_event)
         self._client = client
         if self._listener is not None:
-            await self._listener.connected()
+            await self._listener.on_connected()
 
     async def _stay_connected(self) -> None:
         while True:
-            await asyncio.sleep(_LOOK_EVERY)
+            await asyncio.sleep(_POLL_PERIOD)
             if self._client is None or self._client.status in ("closed", "closing"):
                 self._client, self._futures = None, {}
                 await self._connect()
 
     async def _on_event(self, event: tuple[float, dict[str, Any]]) -> None:
-        _, said = event
-        if self._listener is None or said["job"] not in self._futures:
+        _, content = event
+        if self._listener is None or content["job"] not in self._futures:
             return
-        if said["doing"]:
-            await self._listener.says(said["job"], said["doing"])
+        if content["activity"]:
+            await self._listener.on_progress(content["job"], content["activity"])
         else:
-            await self._listener.began(said["job"])
+            await self._listener.on_started(content["job"])
 
-    async def _follow(self, job_id: str, future: Any) -> None:
-        tell = await self._ending(job_id, future)
-        # After a lost connection the job may be followed anew, by another future.
+    async def _follow_job(self, job_id: str, future: Any) -> None:
+        report = await self._await_outcome(job_id, future)
+        # After a lost connection the job may already have another future.
         if self._futures.get(job_id) is future:
             del self._futures[job_id]
             if self._client is not None:
-                await self._flag(job_id).clear()
+                await self._get_cancel_event(job_id).clear()
         future.release()
-        if tell is not None:
-            await tell()
+        if report is not None:
+            await report()
 
-    async def _ending(self, job_id: str, future: Any) -> Callable[[], Awaitable[None]] | None:
-        """How it ended; none where only the scheduler has gone, and the order will be submitted again."""
+    async def _await_outcome(self, job_id: str, future: Any) -> Callable[[], Awaitable[None]] | None:
+        """Wait for the end of a job and return the call that reports it.
+
+        Returns:
+            None if only the scheduler ended: the job will be submitted again.
+        """
         listener = self._listener
         if listener is None:
             return None
         try:
             summary = await future
         except JobError as error:
-            why = str(error)
+            reason = str(error)
         except JobCancelledError:
-            return lambda: listener.cancelled(job_id)
+            return lambda: listener.on_cancelled(job_id)
         except FutureCancelledError:
             connected = self._client is not None and self._client.status == "running"
-            return (lambda: listener.cancelled(job_id)) if connected else None
+            return (lambda: listener.on_cancelled(job_id)) if connected else None
         except KilledWorker:
-            why = f"its worker was lost {MOST_ATTEMPTS} times; look into memory and the worker's log"
+            reason = f"its worker was lost {MAX_ATTEMPTS} times; check the memory and the worker's log"
         except Exception as error:
-            # What a worker of another version or another machine raises cannot be listed; it must reach a person.
+            # A worker of another version or machine can raise any exception; it must still be reported.
             _LOG.exception("job_defect", extra={"job": job_id})
-            why = f"{type(error).__name__}: {error}"
+            reason = f"{type(error).__name__}: {error}"
         else:
-            return lambda: listener.done(job_id, summary)
-        return lambda: listener.failed(job_id, why)
+            return lambda: listener.on_done(job_id, summary)
+        return lambda: listener.on_failed(job_id, reason)
 
-    def _flag(self, job_id: str) -> Any:
-        return _EVENT(cancel_flag(job_id), client=self._client)
+    def _get_cancel_event(self, job_id: str) -> Any:
+        return _EVENT(make_cancel_flag(job_id), client=self._client)
 
-    def _spawn(self, work: Any) -> None:
+    def _start_task(self, work: Any) -> None:
         task = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)

@@ -1,14 +1,14 @@
-"""How a job can end otherwise than done."""
+"""Errors of jobs and workers."""
 
 from bench.errors import BenchError
 
 
 class JobError(BenchError):
-    """The work could not be done; the message says why."""
+    """A job failed; the message gives the reason."""
 
 
 class JobCancelledError(BenchError):
-    """Somebody has asked for its end."""
+    """A job was cancelled."""
 
 
 class WorkerError(BenchError):

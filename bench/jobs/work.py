@@ -1,4 +1,4 @@
-"""What a worker does for an order: the commands that a person would type, followed, timed and stoppable."""
+"""Execution of a job: runs `mrbench identify` and `mrbench report`, with progress, time limit and cancellation."""
 
 import contextlib
 import json
@@ -13,121 +13,120 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from bench.child_process import MRBENCH, Lines, read_along
 from bench.errors import BenchError
 from bench.jobs.errors import JobCancelledError, JobError
-from bench.jobs.order import FIT, REPORT, Order, Summary
-from bench.report.documents import read_fit
+from bench.jobs.job_spec import FIT_FILE, REPORT_FILE, FitSummary, JobSpec
+from bench.processes import MRBENCH_COMMAND, LineQueue, start_line_reader
+from bench.report import read_fit
 
-LOOK_EVERY = 0.25
-"""[s] between two looks whether somebody wants the end."""
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""A job keeps to one core; the other belongs to the rig."""
-LEASH = (sys.executable, "-m", "bench.jobs.leash")
+POLL_PERIOD = 0.25
+"""Time [s] between two checks for cancellation."""
+SINGLE_THREAD_ENVIRONMENT = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Environment that keeps a job on one core, so that the rig agent has the others."""
+WATCHDOG_COMMAND = (sys.executable, "-m", "bench.jobs.parent_watchdog")
+"""Command that ends a job's processes when the worker ends."""
 
 
 @dataclass(frozen=True)
-class Following:
-    """Who is told, and who may end it."""
+class JobCallbacks:
+    """Functions by which a job reports progress and asks whether it was cancelled."""
 
-    says: Callable[[str], None]
-    """Told what is being done."""
-    cancelled: Callable[[], bool]
-    """Asked a few times a second."""
+    on_progress: Callable[[str], None]
+    is_cancelled: Callable[[], bool]
 
 
-def carry_out(order: Order, following: Following, mrbench: tuple[str, ...] = MRBENCH) -> Summary:
-    """Identify a log and report on it; both files appear together, or not at all.
+def execute_job(spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...] = MRBENCH_COMMAND) -> FitSummary:
+    """Identify a log and write a report; the files of both appear together, or not at all.
 
     Args:
-        order: what to do; work that is done already is not done again.
-        following: who is told, and who may end it.
+        spec: the job; if its result exists, it is only read.
+        callbacks: progress and cancellation.
         mrbench: the command line to call.
 
     Returns:
-        The fit in short.
+        Summary of the fit.
 
     Raises:
-        JobError: a command could not do its work, or the time is up.
-        JobCancelledError: somebody wanted the end.
+        JobError: a command failed, or the time limit was reached.
+        JobCancelledError: the job was cancelled.
     """
-    log, result = Path(order.log), Path(order.result)
+    log, result = Path(spec.log), Path(spec.result)
     if not log.is_file():
-        raise JobError(f"{log} is not on the worker's machine; workers need the data folder at the same place")
-    deadline = time.monotonic() + order.settings.time_limit_s
+        raise JobError(f"{log} is not on the worker's machine; workers need the data folder at the same path")
+    deadline = time.monotonic() + spec.settings.time_limit_s
     if not result.is_dir():
-        with _workplace(result) as place:
-            fit, report = place / FIT, place / REPORT
-            identify = ["identify", str(log), "--out", str(fit), *order.settings.words()]
-            _run([*mrbench, *identify], "identify", following, deadline)
+        with _make_work_folder(result) as folder:
+            fit, report = folder / FIT_FILE, folder / REPORT_FILE
+            identify = ["identify", str(log), "--out", str(fit), *spec.settings.make_cli_arguments()]
+            _run_command([*mrbench, *identify], "identify", callbacks, deadline)
             page = ["report", str(log), "--fit", str(fit), "--out", str(report)]
-            _run([*mrbench, *page], "report", following, deadline)
-            _appear(place, result)
-    return summary_of(result / FIT)
+            _run_command([*mrbench, *page], "report", callbacks, deadline)
+            _publish_result(folder, result)
+    return read_fit_summary(result / FIT_FILE)
 
 
-def summary_of(fit: Path) -> Summary:
-    """What a catalogue keeps of a fit.
+def read_fit_summary(path: Path) -> FitSummary:
+    """Read the summary of a fit.
 
     Raises:
-        JobError: it is no fit.
+        JobError: the file is not a fit.
     """
     try:
-        found = read_fit(fit)
-        said = json.loads(fit.read_text("utf-8"))
+        fit = read_fit(path)
+        document = json.loads(path.read_text("utf-8"))
     except (BenchError, OSError, ValueError) as error:
-        raise JobError(f"{fit} cannot be read: {error}") from None
+        raise JobError(f"{path} cannot be read: {error}") from None
     return {
-        "result": said.get("result", ""),
-        "rmse_n": found.rmse_n.train,
-        "held_out_rmse_n": found.rmse_n.held_out,
-        "noise_floor_n": found.noise_floor_n,
+        "result": document.get("result", ""),
+        "rmse_n": fit.rmse_n.train,
+        "held_out_rmse_n": fit.rmse_n.held_out,
+        "noise_floor_n": fit.noise_floor_n,
     }
 
 
 @contextlib.contextmanager
-def _workplace(result: Path) -> Iterator[Path]:
-    """An empty folder beside the result; what an attempt that was killed has left there goes first."""
-    before = f".{result.name}."
-    for left in result.parent.glob(f"{before}*"):
-        shutil.rmtree(left, ignore_errors=True)
+def _make_work_folder(result: Path) -> Iterator[Path]:
+    """Provide an empty folder next to the result, after deleting those of killed attempts."""
+    prefix = f".{result.name}."
+    for leftover in result.parent.glob(f"{prefix}*"):
+        shutil.rmtree(leftover, ignore_errors=True)
     try:
-        place = Path(mkdtemp(prefix=before, dir=result.parent))
+        folder = Path(mkdtemp(prefix=prefix, dir=result.parent))
     except OSError as error:
         raise JobError(f"{result.parent} cannot be written to: {error.strerror}") from None
     try:
-        yield place
+        yield folder
     finally:
-        shutil.rmtree(place, ignore_errors=True)
+        shutil.rmtree(folder, ignore_errors=True)
 
 
-def _appear(place: Path, result: Path) -> None:
-    """Give the folder its name; another attempt may have been first, with the same content."""
-    place.chmod(0o755)  # mkdtemp keeps it from others, who may read all else in the data folder
+def _publish_result(folder: Path, result: Path) -> None:
+    """Rename the work folder to the result folder; another attempt may already have created an equal one."""
+    folder.chmod(0o755)  # mkdtemp makes it private, the rest of the data folder is readable
     try:
-        place.rename(result)
+        folder.rename(result)
     except OSError as error:
         if not result.is_dir():
             raise JobError(f"{result} cannot be written: {error.strerror}") from None
 
 
-def _run(command: list[str], what: str, following: Following, deadline: float) -> None:
-    """Run one command to its end; its last line is its complaint."""
-    following.says(what)
+def _run_command(command: list[str], name: str, callbacks: JobCallbacks, deadline: float) -> None:
+    """Run one command; its last output line is the reason of a failure."""
+    callbacks.on_progress(name)
     process = subprocess.Popen(
-        [*LEASH, *command],
+        [*WATCHDOG_COMMAND, *command],
         stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
         errors="replace",
-        env=os.environ | ONE_THREAD,
+        env=os.environ | SINGLE_THREAD_ENVIRONMENT,
     )
-    lines, reader = read_along(process)
+    lines, reader = start_line_reader(process)
     try:
-        last = _follow(lines, what, following, deadline)
+        last = _follow_output(lines, name, callbacks, deadline)
     finally:
-        # With the end of its input the leash ends the command, if that still runs.
+        # When its input ends, the watchdog kills the command if it is still running.
         if process.stdin is not None:
             process.stdin.close()
         process.wait()
@@ -135,23 +134,23 @@ def _run(command: list[str], what: str, following: Following, deadline: float) -
         if process.stderr is not None:
             process.stderr.close()
     if process.returncode != 0:
-        raise JobError(f"{what}: {last.removeprefix('mrbench: ') or f'exit status {process.returncode}'}")
+        raise JobError(f"{name}: {last.removeprefix('mrbench: ') or f'exit status {process.returncode}'}")
 
 
-def _follow(lines: Lines, what: str, following: Following, deadline: float) -> str:
-    """The last line that was said, once all is said."""
+def _follow_output(lines: LineQueue, name: str, callbacks: JobCallbacks, deadline: float) -> str:
+    """Report the output of a command until it ends, and return its last line."""
     last = ""
     while True:
-        if following.cancelled():
+        if callbacks.is_cancelled():
             raise JobCancelledError("cancelled")
         if time.monotonic() > deadline:
-            raise JobError(f"{what}: stopped, its time limit was reached; give the job a larger time_limit_s")
+            raise JobError(f"{name}: stopped at its time limit; give the job a larger time_limit_s")
         try:
-            line = lines.get(timeout=LOOK_EVERY)
+            line = lines.get(timeout=POLL_PERIOD)
         except queue.Empty:
             continue
         if line is None:
             return last
         if line.strip():
             last = line.strip()
-            following.says(f"{what}: {last}")
+            callbacks.on_progress(f"{name}: {last}")

@@ -1,77 +1,96 @@
-"""The worker process: one job at a time, at the lowest priority, until its scheduler goes."""
+"""Worker process: executes one job at a time, at the lowest priority, until its scheduler ends."""
 
 import asyncio
 import logging
 import os
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import dask
 from distributed import Worker
 from distributed.comm.addressing import get_address_host_port
+from distributed.utils import get_ip, get_ipv6
 
-from bench.jobs.engine import scheduler_file
+from bench.jobs.engine import get_scheduler_file
 from bench.jobs.errors import WorkerError
 
 _LOG = logging.getLogger(__name__)
-_PATIENCE = "10 s"
+_CONNECT_TIMEOUT = "10 s"
 
 
 def run_worker(scheduler: str, nice: int) -> None:
-    """Work until the scheduler goes or the process is told to end.
+    """Execute jobs until the scheduler ends or the process receives a signal.
 
     Args:
-        scheduler: its address, such as ``tcp://127.0.0.1:8786``.
-        nice: by how much it stands back behind other processes, 0 to 19.
+        scheduler: address, such as ``tcp://127.0.0.1:8786``.
+        nice: niceness of the process, 0 to 19.
 
     Raises:
-        WorkerError: there is no scheduler.
+        WorkerError: no scheduler replies.
     """
     try:
         get_address_host_port(scheduler)
     except ValueError:
         raise WorkerError(f"--scheduler {scheduler}: not of the form tcp://HOST:PORT") from None
     os.nice(nice)
-    asyncio.run(_work(scheduler))
-    # A job's thread cannot be joined; its commands hang on a pipe of this process and end with it.
+    asyncio.run(_run(scheduler))
+    # The thread of a job cannot be joined; its commands end when the pipe from this process closes.
     os._exit(0)
 
 
-def scheduler_of(data: Path) -> str:
-    """Address of the scheduler of the service that works on a data folder.
+def find_scheduler(data: Path) -> str:
+    """Return the address of the scheduler of the service that uses a data folder.
 
     Raises:
-        WorkerError: no service does.
+        WorkerError: no service uses it.
     """
     try:
-        return scheduler_file(data).read_text("utf-8")
+        return get_scheduler_file(data).read_text("utf-8")
     except OSError:
         raise WorkerError(
-            f"no service works on {data}: start one (mrbench serve), or name a scheduler: --scheduler tcp://…"
+            f"no service uses {data}: start one (mrbench serve), or give the scheduler: --scheduler tcp://…"
         ) from None
 
 
-async def _work(scheduler: str) -> None:
+def _find_worker_address(scheduler: str) -> str:
+    """Return the address of the interface that reaches the scheduler; loopback for a scheduler on this machine."""
+    host, port = get_address_host_port(scheduler)
+    find_ip: Callable[[str, int], str] = get_ipv6 if ":" in host else get_ip
+    return find_ip(host, port)
+
+
+async def _run(scheduler: str) -> None:
     dask.config.set(
         {
             "distributed.worker.http.routes": [],
-            # Memory is the job's own process's, not this one's.
+            # The memory is used by the processes of a job, not by this one.
             "distributed.worker.memory.terminate": False,
             "distributed.worker.memory.pause": False,
         }
     )
     try:
-        worker = await Worker(scheduler, nthreads=1, memory_limit=0, dashboard=False, death_timeout=_PATIENCE)
-    except (OSError, TimeoutError, ValueError, RuntimeError) as error:  # dask wraps some of them in the last
+        # Without a host a worker listens on all interfaces, and it executes any code that it receives.
+        host = _find_worker_address(scheduler)
+        worker = await Worker(
+            scheduler,
+            nthreads=1,
+            memory_limit=0,
+            host=host,
+            dashboard=False,
+            dashboard_address=f"[{host}]:0" if ":" in host else f"{host}:0",
+            death_timeout=_CONNECT_TIMEOUT,
+        )
+    except (OSError, TimeoutError, ValueError, RuntimeError) as error:  # dask wraps some in a RuntimeError
         raise WorkerError(
-            f"no scheduler answers at {scheduler} within {_PATIENCE}; "
-            "is the service up (mrbench serve), is this its address?"
+            f"no scheduler replied at {scheduler} within {_CONNECT_TIMEOUT}; "
+            "check the address and that the service is running (mrbench serve)"
         ) from error
     _LOG.info("worker_ready", extra={"scheduler": scheduler})
-    ended = asyncio.Event()
+    stop_requested = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
-        asyncio.get_running_loop().add_signal_handler(number, ended.set)
-    gone = asyncio.create_task(worker.finished())
-    asked = asyncio.create_task(ended.wait())
-    await asyncio.wait({gone, asked}, return_when=asyncio.FIRST_COMPLETED)
+        asyncio.get_running_loop().add_signal_handler(number, stop_requested.set)
+    finished = asyncio.create_task(worker.finished())
+    signalled = asyncio.create_task(stop_requested.wait())
+    await asyncio.wait({finished, signalled}, return_when=asyncio.FIRST_COMPLETED)
     await worker.close(timeout=2, executor_wait=False)

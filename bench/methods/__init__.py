@@ -1,13 +1,26 @@
-"""Methods: planned strokes as documents, compiled to exact samples before anything moves."""
+"""Methods: documents of planned strokes, compiled to exact samples before a run."""
 
-from bench.methods.compile import Programme, ProgrammeSegment, compile_method
-from bench.methods.document import Method, load_method, shipped_methods
+from bench.methods.candidate_strokes import make_candidate_strokes
+from bench.methods.compile import NO_SEGMENT, Programme, ProgrammeSegment, compile_method
+from bench.methods.document import DriveKind, Method, list_shipped_methods, load_method, parse_method
+from bench.methods.envelope import Envelope, compute_envelope, format_envelope
+from bench.methods.kinematics import Array, compute_move, compute_move_duration
 
 __all__ = [
+    "NO_SEGMENT",
+    "Array",
+    "DriveKind",
+    "Envelope",
     "Method",
     "Programme",
     "ProgrammeSegment",
     "compile_method",
+    "compute_envelope",
+    "compute_move",
+    "compute_move_duration",
+    "format_envelope",
+    "list_shipped_methods",
     "load_method",
-    "shipped_methods",
+    "make_candidate_strokes",
+    "parse_method",
 ]

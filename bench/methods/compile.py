@@ -1,7 +1,7 @@
-"""From a method to the exact samples that the actuator and the amplifier are given.
+"""Compilation of a method to the exact samples for actuator and amplifier.
 
-The pieces of ``plan.py`` are laid end to end on one time line; sample k belongs to the piece and the segment that
-hold the time k / rate. Nothing is compiled that exceeds the method's own limits.
+The programme parts of ``plan.py`` follow one another without gaps. Sample k belongs to the part and the segment at
+the time k / rate. A method that exceeds its own limits is refused.
 """
 
 import math
@@ -12,95 +12,94 @@ import numpy.typing as npt
 
 from bench.errors import MethodError
 from bench.methods.document import Method
-from bench.methods.drive import EDGE
+from bench.methods.drive import EDGE_TOLERANCE
 from bench.methods.kinematics import Array
-from bench.methods.plan import Mark, Piece, plan
+from bench.methods.plan import PlannedSegment, ProgrammePart, plan
 
-MOST_SAMPLES = 20_000_000
-"""[1] longest programme that is held in memory."""
-BETWEEN = -1
+MAX_SAMPLES = 20_000_000
+"""Largest number of samples of a programme, which limits the memory."""
+NO_SEGMENT = -1
 """Segment index of fades, moves, warm-ups and rests."""
-ROUNDING = 1e-9
-"""[1] share by which arithmetic may pass a limit."""
+ROUNDING_TOLERANCE = 1e-9
+"""Relative excess over a limit that is attributed to rounding."""
 
 
 @dataclass(frozen=True)
 class ProgrammeSegment:
-    """One segment of a programme: the samples from ``start`` up to, not including, ``stop``."""
+    """One segment of a programme: the samples from ``start`` up to ``stop``, exclusive."""
 
     index: int
     name: str
     start: int
     stop: int
     motion: str
-    """Kind of the motion."""
+    """Kind of motion."""
     drive: str
-    """Kind of the drive; each level of a staircase is ``constant``."""
+    """Kind of drive; each level of a staircase is ``constant``."""
     amplitude: float | None
-    """[m] where the motion has one."""
+    """[m]; None if the motion has none."""
     frequency: float | None
-    """[Hz] where the motion has one."""
+    """[Hz]; None if the motion has none."""
     drive_value: float | None
-    """[V or A] where the drive is constant."""
+    """[V or A]; None if the drive varies."""
     checkpoint: bool = False
-    """Whether an interrupted run may be taken up after it."""
+    """Whether an interrupted run can be resumed after this segment."""
 
 
 @dataclass(frozen=True)
 class Programme:
-    """A method as samples, each array of shape (samples,)."""
+    """A method compiled to samples; each array has shape (samples,)."""
 
     method: Method
     rate: float
-    """[Hz] samples a second."""
+    """Sampling rate [Hz]."""
     time: Array
     """[s] from 0."""
     displacement: Array
-    """[m] positive extends the damper."""
+    """[m], positive in extension."""
     velocity: Array
-    """[m/s] its exact derivative."""
+    """Exact derivative of the displacement [m/s]."""
     acceleration: Array
-    """[m/s²] the derivative of that."""
+    """Exact derivative of the velocity [m/s²]."""
     drive: Array
-    """[V or A] as the method's drive kind says."""
+    """[V or A], according to the method's drive kind."""
     segment: npt.NDArray[np.int64]
     """Index into ``segments``; -1 between them."""
     segments: tuple[ProgrammeSegment, ...]
-    """The segments in their order."""
+    """Segments in order."""
 
     @property
     def duration(self) -> float:
-        """Length [s] from the first sample to the last."""
+        """Time [s] from the first to the last sample."""
         return float(self.time[-1])
 
 
 def compile_method(method: Method) -> Programme:
-    """The samples of a method.
+    """Compile a method to samples.
 
     Raises:
-        MethodError: a segment cannot be made into samples, the programme is too long, or a limit is exceeded.
+        MethodError: a segment cannot be sampled, the programme is too long, or a limit is exceeded.
     """
-    pieces = list(plan(method))
-    starts = np.concatenate([[0.0], np.cumsum([piece.duration for piece in pieces])])
-    programme = _empty(method, float(starts[-1]))
-    # There is one edge more than pieces.
-    for piece, start, end in zip(pieces, starts, starts[1:], strict=False):
-        _lay(piece, float(start), _sample_at(float(end), method.rate_hz), programme)
-    segments = _segments(pieces, starts, method.rate_hz)
-    for one in segments:
-        programme.segment[one.start : one.stop] = one.index
+    parts = list(plan(method))
+    starts = np.concatenate([[0.0], np.cumsum([part.duration for part in parts])])
+    programme = _allocate(method, float(starts[-1]))
+    for part, start, end in zip(parts, starts, starts[1:], strict=False):
+        _write_part(part, float(start), _find_sample(float(end), method.rate_hz), programme)
+    segments = _make_segments(parts, starts, method.rate_hz)
+    for segment in segments:
+        programme.segment[segment.start : segment.stop] = segment.index
     compiled = replace(programme, segments=segments)
     _check_limits(compiled)
     return compiled
 
 
-def _empty(method: Method, duration: float) -> Programme:
-    """Room for the samples; the last sample stands at the end of the last piece, at rest."""
-    count = _sample_at(duration, method.rate_hz) + 1
-    if count > MOST_SAMPLES:
+def _allocate(method: Method, duration: float) -> Programme:
+    """Return a programme of empty samples; the last sample is at the end of the last part, at rest."""
+    count = _find_sample(duration, method.rate_hz) + 1
+    if count > MAX_SAMPLES:
         raise MethodError(
             f"method {method.name}: {duration:.0f} s at {method.rate_hz:g} Hz are {count} samples, more than "
-            f"{MOST_SAMPLES}; split it into several runs"
+            f"{MAX_SAMPLES}; divide it into several runs"
         )
     return Programme(
         method=method,
@@ -110,54 +109,54 @@ def _empty(method: Method, duration: float) -> Programme:
         velocity=np.zeros(count),
         acceleration=np.zeros(count),
         drive=np.zeros(count),
-        segment=np.full(count, BETWEEN, dtype=np.int64),
+        segment=np.full(count, NO_SEGMENT, dtype=np.int64),
         segments=(),
     )
 
 
-def _lay(piece: Piece, start: float, stop: int, programme: Programme) -> None:
-    """Write a piece's samples from its start [s] on; the next piece overwrites what it shares."""
-    first = _sample_at(start, programme.rate)
-    here = slice(first, stop + 1)
-    local = programme.time[here] - start - piece.lead
-    motion = piece.motion(local)
-    programme.displacement[here] = motion.displacement
-    programme.velocity[here] = motion.velocity
-    programme.acceleration[here] = motion.acceleration
-    programme.drive[here] = piece.drive(local)
+def _write_part(part: ProgrammePart, start: float, stop: int, programme: Programme) -> None:
+    """Write the samples of a part that starts at a time [s]; the next part overwrites the common sample."""
+    first = _find_sample(start, programme.rate)
+    rows = slice(first, stop + 1)
+    local_time = programme.time[rows] - start - part.lead_time
+    motion = part.motion(local_time)
+    programme.displacement[rows] = motion.displacement
+    programme.velocity[rows] = motion.velocity
+    programme.acceleration[rows] = motion.acceleration
+    programme.drive[rows] = part.drive(local_time)
 
 
-def _segments(pieces: list[Piece], starts: Array, rate: float) -> tuple[ProgrammeSegment, ...]:
-    placed: list[tuple[float, Mark]] = [
-        (float(start) + piece.lead, mark)
-        for piece, start in zip(pieces, starts, strict=False)
-        for mark in piece.marks
+def _make_segments(parts: list[ProgrammePart], starts: Array, rate: float) -> tuple[ProgrammeSegment, ...]:
+    segments: list[tuple[float, PlannedSegment]] = [
+        (float(start) + part.lead_time, segment)
+        for part, start in zip(parts, starts, strict=False)
+        for segment in part.segments
     ]
     return tuple(
         ProgrammeSegment(
             index,
-            mark.name,
-            _sample_at(begin + mark.begin, rate),
-            _sample_at(begin + mark.end, rate),
-            mark.motion,
-            mark.drive,
-            mark.amplitude,
-            mark.frequency,
-            mark.drive_value,
-            mark.checkpoint,
+            segment.name,
+            _find_sample(begin + segment.begin, rate),
+            _find_sample(begin + segment.end, rate),
+            segment.motion,
+            segment.drive,
+            segment.amplitude,
+            segment.frequency,
+            segment.drive_value,
+            segment.checkpoint,
         )
-        for index, (begin, mark) in enumerate(placed)
+        for index, (begin, segment) in enumerate(segments)
     )
 
 
-def _sample_at(time: float, rate: float) -> int:
-    """The first sample at or after a time [s], forgiving rounding."""
-    return math.ceil((time - EDGE) * rate)
+def _find_sample(time: float, rate: float) -> int:
+    """Return the first sample at or after a time [s], with a tolerance for rounding."""
+    return math.ceil((time - EDGE_TOLERANCE) * rate)
 
 
 def _check_limits(programme: Programme) -> None:
     limits = programme.method.limits
-    for word, values, limit, unit, advice in (
+    for quantity, values, limit, unit, advice in (
         ("displacement", programme.displacement, limits.stroke_m, "m", "lower the amplitude or the centre"),
         ("velocity", programme.velocity, limits.velocity_mps, "m/s", "lower amplitude or frequency"),
         (
@@ -170,16 +169,15 @@ def _check_limits(programme: Programme) -> None:
         ("drive", programme.drive, limits.drive, programme.method.drive_unit, "lower the drive"),
     ):
         worst = int(np.argmax(np.abs(values)))
-        if abs(values[worst]) > limit * (1 + ROUNDING):
-            raise MethodError(
-                f"method {programme.method.name}, {_where(programme, worst)}: {word} {values[worst]:.4g} {unit} "
-                f"exceeds the limit of {limit:g} {unit}; {advice}"
-            )
+        if abs(values[worst]) > limit * (1 + ROUNDING_TOLERANCE):
+            position = f"method {programme.method.name}, {_describe_position(programme, worst)}"
+            excess = f"{quantity} {values[worst]:.4g} {unit} exceeds the limit of {limit:g} {unit}"
+            raise MethodError(f"{position}: {excess}; {advice}")
 
 
-def _where(programme: Programme, sample: int) -> str:
+def _describe_position(programme: Programme, sample: int) -> str:
     index = int(programme.segment[sample])
-    if index != BETWEEN:
+    if index != NO_SEGMENT:
         return f"segment {programme.segments[index].name}"
     later = [segment.name for segment in programme.segments if segment.start > sample]
     return f"before segment {later[0]}" if later else "after the last segment"

@@ -1,7 +1,7 @@
-"""The method document `mrbench.method/1`: planned strokes, told apart from any specimen and any bench.
+"""Method document `mrbench.method/1`: planned strokes, independent of specimen and bench.
 
-The document says what shall happen; ``compile.py`` turns it into exact samples, ``envelope.py`` tells beforehand
-what they will ask of the machine. A method that ships with the product goes by its name, any other by its file.
+``compile.py`` converts it to exact samples, and ``envelope.py`` computes their peaks before a run. A shipped
+method is loaded by its name, any other by its file.
 """
 
 import json
@@ -12,158 +12,158 @@ from typing import Any, Literal, Self, TypeAlias
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError, model_validator
 
 from bench.errors import MethodError
-from bench.faults import first_fault
 from bench.methods.drive import Constant, Drive
-from bench.methods.frozen import Frozen
 from bench.methods.motion import Motion, Sine
+from bench.validation import FrozenModel, format_position, get_first_error
 
 DriveKind: TypeAlias = Literal["driver_command_v", "coil_v", "coil_a"]
 
 
-class Limits(Frozen):
-    """What the method never exceeds, in any direction; it is refused where it would."""
+class MethodLimits(FrozenModel):
+    """Limits on the magnitudes of the method; a method that exceeds them is refused."""
 
     stroke_m: PositiveFloat = Field(description="[m] largest displacement from zero.")
     velocity_mps: PositiveFloat = Field(description="[m/s] largest velocity.")
     acceleration_mps2: PositiveFloat = Field(description="[m/s²] largest acceleration.")
     force_n: PositiveFloat = Field(
-        description="[N] largest force; the dry run compares it with what a damper is expected to give."
+        description="[N] largest force; the dry run compares it with the force expected of a damper."
     )
     drive: PositiveFloat = Field(description="[V or A] largest drive.")
 
 
-class WarmUp(Frozen):
+class WarmUp(FrozenModel):
     """Sine strokes that are recorded but belong to no segment."""
 
-    motion: Sine = Field(description="The strokes, about displacement zero.")
-    cycles: PositiveInt = Field(description="[1] how many.")
-    drive: Constant = Field(description="The drive meanwhile.")
+    motion: Sine = Field(description="Motion about displacement zero.")
+    cycles: PositiveInt = Field(description="[1] number of cycles.")
+    drive: Constant = Field(description="Constant drive.")
 
 
-class Stage(Frozen):
-    """What happens before a segment: strokes that bring the damper into its usual state, then a rest."""
+class ConditioningStage(FrozenModel):
+    """Conditioning before a segment: strokes that bring the damper into its usual state, then a rest."""
 
-    warm_up: WarmUp | None = Field(default=None, description="Strokes first.")
-    rest_s: NonNegativeFloat = Field(default=0.0, description="[s] rest after them, with the drive at zero.")
-
-
-class Conditioning(Frozen):
-    """What happens before the first segment, and between any two."""
-
-    before: Stage | None = Field(default=None, description="Before the first segment.")
-    between: Stage | None = Field(default=None, description="Before every later one.")
+    warm_up: WarmUp | None = Field(default=None, description="Warm-up strokes.")
+    rest_s: NonNegativeFloat = Field(default=0.0, description="[s] rest after the warm-up, with zero drive.")
 
 
-class Segment(Frozen):
-    """One stretch of the method: a motion and a drive programme on one time base."""
+class Conditioning(FrozenModel):
+    """Conditioning before the first segment and between segments."""
 
-    # Without commas and wildcards: segments are chosen by patterns, several in a row.
-    name: str = Field(min_length=1, pattern=r"^[^\s,*?\[\]/]+$", description="Its name in the log, unique.")
-    motion: Motion = Field(description="The motion about the centre.")
-    centre_m: float = Field(default=0.0, description="[m] the centre.")
+    before: ConditioningStage | None = Field(default=None, description="Before the first segment.")
+    between: ConditioningStage | None = Field(default=None, description="Before every later segment.")
+
+
+class MethodSegment(FrozenModel):
+    """Part of a method: a motion and a drive programme on one time base."""
+
+    # Without commas and wildcards, because segments are selected by lists of patterns.
+    name: str = Field(min_length=1, pattern=r"^[^\s,*?\[\]/]+$", description="Unique name in the log.")
+    motion: Motion = Field(description="Motion about the centre.")
+    centre_m: float = Field(default=0.0, description="[m] centre of the motion.")
     fade_s: PositiveFloat = Field(
-        default=0.5, description="[s] soft start before and soft stop after an oscillating motion, not counted."
+        default=0.5,
+        description="[s] soft start before and soft stop after an oscillating motion, not part of its duration.",
     )
-    cycles: PositiveInt | None = Field(default=None, description="[1] length in whole cycles of the motion.")
-    duration_s: PositiveFloat | None = Field(default=None, description="[s] length, instead of cycles.")
-    drive: Drive = Field(description="The drive programme, from the segment's start to its end.")
+    cycles: PositiveInt | None = Field(default=None, description="[1] duration in whole cycles of the motion.")
+    duration_s: PositiveFloat | None = Field(default=None, description="[s] duration, instead of cycles.")
+    drive: Drive = Field(description="Drive programme from the start to the end of the segment.")
     checkpoint: bool = Field(
-        default=False, description="Whether an interrupted run may be taken up after this segment."
+        default=False, description="Whether an interrupted run can be resumed after this segment."
     )
 
     @model_validator(mode="after")
-    def _either_cycles_or_duration(self) -> Self:
+    def _check_length(self) -> Self:
         if (self.cycles is None) == (self.duration_s is None):
             raise ValueError("a segment needs either cycles or duration_s")
         return self
 
 
-class Method(Frozen):
-    """The planned strokes of a test."""
+class Method(FrozenModel):
+    """Planned strokes of a test."""
 
-    schema_name: Literal["mrbench.method/1"] = Field(alias="schema", description="Name of this form.")
+    schema_name: Literal["mrbench.method/1"] = Field(
+        alias="schema", description="Name and version of this document type."
+    )
     name: str = Field(pattern=r"^[A-Za-z0-9_-]+$", description="Short name: letters, digits, - and _.")
     title: str = Field(min_length=1, description="One line for a person.")
-    description: str = Field(description="What it is for, whatever the specimen.")
-    rate_hz: PositiveFloat = Field(le=1e5, description="[Hz] samples a second of commands and log.")
-    drive_kind: DriveKind = Field(description="What commands the damper: volt or ampere at the coil.")
-    limits: Limits = Field(description="What it never exceeds.")
+    description: str = Field(description="Purpose of the method, independent of the specimen.")
+    rate_hz: PositiveFloat = Field(le=1e5, description="[Hz] sampling rate of commands and log.")
+    drive_kind: DriveKind = Field(description="Quantity that commands the damper, in volts or amperes.")
+    limits: MethodLimits = Field(description="Limits of the method.")
     conditioning: Conditioning = Field(default=Conditioning(), description="Warm-up and rests.")
-    segments: tuple[Segment, ...] = Field(min_length=1, description="The stretches, in their order.")
+    segments: tuple[MethodSegment, ...] = Field(min_length=1, description="Segments in order.")
 
     @model_validator(mode="after")
-    def _names_differ(self) -> Self:
+    def _check_unique_names(self) -> Self:
         names = [segment.name for segment in self.segments]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ValueError(f"segment name {twice[0]} is used twice; every segment needs its own")
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            raise ValueError(f"segment name {repeated[0]} is used twice; give every segment a unique name")
         return self
 
     @property
     def drive_unit(self) -> str:
-        """``V`` or ``A``."""
+        """Unit of the drive, ``V`` or ``A``."""
         return "A" if self.drive_kind == "coil_a" else "V"
 
     def to_json(self) -> str:
-        """The document as indented JSON, without what is left at its default."""
+        """Return the document as indented JSON, without default values."""
         return self.model_dump_json(by_alias=True, indent=2, exclude_defaults=True) + "\n"
 
 
-def shipped_methods() -> list[str]:
-    """Names of the methods that ship with the product, sorted."""
+def list_shipped_methods() -> list[str]:
+    """Return the names of the shipped methods, sorted."""
     library = files("bench.methods") / "library"
     return sorted(entry.name.removesuffix(".json") for entry in library.iterdir() if entry.name.endswith(".json"))
 
 
-def method_of(content: Any, origin: str) -> Method:
-    """The method that a parsed document describes; ``origin`` names it in messages.
+def parse_method(content: Any, origin: str) -> Method:
+    """Return the method of a parsed document; ``origin`` names the document in messages.
 
     Raises:
-        MethodError: it is not of the form; the message names the place.
+        MethodError: the document is invalid; the message names the position.
     """
     try:
         return Method.model_validate(content)
     except ValidationError as error:
-        raise MethodError(f"{origin} is no method: {_first_fault(error, content)}") from None
+        raise MethodError(f"{origin} is not a method: {_describe_error(error, content)}") from None
 
 
 def load_method(name_or_path: str | Path) -> Method:
-    """A shipped method by its name, or any other from its file.
+    """Load a shipped method by its name, or any other method from its file.
 
     Raises:
-        MethodError: there is no such method, or the document is not of the form; the message names the place.
+        MethodError: there is no such method, or the document is invalid; the message names the position.
     """
-    text = _text(name_or_path)
+    text = _read_text(name_or_path)
     try:
         content = json.loads(text)
     except ValueError as error:
-        raise MethodError(f"{name_or_path} is no method: not JSON, {error}") from None
-    return method_of(content, str(name_or_path))
+        raise MethodError(f"{name_or_path} is not a method: not JSON, {error}") from None
+    return parse_method(content, str(name_or_path))
 
 
-def _text(name_or_path: str | Path) -> str:
-    if str(name_or_path) in shipped_methods():
+def _read_text(name_or_path: str | Path) -> str:
+    if str(name_or_path) in list_shipped_methods():
         return (files("bench.methods") / "library" / f"{name_or_path}.json").read_text("utf-8")
     try:
         return Path(name_or_path).read_text("utf-8")
     except FileNotFoundError:
         raise MethodError(
-            f"no method {name_or_path}: neither a file nor one of {', '.join(shipped_methods())}"
+            f"no method {name_or_path}: neither a file nor one of {', '.join(list_shipped_methods())}"
         ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise MethodError(f"method {name_or_path} cannot be read: {error}") from None
 
 
-def _first_fault(error: ValidationError, content: Any) -> str:
-    """The first fault with its place in the document, and how many more there are."""
-    first, words = first_fault(error)
-    place = ".".join(str(step) for step in first["loc"]) or "the document"
-    named = _segment_name(first["loc"], content)
-    return f"{place}{named}: {words}"
+def _describe_error(error: ValidationError, content: Any) -> str:
+    """Describe the first fault with its position, and the name of its segment."""
+    first, message = get_first_error(error)
+    return f"{format_position(first['loc'])}{_format_segment_name(first['loc'], content)}: {message}"
 
 
-def _segment_name(place: tuple[int | str, ...], content: Any) -> str:
-    if len(place) < 2 or place[0] != "segments" or not isinstance(place[1], int):
+def _format_segment_name(position: tuple[int | str, ...], content: Any) -> str:
+    if len(position) < 2 or position[0] != "segments" or not isinstance(position[1], int):
         return ""
-    segment = content["segments"][place[1]]
+    segment = content["segments"][position[1]]
     return f" ({segment['name']})" if isinstance(segment, dict) and "name" in segment else ""

@@ -1,8 +1,7 @@
-"""Displacement with its two exact derivatives, and the smooth curves that start, stop and join strokes.
+"""Displacement with its two exact derivatives, and smooth curves that start, stop and connect strokes.
 
-Every curve here is a formula, never a difference of samples, so velocity and acceleration of a programme carry
-no noise. Soft starts and moves use the quintic ``s^3 (10 - 15 s + 6 s^2)``, which leaves and arrives with zero
-velocity and zero acceleration.
+All derivatives are formulas, not differences of samples, so that velocity and acceleration contain no noise. Soft
+starts and moves use the quintic ``s^3 (10 - 15 s + 6 s^2)``: its velocity and acceleration are zero at both ends.
 """
 
 import math
@@ -12,40 +11,40 @@ import numpy as np
 import numpy.typing as npt
 
 Array: TypeAlias = npt.NDArray[np.float64]
-"""Real numbers in SI units; the docstring at hand gives shape and unit."""
+"""Array of real numbers in SI units; docstrings state shape and unit."""
 
 QUINTIC_PEAK_RATE = 1.875
-"""[1] largest slope of the quintic step over its unit length."""
+"""Largest first derivative of the quintic step over its unit length."""
 QUINTIC_PEAK_CURVATURE = 10 / math.sqrt(3)
-"""[1] largest second derivative of the quintic step over its unit length."""
+"""Largest second derivative of the quintic step over its unit length."""
 
 MOVE_GRID = 0.1
-"""[s] moves take a multiple of this, so that what follows them starts on a sample at usual rates."""
+"""Unit [s] of the duration of moves, so that the next part starts on a sample at usual rates."""
 
 
 class Kinematics(NamedTuple):
-    """A motion on its samples, each array of shape (samples,)."""
+    """Samples of a motion; each array has shape (samples,)."""
 
     displacement: Array
-    """[m] positive extends the damper."""
+    """[m], positive in extension."""
     velocity: Array
-    """[m/s] its exact derivative."""
+    """Exact derivative of the displacement [m/s]."""
     acceleration: Array
-    """[m/s²] the derivative of that; it may jump where a motion has rounded corners."""
+    """Exact derivative of the velocity [m/s²]; it may jump in a motion with rounded corners."""
 
-    def about(self, centre: float) -> "Kinematics":
-        """The same motion about another centre [m]."""
+    def shift(self, centre: float) -> "Kinematics":
+        """Return the same motion about another centre [m]."""
         return self._replace(displacement=self.displacement + centre)
 
 
-def at_rest(time: Array) -> Kinematics:
-    """No motion, at displacement zero, for times [s] of shape (samples,)."""
+def make_rest(time: Array) -> Kinematics:
+    """Return rest at displacement zero, for times [s] of shape (samples,)."""
     zero = np.zeros_like(time)
     return Kinematics(zero, zero, zero)
 
 
-def smooth_step(share: Array) -> Kinematics:
-    """The quintic from 0 to 1 over ``share`` in 0..1 with its derivatives over ``share``; flat outside."""
+def compute_smooth_step(share: Array) -> Kinematics:
+    """Compute the quintic from 0 to 1 for ``share`` in 0..1, with its derivatives; it is constant outside."""
     s = np.clip(share, 0.0, 1.0)
     return Kinematics(
         s**3 * (10 - 15 * s + 6 * s**2),
@@ -54,35 +53,35 @@ def smooth_step(share: Array) -> Kinematics:
     )
 
 
-def move(start: float, end: float, duration: float, time: Array) -> Kinematics:
-    """From rest at ``start`` to rest at ``end`` [m] within ``duration`` [s], for times [s] from the start."""
-    step = smooth_step(time / duration)
-    way = end - start
+def compute_move(start: float, end: float, duration: float, time: Array) -> Kinematics:
+    """Compute a move from rest at ``start`` to ``end`` [m] in ``duration`` [s], at times [s] from its start."""
+    step = compute_smooth_step(time / duration)
+    distance = end - start
     return Kinematics(
-        start + way * step.displacement,
-        way * step.velocity / duration,
-        way * step.acceleration / duration**2,
+        start + distance * step.displacement,
+        distance * step.velocity / duration,
+        distance * step.acceleration / duration**2,
     )
 
 
-def move_duration(way: float, velocity: float, acceleration: float) -> float:
-    """Time [s] that a move over ``way`` [m] needs to stay below a velocity [m/s] and an acceleration [m/s²]."""
-    by_velocity = QUINTIC_PEAK_RATE * abs(way) / velocity
-    by_acceleration = math.sqrt(QUINTIC_PEAK_CURVATURE * abs(way) / acceleration)
+def compute_move_duration(distance: float, velocity: float, acceleration: float) -> float:
+    """Compute the duration [s] of a move [m] with limits on velocity [m/s] and acceleration [m/s²]."""
+    by_velocity = QUINTIC_PEAK_RATE * abs(distance) / velocity
+    by_acceleration = math.sqrt(QUINTIC_PEAK_CURVATURE * abs(distance) / acceleration)
     return MOVE_GRID * math.ceil(max(by_velocity, by_acceleration) / MOVE_GRID)
 
 
-def faded(steady: Kinematics, time: Array, duration: float, fade: float) -> Kinematics:
-    """A stroke that swells from rest before time zero and dies down to rest after ``duration``.
+def apply_fade(steady: Kinematics, time: Array, duration: float, fade: float) -> Kinematics:
+    """Fade a motion in from rest before time zero, and out to rest after ``duration``.
 
     Args:
-        steady: the motion about displacement zero, going on before and after its counted part.
-        time: [s] of shape (samples,), zero where the counted part begins.
-        duration: length of the counted part [s], within which nothing is changed.
-        fade: length of the start and of the stop [s].
+        steady: motion about displacement zero, which continues before and after its counted part.
+        time: [s] of shape (samples,), zero at the start of the counted part.
+        duration: duration of the counted part [s], which is not changed.
+        fade: duration of the soft start and of the soft stop [s].
     """
     rising = time < duration / 2
-    step = smooth_step(np.where(rising, time + fade, duration + fade - time) / fade)
+    step = compute_smooth_step(np.where(rising, time + fade, duration + fade - time) / fade)
     size = step.displacement
     rate = np.where(rising, 1.0, -1.0) * step.velocity / fade
     curvature = step.acceleration / fade**2

@@ -1,8 +1,8 @@
-"""The motions of a method: what a document may say of them.
+"""Motions of a method: their types in the document, and their periods, frequencies and end positions.
 
-A motion is told about its centre. The *oscillating* ones (sine, triangle, sweep, multisine, random) never rest
-by themselves and are faded in before and out after their counted part; a hold, a ramp and a table begin and end
-at rest. How a motion becomes samples stands in ``strokes.py``.
+A motion is defined relative to its centre. *Oscillating* motions (sine, triangle, sweep, multisine, random) have
+no rest at their ends: they are faded in before and out after their counted part. A hold, a ramp and a table begin
+and end at rest. ``motion_samples.py`` computes the samples.
 """
 
 import math
@@ -12,109 +12,111 @@ from typing import Annotated, Literal, Self, TypeAlias
 
 from pydantic import Field, PositiveFloat, model_validator
 
-from bench.methods.frozen import Frozen
+from bench.validation import FrozenModel
 
 Seed: TypeAlias = Annotated[
-    int, Field(ge=0, lt=2**32, description="Seed of the random numbers: the same seed, the same samples.")
+    int, Field(ge=0, lt=2**32, description="Seed of the random numbers; equal seeds give equal samples.")
 ]
 
 
-class Hold(Frozen):
-    """The damper stands still at the centre."""
+class Hold(FrozenModel):
+    """Rest at the centre."""
 
     kind: Literal["hold"]
 
 
-class Ramp(Frozen):
-    """From rest to rest at constant velocity, the two corners rounded at a constant acceleration."""
+class Ramp(FrozenModel):
+    """Constant velocity from rest to rest, with the two corners rounded at constant acceleration."""
 
     kind: Literal["ramp"]
-    start_m: float = Field(description="[m] where it starts, from the centre.")
-    end_m: float = Field(description="[m] where it ends, from the centre.")
+    start_m: float = Field(description="[m] first position, relative to the centre.")
+    end_m: float = Field(description="[m] last position, relative to the centre.")
     corner_acceleration_mps2: PositiveFloat = Field(description="[m/s²] acceleration in the two corners.")
 
 
-class Sine(Frozen):
-    """A sine that begins at the centre, extending."""
+class Sine(FrozenModel):
+    """Sine that begins at the centre in the direction of extension."""
 
     kind: Literal["sine"]
     amplitude_m: PositiveFloat = Field(description="[m] amplitude.")
     frequency_hz: PositiveFloat = Field(description="[Hz] frequency.")
 
 
-class Triangle(Frozen):
-    """Constant velocity to and fro, the corners rounded at a constant acceleration; begins at the centre."""
+class Triangle(FrozenModel):
+    """Constant velocity in both directions from the centre, with corners rounded at constant acceleration."""
 
     kind: Literal["triangle"]
-    amplitude_m: PositiveFloat = Field(description="[m] amplitude, reached in spite of the rounding.")
+    amplitude_m: PositiveFloat = Field(description="[m] amplitude with the rounded corners.")
     frequency_hz: PositiveFloat = Field(description="[Hz] frequency.")
     corner_acceleration_mps2: PositiveFloat = Field(
         description="[m/s²] acceleration in the corners; at least 32 amplitude frequency²."
     )
 
     @model_validator(mode="after")
-    def _corners_fit(self) -> Self:
-        # With this much the corners take all of each quarter cycle.
+    def _check_corners(self) -> Self:
+        # At this acceleration each corner takes a whole half cycle.
         needed = 32 * self.amplitude_m * self.frequency_hz**2
         if self.corner_acceleration_mps2 < needed:
             raise ValueError(
-                f"corner_acceleration_mps2 {self.corner_acceleration_mps2:g} m/s² rounds the whole triangle "
-                f"away; this amplitude and frequency need at least {needed:.4g} m/s²"
+                f"corner_acceleration_mps2 {self.corner_acceleration_mps2:g} m/s² leaves no straight part of the "
+                f"triangle; this amplitude and frequency need at least {needed:.4g} m/s²"
             )
         return self
 
 
-class Sweep(Frozen):
-    """A sine whose frequency runs from one value to another."""
+class Sweep(FrozenModel):
+    """Sine whose frequency changes from one value to another."""
 
     kind: Literal["sweep"]
     amplitude_m: PositiveFloat = Field(description="[m] amplitude.")
     start_hz: PositiveFloat = Field(description="[Hz] frequency at the start.")
     end_hz: PositiveFloat = Field(description="[Hz] frequency at the end.")
     law: Literal["linear", "logarithmic"] = Field(
-        default="linear", description="How the frequency runs over time."
+        default="linear", description="Course of the frequency over time."
     )
 
 
-class Line(Frozen):
+class MultisineLine(FrozenModel):
     """One sine of a multisine."""
 
     frequency_hz: PositiveFloat = Field(description="[Hz] frequency.")
     amplitude_m: PositiveFloat = Field(description="[m] amplitude.")
 
 
-class Multisine(Frozen):
-    """A sum of sines whose phases come from the seed."""
+class Multisine(FrozenModel):
+    """Sum of sines with random phases."""
 
     kind: Literal["multisine"]
-    lines: tuple[Line, ...] = Field(min_length=1, description="The sines.")
+    lines: tuple[MultisineLine, ...] = Field(min_length=1, description="Sines.")
     seed: Seed
 
 
-class Spectrum(Frozen):
-    """A flat band."""
+class Spectrum(FrozenModel):
+    """Flat spectrum in a band."""
 
     low_hz: PositiveFloat = Field(description="[Hz] lower edge of the band.")
     high_hz: PositiveFloat = Field(description="[Hz] upper edge of the band.")
-    rms_m: PositiveFloat = Field(description="[m] root mean square of the displacement; peaks reach 3 to 4 times.")
+    rms_m: PositiveFloat = Field(
+        description="[m] root mean square of the displacement; peaks are 3 to 4 times as large."
+    )
 
     @model_validator(mode="after")
-    def _band_is_open(self) -> Self:
+    def _check_band(self) -> Self:
         if self.high_hz <= self.low_hz:
             raise ValueError(f"high_hz {self.high_hz:g} Hz must exceed low_hz {self.low_hz:g} Hz")
         return self
 
 
-class Random(Frozen):
-    """Noise with a flat displacement spectrum in a band, never repeating within its segment."""
+class Random(FrozenModel):
+    """Noise with a flat displacement spectrum in a band, which does not repeat within its segment."""
 
     kind: Literal["random"]
-    spectrum: Spectrum = Field(description="The band and its size.")
+    spectrum: Spectrum = Field(description="Band and root mean square.")
     seed: Seed
 
 
-class MotionTable(Frozen):
-    """A displacement given at points: a cubic spline through them that begins and ends at rest."""
+class MotionTable(FrozenModel):
+    """Cubic spline through given points that begins and ends at rest."""
 
     kind: Literal["table"]
     time_s: tuple[float, ...] = Field(min_length=2, description="[s] times of the points; the first is 0.")
@@ -123,7 +125,7 @@ class MotionTable(Frozen):
     )
 
     @model_validator(mode="after")
-    def _points_in_order(self) -> Self:
+    def _check_points(self) -> Self:
         check_table(self.time_s, self.displacement_m)
         return self
 
@@ -134,45 +136,45 @@ Motion: TypeAlias = Annotated[
 
 
 def check_table(time: tuple[float, ...], values: tuple[float, ...]) -> None:
-    """Whether a table of a document can be read as a function of time [s] from 0.
+    """Check that a table is a function of time [s] from 0.
 
     Raises:
-        ValueError: lengths differ, or the times do not begin at 0 and increase.
+        ValueError: the lengths differ, or the times do not begin at 0 and increase.
     """
     if len(time) != len(values):
-        raise ValueError(f"the table has {len(time)} times for {len(values)} values; give one value a time")
+        raise ValueError(f"the table has {len(time)} times for {len(values)} values; give one value for each time")
     if time[0] != 0 or any(later <= earlier for earlier, later in pairwise(time)):
         raise ValueError("the times of a table must begin at 0 s and increase")
 
 
-def oscillates(motion: Motion) -> bool:
-    """Whether the motion needs a soft start and stop, because it is not at rest at its ends."""
+def is_oscillating(motion: Motion) -> bool:
+    """Return whether the motion is not at rest at its ends and needs a soft start and stop."""
     return not isinstance(motion, Hold | Ramp | MotionTable)
 
 
-def period(motion: Motion) -> float | None:
-    """Length of one cycle [s]; of a table its own, None where nothing repeats."""
+def find_period(motion: Motion) -> float | None:
+    """Return the length of one cycle [s], for a table its duration; None if the motion has no cycles."""
     match motion:
         case Sine() | Triangle():
             return 1 / motion.frequency_hz
         case Multisine():
-            return 1 / _common_frequency([line.frequency_hz for line in motion.lines])
+            return 1 / _find_common_frequency([line.frequency_hz for line in motion.lines])
         case MotionTable():
             return motion.time_s[-1]
         case _:
             return None
 
 
-def _common_frequency(frequencies: list[float]) -> float:
-    """The largest frequency [Hz] of which all are multiples, to a part in a thousand of a hertz."""
-    # A document says 0.7 Hz, and the binary number nearest to it has no period that anybody would wait for.
-    parts = [Fraction(frequency).limit_denominator(1000) for frequency in frequencies]
-    denominator = math.lcm(*(part.denominator for part in parts))
-    return math.gcd(*(int(part * denominator) for part in parts)) / denominator
+def _find_common_frequency(frequencies: list[float]) -> float:
+    """Return the largest frequency [Hz] of which all are multiples, to a thousandth of a hertz."""
+    # The binary number nearest to 0.7 Hz would give an extremely long period, hence the rounding to fractions.
+    fractions = [Fraction(frequency).limit_denominator(1000) for frequency in frequencies]
+    denominator = math.lcm(*(fraction.denominator for fraction in fractions))
+    return math.gcd(*(int(fraction * denominator) for fraction in fractions)) / denominator
 
 
-def highest_frequency(motion: Motion) -> float:
-    """Fastest content [Hz] that the sampling rate has to carry; 0 where it is not told by the document."""
+def find_highest_frequency(motion: Motion) -> float:
+    """Return the highest frequency [Hz] of a motion; 0 if the document does not define it."""
     match motion:
         case Sine() | Triangle():
             return motion.frequency_hz
@@ -186,8 +188,8 @@ def highest_frequency(motion: Motion) -> float:
             return 0.0
 
 
-def ends(motion: Motion) -> tuple[float, float]:
-    """Displacement [m] from the centre at which the motion starts and ends, both at rest."""
+def find_end_positions(motion: Motion) -> tuple[float, float]:
+    """Return the first and the last displacement [m] from the centre, both at rest."""
     match motion:
         case Ramp():
             return motion.start_m, motion.end_m

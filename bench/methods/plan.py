@@ -1,8 +1,8 @@
-"""From a method to the pieces that follow one another on its time line.
+"""Programme parts of a method, in order of time.
 
-A piece is a stroke with its fades, a move from one centre to the next, a warm-up or a rest. Every piece begins and
-ends at rest where its neighbours do, so displacement and velocity are continuous over the whole programme.
-Times are real numbers here; only ``compile.py`` knows samples.
+A part is a segment with its fades, a move between centres, a warm-up or a rest. Every part begins and ends at rest
+at the positions of its neighbours, so that displacement and velocity are continuous. Times are real numbers; only
+``compile.py`` computes samples.
 """
 
 from collections.abc import Callable, Iterator
@@ -10,113 +10,116 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bench.methods.checks import counted_length
-from bench.methods.document import Limits, Method, Segment, Stage, WarmUp
-from bench.methods.drive import Constant, Staircase, drive_values
-from bench.methods.kinematics import Array, Kinematics, at_rest, faded, move, move_duration
-from bench.methods.motion import Sine, Sweep, Triangle, ends, oscillates, period
-from bench.methods.strokes import stroke
+from bench.methods.checks import check_segment
+from bench.methods.document import ConditioningStage, Method, MethodLimits, MethodSegment, WarmUp
+from bench.methods.drive import Constant, Staircase, sample_drive
+from bench.methods.kinematics import Array, Kinematics, apply_fade, compute_move, compute_move_duration, make_rest
+from bench.methods.motion import Sine, Sweep, Triangle, find_end_positions, find_period, is_oscillating
+from bench.methods.motion_samples import sample_motion
 
 MOVE_VELOCITY = 0.05
-"""[m/s] velocity of moves between centres, where the limits allow it."""
+"""Largest velocity [m/s] of moves between centres; the limits may require a smaller one."""
 MOVE_ACCELERATION = 0.5
-"""[m/s²] acceleration of these moves, where the limits allow it."""
+"""Largest acceleration [m/s²] of moves between centres; the limits may require a smaller one."""
 
 
 @dataclass(frozen=True)
-class Mark:
-    """A named part of a piece: a segment of the log."""
+class PlannedSegment:
+    """Segment of the log within a programme part."""
 
     name: str
     begin: float
-    """[s] from the start of the piece's counted part."""
+    """Time [s] since the start of the counted part."""
     end: float
-    """[s] from there."""
+    """Time [s] since the start of the counted part."""
     motion: str
     drive: str
     amplitude: float | None
-    """[m] where the motion has one."""
+    """[m]; None if the motion has none."""
     frequency: float | None
-    """[Hz] where the motion has one."""
+    """[Hz]; None if the motion has none."""
     drive_value: float | None
-    """[V or A] where the drive is constant."""
+    """[V or A]; None if the drive varies."""
     checkpoint: bool
 
 
 @dataclass(frozen=True)
-class Piece:
-    """A part of the time line."""
+class ProgrammePart:
+    """Continuous part of a programme."""
 
-    lead: float
-    """[s] from the piece's start to its counted part, where its local time is zero."""
+    lead_time: float
+    """Time [s] from the start to the counted part, at which the local time is zero."""
     duration: float
-    """[s] of the piece as a whole."""
+    """Total duration [s]."""
     motion: Callable[[Array], Kinematics]
-    """Displacement [m] and its derivatives at local times [s]."""
+    """Function that returns displacement [m] and its derivatives at local times [s]."""
     drive: Callable[[Array], Array]
-    """Drive [V or A] at local times [s]."""
-    marks: tuple[Mark, ...] = ()
-    """The segments in it."""
+    """Function that returns the drive [V or A] at local times [s]."""
+    segments: tuple[PlannedSegment, ...] = ()
 
 
-def plan(method: Method) -> Iterator[Piece]:
-    """The pieces of a method, from displacement zero back to displacement zero.
+def plan(method: Method) -> Iterator[ProgrammePart]:
+    """Yield the parts of a method, from displacement zero back to displacement zero.
 
     Raises:
-        MethodError: a segment asks for what cannot be made into samples.
+        MethodError: a segment cannot be sampled.
     """
-    place = 0.0
+    position = 0.0
     names: set[str] = set()
     drive = 0.0
     for index, segment in enumerate(method.segments):
         stage = method.conditioning.between if index else method.conditioning.before
         if stage is not None and (stage.warm_up or stage.rest_s):
-            yield from _moved(place, 0.0, drive, method.limits)
-            yield from _conditioning(stage)
-            place = 0.0
-        piece = _piece(method, segment, names)
-        # A move to the segment is made under its first drive: the coil need not jump when it begins.
-        start, end = (segment.centre_m + offset for offset in ends(segment.motion))
-        first, drive = (float(value) for value in piece.drive(np.array([0.0, piece.duration])))
-        yield from _moved(place, start, first, method.limits)
-        yield piece
-        place = end
-    yield from _moved(place, 0.0, drive, method.limits)
+            yield from _plan_move(position, 0.0, drive, method.limits)
+            yield from _plan_conditioning(stage)
+            position = 0.0
+        part = _make_part(method, segment, names)
+        # The move to a segment uses the segment's first drive, so that the drive does not jump at its start.
+        start, end = (segment.centre_m + offset for offset in find_end_positions(segment.motion))
+        first, drive = (float(value) for value in part.drive(np.array([0.0, part.duration])))
+        yield from _plan_move(position, start, first, method.limits)
+        yield part
+        position = end
+    yield from _plan_move(position, 0.0, drive, method.limits)
 
 
-def _piece(method: Method, segment: Segment, names: set[str]) -> Piece:
-    """One segment with its fades; each level of a staircase is marked."""
-    duration = counted_length(segment, method.rate_hz)
-    fade = segment.fade_s if oscillates(segment.motion) else 0.0
-    cycle = period(segment.motion)
+def _make_part(method: Method, segment: MethodSegment, names: set[str]) -> ProgrammePart:
+    """Make the part of a segment with its fades; each level of a staircase is a segment of the log."""
+    duration = check_segment(segment, method.rate_hz)
+    fade = segment.fade_s if is_oscillating(segment.motion) else 0.0
+    cycle = find_period(segment.motion)
 
     def motion(time: Array) -> Kinematics:
-        steady = stroke(segment.motion, time, duration)
-        return (faded(steady, time, duration, fade) if fade else steady).about(segment.centre_m)
+        steady = sample_motion(segment.motion, time, duration)
+        return (apply_fade(steady, time, duration, fade) if fade else steady).shift(segment.centre_m)
 
     def drive(time: Array) -> Array:
-        return drive_values(segment.drive, time, duration, cycle)
+        return sample_drive(segment.drive, time, duration, cycle)
 
-    return Piece(fade, duration + 2 * fade, motion, drive, _marks(segment, duration, method.drive_unit, names))
+    return ProgrammePart(
+        fade, duration + 2 * fade, motion, drive, _plan_segments(segment, duration, method.drive_unit, names)
+    )
 
 
-def _marks(segment: Segment, duration: float, unit: str, names: set[str]) -> tuple[Mark, ...]:
+def _plan_segments(
+    segment: MethodSegment, duration: float, unit: str, names: set[str]
+) -> tuple[PlannedSegment, ...]:
     motion, drive = segment.motion, segment.drive
     amplitude = motion.amplitude_m if isinstance(motion, Sine | Triangle | Sweep) else None
     frequency = motion.frequency_hz if isinstance(motion, Sine | Triangle) else None
-    parts: list[tuple[str, float, float, str, float | None]]
+    sections: list[tuple[str, float, float, str, float | None]]
     if isinstance(drive, Staircase):
         share = duration / len(drive.levels)
-        parts = [
+        sections = [
             (f"{segment.name}_{level:g}{unit}", index * share, (index + 1) * share, "constant", level)
             for index, level in enumerate(drive.levels)
         ]
     else:
         value = drive.value if isinstance(drive, Constant) else None
-        parts = [(segment.name, 0.0, duration, drive.kind, value)]
+        sections = [(segment.name, 0.0, duration, drive.kind, value)]
     return tuple(
-        Mark(
-            _unused(name, names),
+        PlannedSegment(
+            _make_unique_name(name, names),
             begin,
             end,
             motion.kind,
@@ -124,14 +127,14 @@ def _marks(segment: Segment, duration: float, unit: str, names: set[str]) -> tup
             amplitude,
             frequency,
             level,
-            segment.checkpoint and end == parts[-1][2],
+            segment.checkpoint and end == sections[-1][2],
         )
-        for name, begin, end, kind, level in parts
+        for name, begin, end, kind, level in sections
     )
 
 
-def _unused(name: str, names: set[str]) -> str:
-    """The name, with a number where a level comes again."""
+def _make_unique_name(name: str, names: set[str]) -> str:
+    """Return the name, with a number if it was used before."""
     number, unused = 1, name
     while unused in names:
         number += 1
@@ -140,34 +143,36 @@ def _unused(name: str, names: set[str]) -> str:
     return unused
 
 
-def _moved(start: float, end: float, drive: float, limits: Limits) -> Iterator[Piece]:
-    """The move between two places, if they differ, at half of what the limits allow or slower."""
+def _plan_move(start: float, end: float, drive: float, limits: MethodLimits) -> Iterator[ProgrammePart]:
+    """Yield the move between two positions if they differ, at most at half of the limits."""
     if start == end:
         return
-    duration = move_duration(
+    duration = compute_move_duration(
         end - start,
         min(MOVE_VELOCITY, limits.velocity_mps / 2),
         min(MOVE_ACCELERATION, limits.acceleration_mps2 / 2),
     )
-    yield Piece(0.0, duration, lambda time: move(start, end, duration, time), _steady(drive))
+    yield ProgrammePart(
+        0.0, duration, lambda time: compute_move(start, end, duration, time), _make_constant_drive(drive)
+    )
 
 
-def _conditioning(stage: Stage) -> Iterator[Piece]:
+def _plan_conditioning(stage: ConditioningStage) -> Iterator[ProgrammePart]:
     if stage.warm_up is not None:
-        yield _warm_up(stage.warm_up)
+        yield _plan_warm_up(stage.warm_up)
     if stage.rest_s:
-        yield Piece(0.0, stage.rest_s, at_rest, _steady(0.0))
+        yield ProgrammePart(0.0, stage.rest_s, make_rest, _make_constant_drive(0.0))
 
 
-def _warm_up(warm_up: WarmUp) -> Piece:
+def _plan_warm_up(warm_up: WarmUp) -> ProgrammePart:
     cycle = 1 / warm_up.motion.frequency_hz
     duration = warm_up.cycles * cycle
 
     def motion(time: Array) -> Kinematics:
-        return faded(stroke(warm_up.motion, time, duration), time, duration, cycle)
+        return apply_fade(sample_motion(warm_up.motion, time, duration), time, duration, cycle)
 
-    return Piece(cycle, duration + 2 * cycle, motion, _steady(warm_up.drive.value))
+    return ProgrammePart(cycle, duration + 2 * cycle, motion, _make_constant_drive(warm_up.drive.value))
 
 
-def _steady(value: float) -> Callable[[Array], Array]:
+def _make_constant_drive(value: float) -> Callable[[Array], Array]:
     return lambda time: np.full_like(time, value)

@@ -11,13 +11,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bench.errors import LogError
-from bench.replay.raw import Raw, read_raw
-from drivers.channel import Block
-from drivers.errors import DriverError
-from drivers.replay import decoder
+from bench.replay.raw import RawRecording, read_raw_recordings
+from drivers import DriverError, SampleBlock
+from drivers.replay import make_decoder
 
 
-class Replayed(NamedTuple):
+class ReplayResult(NamedTuple):
     """What became of one instrument's frames."""
 
     instrument: str
@@ -26,45 +25,45 @@ class Replayed(NamedTuple):
     """Readings that were compared."""
     differences: int
     """Readings that are missing, new, or not the same."""
-    words: str
+    message: str
     """The first difference, or why nothing was compared; empty where all is well."""
 
     @property
-    def equal(self) -> bool:
+    def is_equal(self) -> bool:
         """Whether nothing differs, and there was something that could; always where the log has no frames."""
         return not self.differences and (self.samples > 0 or not self.frames)
 
     def __str__(self) -> str:
         """One line for a person."""
         if not self.samples:
-            return f"{self.instrument}: {self.frames} frames, nothing compared: {self.words}"
-        verdict = f"{self.differences} differ, the first: {self.words}" if self.differences else "all equal"
+            return f"{self.instrument}: {self.frames} frames, nothing compared: {self.message}"
+        verdict = f"{self.differences} differ, the first: {self.message}" if self.differences else "all equal"
         return f"{self.instrument}: {self.frames} frames, {self.samples} samples, {verdict}"
 
 
-def replay_frames(path: Path) -> list[Replayed]:
+def replay_frames(path: Path) -> list[ReplayResult]:
     """Decode the frames of a log anew, instrument by instrument; empty for a log that was made without wires.
 
     Raises:
         LogError: the log cannot be read, or says of an instrument what no decoder understands.
     """
-    return [_replayed(path, name, raw) for name, raw in read_raw(path).items()]
+    return [_replay_instrument(path, name, raw) for name, raw in read_raw_recordings(path).items()]
 
 
-def _replayed(path: Path, name: str, raw: Raw) -> Replayed:
+def _replay_instrument(path: Path, name: str, raw: RawRecording) -> ReplayResult:
     if not raw.frames:
-        return Replayed(name, 0, 0, 0, "the log holds no frames of its wire")
+        return ReplayResult(name, 0, 0, 0, "the log holds no frames of its wire")
     if raw.description is None:
-        return Replayed(name, len(raw.frames), 0, 0, "the log does not say how its frames are decoded")
+        return ReplayResult(name, len(raw.frames), 0, 0, "the log does not say how its frames are decoded")
     try:
-        decoding = decoder(raw.description)
+        decoding = make_decoder(raw.description)
     except DriverError as error:
         raise LogError(f"{path}: {name}: {error}") from error
     began = max(raw.frames[0].received_ns, raw.description["state"]["at_ns"])
     ended = raw.frames[-1].received_ns
-    decoded = _samples(block for frame in raw.frames for block in decoding.feed(frame))
-    recorded = _samples(raw.blocks)
-    return _compared(name, len(raw.frames), decoded, recorded, (began, ended))
+    decoded = _collect_samples(block for frame in raw.frames for block in decoding.feed(frame))
+    recorded = _collect_samples(raw.blocks)
+    return _compare_samples(name, len(raw.frames), decoded, recorded, (began, ended))
 
 
 class _Sample(NamedTuple):
@@ -79,7 +78,7 @@ class _Sample(NamedTuple):
 _Key = tuple[str, int]
 
 
-def _samples(blocks: Iterable[Block]) -> dict[_Key, tuple[_Sample, int]]:
+def _collect_samples(blocks: Iterable[SampleBlock]) -> dict[_Key, tuple[_Sample, int]]:
     """Each sample, and when it came [ns]."""
     found = {}
     for block in blocks:
@@ -92,19 +91,19 @@ def _samples(blocks: Iterable[Block]) -> dict[_Key, tuple[_Sample, int]]:
     return found
 
 
-def _compared(name: str, frames: int, decoded: Any, recorded: Any, span: tuple[int, int]) -> Replayed:
+def _compare_samples(name: str, frames: int, decoded: Any, recorded: Any, span: tuple[int, int]) -> ReplayResult:
     """Every sample that either has within the span, against the other."""
-    begin, end = _edges(decoded, min), _edges(recorded, max)
+    begin, end = _find_edges(decoded, min), _find_edges(recorded, max)
     due = [k for k, (_, came) in recorded.items() if span[0] < came <= span[1] and k[1] >= begin.get(k[0], 0)]
     due += [k for k in decoded if k not in recorded and k[1] < end.get(k[0], -1)]
     wrong = [key for key in due if decoded.get(key, (None,))[0] != recorded.get(key, (None,))[0]]
-    words = _difference(wrong[0], decoded, recorded) if wrong else ""
-    return Replayed(
+    words = _describe_difference(wrong[0], decoded, recorded) if wrong else ""
+    return ReplayResult(
         name, frames, len(due), len(wrong), words if due else "no reading came while frames were recorded"
     )
 
 
-def _edges(samples: Iterable[_Key], outer: Callable[[int, int], int]) -> dict[str, int]:
+def _find_edges(samples: Iterable[_Key], outer: Callable[[int, int], int]) -> dict[str, int]:
     """The first or the last number of each channel."""
     edges: dict[str, int] = {}
     for channel, number in samples:
@@ -112,7 +111,7 @@ def _edges(samples: Iterable[_Key], outer: Callable[[int, int], int]) -> dict[st
     return edges
 
 
-def _difference(key: _Key, decoded: Any, recorded: Any) -> str:
+def _describe_difference(key: _Key, decoded: Any, recorded: Any) -> str:
     channel, number = key
     if key not in decoded:
         return f"{channel} {number} was recorded and is not in the frames"

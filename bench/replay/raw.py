@@ -8,50 +8,56 @@ import orjson
 from mcap.reader import make_reader
 
 from bench.errors import LogError
-from bench.recorder.mcap_file import DAMAGE, file_errors
-from bench.recorder.messages import INSTRUMENT, WIRE
-from bench.recorder.reader import check_profile, check_whole
-from bench.recorder.readings import blocks_of, frames_of
-from drivers.channel import Block, Frame
+from bench.log import (
+    DAMAGE_ERRORS,
+    DECODERS_FILE,
+    INSTRUMENT,
+    WIRE,
+    check_complete,
+    check_profile,
+    convert_file_errors,
+    parse_blocks,
+    parse_frames,
+)
+from drivers import Frame, SampleBlock
 
-DESCRIPTIONS = "decoders.json"
-"""Attachment: what each instrument's decoder needs beside the frames, by name."""
 
-
-class Raw(NamedTuple):
+class RawRecording(NamedTuple):
     """One instrument as a log has it."""
 
     frames: list[Frame]
-    blocks: list[Block]
+    blocks: list[SampleBlock]
     """Its recorded readings."""
     description: dict[str, Any] | None
     """Of its decoder; none where the log has none."""
 
 
-def read_raw(path: Path) -> dict[str, Raw]:
+def read_raw_recordings(path: Path) -> dict[str, RawRecording]:
     """Frames and readings of a log, by instrument; empty for a log that was made without wires.
 
     Raises:
         LogError: there is no such file, it is no log of ours, is cut off or damaged.
     """
     frames: dict[str, list[Frame]] = {}
-    blocks: dict[str, list[Block]] = {}
+    blocks: dict[str, list[SampleBlock]] = {}
     try:
-        for topic, content in _messages(path):
+        for topic, content in _read_messages(path):
             if topic.startswith(WIRE):
-                frames.setdefault(topic.removeprefix(WIRE), []).extend(frames_of(content))
+                frames.setdefault(topic.removeprefix(WIRE), []).extend(parse_frames(content))
             elif topic.startswith(INSTRUMENT):
-                blocks.setdefault(topic.removeprefix(INSTRUMENT), []).extend(blocks_of(content))
-        descriptions = _descriptions(path)
-    except (*DAMAGE, orjson.JSONDecodeError, KeyError, ValueError) as error:
+                blocks.setdefault(topic.removeprefix(INSTRUMENT), []).extend(parse_blocks(content))
+        descriptions = _read_descriptions(path)
+    except (*DAMAGE_ERRORS, orjson.JSONDecodeError, KeyError, ValueError) as error:
         raise LogError(f"{path}: the log is damaged ({error!r}); run `mrbench salvage {path}`") from error
     names = sorted({*frames, *blocks})
-    return {name: Raw(frames.get(name, []), blocks.get(name, []), descriptions.get(name)) for name in names}
+    return {
+        name: RawRecording(frames.get(name, []), blocks.get(name, []), descriptions.get(name)) for name in names
+    }
 
 
-def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    with file_errors(path), path.open("rb") as file:
-        check_whole(path, file)
+def _read_messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    with convert_file_errors(path), path.open("rb") as file:
+        check_complete(path, file)
         reader = make_reader(file, validate_crcs=True)
         check_profile(path, reader.get_header().profile)
         for _, channel, message in reader.iter_messages(log_time_order=False):
@@ -59,10 +65,10 @@ def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
                 yield channel.topic, orjson.loads(message.data)
 
 
-def _descriptions(path: Path) -> dict[str, Any]:
-    with file_errors(path), path.open("rb") as file:
+def _read_descriptions(path: Path) -> dict[str, Any]:
+    with convert_file_errors(path), path.open("rb") as file:
         for document in make_reader(file).iter_attachments():
-            if document.name == DESCRIPTIONS:
+            if document.name == DECODERS_FILE:
                 found: dict[str, Any] = orjson.loads(document.data)
                 return found
     return {}

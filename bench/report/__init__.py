@@ -1,1 +1,23 @@
-"""Reports: one page and its plots from a log and a fit, both read as files."""
+"""Reports: one page with plots from a log, a fit and a diagnosis, which are all read as files."""
+
+from bench.report.diagnosis import VERDICTS, read_diagnosis
+from bench.report.documents import Fit, Prediction, read_fit, read_prediction
+from bench.report.page import gather, make_figures, render
+from bench.report.plots import save_figures
+from bench.report.values import format_force, format_quantity, format_ratio
+
+__all__ = [
+    "VERDICTS",
+    "Fit",
+    "Prediction",
+    "format_force",
+    "format_quantity",
+    "format_ratio",
+    "gather",
+    "make_figures",
+    "read_diagnosis",
+    "read_fit",
+    "read_prediction",
+    "render",
+    "save_figures",
+]

@@ -1,26 +1,32 @@
-"""The rows of the report's tables: every number rounded to what is known of it, with its unit."""
+"""Rows of the report's tables, with every number rounded to its uncertainty and with its unit."""
 
-from datetime import datetime
 from typing import NamedTuple
 
 import orjson
 from markupsafe import Markup, escape
 
-from bench.recorder.reader import Log
-from bench.report.documents import Delay, DriveError, Estimate, Fit
+from bench.log import Log, utc_at
+from bench.report.documents import DelayEstimate, DriveError, Estimate, Fit
 from bench.report.summary import is_gauge
-from bench.report.values import level, newton, percent, quantity, significant, times, unit_text
-from identification.damper.coordinates import COORDINATES
-from identification.damper.parameters import PARAMETERS
+from bench.report.values import (
+    format_drive,
+    format_force,
+    format_percent,
+    format_quantity,
+    format_ratio,
+    format_significant,
+    format_unit,
+)
+from identification.damper import COORDINATES, PARAMETERS
 
 _GREEK = {"alpha": "α", "beta": "β", "gamma": "γ", "eta": "η", "rho": "ρ"}
 _MEANINGS = {
     "parameters": {quantity.symbol: quantity.meaning for quantity in PARAMETERS},
     "coordinates": {quantity.symbol: quantity.meaning for quantity in COORDINATES},
 }
-_GAUGE = "rescaling α, β and γ along with it leaves every force as it is, so it is fixed by convention"
-_MOSTLY_NOISE = 2.0
-"""[1] spread of the force over the noise floor below which an NRMSE says nothing."""
+_GAUGE_NOTE = "rescaling it together with α, β and γ changes no force, so its value is a convention"
+_MIN_FORCE_TO_NOISE = 2.0
+"""Threshold on the standard deviation of the force over the noise floor: below it, an NRMSE has no meaning."""
 
 
 class ParameterRow(NamedTuple):
@@ -30,8 +36,8 @@ class ParameterRow(NamedTuple):
     name: str
     value: str
     unit: str
-    known: str
-    """fixed, not fixed or gauge."""
+    certainty: str
+    """known, not known or gauge."""
     meaning: str
     note: str
 
@@ -47,12 +53,12 @@ class DriveRow(NamedTuple):
     note: str
 
 
-Facts = list[tuple[str, str]]
-"""Name and value, in words."""
+PropertyRows = list[tuple[str, str]]
+"""Rows of name and value as text."""
 
 
-def symbol(name: str) -> Markup:
-    """A parameter's name as it is typeset: ``c0_a`` as c with the index 0a."""
+def format_symbol(name: str) -> Markup:
+    """Return the typeset name of a parameter: ``c0_a`` is c with the index 0a."""
     head, _, tail = name.partition("_")
     letters = head.rstrip("0123456789")
     index = head[len(letters) :] + tail
@@ -60,143 +66,145 @@ def symbol(name: str) -> Markup:
     return Markup("<i>{}</i>").format(body) + (Markup("<sub>{}</sub>").format(index) if index else Markup())
 
 
-def parameter_rows(estimates: dict[str, Estimate], form: str) -> list[ParameterRow]:
-    """A table of parameters.
+def make_parameter_rows(estimates: dict[str, Estimate], form: str) -> list[ParameterRow]:
+    """Make the rows of a table of parameters.
 
     Args:
-        estimates: by name.
+        estimates: estimates by name.
         form: ``parameters`` or ``coordinates``.
     """
-    return [_parameter_row(name, estimate, _MEANINGS[form].get(name, "")) for name, estimate in estimates.items()]
+    return [
+        _make_parameter_row(name, estimate, _MEANINGS[form].get(name, "")) for name, estimate in estimates.items()
+    ]
 
 
-def _parameter_row(name: str, estimate: Estimate, meaning: str) -> ParameterRow:
-    shown = quantity(estimate.value, estimate.ci95, estimate.unit)
-    known = "gauge" if is_gauge(name, estimate) else "fixed" if estimate.identifiable else "not fixed"
-    note = _GAUGE if known == "gauge" else estimate.note.removeprefix(f"{meaning}: ")
-    return ParameterRow(symbol(name), name, shown.value, shown.unit, known, meaning, note)
+def _make_parameter_row(name: str, estimate: Estimate, meaning: str) -> ParameterRow:
+    quantity = format_quantity(estimate.value, estimate.ci95, estimate.unit)
+    certainty = "gauge" if is_gauge(name, estimate) else "known" if estimate.identifiable else "not known"
+    note = _GAUGE_NOTE if certainty == "gauge" else estimate.note.removeprefix(f"{meaning}: ")
+    return ParameterRow(format_symbol(name), name, quantity.value, quantity.unit, certainty, meaning, note)
 
 
-def drive_rows(errors: list[DriveError], floor: float) -> list[DriveRow]:
-    """The force error by drive; ``floor`` is the noise of the force [N]."""
+def make_drive_rows(errors: list[DriveError], floor: float) -> list[DriveRow]:
+    """Make the rows of the force error by drive; ``floor`` is the noise floor [N]."""
     span = max((e.drive for e in errors), default=0.0) - min((e.drive for e in errors), default=0.0)
     return [
         DriveRow(
-            f"{level(e.drive, span)} {e.unit}",
-            newton(e.rmse_n),
-            times(e.rmse_n / floor) if floor > 0 else "–",
-            percent(e.nrmse),
+            f"{format_drive(e.drive, span)} {e.unit}",
+            format_force(e.rmse_n),
+            format_ratio(e.rmse_n / floor) if floor > 0 else "–",
+            format_percent(e.nrmse),
             e.samples,
-            "hardly any force but noise" if e.rmse_n / max(e.nrmse, 1e-12) < _MOSTLY_NOISE * floor else "",
+            "mostly noise" if e.rmse_n / max(e.nrmse, 1e-12) < _MIN_FORCE_TO_NOISE * floor else "",
         )
         for e in errors
     ]
 
 
-def delay_text(delay: Delay) -> str:
-    """A lag, and whether the clocks explain it."""
+def format_delay(delay: DelayEstimate) -> str:
+    """Describe a delay, and whether the clock errors explain it."""
     if delay.ci95 is None:
-        return "cannot be seen in these strokes"
-    verdict = "more than the clocks explain" if delay.outside_prior else "within what the clocks explain"
-    prior = quantity(delay.prior_sd, None, "s")
-    return f"{quantity(delay.value, delay.ci95, 's')} ({verdict}: {prior} standard deviation)"
+        return "not observable with these strokes"
+    verdict = "more than the clock errors explain" if delay.outside_prior else "explained by the clock errors"
+    prior = format_quantity(delay.prior_sd, None, "s")
+    return f"{format_quantity(delay.value, delay.ci95, 's')} ({verdict}: {prior} standard deviation)"
 
 
-def floor_facts(fit: Fit) -> Facts:
-    """How the noise floor of the fitted recordings was got."""
-    repeated = fit.floor.cycle_to_cycle
+def make_floor_rows(fit: Fit) -> PropertyRows:
+    """Make the rows of the noise floor and its estimates."""
+    cycle_to_cycle = fit.floor.cycle_to_cycle
     return [
-        ("Noise floor", f"{newton(fit.noise_floor_n)}: {fit.floor.how}"),
-        ("From repeated cycles", "nothing repeats" if repeated is None else newton(repeated)),
-        ("From what is too swift for a damper", newton(fit.floor.high_frequency)),
+        ("Noise floor", f"{format_force(fit.noise_floor_n)}: {fit.floor.basis}"),
+        ("From repeated cycles", "no repeated cycles" if cycle_to_cycle is None else format_force(cycle_to_cycle)),
+        ("From frequencies above those of a damper", format_force(fit.floor.high_frequency)),
     ]
 
 
-def nuisance_facts(fit: Fit) -> Facts:
-    """What was estimated along with the damper."""
+def make_nuisance_rows(fit: Fit) -> PropertyRows:
+    """Make the rows of the quantities estimated together with the damper."""
     starts = fit.nuisances.y0
-    inner = [f"{name}: {quantity(value, None, 'm')}" for name, value in starts.items()]
+    inner = [f"{name}: {format_quantity(value, None, 'm')}" for name, value in starts.items()]
     return [
-        ("Lag of force behind displacement", delay_text(fit.nuisances.force_delay)),
-        ("Further lag of force behind drive", delay_text(fit.nuisances.drive_delay)),
+        ("Delay of force behind displacement", format_delay(fit.nuisances.force_delay)),
+        ("Additional delay of force behind drive", format_delay(fit.nuisances.drive_delay)),
         ("Inner displacement at the start", "; ".join(inner)),
     ]
 
 
-def correlation_facts(fit: Fit) -> Facts:
-    """Pairs that the strokes hardly tell apart."""
+def make_correlation_rows(fit: Fit) -> PropertyRows:
+    """Make the rows of the strongly correlated pairs of coordinates."""
     return [
         (f"{pair.replace(',', ' and ')}", f"{value:+.3f}".replace("-", "−"))
         for pair, value in sorted(fit.correlations.items(), key=lambda item: -abs(item[1]))
     ]
 
 
-def header_facts(log: Log, sha256: str) -> Facts:
-    """What the recording says of itself."""
+def make_header_rows(log: Log, sha256: str) -> PropertyRows:
+    """Make the rows of the recording's identity."""
     run = log.metadata.get("run", {})
     time = log.samples["time"]
-    facts = [
-        ("Run", _short(run.get("id", ""))),
+    rows = [
+        ("Run", _shorten(run.get("id", ""))),
         ("Specimen", run.get("specimen", "")),
-        ("Method", _short(run.get("method", ""))),
-        ("Recorded", _when(run.get("utc_offset", ""))),
+        ("Method", _shorten(run.get("method", ""))),
+        ("Recorded", _start(run.get("utc_offset", ""), int(log.samples["time_ns"][0]))),
         ("Operator", run.get("operator", "")),
-        ("Length", f"{len(time)} samples, {significant(float(time[-1]), 4)} s"),
+        ("Length", f"{len(time)} samples, {format_significant(float(time[-1]), 4)} s"),
         ("Drive", f"{run.get('drive_kind', '')} [{run.get('drive_unit', '')}]"),
-        ("Recorded with", _pairs(run.get("versions", ""))),
+        ("Recorded with", _format_pairs(run.get("versions", ""))),
         ("Log", log.path.name),
         ("SHA-256", sha256),
     ]
-    return [(name, value) for name, value in facts if value]
+    return [(name, value) for name, value in rows if value]
 
 
-def _when(utc: str) -> str:
-    try:
-        return f"{datetime.fromisoformat(utc):%Y-%m-%d %H:%M:%S} UTC"
-    except ValueError:
-        return "not known"
+def _start(utc_offset: str, first_ns: int) -> str:
+    """Format UTC of the first sample; the bench clock may have started weeks before."""
+    start = utc_at(utc_offset, first_ns)
+    return "not known" if start is None else f"{start:%Y-%m-%d %H:%M:%S} UTC"
 
 
-def _short(text: str, longest: int = 120) -> str:
-    return text if len(text) <= longest else f"{text[:longest].rpartition(', ')[0] or text[:longest]}, …"
+def _shorten(text: str, length: int = 120) -> str:
+    return text if len(text) <= length else f"{text[:length].rpartition(', ')[0] or text[:length]}, …"
 
 
-def _pairs(text: str) -> str:
-    """A JSON object as words."""
+def _format_pairs(text: str) -> str:
+    """Format a JSON object as names and values."""
     try:
         return ", ".join(f"{name} {value}" for name, value in orjson.loads(text).items())
     except (orjson.JSONDecodeError, AttributeError):
         return text
 
 
-def channel_rows(log: Log) -> list[tuple[str, str, str, str, str]]:
-    """Name, unit, rate, filter and delay of every channel, as read back from its instrument."""
-    return [_channel_row(name, text) for name, text in log.metadata.get("channels", {}).items()]
+def make_channel_rows(log: Log) -> list[tuple[str, str, str, str, str]]:
+    """Make the rows of name, unit, rate, filter and delay of every channel."""
+    return [_make_channel_row(name, text) for name, text in log.metadata.get("channels", {}).items()]
 
 
-def _channel_row(name: str, text: str) -> tuple[str, str, str, str, str]:
-    said = orjson.loads(text)
-    kept = said.get("filter")
-    words = (
-        f"{kept.get('kind', '')}, order {kept.get('order', '')}, {kept.get('cutoff_hz', 0.0):g} Hz"
-        if kept
+def _make_channel_row(name: str, text: str) -> tuple[str, str, str, str, str]:
+    info = orjson.loads(text)
+    low_pass = info.get("filter")
+    filter_text = (
+        f"{low_pass.get('kind', '')}, order {low_pass.get('order', '')}, {low_pass.get('cutoff_hz', 0.0):g} Hz"
+        if low_pass
         else "none"
     )
-    unit, rate = unit_text(str(said.get("unit", ""))), f"{said.get('rate_hz', 0.0):g} Hz"
-    return name, unit.replace("degC", "°C"), rate, words, str(quantity(said.get("delay_s", 0.0), None, "s"))
+    unit = format_unit(str(info.get("unit", ""))).replace("degC", "°C")
+    delay = str(format_quantity(info.get("delay_s", 0.0), None, "s"))
+    return name, unit, f"{info.get('rate_hz', 0.0):g} Hz", filter_text, delay
 
 
-def outcome_facts(log: Log) -> Facts:
-    """How the recording ended, with what was counted."""
+def make_outcome_rows(log: Log) -> PropertyRows:
+    """Make the rows of the recording's outcome and its counts."""
     outcome = log.metadata.get("outcome", {})
     names = {"/bench/sample": "samples", "/bench/segment": "segment marks", "/bench/event": "events"}
     counts = ", ".join(f"{outcome[topic]} {name}" for topic, name in names.items() if topic in outcome)
-    lost = _pairs(outcome.get("lost", ""))
+    lost = _format_pairs(outcome.get("lost", ""))
     units = log.metadata.get("units", {})
-    facts = [
+    rows = [
         (
             "Outcome",
-            " – ".join(word for word in (outcome.get("outcome", "not known"), outcome.get("reason", "")) if word),
+            " – ".join(filter(None, (outcome.get("outcome", "not known"), outcome.get("reason", "")))),
         ),
         ("Messages", counts),
         ("Lost readings", lost or "none"),
@@ -204,14 +212,15 @@ def outcome_facts(log: Log) -> Facts:
         ("Resampled", units.get("resampled", "")),
         ("Alarms", "; ".join(str(e.get("text", "")) for e in log.events if e.get("kind") == "alarm") or "none"),
     ]
-    return [(name, value) for name, value in facts if value]
+    return [(name, value) for name, value in rows if value]
 
 
-def provenance_facts(fit: Fit) -> Facts:
-    """What the fit was made from and how."""
+def make_provenance_rows(fit: Fit) -> PropertyRows:
+    """Make the rows of the fit's logs, settings and stages."""
     p = fit.provenance
     stages = "; ".join(
-        f"{s.name}: {newton(s.rmse_n)} after {s.iterations} steps, {significant(s.seconds, 2)} s of processor time"
+        f"{s.name}: {format_force(s.rmse_n)} after {s.iterations} steps, "
+        f"{format_significant(s.seconds, 2)} s of processor time"
         for s in fit.stages
     )
     settings = ", ".join(f"{name} = {value}" for name, value in p.settings.items() if value is not None)

@@ -1,25 +1,25 @@
-"""What a report shows of a diagnosis: which effect is missing where, how far the gap shrinks, how sure that is."""
+"""Diagnosis in a report: its document as far as the report needs it, and the text of its section."""
 
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import AliasChoices, Field
 
-from bench.report.documents import Part, read_document
-from bench.report.values import newton, percent, quantity, significant
+from bench.report.documents import DocumentPart, read_document
+from bench.report.values import format_force, format_percent, format_quantity, format_significant
 
-Facts = list[tuple[str, str]]
+PropertyRows = list[tuple[str, str]]
 
 VERDICTS = {
-    "no_gap": "The simulation repeats the recording: nothing is missing.",
-    "explained": "Something is missing in the simulation, and it is known what.",
-    "partly_explained": "Part of what is missing in the simulation is known.",
-    "unexplained": "Something is missing in the simulation that no known effect explains.",
+    "no_gap": "The simulation reproduces the recording: no effect is missing.",
+    "explained": "The simulation lacks effects, which the diagnosis names.",
+    "partly_explained": "The simulation lacks effects, and the diagnosis names some of them.",
+    "unexplained": "The simulation lacks an effect that no known effect explains.",
 }
-"""The verdict in a sentence."""
+"""Sentence for each verdict."""
 
 
-class Value(Part):
+class ParameterValue(DocumentPart):
     """One parameter of an effect."""
 
     value: float = Field(description="best value, in `unit`")
@@ -27,27 +27,27 @@ class Value(Part):
     ci95: tuple[float, float] | None = Field(default=None, description="95 % interval, in `unit`")
 
 
-class Effect(Part):
-    """An effect that is held to be at work."""
+class Effect(DocumentPart):
+    """A named effect."""
 
     name: str
     stage: str
     form: str
-    parameters: dict[str, Value]
-    share: float = Field(description="part of the explained gap that is lost without it")
+    parameters: dict[str, ParameterValue]
+    share: float = Field(description="part of the explained gap that returns without this effect")
     probability: float
     note: str = ""
 
 
-class EffectSet(Part):
-    """Another set of effects that the recording does not rule out."""
+class EffectSet(DocumentPart):
+    """Alternative set of effects that the recording does not rule out."""
 
     effects: list[str]
     probability: float
 
 
-class Gap(Part):
-    """How far simulation and recording are apart, on strokes that no fit saw."""
+class Gap(DocumentPart):
+    """Force errors on strokes that no fit used."""
 
     before_n: float
     after_n: float
@@ -57,7 +57,7 @@ class Gap(Part):
     nominal_n: float | None = None
 
 
-class Place(Part):
+class MapPoint(DocumentPart):
     """The gap in one condition."""
 
     drive: float
@@ -67,30 +67,30 @@ class Place(Part):
     gap_n: float
 
 
-class Where(Part):
-    """Where the gap shows."""
+class GapLocation(DocumentPart):
+    """Stage and conditions of the gap."""
 
     stage: str | None
     stages: dict[str, float]
-    map: list[Place]
+    map: list[MapPoint]
     explainable: float
 
 
-class NextStroke(Part):
-    """The stroke that would settle what is open."""
+class NextStroke(DocumentPart):
+    """Proposed stroke that separates sets of effects."""
 
     segment: dict[str, Any]
     separates: list[list[str]]
 
 
-class Witness(Part):
-    """What the network says of the named effects."""
+class CrossCheck(DocumentPart):
+    """The network's independent estimate of the named effects."""
 
-    said: str
+    message: str = Field(validation_alias=AliasChoices("message", "said"))
 
 
-class Diagnosis(Part):
-    """A diagnosis, as far as a report shows it."""
+class Diagnosis(DocumentPart):
+    """Part of a diagnosis that a report shows."""
 
     schema_: Literal["mrbench.diagnosis/1"] = Field(alias="schema")
     verdict: Literal["no_gap", "explained", "partly_explained", "unexplained"]
@@ -99,15 +99,15 @@ class Diagnosis(Part):
     probability: float
     unknown_probability: float
     gap: Gap
-    where: Where
+    where: GapLocation
     next_stroke: NextStroke | None = None
     explanation: str
-    witness: Witness | None = None
+    cross_check: CrossCheck | None = Field(default=None, validation_alias=AliasChoices("cross_check", "witness"))
     notes: tuple[str, ...] = ()
 
 
 class EffectRow(NamedTuple):
-    """An effect in a table."""
+    """Row of the table of effects."""
 
     name: str
     stage: str
@@ -118,86 +118,87 @@ class EffectRow(NamedTuple):
 
 
 def read_diagnosis(path: Path) -> Diagnosis:
-    """A diagnosis from its file.
+    """Read a diagnosis from its file.
 
     Raises:
-        ReportError: there is no such file, or it is no diagnosis.
+        ReportError: the file cannot be read or is not a diagnosis.
     """
-    return read_document(path, Diagnosis, "a diagnosis made by `mrbench diagnose`")
+    return read_document(path, Diagnosis, "a diagnosis written by `mrbench diagnose`")
 
 
-def spelt(name: str) -> str:
-    """A name of the library as words."""
+def format_name(name: str) -> str:
+    """Return a name of the library as words."""
     return name.replace("_", " ")
 
 
-def together(effects: list[str]) -> str:
-    """A set of effects in words."""
-    return " and ".join(map(spelt, effects)) or "nothing beside the law"
+def join_names(effects: list[str]) -> str:
+    """Return the names of a set of effects as text."""
+    return " and ".join(map(format_name, effects)) or "the law alone"
 
 
-def context(found: Diagnosis, drive_unit: str) -> dict[str, Any]:
-    """What the page's template needs of a diagnosis; ``drive_unit`` is V or A."""
+def make_context(diagnosis: Diagnosis, drive_unit: str) -> dict[str, Any]:
+    """Return the values for the page's template; ``drive_unit`` is V or A."""
     return {
-        "verdict": VERDICTS[found.verdict],
-        "mood": "good" if found.verdict in ("no_gap", "explained") else "warning",
-        "explanation": found.explanation,
-        "gap": _gap_facts(found),
-        "effects": [_effect_row(effect) for effect in found.effects],
-        "sets": _set_rows(found),
-        "next": _next_words(found.next_stroke, drive_unit),
-        "witness": found.witness.said if found.witness else "",
-        "notes": found.notes,
+        "verdict": VERDICTS[diagnosis.verdict],
+        "severity": "good" if diagnosis.verdict in ("no_gap", "explained") else "warning",
+        "explanation": diagnosis.explanation,
+        "gap": _make_gap_rows(diagnosis),
+        "effects": [_make_effect_row(effect) for effect in diagnosis.effects],
+        "sets": _make_set_rows(diagnosis),
+        "next": _describe_next_stroke(diagnosis.next_stroke, drive_unit),
+        "cross_check": diagnosis.cross_check.message if diagnosis.cross_check else "",
+        "notes": diagnosis.notes,
     }
 
 
-def _gap_facts(found: Diagnosis) -> Facts:
-    gap = found.gap
-    facts = [
-        ("Noise floor of the force", newton(gap.noise_floor_n)),
-        ("Force error of the refitted law, strokes never seen", newton(gap.before_n)),
-        ("The same with what is named", newton(gap.after_n)),
+def _make_gap_rows(diagnosis: Diagnosis) -> PropertyRows:
+    gap = diagnosis.gap
+    rows = [
+        ("Noise floor of the force", format_force(gap.noise_floor_n)),
+        ("Force error of the refitted law, on held-out strokes", format_force(gap.before_n)),
+        ("Force error with the named effects", format_force(gap.after_n)),
     ]
     if gap.nominal_n is not None:
-        facts.insert(1, ("Force error of the given simulation", newton(gap.nominal_n)))
-    if gap.shrinkage is not None and found.effects:
-        interval = gap.shrinkage_ci95
-        sure = f" ({percent(interval[0])} to {percent(interval[1])})" if interval else ""
-        facts.append(("Part of the gap that this closes", f"{percent(gap.shrinkage)}{sure}"))
-    return facts
+        rows.insert(1, ("Force error of the given simulation", format_force(gap.nominal_n)))
+    if gap.shrinkage is not None and diagnosis.effects:
+        bounds = gap.shrinkage_ci95
+        interval = f" ({format_percent(bounds[0])} to {format_percent(bounds[1])})" if bounds else ""
+        rows.append(("Part of the gap that they close", f"{format_percent(gap.shrinkage)}{interval}"))
+    return rows
 
 
-def _effect_row(effect: Effect) -> EffectRow:
+def _make_effect_row(effect: Effect) -> EffectRow:
     values = [
-        f"{spelt(name)}: {quantity(one.value, one.ci95, one.unit)}" for name, one in effect.parameters.items()
+        f"{format_name(name)}: {format_quantity(parameter.value, parameter.ci95, parameter.unit)}"
+        for name, parameter in effect.parameters.items()
     ]
     return EffectRow(
-        spelt(effect.name),
-        spelt(effect.stage),
+        format_name(effect.name),
+        format_name(effect.stage),
         values,
-        percent(effect.share),
-        percent(effect.probability),
+        format_percent(effect.share),
+        format_percent(effect.probability),
         effect.note,
     )
 
 
-def _set_rows(found: Diagnosis) -> list[tuple[str, str]]:
-    """Each set with its probability, the named one first; something unknown last."""
-    named = [(together([effect.name for effect in found.effects]), percent(found.probability))]
-    others = [(together(one.effects), percent(one.probability)) for one in found.alternatives]
-    unknown = ("something that the library does not have", percent(found.unknown_probability))
-    return [*(named if found.verdict != "unexplained" else []), *others, unknown]
+def _make_set_rows(diagnosis: Diagnosis) -> PropertyRows:
+    """Make the rows of sets and probabilities: the named set, the alternatives, an unknown cause."""
+    named = [(join_names([effect.name for effect in diagnosis.effects]), format_percent(diagnosis.probability))]
+    alternatives = [(join_names(s.effects), format_percent(s.probability)) for s in diagnosis.alternatives]
+    unknown = ("an effect outside the library", format_percent(diagnosis.unknown_probability))
+    return [*(named if diagnosis.verdict != "unexplained" else []), *alternatives, unknown]
 
 
-def _next_words(stroke: NextStroke | None, drive_unit: str) -> str:
-    """The stroke that would settle the doubt, in words; empty where there is none."""
+def _describe_next_stroke(stroke: NextStroke | None, drive_unit: str) -> str:
+    """Describe the proposed stroke; empty if there is none."""
     if stroke is None:
         return ""
     motion, drive = stroke.segment.get("motion", {}), stroke.segment.get("drive", {})
     sizes = [
-        f"{significant(1e3 * motion['amplitude_m'])} mm" if "amplitude_m" in motion else "",
-        f"{significant(motion['frequency_hz'])} Hz" if "frequency_hz" in motion else "",
-        f"{significant(drive['value'])} {drive_unit}" if "value" in drive else str(drive.get("kind", "")),
+        f"{format_significant(1e3 * motion['amplitude_m'])} mm" if "amplitude_m" in motion else "",
+        f"{format_significant(motion['frequency_hz'])} Hz" if "frequency_hz" in motion else "",
+        f"{format_significant(drive['value'])} {drive_unit}" if "value" in drive else str(drive.get("kind", "")),
     ]
-    apart = ", ".join(f"“{together(one)}”" for one in stroke.separates)
-    return f"{motion.get('kind', 'stroke')} of {', '.join(filter(None, sizes))}: it tells apart {apart}."
+    sets = ", ".join(f"“{join_names(effects)}”" for effects in stroke.separates)
+    return f"{motion.get('kind', 'stroke')} of {', '.join(filter(None, sizes))}: it separates {sets}."

@@ -1,4 +1,4 @@
-"""The pictures of a diagnosis: how far the gap shrinks, which stage it comes from, where it shows."""
+"""Plots of a diagnosis: force errors, probabilities of the stages, gap map."""
 
 from collections.abc import Sequence
 
@@ -7,96 +7,101 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bench.report.diagnosis import Diagnosis, Place, spelt, together
-from bench.report.drawing import INK, bars, colour_bar, new_figure, style
-from bench.report.values import significant
+from bench.report.diagnosis import Diagnosis, MapPoint, format_name, join_names
+from bench.report.drawing import INK_COLOUR, draw_bars, draw_colour_bar, make_figure, style_axes
+from bench.report.values import format_significant
 
-_GAP, _REST, _PALE = "#b5473c", "#3f7d58", "#c9ced4"
-_CLEAR = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
-"""Behind a figure that the line of the floor may cross."""
-_PHASES = 8
-"""Parts of a cycle that are told apart."""
-_MOST_ROWS = 18
-"""Conditions shown, those with the largest gap."""
+_GAP_COLOUR, _REMAINDER_COLOUR, _PALE_COLOUR = "#b5473c", "#3f7d58", "#c9ced4"
+_LABEL_BOX = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
+"""Background of a label, which the line of the noise floor may cross."""
+_PHASE_BINS = 8
+"""Number of phases of a cycle in the gap map."""
+_MAX_ROWS = 18
+"""Largest number of conditions in the gap map; those with the largest gap are shown."""
 
 Numbers = npt.NDArray[np.float64]
 
 
-def shrinkage(found: Diagnosis) -> Figure:
-    """Force error on strokes that no fit saw, before and after, beside the floor; the stages' probabilities."""
-    figure = new_figure(9.0, 2.9)
+def plot_shrinkage(diagnosis: Diagnosis) -> Figure:
+    """Plot the force errors on held-out strokes with and without the named effects, and the stages' probabilities."""
+    figure = make_figure(9.0, 2.9)
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    _draw_errors(left, found)
-    _draw_stages(right, found)
+    _draw_errors(left, diagnosis)
+    _draw_stages(right, diagnosis)
     return figure
 
 
-def place(found: Diagnosis, drive_unit: str) -> Figure | None:
-    """Where the gap shows: condition by phase of the stroke; none where there is no gap, or nothing repeats.
+def plot_gap_map(diagnosis: Diagnosis, drive_unit: str) -> Figure | None:
+    """Plot the gap by condition and phase of the stroke; None without a gap or without repeated cycles.
 
     Args:
-        found: the diagnosis.
+        diagnosis: content of a diagnosis.
         drive_unit: V or A.
     """
-    if found.verdict == "no_gap":
+    if diagnosis.verdict == "no_gap":
         return None
-    rows, grid = _by_condition([one for one in found.where.map if one.frequency_hz > 0], drive_unit)
+    periodic = [point for point in diagnosis.where.map if point.frequency_hz > 0]
+    rows, grid = _group_by_condition(periodic, drive_unit)
     if not rows:
         return None
-    figure = new_figure(9.0, 1.3 + 0.24 * len(rows))
+    figure = make_figure(9.0, 1.3 + 0.24 * len(rows))
     axes = figure.subplots()
-    drawn = axes.imshow(grid, aspect="auto", cmap="OrRd", vmin=0.0, interpolation="nearest")
+    image = axes.imshow(grid, aspect="auto", cmap="OrRd", vmin=0.0, interpolation="nearest")
     axes.set_yticks(range(len(rows)), rows)
-    axes.set_xticks(np.arange(0, _PHASES + 1, 2) - 0.5, ["out, fastest", "end", "in, fastest", "end", "out"])
-    style(axes, "phase of the stroke", "")
+    phases = ["extension, fastest", "end", "compression, fastest", "end", "extension"]
+    axes.set_xticks(np.arange(0, _PHASE_BINS + 1, 2) - 0.5, phases)
+    style_axes(axes, "phase of the stroke", "")
     axes.grid(visible=False)
-    colour_bar(figure, [axes], drawn, "gap beyond the noise [N]")
+    draw_colour_bar(figure, [axes], image, "gap beyond the noise [N]")
     return figure
 
 
-def _draw_errors(axes: Axes, found: Diagnosis) -> None:
-    gap = found.gap
-    errors = [("refitted law", gap.before_n, _REST if found.verdict == "no_gap" else _GAP)]
+def _draw_errors(axes: Axes, diagnosis: Diagnosis) -> None:
+    gap = diagnosis.gap
+    law_colour = _REMAINDER_COLOUR if diagnosis.verdict == "no_gap" else _GAP_COLOUR
+    errors = [("refitted law", gap.before_n, law_colour)]
     if gap.nominal_n is not None:
-        errors.insert(0, ("given simulation", gap.nominal_n, _GAP))
-    if found.effects:
-        named = together([one.name for one in found.effects]).replace(" and ", "\nand ")
-        errors.append((f"with {named}", gap.after_n, _REST))
-    bars(axes, errors, "force error on strokes never seen, RMSE [N]; dashed: noise floor")
-    for at, (_, size, _) in enumerate(errors):
+        errors.insert(0, ("given simulation", gap.nominal_n, _GAP_COLOUR))
+    if diagnosis.effects:
+        named = join_names([effect.name for effect in diagnosis.effects]).replace(" and ", "\nand ")
+        errors.append((f"with {named}", gap.after_n, _REMAINDER_COLOUR))
+    draw_bars(axes, errors, "force error on held-out strokes, RMSE [N]; dashed: noise floor")
+    for row, (_, size, _) in enumerate(errors):
         axes.annotate(
-            f"{significant(size)} N",
-            (size, at),
+            f"{format_significant(size)} N",
+            (size, row),
             xytext=(6, 0),
             textcoords="offset points",
             va="center",
             fontsize=8.5,
-            color=INK,
-            bbox=_CLEAR,
+            color=INK_COLOUR,
+            bbox=_LABEL_BOX,
         )
-    axes.axvline(gap.noise_floor_n, color=INK, linewidth=1.2, linestyle=(0, (4, 3)))
-    axes.set_ylim(max(len(errors), 2) - 0.5, -0.5)  # a bar alone is no broader than one of two
+    axes.axvline(gap.noise_floor_n, color=INK_COLOUR, linewidth=1.2, linestyle=(0, (4, 3)))
+    axes.set_ylim(max(len(errors), 2) - 0.5, -0.5)  # a single bar has the width of one of two
     axes.set_xlim(0, 1.25 * max(size for _, size, _ in errors))
 
 
-def _draw_stages(axes: Axes, found: Diagnosis) -> None:
-    chances = [
-        (spelt(stage), chance, _GAP if chance > 0.5 else _PALE) for stage, chance in found.where.stages.items()
+def _draw_stages(axes: Axes, diagnosis: Diagnosis) -> None:
+    bars = [
+        (format_name(stage), probability, _GAP_COLOUR if probability > 0.5 else _PALE_COLOUR)
+        for stage, probability in diagnosis.where.stages.items()
     ]
-    bars(axes, chances, "probability that something is missing there")
+    draw_bars(axes, bars, "probability of a missing effect")
     axes.set_xlim(0, 1)
 
 
-def _by_condition(places: Sequence[Place], drive_unit: str) -> tuple[list[str], Numbers]:
-    """Names of the conditions, those with the largest gap first, and (conditions, phases) gap [N]."""
+def _group_by_condition(points: Sequence[MapPoint], drive_unit: str) -> tuple[list[str], Numbers]:
+    """Return the names of the conditions with the largest gap, and the gap [N], shape (conditions, phases)."""
     gaps: dict[tuple[float, float, float], Numbers] = {}
-    for one in places:
-        row = gaps.setdefault((one.amplitude_m, one.frequency_hz, one.drive), np.zeros(_PHASES))
-        row[int(one.phase * _PHASES) % _PHASES] = one.gap_n
-    largest = sorted(gaps, key=lambda key: -float(np.sum(gaps[key] ** 2)))[:_MOST_ROWS]
-    shown = sorted(largest)
+    for point in points:
+        row = gaps.setdefault((point.amplitude_m, point.frequency_hz, point.drive), np.zeros(_PHASE_BINS))
+        row[int(point.phase * _PHASE_BINS) % _PHASE_BINS] = point.gap_n
+    largest = sorted(gaps, key=lambda key: -float(np.sum(gaps[key] ** 2)))[:_MAX_ROWS]
+    conditions = sorted(largest)
     names = [
-        f"{significant(1e3 * amplitude)} mm, {significant(frequency)} Hz, {significant(drive)} {drive_unit}"
-        for amplitude, frequency, drive in shown
+        f"{format_significant(1e3 * amplitude)} mm, {format_significant(frequency)} Hz, "
+        f"{format_significant(drive)} {drive_unit}"
+        for amplitude, frequency, drive in conditions
     ]
-    return names, np.array([gaps[key] for key in shown])
+    return names, np.array([gaps[key] for key in conditions])

@@ -1,4 +1,4 @@
-"""The report's page: one HTML file that needs nothing else."""
+"""Page of a report: one self-contained HTML file."""
 
 import base64
 import hashlib
@@ -12,45 +12,46 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from bench.errors import ReportError
-from bench.recorder.reader import Log, read_log
+from bench.log import Log, read_log
 from bench.report import content, diagnosis, diagnosis_plots, plots
 from bench.report.diagnosis import Diagnosis, read_diagnosis
 from bench.report.documents import Fit, Prediction, read_fit
-from bench.report.recording import Recording, recording_from
+from bench.report.recording import Recording, make_recording
 from bench.report.series import predict
-from bench.report.summary import findings
-from bench.report.values import newton, percent, rounded
+from bench.report.summary import make_findings
+from bench.report.values import format_force, format_percent, format_rounded
 
 CAPTIONS = {
     "loops": (
         "Force against displacement and velocity",
-        "One steady cycle at each drive, or a few seconds where the drive varies.",
+        "One steady cycle at each drive, or a few seconds if the drive varies.",
     ),
-    "time": ("Force against time", "Steady cycles at each drive, laid upon each other."),
+    "time": ("Force against time", "Steady cycles at each drive, overlaid."),
     "residual": (
-        "What the law leaves",
-        "Simulated minus recorded force over the whole recording: lowest and highest of each short stretch of "
-        "time. Noise alone, too, reaches a little beyond twice its floor.",
+        "Force error",
+        "Simulated minus recorded force over the whole recording: lowest and highest value of each short interval. "
+        "Noise alone extends slightly beyond twice the noise floor.",
     ),
-    "drives": ("Force error by drive", "Root mean square over all samples at that drive, beside the noise floor."),
+    "drives": ("Force error by drive", "Root mean square over all samples at each drive, with the noise floor."),
     "gap": (
-        "How far it shrinks, and where it comes from",
-        "Left: force error on strokes that no fit saw. Right: stages of the chain from the coil to the record.",
+        "Sim-to-real gap and its origin",
+        "Left: force error on held-out strokes. Right: stages of the chain from the coil to the recording.",
     ),
     "where": (
-        "Where it shows",
-        "What the refitted law leaves beyond the noise, by condition and phase of the stroke.",
+        "Gap map",
+        "Error of the refitted law beyond the noise, by condition and phase of the stroke.",
     ),
-    "whole": (
+    "recording": (
         "The whole recording",
-        "Displacement, drive and force; colours by drive as everywhere on this page.",
+        "Displacement, drive and force; colours by drive as in the other plots.",
     ),
 }
+"""Title and caption of each plot."""
 
 
 @dataclass(frozen=True)
 class Picture:
-    """One figure in the page."""
+    """One plot in the page."""
 
     title: str
     caption: str
@@ -60,7 +61,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Report:
-    """Everything that a page is made from."""
+    """Content of a page."""
 
     log: Log
     sha256: str
@@ -70,111 +71,112 @@ class Report:
     diagnosis: Diagnosis | None = None
 
     @property
-    def seen(self) -> bool:
+    def is_fitted_log(self) -> bool:
         """Whether the fit was made from this log."""
-        return self.fit is not None and self.fit.saw(self.sha256)
+        return self.fit is not None and self.fit.has_fitted(self.sha256)
 
 
-def gather(log: Path, fit: Path | None, diagnosed: Path | None = None) -> Report:
+def gather(log: Path, fit: Path | None, diagnosis_path: Path | None = None) -> Report:
     """Read a log, a fit and a diagnosis, and simulate the fit on the log.
 
     Raises:
-        ReportError: the fit or the diagnosis is none, or the fit cannot be simulated on this log.
+        ReportError: the fit or the diagnosis is invalid, or the fit cannot be simulated on this log.
         LogError: the log cannot be read.
     """
-    known = None if fit is None else read_fit(fit)
-    answer = None if diagnosed is None else read_diagnosis(diagnosed)
-    recorded = read_log(log)
+    fit_document = None if fit is None else read_fit(fit)
+    diagnosis_document = None if diagnosis_path is None else read_diagnosis(diagnosis_path)
+    content_of_log = read_log(log)
     prediction, series = (None, None) if fit is None else predict(fit, log)
     with log.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    return Report(recorded, digest, known, prediction, recording_from(recorded, series), answer)
+        sha256 = hashlib.file_digest(file, "sha256").hexdigest()
+    recording = make_recording(content_of_log, series)
+    return Report(content_of_log, sha256, fit_document, prediction, recording, diagnosis_document)
 
 
-def figures(report: Report) -> dict[str, Figure]:
-    """The pictures of a report by name, in the order of the page."""
-    found = {"loops": plots.loops(report.recording), "time": plots.over_time(report.recording)}
+def make_figures(report: Report) -> dict[str, Figure]:
+    """Make the plots of a report by name, in the order of the page."""
+    figures = {"loops": plots.plot_loops(report.recording), "time": plots.plot_over_time(report.recording)}
     if report.prediction is not None:
         floor = report.prediction.noise_floor_n
-        found["residual"] = plots.residual(report.recording, floor)
-        found["drives"] = plots.by_drive(report.prediction.per_drive, floor, report.recording)
+        figures["residual"] = plots.plot_residual(report.recording, floor)
+        figures["drives"] = plots.plot_error_by_drive(report.prediction.per_drive, floor, report.recording)
     if report.diagnosis is not None:
-        found["gap"] = diagnosis_plots.shrinkage(report.diagnosis)
-        if (where := diagnosis_plots.place(report.diagnosis, report.recording.drive_unit)) is not None:
-            found["where"] = where
-    return {**found, "whole": plots.whole(report.recording)}
+        figures["gap"] = diagnosis_plots.plot_shrinkage(report.diagnosis)
+        if (where := diagnosis_plots.plot_gap_map(report.diagnosis, report.recording.drive_unit)) is not None:
+            figures["where"] = where
+    return {**figures, "recording": plots.plot_recording(report.recording)}
 
 
-def render(report: Report, drawn: dict[str, Figure], command: str, made: datetime) -> str:
-    """The page.
+def render(report: Report, figures: dict[str, Figure], command: str, created_at: datetime) -> str:
+    """Render the page.
 
     Args:
-        report: what it is about.
-        drawn: its pictures, as of `figures`.
-        command: the command line that made it.
-        made: when.
+        report: content of the page.
+        figures: plots, from `make_figures`.
+        command: command line that wrote the page.
+        created_at: time at which the page is written.
     """
     environment = Environment(
         loader=PackageLoader("bench.report", "."),
         autoescape=True,
-        undefined=StrictUndefined,  # a name that the page misses is an error, not a gap
+        undefined=StrictUndefined,  # an unknown name in the template is an error
         trim_blocks=True,
         lstrip_blocks=True,
     )
     pictures = {
-        name: Picture(*CAPTIONS[name], base64.b64encode(plots.png(figure)).decode())
-        for name, figure in drawn.items()
+        name: Picture(*CAPTIONS[name], base64.b64encode(plots.render_png(figure)).decode())
+        for name, figure in figures.items()
     }
-    answer = report.diagnosis
+    found = report.diagnosis
     return environment.get_template("report.html").render(
-        title=_title(report.log),
-        run=content.header_facts(report.log, report.sha256),
-        findings=findings(report.log, report.fit, report.prediction, report.seen),
+        title=_make_title(report.log),
+        run=content.make_header_rows(report.log, report.sha256),
+        findings=make_findings(report.log, report.fit, report.prediction, report.is_fitted_log),
         pictures=pictures,
-        outcome=content.outcome_facts(report.log),
-        channels=content.channel_rows(report.log),
-        diagnosis=None if answer is None else diagnosis.context(answer, report.recording.drive_unit),
-        fit=None if report.fit is None else _fit_context(report),
-        made=f"{made:%Y-%m-%d %H:%M} UTC",
+        outcome=content.make_outcome_rows(report.log),
+        channels=content.make_channel_rows(report.log),
+        diagnosis=None if found is None else diagnosis.make_context(found, report.recording.drive_unit),
+        fit=None if report.fit is None else _make_fit_context(report),
+        created_at=f"{created_at:%Y-%m-%d %H:%M} UTC",
         version=version("mrbench"),
         command=command,
     )
 
 
-def _title(log: Log) -> str:
+def _make_title(log: Log) -> str:
     specimen = log.metadata["run"].get("specimen", "")
     return log.path.stem if specimen in ("", "unknown") else specimen
 
 
-def _fit_context(report: Report) -> dict[str, object]:
-    """What the page shows of a fit."""
+def _make_fit_context(report: Report) -> dict[str, object]:
+    """Return the values of a fit for the page's template."""
     fit, prediction = report.fit, report.prediction
     if fit is None or prediction is None:
-        raise ReportError("a fit is shown only with its prediction on the log; make both")
+        raise ReportError("a report on a fit needs its prediction on the log; give both")
     return {
         "key_figures": [
-            (newton(prediction.rmse_n), "force error (RMSE)"),
-            (newton(prediction.noise_floor_n), "noise floor of the force"),
-            (percent(prediction.nrmse), "of the force's standard deviation"),
-            ("fitted" if report.seen else "never seen", "this recording, by the fit"),
+            (format_force(prediction.rmse_n), "force error (RMSE)"),
+            (format_force(prediction.noise_floor_n), "noise floor of the force"),
+            (format_percent(prediction.nrmse), "of the force's standard deviation (NRMSE)"),
+            ("fitted" if report.is_fitted_log else "not used", "use of this recording in the fit"),
         ],
-        "drives": content.drive_rows(prediction.per_drive, prediction.noise_floor_n),
+        "drives": content.make_drive_rows(prediction.per_drive, prediction.noise_floor_n),
         "samples": prediction.samples,
-        "bias": f"{rounded(prediction.bias_n, prediction.rmse_n / math.sqrt(prediction.samples))} N",
+        "bias": f"{format_rounded(prediction.bias_n, prediction.rmse_n / math.sqrt(prediction.samples))} N",
         "freed": ", ".join(prediction.freed),
-        "coordinates": content.parameter_rows(fit.coordinates, "coordinates"),
-        "parameters": content.parameter_rows(fit.parameters, "parameters"),
-        "errors": _split_errors(fit),
-        "floor": content.floor_facts(fit),
-        "nuisances": content.nuisance_facts(fit),
-        "correlations": content.correlation_facts(fit),
-        "provenance": content.provenance_facts(fit),
+        "coordinates": content.make_parameter_rows(fit.coordinates, "coordinates"),
+        "parameters": content.make_parameter_rows(fit.parameters, "parameters"),
+        "errors": _make_error_rows(fit),
+        "floor": content.make_floor_rows(fit),
+        "nuisances": content.make_nuisance_rows(fit),
+        "correlations": content.make_correlation_rows(fit),
+        "provenance": content.make_provenance_rows(fit),
     }
 
 
-def _split_errors(fit: Fit) -> list[tuple[str, str, str]]:
-    """Force error of the fit on what it saw and what was held out."""
-    rows = [("fitted", newton(fit.rmse_n.train), percent(fit.nrmse.train))]
+def _make_error_rows(fit: Fit) -> list[tuple[str, str, str]]:
+    """Make the rows of the fit's force error on fitted and held-out samples."""
+    rows = [("fitted", format_force(fit.rmse_n.train), format_percent(fit.nrmse.train))]
     if fit.rmse_n.held_out is not None and fit.nrmse.held_out is not None:
-        rows.append(("held out", newton(fit.rmse_n.held_out), percent(fit.nrmse.held_out)))
+        rows.append(("held out", format_force(fit.rmse_n.held_out), format_percent(fit.nrmse.held_out)))
     return rows

@@ -1,4 +1,4 @@
-"""What a report draws: a recording on one time base, with the simulated force beside it where a fit was given."""
+"""Recording for the plots: samples on one time base, with the simulated force if a fit was given."""
 
 from dataclasses import dataclass
 
@@ -6,21 +6,21 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import ReportError
-from bench.recorder.reader import Log, LoggedSegment
-from bench.report.series import Series
+from bench.log import Log, LoggedSegment
+from bench.report.series import ForceSeries
 
 Array = npt.NDArray[np.float64]
 
-_SHOWN = ("displacement", "velocity", "force", "coil_drive")
-"""Channels that a picture needs."""
+_CHANNELS = ("displacement", "velocity", "force", "coil_drive")
+"""Channels that the plots need."""
 
 
 @dataclass(frozen=True)
 class Recording:
-    """Samples of one log, arrays (N,)."""
+    """Samples of one log; arrays have shape (N,)."""
 
     time: Array
-    """[s] on the log's clock."""
+    """Time [s] since the first sample of the log."""
     displacement: Array
     """[m]"""
     velocity: Array
@@ -28,32 +28,32 @@ class Recording:
     drive: Array
     """[V or A]"""
     force: Array
-    """[N] recorded."""
+    """Recorded force [N]."""
     simulated: Array | None
-    """[N] none without a fit."""
+    """Simulated force [N]; None without a fit."""
     held_out: npt.NDArray[np.bool_] | None
-    """True where the fit did not see the sample; none without a fit."""
+    """True for samples that the fit did not use; None without a fit."""
     segments: tuple[LoggedSegment, ...]
-    """`start` and `stop` count these samples."""
+    """Segments; `start` and `stop` are indices of these samples."""
     drive_unit: str
     """V or A."""
 
 
-def recording_from(log: Log, series: Series | None) -> Recording:
-    """The samples of a log, or those of its prediction.
+def make_recording(log: Log, series: ForceSeries | None) -> Recording:
+    """Return the samples of a log, or those of its prediction.
 
     Args:
-        log: as recorded; its segments tell what to draw.
-        series: recorded and simulated force of the same log, or none.
+        log: log with its segments.
+        series: recorded and simulated force of the same log, or None.
 
     Raises:
-        ReportError: the samples lack a channel that the pictures show.
+        ReportError: the samples lack a channel that the plots need.
     """
     samples = log.samples
-    for name in _SHOWN:
+    for name in _CHANNELS:
         if series is None and name not in samples:
             raise ReportError(
-                f"{log.path}: no channel {name!r} in the samples; a report shows {', '.join(_SHOWN)}"
+                f"{log.path}: the samples have no channel {name!r}; a report needs {', '.join(_CHANNELS)}"
             )
     source = samples if series is None else series.arrays
     time = np.asarray(source["time"], float)
@@ -65,13 +65,13 @@ def recording_from(log: Log, series: Series | None) -> Recording:
         force=np.asarray(source["force"], float),
         simulated=None if series is None else np.asarray(series.arrays["simulated"], float),
         held_out=None if series is None else np.asarray(series.arrays["held_out"], bool),
-        segments=tuple(_onto(segment, samples["time"], time) for segment in log.segments),
+        segments=tuple(_rebase_segment(segment, samples["time"], time) for segment in log.segments),
         drive_unit=log.metadata["run"]["drive_unit"],
     )
 
 
-def _onto(segment: LoggedSegment, logged: npt.NDArray[np.generic], time: Array) -> LoggedSegment:
-    """A segment whose samples are counted on another time base."""
+def _rebase_segment(segment: LoggedSegment, logged: npt.NDArray[np.generic], time: Array) -> LoggedSegment:
+    """Return the segment with sample indices of another time base."""
     last = max(segment.stop - 1, segment.start)
     first, final = (float(logged[min(i, len(logged) - 1)]) for i in (segment.start, last))
     start, stop = np.searchsorted(time, [first - 1e-6, final + 1e-6])

@@ -1,173 +1,174 @@
-"""What a report says first, in plain words: what was reached, what falls short, what cannot be known."""
+"""Findings at the top of a report: force error, deficiencies, and quantities that cannot be determined."""
 
 from typing import Literal, NamedTuple
 
-from bench.recorder.reader import Log
-from bench.report.documents import Delay, Estimate, Fit, Prediction
-from bench.report.values import level, newton, percent, quantity, significant
+from bench.log import Log
+from bench.report.documents import DelayEstimate, Estimate, Fit, Prediction
+from bench.report.values import format_drive, format_force, format_percent, format_quantity, format_significant
 
-_AS_GOOD, _NEAR = 1.05, 1.2
-"""[1] force error over the noise floor up to which nothing, or only little, is left to explain."""
-_BEYOND = 0.02
-"""[1] share of the fitted drives' span by which a recording may leave it unmentioned."""
+_AT_FLOOR_RATIO, _NEAR_FLOOR_RATIO = 1.05, 1.2
+"""Thresholds on the force error over the noise floor: up to them, it counts as equal or close to the floor."""
+_EXTRAPOLATION_SHARE = 0.02
+"""Threshold on the extrapolated drive over the span of the fitted drives: below it, no warning is given."""
 
 
 class Finding(NamedTuple):
-    """One sentence or two, and what it means."""
+    """One or two sentences with their severity."""
 
-    mood: Literal["good", "plain", "warning"]
+    severity: Literal["good", "plain", "warning"]
     text: str
 
 
-def findings(log: Log, fit: Fit | None, prediction: Prediction | None, seen: bool) -> list[Finding]:
-    """Everything that a reader should know first.
+def make_findings(log: Log, fit: Fit | None, prediction: Prediction | None, is_fitted_log: bool) -> list[Finding]:
+    """Return the findings on a recording and a fit.
 
     Args:
-        log: the recording.
-        fit: the damper, or none for a report of the recording alone.
-        prediction: the fit simulated on this recording.
-        seen: whether the fit was made from this recording.
+        log: recording.
+        fit: identified damper, or None for a report on the recording alone.
+        prediction: fit simulated on this recording.
+        is_fitted_log: whether the fit used this recording.
     """
-    found = [_outcome(log)]
+    findings = [_describe_outcome(log)]
     if fit is None or prediction is None:
-        return [*found, Finding("plain", "No fit was given: this page shows the recording alone.")]
-    found += [*_origin(log, fit, seen), _error(prediction)]
-    found += _held_out(fit, seen) + _convergence(fit) + _drives(log, fit)
-    return [*found, *_known(fit), *_delays(fit), _calibration()]
+        return [*findings, Finding("plain", "No fit was given: this page shows only the recording.")]
+    findings += [*_describe_origin(log, fit, is_fitted_log), _describe_error(prediction)]
+    findings += _describe_held_out(fit, is_fitted_log) + _describe_convergence(fit) + _describe_drives(log, fit)
+    return [*findings, *_describe_identifiability(fit), *_describe_delays(fit), _describe_calibration()]
 
 
-def _outcome(log: Log) -> Finding:
-    """How the recording ended."""
-    outcome = log.metadata.get("outcome", {})
-    ended, reason = outcome.get("outcome", "unknown"), outcome.get("reason", "")
-    if ended == "clean":
+def _describe_outcome(log: Log) -> Finding:
+    """Describe the end of the recording."""
+    metadata = log.metadata.get("outcome", {})
+    outcome, reason = metadata.get("outcome", "unknown"), metadata.get("reason", "")
+    if outcome == "clean":
         return Finding("good", "The recording is clean: no sample was lost.")
     meaning = {
-        "lossy": "samples were lost on the way",
+        "lossy": "samples were lost",
         "truncated": "its end is missing",
-        "incomplete": "the run was ended before the method was through",
-    }.get(ended, "how it ended is not known")
-    return Finding("warning", f"The recording is {ended}: {meaning}{f' ({reason})' if reason else ''}.")
+        "incomplete": "the run was stopped before the end of the method",
+    }.get(outcome, "its end is not documented")
+    return Finding("warning", f"The recording is {outcome}: {meaning}{f' ({reason})' if reason else ''}.")
 
 
-def _origin(log: Log, fit: Fit, seen: bool) -> list[Finding]:
-    """What the fit was made from, where it was not this log alone."""
+def _describe_origin(log: Log, fit: Fit, is_fitted_log: bool) -> list[Finding]:
+    """Describe the recordings of the fit, if they are not this one alone."""
     names = ", ".join(fit.provenance.logs)
     specimen = log.metadata["run"].get("specimen", "")
-    found = []
-    if not seen:
-        found.append(
+    findings = []
+    if not is_fitted_log:
+        findings.append(
             Finding(
                 "plain",
-                f"The fit was made from another recording ({names}). Everything simulated here is a prediction "
-                "on strokes that the fit never saw.",
+                f"The law was fitted to another recording ({names}). All simulated forces here are predictions for "
+                "strokes that the fit did not use.",
             )
         )
     elif len(fit.provenance.logs) > 1:
-        found.append(Finding("plain", f"The fit was made from {len(fit.provenance.logs)} recordings: {names}."))
+        findings.append(Finding("plain", f"The law was fitted to {len(fit.provenance.logs)} recordings: {names}."))
     if fit.specimen and specimen and fit.specimen != specimen:
-        found.append(
+        findings.append(
             Finding("warning", f"The fit is of specimen “{fit.specimen}”, this recording of “{specimen}”.")
         )
-    return found
+    return findings
 
 
-def _error(prediction: Prediction) -> Finding:
-    """The force error beside the noise floor."""
+def _describe_error(prediction: Prediction) -> Finding:
+    """Describe the force error relative to the noise floor."""
     ratio = prediction.rmse_n / prediction.noise_floor_n if prediction.noise_floor_n > 0 else float("inf")
     text = (
-        f"The law repeats the recorded force to {newton(prediction.rmse_n)} (RMSE, "
-        f"{percent(prediction.nrmse)} of the force's standard deviation); "
-        f"the noise floor of the recording is {newton(prediction.noise_floor_n)}."
+        f"The law reproduces the recorded force with an error of {format_force(prediction.rmse_n)} (RMSE, "
+        f"{format_percent(prediction.nrmse)} of the force's standard deviation). "
+        f"The noise floor of the recording is {format_force(prediction.noise_floor_n)}."
     )
-    if ratio <= _AS_GOOD:
-        return Finding("good", f"{text} No model could come noticeably closer on this recording.")
-    if ratio <= _NEAR:
-        return Finding("plain", f"{text} It stays {100 * (ratio - 1):.0f} % above the floor: a little is left.")
+    if ratio <= _AT_FLOOR_RATIO:
+        return Finding("good", f"{text} No model could be noticeably better on this recording.")
+    if ratio <= _NEAR_FLOOR_RATIO:
+        return Finding("plain", f"{text} The error is {100 * (ratio - 1):.0f} % above the noise floor.")
     return Finding(
         "warning",
-        f"{text} That is {significant(ratio, 2)} times the floor: the damper, or the bench, does something that "
-        "this law and its values do not have. This report does not say what.",
+        f"{text} The error is {format_significant(ratio, 2)} times the noise floor: damper or bench have an effect "
+        "that the fitted law lacks. `mrbench diagnose` searches for it.",
     )
 
 
-def _held_out(fit: Fit, seen: bool) -> list[Finding]:
-    if not seen or fit.rmse_n.held_out is None or fit.nrmse.held_out is None:
+def _describe_held_out(fit: Fit, is_fitted_log: bool) -> list[Finding]:
+    if not is_fitted_log or fit.rmse_n.held_out is None or fit.nrmse.held_out is None:
         return []
     return [
         Finding(
             "plain",
-            f"On the strokes held out of the fit the error is {newton(fit.rmse_n.held_out)} "
-            f"({percent(fit.nrmse.held_out)}), on those fitted {newton(fit.rmse_n.train)} "
-            f"({percent(fit.nrmse.train)}).",
+            f"On held-out strokes the force error is {format_force(fit.rmse_n.held_out)} "
+            f"({format_percent(fit.nrmse.held_out)}), on fitted strokes {format_force(fit.rmse_n.train)} "
+            f"({format_percent(fit.nrmse.train)}).",
         )
     ]
 
 
-def _convergence(fit: Fit) -> list[Finding]:
+def _describe_convergence(fit: Fit) -> list[Finding]:
     if fit.result == "converged":
         return []
-    mood: Literal["plain", "warning"] = "plain" if fit.result.startswith("converged") else "warning"
-    return [Finding(mood, f"The fit says of itself: {fit.result}.")]
+    severity: Literal["plain", "warning"] = "plain" if fit.result.startswith("converged") else "warning"
+    return [Finding(severity, f"Result of the fit: {fit.result}.")]
 
 
-def _drives(log: Log, fit: Fit) -> list[Finding]:
-    """Whether the recording leaves the drives that were fitted."""
+def _describe_drives(log: Log, fit: Fit) -> list[Finding]:
+    """Warn if the drive of the recording exceeds the fitted range."""
     low, high = fit.drive_range
     drive, span = log.samples["coil_drive"], high - low
-    margin = max(_BEYOND * span, 1e-3)
+    margin = max(_EXTRAPOLATION_SHARE * span, 1e-3)
     first, last = float(drive.min()), float(drive.max())
     if first >= low - margin and last <= high + margin:
         return []
-    unit = fit.drive_unit
+    unit, recorded_span = fit.drive_unit, last - first
     return [
         Finding(
             "warning",
-            f"The recording's drive goes from {level(first, last - first)} to {level(last, last - first)} {unit}, "
-            f"the fit knows {level(low, span)} to {level(high, span)} {unit}: beyond that it extrapolates.",
+            f"The drive of the recording is {format_drive(first, recorded_span)} to "
+            f"{format_drive(last, recorded_span)} {unit}, the fitted range is {format_drive(low, span)} to "
+            f"{format_drive(high, span)} {unit}. Beyond this range the fit extrapolates.",
         )
     ]
 
 
-def _known(fit: Fit) -> list[Finding]:
-    """Which parameters the strokes fix, and which not."""
+def _describe_identifiability(fit: Fit) -> list[Finding]:
+    """Describe which parameters the strokes determine."""
     free = {name: e for name, e in fit.parameters.items() if not is_gauge(name, e)}
     unknown = [name for name, e in free.items() if not e.identifiable]
-    text = (
-        f"{len(free) - len(unknown)} of the {len(free)} parameters that a force can show are fixed by the strokes"
-    )
+    text = f"The strokes determine {len(free) - len(unknown)} of the {len(free)} parameters that affect the force"
     gauge = (
-        " The fourteenth, A, is a gauge: it rescales four others without changing any force, and no recording "
-        "reveals it."
+        " The fourteenth parameter, A, is a gauge: it rescales four others without changing any force, so that no "
+        "recording determines it."
         if len(free) < len(fit.parameters)
         else ""
     )
     if unknown:
-        return [Finding("warning", f"{text}; these are not: {', '.join(unknown)}.{gauge}")]
+        return [Finding("warning", f"{text}. Not determined: {', '.join(unknown)}.{gauge}")]
     return [Finding("good", f"{text}.{gauge}")]
 
 
 def is_gauge(name: str, estimate: Estimate) -> bool:
-    """Whether a parameter is the one that no force reveals."""
+    """Return whether a parameter is the gauge, on which no force depends."""
     return name == "A" and not estimate.identifiable
 
 
-def _delays(fit: Fit) -> list[Finding]:
-    named = {"force": fit.nuisances.force_delay, "drive": fit.nuisances.drive_delay}
+def _describe_delays(fit: Fit) -> list[Finding]:
+    delays = {"force": fit.nuisances.force_delay, "drive": fit.nuisances.drive_delay}
     return [
-        Finding("plain", f"The {name} channel's lag of {_lag(delay)} is more than the clocks explain.")
-        for name, delay in named.items()
+        Finding(
+            "plain", f"The delay of the {name} channel, {_format_delay(delay)}, exceeds what clock errors explain."
+        )
+        for name, delay in delays.items()
         if delay.outside_prior
     ]
 
 
-def _lag(delay: Delay) -> str:
-    return str(quantity(delay.value, delay.ci95, "s"))
+def _format_delay(delay: DelayEstimate) -> str:
+    return str(format_quantity(delay.value, delay.ci95, "s"))
 
 
-def _calibration() -> Finding:
+def _describe_calibration() -> Finding:
     return Finding(
         "plain",
-        "Gains of the force and displacement channels cannot be told from the damper's own values: "
-        "they rest on the calibration.",
+        "Gain errors of the force and displacement channels cannot be distinguished from parameters of the damper: "
+        "the parameters rely on the calibration.",
     )

@@ -1,108 +1,108 @@
-"""Numbers as a person reads them: rounded to what is known of them, each with its unit."""
+"""Formatting of numbers, rounded to their uncertainty and with their unit."""
 
 import math
 from typing import NamedTuple
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"))
-_PREFIXED = ("m", "s")
+_PREFIXED_UNITS = ("m", "s")
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
-_SYMMETRIC = 0.25
-"""[1] how far the halves of an interval may differ to be written with one ±."""
+_SYMMETRY_TOLERANCE = 0.25
+"""Largest relative difference of the halves of an interval that is written with ±."""
 
 
-class Shown(NamedTuple):
-    """A quantity in words."""
+class FormattedQuantity(NamedTuple):
+    """A quantity as text."""
 
     value: str
-    """With its interval."""
+    """Value with its interval."""
     unit: str
 
     def __str__(self) -> str:
         return f"{self.value} {self.unit}".strip()
 
 
-def significant(value: float, digits: int = 3) -> str:
-    """A number with so many significant digits, never in powers of ten."""
+def format_significant(value: float, digits: int = 3) -> str:
+    """Format a number with significant digits, without a power of ten."""
     if not math.isfinite(value):
         return "–"
     if value == 0:
         return "0"
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
-    return _fixed(round(value, decimals), decimals)
+    return _format_fixed(round(value, decimals), decimals)
 
 
-def rounded(value: float, uncertainty: float) -> str:
-    """A number rounded to the first digit of its uncertainty, which is positive."""
-    return _fixed(value, -math.floor(math.log10(uncertainty)))
+def format_rounded(value: float, uncertainty: float) -> str:
+    """Format a number rounded to the first digit of its (positive) uncertainty."""
+    return _format_fixed(value, -math.floor(math.log10(uncertainty)))
 
 
-def newton(force: float) -> str:
-    """A force [N] with unit."""
-    return f"{significant(force)} N"
+def format_force(force: float) -> str:
+    """Format a force [N] with unit."""
+    return f"{format_significant(force)} N"
 
 
-def times(ratio: float) -> str:
-    """A ratio [1] in words."""
-    return f"{ratio:.2f} times" if ratio < 10 else f"{significant(ratio)} times"
+def format_ratio(ratio: float) -> str:
+    """Format a ratio as a multiple."""
+    return f"{ratio:.2f} times" if ratio < 10 else f"{format_significant(ratio)} times"
 
 
-def percent(share: float) -> str:
-    """A share [1] in percent, two significant digits."""
-    return f"{significant(100 * share, 2)} %"
+def format_percent(share: float) -> str:
+    """Format a share in percent with two significant digits."""
+    return f"{format_significant(100 * share, 2)} %"
 
 
-def level(drive: float, span: float) -> str:
-    """A drive [V or A], rounded to a five-hundredth of the drives' span."""
+def format_drive(drive: float, span: float) -> str:
+    """Format a drive [V or A], rounded to a five-hundredth of the drives' span."""
     quantum = 10.0 ** math.floor(math.log10(span / 500)) if span > 0 else 1e-4
-    # The added zero takes the sign off a negative one.
+    # Adding zero removes the sign of a negative zero.
     return f"{round(drive / quantum) * quantum + 0.0:.6g}"
 
 
-def unit_text(unit: str) -> str:
-    """A unit as it is typeset."""
+def format_unit(unit: str) -> str:
+    """Return the typeset unit."""
     return unit.replace("^n", "ⁿ").replace(" ", "·")
 
 
-def quantity(value: float, interval: tuple[float, float] | None, unit: str) -> Shown:
-    """A number with its interval, in a handy multiple of its unit.
+def format_quantity(value: float, interval: tuple[float, float] | None, unit: str) -> FormattedQuantity:
+    """Format a number with its interval, in a suitable multiple of its unit.
 
-    ``± h`` where both halves of the interval are alike, the larger being given; ``(from … to)`` where they are
-    not. Two significant digits of the half interval decide where the number is rounded.
+    An interval is written as ``± h`` with the larger half if both halves are similar, otherwise as ``(from … to)``.
+    The number is rounded to two significant digits of the half interval.
     """
-    scale, prefix, power = _multiple(value, interval, unit)
-    shown_unit = prefix + unit_text(unit)
+    scale, prefix, power = _choose_multiple(value, interval, unit)
+    unit_text = prefix + format_unit(unit)
     if interval is None:
-        return Shown(_powered(f"{value / scale:.4g}".replace("-", "−"), power), shown_unit)
+        return FormattedQuantity(_append_power(f"{value / scale:.4g}".replace("-", "−"), power), unit_text)
     low, high = sorted((interval[0] / scale, interval[1] / scale))
     below, above = value / scale - low, high - value / scale
     half = max(below, above)
     if half <= 1e-12 * abs(value / scale) or not math.isfinite(half):
-        return Shown(_powered(significant(value / scale, 6), power), shown_unit)
+        return FormattedQuantity(_append_power(format_significant(value / scale, 6), power), unit_text)
     decimals = 1 - math.floor(math.log10(half))
-    if abs(above - below) <= _SYMMETRIC * half:
-        text = f"{_fixed(value / scale, decimals)} ± {_fixed(half, decimals)}"
-        return Shown(_powered(f"({text})" if power else text, power), shown_unit)
-    text = f"{significant(value / scale)} ({significant(low, 2)} … {significant(high, 2)})"
-    return Shown(_powered(f"[{text}]" if power else text, power), shown_unit)
+    if abs(above - below) <= _SYMMETRY_TOLERANCE * half:
+        text = f"{_format_fixed(value / scale, decimals)} ± {_format_fixed(half, decimals)}"
+        return FormattedQuantity(_append_power(f"({text})" if power else text, power), unit_text)
+    text = f"{format_significant(value / scale)} ({format_significant(low, 2)} … {format_significant(high, 2)})"
+    return FormattedQuantity(_append_power(f"[{text}]" if power else text, power), unit_text)
 
 
-def _multiple(value: float, interval: tuple[float, float] | None, unit: str) -> tuple[float, str, int]:
-    """Scale, prefix and power of ten that make a number handy."""
+def _choose_multiple(value: float, interval: tuple[float, float] | None, unit: str) -> tuple[float, str, int]:
+    """Return scale, prefix and power of ten of a suitable multiple."""
     size = abs(value) or max((abs(end) for end in interval or ()), default=0.0)
     if size == 0:
         return 1.0, "", 0
-    if unit in _PREFIXED:
+    if unit in _PREFIXED_UNITS:
         scale, prefix = next((p for p in _PREFIXES if size >= p[0]), _PREFIXES[-1])
         return scale, prefix, 0
     power = math.floor(math.log10(size))
     return (10.0**power, "", power) if power >= 5 or power < -2 else (1.0, "", 0)
 
 
-def _powered(text: str, power: int) -> str:
+def _append_power(text: str, power: int) -> str:
     return f"{text} × 10{str(power).translate(_SUPERSCRIPT)}" if power else text
 
 
-def _fixed(value: float, decimals: int) -> str:
-    """A number rounded to decimals, which may be negative; with a true minus sign and never a negative zero."""
-    rounded = round(value, decimals) + 0.0  # takes the sign off a zero
+def _format_fixed(value: float, decimals: int) -> str:
+    """Format a number rounded to decimals, which may be negative, with a minus sign but without a negative zero."""
+    rounded = round(value, decimals) + 0.0  # removes the sign of a zero
     return f"{rounded:.{max(0, decimals)}f}".replace("-", "−")

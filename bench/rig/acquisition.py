@@ -1,204 +1,244 @@
-"""One thread a wire: asks its instrument for samples again and again, and its clock beside the bench's.
+"""Acquisition: one thread per wire reads the samples of its instrument and its clock.
 
-Nothing that blocks on anything but the wire runs here. A driver's error is told once; a failed instrument is left
-alone, or connected again with growing pauses where that is allowed.
+These threads block on nothing but their wire. An error of a driver is reported once. The failed instrument is then
+connected again at growing intervals, or left alone while reconnection is suspended.
 """
 
 import contextlib
 import threading
 import time
-from collections.abc import Callable, Mapping
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from bench.rig.clock_map import ClockMap
 from bench.rig.priority import raise_priority
-from drivers.channel import Block, Stamp
-from drivers.errors import DriverError
-from drivers.instrument import Instrument
+from drivers import ClockReading, DriverError, Instrument, SampleBlock
 
-PATIENCE = 0.1
-"""[s] that an instrument is waited for in one turn; stopping takes no longer, but for a wire that hangs."""
+ACQUIRE_TIMEOUT = 0.1
+"""[s] Longest wait for samples in one turn, and so the time that stopping takes unless a wire hangs."""
 IDLE_PERIOD = 0.05
-"""[s] between two samples of an instrument that must be asked for each, while nobody leads it."""
-FIRST_PAUSE, LONGEST_PAUSE = 0.5, 10.0
-"""[s] before connecting again: at first, and at most."""
-STOP_WITHIN = 3.0
-"""[s] for all threads to end."""
+"""[s] Interval of requests to a polled instrument while no setpoint thread triggers it."""
+MIN_RETRY_PAUSE, MAX_RETRY_PAUSE = 0.5, 10.0
+"""[s] First and longest pause before a failed instrument is connected again."""
+STOP_TIMEOUT = 3.0
+"""[s] Time for all threads to end."""
 
 
 class Batch(NamedTuple):
-    """What one instrument brought in one turn."""
+    """Sample blocks that one instrument delivered in one turn."""
 
     instrument: str
-    blocks: tuple[Block, ...]
+    blocks: tuple[SampleBlock, ...]
 
 
-class Sampled(Protocol):
-    """An instrument that gives a sample only when it is asked for one, as a drive does at each SYNC."""
+BatchSink = Callable[[Batch], None]
+FailureSink = Callable[[str, DriverError], None]
 
-    def sample(self) -> None:
-        """Ask for one."""
+
+class PolledInstrument(Protocol):
+    """Instrument that takes a sample only on request, as a drive does at each SYNC."""
+
+    def send_sync(self) -> None:
+        """Request one sample."""
+
+
+@runtime_checkable
+class ClockedInstrument(Protocol):
+    """Instrument whose clock is read together with the bench clock."""
+
+    @property
+    def clock_reading(self) -> ClockReading | None:
+        """Latest reading of its clock; None before the first."""
+
+
+class _Controls:
+    """Switches that an acquisition shares with its threads."""
+
+    def __init__(self) -> None:
+        self.stopping = threading.Event()
+        self.may_reconnect = threading.Event()
+        self.externally_triggered = threading.Event()
 
 
 class Acquisition:
-    """Threads around connected instruments."""
+    """Acquisition threads of all instruments."""
 
     def __init__(
         self,
         instruments: Mapping[str, Instrument],
-        sink: Callable[[Batch], None],
-        failed: Callable[[str, DriverError], None],
+        on_batch: BatchSink,
+        on_failed: FailureSink,
         *,
-        idle: Mapping[str, Sampled] | None = None,
+        idle: Mapping[str, PolledInstrument] | None = None,
     ) -> None:
-        """Nothing is read yet.
+        """Create the threads; `start` begins to read.
 
         Args:
-            instruments: by name, connected.
-            sink: takes each batch, on the thread of its wire; must not block.
-            failed: told once that an instrument has failed, on its thread, with its name and why.
-            idle: by name, those that are to be asked for samples while nobody leads them.
+            instruments: connected instruments by name.
+            on_batch: receives each batch on the thread of its wire; must not block.
+            on_failed: receives name and error of a failed instrument once, on the thread of its wire.
+            idle: polled instruments by name, which are asked for samples while they are not externally triggered.
         """
         self.maps = {name: ClockMap() for name in instruments}
-        """Each instrument's clock on the bench's; those without a clock stay unknown."""
-        self.reconnect = False
-        """Whether a failed instrument is connected again."""
-        self.led = False
-        """While true, somebody else asks those of ``idle`` for samples. Set it before a table is armed that the
-        next SYNC starts."""
-        self._warnings: dict[str, str] = {}
-        self._stopping = threading.Event()
+        """Clock map of each instrument; unknown for instruments without a clock."""
+        self._controls = _Controls()
         idle = idle or {}
-        self._wires = [_Wire(name, made, idle.get(name), self, sink, failed) for name, made in instruments.items()]
+        self._threads = [
+            _AcquisitionThread(
+                name, instrument, idle.get(name), self.maps[name], self._controls, on_batch, on_failed
+            )
+            for name, instrument in instruments.items()
+        ]
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the system did not grant, each sentence once."""
-        return tuple(dict.fromkeys(filter(None, self._warnings.values())))
+        """Privileges that the system did not grant to the threads, each sentence once."""
+        return tuple(dict.fromkeys(wire.warning for wire in self._threads if wire.warning))
 
     @property
-    def down(self) -> tuple[str, ...]:
-        """Names of the instruments that have failed and are not back."""
-        return tuple(wire.name for wire in self._wires if wire.down)
+    def failed_instruments(self) -> tuple[str, ...]:
+        """Names of the instruments that have failed and are not connected again."""
+        return tuple(wire.name for wire in self._threads if wire.has_failed)
 
     @property
-    def reconnected(self) -> dict[str, int]:
-        """Times that each instrument was connected again."""
-        return {wire.name: wire.reconnected for wire in self._wires}
+    def reconnect_counts(self) -> dict[str, int]:
+        """Number of times that each instrument was connected again."""
+        return {wire.name: wire.reconnect_count for wire in self._threads}
+
+    def enable_reconnection(self) -> None:
+        """Connect failed instruments again from now on."""
+        self._controls.may_reconnect.set()
+
+    @contextlib.contextmanager
+    def suspend_reconnection(self) -> Iterator[None]:
+        """Leave failed instruments alone for the duration of a block."""
+        was_enabled = self._controls.may_reconnect.is_set()
+        self._controls.may_reconnect.clear()
+        try:
+            yield
+        finally:
+            if was_enabled:
+                self._controls.may_reconnect.set()
+
+    def set_externally_triggered(self, triggered: bool) -> None:
+        """Set whether the setpoint thread's SYNCs request the samples of polled instruments.
+
+        Call it before a drive table is armed, because any SYNC would start the table.
+        """
+        if triggered:
+            self._controls.externally_triggered.set()
+        else:
+            self._controls.externally_triggered.clear()
 
     def start(self) -> None:
-        """Read from now on."""
-        for wire in self._wires:
+        """Begin to read all instruments."""
+        for wire in self._threads:
             wire.thread.start()
 
-    def stop(self, within: float = STOP_WITHIN) -> tuple[str, ...]:
-        """Stop reading; harmless when repeated.
+    def stop(self, timeout: float = STOP_TIMEOUT) -> tuple[str, ...]:
+        """Stop reading; harmless if repeated.
 
         Args:
-            within: deadline for all threads together [s].
+            timeout: [s] for all threads together.
 
         Returns:
             Names of the instruments whose wires hang; their threads end with the process.
         """
-        self._stopping.set()
-        deadline = time.monotonic() + within
-        return tuple(wire.name for wire in self._wires if not wire.ended(deadline))
-
-    def warn(self, wire: str, sentence: str) -> None:
-        """Take note of what a thread was not granted."""
-        self._warnings[wire] = sentence
-
-    @property
-    def stopping(self) -> bool:
-        """Whether the threads are to end."""
-        return self._stopping.is_set()
-
-    def wait(self, seconds: float) -> bool:
-        """Wait [s]; whether the threads are to end."""
-        return self._stopping.wait(seconds)
+        self._controls.stopping.set()
+        deadline = time.monotonic() + timeout
+        return tuple(wire.name for wire in self._threads if not wire.join(deadline))
 
 
-class _Wire:
-    """One instrument and its thread."""
+class _AcquisitionThread:
+    """Thread that reads one instrument."""
 
     def __init__(
         self,
         name: str,
         instrument: Instrument,
-        idle: Sampled | None,
-        owner: Acquisition,
-        sink: Callable[[Batch], None],
-        failed: Callable[[str, DriverError], None],
+        idle: PolledInstrument | None,
+        clock_map: ClockMap,
+        controls: _Controls,
+        on_batch: BatchSink,
+        on_failed: FailureSink,
     ) -> None:
         self.name = name
-        self.down = False
-        self.reconnected = 0
+        self.has_failed = False
+        self.reconnect_count = 0
+        self.warning = ""
         self.thread = threading.Thread(target=self._run, name=name, daemon=True)
-        self._instrument, self._idle, self._owner = instrument, idle, owner
-        self._sink, self._failed = sink, failed
-        self._due = 0.0
-        self._stamp: Stamp | None = None
+        self._instrument, self._idle = instrument, idle
+        self._clocked = instrument if isinstance(instrument, ClockedInstrument) else None
+        self._clock_map, self._controls = clock_map, controls
+        self._on_batch, self._on_failed = on_batch, on_failed
+        self._next_request = 0.0
+        self._last_reading: ClockReading | None = None
 
-    def ended(self, deadline: float) -> bool:
-        """Whether the thread has ended by the deadline, on the monotonic clock [s]."""
+    def join(self, deadline: float) -> bool:
+        """Return whether the thread has ended by a deadline on the monotonic clock [s]."""
         if self.thread.is_alive():
             self.thread.join(max(deadline - time.monotonic(), 0.0))
         return not self.thread.is_alive()
 
     def _run(self) -> None:
-        self._owner.warn(self.name, raise_priority())
-        while not self._owner.stopping:
+        self.warning = raise_priority()
+        while not self._controls.stopping.is_set():
             try:
-                self._turn()
+                self._acquire()
             except DriverError as error:
                 self._recover(error)
-            except Exception as error:  # a thread that dies in silence would look like an instrument at rest
+            except Exception as error:  # a thread that ended silently would look like an instrument at rest
                 self._recover(
-                    DriverError(f"{self.name}: cannot be read: {error!r}; this is a defect of the driver")
+                    DriverError(
+                        f"{self.name}: cannot be read: {error!r}; internal error of the driver, please report"
+                    )
                 )
 
-    def _turn(self) -> None:
-        blocks = self._instrument.acquire(self._patience())
-        # The clock before the samples: whoever takes them asks at once when they were made.
-        stamp = getattr(self._instrument, "stamp", None)
-        if stamp is not None and stamp is not self._stamp:
-            self._stamp = stamp
-            self._owner.maps[self.name].feed(stamp)
+    def _acquire(self) -> None:
+        blocks = self._instrument.acquire(self._request_idle_sample())
+        # The clock before the samples, because their receivers convert the sample times at once.
+        self._add_clock_reading()
         if blocks:
             newest = blocks[-1]
             if newest.device_ns is not None:
-                self._owner.maps[self.name].feed_sample(int(newest.device_ns[-1]), newest.received_ns)
-            self._sink(Batch(self.name, tuple(blocks)))
+                self._clock_map.add_sample(int(newest.device_ns[-1]), newest.received_ns)
+            self._on_batch(Batch(self.name, tuple(blocks)))
 
-    def _patience(self) -> float:
-        """How long to wait in this turn [s]; asks for a sample first where nobody else does."""
-        if self._idle is None or self._owner.led:
-            return PATIENCE
+    def _add_clock_reading(self) -> None:
+        reading = None if self._clocked is None else self._clocked.clock_reading
+        if reading is not None and reading is not self._last_reading:
+            self._last_reading = reading
+            self._clock_map.add_reading(reading)
+
+    def _request_idle_sample(self) -> float:
+        """Request a sample if nothing else triggers it and one is due; return the timeout of this turn [s]."""
+        if self._idle is None or self._controls.externally_triggered.is_set():
+            return ACQUIRE_TIMEOUT
         now = time.monotonic()
-        if now >= self._due:
-            self._idle.sample()
-            self._due = now + IDLE_PERIOD
-        return self._due - now
+        if now >= self._next_request:
+            self._idle.send_sync()
+            self._next_request = now + IDLE_PERIOD
+        return self._next_request - now
 
     def _recover(self, error: DriverError) -> None:
-        """Tell of the error, and come back once the instrument is connected again, or never."""
-        self.down = True
-        self._failed(self.name, error)
-        pause = FIRST_PAUSE
-        while not self._owner.wait(pause):
-            if not self._owner.reconnect:
+        """Report an error, and return once the instrument is connected again or the acquisition stops."""
+        self.has_failed = True
+        self._on_failed(self.name, error)
+        pause = MIN_RETRY_PAUSE
+        while not self._controls.stopping.wait(pause):
+            if not self._controls.may_reconnect.is_set():
                 continue
-            if self._connected():
-                self.down = False
-                self.reconnected += 1
+            if self._try_reconnect():
+                self.has_failed = False
+                self.reconnect_count += 1
                 return
-            pause = min(2 * pause, LONGEST_PAUSE)
+            pause = min(2 * pause, MAX_RETRY_PAUSE)
 
-    def _connected(self) -> bool:
-        # Why it failed has been told; whatever keeps it from coming back must not end the thread that tries.
+    def _try_reconnect(self) -> bool:
+        # The failure was reported, and no further error may end the thread.
         with contextlib.suppress(Exception):
             self._instrument.close()
             self._instrument.connect()
-            self._owner.maps[self.name].restart()
+            self._clock_map.restart()
             return True
         return False

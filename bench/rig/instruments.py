@@ -1,12 +1,11 @@
-"""From ``bench.toml`` to the instruments themselves: each driver built, none of them opened yet."""
+"""Construction of the instruments that ``bench.toml`` names; none of them is opened."""
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias, cast
+from typing import NamedTuple, TypeAlias, TypeVar
 
-from bench.rig.alignment import DriveChannel
-from bench.rig.config import (
+from bench.config import (
     ActuatorSection,
     AsciiLoadCellSection,
     BenchConfig,
@@ -16,30 +15,25 @@ from bench.rig.config import (
     LvdtSection,
     ModbusSection,
     ThermometerSection,
-    role_of,
 )
-from drivers.actuator import Actuator
-from drivers.ascii_load_cell import AsciiLoadCell
-from drivers.can_bus import CanAddress
-from drivers.coil_amplifier import DRIVE_UNITS, CoilAmplifier
-from drivers.errors import DriverError
-from drivers.instrument import Clock, Instrument
-from drivers.load_cell import LoadCell
-from drivers.lvdt import Lvdt
-from drivers.modbus_address import ModbusAddress
-from drivers.servo_drive import ActuatorSettings
-from drivers.thermometer import Thermometer
+from bench.rig.alignment import DriveChannel
+from drivers import Clock, DriverError, Instrument
+from drivers.actuator import Actuator, ActuatorSettings
+from drivers.load_cell import AsciiLoadCell, LoadCell
+from drivers.modbus import DRIVE_UNITS, CoilAmplifier, Lvdt, Thermometer
+from drivers.transport import CanAddress, ModbusAddress
 
-STALE_AFTER = 0.05
-"""[s] without a setpoint until the drive stops by itself, where the agent has real-time priority."""
-STALE_WITHOUT_PRIORITY = 0.15
-"""[s] the same where it has not: under load, a thread of usual priority is held up for some 50 ms now and then."""
+SETPOINT_TIMEOUT = 0.05
+"""[s] Setpoint timeout of the drive if the agent has real-time priority."""
+SETPOINT_TIMEOUT_WITHOUT_PRIORITY = 0.15
+"""[s] Setpoint timeout without it: under load, a thread of ordinary priority is delayed by up to about 50 ms."""
 
 AnyInstrument: TypeAlias = Actuator | LoadCell | AsciiLoadCell | Lvdt | CoilAmplifier | Thermometer
+InstrumentT = TypeVar("InstrumentT", bound=AnyInstrument)
 
 
-class Named(NamedTuple):
-    """One instrument and what the configuration says of it."""
+class RegisteredInstrument(NamedTuple):
+    """Instrument with its name, driver and address in the configuration."""
 
     name: str
     driver: str
@@ -49,15 +43,15 @@ class Named(NamedTuple):
 
 @dataclass(frozen=True)
 class Rig:
-    """The instruments of one bench."""
+    """Instruments of one bench."""
 
     actuator: Actuator
     load_cell: LoadCell | AsciiLoadCell
     lvdt: Lvdt
     amplifier: CoilAmplifier
     thermometer: Thermometer | None
-    named: tuple[Named, ...]
-    """All of them, as the configuration has them."""
+    instruments: tuple[RegisteredInstrument, ...]
+    """All instruments in the order of the configuration."""
     drive_kind: str
     """coil_v or coil_a."""
     drive_unit: str
@@ -66,85 +60,94 @@ class Rig:
     """Channel that measures the drive."""
 
     @contextlib.contextmanager
-    def connected(self) -> Iterator["Rig"]:
-        """All wires open; on leaving, everything is made safe and closed.
+    def connect_all(self) -> Iterator["Rig"]:
+        """Open all wires; make everything safe and close it at the end.
 
         Raises:
-            DriverError: some do not answer as themselves, all of which are named; the others are closed again.
+            DriverError: instruments do not reply as expected; all of them are named, and all wires are closed.
         """
         with contextlib.ExitStack() as opened:
-            faults: list[DriverError] = []
-            for one in self.named:
-                opened.callback(_closed, one.instrument)  # before: one that fails half-way is closed, too
+            errors: list[DriverError] = []
+            for one in self.instruments:
+                # Before it connects, so that an instrument that fails half-way is closed, too.
+                opened.callback(_close_quietly, one.instrument)
                 try:
                     one.instrument.connect()
                 except DriverError as error:
-                    # Whoever wires a bench wants all of what is wrong at once, not one instrument a try.
-                    faults.append(error)
-            if faults:
-                raise _together(faults, len(self.named))
+                    errors.append(error)  # all errors are reported together, not one per attempt
+            if errors:
+                raise _combine_errors(errors, len(self.instruments))
             yield self
 
 
-def _together(faults: list[DriverError], instruments: int) -> DriverError:
-    if len(faults) == 1:
-        return faults[0]
-    return DriverError(f"{len(faults)} of {instruments} instruments fail: {'; '.join(map(str, faults))}")
+def _combine_errors(errors: list[DriverError], instruments: int) -> DriverError:
+    if len(errors) == 1:
+        return errors[0]
+    return DriverError(f"{len(errors)} of {instruments} instruments fail: {'; '.join(map(str, errors))}")
 
 
-def _closed(instrument: Instrument) -> None:
-    """Close it, come what may: the next one has to be closed as well."""
+def _close_quietly(instrument: Instrument) -> None:
+    """Close an instrument; an error must not keep the others from being closed."""
     with contextlib.suppress(DriverError):
         instrument.close()
 
 
-def build_rig(config: BenchConfig, clock: Clock, *, prompt: bool) -> Rig:
-    """The instruments of a configuration, none of them opened.
+def build_rig(config: BenchConfig, clock: Clock, *, realtime: bool) -> Rig:
+    """Build the instruments of a configuration without opening them.
 
     Args:
-        config: of the bench.
-        clock: of the bench [ns].
-        prompt: whether setpoints leave with real-time priority, so that the drive need not wait long for them.
+        config: configuration of the bench.
+        clock: bench clock [ns].
+        realtime: whether setpoints are sent with real-time priority, so that the drive may expect them sooner.
 
     Raises:
-        OutOfRange: a driver refuses a setting, such as a baud rate that does not carry the samples.
+        OutOfRangeError: a driver refuses a setting, such as a baud rate that is too low for the samples.
     """
-    named = tuple(
-        Named(name, section.driver, _address(section), cast("Instrument", _built(name, section, clock, prompt)))
-        for name, section in config.instruments.items()
-    )
-    by_role = {role_of(one.driver): one.instrument for one in named}
+    built = {
+        name: _build_instrument(name, section, clock, realtime) for name, section in config.instruments.items()
+    }
+    instruments = list(built.values())
     section = next(one for one in config.instruments.values() if isinstance(one, CoilAmplifierSection))
-    by_current = section.mode == "current"
+    is_current = section.mode == "current"
+    load_cells = [one for one in instruments if isinstance(one, LoadCell | AsciiLoadCell)]
+    thermometers = [one for one in instruments if isinstance(one, Thermometer)]
     return Rig(
-        actuator=cast("Actuator", by_role["actuator"]),
-        load_cell=cast("LoadCell | AsciiLoadCell", by_role["load_cell"]),
-        lvdt=cast("Lvdt", by_role["lvdt"]),
-        amplifier=cast("CoilAmplifier", by_role["coil_amplifier"]),
-        thermometer=cast("Thermometer | None", by_role.get("thermometer")),
-        named=named,
-        drive_kind="coil_a" if by_current else "coil_v",
+        actuator=_select(instruments, Actuator),
+        load_cell=load_cells[0],
+        lvdt=_select(instruments, Lvdt),
+        amplifier=_select(instruments, CoilAmplifier),
+        thermometer=thermometers[0] if thermometers else None,
+        instruments=tuple(
+            RegisteredInstrument(name, section.driver, _format_address(section), built[name])
+            for name, section in config.instruments.items()
+        ),
+        drive_kind="coil_a" if is_current else "coil_v",
         drive_unit=DRIVE_UNITS[section.mode],
-        drive_channel="coil_current" if by_current else "coil_voltage",
+        drive_channel="coil_current" if is_current else "coil_voltage",
     )
 
 
-def _built(name: str, section: InstrumentSection, clock: Clock, prompt: bool) -> AnyInstrument:
+def _select(instruments: Iterable[AnyInstrument], kind: type[InstrumentT]) -> InstrumentT:
+    """Return the instrument of a class; the configuration has exactly one."""
+    return next(one for one in instruments if isinstance(one, kind))
+
+
+def _build_instrument(name: str, section: InstrumentSection, clock: Clock, realtime: bool) -> AnyInstrument:
     match section:
         case ActuatorSection():
-            return _actuator(name, section, clock, prompt)
+            return _build_actuator(name, section, clock, realtime)
         case LoadCellSection():
             return LoadCell(name, section.url, clock, rate=section.rate, baud=section.baud)
         case AsciiLoadCellSection():
             return AsciiLoadCell(name, section.url, clock, baud=section.baud)
         case LvdtSection():
-            return Lvdt(name, _modbus(section), clock, unit=section.unit)
+            return Lvdt(name, _make_modbus_address(section), clock, unit=section.unit)
         case ThermometerSection():
-            return Thermometer(name, _modbus(section), clock, unit=section.unit)
+            return Thermometer(name, _make_modbus_address(section), clock, unit=section.unit)
         case CoilAmplifierSection():
             return CoilAmplifier(
                 name,
-                _modbus(section),
+                _make_modbus_address(section),
                 clock,
                 mode=section.mode,
                 ramp=section.ramp,
@@ -153,15 +156,16 @@ def _built(name: str, section: InstrumentSection, clock: Clock, prompt: bool) ->
             )
 
 
-def _actuator(name: str, section: ActuatorSection, clock: Clock, prompt: bool) -> Actuator:
-    stale = section.stale_after or (STALE_AFTER if prompt else STALE_WITHOUT_PRIORITY)
+def _build_actuator(name: str, section: ActuatorSection, clock: Clock, realtime: bool) -> Actuator:
+    default = SETPOINT_TIMEOUT if realtime else SETPOINT_TIMEOUT_WITHOUT_PRIORITY
+    timeout = section.setpoint_timeout or default
     settings = ActuatorSettings(
-        stale_after=stale,
-        master_lost_after=2 * stale,
+        setpoint_timeout=timeout,
+        master_heartbeat_timeout=2 * timeout,
         travel=section.travel,
-        top_speed=section.top_speed,
-        torque=section.torque,
-        following=section.following,
+        max_speed=section.max_speed,
+        torque_limit=section.torque_limit,
+        following_error_window=section.following_error_window,
     )
     address = CanAddress(section.interface, section.channel, section.host, section.port)
     return Actuator(
@@ -175,12 +179,12 @@ def _actuator(name: str, section: ActuatorSection, clock: Clock, prompt: bool) -
     )
 
 
-def _modbus(section: ModbusSection) -> ModbusAddress:
+def _make_modbus_address(section: ModbusSection) -> ModbusAddress:
     return ModbusAddress(section.url, section.baud, section.parity, section.stop_bits)
 
 
-def _address(section: InstrumentSection) -> str:
+def _format_address(section: InstrumentSection) -> str:
     if isinstance(section, ActuatorSection):
-        at = f"{section.host}:{section.port}" if section.interface == "socketcand" else section.channel
-        return f"{section.interface}://{at}"
+        host = f"{section.host}:{section.port}" if section.interface == "socketcand" else section.channel
+        return f"{section.interface}://{host}"
     return section.url

@@ -1,19 +1,22 @@
-"""Watches every sample that comes, and has the last word before anything is sent.
+"""Interlocks: every sample is checked on arrival, and every command before it is sent.
 
-The interlocks know nothing of threads or wires: time and samples are handed in, verdicts come back. Fast limits
-rest on the actuator's own encoder and on the load cell; the LVDT's samples are tens of milliseconds old when they
-come, good for the record alone.
+Time and samples are passed in and limit violations are returned; nothing here knows threads or wires. The fast
+limits use the actuator's encoder and the load cell. LVDT samples arrive tens of milliseconds late, so they are
+recorded but not limited.
 """
 
+import contextlib
 import math
 import threading
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from functools import reduce
+from typing import NamedTuple
 
-from bench.errors import Interlocked
-from bench.safety.limits import Action, Matrix, Quantity, Verdict, judge
-from drivers.channel import Block
+from bench.errors import InterlockError
+from bench.safety.limits import Action, LimitMatrix, LimitViolation, Quantity, evaluate_limits, merge_limits
+from drivers import SampleBlock
 
-_WATCHED: dict[str, Quantity] = {
+_CHANNEL_QUANTITIES: dict[str, Quantity] = {
     "force": "force",
     "actuator_position": "displacement",
     "actuator_velocity": "actuator_velocity",
@@ -21,132 +24,204 @@ _WATCHED: dict[str, Quantity] = {
     "coil_voltage": "coil_voltage",
     "temperature": "temperature",
 }
-"""Quantity behind each channel; ``force_raw``, LVDT and torque are not limited."""
-_AGAIN = 1.0
-"""[s] after which an action that was taken already is reported again, if its cause stays."""
+"""Limited quantity of each channel; ``force_raw``, LVDT and torque are not limited."""
+_REPEAT_TIME = 1.0
+"""[s] Time after which a violation that persists is reported again."""
+_NEVER_NS = -(2**62)
+"""[ns] Instant before all others."""
+
+
+class _LimitScope(NamedTuple):
+    """Change of the limits for the duration of one `Interlocks.use_limits` block."""
+
+    specimen: LimitMatrix
+    ignore: frozenset[Quantity]
 
 
 class Interlocks:
-    """One matrix of limits at work; may be used from any thread.
+    """Limits of the bench with their state; all methods may be called from any thread.
+
+    One lock guards the limits in force, the latch of a trip, the force age and the reported violations.
 
     Args:
-        matrix: of both tiers.
-        drive: the quantity that is commanded of the coil.
+        fixture: limits that always apply, unless a block of `use_limits` ignores a quantity.
+        drive: quantity that is commanded of the coil.
     """
 
-    def __init__(self, matrix: Matrix, drive: Quantity) -> None:
-        self.matrix = matrix
+    def __init__(self, fixture: LimitMatrix, drive: Quantity) -> None:
+        self._fixture: LimitMatrix = {quantity: dict(thresholds) for quantity, thresholds in fixture.items()}
         self._drive = drive
-        self._latching = threading.Lock()
-        self._tripped = ""
+        self._lock = threading.Lock()
+        self._scopes: list[_LimitScope] = []
+        self._limits: LimitMatrix = self._fixture
+        self._trip_reason = ""
+        self._force_watchers = 0
         self._force_ns: int | None = None
-        self._told: dict[tuple[Quantity, Action], int] = {}
+        self._reported_ns: dict[tuple[Quantity, Action], int] = {}
 
     @property
-    def tripped(self) -> str:
-        """Why everything was brought to rest; empty where it was not."""
-        return self._tripped
+    def trip_reason(self) -> str:
+        """Reason of the trip that is latched; empty without a trip."""
+        with self._lock:
+            return self._trip_reason
 
-    def latch(self, why: str) -> bool:
-        """Refuse every write from now on; false where that was so already."""
-        with self._latching:
-            first = not self._tripped
-            self._tripped = self._tripped or why
-        return first
+    def latch(self, reason: str) -> bool:
+        """Refuse all commands until a reset; return False if a trip was latched before."""
+        with self._lock:
+            is_first = not self._trip_reason
+            self._trip_reason = self._trip_reason or reason
+            return is_first
 
     def reset(self) -> None:
-        """Allow writes again."""
-        self._tripped = ""
-        # What comes next is news, however soon it comes.
-        self._told.clear()
+        """Release the latch, and report the next violation without the repeat delay."""
+        with self._lock:
+            self._trip_reason = ""
+            self._reported_ns.clear()
 
-    def expect_force(self, since_ns: int | None) -> None:
-        """Expect force samples from an instant on [ns]; none for no longer."""
-        self._force_ns = since_ns
+    @contextlib.contextmanager
+    def use_limits(self, specimen: LimitMatrix | None = None, ignore: Collection[Quantity] = ()) -> Iterator[None]:
+        """Change the limits for the duration of a block, and restore them however it ends.
 
-    def check(self, blocks: Iterable[Block], now_ns: int) -> list[Verdict]:
-        """What new samples ask for, strongest first.
+        Blocks may be nested, and may overlap in several threads: the limits in force always follow from the
+        fixture and all open blocks.
 
         Args:
-            blocks: as acquired.
-            now_ns: bench clock.
+            specimen: limits that apply in addition; the stricter threshold wins.
+            ignore: quantities whose fixture limits do not apply.
         """
-        found = [verdict for block in blocks for verdict in self._of_block(block)]
-        found += self._judged("force_age", self.force_age(now_ns))
-        return self._fresh(found, now_ns)
+        scope = _LimitScope(specimen or {}, frozenset(ignore))
+        with self._lock:
+            self._scopes.append(scope)
+            self._limits = self._combine_scopes()
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._scopes.remove(scope)
+                self._limits = self._combine_scopes()
 
-    def check_value(self, quantity: Quantity, value: float, now_ns: int) -> list[Verdict]:
-        """What one value [in the quantity's unit] asks for."""
-        return self._fresh(self._judged(quantity, value), now_ns)
+    @contextlib.contextmanager
+    def expect_force(self, since_ns: int) -> Iterator[None]:
+        """Limit the age of the newest force sample for the duration of a block.
 
-    def force_age(self, now_ns: int) -> float:
-        """[s] since the newest good force sample came; 0 before one was expected."""
-        since = self._force_ns
-        return 0.0 if since is None else (now_ns - since) * 1e-9
+        Args:
+            since_ns: bench clock [ns] from which the age counts until the first sample.
+        """
+        with self._lock:
+            self._force_watchers += 1
+            self._force_ns = since_ns if self._force_ns is None else max(since_ns, self._force_ns)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._force_watchers -= 1
+                if not self._force_watchers:
+                    self._force_ns = None
+
+    def check(self, blocks: Iterable[SampleBlock], now_ns: int) -> list[LimitViolation]:
+        """Return the violations of new samples and of the force age, strongest first.
+
+        A violation that persists is returned once per repeat time (1 s).
+
+        Args:
+            blocks: samples as acquired.
+            now_ns: bench clock [ns].
+        """
+        measured = [(block, _find_largest(block.values.tolist())) for block in blocks if _is_limited(block)]
+        with self._lock:
+            violations = []
+            for block, value in measured:
+                self._note_force_time(block, value)
+                violations += self._evaluate(_CHANNEL_QUANTITIES[block.channel], value)
+            violations += self._evaluate("force_age", self._compute_force_age(now_ns))
+            return self._drop_repeats(violations, now_ns)
+
+    def check_value(self, quantity: Quantity, value: float, now_ns: int) -> list[LimitViolation]:
+        """Return the violation of one value in the quantity's unit, if any, as `check` does."""
+        with self._lock:
+            return self._drop_repeats(self._evaluate(quantity, value), now_ns)
+
+    def compute_force_age(self, now_ns: int) -> float:
+        """Return the time since the newest valid force sample [s]; 0 while no force is expected."""
+        with self._lock:
+            return self._compute_force_age(now_ns)
 
     def permit(self, position: float | None = None, drive: float | None = None) -> None:
-        """The last word before a write.
+        """Check a command immediately before it is sent.
 
         Args:
-            position: [m] setpoint of the actuator.
-            drive: [V or A] of the coil.
+            position: setpoint of the actuator [m].
+            drive: setpoint of the coil [V or A].
 
         Raises:
-            Interlocked: everything was brought to rest, or the value itself is beyond what ends a run.
+            InterlockError: a trip is latched, or the value exceeds a limit that would end a run.
         """
-        if self._tripped:
-            raise Interlocked(f"nothing is sent after a trip ({self._tripped}); find the cause, then reset")
-        for quantity, value in (("displacement", position), (self._drive, drive)):
+        with self._lock:
+            trip_reason, limits = self._trip_reason, self._limits
+        if trip_reason:
+            raise InterlockError(f"nothing is sent after a trip ({trip_reason}); find the cause, then reset")
+        commands: list[tuple[Quantity, float | None]] = [("displacement", position), (self._drive, drive)]
+        for quantity, value in commands:
             if value is not None:
-                self._permit(quantity, value)  # type: ignore[arg-type]  # both are quantities
+                _check_command(limits, quantity, value)
 
-    def _permit(self, quantity: Quantity, value: float) -> None:
-        if not math.isfinite(value):
-            raise Interlocked(
-                f"a commanded {quantity.replace('_', ' ')} of {value} is no number; nothing was sent"
-            )
-        verdict = judge(self.matrix, quantity, value)
-        if verdict is not None and verdict.action >= Action.CONTROLLED_STOP:
-            raise Interlocked(f"commanded {verdict}; nothing was sent")
+    # With the lock held
 
-    def _of_block(self, block: Block) -> Iterator[Verdict]:
-        quantity = _WATCHED.get(block.channel)
-        if quantity is None or not len(block.values):
-            return
-        worst = _largest(block.values.tolist())  # plain numbers: blocks are short, and arrays the slower way
-        # A sample that is bad came in time, and says nothing of the force: it must not count as news of it.
-        expected = self._force_ns is not None
-        if expected and block.channel == "force" and block.quality != "bad" and not math.isnan(worst):
+    def _combine_scopes(self) -> LimitMatrix:
+        ignored = {quantity for scope in self._scopes for quantity in scope.ignore}
+        fixture = {quantity: limits for quantity, limits in self._fixture.items() if quantity not in ignored}
+        return reduce(merge_limits, (scope.specimen for scope in self._scopes), fixture)
+
+    def _evaluate(self, quantity: Quantity, value: float) -> list[LimitViolation]:
+        violation = evaluate_limits(self._limits, quantity, value)
+        return [] if violation is None else [violation]
+
+    def _note_force_time(self, block: SampleBlock, value: float) -> None:
+        # A bad sample arrives in time but carries no force, so it must not reset the force age.
+        is_valid = block.channel == "force" and block.quality != "bad" and not math.isnan(value)
+        if self._force_ns is not None and is_valid:
             self._force_ns = block.received_ns
-        yield from self._judged(quantity, worst)
 
-    def _judged(self, quantity: Quantity, value: float) -> list[Verdict]:
-        verdict = judge(self.matrix, quantity, value)
-        return [] if verdict is None else [verdict]
+    def _compute_force_age(self, now_ns: int) -> float:
+        return 0.0 if self._force_ns is None else (now_ns - self._force_ns) * 1e-9
 
-    def _fresh(self, verdicts: list[Verdict], now_ns: int) -> list[Verdict]:
-        """Without what was reported a moment ago: a limit that stays exceeded is one alarm, not a thousand."""
-        fresh = []
-        for verdict in sorted(verdicts, key=lambda one: one.action, reverse=True):
-            key = verdict.quantity, verdict.action
-            # By action, too: what was an alarm a moment ago and is a trip now is news.
-            if now_ns - self._told.get(key, -(2**62)) >= _AGAIN * 1e9:
-                self._told[key] = now_ns
-                fresh.append(verdict)
-        return fresh
+    def _drop_repeats(self, violations: list[LimitViolation], now_ns: int) -> list[LimitViolation]:
+        """Remove violations that were reported within the repeat time, and sort the others by action."""
+        new = []
+        for violation in sorted(violations, key=lambda one: one.action, reverse=True):
+            # The action is part of the key: a trip is reported although the alarm before it was.
+            key = violation.quantity, violation.action
+            if now_ns - self._reported_ns.get(key, _NEVER_NS) >= _REPEAT_TIME * 1e9:
+                self._reported_ns[key] = now_ns
+                new.append(violation)
+        return new
 
 
-def _largest(values: Iterable[float]) -> float:
-    """The value of largest magnitude that is a number, with its sign; NaN where none is."""
+def _check_command(limits: LimitMatrix, quantity: Quantity, value: float) -> None:
+    if not math.isfinite(value):
+        raise InterlockError(f"commanded {quantity.replace('_', ' ')} is {value}, not a number; nothing was sent")
+    violation = evaluate_limits(limits, quantity, value)
+    if violation is not None and violation.action >= Action.CONTROLLED_STOP:
+        raise InterlockError(f"commanded {violation}; nothing was sent")
+
+
+def _is_limited(block: SampleBlock) -> bool:
+    return block.channel in _CHANNEL_QUANTITIES and len(block.values) > 0
+
+
+def _find_largest(values: Iterable[float]) -> float:
+    """Return the value of largest magnitude with its sign, ignoring NaN; NaN if there is no other."""
     return max((value for value in values if value == value), key=abs, default=math.nan)
 
 
-def following_error(position: Sequence[float], time_ns: Sequence[int], command: Callable[[int], float]) -> float:
-    """How far the rod is from where it was sent, at worst, with its sign [m].
+def compute_following_error(
+    position: Sequence[float], time_ns: Sequence[int], command: Callable[[int], float]
+) -> float:
+    """Return the largest following error with its sign [m].
 
     Args:
-        position: [m] by the drive's encoder. Lists, since for a sample or two arrays are the slower way.
-        time_ns: bench clock of these samples [ns].
-        command: where the rod was sent at an instant of the bench clock [ns]: [m].
+        position: position by the drive's encoder [m]. Lists, because arrays are slower for one or two samples.
+        time_ns: bench clock of each position [ns].
+        command: commanded position [m] at an instant of the bench clock [ns].
     """
-    return _largest(place - command(instant) for place, instant in zip(position, time_ns, strict=True))
+    return _find_largest(actual - command(instant) for actual, instant in zip(position, time_ns, strict=True))

@@ -1,7 +1,7 @@
-"""Which quantity may be how large, and what is done where it is larger: a matrix of limits and actions.
+"""Limit matrix: thresholds for each limited quantity and each action.
 
-There are two tiers: what the specimen bears, which the method says, and what the fixture bears, which the bench's
-configuration says. The stricter of the two wins, action by action.
+There are two tiers: the limits of the specimen, from the method, and those of the fixture, from the bench's
+configuration. For each quantity and action the stricter threshold applies.
 """
 
 from collections.abc import Mapping
@@ -22,7 +22,7 @@ Quantity: TypeAlias = Literal[
     "setpoint_lateness",
 ]
 QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-_READ: dict[Quantity, tuple[float, str]] = {
+_DISPLAY_UNITS: dict[Quantity, tuple[float, str]] = {
     "force": (1.0, "N"),
     "displacement": (1e3, "mm"),
     "actuator_velocity": (1.0, "m/s"),
@@ -33,82 +33,83 @@ _READ: dict[Quantity, tuple[float, str]] = {
     "force_age": (1e3, "ms"),
     "setpoint_lateness": (1e3, "ms"),
 }
-"""The unit in which a person reads each quantity, and how many of it the SI unit is."""
-_SPARE = 1.05
-"""A method keeps its limits of motion and drive exactly; what is measured of them carries noise and overshoot."""
-_BEYOND = 1.25
-"""Share of the method's force limit at which a stop in good order is not soon enough."""
+"""Unit of each quantity in messages, with the factor that converts from SI to it."""
+_LIMIT_MARGIN = 1.05
+"""Factor on a method's limits of motion and drive (dimensionless): above it, the run is stopped.
+
+Commands keep these limits exactly, but measured values also contain noise and overshoot."""
+_TRIP_FACTOR = 1.25
+"""Factor on a method's force limit (dimensionless): above it, the bench trips, because a stop is too slow."""
 
 
 class Action(IntEnum):
-    """What is done, from nothing to the most."""
+    """Reaction to an exceeded limit, from the weakest to the strongest."""
 
     NONE = 0
     INDICATE = 1
-    """An alarm in the log and on the screen; the run goes on."""
+    """Alarm in the log and on the page; the run continues."""
     HOLD = 2
-    """The motion fades out, the coil goes to zero, and the rod is held where it stands until a stop."""
+    """The motion fades out, the coil goes to zero, and the rod is held at its position until a stop."""
     CONTROLLED_STOP = 3
     """The motion fades out, the coil goes to zero, and the run ends."""
     TRIP = 4
-    """Coil and actuator are brought to rest at once, each by its own fastest way; latched."""
+    """Coil and actuator are stopped at once, each in its fastest way; latches until a reset."""
 
 
-Steps: TypeAlias = Mapping[Action, float]
-"""The value beyond which each action is taken, in the quantity's unit."""
-Matrix: TypeAlias = Mapping[Quantity, Steps]
+Thresholds: TypeAlias = Mapping[Action, float]
+"""Value beyond which each action is taken, in the quantity's unit."""
+LimitMatrix: TypeAlias = Mapping[Quantity, Thresholds]
 
 
-class Verdict(NamedTuple):
-    """A limit that is exceeded."""
+class LimitViolation(NamedTuple):
+    """Exceeded limit; value and limit in the quantity's unit."""
 
     quantity: Quantity
     action: Action
     value: float
     limit: float
-    """Both in the quantity's unit."""
 
     def __str__(self) -> str:
-        """For a person."""
-        times, unit = _READ[self.quantity]
+        """Return a sentence with value, limit and unit."""
+        factor, unit = _DISPLAY_UNITS[self.quantity]
         name = self.quantity.replace("_", " ")
-        return f"{name} {times * self.value:.4g} {unit} exceeds the limit of {times * self.limit:.4g} {unit}"
+        return f"{name} {factor * self.value:.4g} {unit} exceeds the limit of {factor * self.limit:.4g} {unit}"
 
 
-def judge(matrix: Matrix, quantity: Quantity, value: float) -> Verdict | None:
-    """The strongest action that a value [in the quantity's unit, either sign] asks for, if any."""
-    steps = matrix.get(quantity, {})
-    exceeded = [action for action, limit in steps.items() if abs(value) > limit]
+def evaluate_limits(matrix: LimitMatrix, quantity: Quantity, value: float) -> LimitViolation | None:
+    """Return the violation with the strongest action for a value of either sign, or None within the limits."""
+    thresholds = matrix.get(quantity, {})
+    exceeded = [action for action, limit in thresholds.items() if abs(value) > limit]
     if not exceeded:
         return None
     action = max(exceeded)
-    return Verdict(quantity, action, value, steps[action])
+    return LimitViolation(quantity, action, value, thresholds[action])
 
 
-def stricter(first: Matrix, second: Matrix) -> Matrix:
-    """Both tiers as one."""
+def merge_limits(first: LimitMatrix, second: LimitMatrix) -> LimitMatrix:
+    """Return the stricter of both thresholds for each quantity and action."""
     return {
-        quantity: _stricter_steps(first.get(quantity, {}), second.get(quantity, {}))
+        quantity: _merge_thresholds(first.get(quantity, {}), second.get(quantity, {}))
         for quantity in QUANTITIES
         if quantity in first or quantity in second
     }
 
 
-def _stricter_steps(first: Steps, second: Steps) -> Steps:
+def _merge_thresholds(first: Thresholds, second: Thresholds) -> Thresholds:
     return {
-        action: min(steps[action] for steps in (first, second) if action in steps)
+        action: min(thresholds[action] for thresholds in (first, second) if action in thresholds)
         for action in Action
         if action in first or action in second
     }
 
 
-def specimen_matrix(method: Method) -> Matrix:
-    """What a method's own limits mean while it runs."""
+def make_specimen_matrix(method: Method) -> LimitMatrix:
+    """Convert a method's own limits to the limit matrix that applies while it runs."""
     limits = method.limits
     drive: Quantity = "coil_current" if method.drive_kind == "coil_a" else "coil_voltage"
     return {
-        "force": {Action.CONTROLLED_STOP: limits.force_n, Action.TRIP: _BEYOND * limits.force_n},
-        "displacement": {Action.CONTROLLED_STOP: _SPARE * limits.stroke_m},
-        "actuator_velocity": {Action.CONTROLLED_STOP: _SPARE * limits.velocity_mps},
-        drive: {Action.CONTROLLED_STOP: _SPARE * limits.drive},
+        "force": {Action.CONTROLLED_STOP: limits.force_n, Action.TRIP: _TRIP_FACTOR * limits.force_n},
+        "displacement": {Action.CONTROLLED_STOP: _LIMIT_MARGIN * limits.stroke_m},
+        "actuator_velocity": {Action.CONTROLLED_STOP: _LIMIT_MARGIN * limits.velocity_mps},
+        drive: {Action.CONTROLLED_STOP: _LIMIT_MARGIN * limits.drive},
     }

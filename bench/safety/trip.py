@@ -1,7 +1,7 @@
-"""Brings coil and actuator to rest, each in its own thread: neither waits for the other.
+"""Simultaneous stop of several instruments, each in a thread of its own with a common deadline.
 
-What is done here is the faster way, never the only one. The drive stops by itself when setpoints or heartbeat go,
-the amplifier ramps down by itself when nobody speaks; and the emergency stop is a chain of hardware.
+This is the fast way to a safe state, but not the only one. The drive stops by itself without setpoints or
+heartbeat, the amplifier ramps down by itself without requests, and the emergency stop is a hardware chain.
 """
 
 import threading
@@ -9,66 +9,68 @@ import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
-from drivers.errors import DriverError
+from drivers import DriverError
 
-DEADLINE = 1.0
-"""[s] within which both have to be at rest."""
+STOP_DEADLINE = 1.0
+"""[s] Time within which all instruments have to be at rest."""
 
 
-class Stoppable(Protocol):
-    """What can be brought to rest."""
+class StoppableInstrument(Protocol):
+    """Instrument that can be stopped."""
 
     @property
     def name(self) -> str:
-        """Of the instrument."""
+        """Name in configuration and logs."""
 
     def make_safe(self) -> None:
-        """Bring it to rest by its own safest way."""
+        """Stop by the instrument's own safest procedure."""
 
 
-class Rest(NamedTuple):
-    """What came of it."""
+class StopResult(NamedTuple):
+    """Result of a stop, by the names of the instruments."""
 
     seconds: dict[str, float]
-    """[s] until each said that it was done, by name; missing where it did not."""
+    """[s] Time until each instrument confirmed the stop; missing if it did not."""
     failures: dict[str, str]
-    """What went wrong, by name."""
+    """Reason why an instrument did not confirm the stop."""
 
     def __str__(self) -> str:
-        """For a person."""
-        done = [f"{name} after {seconds * 1e3:.0f} ms" for name, seconds in self.seconds.items()]
-        return "; ".join([*done, *(f"{name}: {why}" for name, why in self.failures.items())])
+        """Return times and failures in one line."""
+        stopped = [f"{name} after {seconds * 1e3:.0f} ms" for name, seconds in self.seconds.items()]
+        return "; ".join([*stopped, *(f"{name}: {reason}" for name, reason in self.failures.items())])
 
 
 def bring_to_rest(
-    instruments: list[Stoppable], within: float = DEADLINE, clock: Callable[[], float] = time.monotonic
-) -> Rest:
-    """Make all of them safe at the same time; returns when all have, or when the time is over.
+    instruments: list[StoppableInstrument],
+    timeout: float = STOP_DEADLINE,
+    clock: Callable[[], float] = time.monotonic,
+) -> StopResult:
+    """Stop all instruments at the same time; return when all are done or the timeout has passed.
 
     Args:
-        instruments: each is called in a thread of its own.
-        within: [s] deadline for all of them together.
-        clock: [s] for how long each took.
+        instruments: each is stopped in a thread of its own.
+        timeout: [s] for all instruments together.
+        clock: [s] by which the stop times are measured.
     """
     begin = clock()
     seconds: dict[str, float] = {}
     failures: dict[str, str] = {}
 
-    def stop(one: Stoppable) -> None:
+    def stop(instrument: StoppableInstrument) -> None:
         try:
-            one.make_safe()
-            seconds[one.name] = clock() - begin
+            instrument.make_safe()
+            seconds[instrument.name] = clock() - begin
         except DriverError as error:
-            failures[one.name] = str(error)
-        except Exception as error:  # what is not told here would read as if it had come to rest
-            failures[one.name] = f"{error!r}; this is a defect of the driver"
+            failures[instrument.name] = str(error)
+        except Exception as error:  # an unreported failure would look like an instrument at rest
+            failures[instrument.name] = f"{error!r}; internal error of the driver, please report"
 
     threads = {one.name: threading.Thread(target=stop, args=(one,), daemon=True) for one in instruments}
     for thread in threads.values():
         thread.start()
     for name, thread in threads.items():
-        thread.join(max(0.0, begin + within - clock()))
+        thread.join(max(0.0, begin + timeout - clock()))
         if thread.is_alive():
-            failures[name] = f"waited {within:g} s for it to come to rest; its own watchdog has to"
-    # Copies: a thread that was given up may write into the others still.
-    return Rest(dict(seconds), dict(failures))
+            failures[name] = f"not at rest after {timeout:g} s; its own watchdog has to stop it"
+    # Copies, because an abandoned thread may still write to the originals.
+    return StopResult(dict(seconds), dict(failures))

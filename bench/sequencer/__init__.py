@@ -1,1 +1,18 @@
-"""The sequencer: plays a compiled method on actuator and coil amplifier."""
+"""Sequencer: plays a compiled method on actuator and coil amplifier."""
+
+from bench.sequencer.command_history import CommandHistory
+from bench.sequencer.playback import find_resume_sample, split_into_sections
+from bench.sequencer.rod_motion import move_rod
+from bench.sequencer.run_observer import RunObserver
+from bench.sequencer.sequencer import Sequencer
+from bench.sequencer.trajectory import Times
+
+__all__ = [
+    "CommandHistory",
+    "RunObserver",
+    "Sequencer",
+    "Times",
+    "find_resume_sample",
+    "move_rod",
+    "split_into_sections",
+]

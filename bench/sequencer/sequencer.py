@@ -1,7 +1,7 @@
-"""Plays one programme on actuator and coil amplifier, from the first move to the rest at the end.
+"""Sequencer: plays one programme on actuator and coil amplifier, from the first move to rest at the end.
 
-Whatever happens, the rest at the end is not part of the plan: it is what leaving `Sequencer.run` means. Every wait
-has a deadline, and its error says what was awaited, for how long, and what the last value was.
+Leaving `Sequencer.run` in any way brings the bench to rest. Every wait has a deadline, and its error states what
+was awaited, for how long, and the last value.
 """
 
 import threading
@@ -13,59 +13,51 @@ import numpy as np
 
 from bench.errors import RunError
 from bench.methods import Programme
-from bench.sequencer.lead import PAUSE, Lead, LeadThread
-from bench.sequencer.passages import Passage, passages
-from bench.sequencer.plan import RunPlan
-from bench.sequencer.track import FADES, approach
+from bench.sequencer.command_history import CommandHistory
+from bench.sequencer.playback import PlaybackSection, split_into_sections
+from bench.sequencer.run_observer import RunObserver
+from bench.sequencer.setpoint_thread import PAUSE_SHARE, SetpointGenerator, SetpointThread
+from bench.sequencer.trajectory import STOP_TIMES, plan_approach
+from drivers import Clock, DriverError
 from drivers.actuator import Actuator
-from drivers.coil_amplifier import CoilAmplifier
-from drivers.coil_table import TableState
-from drivers.errors import DriverError
+from drivers.modbus import CoilAmplifier, TableState
 
-_LOOK = 0.02
-"""[s] between two looks while waiting."""
-_SPARE = 1.0
-"""[s] beyond what a motion is to take."""
-_TABLE_WITHIN = 1.0
-"""[s] for the armed table to start with the SYNC."""
-_ZERO_WITHIN = 2.0
-"""[s] for the coil to come to zero, its ramp included."""
-_ATTEMPTS = 3
-"""Times that the table is armed anew where its answer came too late to hold the SYNC back for it."""
-_LONGEST_HOLD = 600.0
-"""[s] after which a rod that is held is let go all the same."""
-
-Clock = Callable[[], int]
-Tell = Callable[[str, str], None]
-"""Told of what happens: kind of event, words."""
+_POLL_PERIOD = 0.02
+"""[s] Interval of polling while waiting."""
+_TIME_MARGIN = 1.0
+"""[s] Time by which a motion may exceed its planned duration."""
+_TABLE_START_TIMEOUT = 1.0
+"""[s] Time for the armed table to start with the SYNC."""
+_ZERO_TIMEOUT = 2.0
+"""[s] Time for the coil to reach zero, including its ramp."""
+_MAX_ATTEMPTS = 3
+"""Number of attempts to arm the table if its reply exceeds the suspension of setpoints."""
+_MAX_HOLD_TIME = 600.0
+"""[s] Longest hold; after it, the run ends."""
 
 
 class Guard(Protocol):
-    """Has the last word before any write; `bench.safety.interlocks.Interlocks` is one."""
+    """Check of every command, such as `bench.safety.Interlocks`."""
 
     @property
-    def tripped(self) -> str:
-        """Why everything was brought to rest; empty where it was not."""
+    def trip_reason(self) -> str:
+        """Reason of the trip that is latched; empty without a trip."""
 
     def permit(self, position: float | None = None, drive: float | None = None) -> None:
-        """Raise `bench.errors.Interlocked` to forbid a position [m] or a drive [V or A]."""
+        """Raise `bench.errors.InterlockError` to forbid a position [m] or a drive [V or A]."""
 
 
 class Sequencer:
-    """One run.
+    """Playback of one run.
 
     Args:
         actuator: connected, at rest.
         amplifier: connected, at zero.
-        guard: has the last word before any write.
-        plan: told what is commanded from when on.
-        clock: of the bench [ns].
-        tell: told of what happens.
-        late: told of setpoints that leave late: bench clock [ns], by how much [s].
-        failed: told at once why the rod is led no more.
-        leading: told whether setpoints, and the SYNCs that go with them, are sent.
-        arrived: told when the rod stands where the programme begins.
-        clock_rate: how fast the amplifier's clock runs, as a share above the bench's.
+        guard: checks each command before it is sent.
+        history: records the commands.
+        clock: bench clock [ns].
+        observer: receives the events of the run.
+        get_amplifier_rate: returns the relative rate deviation of the amplifier's clock (50e-6 for 50 ppm fast).
     """
 
     def __init__(
@@ -73,152 +65,153 @@ class Sequencer:
         actuator: Actuator,
         amplifier: CoilAmplifier,
         guard: Guard,
-        plan: RunPlan,
+        history: CommandHistory,
         clock: Clock,
-        tell: Tell,
-        late: Callable[[int, float], None] = lambda now_ns, late: None,
-        failed: Callable[[str], None] = lambda why: None,
-        leading: Callable[[bool], None] = lambda led: None,
-        arrived: Callable[[], None] = lambda: None,
-        clock_rate: Callable[[], float] = lambda: 0.0,
+        observer: RunObserver,
+        get_amplifier_rate: Callable[[], float],
     ) -> None:
         settings = actuator.settings
-        self._actuator, self._amplifier, self._guard, self._plan = actuator, amplifier, guard, plan
-        self._clock, self._clock_rate = clock, clock_rate
-        self._tell, self._told_failed = tell, failed
-        self._told_leading, self._told_arrived = leading, arrived
-        self._lead = Lead(actuator, self._permit, plan, settings.cycle, settings.stale_after)
-        self._thread = LeadThread(self._lead, clock, late, self._failed)
-        self._ending = threading.Event()
-        self._released = threading.Event()
+        self._actuator, self._amplifier, self._guard, self._history = actuator, amplifier, guard, history
+        self._clock, self._observer, self._get_amplifier_rate = clock, observer, get_amplifier_rate
+        self._generator = SetpointGenerator(
+            actuator, self._permit, history, settings.cycle, settings.setpoint_timeout
+        )
+        self._thread = SetpointThread(self._generator, clock, observer.on_late_setpoint, self._on_setpoints_failed)
+        self._stop_requested = threading.Event()
+        self._hold_released = threading.Event()
         self._acceleration = 0.0
-        self.stopped = ""
-        """Why it ended before its end; empty where it did not."""
+        self._stop_reason = ""
+
+    @property
+    def stop_reason(self) -> str:
+        """Reason why the run ended early; empty if it did not."""
+        return self._stop_reason
 
     @property
     def late_cycles(self) -> int:
-        """Cycles in which no setpoint left in time."""
+        """Number of cycles without a setpoint in time."""
         return self._thread.late_cycles
 
-    def stop(self, why: str, hold: bool = False) -> None:
-        """End in good order: the motion fades out, the coil goes to zero; from any thread, harmless when repeated.
+    def stop(self, reason: str, hold: bool = False) -> None:
+        """Stop the motion softly and set the coil to zero; from any thread, harmless if repeated.
 
         Args:
-            why: in words; the first one is kept.
-            hold: keep the rod led where it stands until `stop` is called without it.
+            reason: for a person; the first one is kept.
+            hold: keep the rod at its position until `stop` is called without it.
         """
-        self.stopped = self.stopped or why
-        # Before `_ending` is set, or the run would take this stop for a hold.
+        self._stop_reason = self._stop_reason or reason
+        # Before the stop is requested, or the run would take this stop for a hold.
         if not hold:
-            self._released.set()
-        self._plan.switch_off(self._clock())
-        self._lead.stop(self._clock(), self._acceleration)
-        self._ending.set()
+            self._hold_released.set()
+        self._history.switch_off(self._clock())
+        self._generator.stop(self._clock(), self._acceleration)
+        self._stop_requested.set()
 
     def run(self, programme: Programme, first: int = 0) -> None:
-        """Play a programme; returns when everything is at rest, early after a `stop`.
+        """Play a programme; return when everything is at rest, early after a `stop`.
 
         Args:
-            programme: compiled.
+            programme: compiled method.
             first: sample to begin with, at rest.
 
         Raises:
-            RunError: the drive cannot be played exactly, a wait was in vain, or the run was tripped.
-            DriverError: an instrument refuses or has gone.
+            RunError: the drive cannot be played exactly, a wait timed out, or a command was forbidden.
+            DriverError: an instrument refuses or does not reply.
         """
-        parts = passages(programme, self._amplifier.table_capacity, first)
-        self._check(programme)
+        sections = split_into_sections(programme, self._amplifier.table_capacity, first)
+        self._check_programme(programme)
         self._acceleration = programme.method.limits.acceleration_mps2
-        if self._ending.is_set():  # stopped before anything was switched on: nothing has to come to rest
+        if self._stop_requested.is_set():  # nothing was switched on yet
             return
         try:
-            here = self._actuator.arm()
-            self._lead.stand(here)
-            self._told_leading(True)
+            position = self._actuator.arm()
+            self._generator.hold_at(position)
+            self._observer.on_setpoints_active(True)
             with self._thread:
                 try:
-                    self._play(programme, parts, here)
+                    self._play(programme, sections, position)
                 finally:
-                    # Within the thread's context: setpoints have to go on until nothing moves.
-                    self._come_to_rest(programme)
+                    # Within the thread's context, because setpoints have to continue until nothing moves.
+                    self._stop_motion(programme)
         finally:
-            self._told_leading(False)
+            self._observer.on_setpoints_active(False)
             self._switch_off()
         self._raise_failure()
 
-    def _play(self, programme: Programme, parts: tuple[Passage, ...], here: float) -> None:
-        start = float(programme.displacement[parts[0].start])
-        way = approach(here, start)
-        self._tell(
-            "state", f"going to {start * 1e3:.3f} mm, from {here * 1e3:.3f} mm, within {way.duration:.1f} s"
+    def _play(self, programme: Programme, sections: tuple[PlaybackSection, ...], position: float) -> None:
+        start = float(programme.displacement[sections[0].start])
+        approach = plan_approach(position, start)
+        self._observer.on_state(
+            f"moving to {start * 1e3:.3f} mm, from {position * 1e3:.3f} mm, within {approach.duration:.1f} s"
         )
-        self._lead.play(way)
-        self._await_rest(way.duration, "the rod to reach its first position")
-        self._told_arrived()
-        for part in parts:
-            if self._ending.is_set():
+        self._generator.start(approach)
+        self._await_rest(approach.duration, "the rod to reach its first position")
+        self._observer.on_arrived()
+        for section in sections:
+            if self._stop_requested.is_set():
                 return
-            self._bring_up(part)
-            if not self._ending.is_set():
-                self._begin(part)
-                self._await_rest(part.track.duration, "the end of the passage")
+            self._upload_drive(section)
+            if not self._stop_requested.is_set():
+                self._start_section(section)
+                self._await_rest(section.trajectory.duration, "the end of the section")
 
-    def _check(self, programme: Programme) -> None:
-        """See before anything moves that nothing will be forbidden on the way."""
+    def _check_programme(self, programme: Programme) -> None:
+        """Check before anything moves that every command of the programme is permitted."""
         for position in (programme.displacement.min(), programme.displacement.max()):
-            self._actuator.channels[0].checked(float(position))
+            self._actuator.channels[0].validate(float(position))
             self._guard.permit(position=float(position))
         for drive in (programme.drive.min(), programme.drive.max()):
             self._guard.permit(drive=float(drive))
-        fastest = float(np.abs(programme.velocity).max())
-        if fastest > self._actuator.settings.top_speed:
+        peak_velocity = float(np.abs(programme.velocity).max())
+        if peak_velocity > self._actuator.settings.max_speed:
             raise RunError(
-                f"method {programme.method.name} moves at {fastest:.3g} m/s, the actuator is allowed "
-                f"{self._actuator.settings.top_speed:g} m/s; lower amplitude or frequency"
+                f"method {programme.method.name} moves at {peak_velocity:.3g} m/s, but the actuator's limit is "
+                f"{self._actuator.settings.max_speed:g} m/s; lower amplitude or frequency"
             )
 
-    # The coil
+    # Coil
 
-    def _bring_up(self, part: Passage) -> None:
-        times, levels = part.steps()
+    def _upload_drive(self, section: PlaybackSection) -> None:
+        times, levels = section.list_drive_steps()
         self._guard.permit(drive=float(np.abs(levels).max()))
-        # The table runs by the amplifier's clock, the motion by the bench's.
-        self._amplifier.upload(times * (1 + self._clock_rate()), levels)
+        # The table runs by the amplifier's clock, the motion by the bench clock.
+        self._amplifier.upload_table(times * (1 + self._get_amplifier_rate()), levels)
 
-    def _begin(self, part: Passage) -> None:
-        """Start motion and table with one and the same SYNC."""
-        for _ in range(_ATTEMPTS):
-            # No SYNC from here on: the next one starts the armed table, and has to be that of the first setpoint.
-            self._lead.hush(self._clock())
+    def _start_section(self, section: PlaybackSection) -> None:
+        """Start motion and table with the same SYNC."""
+        for _ in range(_MAX_ATTEMPTS):
+            # The next SYNC starts the armed table, so it has to be the SYNC of the section's first setpoint.
+            self._generator.suspend(self._clock())
             try:
                 self._guard.permit()
-                self._amplifier.arm()
+                self._amplifier.arm_table()
             except Exception:
-                # The run is to end in good order; in a silence that lasts the drive would stop by itself.
-                self._lead.stand(float(part.programme.displacement[part.start]))
+                # Setpoints have to continue for a soft stop; during a suspension the drive would stop by itself.
+                self._generator.hold_at(float(section.programme.displacement[section.start]))
                 raise
-            started = self._lead.play(part.track, part)
-            if self._ending.is_set():
+            has_started = self._generator.start(section.trajectory, section)
+            if self._stop_requested.is_set():
                 return
-            if started:
-                self._see_table_run()
+            if has_started:
+                self._check_table_started()
                 return
             self._amplifier.abort_table()
+        longest = self._actuator.settings.setpoint_timeout * PAUSE_SHARE * 1e3
         raise RunError(
-            f"{self._amplifier.name}: its table was armed {_ATTEMPTS} times, each answer came later than "
-            f"{self._actuator.settings.stale_after * PAUSE * 1e3:.0f} ms; see its wire, or raise stale_after"
+            f"{self._amplifier.name}: its table was armed {_MAX_ATTEMPTS} times, but each reply took longer than "
+            f"{longest:.0f} ms; check its wire, or raise setpoint_timeout"
         )
 
-    def _see_table_run(self) -> None:
-        """A table that no SYNC starts would leave the coil without its drive, and nobody the wiser."""
-        deadline = time.monotonic() + _TABLE_WITHIN
-        while (state := self._amplifier.table().state) not in (TableState.RUNNING, TableState.DONE):
-            if self._ending.wait(_LOOK):
+    def _check_table_started(self) -> None:
+        """Wait for the start of the table; without it, the coil would stay undriven and no error would appear."""
+        deadline = time.monotonic() + _TABLE_START_TIMEOUT
+        while (state := self._amplifier.read_table_progress().state) not in (TableState.RUNNING, TableState.DONE):
+            if self._stop_requested.wait(_POLL_PERIOD):
                 return
             if time.monotonic() > deadline:
                 raise RunError(
-                    f"{self._amplifier.name}: waited {_TABLE_WITHIN:g} s for its table to start with the SYNC; it "
-                    f"is {state.name.lower()}; see the line from the bus to its SYNC input"
+                    f"{self._amplifier.name}: waited {_TABLE_START_TIMEOUT:g} s for its table to start with the "
+                    f"SYNC; it is {state.name.lower()}; check the line from the bus to its SYNC input"
                 )
 
     # Waiting and ending
@@ -226,73 +219,76 @@ class Sequencer:
     def _permit(self, position: float) -> None:
         self._guard.permit(position=position)
 
-    def _failed(self, error: Exception) -> None:
-        self.stopped = self.stopped or str(error)
-        self._plan.switch_off(self._clock())
-        self._ending.set()
-        self._told_failed(str(error))
+    def _on_setpoints_failed(self, error: Exception) -> None:
+        self._stop_reason = self._stop_reason or str(error)
+        self._history.switch_off(self._clock())
+        self._stop_requested.set()
+        self._observer.on_setpoints_failed(str(error))
 
-    def _await_rest(self, duration: float, what: str) -> None:
-        """Until nothing moves any more, or the run is to end."""
-        deadline = time.monotonic() + duration + _SPARE
-        while not self._lead.done(self._clock()):
-            if self._ending.wait(_LOOK):
+    def _await_rest(self, duration: float, event: str) -> None:
+        """Wait until the motion has ended or a stop is requested."""
+        deadline = time.monotonic() + duration + _TIME_MARGIN
+        while not self._generator.is_done(self._clock()):
+            if self._stop_requested.wait(_POLL_PERIOD):
                 return
             if time.monotonic() > deadline:
-                raise RunError(f"waited {duration + _SPARE:.1f} s for {what}; {self._where()}")
+                raise RunError(f"waited {duration + _TIME_MARGIN:.1f} s for {event}; {self._describe_setpoint()}")
 
-    def _where(self) -> str:
-        playing = self._lead.playing
-        return "nothing was sent" if playing is None else f"sent to {playing.position(self._clock()) * 1e3:.3f} mm"
+    def _describe_setpoint(self) -> str:
+        schedule = self._generator.schedule
+        if schedule is None:
+            return "no setpoint was sent"
+        return f"the setpoint is {schedule.find_position(self._clock()) * 1e3:.3f} mm"
 
-    def _come_to_rest(self, programme: Programme) -> None:
-        """Coil to zero and motion faded out, whyever the run ends; after a trip others see to that."""
-        self._plan.switch_off(self._clock())
-        if self._guard.tripped or self._thread.failure is not None:
+    def _stop_motion(self, programme: Programme) -> None:
+        """Set the coil to zero and stop the motion softly; after a trip the supervisor stops both."""
+        self._history.switch_off(self._clock())
+        if self._guard.trip_reason or self._thread.failure is not None:
             return
-        self._lead.stop(self._clock(), programme.method.limits.acceleration_mps2)
-        # While the motion fades: without its field the damper resists the least.
+        self._generator.stop(self._clock(), programme.method.limits.acceleration_mps2)
+        # Before the motion has ended, because without its field the damper resists least.
         self._amplifier.make_safe()
-        deadline = time.monotonic() + FADES[-1] + _SPARE
-        while not self._lead.done(self._clock()) and self._thread.failure is None:
+        timeout = STOP_TIMES[-1] + _TIME_MARGIN
+        deadline = time.monotonic() + timeout
+        while not self._generator.is_done(self._clock()) and self._thread.failure is None:
             if time.monotonic() > deadline:
-                raise RunError(f"waited {FADES[-1] + _SPARE:.1f} s for the motion to fade out; {self._where()}")
-            time.sleep(_LOOK)
-        if self._ending.is_set() and not self._released.is_set() and self._thread.failure is None:
-            self._tell("state", "the rod is held where it stands; stop ends it")
-            self._hold()
+                raise RunError(f"waited {timeout:.1f} s for the motion to stop; {self._describe_setpoint()}")
+            time.sleep(_POLL_PERIOD)
+        if self._stop_requested.is_set() and not self._hold_released.is_set() and self._thread.failure is None:
+            self._observer.on_state("the rod is held at its position; stop ends the hold")
+            self._hold_position()
 
-    def _hold(self) -> None:
-        deadline = time.monotonic() + _LONGEST_HOLD
-        while not self._released.wait(_LOOK) and time.monotonic() < deadline:
-            if self._guard.tripped or self._thread.failure is not None:
+    def _hold_position(self) -> None:
+        deadline = time.monotonic() + _MAX_HOLD_TIME
+        while not self._hold_released.wait(_POLL_PERIOD) and time.monotonic() < deadline:
+            if self._guard.trip_reason or self._thread.failure is not None:
                 return
 
     def _switch_off(self) -> None:
-        """No voltage at coil and drive; where the rod may still move, the drive's own quick stop."""
-        if self._guard.tripped:  # its own threads see to that
+        """Remove the voltage from coil and drive; use the drive's quick stop if the rod may still move."""
+        if self._guard.trip_reason:  # the supervisor stops both
             return None
         self._amplifier.make_safe()
         if self._thread.failure is not None:
             return self._actuator.make_safe()
         try:
-            self._actuator.rest()
+            self._actuator.disable()
         except DriverError:
             self._actuator.make_safe()
             raise
-        return self._see_zero()
+        return self._check_zero_output()
 
-    def _see_zero(self) -> None:
-        deadline = time.monotonic() + _ZERO_WITHIN
-        while (output := self._amplifier.condition().output) != 0.0:
+    def _check_zero_output(self) -> None:
+        deadline = time.monotonic() + _ZERO_TIMEOUT
+        while (output := self._amplifier.read_status().output) != 0.0:
             if time.monotonic() > deadline:
                 raise RunError(
-                    f"{self._amplifier.name}: waited {_ZERO_WITHIN:g} s for its output to come to zero; it is "
-                    f"{output:.4g}; its watchdog or the main switch has to"
+                    f"{self._amplifier.name}: waited {_ZERO_TIMEOUT:g} s for its output to reach zero; it is "
+                    f"{output:.4g}; if its watchdog does not switch it off, use the main switch"
                 )
-            time.sleep(_LOOK)
+            time.sleep(_POLL_PERIOD)
 
     def _raise_failure(self) -> None:
         failure = self._thread.failure
-        if failure is not None and not self._guard.tripped:
+        if failure is not None and not self._guard.trip_reason:
             raise failure

@@ -6,7 +6,7 @@ import os
 import secrets
 from pathlib import Path
 
-FILE = "token.sha256"
+TOKEN_FILE = "token.sha256"
 """In the data folder; holds what the token is checked against, not the token."""
 
 
@@ -19,9 +19,9 @@ class Access:
     def __init__(self, sha256: str) -> None:
         self._sha256 = sha256
 
-    def allows(self, token: str) -> bool:
+    def is_allowed(self, token: str) -> bool:
         """Whether this is the token; takes as long for every wrong one."""
-        return hmac.compare_digest(_sha256(token), self._sha256)
+        return hmac.compare_digest(_compute_sha256(token), self._sha256)
 
 
 def open_access(data: Path, *, new: bool = False) -> tuple[Access, str | None]:
@@ -34,15 +34,15 @@ def open_access(data: Path, *, new: bool = False) -> tuple[Access, str | None]:
     Returns:
         The access, and the token if it was made now; later it cannot be had.
     """
-    path = data / FILE
+    path = data / TOKEN_FILE
     if path.exists() and not new:
         return Access(path.read_text("ascii").strip()), None
     token = secrets.token_urlsafe(32)
-    _write_privately(path, _sha256(token))
-    return Access(_sha256(token)), token
+    _write_privately(path, _compute_sha256(token))
+    return Access(_compute_sha256(token)), token
 
 
-def _sha256(token: str) -> str:
+def _compute_sha256(token: str) -> str:
     return hashlib.sha256(token.encode()).hexdigest()
 
 

@@ -10,7 +10,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from bench.errors import AgentUnreachable, BenchError, LogError, MethodError
+from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -33,18 +33,18 @@ class ProblemError(Exception):
         self.problem = Problem(type=f"urn:mrbench:problem:{name}", title=title, status=status, detail=detail)
 
 
-def not_found(what: str, name: str) -> ProblemError:
+def make_not_found(what: str, name: str) -> ProblemError:
     """There is no such thing."""
     return ProblemError(HTTPStatus.NOT_FOUND, "not-found", "Not found", f"there is no {what} {name}")
 
 
-def unauthorised() -> ProblemError:
+def make_unauthorised() -> ProblemError:
     """The token is missing or wrong."""
     words = "give the token as `Authorization: Bearer ...`; `mrbench serve --new-token` makes another"
     return ProblemError(HTTPStatus.UNAUTHORIZED, "unauthorised", "The token is missing or wrong", words)
 
 
-def conflict(name: str, title: str, detail: str) -> ProblemError:
+def make_conflict(name: str, title: str, detail: str) -> ProblemError:
     """It cannot be done in the present state."""
     return ProblemError(HTTPStatus.CONFLICT, name, title, detail)
 
@@ -62,29 +62,29 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
 """What any call may answer instead."""
 
 # The first that fits counts: the base of all stands last.
-_OF_BENCH: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
+_BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
     (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method is refused"),
-    (AgentUnreachable, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
+    (AgentUnreachableError, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),
 )
 
 
-def install(app: FastAPI) -> None:
+def install_handlers(app: FastAPI) -> None:
     """Have an application answer every error as a problem."""
 
     @app.exception_handler(ProblemError)
     async def _problem(request: Request, error: ProblemError) -> JSONResponse:
-        return _answer(error.problem)
+        return _make_response(error.problem)
 
     @app.exception_handler(BenchError)
     async def _of_bench(request: Request, error: BenchError) -> JSONResponse:
-        status, name, title = next(kind[1:] for kind in _OF_BENCH if isinstance(error, kind[0]))
-        return _answer(ProblemError(status, name, title, str(error)).problem)
+        status, name, title = next(kind[1:] for kind in _BENCH_PROBLEMS if isinstance(error, kind[0]))
+        return _make_response(ProblemError(status, name, title, str(error)).problem)
 
     @app.exception_handler(RequestValidationError)
     async def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
-        return _answer(_of_validation(error))
+        return _make_response(_make_validation_problem(error))
 
     # Starlette's, not FastAPI's own: a path that nobody serves raises it, too.
     @app.exception_handler(HTTPException)
@@ -92,16 +92,16 @@ def install(app: FastAPI) -> None:
         status = HTTPStatus(error.status_code)
         name = status.phrase.lower().replace(" ", "-")
         problem = ProblemError(status, name, status.phrase, f"{request.method} {request.url.path}: {error.detail}")
-        return _answer(problem.problem, error.headers)
+        return _make_response(problem.problem, error.headers)
 
     @app.exception_handler(Exception)
     async def _defect(request: Request, error: Exception) -> JSONResponse:
         _LOG.error("defect", exc_info=error, extra={"path": request.url.path})
         words = "the service has a defect; its log says more"
-        return _answer(ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "Defect", words).problem)
+        return _make_response(ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "Defect", words).problem)
 
 
-def _of_validation(error: RequestValidationError) -> Problem:
+def _make_validation_problem(error: RequestValidationError) -> Problem:
     first = error.errors()[0]
     place = ".".join(str(step) for step in first["loc"])
     others = len(error.errors()) - 1
@@ -110,5 +110,5 @@ def _of_validation(error: RequestValidationError) -> Problem:
     return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "Invalid request", detail).problem
 
 
-def _answer(problem: Problem, headers: Any = None) -> JSONResponse:
+def _make_response(problem: Problem, headers: Any = None) -> JSONResponse:
     return JSONResponse(problem.model_dump(), problem.status, headers=headers, media_type=MEDIA_TYPE)

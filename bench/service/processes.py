@@ -8,31 +8,31 @@ import time
 from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 
-from bench.agent.messages import ShutDownCommand, StatusCommand
-from bench.child_process import MRBENCH, end
-from bench.errors import AgentUnreachable
-from bench.jobs.engine import DaskEngine, local_scheduler
-from bench.service.agent_watch import AgentLink
+from bench.agent_protocol import ShutDownCommand, StatusCommand
+from bench.errors import AgentUnreachableError
+from bench.jobs import DaskEngine, start_local_scheduler
+from bench.processes import MRBENCH_COMMAND, terminate
+from bench.service.agent_monitor import AgentLink
 from bench.service.errors import ServiceError
 
-AGENT_WITHIN = 90.0
+AGENT_TIMEOUT = 90.0
 """[s] from its start to an agent's first answer."""
-LONGEST_PAUSE = 30.0
+MAX_RESTART_PAUSE = 30.0
 """[s] between two starts of a worker that ends at once."""
-_TERM_WITHIN = 5.0
+_TERMINATE_TIMEOUT = 5.0
 """[s] for a process to end in good order."""
 _LOG = logging.getLogger(__name__)
 
 
 @contextlib.asynccontextmanager
-async def local_engine(data: Path, mrbench: Sequence[str] = MRBENCH) -> AsyncIterator[DaskEngine]:
+async def start_local_engine(data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> AsyncIterator[DaskEngine]:
     """An engine with a scheduler in this process and one worker process, which is started again whenever it ends.
 
     Args:
         data: the data folder; the scheduler's address and the worker's words go there.
         mrbench: the command line.
     """
-    async with local_scheduler(data) as address:
+    async with start_local_scheduler(data) as address:
         command = [*mrbench, "worker", "--scheduler", address]
         keeping = asyncio.create_task(_keep_alive(command, data / "worker.log"))
         try:
@@ -44,7 +44,7 @@ async def local_engine(data: Path, mrbench: Sequence[str] = MRBENCH) -> AsyncIte
 
 
 @contextlib.asynccontextmanager
-async def engine_at(address: str) -> AsyncIterator[DaskEngine]:
+async def connect_engine(address: str) -> AsyncIterator[DaskEngine]:
     """An engine whose scheduler and workers somebody else has started."""
     yield DaskEngine(address)
 
@@ -53,19 +53,19 @@ async def _keep_alive(command: Sequence[str], log: Path) -> None:
     pause = 1.0
     while True:
         began = time.monotonic()
-        process = await asyncio.to_thread(_start, command, log)
+        process = await asyncio.to_thread(_start_process, command, log)
         _LOG.info("worker_started", extra={"pid": process.pid})
         try:
             status = await asyncio.to_thread(process.wait)
         finally:
             # Cancelled: the thread that waits ends as soon as the process does.
-            await asyncio.shield(asyncio.to_thread(end, process, _TERM_WITHIN))
+            await asyncio.shield(asyncio.to_thread(terminate, process, _TERMINATE_TIMEOUT))
         _LOG.warning("worker_ended", extra={"pid": process.pid, "status": status, "log": str(log)})
-        pause = 1.0 if time.monotonic() - began > LONGEST_PAUSE else min(2.0 * pause, LONGEST_PAUSE)
+        pause = 1.0 if time.monotonic() - began > MAX_RESTART_PAUSE else min(2.0 * pause, MAX_RESTART_PAUSE)
         await asyncio.sleep(pause)
 
 
-def _start(command: Sequence[str], log: Path) -> "subprocess.Popen[bytes]":
+def _start_process(command: Sequence[str], log: Path) -> "subprocess.Popen[bytes]":
     """Start a process in a session of its own, so that a Ctrl-C meant for the service does not reach it."""
     with log.open("ab") as words:
         return subprocess.Popen(
@@ -73,7 +73,7 @@ def _start(command: Sequence[str], log: Path) -> "subprocess.Popen[bytes]":
         )
 
 
-def answers(link: AgentLink, timeout: float = 1.0) -> bool:
+def is_answering(link: AgentLink, timeout: float = 1.0) -> bool:
     """Whether an agent is there.
 
     Args:
@@ -82,11 +82,11 @@ def answers(link: AgentLink, timeout: float = 1.0) -> bool:
     """
     try:
         return link.send(StatusCommand(), timeout).ok
-    except AgentUnreachable:
+    except AgentUnreachableError:
         return False
 
 
-def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str] = MRBENCH) -> None:
+def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> None:
     """Start a rig agent that goes on when the service ends; returns once it answers.
 
     Args:
@@ -99,18 +99,18 @@ def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str
         ServiceError: it ends, or does not answer in time.
     """
     log = data / "agent.log"
-    process = _start([*mrbench, "rig", "--config", str(config)], log)
-    deadline = time.monotonic() + AGENT_WITHIN
-    while not answers(link):
+    process = _start_process([*mrbench, "rig", "--config", str(config)], log)
+    deadline = time.monotonic() + AGENT_TIMEOUT
+    while not is_answering(link):
         if process.poll() is not None:
-            raise ServiceError(f"the rig agent ended at once: {_last_line(log)}")
+            raise ServiceError(f"the rig agent ended at once: {_read_last_line(log)}")
         if time.monotonic() > deadline:
-            end(process, _TERM_WITHIN)
-            raise ServiceError(f"the rig agent did not answer within {AGENT_WITHIN:g} s; see {log}")
+            terminate(process, _TERMINATE_TIMEOUT)
+            raise ServiceError(f"the rig agent did not answer within {AGENT_TIMEOUT:g} s; see {log}")
     _LOG.info("agent_started", extra={"pid": process.pid, "log": str(log)})
 
 
-def leave_agent(link: AgentLink) -> str:
+def shut_down_idle_agent(link: AgentLink) -> str:
     """End an agent if nothing goes on there.
 
     Returns:
@@ -122,11 +122,11 @@ def leave_agent(link: AgentLink) -> str:
             state = status.state if status else "of unknown state"
             return f"the rig agent is {state} and goes on; `mrbench serve` finds it again"
         link.send(ShutDownCommand(), 10.0)
-    except AgentUnreachable as error:
+    except AgentUnreachableError as error:
         return f"the rig agent does not answer: {error}"
     return "the rig agent was idle and has ended"
 
 
-def _last_line(log: Path) -> str:
+def _read_last_line(log: Path) -> str:
     lines = log.read_text("utf-8", errors="replace").strip().splitlines()
     return lines[-1].removeprefix("mrbench: ") if lines else f"see {log}"

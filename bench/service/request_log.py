@@ -6,10 +6,10 @@ import time
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 _LOG = logging.getLogger(__name__)
-_QUIET = ("GET", "HEAD")
+_QUIET_METHODS = ("GET", "HEAD")
 
 
-class RequestLog:
+class RequestLogMiddleware:
     """Wraps an application."""
 
     def __init__(self, app: ASGIApp) -> None:
@@ -31,7 +31,7 @@ class RequestLog:
         try:
             await self._app(scope, receive, note)
         finally:
-            if scope["method"] not in _QUIET or status >= 400:
+            if scope["method"] not in _QUIET_METHODS or status >= 400:
                 took = round(time.monotonic() - began, 4)
                 # The path alone: a query may hold the token.
                 said = {"method": scope["method"], "path": scope["path"], "status": status, "seconds": took}

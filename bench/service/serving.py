@@ -12,23 +12,29 @@ from urllib.parse import urlsplit
 
 import uvicorn
 
-from bench.agent.link import AgentClient
-from bench.jobs.engine import Engine
-from bench.rig.config import load_config
+from bench.agent_protocol import AgentClient
+from bench.config import load_config
+from bench.jobs import JobEngine
+from bench.log_lines import log_to_stderr
 from bench.service.access import open_access
-from bench.service.agent_watch import AgentLink, NoAgent
-from bench.service.application import LOOPBACK_NAMES, Surroundings, create_app
+from bench.service.agent_monitor import AgentLink, NoAgent
+from bench.service.application import LOOPBACK_NAMES, AppSettings, create_app
 from bench.service.errors import ServiceError
-from bench.service.log_lines import log_to_stderr
-from bench.service.processes import answers, engine_at, leave_agent, local_engine, start_agent
+from bench.service.processes import (
+    connect_engine,
+    is_answering,
+    shut_down_idle_agent,
+    start_agent,
+    start_local_engine,
+)
 
 _LOG = logging.getLogger(__name__)
-_GRACE = 5
+_SHUTDOWN_TIMEOUT = 5
 """[s] for open calls at the end."""
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ServeOptions:
     """How the service is wanted."""
 
     data: Path
@@ -43,7 +49,7 @@ class Wanted:
     new_token: bool = False
 
 
-def serve(wanted: Wanted, say: Callable[[str], None]) -> None:
+def serve(wanted: ServeOptions, say: Callable[[str], None]) -> None:
     """Serve until the process is told to end.
 
     Args:
@@ -57,38 +63,38 @@ def serve(wanted: Wanted, say: Callable[[str], None]) -> None:
     """
     log_to_stderr()
     data = wanted.data.resolve()
-    link, commands = _way_to_agent(wanted)
-    with _folder(data), _listening(wanted.host, wanted.port) as listener:
-        started = _agent_started(wanted, link, data)
+    link, commands = _make_agent_link(wanted)
+    with _lock_data_folder(data), _open_listener(wanted.host, wanted.port) as listener:
+        started = _start_missing_agent(wanted, link, data)
         access, token = open_access(data, new=wanted.new_token)
         loopback = wanted.host in LOOPBACK_NAMES
         app = create_app(
-            Surroundings(
+            AppSettings(
                 data=data,
                 access=access,
                 link=link,
-                engine=_engine(wanted, data),
-                logs_here=commands is None or _on_this_machine(commands),
+                engine=_choose_engine(wanted, data),
+                has_local_logs=commands is None or _is_local(commands),
                 hosts=LOOPBACK_NAMES if loopback else ("*",),
             )
         )
         host, port = listener.getsockname()[:2]
-        say(_address(f"http://{f'[{host}]' if ':' in host else host}:{port}/", token))
+        say(_format_address(f"http://{f'[{host}]' if ':' in host else host}:{port}/", token))
         if not loopback:
             say("anyone on the network can reach this address, and nothing is encrypted: put TLS in front of it")
-        _run(app, listener)
+        _run_server(app, listener)
         if started:
-            say(leave_agent(link))
+            say(shut_down_idle_agent(link))
 
 
-def _address(page: str, token: str | None) -> str:
+def _format_address(page: str, token: str | None) -> str:
     if token is None:
         return f"{page} (the token is as before; --new-token makes another)"
     return f"{page}#token={token}"
 
 
 @contextmanager
-def _folder(data: Path) -> Iterator[None]:
+def _lock_data_folder(data: Path) -> Iterator[None]:
     """The data folder, for one service at a time."""
     # The lock is the system's, not the file's presence: a service that was killed leaves none behind.
     try:
@@ -105,7 +111,7 @@ def _folder(data: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _listening(host: str, port: int) -> Iterator[socket.socket]:
+def _open_listener(host: str, port: int) -> Iterator[socket.socket]:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         listener = socket.create_server((host, port), family=family)
@@ -116,17 +122,17 @@ def _listening(host: str, port: int) -> Iterator[socket.socket]:
         yield listener
 
 
-def _way_to_agent(wanted: Wanted) -> tuple[AgentLink, str | None]:
+def _make_agent_link(wanted: ServeOptions) -> tuple[AgentLink, str | None]:
     """The way to the agent, and its address; none where no agent was named."""
     if wanted.agent is not None:
-        return AgentClient(wanted.agent, _next_port(wanted.agent)), wanted.agent
+        return AgentClient(wanted.agent, _make_sample_address(wanted.agent)), wanted.agent
     if wanted.config is not None:
         agent = load_config(wanted.config).agent
         return AgentClient(agent.commands, agent.samples), agent.commands
     return NoAgent(), None
 
 
-def _next_port(address: str) -> str:
+def _make_sample_address(address: str) -> str:
     try:
         parts = urlsplit(address)
         if parts.scheme != "tcp" or parts.hostname is None or parts.port is None:
@@ -136,26 +142,26 @@ def _next_port(address: str) -> str:
     return f"tcp://{parts.hostname}:{parts.port + 1}"
 
 
-def _on_this_machine(address: str) -> bool:
+def _is_local(address: str) -> bool:
     return not address.startswith("tcp://") or urlsplit(address).hostname in LOOPBACK_NAMES
 
 
-def _agent_started(wanted: Wanted, link: AgentLink, data: Path) -> bool:
+def _start_missing_agent(wanted: ServeOptions, link: AgentLink, data: Path) -> bool:
     """Start an agent where one is configured and none answers; whether that was done."""
     if wanted.config is None or wanted.agent is not None:
         return False
-    if answers(link):
+    if is_answering(link):
         _LOG.info("agent_found", extra={"config": str(wanted.config)})
         return False
     start_agent(wanted.config, link, data)
     return True
 
 
-def _engine(wanted: Wanted, data: Path) -> Callable[[], AbstractAsyncContextManager[Engine]]:
+def _choose_engine(wanted: ServeOptions, data: Path) -> Callable[[], AbstractAsyncContextManager[JobEngine]]:
     if wanted.scheduler is None:
-        return lambda: local_engine(data)
+        return lambda: start_local_engine(data)
     address = wanted.scheduler
-    return lambda: engine_at(address)
+    return lambda: connect_engine(address)
 
 
 class _Server(uvicorn.Server):
@@ -172,14 +178,14 @@ class _Server(uvicorn.Server):
                 signal.signal(number, handler)
 
 
-def _run(app: object, listener: socket.socket) -> None:
+def _run_server(app: object, listener: socket.socket) -> None:
     # Uvicorn's own lines would write down the token that a browser gives in the websocket's address.
     settings = uvicorn.Config(
         app,  # type: ignore[arg-type]
         log_config=None,
         access_log=False,
         server_header=False,
-        timeout_graceful_shutdown=_GRACE,
+        timeout_graceful_shutdown=_SHUTDOWN_TIMEOUT,
         ws_max_size=65536,
     )
     server = _Server(settings)

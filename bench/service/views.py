@@ -5,10 +5,10 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from bench.agent.messages import AgentStatus
-from bench.agent.steps import Step
-from bench.catalogue.models import JobRow, JobState, RunOutcome, RunRow, RunState
-from bench.methods.document import DriveKind
+from bench.agent_protocol import AgentStatus
+from bench.catalogue import JobRow, JobState, RunOutcome, RunRow, RunState
+from bench.methods import DriveKind
+from bench.setup_steps import SetupStep
 
 
 class View(BaseModel):
@@ -25,16 +25,16 @@ class Health(View):
     worker: str = Field(description="`ok`, or what is missing")
 
 
-class Preparation(View):
+class SetupRequest(View):
     """A step before a run."""
 
-    step: Step = Field(description="home, move, mount, centre, unmount, tare or clear-tare")
+    step: SetupStep = Field(description="home, move, mount, centre, unmount, tare or clear-tare")
     position_m: float | None = Field(
         default=None, description="[m] where `move` goes, from the middle or from home; no other step needs it"
     )
 
     @model_validator(mode="after")
-    def _place_of_a_move(self) -> Self:
+    def _check_move_position(self) -> Self:
         if self.step == "move" and self.position_m is None:
             raise ValueError("move needs position_m; nothing was done")
         return self
@@ -49,7 +49,7 @@ class MethodSummary(View):
     drive_kind: DriveKind = Field(description="what commands the damper")
 
 
-class Progress(View):
+class RunProgress(View):
     """How far a run is."""
 
     elapsed_s: float = Field(description="[s] of the plan that are done")
@@ -64,7 +64,7 @@ class Job(View):
     run: str = Field(description="id of the run")
     kind: str = Field(description="`identify`")
     state: JobState
-    doing: str = Field(description="what it says of itself while it runs")
+    activity: str = Field(description="what it says of itself while it runs")
     attempts: int = Field(description="times that a worker began")
     error: str = Field(description="why it has failed")
     settings: dict[str, Any] = Field(description="as asked")
@@ -90,7 +90,7 @@ class Run(View):
     outcome: RunOutcome | None = Field(description="null until it has ended")
     reason: str = Field(description="why the outcome is not clean")
     log: str = Field(description="the log's file, from the data folder or absolute")
-    progress: Progress | None = Field(description="while it runs")
+    progress: RunProgress | None = Field(description="while it runs")
     rmse_n: float | None = Field(description="[N] force error of the newest fit; null without fit")
     noise_floor_n: float | None = Field(description="[N] noise of the recorded force; null without fit")
     result: str = Field(description="of the newest fit: `converged`, or why not; empty without fit")
@@ -110,7 +110,7 @@ class JobList(View):
     items: tuple[Job, ...]
 
 
-class StartRun(View):
+class StartRunRequest(View):
     """A run that is wanted."""
 
     method: str | dict[str, Any] = Field(description="name of a shipped method, or a document `mrbench.method/1`")
@@ -121,7 +121,7 @@ class StartRun(View):
     )
 
 
-def job_view(row: JobRow) -> Job:
+def make_job_view(row: JobRow) -> Job:
     """A job as it is shown."""
     summary = row.summary or {}
     return Job(
@@ -129,7 +129,7 @@ def job_view(row: JobRow) -> Job:
         run=row.run_id,
         kind=row.kind,
         state=row.state,
-        doing=row.doing,
+        activity=row.activity,
         attempts=row.attempts,
         error=row.error,
         settings=row.settings,
@@ -142,7 +142,7 @@ def job_view(row: JobRow) -> Job:
     )
 
 
-def run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run:
+def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run:
     """A run as it is shown.
 
     Args:
@@ -150,7 +150,7 @@ def run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run
         jobs: its jobs, newest first.
         status: of the agent, for the progress; none where it is not known.
     """
-    shown = [job_view(job) for job in jobs]
+    shown = [make_job_view(job) for job in jobs]
     fit = next((job for job in shown if job.state == "done"), None)
     return Run(
         id=row.id,
@@ -164,7 +164,7 @@ def run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run
         outcome=row.outcome,
         reason=row.reason,
         log=row.log,
-        progress=_progress(row, status),
+        progress=_find_progress(row, status),
         rmse_n=fit.rmse_n if fit else None,
         noise_floor_n=fit.noise_floor_n if fit else None,
         result=fit.result if fit else "",
@@ -172,8 +172,8 @@ def run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run
     )
 
 
-def _progress(row: RunRow, status: AgentStatus | None) -> Progress | None:
+def _find_progress(row: RunRow, status: AgentStatus | None) -> RunProgress | None:
     run = status.run if status else None
     if row.state != "running" or run is None or run.id != row.id:
         return None
-    return Progress(elapsed_s=run.elapsed_s, duration_s=run.duration_s, segment=run.segment)
+    return RunProgress(elapsed_s=run.elapsed_s, duration_s=run.duration_s, segment=run.segment)

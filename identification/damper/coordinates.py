@@ -1,8 +1,8 @@
 """Thirteen regular coordinates in place of the paper's fourteen parameters.
 
 The force is unchanged by (alpha_a, alpha_b, beta, gamma, A) -> (s alpha_a, s alpha_b, s^(n-1) beta,
-s^(n-1) gamma, A/s), so one direction of the fourteen is never known. With ``z_ss = (A/(beta+gamma))^(1/n)``,
-the saturated hysteretic displacement, these coordinates are free of that direction and well scaled:
+s^(n-1) gamma, A/s), so no recording determines that direction. With the saturated
+hysteretic displacement ``z_ss = (A/(beta+gamma))^(1/n)``, these coordinates are gauge-free and well scaled:
 
     F_a = alpha_a z_ss   F_b = alpha_b z_ss   D_y = z_ss / A   rho = beta / (beta + gamma)   f0 = k1 x0
 
@@ -15,28 +15,28 @@ from identification.damper.parameters import GAUGE, Parameters, Quantity
 
 
 class Coordinates(NamedTuple):
-    """One point in the space that the fit searches, in SI units."""
+    """Point in the space that the fit searches, in SI units."""
 
     F_a: float
     """[N] yield force at zero drive."""
     F_b: float
-    """[N/drive] its slope."""
+    """[N/drive] growth of the yield force with drive."""
     D_y: float
-    """[m] yield displacement: slip over which the loop turns."""
+    """[m] yield displacement: slip over which the loop turns at a reversal."""
     rho: float
-    """[1] shape, beta / (beta + gamma)."""
+    """[1] shape of the loop, beta / (beta + gamma)."""
     n: float
     """[1] sharpness of the yield."""
     eta: float
-    """[1/s] rate of the field behind the drive."""
+    """[1/s] rate constant of the field behind the drive."""
     c0_a: float
     """[N s/m] viscous damping at large velocity, zero drive."""
     c0_b: float
-    """[N s/(m drive)] its slope."""
+    """[N s/(m drive)] growth of c0 with drive."""
     c1_a: float
     """[N s/m] roll-off dashpot, zero drive."""
     c1_b: float
-    """[N s/(m drive)] its slope."""
+    """[N s/(m drive)] growth of c1 with drive."""
     k0: float
     """[N/m] stiffness at large velocity."""
     k1: float
@@ -50,12 +50,12 @@ COORDINATES: tuple[Quantity, ...] = (
     Quantity("F_b", "N/{drive}", 0.0, 20000.0, 900.0, "growth of the yield force with drive"),
     Quantity("D_y", "m", 1e-6, 5e-3, 3e-5, "slip over which the loop turns at a reversal"),
     Quantity("rho", "1", 0.02, 0.98, 0.5, "asymmetry between loading and unloading of the loop"),
-    # Below n = 1 the slope of z' over z would be infinite at z = 0.
+    # Below n = 1 the derivative of z' over z would be infinite at z = 0.
     Quantity("n", "1", 1.0, 6.0, 2.0, "sharpness of the yield"),
-    Quantity("eta", "1/s", 2.0, 2000.0, 100.0, "how fast the field follows the drive"),
+    Quantity("eta", "1/s", 2.0, 2000.0, 100.0, "rate constant with which the field follows the drive"),
     Quantity("c0_a", "N s/m", 1.0, 1e5, 1e3, "viscous damping at large velocity, zero drive"),
     Quantity("c0_b", "N s/(m {drive})", -1e5, 1e5, 1e3, "growth of that damping with drive"),
-    Quantity("c1_a", "N s/m", 100.0, 1e7, 2e4, "dashpot that rounds the force off at low velocity, zero drive"),
+    Quantity("c1_a", "N s/m", 100.0, 1e7, 2e4, "dashpot that rounds the force at low velocity, zero drive"),
     Quantity("c1_b", "N s/(m {drive})", -1e7, 1e7, 2e4, "growth of that dashpot with drive"),
     Quantity("k0", "N/m", -1e5, 1e5, 2e3, "stiffness at large velocity"),
     Quantity("k1", "N/m", -1e5, 1e5, 1e3, "stiffness of the gas accumulator"),
@@ -64,7 +64,7 @@ COORDINATES: tuple[Quantity, ...] = (
 
 
 def to_coordinates(p: Parameters) -> Coordinates:
-    """The regular coordinates of a parameter set; two sets that differ by the gauge alone give the same."""
+    """Return the regular coordinates of a parameter set; they do not depend on its gauge."""
     saturated = (p.A / (p.beta + p.gamma)) ** (1 / p.n)
     return Coordinates(
         F_a=p.alpha_a * saturated,
@@ -84,18 +84,18 @@ def to_coordinates(p: Parameters) -> Coordinates:
 
 
 def to_parameters(c: Coordinates, gauge: float = GAUGE) -> Parameters:
-    """The paper's fourteen at a chosen gauge A [1].
+    """Return the paper's fourteen parameters at a chosen gauge A [1].
 
     Raises:
         ZeroDivisionError: ``k1`` is exactly zero, so that no x0 gives the preload ``f0``.
     """
     saturated = c.D_y * gauge
-    both = gauge / saturated**c.n
+    beta_plus_gamma = gauge / saturated**c.n
     return Parameters(
         alpha_a=c.F_a / saturated,
         alpha_b=c.F_b / saturated,
-        beta=c.rho * both,
-        gamma=(1 - c.rho) * both,
+        beta=c.rho * beta_plus_gamma,
+        gamma=(1 - c.rho) * beta_plus_gamma,
         eta=c.eta,
         A=gauge,
         c0_a=c.c0_a,

@@ -1,4 +1,4 @@
-"""Dampers that ship with the product, by name."""
+"""Dampers that ship with mrbench, by name."""
 
 import warnings
 from typing import NamedTuple
@@ -8,18 +8,18 @@ from identification.damper.parameters import Parameters
 
 
 class ParameterSet(NamedTuple):
-    """A damper with its source and the drives for which it makes sense."""
+    """Damper with its source and its range of drives."""
 
     parameters: Parameters
-    """The fourteen, in SI units."""
+    """The fourteen parameters, in SI units."""
     drive_unit: str
     """``V`` or ``A``."""
     drive_max: float
-    """[V or A] largest drive at which the set is meant to be used."""
+    """Largest drive for which the set is intended [V or A]."""
     source: str
-    """Where the figures come from."""
+    """Source of the values."""
     warning: str = ""
-    """Why the set should not be taken for a damper; empty where it is one."""
+    """Reason why the set does not describe a damper; empty where it does."""
 
 
 _LABORATORY = Coordinates(
@@ -62,7 +62,7 @@ PARAMETER_SETS: dict[str, ParameterSet] = {
         "A",
         1.0,
         "current-driven damper of the Lord class: 5 ohm, 1 A continuous, 2 A for a short time, 74 mm stroke, "
-        "about 2.4 kN at 1 A; figures from trade knowledge, not from a data sheet",
+        "about 2.4 kN at 1 A; values from trade knowledge, not from a data sheet",
     ),
     "spencer_1997": ParameterSet(
         Parameters(
@@ -106,31 +106,31 @@ PARAMETER_SETS: dict[str, ParameterSet] = {
         0.5,
         "Wu, Sicard, Kosierb and Gadsden, Table 1",
         "not a damper: c0 = c0_a + c0_b u is -1627 N s/m at 0.5 V (negative above 0.4951 V), and at 0 V "
-        "it is some 2000 times c1, so that a 10 mm stroke at 1 Hz makes 5 N. It is here to study the paper",
+        "it is about 2000 times c1, so a 10 mm stroke at 1 Hz causes 5 N. Use it only to study the paper",
     ),
 }
 
 
-def parameter_set(name: str) -> ParameterSet:
-    """A shipped damper by its name.
+def find_parameter_set(name: str) -> ParameterSet:
+    """Return a shipped damper by its name.
 
     Raises:
-        KeyError: no such set; the message lists those that exist.
+        KeyError: there is no such set; the message lists those that exist.
 
     Warns:
-        UserWarning: the set loads but is no damper; the text says why.
+        UserWarning: the set does not describe a damper; the text gives the reason.
     """
     try:
-        found = PARAMETER_SETS[name]
+        parameter_set = PARAMETER_SETS[name]
     except KeyError:
         raise KeyError(f"no parameter set {name!r}; there are {', '.join(sorted(PARAMETER_SETS))}") from None
-    if found.warning:
-        warnings.warn(f"{name}: {found.warning}", UserWarning, stacklevel=2)
-    return found
+    if parameter_set.warning:
+        warnings.warn(f"{name}: {parameter_set.warning}", UserWarning, stacklevel=2)
+    return parameter_set
 
 
 def check_drive_range(p: Parameters, lowest: float, highest: float) -> list[str]:
-    """What is unphysical about a set between two drives [V or A]: a sentence for each fault."""
+    """Return one sentence for each unphysical property of a set between two drives [V or A]."""
     c = to_coordinates(p)
     faults = []
     for name, unit, base, slope in (
@@ -138,9 +138,9 @@ def check_drive_range(p: Parameters, lowest: float, highest: float) -> list[str]
         ("c0", "N s/m", p.c0_a, p.c0_b),
         ("c1", "N s/m", p.c1_a, p.c1_b),
     ):
-        # Straight lines over the drive: what holds at both ends holds between them.
+        # Linear in the drive: a value that is positive at both ends is positive between them.
         for drive in (lowest, highest):
             value = base + slope * drive
             if value < 0:
-                faults.append(f"{name} is {value:.4g} {unit} at drive {drive:g}: the damper would feed energy in")
+                faults.append(f"{name} is {value:.4g} {unit} at drive {drive:g}: the damper would generate energy")
     return faults

@@ -1,1 +1,10 @@
-"""What a recording holds that the law does not say: first its noise floor, below which nothing can be found."""
+"""Diagnosis of the gap between law and recordings of a damper: the missing effects and their probabilities."""
+
+from identification.gap.diagnosis import diagnose, make_diagnosis_problem
+from identification.gap.trend import analyse_trend
+
+__all__ = [
+    "analyse_trend",
+    "diagnose",
+    "make_diagnosis_problem",
+]

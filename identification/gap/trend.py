@@ -1,8 +1,8 @@
-"""A specimen's life: what grows from run to run, and since when.
+"""Trend over the runs of one specimen.
 
-Each run is diagnosed alone. What any of them names is then fitted beside the law in all of them, in one form, so
-that an effect has a size also where it was still too small to be named. A quantity changes where a line with a
-bend, level before it and straight after, stands clearly above a level line.
+Each run is diagnosed alone. The effects that any run names are then fitted together with the law in all runs,
+in one form each, so that an effect has a size also where it was too small to be named. A quantity has changed
+if a line with a change point, constant before it and linear after it, differs significantly from a constant.
 """
 
 from collections.abc import Sequence
@@ -12,74 +12,86 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from identification.damper.coordinates import COORDINATES
-from identification.effect_choice import EffectChoice
-from identification.errors import NothingToFit
-from identification.gap.checks import one_specimen
-from identification.gap.diagnose import Prepared, Progress, diagnose_prepared, diagnosed_problem, prepare
-from identification.gap.documents import Diagnosis
-from identification.gap.explain import Effort, JointFit, fit_with
-from identification.gap.trend_documents import Change, RunOfLife, Size, Trend, Way
-from identification.gap.words import advice
-from identification.problem import COORDINATE_COUNT
-from identification.recordings import Recording
-from identification.results import Provenance
+from identification.damper import COORDINATES
+from identification.documents import (
+    Diagnosis,
+    Provenance,
+    QuantityTrend,
+    Trend,
+    TrendDirection,
+    TrendRun,
+    TrendValue,
+)
+from identification.errors import UnusableDataError
+from identification.fitting import COORDINATE_COUNT, EffectModel
+from identification.gap.diagnosis import (
+    PreparedRecordings,
+    diagnose_prepared,
+    make_diagnosis_problem,
+    prepare_recordings,
+)
+from identification.gap.fits import JointFit, fit_jointly
+from identification.gap.outcome import NORMAL_QUANTILE, suggest_check
+from identification.logs import Recording
+from identification.progress import Progress, ignore_progress
+from identification.signals import check_single_specimen
 
-FEWEST = 3
-"""Runs without which there is no trend."""
-_CLEAR = 5.0
-"""[1] whole change over its standard deviation from which on a quantity counts as changed."""
-_LARGE = 0.1
-"""[1] least change of a coordinate of the law, over its largest size: a form that is not exact moves it less."""
-_LIKELY = 0.5
-"""[1] probability from which on an effect of one run is looked for in all."""
+MIN_RUNS = 3
+"""Smallest number of runs of a trend."""
+_CHANGE_DEVIATIONS = 5.0
+"""Smallest change of a quantity [standard deviations of the change]."""
+_MIN_LAW_CHANGE = 0.1
+"""Smallest change of a coordinate of the law, relative to its largest value; an inexact form causes less."""
+_EFFECT_PROBABILITY = 0.5
+"""Probability of an effect in one run, above which it is fitted in all runs."""
+_VERBS: dict[TrendDirection, str] = {"rising": "rises", "falling": "falls", "steady": "is steady"}
 
 
-class Bend(NamedTuple):
-    """A level line, then a straight one."""
+class ChangePoint(NamedTuple):
+    """Change point of a quantity: constant before it, linear after it."""
 
     start: int
-    """Index of the last run on the level."""
+    """Index of the last run before the change."""
     slope: float
-    """From run to run behind it."""
+    """Change per run after it."""
     deviations: float
-    """[1] whole change over its standard deviation."""
+    """Total change over its standard deviation [1]."""
 
 
-def trend(
+def analyse_trend(
     recordings: Sequence[Recording],
     *,
     seed: int = 1,
-    progress: Progress = lambda what, error: None,
+    progress: Progress = ignore_progress,
 ) -> Trend:
-    """What changes over the runs of one specimen.
+    """Find changes over the runs of one specimen.
 
     Args:
-        recordings: one log a run, in the order of time.
-        seed: of everything that chance decides.
-        progress: told what is fitted and the force error so far [N].
+        recordings: one log for each run, in the order of time.
+        seed: seed of all random numbers.
+        progress: receives the fitted effects and the force error [N].
 
     Raises:
-        NothingToFit: fewer than three runs, different specimens, or a run that cannot be diagnosed.
+        UnusableDataError: fewer than three runs, different specimens, or a run that cannot be diagnosed.
     """
-    if len(recordings) < FEWEST:
-        raise NothingToFit(f"{len(recordings)} runs are no trend; give the logs of at least {FEWEST}")
-    one_specimen(recordings)
-    prepared = [prepare([r]) for r in recordings]
-    found = [diagnose_prepared(p, seed=seed, progress=progress).diagnosis for p in prepared]
-    common = common_effects(found)
-    fits = [_fitted(p, common) for p in prepared]
+    if len(recordings) < MIN_RUNS:
+        raise UnusableDataError(f"a trend needs at least {MIN_RUNS} runs; {len(recordings)} were given")
+    check_single_specimen(recordings, "diagnose")
+    prepared = [prepare_recordings([r]) for r in recordings]
+    diagnoses = [diagnose_prepared(p, seed=seed, progress=progress).diagnosis for p in prepared]
+    common = collect_effects(diagnoses)
+    fits = [_fit_run(p, common) for p in prepared]
     logs = [r.path.name for r in recordings]
     changes = [
-        *_of_effects(fits, common, logs, recordings[0].drive_unit),
-        *_of_law(fits, logs, recordings[0].drive_unit),
+        *_find_effect_changes(fits, common, logs, recordings[0].drive_unit),
+        *_find_law_changes(fits, logs, recordings[0].drive_unit),
     ]
     return Trend(
         specimen=recordings[0].metadata["run"].get("specimen", ""),
-        runs=[_run(log, d) for log, d in zip(logs, found, strict=True)],
-        effects=[choice.name for choice in common],
+        runs=[_summarise_run(log, d) for log, d in zip(logs, diagnoses, strict=True)],
+        effects=[model.name for model in common],
         changes=changes,
-        explanation=explained(changes, len(logs)),
+        explanation=explain_changes(changes, len(logs)),
         provenance=Provenance(
             logs={r.path.name: r.sha256 for r in recordings},
             version=version("mrbench"),
@@ -89,23 +101,23 @@ def trend(
     )
 
 
-def common_effects(found: Sequence[Diagnosis]) -> tuple[EffectChoice, ...]:
-    """What any run names, each in the form of the run that is surest of it."""
-    surest: dict[str, tuple[float, str]] = {}
-    for effect in (e for diagnosis in found for e in diagnosis.effects if e.probability > _LIKELY):
-        known = surest.get(effect.name)
+def collect_effects(diagnoses: Sequence[Diagnosis]) -> tuple[EffectModel, ...]:
+    """Return the effects that any run names, each in the form of the run with the highest probability."""
+    best: dict[str, tuple[float, str]] = {}
+    for effect in (e for d in diagnoses for e in d.effects if e.probability > _EFFECT_PROBABILITY):
+        known = best.get(effect.name)
         if known is None or effect.probability >= known[0]:
-            surest[effect.name] = (effect.probability, effect.form)
-    return tuple(EffectChoice(name, form) for name, (_, form) in surest.items())
+            best[effect.name] = (effect.probability, effect.form)
+    return tuple(EffectModel(name, form) for name, (_, form) in best.items())
 
 
-def _fitted(run: Prepared, effects: tuple[EffectChoice, ...]) -> JointFit:
-    """The law with the effects, fitted to all samples of one run."""
-    return fit_with(diagnosed_problem(run.assembled, run.judge.pieces), effects, None, Effort())
+def _fit_run(run: PreparedRecordings, effects: tuple[EffectModel, ...]) -> JointFit:
+    """Fit the law with the effects to all samples of one run."""
+    return fit_jointly(make_diagnosis_problem(run.dataset, run.evaluation.pieces), effects)
 
 
-def _run(log: str, diagnosis: Diagnosis) -> RunOfLife:
-    return RunOfLife(
+def _summarise_run(log: str, diagnosis: Diagnosis) -> TrendRun:
+    return TrendRun(
         log=log,
         verdict=diagnosis.verdict,
         effects=[e.name for e in diagnosis.effects],
@@ -114,117 +126,125 @@ def _run(log: str, diagnosis: Diagnosis) -> RunOfLife:
     )
 
 
-def _of_effects(
-    fits: Sequence[JointFit], effects: Sequence[EffectChoice], logs: Sequence[str], unit: str
-) -> list[Change]:
-    """Changes of the effects' sizes; lengths, speeds and times only shape them."""
-    quantities = [(choice, q) for choice in effects for q in choice.quantities]
-    values = np.array([[fit.values[choice.name][q.symbol] for choice, q in quantities] for fit in fits])
-    deviations = np.array([_deviations(fit)[COORDINATE_COUNT:] for fit in fits])
+def _find_effect_changes(
+    fits: Sequence[JointFit], effects: Sequence[EffectModel], logs: Sequence[str], unit: str
+) -> list[QuantityTrend]:
+    """Return the trends of the effects' sizes; lengths, speeds and times only set their shape."""
+    quantities = [(model, q) for model in effects for q in model.quantities]
+    values = np.array([[fit.values[model.name][q.symbol] for model, q in quantities] for fit in fits])
+    deviations = np.array([_compute_deviations(fit)[COORDINATE_COUNT:] for fit in fits])
     return [
-        _change(f"{choice.name}.{q.symbol}", q.unit_for(unit), logs, values[:, k], deviations[:, k], 0.0)
-        for k, (choice, q) in enumerate(quantities)
+        _make_quantity_trend(
+            f"{model.name}.{q.symbol}", q.format_unit(unit), logs, values[:, k], deviations[:, k], 0.0
+        )
+        for k, (model, q) in enumerate(quantities)
         if q.low <= 0.0
     ]
 
 
-def _of_law(fits: Sequence[JointFit], logs: Sequence[str], unit: str) -> list[Change]:
-    """Changes of the law's coordinates."""
+def _find_law_changes(fits: Sequence[JointFit], logs: Sequence[str], unit: str) -> list[QuantityTrend]:
+    """Return the trends of the law's coordinates."""
     values = np.array([fit.coordinates for fit in fits])
-    deviations = np.array([_deviations(fit)[:COORDINATE_COUNT] for fit in fits])
+    deviations = np.array([_compute_deviations(fit)[:COORDINATE_COUNT] for fit in fits])
     return [
-        _change(q.symbol, q.unit_for(unit), logs, values[:, k], deviations[:, k], _LARGE)
+        _make_quantity_trend(q.symbol, q.format_unit(unit), logs, values[:, k], deviations[:, k], _MIN_LAW_CHANGE)
         for k, q in enumerate(COORDINATES)
     ]
 
 
-def _deviations(fit: JointFit) -> Array:
-    """Standard deviations (13 + P,) of coordinates and effects [SI]; infinite where the strokes say nothing.
+def _compute_deviations(fit: JointFit) -> Array:
+    """Return standard deviations (13 + P,) of coordinates and effects [SI]; infinite where they are undetermined.
 
-    Also of a size that stands at its bound of zero, which the intervals of a single diagnosis leave open.
+    A size at its bound of zero has a deviation as well, which the intervals of a single diagnosis omit.
     """
     problem, unknowns = fit.problem, fit.minimum.unknowns
-    free, effects = problem.free, slice(problem.first_effect, problem.first_own)
-    known = fit.minimum.evaluation.hessian[np.ix_(free, free)] / max(fit.ratio, 1.0) ** 2
-    scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
-    whole = np.zeros((len(free), len(free)))
-    whole[np.ix_(free, free)] = np.linalg.pinv(known / np.outer(scale, scale), rcond=1e-12) / np.outer(
+    free, effects = problem.free_mask, problem.layout.effects
+    information = fit.minimum.evaluation.hessian[np.ix_(free, free)] / max(fit.ratio, 1.0) ** 2
+    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
+    covariance = np.zeros((len(free), len(free)))
+    covariance[np.ix_(free, free)] = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(
         scale, scale
     )
-    slopes = problem.space.slopes(unknowns[:COORDINATE_COUNT])
-    law = np.diag(slopes @ whole[:COORDINATE_COUNT, :COORDINATE_COUNT] @ slopes.T)
-    at, own = effects.start, []
-    for choice in fit.effects:
-        own.append(choice.slopes(unknowns[at : at + len(choice.quantities)]))
-        at += len(choice.quantities)
-    variance = np.concatenate([law, np.diag(whole)[effects] * np.concatenate([*own, np.empty(0)]) ** 2])
+    derivatives = problem.space.differentiate(unknowns[:COORDINATE_COUNT])
+    law = np.diag(derivatives @ covariance[:COORDINATE_COUNT, :COORDINATE_COUNT] @ derivatives.T)
+    sizes = np.diag(covariance)[effects] * problem.differentiate_effects(unknowns) ** 2
+    variance = np.concatenate([law, sizes])
     return np.where(variance > 0.0, np.sqrt(np.maximum(variance, 0.0)), np.inf)
 
 
-def _change(
+def _make_quantity_trend(
     quantity: str,
     unit: str,
     logs: Sequence[str],
     values: Array,
     deviations: Array,
-    least: float,
-) -> Change:
-    bend = bent(values, deviations)
-    whole = bend.slope * (len(values) - 1 - bend.start)
-    changed = bend.deviations > _CLEAR and abs(whole) > least * float(np.abs(values).max())
-    way: Way = "steady" if not changed else "grows" if bend.slope > 0.0 else "falls"
-    return Change(
+    min_change: float,
+) -> QuantityTrend:
+    """Make the trend of one quantity; ``min_change`` is relative to its largest value [1]."""
+    point = find_change_point(values, deviations)
+    change = point.slope * (len(values) - 1 - point.start)
+    changed = point.deviations > _CHANGE_DEVIATIONS and abs(change) > min_change * float(np.abs(values).max())
+    direction: TrendDirection = "steady" if not changed else "rising" if point.slope > 0.0 else "falling"
+    return QuantityTrend(
         quantity=quantity,
         unit=unit,
-        way=way,
-        since=logs[bend.start + 1] if changed else None,
-        per_run=bend.slope if changed else 0.0,
-        deviations=bend.deviations,
-        sizes=[_size(*each) for each in zip(logs, values, deviations, strict=True)],
+        direction=direction,
+        since=logs[point.start + 1] if changed else None,
+        change_per_run=point.slope if changed else 0.0,
+        deviations=point.deviations,
+        values=[_make_value(*row) for row in zip(logs, values, deviations, strict=True)],
     )
 
 
-def _size(log: str, value: float, deviation: float) -> Size:
-    reach = 1.96 * deviation if np.isfinite(deviation) else None
-    return Size(log=log, value=float(value), ci95=None if reach is None else (value - reach, value + reach))
+def _make_value(log: str, value: float, deviation: float) -> TrendValue:
+    if not np.isfinite(deviation):
+        return TrendValue(log=log, value=float(value), ci95=None)
+    width = NORMAL_QUANTILE * deviation
+    return TrendValue(log=log, value=float(value), ci95=(value - width, value + width))
 
 
-def bent(values: Array, deviations: Array) -> Bend:
-    """The line with a bend that fits a quantity best over its runs (R,).
+def find_change_point(values: Array, deviations: Array) -> ChangePoint:
+    """Return the change point that fits a quantity best over its runs (R,).
 
-    Deviations that the scatter about it belies are widened to it. Runs of infinite deviation do not count.
+    If the values scatter more than their deviations, the deviation of the change is increased accordingly. Runs
+    with an infinite deviation do not count.
     """
     weights = np.where(np.isfinite(deviations), 1.0 / np.maximum(deviations, 1e-300), 0.0)
-    if np.count_nonzero(weights) < FEWEST:
-        return Bend(0, 0.0, 0.0)
-    return min((_from(values, weights, start) for start in range(len(values) - 1)), key=lambda found: found[0])[1]
+    if np.count_nonzero(weights) < MIN_RUNS:
+        return ChangePoint(0, 0.0, 0.0)
+    fits = (_fit_change_point(values, weights, start) for start in range(len(values) - 1))
+    return min(fits, key=lambda cost_and_point: cost_and_point[0])[1]
 
 
-def _from(values: Array, weights: Array, start: int) -> tuple[float, Bend]:
-    """Sum of squared errors of the line that bends at a run, and that line."""
+def _fit_change_point(values: Array, weights: Array, start: int) -> tuple[float, ChangePoint]:
+    """Return the sum of squared errors with the change point after a run, and the change point."""
     ramp = np.maximum(np.arange(len(values)) - start, 0.0)
     table = np.column_stack([np.ones(len(values)), ramp])
-    found = np.linalg.lstsq(table * weights[:, None], values * weights, rcond=None)[0]
-    left = float(np.sum(((values - table @ found) * weights) ** 2))
+    solution = np.linalg.lstsq(table * weights[:, None], values * weights, rcond=None)[0]
+    cost = float(np.sum(((values - table @ solution) * weights) ** 2))
     inverse = np.linalg.pinv((table * weights[:, None]).T @ (table * weights[:, None]))
-    spread = max(left / max(int(np.count_nonzero(weights)) - 2, 1), 1.0)
-    deviation = float(np.sqrt(inverse[1, 1] * spread))
-    return left, Bend(start, float(found[1]), abs(float(found[1])) / max(deviation, 1e-300))
+    scatter = max(cost / max(int(np.count_nonzero(weights)) - 2, 1), 1.0)
+    deviation = float(np.sqrt(inverse[1, 1] * scatter))
+    slope = float(solution[1])
+    return cost, ChangePoint(start, slope, abs(slope) / max(deviation, 1e-300))
 
 
-def explained(changes: Sequence[Change], runs: int) -> str:
-    """What changes, for a person."""
+def explain_changes(changes: Sequence[QuantityTrend], runs: int) -> str:
+    """Return the changes as text for a person."""
     moving = sorted(
-        (c for c in changes if c.way != "steady"), key=lambda c: ("." not in c.quantity, -c.deviations)
+        (c for c in changes if c.direction != "steady"), key=lambda c: ("." not in c.quantity, -c.deviations)
     )
     if not moving:
-        return f"Over {runs} runs nothing grows or falls that stands clear of how well each run knows it."
-    said = "; ".join(
-        f"{c.quantity} {c.way} by {abs(c.per_run):.3g} {'' if c.unit == '1' else c.unit}".rstrip()
-        + f" a run since {c.since} ({c.sizes[0].value:.3g} to {c.sizes[-1].value:.3g})"
-        for c in moving
+        return f"Over {runs} runs, no quantity rises or falls significantly."
+    sentences = "; ".join(_describe_change(c) for c in moving)
+    names = dict.fromkeys(c.quantity.split(".")[0] for c in moving if "." in c.quantity)
+    checks = "; ".join(suggest_check(name) for name in names)
+    return f"Over {runs} runs: {sentences}." + (f" Check: {checks}." if checks else "")
+
+
+def _describe_change(trend: QuantityTrend) -> str:
+    unit = "" if trend.unit == "1" else f" {trend.unit}"
+    return (
+        f"{trend.quantity} {_VERBS[trend.direction]} by {abs(trend.change_per_run):.3g}{unit} per run "
+        f"since {trend.since} ({trend.values[0].value:.3g} to {trend.values[-1].value:.3g})"
     )
-    checks = [
-        advice(name) for name in dict.fromkeys(c.quantity.split(".")[0] for c in moving if "." in c.quantity)
-    ]
-    return f"Over {runs} runs {said}." + (f" Check: {'; '.join(checks)}." if checks else "")

@@ -1,1 +1,10 @@
-"""The physics-informed network: finds the damper's parameters by training, never by fitting a simulation."""
+"""Physics-informed networks: the damper's parameters by training, without fitting a simulation."""
+
+from identification.pinn.training import describe_incompatibility, group_batches, train, train_batch
+
+__all__ = [
+    "describe_incompatibility",
+    "group_batches",
+    "train",
+    "train_batch",
+]

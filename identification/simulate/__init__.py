@@ -1,7 +1,37 @@
 """Compiled trajectories of the law with chosen effects, and their exact sensitivities."""
 
-from identification.simulate.kernel import Plan
-from identification.simulate.setting import UNKNOWNS, ActiveEffect, Setting, Stroke, Trajectory
-from identification.simulate.trajectory import FINENESS, simulate
+from identification.simulate.channel import (
+    apply_force_channel,
+    compute_parallel_force,
+    differentiate_parallel_force,
+)
+from identification.simulate.inputs import compute_damper_field
+from identification.simulate.kernel import StepCounts
+from identification.simulate.motion import DamperMotion, compute_damper_motion
+from identification.simulate.scaling import compute_scale_factors
+from identification.simulate.simulation_model import (
+    SENSITIVITY_COLUMNS,
+    ActiveEffect,
+    Excitation,
+    SimulationModel,
+    Trajectory,
+)
+from identification.simulate.trajectory import MAX_TRAVEL, simulate
 
-__all__ = ["FINENESS", "UNKNOWNS", "ActiveEffect", "Plan", "Setting", "Stroke", "Trajectory", "simulate"]
+__all__ = [
+    "MAX_TRAVEL",
+    "SENSITIVITY_COLUMNS",
+    "ActiveEffect",
+    "DamperMotion",
+    "StepCounts",
+    "SimulationModel",
+    "Excitation",
+    "Trajectory",
+    "compute_parallel_force",
+    "differentiate_parallel_force",
+    "compute_damper_field",
+    "compute_damper_motion",
+    "compute_scale_factors",
+    "apply_force_channel",
+    "simulate",
+]

@@ -9,21 +9,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array, compiled, compiled_anew
-from identification.damper.parameters import Quantity
-from identification.simulate.curves import lagged, over_parameters
-from identification.simulate.motion import machine
-from identification.simulate.setting import Setting, Stroke
+from identification.arrays import Array, njit_cached, njit_uncached
+from identification.damper import Quantity
+from identification.simulate.curves import apply_lag, differentiate_by_parameters
+from identification.simulate.motion import compile_once
+from identification.simulate.simulation_model import Excitation, SimulationModel
 
-_AT_ONCE = 1e-6
+_MIN_LAG = 1e-6
 """[s] a second lag below which the drive passes as it is."""
-_SLOW = 1e-3
+_REST_SPEED = 1e-3
 """[m/s] below which a damper that starts counts as resting rather than as sliding."""
 _ETA = Quantity("eta", "1/s", 0.0, math.inf, 100.0, "")
 _DELAY = Quantity("delay", "s", -math.inf, math.inf, 0.1, "")
 
 
-class Field(NamedTuple):
+class DamperField(NamedTuple):
     """Field that the damper sees, and its derivatives over A unknowns: eta, drive delay, coil, force delay."""
 
     u: Array
@@ -38,38 +38,40 @@ class Field(NamedTuple):
     """Columns of the unknowns between the first two and the last, among the parameters of the effects."""
 
 
-def damper_field(setting: Setting, stroke: Stroke, slopes: bool = True) -> Field:
+def compute_damper_field(setting: SimulationModel, stroke: Excitation, sensitivities: bool = True) -> DamperField:
     """Field behind the drive of a stroke; derivatives through effects of the coil only on request."""
-    late = sum(values[0] for _, _, values in setting.acting("time_shift"))
-    delay, h = setting.force_delay + setting.drive_delay + late, 1.0 / (stroke.rate * stroke.drive_finer)
-    coil = setting.acting("drive_delay", "field", "field_memory")
+    late = sum(values[0] for _, _, values in setting.select_forms("time_shift"))
+    delay, h = setting.force_delay + setting.drive_delay + late, 1.0 / (stroke.rate * stroke.drive_oversampling)
+    coil = setting.select_forms("drive_delay", "field", "field_memory")
     if not coil:
-        u, middle, du, dmiddle = field(stroke.drive, setting.coordinates.eta, delay, h)
-        u, middle = _thinned(u, middle, stroke.drive_finer)
-        du, dmiddle = _thinned(du, dmiddle, stroke.drive_finer)
+        u, middle, du, dmiddle = compute_field(stroke.drive, setting.coordinates.eta, delay, h)
+        u, middle = _decimate_field(u, middle, stroke.drive_oversampling)
+        du, dmiddle = _decimate_field(du, dmiddle, stroke.drive_oversampling)
         # A late force shows an earlier field, as a late drive does: the last row is that of the delay again.
-        return Field(u, middle, np.vstack([du, du[1:]]), np.vstack([dmiddle, dmiddle[1:]]), ())
+        return DamperField(u, middle, np.vstack([du, du[1:]]), np.vstack([dmiddle, dmiddle[1:]]), ())
     values = (setting.coordinates.eta, delay, *(v for _, _, some in coil for v in some))
     quantities = (_ETA, _DELAY, *(q for _, form, _ in coil for q in form.parameters))
 
     def whole(*parameters: float) -> Array:
-        return _through(coil, parameters, stroke.drive, h)
+        return _apply_coil(coil, parameters, stroke.drive, h)
 
     both = whole(*values)
     columns = tuple(at + k for at, _, some in coil for k in range(len(some)))
-    finer = stroke.drive_finer
-    if not slopes:
-        return Field(*_parted(both, finer), np.empty((0, 0)), np.empty((0, 0)), columns)
-    rows = over_parameters(whole, values, quantities)
-    return Field(*_parted(both, finer), *_parted(np.stack([*rows, rows[1]]), finer), columns)
+    finer = stroke.drive_oversampling
+    if not sensitivities:
+        return DamperField(*_split_half_samples(both, finer), np.empty((0, 0)), np.empty((0, 0)), columns)
+    rows = differentiate_by_parameters(whole, values, quantities)
+    return DamperField(
+        *_split_half_samples(both, finer), *_split_half_samples(np.stack([*rows, rows[1]]), finer), columns
+    )
 
 
-def _parted(both: Array, finer: int) -> tuple[Array, Array]:
+def _split_half_samples(both: Array, finer: int) -> tuple[Array, Array]:
     """Values at the samples of the motion, and half way between them, from half samples of the drive."""
     return np.ascontiguousarray(both[..., :: 2 * finer]), np.ascontiguousarray(both[..., finer :: 2 * finer])
 
 
-def _thinned(at: Array, middle: Array, finer: int) -> tuple[Array, Array]:
+def _decimate_field(at: Array, middle: Array, finer: int) -> tuple[Array, Array]:
     """The same from samples of the drive and the values half way between those."""
     if finer == 1:
         return at, middle
@@ -77,33 +79,33 @@ def _thinned(at: Array, middle: Array, finer: int) -> tuple[Array, Array]:
     return np.ascontiguousarray(at[..., ::finer]), np.ascontiguousarray(halves)
 
 
-def _through(coil: Any, parameters: tuple[float, ...], drive: Array, h: float) -> Array:
+def _apply_coil(coil: Any, parameters: tuple[float, ...], drive: Array, h: float) -> Array:
     """(2N-1,) field on the grid of half samples, through every effect of the coil in the order of the chain."""
     eta, delay, lag, part, layers, at = parameters[0], parameters[1], 0.0, 1.0, 1, 2
     maps = []
     for _, form, some in coil:
         own = parameters[at : at + len(some)]
         at += len(some)
-        if form.acts == "drive_delay":
-            further, slower, part, layers = form.act(*own)
+        if form.action == "drive_delay":
+            further, slower, part, layers = form.function(*own)
             delay, lag = delay + further, lag + slower
         else:
             maps.append((form, own))
-    u = twice_lagged(drive, eta, lag, delay, h)
+    u = apply_two_lags(drive, eta, lag, delay, h)
     for _ in range(1, layers):
-        u = lagged(u, lag, 0.5 * h)
+        u = apply_lag(u, lag, 0.5 * h)
     if part < 1.0:
-        u = part * u + (1.0 - part) * twice_lagged(drive, eta, 0.0, delay, h)
+        u = part * u + (1.0 - part) * apply_two_lags(drive, eta, 0.0, delay, h)
     for form, own in maps:
-        if form.acts == "field":
-            u = form.act(u, *own)
+        if form.action == "field":
+            u = form.function(u, *own)
         else:
-            u = form.act(u, remembered(machine(form.memory), u, *own), *own)
+            u = form.function(u, trace_memory(compile_once(form.memory), u, *own), *own)
     return np.asarray(u)
 
 
-@compiled_anew
-def remembered(memory: Any, u: Array, *values: float) -> Array:
+@njit_uncached
+def trace_memory(memory: Any, u: Array, *values: float) -> Array:
     """What a form with memory remembers along a field or a displacement (N,); nothing at its start."""
     found = np.zeros(len(u))
     for i in range(1, len(u)):
@@ -113,14 +115,14 @@ def remembered(memory: Any, u: Array, *values: float) -> Array:
     return found
 
 
-@compiled
-def twice_lagged(drive: Array, eta: float, lag: float, delay: float, h: float) -> Array:
+@njit_cached
+def apply_two_lags(drive: Array, eta: float, lag: float, delay: float, h: float) -> Array:
     """(2N-1,) field on the grid of half samples behind two lags and a dead time (exact for a held drive)."""
     count = len(drive)
     found = np.empty(2 * count - 1)
     whole = math.floor(delay / h)
     early = delay / h - whole
-    usual = _weights(eta, lag, 0.5 * h)
+    usual = _compute_decay_weights(eta, lag, 0.5 * h)
     w = u = drive[0]
     found[0] = u
     for i in range(count - 1):
@@ -129,28 +131,28 @@ def twice_lagged(drive: Array, eta: float, lag: float, delay: float, h: float) -
         for half in range(2):
             switch = min(max(early - 0.5 * half, 0.0), 0.5)
             if old == new or switch == 0.0:
-                w, u = _lag_both(w, u, new, usual)
+                w, u = _advance_lags(w, u, new, usual)
             elif switch == 0.5:
-                w, u = _lag_both(w, u, old, usual)
+                w, u = _advance_lags(w, u, old, usual)
             else:
-                w, u = _lag_both(w, u, old, _weights(eta, lag, switch * h))
-                w, u = _lag_both(w, u, new, _weights(eta, lag, (0.5 - switch) * h))
+                w, u = _advance_lags(w, u, old, _compute_decay_weights(eta, lag, switch * h))
+                w, u = _advance_lags(w, u, new, _compute_decay_weights(eta, lag, (0.5 - switch) * h))
             found[2 * i + 1 + half] = u
     return found
 
 
-@compiled
-def _lag_both(w: float, u: float, drive: float, weights: tuple[float, float, float]) -> tuple[float, float]:
+@njit_cached
+def _advance_lags(w: float, u: float, drive: float, weights: tuple[float, float, float]) -> tuple[float, float]:
     """Lagged drive and field after some time towards a drive."""
     slow, fade, mixed = weights
     return drive + (w - drive) * slow, drive + (u - drive) * fade + (w - drive) * mixed
 
 
-@compiled
-def _weights(eta: float, lag: float, t: float) -> tuple[float, float, float]:
+@njit_cached
+def _compute_decay_weights(eta: float, lag: float, t: float) -> tuple[float, float, float]:
     """What is left after t [s] of the lagged drive, of the field, and of the first in the second."""
     fade = math.exp(-eta * t)
-    if lag < _AT_ONCE:
+    if lag < _MIN_LAG:
         return 0.0, fade, 0.0
     slow = math.exp(-t / lag)
     difference = eta - 1.0 / lag
@@ -165,8 +167,8 @@ def _weights(eta: float, lag: float, t: float) -> tuple[float, float, float]:
     return slow, fade, eta * mixed
 
 
-@compiled
-def field(drive: Array, eta: float, delay: float, h: float) -> tuple[Array, Array, Array, Array]:
+@njit_cached
+def compute_field(drive: Array, eta: float, delay: float, h: float) -> tuple[Array, Array, Array, Array]:
     """Field u behind a drive that is held between samples and arrives ``delay`` [s] late (eq. 8).
 
     Args:
@@ -190,19 +192,19 @@ def field(drive: Array, eta: float, delay: float, h: float) -> tuple[Array, Arra
         old = drive[min(max(i - whole - 1, 0), count - 1)]
         new = drive[min(max(i - whole, 0), count - 1)]
         if early < 0.5:
-            middle[i], dmiddle[0, i] = _decay(value, over_eta, old, new, eta, early * h, (0.5 - early) * h)
+            middle[i], dmiddle[0, i] = _advance_field(value, over_eta, old, new, eta, early * h, (0.5 - early) * h)
             dmiddle[1, i] = eta * (middle[i] - new)
         else:
-            middle[i], dmiddle[0, i] = _decay(value, over_eta, old, old, eta, 0.5 * h, 0.0)
+            middle[i], dmiddle[0, i] = _advance_field(value, over_eta, old, old, eta, 0.5 * h, 0.0)
             dmiddle[1, i] = eta * (middle[i] - old)
-        value, over_eta = _decay(value, over_eta, old, new, eta, early * h, (1.0 - early) * h)
+        value, over_eta = _advance_field(value, over_eta, old, new, eta, early * h, (1.0 - early) * h)
         u[i + 1], du[0, i + 1] = value, over_eta
         du[1, i + 1] = eta * (value - new)
     return u, middle, du, dmiddle
 
 
-@compiled
-def _decay(
+@njit_cached
+def _advance_field(
     value: float, over_eta: float, old: float, new: float, eta: float, first: float, second: float
 ) -> tuple[float, float]:
     """Field and its slope over eta after ``first`` [s] towards ``old``, then ``second`` [s] towards ``new``."""
@@ -213,7 +215,7 @@ def _decay(
     return new + (value - new) * fade, (slope - second * (value - new)) * fade
 
 
-@compiled
-def settled_hysteresis(velocity: float) -> float:
+@njit_cached
+def estimate_settled_hysteresis(velocity: float) -> float:
     """Hysteretic state [1] to start from at a velocity [m/s]: saturated in motion, relaxed at rest."""
-    return velocity / (abs(velocity) + _SLOW)
+    return velocity / (abs(velocity) + _REST_SPEED)

@@ -1,9 +1,9 @@
-"""The march through a recording: states alone, or with the slopes of the force over everything.
+"""The march through a recording: states alone, or with the sensitivities of the force over everything.
 
-The slopes are exact derivatives of the discrete solution: each implicit step is differentiated as it was
+The sensitivities are exact derivatives of the discrete solution: each implicit step is differentiated as it was
 taken, so that they agree with finite differences to rounding. Each sample is one step, but more where the
 hysteretic variable turns: the number is chosen on the first march from how far zeta is about to move, and kept
-as a plan, so that later marches with slopes or with nearby coordinates are smooth in them.
+as a step_counts, so that later marches with sensitivities or with nearby coordinates are smooth in them.
 """
 
 from typing import NamedTuple
@@ -11,56 +11,56 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from identification.arrays import Array, compiled, compiled_within
+from identification.arrays import Array, njit_cached, njit_inline
 from identification.simulate.step import (
     GAMMA,
-    HALF,
-    STRUCTURAL,
+    RATE_WEIGHT,
+    STRUCTURAL_COUNT,
     WEIGHT_STAGE,
     WEIGHT_START,
-    between,
     choose_steps,
-    first_stage,
-    rate_slopes,
-    rates,
-    second_stage,
-    through_middle,
+    compute_rates,
+    differentiate_rates,
+    interpolate_motion,
+    interpolate_parabola,
+    solve_first_stage,
+    solve_second_stage,
 )
 
-Plan = npt.NDArray[np.uint8]
+StepCounts = npt.NDArray[np.uint8]
 """(samples - 1,) steps in each sample; 0 where they are still to be chosen."""
 
-Places = npt.NDArray[np.int64]
-"""Columns of a table of slopes."""
+ColumnIndices = npt.NDArray[np.int64]
+"""Columns of a table of sensitivities."""
 
-_FADED = 1e-200
+_MIN_SENSITIVITY = 1e-200
 """[1] slope of zeta below which it counts as none."""
 
 
-@compiled_within
-def _inputs(
+@njit_inline
+def _interpolate_inputs(
     x: Array, v: Array, u: Array, u_middle: Array, h: float, i: int, t: float
 ) -> tuple[float, float, float]:
     """Displacement, velocity and field at the fraction t of sample i."""
-    xs, vs = between(x[i], x[i + 1], v[i], v[i + 1], h, t)
-    return xs, vs, through_middle(u[i], u_middle[i], u[i + 1], t)
+    xs, vs = interpolate_motion(x[i], x[i + 1], v[i], v[i + 1], h, t)
+    return xs, vs, interpolate_parabola(u[i], u_middle[i], u[i + 1], t)
 
 
-@compiled_within
-def scaled(s: Array, factors: Array, middle: Array, i: int, t: float, out: Array) -> None:
+@njit_inline
+def scale_coefficients(s: Array, factors: Array, middle: Array, i: int, t: float, out: Array) -> None:
     """Alpha, c0 and c1 of structural coordinates (10,), scaled, at the fraction t of sample i."""
     a, b, c = factors[0, i], factors[1, i], factors[2, i]
     if t > 0.0:
-        a = through_middle(a, middle[0, i], factors[0, i + 1], t)
-        b = through_middle(b, middle[1, i], factors[1, i + 1], t)
-        c = through_middle(c, middle[2, i], factors[2, i + 1], t)
+        a = interpolate_parabola(a, middle[0, i], factors[0, i + 1], t)
+        b = interpolate_parabola(b, middle[1, i], factors[1, i + 1], t)
+        c = interpolate_parabola(c, middle[2, i], factors[2, i + 1], t)
     out[0], out[1] = a * s[0], a * s[1]
     out[5], out[6] = b * s[5], b * s[6]
     out[7], out[8] = c * s[7], c * s[8]
 
 
-@compiled
-def march(
+@njit_cached
+def integrate(
     s: Array,
     x: Array,
     v: Array,
@@ -71,8 +71,8 @@ def march(
     h: float,
     y0: float,
     zeta0: float,
-    fineness: float,
-    plan: Plan,
+    max_travel: float,
+    step_counts: StepCounts,
 ) -> tuple[Array, Array, Array]:
     """States along a recording.
 
@@ -83,8 +83,8 @@ def march(
         u_middle: (N-1,) field half way between them.
         h: [s] time between samples.
         y0, zeta0: state at the first sample [m], [1].
-        fineness: [1] travel of zeta in a sample above which it takes more than one step, where the plan is open.
-        plan: filled in place where it is 0.
+        max_travel: [1] travel of zeta in a sample above which it takes more than one step, where the step_counts is open.
+        step_counts: filled in place where it is 0.
 
     Returns:
         y [m], zeta [1] and y' [m/s], each (N,).
@@ -94,30 +94,32 @@ def march(
     scales, sc = factors.shape[1] > 0, s.copy()
     y, zeta = y0, zeta0
     if scales:
-        scaled(s, factors, factors_middle, 0, 0.0, sc)
-    y_rate, zeta_rate = rates(sc, x[0], v[0], u[0], y, zeta)
+        scale_coefficients(s, factors, factors_middle, 0, 0.0, sc)
+    y_rate, zeta_rate = compute_rates(sc, x[0], v[0], u[0], y, zeta)
     for i in range(count):
         ys[i], zetas[i], y_rates[i] = y, zeta, y_rate
         if i == count - 1:
             break
-        if plan[i] == 0:
-            plan[i] = choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
-        weight = HALF * h / plan[i]
-        for k in range(plan[i]):
-            t = (k + GAMMA) / plan[i]
-            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+        if step_counts[i] == 0:
+            step_counts[i] = choose_steps(
+                max_travel, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate
+            )
+        weight = RATE_WEIGHT * h / step_counts[i]
+        for k in range(step_counts[i]):
+            t = (k + GAMMA) / step_counts[i]
+            xs, vs, us = _interpolate_inputs(x, v, u, u_middle, h, i, t)
             if scales:
-                scaled(s, factors, factors_middle, i, t, sc)
-            y1, zeta1 = first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
-            t = (k + 1.0) / plan[i]
-            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+                scale_coefficients(s, factors, factors_middle, i, t, sc)
+            y1, zeta1 = solve_first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
+            t = (k + 1.0) / step_counts[i]
+            xs, vs, us = _interpolate_inputs(x, v, u, u_middle, h, i, t)
             if scales:
-                scaled(s, factors, factors_middle, i, t, sc)
-            y, zeta, y_rate, zeta_rate = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
+                scale_coefficients(s, factors, factors_middle, i, t, sc)
+            y, zeta, y_rate, zeta_rate = solve_second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
     return ys, zetas, y_rates
 
 
-class Derivatives(NamedTuple):
+class InputDerivatives(NamedTuple):
     """Derivatives of the inputs over E further unknowns: A of the field, then motion and factors.
 
     Those of the motion and of the factors both begin at the last of the field's: the delay moves everything.
@@ -137,8 +139,8 @@ class Derivatives(NamedTuple):
     """(S, 3, N-1)"""
 
 
-@compiled
-def march_with_slopes(
+@njit_cached
+def integrate_with_sensitivities(
     s: Array,
     c1: Array,
     x: Array,
@@ -150,20 +152,20 @@ def march_with_slopes(
     h: float,
     y0: float,
     zeta0: float,
-    fineness: float,
-    plan: Plan,
-    over: Derivatives,
-    columns: Places,
-    slopes: Array,
+    max_travel: float,
+    step_counts: StepCounts,
+    over: InputDerivatives,
+    columns: ColumnIndices,
+    sensitivities: Array,
 ) -> tuple[Array, Array, Array]:
-    """States along a recording, and the slopes of the dashpot force c1 y' over coordinates, y0 and inputs.
+    """States along a recording, and the sensitivities of the dashpot force c1 y' over coordinates, y0 and inputs.
 
     Args:
-        s, x, v, u, u_middle, factors, factors_middle, h, y0, zeta0, fineness, plan: as in ``march``.
+        s, x, v, u, u_middle, factors, factors_middle, h, y0, zeta0, max_travel, step_counts: as in ``march``.
         c1: (N,) roll-off dashpot at the samples [N s/m], unscaled.
         over: derivatives of the inputs over E further unknowns.
-        columns: (10 + 1 + E,) where the slopes over structural coordinates, y0 and the further unknowns go.
-        slopes: (N, U), filled in those columns.
+        columns: (10 + 1 + E,) where the sensitivities over structural coordinates, y0 and the further unknowns go.
+        sensitivities: (N, U), filled in those columns.
 
     Returns:
         y [m], zeta [1] and y' [m/s], each (N,).
@@ -176,65 +178,67 @@ def march_with_slopes(
     f1, f = np.zeros((2, width)), np.zeros((2, width))
     J1, J, over_inputs = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 3))
     scales, sc = factors.shape[1] > 0, s.copy()
-    S[0, STRUCTURAL] = 1.0
+    S[0, STRUCTURAL_COUNT] = 1.0
     y, zeta = y0, zeta0
     if scales:
-        scaled(s, factors, factors_middle, 0, 0.0, sc)
-    y_rate, zeta_rate = rate_slopes(sc, x[0], v[0], u[0], y, zeta, J, over_inputs, f)
-    _from_inputs(over_inputs, over, s, sc, 0, 0.0, h, f)
+        scale_coefficients(s, factors, factors_middle, 0, 0.0, sc)
+    y_rate, zeta_rate = differentiate_rates(sc, x[0], v[0], u[0], y, zeta, J, over_inputs, f)
+    _propagate_inputs(over_inputs, over, s, sc, 0, 0.0, h, f)
     for j in range(width):
         S_rate[0, j] = J[0, 0] * S[0, j] + J[0, 1] * S[1, j] + f[0, j]
         S_rate[1, j] = J[1, 0] * S[0, j] + J[1, 1] * S[1, j] + f[1, j]
     for i in range(count):
         ys[i], zetas[i], y_rates[i] = y, zeta, y_rate
         factor = factors[2, i] if scales else 1.0
-        _record(slopes, columns, c1[i], factor, u[i], s[8], y_rate, S_rate, over, i)
+        _record_row(sensitivities, columns, c1[i], factor, u[i], s[8], y_rate, S_rate, over, i)
         if i == count - 1:
             break
-        if plan[i] == 0:
-            plan[i] = choose_steps(fineness, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate)
-        weight = HALF * h / plan[i]
-        for k in range(plan[i]):
-            t = (k + GAMMA) / plan[i]
-            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+        if step_counts[i] == 0:
+            step_counts[i] = choose_steps(
+                max_travel, s, h, v[i], v[i + 1], u[i], u[i + 1], y_rate, zeta, zeta_rate
+            )
+        weight = RATE_WEIGHT * h / step_counts[i]
+        for k in range(step_counts[i]):
+            t = (k + GAMMA) / step_counts[i]
+            xs, vs, us = _interpolate_inputs(x, v, u, u_middle, h, i, t)
             if scales:
-                scaled(s, factors, factors_middle, i, t, sc)
-            y1, zeta1 = first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
-            rate_slopes(sc, xs, vs, us, y1, zeta1, J1, over_inputs, f1)
-            _from_inputs(over_inputs, over, s, sc, i, t, h, f1)
-            # The slopes take the very steps that the states took, so they are those of the discrete solution.
-            _first_slopes(weight, J1, f1, S, S_rate, S1)
-            t = (k + 1.0) / plan[i]
-            xs, vs, us = _inputs(x, v, u, u_middle, h, i, t)
+                scale_coefficients(s, factors, factors_middle, i, t, sc)
+            y1, zeta1 = solve_first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
+            differentiate_rates(sc, xs, vs, us, y1, zeta1, J1, over_inputs, f1)
+            _propagate_inputs(over_inputs, over, s, sc, i, t, h, f1)
+            # The sensitivities take the very steps that the states took, so they are those of the discrete solution.
+            _advance_first_stage(weight, J1, f1, S, S_rate, S1)
+            t = (k + 1.0) / step_counts[i]
+            xs, vs, us = _interpolate_inputs(x, v, u, u_middle, h, i, t)
             if scales:
-                scaled(s, factors, factors_middle, i, t, sc)
-            y, zeta, _, _ = second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
-            y_rate, zeta_rate = rate_slopes(sc, xs, vs, us, y, zeta, J, over_inputs, f)
-            _from_inputs(over_inputs, over, s, sc, i, t, h, f)
-            _second_slopes(weight, J, f, S1, S, S_rate)
+                scale_coefficients(s, factors, factors_middle, i, t, sc)
+            y, zeta, _, _ = solve_second_stage(sc, xs, vs, us, weight, y, zeta, y1, zeta1)
+            y_rate, zeta_rate = differentiate_rates(sc, xs, vs, us, y, zeta, J, over_inputs, f)
+            _propagate_inputs(over_inputs, over, s, sc, i, t, h, f)
+            _advance_second_stage(weight, J, f, S1, S, S_rate)
     return ys, zetas, y_rates
 
 
-@compiled_within
-def _first_slopes(weight: float, J: Array, f: Array, S: Array, S_rate: Array, S1: Array) -> None:
+@njit_inline
+def _advance_first_stage(weight: float, J: Array, f: Array, S: Array, S_rate: Array, S1: Array) -> None:
     """Slopes S1 of the first stage, from those of the step's start and their rates; all (2, columns).
 
     Each is the solution of (1 - weight J) S1 = S + weight (S' + f); J is the 2 by 2 slope of the rates.
     """
-    a, b, c, d = _inverse(weight, J)
+    a, b, c, d = _invert_stage_matrix(weight, J)
     for j in range(S.shape[1]):
         first = S[0, j] + weight * (S_rate[0, j] + f[0, j])
         second = S[1, j] + weight * (S_rate[1, j] + f[1, j])
         S1[0, j] = a * first + b * second
         steep = c * first + d * second
-        # In saturation slopes fade away; the last digits before zero would be a hundred times slower to carry on.
-        S1[1, j] = steep if abs(steep) > _FADED else 0.0
+        # In saturation sensitivities fade away; the last digits before zero would be a hundred times slower to carry on.
+        S1[1, j] = steep if abs(steep) > _MIN_SENSITIVITY else 0.0
 
 
-@compiled_within
-def _second_slopes(weight: float, J: Array, f: Array, S1: Array, S: Array, S_rate: Array) -> None:
+@njit_inline
+def _advance_second_stage(weight: float, J: Array, f: Array, S1: Array, S: Array, S_rate: Array) -> None:
     """Slopes S after the step and their rates, from those of its start, in S, and of its first stage, S1."""
-    a, b, c, d = _inverse(weight, J)
+    a, b, c, d = _invert_stage_matrix(weight, J)
     per_weight = 1.0 / weight
     for j in range(S.shape[1]):
         y_known = WEIGHT_STAGE * S1[0, j] - WEIGHT_START * S[0, j]
@@ -242,13 +246,13 @@ def _second_slopes(weight: float, J: Array, f: Array, S1: Array, S: Array, S_rat
         first, second = y_known + weight * f[0, j], zeta_known + weight * f[1, j]
         y = a * first + b * second
         steep = c * first + d * second
-        zeta = steep if abs(steep) > _FADED else 0.0
+        zeta = steep if abs(steep) > _MIN_SENSITIVITY else 0.0
         S[0, j], S[1, j] = y, zeta
         S_rate[0, j], S_rate[1, j] = (y - y_known) * per_weight, (zeta - zeta_known) * per_weight
 
 
-@compiled_within
-def _inverse(weight: float, J: Array) -> tuple[float, float, float, float]:
+@njit_inline
+def _invert_stage_matrix(weight: float, J: Array) -> tuple[float, float, float, float]:
     """Of the 2 by 2 matrix 1 - weight J, row by row."""
     a, b = 1.0 - weight * J[0, 0], -weight * J[0, 1]
     c, d = -weight * J[1, 0], 1.0 - weight * J[1, 1]
@@ -256,44 +260,46 @@ def _inverse(weight: float, J: Array) -> tuple[float, float, float, float]:
     return d * per_determinant, -b * per_determinant, -c * per_determinant, a * per_determinant
 
 
-@compiled_within
-def _from_inputs(
-    over_inputs: Array, over: Derivatives, s: Array, sc: Array, i: int, t: float, h: float, f: Array
+@njit_inline
+def _propagate_inputs(
+    over_inputs: Array, over: InputDerivatives, s: Array, sc: Array, i: int, t: float, h: float, f: Array
 ) -> None:
     """Slopes of the two rates over the unknowns that act through the inputs, at the fraction t of sample i."""
-    first = STRUCTURAL + 1
+    first = STRUCTURAL_COUNT + 1
     for j in range(first, f.shape[1]):
         f[0, j] = f[1, j] = 0.0
     for e in range(len(over.du)):
         c = over.du[e, i]
         if t > 0.0:
-            c = through_middle(c, over.du_middle[e, i], over.du[e, i + 1], t)
+            c = interpolate_parabola(c, over.du_middle[e, i], over.du[e, i + 1], t)
         f[0, first + e] = over_inputs[0, 2] * c
         f[1, first + e] = over_inputs[1, 2] * c
     first += len(over.du) - 1
     for m in range(len(over.dx)):
         a, b = over.dx[m, i], over.dv[m, i]
         if t > 0.0:
-            a, b = between(a, over.dx[m, i + 1], b, over.dv[m, i + 1], h, t)
+            a, b = interpolate_motion(a, over.dx[m, i + 1], b, over.dv[m, i + 1], h, t)
         f[0, first + m] += over_inputs[0, 0] * a + over_inputs[0, 1] * b
         f[1, first + m] += over_inputs[1, 0] * a + over_inputs[1, 1] * b
     if len(over.df) > 0:
-        _from_factors(over, s, sc, i, t, f, first)
+        _propagate_factors(over, s, sc, i, t, f, first)
 
 
-@compiled_within
-def _from_factors(over: Derivatives, s: Array, sc: Array, i: int, t: float, f: Array, first: int) -> None:
+@njit_inline
+def _propagate_factors(
+    over: InputDerivatives, s: Array, sc: Array, i: int, t: float, f: Array, first: int
+) -> None:
     """Slopes over the scaled coordinates stand in f: carried to the three factors, and made those of ``s``."""
     for m in range(len(over.df)):
         for k in range(3):
-            a, b = _PAIRS[k]
+            a, b = _SCALED_PAIRS[k]
             c = over.df[m, k, i]
             if t > 0.0:
-                c = through_middle(c, over.df_middle[m, k, i], over.df[m, k, i + 1], t)
+                c = interpolate_parabola(c, over.df_middle[m, k, i], over.df[m, k, i + 1], t)
             f[0, first + m] += (s[a] * f[0, a] + s[b] * f[0, b]) * c
             f[1, first + m] += (s[a] * f[1, a] + s[b] * f[1, b]) * c
     for k in range(3):
-        a, b = _PAIRS[k]
+        a, b = _SCALED_PAIRS[k]
         factor = sc[a] / s[a]
         f[0, a] *= factor
         f[0, b] *= factor
@@ -301,29 +307,29 @@ def _from_factors(over: Derivatives, s: Array, sc: Array, i: int, t: float, f: A
         f[1, b] *= factor
 
 
-_PAIRS = ((0, 1), (5, 6), (7, 8))
+_SCALED_PAIRS = ((0, 1), (5, 6), (7, 8))
 """Structural coordinates that each factor scales."""
 
 
-@compiled_within
-def _record(
-    slopes: Array,
-    columns: Places,
+@njit_inline
+def _record_row(
+    sensitivities: Array,
+    columns: ColumnIndices,
     c1: float,
     factor: float,
     u: float,
     c1_b: float,
     y_rate: float,
     S_rate: Array,
-    over: Derivatives,
+    over: InputDerivatives,
     i: int,
 ) -> None:
-    """Write the slopes of the scaled c1 y' at one sample into its row."""
+    """Write the sensitivities of the scaled c1 y' at one sample into its row."""
     for j in range(len(columns)):
-        slopes[i, columns[j]] = factor * c1 * S_rate[0, j]
-    slopes[i, columns[7]] += factor * y_rate
-    slopes[i, columns[8]] += factor * u * y_rate
+        sensitivities[i, columns[j]] = factor * c1 * S_rate[0, j]
+    sensitivities[i, columns[7]] += factor * y_rate
+    sensitivities[i, columns[8]] += factor * u * y_rate
     for e in range(len(over.du)):
-        slopes[i, columns[STRUCTURAL + 1 + e]] += factor * c1_b * over.du[e, i] * y_rate
+        sensitivities[i, columns[STRUCTURAL_COUNT + 1 + e]] += factor * c1_b * over.du[e, i] * y_rate
     for m in range(len(over.df)):
-        slopes[i, columns[STRUCTURAL + len(over.du) + m]] += c1 * over.df[m, 2, i] * y_rate
+        sensitivities[i, columns[STRUCTURAL_COUNT + len(over.du) + m]] += c1 * over.df[m, 2, i] * y_rate

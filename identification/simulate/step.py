@@ -1,4 +1,4 @@
-"""One implicit step of the damper, how many of them a sample takes, and the slopes of its rates.
+"""One implicit step of the damper, how many of them a sample takes, and the sensitivities of its rates.
 
 TR-BDF2 (Bank et al. 1985): a trapezoidal stage to gamma h, then a second-order backward difference to h. It is
 L-stable, which the law needs: at a reversal the hysteretic variable relaxes at some 2e4 1/s. In the regular
@@ -11,39 +11,39 @@ F_a F_b D_y rho n c0_a c0_b c1_a c1_b k0.
 
 import math
 
-from identification.arrays import Array, compiled_within
+from identification.arrays import Array, njit_inline
 from identification.damper import law
 
 GAMMA = 2.0 - math.sqrt(2.0)
 """[1] where the first stage stands inside the step; makes both stages share one matrix."""
-HALF = GAMMA / 2.0
+RATE_WEIGHT = GAMMA / 2.0
 """[1] of the step: weight of the rates at the end of either stage."""
 WEIGHT_STAGE = 1.0 / (GAMMA * (2.0 - GAMMA))
 WEIGHT_START = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
 
-STRUCTURAL = 10
+STRUCTURAL_COUNT = 10
 """How many structural coordinates there are."""
 
 TOLERANCE = 1e-11
 """[1] move of zeta at which Newton's iteration of a stage ends."""
-LARGEST_MOVE = 0.5
+MAX_MOVE = 0.5
 """[1] largest move of zeta in one iteration; it runs from -1 to 1."""
-ITERATIONS = 40
-_MOST_STEPS = 64
-"""In a sample, so that no set of parameters inside the bounds can stall a fit; a plan holds bytes."""
+MAX_ITERATIONS = 40
+_MAX_STEPS = 64
+"""In a sample, so that no set of parameters inside the bounds can stall a fit; a step_counts holds bytes."""
 _STEPS_AT_TURN = 4
 """Least number of steps in a sample in which slip or field turn."""
 _FIELD_JUMP = 0.05
 """[1] relative change of the yield force in one sample above which the field counts as turning."""
 
-at_field = compiled_within(law.at_field)
-inner_velocity = compiled_within(law.inner_velocity)
-hysteresis_rate = compiled_within(law.hysteresis_rate)
-hysteresis_slopes = compiled_within(law.hysteresis_slopes)
+evaluate_coefficient = njit_inline(law.evaluate_coefficient)
+compute_inner_velocity = njit_inline(law.compute_inner_velocity)
+compute_hysteresis_rate = njit_inline(law.compute_hysteresis_rate)
+differentiate_hysteresis_rate = njit_inline(law.differentiate_hysteresis_rate)
 
 
-@compiled_within
-def between(x0: float, x1: float, v0: float, v1: float, h: float, t: float) -> tuple[float, float]:
+@njit_inline
+def interpolate_motion(x0: float, x1: float, v0: float, v1: float, h: float, t: float) -> tuple[float, float]:
     """Displacement [m] and velocity [m/s] at the fraction t of a sample of h [s], by a Hermite cubic."""
     d = x1 - x0
     square = 3.0 * d - h * (2.0 * v0 + v1)
@@ -51,30 +51,34 @@ def between(x0: float, x1: float, v0: float, v1: float, h: float, t: float) -> t
     return x0 + t * (h * v0 + t * (square + t * cube)), v0 + t * (2.0 * square + 3.0 * t * cube) / h
 
 
-@compiled_within
-def through_middle(start: float, middle: float, end: float, t: float) -> float:
+@njit_inline
+def interpolate_parabola(start: float, middle: float, end: float, t: float) -> float:
     """Value at the fraction t of a sample, by the parabola through its start, middle and end."""
     bend = 2.0 * (start + end) - 4.0 * middle
     return start + t * (end - start - bend + t * bend)
 
 
-@compiled_within
-def _y_rate(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> float:
+@njit_inline
+def _compute_y_rate(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> float:
     """Rate y' [m/s]."""
-    alpha, c0, c1 = at_field(s[0], s[1], u), at_field(s[5], s[6], u), at_field(s[7], s[8], u)
-    return float(inner_velocity(x, v, y, zeta, alpha, c0, c1, s[9]))
+    alpha, c0, c1 = (
+        evaluate_coefficient(s[0], s[1], u),
+        evaluate_coefficient(s[5], s[6], u),
+        evaluate_coefficient(s[7], s[8], u),
+    )
+    return float(compute_inner_velocity(x, v, y, zeta, alpha, c0, c1, s[9]))
 
 
-@compiled_within
-def rates(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> tuple[float, float]:
+@njit_inline
+def compute_rates(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> tuple[float, float]:
     """Rates y' [m/s] and zeta' [1/s]."""
-    y_rate = _y_rate(s, x, v, u, y, zeta)
-    return y_rate, hysteresis_rate(v - y_rate, zeta, 1.0 / s[2], s[3] / s[2], (1.0 - s[3]) / s[2], s[4])
+    y_rate = _compute_y_rate(s, x, v, u, y, zeta)
+    return y_rate, compute_hysteresis_rate(v - y_rate, zeta, 1.0 / s[2], s[3] / s[2], (1.0 - s[3]) / s[2], s[4])
 
 
-@compiled_within
+@njit_inline
 def choose_steps(
-    fineness: float,
+    max_travel: float,
     s: Array,
     h: float,
     v0: float,
@@ -85,7 +89,7 @@ def choose_steps(
     zeta: float,
     zeta_rate: float,
 ) -> int:
-    """Steps for one sample: the root of zeta's travel over ``fineness``; a few more where slip or field turn.
+    """Steps for one sample: the root of zeta's travel over ``max_travel``; a few more where slip or field turn.
 
     The root, because the error of a step falls with its third power: many small travels add up as one large.
     """
@@ -95,48 +99,48 @@ def choose_steps(
     # After a reversal zeta moves at up to twice slip / D_y, of which its rate before the turn tells nothing.
     if slip_after * zeta < 0.0:
         travel = max(travel, 2.0 * abs(slip_after) * h / s[2])
-    steps = min(max(math.ceil(math.sqrt(travel / fineness)), 1), _MOST_STEPS)
+    steps = min(max(math.ceil(math.sqrt(travel / max_travel)), 1), _MAX_STEPS)
     turns = slip_before * slip_after <= 0.0
-    jumps = abs(s[1] * (u1 - u0)) > _FIELD_JUMP * abs(at_field(s[0], s[1], u0))
+    jumps = abs(s[1] * (u1 - u0)) > _FIELD_JUMP * abs(evaluate_coefficient(s[0], s[1], u0))
     return max(steps, _STEPS_AT_TURN) if turns or jumps else steps
 
 
-@compiled_within
+@njit_inline
 def solve_stage(
     s: Array, x: float, v: float, u: float, y_known: float, zeta_known: float, weight: float, zeta: float
 ) -> tuple[float, float]:
     """State at the end of a stage: state = known + weight * rates(state), by Newton from ``zeta``."""
-    c0 = at_field(s[5], s[6], u)
-    both = c0 + at_field(s[7], s[8], u)
+    c0 = evaluate_coefficient(s[5], s[6], u)
+    both = c0 + evaluate_coefficient(s[7], s[8], u)
     inverse = 1.0 / (both + weight * s[9])
     constant = (both * y_known + weight * (c0 * v + s[9] * x)) * inverse
-    slope = weight * at_field(s[0], s[1], u) * inverse
+    slope = weight * evaluate_coefficient(s[0], s[1], u) * inverse
     A = 1.0 / s[2]
     beta = s[3] * A
     gamma = A - beta
-    for _ in range(ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         slip = v - (constant + slope * zeta - y_known) / weight
-        rate = hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
-        over_slip, over_zeta = hysteresis_slopes(slip, zeta, A, beta, gamma, s[4])
+        rate = compute_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
+        over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         steepness = 1.0 - weight * over_zeta + over_slip * slope
         # Just after a reversal the slope may be nearly flat or negative; a bounded move gets past it.
         move = (zeta_known + weight * rate - zeta) / max(steepness, 0.2)
-        zeta += min(max(move, -LARGEST_MOVE), LARGEST_MOVE)
+        zeta += min(max(move, -MAX_MOVE), MAX_MOVE)
         if abs(move) < TOLERANCE:
             break
     return constant + slope * zeta, zeta
 
 
-@compiled_within
-def first_stage(
+@njit_inline
+def solve_first_stage(
     s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y_rate: float, zeta_rate: float
 ) -> tuple[float, float]:
     """State at the fraction GAMMA of a step from (y, zeta), inputs there; the weight is HALF times the step."""
     return solve_stage(s, x, v, u, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
 
 
-@compiled_within
-def second_stage(
+@njit_inline
+def solve_second_stage(
     s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y1: float, zeta1: float
 ) -> tuple[float, float, float, float]:
     """State at the end of the step and its rates, from its start (y, zeta) and its first stage (y1, zeta1)."""
@@ -144,32 +148,32 @@ def second_stage(
     zeta_known = WEIGHT_STAGE * zeta1 - WEIGHT_START * zeta
     y, zeta = solve_stage(s, x, v, u, y_known, zeta_known, weight, zeta1)
     # The stage holds for zeta', whose power is dear; y' makes the force and is asked of the law to the last digit.
-    return y, zeta, _y_rate(s, x, v, u, y, zeta), (zeta - zeta_known) / weight
+    return y, zeta, _compute_y_rate(s, x, v, u, y, zeta), (zeta - zeta_known) / weight
 
 
-@compiled_within
-def rate_slopes(
+@njit_inline
+def differentiate_rates(
     s: Array, x: float, v: float, u: float, y: float, zeta: float, over_state: Array, over_inputs: Array, of: Array
 ) -> tuple[float, float]:
     """Slopes of y' and zeta' over everything, written into the arrays given; returns the rates too.
 
     Args:
         s, x, v, u, y, zeta: where; as everywhere.
-        over_state: (2, 2) slopes of y' and zeta' over y and zeta.
-        over_inputs: (2, 3) slopes of y' and zeta' over x, v and u.
-        of: (2, 10 or more) slopes of y' and zeta' over the structural coordinates come first.
+        over_state: (2, 2) sensitivities of y' and zeta' over y and zeta.
+        over_inputs: (2, 3) sensitivities of y' and zeta' over x, v and u.
+        of: (2, 10 or more) sensitivities of y' and zeta' over the structural coordinates come first.
     """
-    yield_force = at_field(s[0], s[1], u)
-    c0 = at_field(s[5], s[6], u)
-    c1 = at_field(s[7], s[8], u)
+    yield_force = evaluate_coefficient(s[0], s[1], u)
+    c0 = evaluate_coefficient(s[5], s[6], u)
+    c1 = evaluate_coefficient(s[7], s[8], u)
     inverse = 1.0 / (c0 + c1)
-    y_rate = inner_velocity(x, v, y, zeta, yield_force, c0, c1, s[9])
+    y_rate = compute_inner_velocity(x, v, y, zeta, yield_force, c0, c1, s[9])
     slip = v - y_rate
     A = 1.0 / s[2]
     beta = s[3] * A
     gamma = A - beta
-    zeta_rate = hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
-    over_slip, steep = hysteresis_slopes(slip, zeta, A, beta, gamma, s[4])
+    zeta_rate = compute_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
+    over_slip, steep = differentiate_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
     of[0, 0] = zeta * inverse
     of[0, 1] = u * zeta * inverse
     of[0, 2] = 0.0
@@ -180,7 +184,7 @@ def rate_slopes(
     of[0, 7] = -y_rate * inverse
     of[0, 8] = -u * y_rate * inverse
     of[0, 9] = (x - y) * inverse
-    for k in range(STRUCTURAL):
+    for k in range(STRUCTURAL_COUNT):
         of[1, k] = -over_slip * of[0, k]
     size = abs(zeta)
     power = (size + law.Z_GUARD) ** (s[4] - 1.0)

@@ -1,13 +1,13 @@
-"""The study: trials of settings on some recordings, kept in a file, shared by several workers.
+"""Tuning study: trials of settings on some recordings, stored in one SQLite file and shared by several workers.
 
-What is minimised is, in the mean over the recordings,
+The objective is the mean over the recordings of
 
-    error + (sqrt(1 + offset²) - 1) + price * seconds
+    error + (sqrt(1 + offset²) - 1) + time_weight * seconds
 
-with the force error of the *simulated* law on blocks that the training did not see, over the noise floor; the
-parameters' offset from the best simulated fit in standard deviations, as the factor by which it widens the error
-of an estimate that has a deviation of its own; and the processor time. A trial that does worse than the median of
-the others at the same time is pruned. The study lives in an SQLite file and goes on where it stopped.
+The error is that of the *simulated* law on blocks that the training did not use, over the noise floor. The offset
+is the distance of the parameters from the best simulated fit in standard deviations; its term is the factor by
+which it widens the error of an estimate with a standard deviation of one. Seconds are processor time. A trial that
+is worse than the median of the others at the same time is pruned. An interrupted study is continued from its file.
 """
 
 import multiprocessing
@@ -15,203 +15,213 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import optuna
 from optuna.trial import FrozenTrial, TrialState
 
-from identification.assemble import assemble
 from identification.errors import IdentificationError
-from identification.identify import fit_problem
-from identification.pinn.settings import read_settings
-from identification.pinn.supervision import Stopped, Supervision
-from identification.pinn.train import train
-from identification.problem import Problem
-from identification.recordings import load
-from identification.tuning.offset import offset
-from identification.tuning.space import settings_of, suggested, values_of
+from identification.fitting import Problem, assemble
+from identification.logs import load
+from identification.pinn import train
+from identification.pinn.common import (
+    PinnSettings,
+    TrainingMonitor,
+    TrainingStopped,
+    read_settings,
+    rename_preset,
+)
+from identification.pipeline import make_problem
+from identification.tuning.offset import estimate_offset
+from identification.tuning.space import apply_values, extract_values, suggest_settings
 
-if TYPE_CHECKING:
-    from identification.tuning.space import Settings
-
-_DONE = (TrialState.COMPLETE, TrialState.PRUNED)
-_STARTUP, _WARM = 6, 2
-"""Trials before anything is pruned, and moments of each that do not count."""
-_MOMENT = 0.5
-"""[s] of processor time between two moments at which trials are compared."""
-_APART = 100_000
-"""Moments from the beginning of one recording to that of the next."""
-_FAILED = 100.0
-"""[1] value of a trial that ended without any parameters."""
+_FINISHED_STATES = (TrialState.COMPLETE, TrialState.PRUNED)
+_STARTUP_TRIALS, _WARMUP_STEPS = 6, 2
+"""Trials before any is pruned, and reports of each trial that do not count."""
+_REPORT_INTERVAL = 0.5
+"""Processor time between two reports at which trials are compared [s]."""
+_RECORDING_OFFSET = 100_000
+"""Distance of the report numbers of one recording from those of the next."""
+_FAILED_VALUE = 100.0
+"""Objective of a trial that ended without parameters [1]."""
 
 
-class Result(NamedTuple):
-    """How a training ended."""
+class TrialResult(NamedTuple):
+    """Result of a trial on one recording; the study stores its fields under these names."""
 
     error: float
-    """[1] of the simulated law on blocks set aside, over the noise."""
+    """Error of the simulated law on validation blocks, over the noise [1]."""
     offset: float
-    """[1] deviations from the best simulated fit."""
+    """Distance from the best simulated fit [standard deviations]."""
     seconds: float
-    """[s] of processor time."""
+    """Processor time [s]."""
 
-    def value(self, price: float) -> float:
-        """[1] what the study minimises."""
-        return min(self.error + float(np.hypot(1.0, self.offset)) - 1.0, _FAILED) + price * self.seconds
+    def compute_value(self, time_weight: float) -> float:
+        """Return the objective [1]."""
+        return (
+            min(self.error + float(np.hypot(1.0, self.offset)) - 1.0, _FAILED_VALUE) + time_weight * self.seconds
+        )
 
 
 @dataclass(frozen=True)
-class Order:
-    """What a study is asked for."""
+class StudyRequest:
+    """Logs, preset and extent of a study."""
 
     logs: tuple[Path, ...]
     preset: str
     study: Path
-    """The SQLite file."""
+    """SQLite file of the study."""
     trials: int
-    """Trials in all, those of earlier calls included."""
+    """Number of trials in total, those of earlier calls included."""
     budget: float
-    """[s] of processor time for one training."""
-    price: float
-    """[1/s] what a second of processor time adds to the value."""
+    """Processor time of one training [s]."""
+    time_weight: float
+    """Weight of one second of processor time in the objective [1/s]."""
     seed: int
 
     @property
     def storage(self) -> str:
-        """The study's place as optuna names it."""
+        """The study's file as an address for optuna."""
         return f"sqlite:///{self.study.resolve()}"
 
 
-def run(order: Order, workers: int, progress: Callable[[str], None]) -> optuna.Study:
-    """Carry a study on until it has its trials.
+def run_study(request: StudyRequest, workers: int, progress: Callable[[str], None]) -> optuna.Study:
+    """Begin or continue a study until it has its number of trials.
 
     Args:
-        order: what is asked for.
-        workers: processes that work on it.
-        progress: told of every trial done here.
+        request: logs, preset and extent of the study.
+        workers: number of processes.
+        progress: receives a message for every trial of this process.
 
     Raises:
-        IdentificationError: a worker failed, or the file holds another network's study.
+        IdentificationError: a worker failed, or the file contains a study of other logs or of another preset.
     """
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = _open(order)
+    study = _open_study(request)
     if workers == 1:
-        work(order, progress)
-    else:
-        # Forked, a worker would inherit the open database, and torch's threads where it is loaded.
-        context = multiprocessing.get_context("spawn")
-        hands = [context.Process(target=work, args=(order, None, k)) for k in range(workers)]
-        for hand in hands:
-            hand.start()
-        for hand in hands:
-            hand.join()
-        if any(hand.exitcode for hand in hands):
-            raise IdentificationError(f"{order.study}: a worker failed; what is done is kept, call again to go on")
+        run_worker(request, progress)
+        return study
+    # A forked worker would inherit the open database, and torch's threads if torch is loaded.
+    context = multiprocessing.get_context("spawn")
+    processes = [context.Process(target=run_worker, args=(request, None, k)) for k in range(workers)]
+    for process in processes:
+        process.start()
+    for process in processes:
+        process.join()
+    if any(process.exitcode for process in processes):
+        raise IdentificationError(
+            f"{request.study}: a worker failed; finished trials are stored, repeat the command to continue"
+        )
     return study
 
 
-def work(order: Order, progress: Callable[[str], None] | None = None, worker: int = 0) -> None:
-    """One worker: trials until the study has enough."""
+def run_worker(request: StudyRequest, progress: Callable[[str], None] | None = None, worker: int = 0) -> None:
+    """Run trials until the study has its number of trials."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
-    study = _open(order, worker)
-    preset = read_settings(order.preset).model_copy(update={"seed": order.seed})
-    # Each log is a damper of its own.
-    problems = [fit_problem(assemble([load(log)])) for log in order.logs]
+    study = _open_study(request, worker)
+    preset = read_settings(request.preset).model_copy(update={"seed": request.seed})
+    # Each log is of another damper.
+    problems = [make_problem(assemble([load(log)])) for log in request.logs]
 
-    def value(trial: optuna.Trial) -> float:
-        settings, results = suggested(trial, preset), list[Result]()
+    def compute_objective(trial: optuna.Trial) -> float:
+        settings, results = suggest_settings(trial, preset), list[TrialResult]()
         for number, problem in enumerate(problems):
-            watched = _Watched(trial, problem.noise, number * _APART)
+            monitor = _TrialMonitor(trial, problem.noise, number * _RECORDING_OFFSET)
             try:
-                results.append(_trained(problem, settings, watched, order.budget))
-            except Stopped:
-                if watched.pruned:
+                results.append(_run_trial(problem, settings, monitor, request.budget))
+            except TrainingStopped:
+                if monitor.pruned:
                     raise optuna.TrialPruned from None
-                return _FAILED
-        for name, column in zip(Result._fields, zip(*results, strict=True), strict=True):
+                return _FAILED_VALUE
+        for name, column in zip(TrialResult._fields, zip(*results, strict=True), strict=True):
             trial.set_user_attr(name, fmean(column))
-        return fmean(result.value(order.price) for result in results)
+        return fmean(result.compute_value(request.time_weight) for result in results)
 
-    def said(study: optuna.Study, trial: FrozenTrial) -> None:
+    def on_trial(study: optuna.Study, trial: FrozenTrial) -> None:
         if progress is not None:
-            progress(_in_words(trial))
-        # Those of the other workers count, too.
-        if len(study.get_trials(states=_DONE, deepcopy=False)) >= order.trials:
+            progress(_describe_trial(trial))
+        # Trials of other workers count as well.
+        if len(study.get_trials(states=_FINISHED_STATES, deepcopy=False)) >= request.trials:
             study.stop()
 
-    left = order.trials - len(study.get_trials(states=_DONE, deepcopy=False))
-    if left > 0:
-        study.optimize(value, n_trials=left, callbacks=[said])
+    remaining = request.trials - len(study.get_trials(states=_FINISHED_STATES, deepcopy=False))
+    if remaining > 0:
+        study.optimize(compute_objective, n_trials=remaining, callbacks=[on_trial])
 
 
-def _trained(problem: Problem, settings: "Settings", watched: "_Watched", budget: float) -> Result:
-    supervision = Supervision(watched.step, watched.stop, budget)
-    # Trials are compared at the same processor time, since their steps cost differently.
-    watched.clock = lambda: supervision.seconds
-    # Without the stretches, the motion stays that of the fit from which the offset is counted.
-    found = train(problem, settings, supervision)
-    # A preset may set no block aside to be judged on.
-    error = found.simulation.validation or found.simulation.train
-    return Result(error / problem.noise, offset(problem, found), found.seconds)
+def _run_trial(
+    problem: Problem, settings: PinnSettings, trial_monitor: "_TrialMonitor", budget: float
+) -> TrialResult:
+    monitor = TrainingMonitor(trial_monitor.report, trial_monitor.should_stop, budget)
+    # Trials are compared at the same processor time, because the cost of a step depends on the settings.
+    trial_monitor.clock = lambda: monitor.seconds
+    # Without the stretches, the motion is that of the fit from which the offset is counted.
+    result = train(problem, settings, monitor)
+    # A preset may set no validation blocks aside.
+    error = result.simulation.validation or result.simulation.train
+    return TrialResult(error / problem.noise, estimate_offset(problem, result), result.seconds)
 
 
-class _Watched:
-    """A trial's moments on one recording, told to the study; asks whether it shall go on."""
+class _TrialMonitor:
+    """Reports of one trial on one recording to the study, and the study's decision to prune it."""
 
     def __init__(self, trial: optuna.Trial, noise: float, first: int) -> None:
         self.clock: Callable[[], float] = lambda: 0.0
         self.pruned = False
         self._trial, self._noise, self._first, self._last = trial, noise, first, -1
 
-    def step(self, what: str, error: float) -> None:
-        """Tell the force error [N] of the network now, once a moment."""
-        moment = int(self.clock() / _MOMENT)
-        if moment > self._last and np.isfinite(error):  # what is not yet known says nothing
-            self._last = moment
-            self._trial.report(error / self._noise, self._first + moment)
+    def report(self, _message: str, error: float) -> None:
+        """Report the network's present force error [N], once in each interval, unless it is unknown (NaN)."""
+        number = int(self.clock() / _REPORT_INTERVAL)
+        if number > self._last and np.isfinite(error):
+            self._last = number
+            self._trial.report(error / self._noise, self._first + number)
 
-    def stop(self) -> bool:
-        """Whether the trial is hopeless beside the others."""
+    def should_stop(self) -> bool:
+        """Return whether the trial is to be pruned."""
         self.pruned = self.pruned or self._trial.should_prune()
         return self.pruned
 
 
-def _open(order: Order, worker: int = 0) -> optuna.Study:
-    network = read_settings(order.preset).network
+def _open_study(request: StudyRequest, worker: int = 0) -> optuna.Study:
+    """Open or create the study, also under a former name of its network and preset."""
+    preset = rename_preset(request.preset)
+    settings = read_settings(preset)
+    stored_names = optuna.get_all_study_names(request.storage)
     study = optuna.create_study(
-        storage=order.storage,
-        study_name=network,
-        # A seed of its own, or all workers would try the same settings.
-        sampler=optuna.samplers.TPESampler(seed=order.seed + worker, multivariate=False),
-        pruner=optuna.pruners.MedianPruner(n_startup_trials=_STARTUP, n_warmup_steps=_WARM),
+        storage=request.storage,
+        study_name=next((n for n in stored_names if rename_preset(n) == settings.network), settings.network),
+        # With one seed, all workers would try the same settings.
+        sampler=optuna.samplers.TPESampler(seed=request.seed + worker, multivariate=False),
+        pruner=optuna.pruners.MedianPruner(n_startup_trials=_STARTUP_TRIALS, n_warmup_steps=_WARMUP_STEPS),
         load_if_exists=True,
     )
-    # Values of other logs or of another preset would not compare.
-    asked = {"logs": [str(log) for log in order.logs], "preset": order.preset}
+    logs = [str(log) for log in request.logs]
     if not study.user_attrs:
-        for name, given in asked.items():
-            study.set_user_attr(name, given)
-        # The preset itself comes first: what the others are compared with.
-        study.enqueue_trial(values_of(read_settings(order.preset)))
-    if any(study.user_attrs.get(name) != given for name, given in asked.items()):
+        study.set_user_attr("logs", logs)
+        study.set_user_attr("preset", preset)
+        # The preset itself is the first trial, as the reference of the others.
+        study.enqueue_trial(extract_values(settings))
+    # Objectives of other logs or of another preset are not comparable.
+    if study.user_attrs.get("logs") != logs or rename_preset(study.user_attrs.get("preset", "")) != preset:
         raise IdentificationError(
-            f"{order.study}: holds a study of {study.user_attrs}; give another --study for other logs or presets"
+            f"{request.study}: contains a study of {study.user_attrs}; "
+            "use another --study for other logs or presets"
         )
     return study
 
 
-def best_settings(study: optuna.Study, preset: str) -> "Settings":
-    """The preset with the values of the best trial."""
-    base = read_settings(preset)
-    return settings_of(base, study.best_trial.params)
+def get_best_settings(study: optuna.Study, preset: str) -> PinnSettings:
+    """Return the preset with the values of the best trial."""
+    return apply_values(read_settings(preset), study.best_trial.params)
 
 
-def _in_words(trial: FrozenTrial) -> str:
+def _describe_trial(trial: FrozenTrial) -> str:
     if trial.state == TrialState.PRUNED:
         return f"trial {trial.number}: pruned"
     try:
-        error, apart, seconds = (trial.user_attrs[name] for name in Result._fields)
+        error, offset, seconds = (trial.user_attrs[name] for name in TrialResult._fields)
     except KeyError:
-        return f"trial {trial.number}: nothing found"
-    return f"trial {trial.number}: {error:.4f} of the noise, {apart:.2f} deviations off, {seconds:.1f} s"
+        return f"trial {trial.number}: no parameters found"
+    return f"trial {trial.number}: {error:.4f} of the noise, {offset:.2f} deviations off, {seconds:.1f} s"

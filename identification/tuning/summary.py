@@ -1,4 +1,4 @@
-"""What a study found, as a page and a picture."""
+"""Summary of a tuning study as a page and a plot."""
 
 from pathlib import Path
 from typing import Any
@@ -7,83 +7,103 @@ import matplotlib
 import optuna
 from matplotlib.figure import Figure
 from optuna.importance import PedAnovaImportanceEvaluator
-from optuna.trial import TrialState
+from optuna.trial import FrozenTrial, TrialState
 
-_SHOWN = 10
-"""Trials in the table."""
-_FEWEST = 10
-"""Trials from which importances mean anything."""
+from identification.pinn.common import rename_preset
+from identification.tuning.space import describe_parameter
+
+_TABLE_TRIALS = 10
+"""Number of trials in the table."""
+_MIN_TRIALS = 10
+"""Smallest number of trials for which importances are computed."""
 
 
-def importances(study: optuna.Study) -> dict[str, float]:
-    """Share of each setting in what sets the better trials apart; empty where too few have ended."""
-    if len(study.get_trials(states=(TrialState.COMPLETE,), deepcopy=False)) < _FEWEST:
+def compute_importances(study: optuna.Study) -> dict[str, float]:
+    """Return the importance [1] of each varied setting for the objective; empty if too few trials have ended."""
+    if len(study.get_trials(states=(TrialState.COMPLETE,), deepcopy=False)) < _MIN_TRIALS:
         return {}
-    # The usual evaluator needs a random forest; this one needs nothing.
-    return dict(optuna.importance.get_param_importances(study, evaluator=PedAnovaImportanceEvaluator()))
+    # optuna's default evaluator needs scikit-learn; this one has no dependencies.
+    importances = optuna.importance.get_param_importances(study, evaluator=PedAnovaImportanceEvaluator())
+    network = rename_preset(study.study_name)
+    return {describe_parameter(name, network): value for name, value in importances.items()}
 
 
-def write_picture(path: Path, shares: dict[str, float]) -> None:
-    """The importances as bars."""
+def write_plot(path: Path, importances: dict[str, float]) -> None:
+    """Write the importances as a bar chart."""
     matplotlib.use("Agg")
-    figure = Figure(figsize=(6.0, 0.4 * len(shares) + 1.0), layout="constrained")
+    figure = Figure(figsize=(6.0, 0.4 * len(importances) + 1.0), layout="constrained")
     axes = figure.subplots()
-    names = list(reversed(shares))
-    axes.barh(names, [shares[name] for name in names], color="#31688e", height=0.6)
+    names = list(reversed(importances))
+    axes.barh(names, [importances[name] for name in names], color="#31688e", height=0.6)
     axes.set_xlabel("importance [1]")
     axes.spines[["top", "right"]].set_visible(False)
-    # Without the library's version in it: the same study makes the same file.
+    # Without the version of the library, the same study yields the same file.
     figure.savefig(path, dpi=90, metadata={"Software": None})
 
 
-def page(study: optuna.Study, settings: str, shares: dict[str, float], picture: str | None) -> str:
-    """The study in words and tables."""
+def format_summary(
+    study: optuna.Study, settings: str, importances: dict[str, float], plot_name: str | None
+) -> str:
+    """Return the study as a page in Markdown.
+
+    Args:
+        study: a study with at least one complete trial.
+        settings: best settings as JSON.
+        importances: importance of each varied setting; empty if unknown.
+        plot_name: file name of the plot; None without a plot.
+    """
     trials = study.get_trials(deepcopy=False)
-    ended = sorted((t for t in trials if t.state == TrialState.COMPLETE), key=_value)
-    pruned = sum(t.state == TrialState.PRUNED for t in trials)
-    best = ended[0]
+    complete = sorted((t for t in trials if t.state == TrialState.COMPLETE), key=_get_value)
+    network = rename_preset(study.study_name)
     lines = [
-        f"# Tuning of the {study.study_name} network",
+        f"# Tuning of the network `{network}`",
         "",
-        f"{len(trials)} trials, {len(ended)} to their end, {pruned} pruned; "
-        f"preset `{study.user_attrs['preset']}`, which is trial 0. Best: trial {best.number}, simulated error "
-        f"{_attribute(best, 'error')} of the noise on blocks that it was not trained on, parameters "
-        f"{_attribute(best, 'offset')} deviations from the best simulated fit, {_attribute(best, 'seconds')} s of "
-        f"processor time; means over {len(study.user_attrs['logs'])} logs.",
+        _describe_study(study, trials, complete),
         "",
         "```json",
         settings,
         "```",
         "",
-        *_table(ended[:_SHOWN] + [t for t in ended[_SHOWN:] if t.number == 0]),
+        *_format_table(complete[:_TABLE_TRIALS] + [t for t in complete[_TABLE_TRIALS:] if t.number == 0], network),
     ]
-    if shares:
+    if importances:
         lines += ["", "| setting | importance |", "| --- | ---: |"]
-        lines += [f"| `{name}` | {share:.2f} |" for name, share in shares.items()]
-    if picture is not None:
-        lines += ["", f"![Importance of each setting]({picture})"]
+        lines += [f"| `{name}` | {importance:.2f} |" for name, importance in importances.items()]
+    if plot_name is not None:
+        lines += ["", f"![Importance of each setting]({plot_name})"]
     return "\n".join(lines) + "\n"
 
 
-def _table(trials: list[optuna.trial.FrozenTrial]) -> list[str]:
+def _describe_study(study: optuna.Study, trials: list[FrozenTrial], complete: list[FrozenTrial]) -> str:
+    best, pruned = complete[0], sum(t.state == TrialState.PRUNED for t in trials)
+    error, offset, seconds = (_format_attribute(best, name) for name in ("error", "offset", "seconds"))
+    return (
+        f"{len(trials)} trials, {len(complete)} complete, {pruned} pruned. Trial 0 is the preset "
+        f"`{rename_preset(study.user_attrs['preset'])}`. The best is trial {best.number}: simulated error {error} "
+        f"of the noise on validation blocks, parameters {offset} deviations from the best simulated fit, "
+        f"{seconds} s of processor time; means over {len(study.user_attrs['logs'])} logs."
+    )
+
+
+def _format_table(trials: list[FrozenTrial], network: str) -> list[str]:
     names = list(trials[0].params)
-    varied = " | ".join(f"`{name}`" for name in names)
-    head = [f"| trial | value | error over noise | offset | s | {varied} |"]
-    head.append("| ---: | ---: | ---: | ---: | ---: |" + " ---: |" * len(names))
+    varied = " | ".join(f"`{describe_parameter(name, network)}`" for name in names)
+    lines = [f"| trial | value | error over noise | offset | s | {varied} |"]
+    lines.append("| ---: | ---: | ---: | ---: | ---: |" + " ---: |" * len(names))
     for t in trials:
-        values = " | ".join(_short(t.params[name]) for name in names)
-        measured = " | ".join(_attribute(t, name) for name in ("error", "offset", "seconds"))
-        head.append(f"| {t.number} | {_value(t):.4f} | {measured} | {values} |")
-    return head
+        values = " | ".join(_format_value(t.params[name]) for name in names)
+        measured = " | ".join(_format_attribute(t, name) for name in ("error", "offset", "seconds"))
+        lines.append(f"| {t.number} | {_get_value(t):.4f} | {measured} | {values} |")
+    return lines
 
 
-def _value(trial: optuna.trial.FrozenTrial) -> float:
+def _get_value(trial: FrozenTrial) -> float:
     return float("inf") if trial.value is None else trial.value
 
 
-def _attribute(trial: optuna.trial.FrozenTrial, name: str) -> str:
-    return _short(trial.user_attrs[name]) if name in trial.user_attrs else "–"
+def _format_attribute(trial: FrozenTrial, name: str) -> str:
+    return _format_value(trial.user_attrs[name]) if name in trial.user_attrs else "–"
 
 
-def _short(value: Any) -> str:
+def _format_value(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)

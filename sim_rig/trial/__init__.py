@@ -1,1 +1,3 @@
-"""The product's own blind trial: sealed scenarios, recorded, diagnosed, unsealed, scored."""
+"""Blind trial of the diagnosis: sealed scenarios are recorded, diagnosed, unsealed and scored."""
+
+__all__: list[str] = []

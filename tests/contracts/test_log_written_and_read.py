@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bench.recorder.header import Channel, RunHeader
-from bench.recorder.reader import read_log
-from bench.recorder.writer import LogWriter
-from identification.errors import LogUnreadable
-from identification.recordings import load
+from bench.log.header import ChannelInfo, RunHeader
+from bench.log.reader import read_log
+from bench.log.writer import LogWriter
+from identification.errors import UnreadableLogError
+from identification.logs.recording import load
 
 RATE = 1000
 COUNT = 600
@@ -29,7 +29,7 @@ def header(**more):
         "drive_kind": "coil_v",
         "drive_unit": "V",
         "source": "run",
-        "channels": {"force": Channel(unit="N", rate_hz=1000.0, filter=lowpass, delay_s=1.1e-3)},
+        "channels": {"force": ChannelInfo(unit="N", rate_hz=1000.0, filter=lowpass, delay_s=1.1e-3)},
     }
     return RunHeader(**(said | more))
 
@@ -99,5 +99,5 @@ def test_both_readers_see_the_same_log(log):
 def test_a_log_that_was_cut_off_is_refused_until_salvaged(log):
     path, _ = log
     path.write_bytes(path.read_bytes()[:-200])
-    with pytest.raises(LogUnreadable, match="mrbench salvage"):
+    with pytest.raises(UnreadableLogError, match="mrbench salvage"):
         load(path)

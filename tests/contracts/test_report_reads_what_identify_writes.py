@@ -6,8 +6,8 @@ import pytest
 from pydantic import BaseModel
 
 from bench.report import diagnosis, documents
-from identification import results
-from identification.gap import documents as gap_documents
+from identification.documents import diagnosis as gap_documents
+from identification.documents import fit
 
 
 def part_of(annotation):
@@ -25,7 +25,7 @@ def assert_within(read, written):
 
 @pytest.mark.parametrize("name", ["Fit", "Prediction"])
 def test_every_key_that_a_report_reads_is_one_that_is_written(name):
-    assert_within(getattr(documents, name), getattr(results, name))
+    assert_within(getattr(documents, name), getattr(fit, name))
 
 
 def test_every_key_of_a_diagnosis_that_a_report_reads_is_one_that_is_written():

@@ -4,8 +4,9 @@ import os
 import sys
 from pathlib import Path
 
-import blocks
 import pytest
+
+from tests.support import blocks
 
 STROKES = {"10mm_1Hz.csv": (0, 7500), "5mm_2.5Hz.csv": (7500, 15704)}
 """Which samples of `quick` each file holds."""

@@ -1,7 +1,8 @@
 """Every block of README, tutorial and how-to is run, in the order of its page, as a reader would."""
 
-import blocks
 import pytest
+
+from tests.support import blocks
 
 RUNNABLE = ("sh", "console")
 

@@ -1,15 +1,15 @@
 """What pages refer to is there, and what they repeat of the code is what the code says."""
 
-import importlib.util
 import re
 import tomllib
 from importlib.metadata import entry_points
 
-import blocks
 import pytest
 
-from bench.rig.config import BenchConfig
+from bench.config import BenchConfig
 from bench.safety.limits import Action
+from tests.support import blocks
+from tests.support.reference import generator
 
 HIDDEN = {".venv", "node_modules", "build", "runs"}
 ALL_PAGES = [p for p in sorted(blocks.ROOT.rglob("*.md")) if not HIDDEN & set(p.relative_to(blocks.ROOT).parts)]
@@ -19,14 +19,6 @@ COMMAND_LINE = blocks.ROOT / "docs" / "reference" / "command-line.md"
 
 def name(page):
     return str(page.relative_to(blocks.ROOT))
-
-
-@pytest.fixture(scope="module")
-def generator():
-    spec = importlib.util.spec_from_file_location("generate", blocks.ROOT / "docs" / "generate_reference.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def anchors(page):
@@ -53,10 +45,10 @@ def test_every_page_of_the_documentation_is_reached_from_its_index(page):
 
 
 @pytest.mark.parametrize("page", REFERENCE, ids=name)
-def test_generated_parts_of_the_reference_are_up_to_date(page, generator):
+def test_generated_parts_of_the_reference_are_up_to_date(page):
     text = page.read_text()
     assert "<!-- generated: " in text
-    assert text == generator.filled(text), "run: python docs/generate_reference.py"
+    assert text == generator.fill_page(text), "run: python docs/generate_reference.py"
 
 
 @pytest.mark.parametrize("command", sorted(entry.name for entry in entry_points(group="mrbench.commands")))
@@ -83,4 +75,4 @@ def test_the_pieces_of_bench_toml_in_the_how_to_make_a_bench():
     pieces = [block.text for block in blocks.blocks(page) if block.language == "toml"]
     config = BenchConfig.model_validate(tomllib.loads("\n".join(pieces)))
     assert len(config.instruments) == 5
-    assert config.limits.matrix()["force"][Action.TRIP] == 1500.0
+    assert config.limits.make_limit_matrix()["force"][Action.TRIP] == 1500.0

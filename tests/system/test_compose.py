@@ -12,9 +12,10 @@ from urllib.request import Request, urlopen
 
 import pytest
 import yaml
-from live_bench import until
-from test_page import CHROMIUM, FOLDER, NODE, browser_test
-from test_service import PATIENCE, PROMPT, TINY
+
+from tests.support.live_bench import until
+from tests.system.test_page import CHROMIUM, FOLDER, NODE, browser_test
+from tests.system.test_service import PATIENCE, PROMPT, TINY
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docker-compose.yml"

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.recorder.header import RunHeader
-from bench.recorder.messages import MESSAGES, schema_name
-from bench.recorder.reader import read_log
-from bench.recorder.salvage import salvage
-from bench.recorder.writer import LogWriter
+from bench.log.header import RunHeader
+from bench.log.messages import MESSAGES, make_schema_name
+from bench.log.reader import read_log
+from bench.log.salvage import salvage_log
+from bench.log.writer import LogWriter
 
 FOLDER = Path(__file__).with_name("javascript")
 NODE = shutil.which("node")
@@ -35,10 +35,10 @@ def write_log(path):
     time_ns = 1_700_000_000_123_456_789 + np.arange(3000, dtype=np.int64) * 1_000_003
     with LogWriter(path, header) as log:
         log.attach("method.json", "application/json", b"{}")
-        log.segment(int(time_ns[0]), phase="start", **mark)
-        log.samples(time_ns, columns)
-        log.segment(int(time_ns[-1]), phase="end", **mark)
-        log.event(int(time_ns[-1]), "state", "run finished")
+        log.write_segment(int(time_ns[0]), phase="start", **mark)
+        log.write_samples(time_ns, columns)
+        log.write_segment(int(time_ns[-1]), phase="end", **mark)
+        log.write_event(int(time_ns[-1]), "state", "run finished")
     return path
 
 
@@ -55,7 +55,7 @@ def both(request, tmp_path_factory):
     path = write_log(tmp_path_factory.mktemp("log") / "run.mcap")
     if request.param == "truncated":
         path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-        salvage(path)
+        salvage_log(path)
     return read_log(path), read_with_javascript(path)
 
 
@@ -77,7 +77,7 @@ def test_values_are_the_same_to_the_last_bit(both):
 
 def test_schemas_have_their_names(both):
     assert both[1]["schemas"] == {
-        topic: {"name": schema_name(topic), "encoding": "jsonschema", "message": "json"} for topic in MESSAGES
+        topic: {"name": make_schema_name(topic), "encoding": "jsonschema", "message": "json"} for topic in MESSAGES
     }
 
 

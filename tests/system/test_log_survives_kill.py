@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bench.errors import LogError
-from bench.recorder.reader import read_log
+from bench.log.reader import read_log
 
 RECORDER = Path(__file__).with_name("record_in_real_time.py")
 

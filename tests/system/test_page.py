@@ -8,7 +8,8 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from fake_service import CLAMPED, REFUSAL, SILENCE, STATIC, TOKEN, TRIP, FakeBench, served
+
+from tests.support.fake_page_service import CLAMPED, REFUSAL, SILENCE, STATIC, TOKEN, TRIP, FakeBench, served
 
 FOLDER = Path(__file__).with_name("javascript")
 NODE = shutil.which("node")

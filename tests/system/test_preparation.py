@@ -3,12 +3,12 @@
 import subprocess
 
 import pytest
-from live_bench import COMMAND, DEADLINE, ended, live_bench, method, until
 
-from bench.agent.link import AgentClient
-from bench.agent.messages import PrepareCommand, RunCommand, StatusCommand, StopCommand
-from bench.errors import AgentUnreachable
-from bench.rig.config import load_config
+from bench.agent_protocol.link import AgentClient
+from bench.agent_protocol.messages import PrepareCommand, RunCommand, StatusCommand, StopCommand
+from bench.config import load_config
+from bench.errors import AgentUnreachableError
+from tests.support.live_bench import COMMAND, DEADLINE, ended, live_bench, method, until
 
 pytestmark = [pytest.mark.wire, pytest.mark.timeout(240)]
 
@@ -36,7 +36,7 @@ def client(bench):
 def answers(bench):
     try:
         return client(bench).send(StatusCommand()).ok
-    except AgentUnreachable:
+    except AgentUnreachableError:
         return False
 
 
@@ -73,7 +73,7 @@ def test_the_way_from_an_empty_rig_to_a_centred_specimen(bench):
     assert [words.split(":")[0] for _, words in said] == ["homed", "homed", "mounted", "mounted", "centred"]
     assert "10.0" in said[3][1]
     assert bench.truth().position[-1] == pytest.approx(0.01, abs=1e-4)
-    assert status(bench).mounting == "centred"
+    assert status(bench).reference_state == "centred"
 
 
 def test_a_move_out_of_the_limits_is_refused_before_anything_moves(bench):
@@ -93,7 +93,7 @@ def test_a_stop_breaks_homing_off_and_the_rod_rests(bench):
     agent.send(StopCommand())
     until(lambda: status(bench).state == "idle")
     until(lambda: status(bench).step.outcome == "failed")
-    assert "broken off" in status(bench).step.words
+    assert "interrupted" in status(bench).step.message
     until(bench.rests)
 
 

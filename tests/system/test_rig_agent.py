@@ -8,14 +8,21 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
-from live_bench import COMMAND, DEADLINE, ended, live_bench, method, until
 
 from bench.agent.agent import Agent
-from bench.agent.link import AgentClient
-from bench.agent.messages import AgentEvent, AgentStatus, RunCommand, Samples, ShutDownCommand, StatusCommand
-from bench.recorder.reader import read_log
-from bench.rig.config import load_config
-from sim_rig.faults import WireFault
+from bench.agent_protocol.link import AgentClient
+from bench.agent_protocol.messages import (
+    AgentEvent,
+    AgentStatus,
+    RunCommand,
+    Samples,
+    ShutDownCommand,
+    StatusCommand,
+)
+from bench.config import load_config
+from bench.log.reader import read_log
+from sim_rig.protocols.fault_proxy import WireFault
+from tests.support.live_bench import COMMAND, DEADLINE, ended, live_bench, method, until
 
 pytestmark = [pytest.mark.wire, pytest.mark.timeout(240)]
 

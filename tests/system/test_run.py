@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.recorder.reader import read_log
+from bench.log.reader import read_log
 
 COMMAND = Path(sys.executable).parent / "mrbench"
 

@@ -1,4 +1,4 @@
-"""Every test of this folder talks to a simulated instrument over its real protocol."""
+"""Mark every test of this folder: it uses a simulated instrument over its real protocol."""
 
 from pathlib import Path
 

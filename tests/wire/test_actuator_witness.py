@@ -1,17 +1,15 @@
-"""A plain canopen node, not our driver, talks to the simulated drive."""
+"""The simulated drive and a plain canopen node, which shares no code with the driver."""
 
 import math
 import time
-from pathlib import Path
 
 import canopen
 import pytest
-from can_rig import CanRig, wait_until
 
-import drivers
-from sim_rig.drive_states import State
+from drivers.wire_files import ACTUATOR_EDS
+from sim_rig.instruments.cia402_states import DriveState
+from tests.support.can_rig import CanRig, wait_until
 
-EDS = str(Path(drivers.__file__).parent / "wire" / "actuator.eds")
 pytestmark = pytest.mark.timeout(60)
 
 
@@ -27,14 +25,14 @@ def node(rig):
     network = canopen.Network()
     network.NOTIFIER_CYCLE = 0.05
     network.connect(interface="socketcand", channel="can0", host="127.0.0.1", port=rig.server.port)
-    node = network.add_node(5, EDS)
+    node = network.add_node(5, str(ACTUATOR_EDS))
     node.sdo.RESPONSE_TIMEOUT = 2.0
     yield node
     network.disconnect()
 
 
 def switch_on(node) -> None:
-    """To operation enabled in cyclic synchronous position, by object access."""
+    """Enable operation in cyclic synchronous position mode, by object access."""
     node.sdo[0x6060].raw = 8
     for word in (0x06, 0x07, 0x0F):
         node.sdo[0x6040].raw = word
@@ -42,7 +40,7 @@ def switch_on(node) -> None:
 
 
 def send(node, target: int, controlword: int = 0x0F) -> None:
-    """One setpoint and a SYNC."""
+    """Send one setpoint and a SYNC."""
     pdo = node.rpdo[1]
     pdo[0x6040].raw, pdo[0x6060].raw, pdo[0x607A].raw = controlword, 8, target
     pdo.transmit()
@@ -66,14 +64,14 @@ def test_objects_are_read_as_the_data_sheet_says(node):
     assert node.sdo[0x1800][1].raw == 0x40000185
 
 
-def test_every_object_of_the_data_sheet_answers(node):
+def test_every_object_of_the_data_sheet_can_be_read(node):
     for entry in node.object_dictionary.values():
         variables = [entry] if isinstance(entry, canopen.objectdictionary.ODVariable) else entry.values()
         for variable in variables:
             assert node.sdo.upload(variable.index, variable.subindex) is not None
 
 
-def test_writes_are_kept_and_wrong_ones_aborted_with_the_right_code(node):
+def test_valid_writes_are_stored_and_wrong_ones_aborted_with_the_right_code(node):
     node.sdo.download(0x6065, 0, (12_345).to_bytes(4, "little"), force_segment=True)
     assert node.sdo[0x6065].raw == 12_345
     for index, data, code in (
@@ -90,7 +88,7 @@ def test_writes_are_kept_and_wrong_ones_aborted_with_the_right_code(node):
     assert aborted.value.code == 0x06090011
 
 
-def test_network_commands_change_the_state_that_the_heartbeat_tells(node):
+def test_network_commands_change_the_state_in_the_heartbeat(node):
     node.sdo[0x1017].raw = 20
     for state in ("OPERATIONAL", "STOPPED", "PRE-OPERATIONAL"):
         node.nmt.state = state
@@ -99,31 +97,31 @@ def test_network_commands_change_the_state_that_the_heartbeat_tells(node):
 
 
 def test_reset_brings_a_boot_up_message(node):
-    heard = []
-    node.nmt.add_heartbeat_callback(heard.append)
+    states = []
+    node.nmt.add_heartbeat_callback(states.append)
     node.nmt.state = "RESET"
-    wait_until(lambda: 0 in heard)
+    wait_until(lambda: 0 in states)
 
 
-def test_setpoints_by_process_data_are_interpolated_and_answered(rig, operational):
+def test_setpoints_by_process_data_are_interpolated_and_give_samples(rig, operational):
     node = operational
-    seen = []
-    node.tpdo[1].add_callback(lambda pdo: seen.append((pdo[0x6064].raw, pdo[0x1013].raw)))
+    samples = []
+    node.tpdo[1].add_callback(lambda pdo: samples.append((pdo[0x6064].raw, pdo[0x1013].raw)))
     node.sdo[0x1400][5].raw = 1000
     switch_on(node)
     for target in range(0, 20_001, 200):
         send(node, target)
         time.sleep(0.004)  # the pace of the setpoints
     wait_until(lambda: abs(rig.rod.position - 2e-3) < 2e-4)
-    wait_until(lambda: len(seen) == 101)
-    places = [place for place, _ in seen]
-    assert places[0] == 0
-    assert max(places) > 15_000
-    assert seen[-1][1] > seen[0][1]
+    wait_until(lambda: len(samples) == 101)
+    positions = [position for position, _ in samples]
+    assert positions[0] == 0
+    assert max(positions) > 15_000
+    assert samples[-1][1] > samples[0][1]
     assert node.tpdo[2][0x6077].raw == round(120 * 5e-3 / (2 * math.pi) / 1.27 * 1000)
 
 
-def test_stale_setpoints_end_in_a_quick_stop_an_emergency_and_a_latched_state(rig, operational):
+def test_stale_setpoints_cause_a_quick_stop_an_emergency_and_a_latched_state(rig, operational):
     node = operational
     emergencies = []
     node.emcy.add_callback(emergencies.append)
@@ -131,7 +129,7 @@ def test_stale_setpoints_end_in_a_quick_stop_an_emergency_and_a_latched_state(ri
     send(node, 100)
     wait_until(lambda: emergencies)
     assert emergencies[0].code == 0x8250
-    assert rig.drive.state is State.QUICK_STOP
+    assert rig.drive.state is DriveState.QUICK_STOP
     node.sdo[0x6040].raw = 0x0F
     assert node.sdo[0x6041].raw & 0x6F == 0x07
     node.sdo[0x6040].raw = 0x00
@@ -145,19 +143,24 @@ def test_lost_master_heartbeat_stops_the_drive(rig, operational):
     node.sdo[0x1016][1].raw = 127 << 16 | 100
     switch_on(node)
     node.network.send_message(0x77F, b"\x05")
-    wait_until(lambda: rig.drive.state is State.QUICK_STOP)
+    wait_until(lambda: rig.drive.state is DriveState.QUICK_STOP)
     assert node.sdo[0x603F].raw == 0x8130
 
 
 @pytest.mark.parametrize(
     ("reaction", "state"),
-    [(0, State.ENABLED), (1, State.FAULT), (2, State.SWITCH_ON_DISABLED), (3, State.QUICK_STOP)],
+    [
+        (0, DriveState.ENABLED),
+        (1, DriveState.FAULT),
+        (2, DriveState.SWITCH_ON_DISABLED),
+        (3, DriveState.QUICK_STOP),
+    ],
 )
 def test_reaction_to_a_lost_master_is_that_of_6007(rig, operational, reaction, state):
     operational.sdo[0x6007].raw = reaction
     operational.sdo[0x1400][5].raw = 0
     switch_on(operational)
-    rig.drive.master_lost(rig.rod.now_ns())
+    rig.drive.on_master_lost(rig.rod.now_ns())
     wait_until(lambda: rig.drive.state is state)
 
 
@@ -165,23 +168,23 @@ def test_target_outside_the_software_limits_is_a_fault(rig, operational):
     node = operational
     switch_on(node)
     send(node, 700_000)
-    wait_until(lambda: rig.drive.state is State.FAULT)
+    wait_until(lambda: rig.drive.state is DriveState.FAULT)
     assert node.sdo[0x603F].raw == 0x8612
     assert node.sdo[0x1003][1].raw == 0x8612
     node.sdo[0x6040].raw = 0x80
-    assert rig.drive.state is State.SWITCH_ON_DISABLED
+    assert rig.drive.state is DriveState.SWITCH_ON_DISABLED
 
 
-def test_short_process_data_are_told_and_not_used(rig, operational):
+def test_short_process_data_are_reported_and_not_used(rig, operational):
     emergencies = []
     operational.emcy.add_callback(emergencies.append)
     operational.network.send_message(0x205, b"\x0f\x00")
     wait_until(lambda: emergencies)
     assert emergencies[0].code == 0x8210
-    assert rig.drive.state is State.SWITCH_ON_DISABLED
+    assert rig.drive.state is DriveState.SWITCH_ON_DISABLED
 
 
-def test_bus_load_is_that_of_the_frames(rig, operational):
+def test_the_bus_load_is_that_of_the_frames(rig, operational):
     bits = rig.server.timing.bits
     operational.sdo[0x1017].raw = 0
     frames = rig.server.timing.frames
@@ -189,4 +192,4 @@ def test_bus_load_is_that_of_the_frames(rig, operational):
         operational.sdo[0x6041].raw  # noqa: B018 - the access is what counts
     assert rig.server.timing.frames - frames <= 22
     assert rig.server.timing.bits > bits
-    assert 0 < rig.server.load() < 1
+    assert 0 < rig.server.compute_load() < 1

@@ -3,29 +3,29 @@ import time
 import numpy as np
 import pytest
 import serial
-from serial_examples import KnownForce, awaited, collected, joined, numbers, same
 
-from drivers.ascii_load_cell import AsciiLoadCell
-from drivers.ascii_load_cell_stream import ReadingStream
-from drivers.errors import NoReply, NotConnected, OutOfRange
-from sim_rig.serial_ascii_load_cell import serial_ascii_load_cell
-from sim_rig.serial_port import corrupted, cut, lost, with_garbage
+from drivers.errors import NoReplyError, NotConnectedError, OutOfRangeError
+from drivers.load_cell.ascii_decoder import AsciiLoadCellDecoder
+from drivers.load_cell.ascii_load_cell import AsciiLoadCell
+from sim_rig.instruments.ascii_load_cell import make_ascii_load_cell
+from sim_rig.protocols.serial_port import drop, flip_bit, prepend_noise, truncate
+from tests.support.serial_lines import KnownForce, collect, is_equal, join, numbers, wait_until
 
 TCP = "127.0.0.1:0"
 
 
 def steps(ticks):
-    """[N] another whole multiple of 9.80665 N every 20 ms."""
+    """[N] Another whole multiple of 9.80665 N every 20 ms."""
     return 9.80665 * (ticks // 20 % 100)
 
 
 @pytest.fixture
 def rig():
-    """Starts indicators, each with a driver that is not connected yet; stops them all."""
+    """Starts indicators, each with a driver that is not connected; stops all at the end."""
     running, drivers = [], []
 
     def start(force=steps, address="pty", **options):
-        adapter, device = serial_ascii_load_cell(KnownForce(force), address, **{"rate": 50, **options})
+        adapter, device = make_ascii_load_cell(KnownForce(force), address, **{"rate": 50, **options})
         adapter.start()
         running.append(adapter)
         drivers.append(AsciiLoadCell("indicator", adapter.address, time.monotonic_ns))
@@ -40,7 +40,7 @@ def rig():
 
 @pytest.fixture
 def streaming(rig):
-    """The same, connected."""
+    """Starts indicators with connected drivers."""
 
     def start(*arguments, **options):
         adapter, device, driver = rig(*arguments, **options)
@@ -50,20 +50,20 @@ def streaming(rig):
     return start
 
 
-def right(blocks):
-    """Every value is one that the indicator has shown."""
-    kilograms = joined(blocks, "values") / 9.80665
+def is_right(blocks):
+    """Whether every value is one that the indicator has shown."""
+    kilograms = join(blocks, "values") / 9.80665
     return np.allclose(kilograms, np.rint(kilograms), atol=1e-9) and kilograms.max() < 100
 
 
 @pytest.mark.parametrize("address", ["pty", TCP])
 def test_every_reading_comes_once_and_is_uncertain(streaming, address):
     _, _, driver = streaming(address=address)
-    blocks = collected(driver, 40)
-    assert right(blocks)
+    blocks = collect(driver, 40)
+    assert is_right(blocks)
     assert np.all(np.diff(numbers(blocks)) == 1)
     assert {(block.quality, block.device_ns) for block in blocks} == {("uncertain", None)}
-    assert driver.health().corrupted == driver.health().lost == 0
+    assert driver.get_health().corrupted == driver.get_health().lost == 0
 
 
 @pytest.mark.parametrize("unit", ["N", "kN", "kg", "lb"])
@@ -73,78 +73,80 @@ def test_every_unit_becomes_newtons(streaming, unit):
     assert driver.read("force_raw").quality == "uncertain"
 
 
-def test_a_net_reading_does_not_know_the_untared_force(streaming):
+def test_a_net_reading_has_no_untared_force(streaming):
     _, device, driver = streaming(lambda ticks: np.full(len(ticks), 98.0665))
     device.press_tare()
-    awaited(lambda: driver.read("force").value == 0.0, "the net reading")
-    with pytest.raises(NoReply, match=r"no reading of force_raw .* shows gross"):
+    wait_until(lambda: driver.read("force").value == 0.0, "the net reading")
+    with pytest.raises(NoReplyError, match=r"no reading of force_raw .* shows gross"):
         driver.read("force_raw")
 
 
-@pytest.mark.parametrize(("harm", "refused"), [(cut, 1), (with_garbage, 3), (corrupted, 0), (lost, 0)])
-def test_a_harmed_line_is_refused_and_counted(streaming, harm, refused):
+@pytest.mark.parametrize(("fault", "refused"), [(truncate, 1), (prepend_noise, 3), (flip_bit, 0), (drop, 0)])
+def test_a_faulty_line_is_refused_and_counted(streaming, fault, refused):
     adapter, _, driver = streaming()
-    blocks = collected(driver, 5)
-    adapter.faults.inject(harm, 3)
-    awaited(lambda: bool(blocks.extend(driver.acquire(0.05))) or not adapter.faults.pending, "the harm")
-    blocks = [block for block in blocks if block.channel == "force"] + collected(driver, 5)
-    assert driver.health().corrupted >= refused
-    assert driver.health().corrupted == np.sum(np.diff(numbers(blocks)) - 1)
-    if harm is not corrupted:
-        assert right(blocks)
+    blocks = collect(driver, 5)
+    adapter.faults.inject(fault, 3)
+    wait_until(lambda: bool(blocks.extend(driver.acquire(0.05))) or not adapter.faults.pending_count, "the fault")
+    blocks = [block for block in blocks if block.channel == "force"] + collect(driver, 5)
+    assert driver.get_health().corrupted >= refused
+    assert driver.get_health().corrupted == np.sum(np.diff(numbers(blocks)) - 1)
+    if fault is not flip_bit:
+        assert is_right(blocks)
 
 
-def test_a_wild_value_is_refused(streaming):
+def test_an_implausible_value_is_refused(streaming):
     adapter, _, driver = streaming()
-    collected(driver, 5)
+    collect(driver, 5)
     adapter.faults.inject(lambda line: line.replace(b"+0", b"+9"))
     adapter.faults.inject(lambda line: line.replace(b"+00", b"-09"))
-    blocks = collected(driver, 10)
-    assert driver.health().corrupted == 2
-    assert right(blocks)
+    blocks = collect(driver, 10)
+    assert driver.get_health().corrupted == 2
+    assert is_right(blocks)
 
 
-def test_an_overload_is_told_and_its_readings_are_lost(streaming):
+def test_an_overload_is_reported_and_its_readings_are_lost(streaming):
     _, _, driver = streaming(lambda ticks: np.where(ticks < 300, 50.0, 12000.0))
-    awaited(lambda: driver.acquire(0.05) is not None and driver.health().words == "overload", "the overload")
-    assert driver.health().lost > 0
+    wait_until(
+        lambda: driver.acquire(0.05) is not None and driver.get_health().message == "overload", "the overload"
+    )
+    assert driver.get_health().lost > 0
 
 
-def test_silence_is_told(streaming):
+def test_silence_is_reported(streaming):
     adapter, _, driver = streaming()
     adapter.faults.silent = True
-    awaited(lambda: not driver.acquire(0.2) and "silent for" in driver.health().words, "silence")
-    with pytest.raises(NoReply, match="no reading of force within 1 s"):
+    wait_until(lambda: not driver.acquire(0.2) and "silent for" in driver.get_health().message, "silence")
+    with pytest.raises(NoReplyError, match="no reading of force within 1 s"):
         driver.read("force")
     adapter.faults.silent = False
-    collected(driver, 5)
-    assert driver.health().words == ""
+    collect(driver, 5)
+    assert driver.get_health().message == ""
 
 
 def test_a_silent_indicator_is_no_reply(rig):
     adapter, _, driver = rig()
     adapter.faults.silent = True
-    with pytest.raises(NoReply, match="indicator: no reading within 2 s, 0 lines refused"):
+    with pytest.raises(NoReplyError, match="indicator: no reading within 2 s, 0 lines refused"):
         driver.connect()
-    assert driver.health().words == "not connected"
+    assert driver.get_health().message == "not connected"
 
 
-def test_a_pulled_cable_is_told_and_the_driver_connects_again(streaming):
+def test_a_pulled_cable_is_reported_and_the_driver_connects_again(streaming):
     adapter, _, driver = streaming(address=TCP)
     adapter.hang_up()
-    with pytest.raises(NotConnected, match="has gone"):
-        awaited(lambda: driver.acquire(0.05) is None, "the end of the line")
+    with pytest.raises(NotConnectedError, match="is gone"):
+        wait_until(lambda: driver.acquire(0.05) is None, "the end of the line")
     driver.connect()
-    assert right(collected(driver, 10))
+    assert is_right(collect(driver, 10))
 
 
-def test_an_indicator_takes_no_values(rig):
+def test_an_indicator_has_no_writable_channel(rig):
     _, _, driver = rig()
-    with pytest.raises(OutOfRange, match="force is measured, never set to 2 N"):
+    with pytest.raises(OutOfRangeError, match="force is measured and cannot be set to 2 N"):
         driver.write("force", 2.0)
-    with pytest.raises(OutOfRange, match="no channel 'tare'"):
+    with pytest.raises(OutOfRangeError, match="no channel 'tare'"):
         driver.read("tare")
-    with pytest.raises(NotConnected, match="connect first"):
+    with pytest.raises(NotConnectedError, match="connect first"):
         driver.acquire(0.0)
     driver.make_safe()
 
@@ -152,17 +154,17 @@ def test_an_indicator_takes_no_values(rig):
 def test_replay_of_the_recorded_bytes_gives_the_same_blocks_bit_for_bit(rig):
     adapter, _, driver = rig()
     frames, live = [], []
-    driver.listen(frames.append)
+    driver.add_listener(frames.append)
     driver.connect()
-    adapter.faults.inject(cut, 2)
-    awaited(lambda: bool(live.extend(driver.acquire(0.05))) or len(live) > 30, "readings")
-    stream = ReadingStream()
-    again = [block for frame in frames for block in stream.feed(frame.received_ns, frame.data)]
-    assert len(live) <= len(again)
-    assert all(same(one, other) for one, other in zip(live, again, strict=False))
+    adapter.faults.inject(truncate, 2)
+    wait_until(lambda: bool(live.extend(driver.acquire(0.05))) or len(live) > 30, "readings")
+    decoder = AsciiLoadCellDecoder()
+    replayed = [block for frame in frames for block in decoder.feed(frame.received_ns, frame.data)]
+    assert len(live) <= len(replayed)
+    assert all(is_equal(one, other) for one, other in zip(live, replayed, strict=False))
 
 
-def test_a_plain_serial_reader_understands_the_indicator(rig):
+def test_a_plain_serial_reader_can_decode_the_indicator(rig):
     adapter, _, _ = rig()
     with serial.serial_for_url(adapter.address, 9600, timeout=1.0) as port:
         port.readline()

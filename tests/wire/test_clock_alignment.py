@@ -1,4 +1,4 @@
-"""Every instrument's samples on the bench clock, against the clocks that the simulated rig knows."""
+"""Every instrument's samples on the bench clock, compared with the true clocks of the simulated rig."""
 
 import gc
 import multiprocessing
@@ -9,51 +9,49 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from can_rig import wait_until
 
 from bench.rig.acquisition import Acquisition, Batch
 from bench.rig.alignment import Aligner
-from drivers.actuator import Actuator
-from drivers.can_bus import CanAddress
-from drivers.coil_amplifier import CoilAmplifier
+from drivers.actuator.actuator import Actuator
 from drivers.errors import DriverError
-from drivers.load_cell import LoadCell
-from drivers.lvdt import Lvdt
-from drivers.modbus_address import ModbusAddress
-from drivers.thermometer import Thermometer
-from sim_rig.clock import RunningClock
-from sim_rig.scenario import load_scenario
-from sim_rig.serve import ServedRig
+from drivers.load_cell.load_cell import LoadCell
+from drivers.modbus.coil_amplifier import CoilAmplifier
+from drivers.modbus.sensors import Lvdt, Thermometer
+from drivers.transport.can_bus import CanAddress
+from drivers.transport.modbus_address import ModbusAddress
+from sim_rig.live.clock import RunningClock
+from sim_rig.scenario.scenario import load_scenario
+from sim_rig.server.server import RigServer
+from tests.support.can_rig import wait_until
 
 pytestmark = pytest.mark.timeout(120)
-BAR = 0.2e-3
-"""[s] of skew between channels, in 95 of 100 samples."""
+MAX_SKEW = 0.2e-3
+"""Largest skew between channels in 95 of 100 samples [s]."""
+SETTLING_TIME = 3.0
+"""Time after which the clocks are known [s]; a run begins later."""
 
-SETTLED = 3.0
-"""[s] after which the clocks are known; a run begins later."""
 
-
-def built(wires):
-    """The drivers that reach the wires of a rig."""
+def build_drivers(wires):
+    """Make the drivers of the wires of a rig."""
     clock = time.monotonic_ns
-    found = {}
+    built = {}
     for wire in wires:
         section = wire.settings
         url = str(section.get("url", ""))
         match wire.instrument:
             case "load_cell":
-                found["load_cell"] = LoadCell("load_cell", url, clock)
+                built["load_cell"] = LoadCell("load_cell", url, clock)
             case "lvdt":
-                found["lvdt"] = Lvdt("lvdt", ModbusAddress(url), clock, unit=section["unit"])
+                built["lvdt"] = Lvdt("lvdt", ModbusAddress(url), clock, unit=section["unit"])
             case "thermometer":
-                found["thermometer"] = Thermometer("thermometer", ModbusAddress(url), clock, unit=section["unit"])
+                built["thermometer"] = Thermometer("thermometer", ModbusAddress(url), clock, unit=section["unit"])
             case "coil_amplifier":
                 address = ModbusAddress(url)
-                found["coil_amplifier"] = CoilAmplifier("coil_amplifier", address, clock, unit=section["unit"])
+                built["coil_amplifier"] = CoilAmplifier("coil_amplifier", address, clock, unit=section["unit"])
             case "actuator":
                 address = CanAddress("socketcand", port=section["port"])
-                found["actuator"] = Actuator("actuator", address, clock, clamped=True)
-    return found
+                built["actuator"] = Actuator("actuator", address, clock, clamped=True)
+    return built
 
 
 @contextmanager
@@ -68,14 +66,14 @@ def connected(instruments):
 
 
 def serve(pipe):
-    """The rig in a process of its own, as `mrbench sim` runs it; tells its wires and its clocks."""
+    """Run the rig in a process of its own, as `mrbench sim` does; sends its wires and its clocks."""
     sys.setswitchinterval(5e-4)
     clock = RunningClock()
-    began = time.monotonic_ns() - clock.now_ns()
-    with ServedRig(load_scenario("default"), clock) as served:
+    start_ns = time.monotonic_ns() - clock.now_ns()
+    with RigServer(load_scenario("default"), clock) as served:
         gc.collect()
         gc.freeze()
-        pipe.send((served.wires, served.clocks, began))
+        pipe.send((served.wires, served.clocks, start_ns))
         pipe.recv()
 
 
@@ -94,11 +92,11 @@ def rig():
         process.kill()
 
 
-def recorded(seconds):
-    """Batches, bench samples and the error of each mapped instant [ns] by instrument, over some seconds."""
+def record(seconds):
+    """Acquire for some seconds; returns clock errors [ns], bench samples, losses, skews and driver errors."""
     batches: list[Batch] = []
     errors: list[tuple[str, DriverError]] = []
-    with rig() as (wires, clocks, began), connected(built(wires)) as instruments:
+    with rig() as (wires, clocks, start_ns), connected(build_drivers(wires)) as instruments:
         acquisition = Acquisition(
             instruments,
             lambda batch: (batches.append(batch), aligner.feed(batch)),
@@ -110,72 +108,71 @@ def recorded(seconds):
         acquisition.start()
         end = time.monotonic() + seconds
 
-        def over():
-            if (ready := aligner.ready()) is not None:
+        def is_over():
+            if (ready := aligner.align()) is not None:
                 aligned.append(ready)
-            for name, made in acquisition.maps.items():
-                if made.known:
-                    skews[name].append(made.skew())
+            for name, clock_map in acquisition.maps.items():
+                if clock_map.is_known:
+                    skews[name].append(clock_map.compute_error_bound())
             time.sleep(0.025)
             return time.monotonic() > end
 
-        wait_until(over, seconds + 5)
+        wait_until(is_over, seconds + 5)
         assert acquisition.stop() == ()
-        left = {}
+        clock_errors = {}
         for name in instruments:
-            mine = [b for batch in batches if batch.instrument == name for b in batch.blocks]
-            device = np.concatenate([block.device_ns for block in mine if block.channel == mine[0].channel])
-            device = device[device > device[0] + SETTLED * 1e9]
-            own = clocks[name]
-            truth = began + (device - own.offset_ns) / (1 + own.ppm * 1e-6)
-            left[name] = acquisition.maps[name].bench_ns(device) - truth
-    return left, aligned, aligner.lost, skews, errors
+            blocks = [b for batch in batches if batch.instrument == name for b in batch.blocks]
+            device = np.concatenate([block.device_ns for block in blocks if block.channel == blocks[0].channel])
+            device = device[device > device[0] + SETTLING_TIME * 1e9]
+            clock = clocks[name]
+            truth = start_ns + (device - clock.offset_ns) / (1 + clock.ppm * 1e-6)
+            clock_errors[name] = acquisition.maps[name].map_instants(device) - truth
+    return clock_errors, aligned, aligner.lost, skews, errors
 
 
-def shown(left, skews):
-    for name, error in left.items():
+def print_errors(clock_errors, skews):
+    for name, error in clock_errors.items():
         size = np.abs(error) / 1e3
         quantiles = " ".join(f"p{q} {np.percentile(size, q):.0f}" for q in (50, 95, 99, 100))
         bound = np.median(skews[name]) * 1e6
         sys.stdout.write(f"{name:15} {len(error):6} samples  {quantiles} us  bound {bound:.0f} us\n")
 
 
-def between(left):
-    """Largest difference between the clocks' errors by percentile, of random pairs of samples [s]."""
+def compute_skew(clock_errors):
+    """Return the largest difference between the clocks' errors in random sets of samples [s]."""
     random = np.random.default_rng(1)
-    fast = [name for name in left if name != "thermometer"]
-    drawn = np.stack([random.choice(left[name], 20_000) for name in fast])
-    return (drawn.max(axis=0) - drawn.min(axis=0)) * 1e-9
+    fast = [name for name in clock_errors if name != "thermometer"]
+    sampled = np.stack([random.choice(clock_errors[name], 20_000) for name in fast])
+    return (sampled.max(axis=0) - sampled.min(axis=0)) * 1e-9
 
 
 def check(seconds):
-    left, aligned, lost, skews, errors = recorded(seconds)
-    shown(left, skews)
-    skew = between(left)
+    clock_errors, aligned, lost, skews, errors = record(seconds)
+    print_errors(clock_errors, skews)
+    skew = compute_skew(clock_errors)
     p50, p95 = np.percentile(skew, [50, 95]) * 1e6
     sys.stdout.write(f"between any two: p50 {p50:.0f} p95 {p95:.0f} us; lost {lost}\n")
     assert not errors
-    assert np.percentile(skew, 95) <= BAR
+    assert np.percentile(skew, 95) <= MAX_SKEW
     time_ns = np.concatenate([part.time_ns for part in aligned])
     assert np.all(np.diff(time_ns) > 0)
     assert len(time_ns) >= 900 * (seconds - 2)
-    return left, skews
 
 
 def test_channels_are_within_a_fifth_of_a_millisecond_of_each_other():
     check(8.0)
 
 
-def busy():
-    """At the lowest priority, as fits are."""
+def run_busy_loop():
+    """Use a core at the lowest priority, like a fit."""
     os.nice(19)
     while True:
         sum(range(10_000))
 
 
 @pytest.mark.slow
-def test_they_are_beside_two_busy_processes():
-    load = [multiprocessing.get_context("spawn").Process(target=busy, daemon=True) for _ in range(2)]
+def test_they_are_so_with_two_busy_processes():
+    load = [multiprocessing.get_context("spawn").Process(target=run_busy_loop, daemon=True) for _ in range(2)]
     for process in load:
         process.start()
     try:

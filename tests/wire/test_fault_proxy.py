@@ -1,24 +1,24 @@
-"""The proxy that spoils a TCP connection, in front of a server that says what it hears."""
+"""The proxy that applies faults to a TCP connection, in front of a server that echoes."""
 
 import socket
 import threading
 
 import pytest
 
-from sim_rig.clock import SteppedClock
 from sim_rig.errors import ScenarioError
-from sim_rig.faults import FaultProxy, WireFault, load_wire_faults
+from sim_rig.live.clock import SteppedClock
+from sim_rig.protocols.fault_proxy import FaultProxy, WireFault, load_wire_faults
 
 pytestmark = pytest.mark.timeout(60)
 SECOND = 1_000_000_000
 
 
 class Echo:
-    """A device that sends back whatever it is sent, to any number of hosts."""
+    """A device that returns all bytes to any number of hosts."""
 
     def __init__(self) -> None:
         self.listener = socket.create_server(("127.0.0.1", 0))
-        self.heard = b""
+        self.received = b""
         threading.Thread(target=self._serve, daemon=True).start()
 
     def _serve(self) -> None:
@@ -32,7 +32,7 @@ class Echo:
     def _echo(self, connection: socket.socket) -> None:
         with connection:
             while data := connection.recv(4096):
-                self.heard += data
+                self.received += data
                 connection.sendall(data)
 
 
@@ -45,7 +45,7 @@ def echo():
 
 @pytest.fixture
 def bench(echo):
-    """A clock, a proxy before the device, and a way to connect to it."""
+    """A clock, a proxy in front of the device, and a function that connects to it."""
     clock, hosts = SteppedClock(), []
     with FaultProxy(echo.listener.getsockname(), clock) as proxy:
 
@@ -58,14 +58,14 @@ def bench(echo):
         host.close()
 
 
-def received(host: socket.socket, count: int) -> bytes:
+def receive(host: socket.socket, count: int) -> bytes:
     data = b""
     while len(data) < count and (piece := host.recv(count - len(data))):
         data += piece
     return data
 
 
-def nothing_comes(host: socket.socket) -> bool:
+def is_silent(host: socket.socket) -> bool:
     host.settimeout(0.1)
     try:
         return not host.recv(1) and False
@@ -78,75 +78,75 @@ def nothing_comes(host: socket.socket) -> bool:
 def test_without_faults_everything_passes(bench):
     host = bench[2]()
     host.sendall(bytes(range(256)) * 100)
-    assert received(host, 25600) == bytes(range(256)) * 100
+    assert receive(host, 25600) == bytes(range(256)) * 100
 
 
-def test_late_bytes_come_later_by_the_clock(bench):
+def test_delayed_bytes_arrive_later_by_the_clock(bench):
     clock, proxy, connect = bench
     host = connect()
-    proxy.inject(WireFault(kind="late", delay=0.5, duration=10.0))
+    proxy.inject(WireFault(kind="delayed", delay=0.5, duration=10.0))
     host.sendall(b"late")
-    assert nothing_comes(host)
+    assert is_silent(host)
     clock.advance(SECOND)
-    assert received(host, 4) == b"late"
+    assert receive(host, 4) == b"late"
 
 
-def test_of_a_cut_piece_the_second_half_is_lost(bench, echo):
+def test_the_second_half_of_a_truncated_piece_is_lost(bench, echo):
     _, proxy, connect = bench
     host = connect()
-    proxy.inject(WireFault(kind="cut", duration=1.0, direction="to_device"))
+    proxy.inject(WireFault(kind="truncated", duration=1.0, direction="to_device"))
     host.sendall(b"12345678")
-    assert received(host, 4) == b"1234"
-    assert echo.heard == b"1234"
+    assert receive(host, 4) == b"1234"
+    assert echo.received == b"1234"
 
 
-def test_in_a_corrupted_piece_one_bit_is_turned(bench, echo):
+def test_one_bit_of_a_corrupted_piece_is_flipped(bench, echo):
     _, proxy, connect = bench
     host = connect()
     proxy.inject(WireFault(kind="corrupted", duration=1.0))
     host.sendall(b"12345678")
-    spoilt = received(host, 8)
-    turned = [one ^ other for one, other in zip(spoilt, b"12345678", strict=True)]
-    assert sum(bits.bit_count() for bits in turned) == 1
-    assert echo.heard == b"12345678"
+    corrupted = receive(host, 8)
+    flipped = [one ^ other for one, other in zip(corrupted, b"12345678", strict=True)]
+    assert sum(bits.bit_count() for bits in flipped) == 1
+    assert echo.received == b"12345678"
 
 
-def test_a_stuck_wire_lets_nothing_pass_and_then_all_at_once(bench):
+def test_a_stalled_wire_passes_nothing_and_then_all_at_once(bench):
     clock, proxy, connect = bench
     host = connect()
-    proxy.inject(WireFault(kind="stuck", duration=1.0))
+    proxy.inject(WireFault(kind="stalled", duration=1.0))
     host.sendall(b"one")
-    assert nothing_comes(host)
+    assert is_silent(host)
     host.sendall(b"two")
     clock.advance(SECOND)
-    assert received(host, 6) == b"onetwo"
+    assert receive(host, 6) == b"onetwo"
 
 
-def test_a_closed_wire_ends_the_connection_and_takes_none_until_it_is_over(bench):
+def test_a_closed_wire_ends_the_connection_and_accepts_none_until_it_is_over(bench):
     clock, proxy, connect = bench
     before = connect()
     before.sendall(b"x")
-    assert received(before, 1) == b"x"
+    assert receive(before, 1) == b"x"
     proxy.inject(WireFault(kind="closed", duration=1.0))
     assert before.recv(1) == b""
     assert connect().recv(1) == b""
     clock.advance(SECOND)
     after = connect()
     after.sendall(b"again")
-    assert received(after, 5) == b"again"
+    assert receive(after, 5) == b"again"
 
 
-def test_a_fault_begins_and_ends_by_the_schedule(bench):
+def test_a_fault_begins_and_ends_as_scheduled(bench):
     clock, proxy, connect = bench
     host = connect()
-    proxy.inject(WireFault(kind="cut", start=1.0, duration=1.0))
+    proxy.inject(WireFault(kind="truncated", start=1.0, duration=1.0))
     for expected in (b"12", b"1", b"12"):
         host.sendall(b"12")
-        assert received(host, len(expected)) == expected
+        assert receive(host, len(expected)) == expected
         clock.advance(SECOND)
 
 
-def test_what_the_device_said_before_it_hung_up_still_passes():
+def test_bytes_sent_before_the_device_closes_still_pass():
     device, clock = socket.create_server(("127.0.0.1", 0)), SteppedClock()
     with (
         device,
@@ -156,36 +156,36 @@ def test_what_the_device_said_before_it_hung_up_still_passes():
         connection, _ = device.accept()
         connection.sendall(b"last words")
         connection.close()
-        assert received(host, 100) == b"last words"
+        assert receive(host, 100) == b"last words"
 
 
-def test_a_device_that_is_not_there_is_a_connection_that_ends():
+def test_without_a_device_the_connection_ends():
     proxy = FaultProxy(("127.0.0.1", 1), SteppedClock())
     with proxy, socket.create_connection((proxy.host, proxy.port), 10.0) as host:
         assert host.recv(1) == b""
 
 
 def test_faults_are_read_from_a_file_by_instrument(tmp_path):
-    (tmp_path / "faults.json").write_text('{"lvdt": [{"kind": "late", "duration": 2, "delay": 0.1}]}')
+    (tmp_path / "faults.json").write_text('{"lvdt": [{"kind": "delayed", "duration": 2, "delay": 0.1}]}')
     assert load_wire_faults(tmp_path / "faults.json") == {
-        "lvdt": (WireFault(kind="late", duration=2.0, delay=0.1),)
+        "lvdt": (WireFault(kind="delayed", duration=2.0, delay=0.1),)
     }
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"lvdt": [{"kind": "lost", "duration": 2}]}', "lvdt.0.kind: Input should be 'late'"),
-        ('{"lvdt": [{"kind": "late"}]}', "lvdt.0.duration: is missing"),
+        ('{"lvdt": [{"kind": "lost", "duration": 2}]}', "lvdt.0.kind: Input should be 'delayed'"),
+        ('{"lvdt": [{"kind": "delayed"}]}', "lvdt.0.duration: is missing"),
         ("[]", "document: Input should be"),
     ],
 )
-def test_faults_that_are_none_are_refused(tmp_path, text, message):
+def test_invalid_faults_are_refused(tmp_path, text, message):
     (tmp_path / "faults.json").write_text(text)
     with pytest.raises(ScenarioError, match=message):
         load_wire_faults(tmp_path / "faults.json")
 
 
-def test_a_file_of_faults_that_is_not_there_is_refused(tmp_path):
+def test_a_missing_file_of_faults_is_refused(tmp_path):
     with pytest.raises(ScenarioError, match=r"none\.json: cannot be read"):
         load_wire_faults(tmp_path / "none.json")

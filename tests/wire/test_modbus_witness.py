@@ -1,23 +1,22 @@
-"""Independent witnesses: a plain pymodbus client and a plain socket talk to the simulated instruments."""
+"""The simulated instruments with a plain pymodbus client and a plain socket, independent of the drivers."""
 
 import socket
 import struct
 
 import pytest
-from modbus_bench import MS, FakeSignals, served, truth
 from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
-from sim_rig.device_clock import DeviceClock
-from sim_rig.modbus_coil_amplifier import CoilAmplifierDevice
-from sim_rig.modbus_lvdt import LvdtDevice
-from sim_rig.modbus_server import WireFault
-from sim_rig.modbus_thermometer import ThermometerDevice
+from sim_rig.instruments.coil_amplifier import CoilAmplifierDevice
+from sim_rig.instruments.modbus_sensor import SensorDevice
+from sim_rig.live.device_clock import DeviceClock
+from sim_rig.protocols.modbus_server import ReplyFault
+from tests.support.modbus_bench import MS, FakeSignals, serve, truth
 
 pytestmark = pytest.mark.timeout(60)
 
 
-def client_of(server):
+def make_client(server):
     if server.address.startswith("/dev/"):
         return ModbusSerialClient(server.address, baudrate=115200, timeout=1, retries=0)
     port = int(server.address.rpartition(":")[2])
@@ -28,8 +27,8 @@ def client_of(server):
 @pytest.fixture(params=["tcp", "rtu over socket", "rtu over pty"])
 def lvdt(request):
     signals = FakeSignals()
-    with served(LvdtDevice(signals, DeviceClock(1_000_000_000)), request.param) as (server, _):
-        client = client_of(server)
+    with serve(SensorDevice("lvdt", signals, DeviceClock(1_000_000_000)), request.param) as (server, _):
+        client = make_client(server)
         assert client.connect()
         yield client, server, signals
         client.close()
@@ -58,18 +57,18 @@ def test_a_plain_client_reads_the_ring_again_and_again(lvdt):
     assert number(client, block[1:3], "UINT32") == 4000
     assert block[9] == 57
     assert number(client, block[3:5], "UINT32") == 5_000_000
-    for place in range(57):
-        raw = number(client, block[11 + 2 * place : 13 + 2 * place], "INT32")
-        assert raw * 1e-7 == pytest.approx(truth("displacement", (4000 + place) * MS), abs=1e-7)
+    for index in range(57):
+        raw = number(client, block[11 + 2 * index : 13 + 2 * index], "INT32")
+        assert raw * 1e-7 == pytest.approx(truth("displacement", (4000 + index) * MS), abs=1e-7)
     signals.step(20)
-    again = client.read_input_registers(100, count=125).registers
-    assert again[:5] + again[9:] == block[:5] + block[9:]
+    repeated = client.read_input_registers(100, count=125).registers
+    assert repeated[:5] + repeated[9:] == block[:5] + block[9:]
 
 
-def test_a_plain_client_says_where_the_block_begins_and_reads_it_in_one_exchange(lvdt):
+def test_a_plain_client_writes_the_start_of_the_block_and_reads_it_in_one_exchange(lvdt):
     client, _, _ = lvdt
-    where = client.convert_to_registers(4010, client.DATATYPE.UINT32)
-    block = client.readwrite_registers(read_address=100, read_count=125, write_address=0, values=where).registers
+    start = client.convert_to_registers(4010, client.DATATYPE.UINT32)
+    block = client.readwrite_registers(read_address=100, read_count=125, write_address=0, values=start).registers
     assert number(client, block[1:3], "UINT32") == 4010
     assert block == client.read_holding_registers(100, count=125).registers
     assert block == client.read_input_registers(100, count=125).registers
@@ -77,7 +76,7 @@ def test_a_plain_client_says_where_the_block_begins_and_reads_it_in_one_exchange
     assert refused.exception_code == 2
 
 
-def test_what_does_not_exist_is_refused_with_the_right_code(lvdt):
+def test_missing_registers_and_functions_are_refused_with_the_right_code(lvdt):
     client, _, _ = lvdt
     assert client.read_input_registers(60, count=2).exception_code == 2
     assert client.read_holding_registers(8, count=2).exception_code == 2
@@ -89,23 +88,23 @@ def test_what_does_not_exist_is_refused_with_the_right_code(lvdt):
 
 def test_every_injected_exception_reaches_a_plain_client(lvdt):
     client, server, _ = lvdt
-    server.inject(WireFault("exception", 6))
+    server.inject(ReplyFault("exception", 6))
     assert client.read_input_registers(0, count=1).exception_code == 6
     assert client.read_input_registers(0, count=1).registers == [0x4C56]
 
 
-def test_another_unit_is_not_answered(lvdt):
+def test_a_request_to_another_unit_has_no_reply(lvdt):
     client, server, _ = lvdt
     client.comm_params.timeout_connect = 0.05
     with pytest.raises(Exception, match="No response"):
         client.read_input_registers(0, count=1, device_id=9)
-    assert server.answered == 0
+    assert server.reply_count == 0
 
 
 def test_a_plain_client_drives_the_coil():
     signals = FakeSignals()
-    with served(CoilAmplifierDevice(signals), "tcp") as (server, _):
-        client = client_of(server)
+    with serve(CoilAmplifierDevice(signals), "tcp") as (server, _):
+        client = make_client(server)
         assert client.write_register(3, 0).isError()  # half a number
         setpoint = client.convert_to_registers(1_500_000, client.DATATYPE.INT32)
         assert client.write_registers(3, setpoint).exception_code == 4  # no mode yet
@@ -121,23 +120,23 @@ def test_a_plain_client_drives_the_coil():
 
 
 def test_a_plain_client_reads_the_temperature():
-    with served(ThermometerDevice(FakeSignals()), "rtu over pty") as (server, _):
-        client = client_of(server)
+    with serve(SensorDevice("thermometer", FakeSignals()), "rtu over pty") as (server, _):
+        client = make_client(server)
         client.connect()
         assert client.read_input_registers(8, count=1).registers == [2700]
         client.close()
 
 
 def test_pipelined_requests_are_answered_in_order_with_their_own_numbers():
-    with served(LvdtDevice(FakeSignals()), "tcp") as (server, _):
-        server.inject(WireFault("delay", 0.05))
+    with serve(SensorDevice("lvdt", FakeSignals()), "tcp") as (server, _):
+        server.inject(ReplyFault("delay", 0.05))
         with socket.create_connection(("127.0.0.1", int(server.address.rpartition(":")[2])), 5) as plain:
             for tid, (address, count) in enumerate([(0, 1), (2, 2), (4, 2)], 41):
                 plain.sendall(struct.pack(">HHHBBHH", tid, 0, 6, 1, 4, address, count))
-            heard = b""
-            while len(heard) < 11 + 13 + 13:
-                heard += plain.recv(4096)
-    assert heard == (
+            received = b""
+            while len(received) < 11 + 13 + 13:
+                received += plain.recv(4096)
+    assert received == (
         bytes.fromhex("0029 0000 0005 01 04 02 4c56")
         + bytes.fromhex("002a 0000 0007 01 04 04 000003e8")
         + bytes.fromhex("002b 0000 0007 01 04 04 00001388")

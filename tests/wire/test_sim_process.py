@@ -1,4 +1,4 @@
-"""The simulated rig as a process: plain clients talk to every wire that its bench.toml names."""
+"""The simulated rig as a process: plain clients use every wire in its bench.toml."""
 
 import binascii
 import itertools
@@ -23,9 +23,9 @@ DEADLINE = 60.0
 START, TARE = 1, 3
 
 
-def started(*words):
+def start_rig(*arguments):
     return subprocess.Popen(
-        [sys.executable, "-m", "sim_rig", "serve", *map(str, words)],
+        [sys.executable, "-m", "sim_rig", "serve", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -33,17 +33,17 @@ def started(*words):
 
 
 @contextmanager
-def running(folder, *words):
-    """The rig as a process: its wires, what it printed, and itself; it is stopped in the end."""
-    process = started("--out", folder / "bench.toml", *words)
+def running(folder, *arguments):
+    """Run the rig as a process; yields its wires, its output and the process, and stops it at the end."""
+    process = start_rig("--out", folder / "bench.toml", *arguments)
     try:
-        said = []
+        output = []
         while process.stdout and (line := process.stdout.readline()):
-            said.append(line)
+            output.append(line)
             if "Ctrl-C" in line:
                 break
-        assert said, process.communicate(timeout=DEADLINE)[1]
-        yield tomllib.loads((folder / "bench.toml").read_text())["instruments"], said, process
+        assert output, process.communicate(timeout=DEADLINE)[1]
+        yield tomllib.loads((folder / "bench.toml").read_text())["instruments"], output, process
     finally:
         process.kill()
         process.communicate(timeout=DEADLINE)
@@ -77,20 +77,20 @@ def number(client, section, address, type_):
     return client.convert_from_registers(registers, getattr(client.DATATYPE, type_))
 
 
-def until(true, seconds=20.0):
-    end = time.monotonic() + seconds
-    while not true():
+def wait_until(condition, timeout=20.0):
+    end = time.monotonic() + timeout
+    while not condition():
         assert time.monotonic() < end, "it did not happen in time"
         time.sleep(0.005)
 
 
-def test_it_says_where_every_instrument_is_reached(rig):
-    wires, said, _ = rig
+def test_it_prints_the_address_of_every_instrument(rig):
+    wires, output, _ = rig
     assert set(wires) == {"actuator", "load_cell", "lvdt", "coil_amplifier", "thermometer"}
     for name, section in wires.items():
         assert section["driver"] == name
-        place = section.get("url") or str(section["port"])
-        assert any(name in line and place in line for line in said)
+        address = section.get("url") or str(section["port"])
+        assert any(name in line and address in line for line in output)
 
 
 def test_a_plain_modbus_client_reads_the_lvdt(rig):
@@ -99,13 +99,13 @@ def test_a_plain_modbus_client_reads_the_lvdt(rig):
         assert number(client, section, 0, "UINT16") == 0x4C56
         assert abs(number(client, section, 8, "INT32") * 1e-7) < 2e-4
         before = number(client, section, 4, "UINT32")
-        until(lambda: number(client, section, 4, "UINT32") > before + 100)
+        wait_until(lambda: number(client, section, 4, "UINT32") > before + 100)
 
 
 def test_a_plain_modbus_client_reads_the_room_from_the_thermometer(rig):
     section = rig[0]["thermometer"]
     with modbus(section) as client:
-        until(lambda: 20.0 < number(client, section, 8, "INT16") * 0.01 < 25.0)
+        wait_until(lambda: 20.0 < number(client, section, 8, "INT16") * 0.01 < 25.0)
 
 
 def test_a_plain_modbus_client_drives_the_coil_and_measures_there(rig):
@@ -113,34 +113,34 @@ def test_a_plain_modbus_client_drives_the_coil_and_measures_there(rig):
     with modbus(section) as client:
         client.write_register(2, 1, device_id=section["unit"])
         client.write_registers(3, [*divmod(300_000, 65536)], device_id=section["unit"])
-        until(lambda: abs(number(client, section, 8, "INT32") * 1e-4 - 0.3) < 0.02)
-        until(lambda: abs(number(client, section, 10, "INT16") * 1e-4 - 0.06) < 0.02)
+        wait_until(lambda: abs(number(client, section, 8, "INT32") * 1e-4 - 0.3) < 0.02)
+        wait_until(lambda: abs(number(client, section, 10, "INT16") * 1e-4 - 0.06) < 0.02)
         client.write_registers(3, [0, 0], device_id=section["unit"])
-        until(lambda: abs(number(client, section, 8, "INT32") * 1e-4) < 0.02)
+        wait_until(lambda: abs(number(client, section, 8, "INT32") * 1e-4) < 0.02)
 
 
-def framed(kind, payload):
+def make_frame(kind, payload):
     covered = bytes([len(payload), kind]) + payload
     return b"\xa5\x5a" + covered + struct.pack("<H", binascii.crc_hqx(covered, 0xFFFF))
 
 
-def frames(data):
+def find_frames(data):
     """Type and payload of the good frames among bytes."""
-    place, good = 0, []
-    while (place := data.find(b"\xa5\x5a", place)) >= 0 and place + 6 <= len(data):
-        end = place + 4 + data[place + 2]
-        whole = data[place + 2 : end]
-        if data[end : end + 2] == struct.pack("<H", binascii.crc_hqx(whole, 0xFFFF)):
-            good.append((whole[1], whole[2:]))
-        place += 2
+    start, good = 0, []
+    while (start := data.find(b"\xa5\x5a", start)) >= 0 and start + 6 <= len(data):
+        end = start + 4 + data[start + 2]
+        covered = data[start + 2 : end]
+        if data[end : end + 2] == struct.pack("<H", binascii.crc_hqx(covered, 0xFFFF)):
+            good.append((covered[1], covered[2:]))
+        start += 2
     return good
 
 
-def test_a_plain_serial_reader_hears_the_load_cell(rig):
+def test_a_plain_serial_reader_receives_the_load_cell(rig):
     section = rig[0]["load_cell"]
     with serial.Serial(section["url"], section["baud"], timeout=5) as port:
-        port.write(framed(0x10, struct.pack("<BBI", 7, START, 0)))
-        found = frames(port.read(21 * 300))
+        port.write(make_frame(0x10, struct.pack("<BBI", 7, START, 0)))
+        found = find_frames(port.read(21 * 300))
     assert struct.pack("<BBBi", 7, START, 0, 1000) in [payload for kind, payload in found if kind == 0x11]
     samples = [struct.unpack("<HIiiB", payload) for kind, payload in found if kind == 0x01]
     assert [sample[0] for sample in samples] == list(range(len(samples)))
@@ -169,17 +169,17 @@ def test_a_plain_canopen_node_reads_the_drive(rig):
 
 
 @pytest.mark.parametrize("number_", [signal.SIGTERM, signal.SIGINT])
-def test_a_signal_ends_it_well_whoever_listens(tmp_path, number_):
+def test_a_signal_stops_it_cleanly_with_clients_connected(tmp_path, number_):
     with running(tmp_path, "--speed", "4", "--lvdt", "rtu", "--load-cell", "tcp") as (wires, _, process):
         host, port = wires["load_cell"]["url"].removeprefix("socket://").split(":")
         with serial.serial_for_url(f"socket://{host}:{port}"), modbus(wires["lvdt"]) as client:
             assert number(client, wires["lvdt"], 0, "UINT16") == 0x4C56
             process.send_signal(number_)
-            _, complaint = process.communicate(timeout=DEADLINE)
-    assert (process.returncode, complaint) == (0, "")
+            _, stderr = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, stderr) == (0, "")
 
 
-def test_text_lines_of_an_indicator_come_in_place_of_the_framed_stream(tmp_path):
+def test_an_indicator_can_replace_the_framed_stream(tmp_path):
     with running(tmp_path, "--load-cell", "ascii") as (wires, _, _process):
         section = wires["load_cell"]
         assert section["driver"] == "ascii_load_cell"
@@ -188,7 +188,7 @@ def test_text_lines_of_an_indicator_come_in_place_of_the_framed_stream(tmp_path)
             assert port.read_until(b"\r\n").decode("ascii").split(",")[1] == "GS"
 
 
-def test_a_wire_with_faults_is_reached_through_them(tmp_path):
+def test_a_wire_can_have_faults(tmp_path):
     faults = {"thermometer": [{"kind": "closed", "duration": 1e6}]}
     (tmp_path / "faults.json").write_text(json.dumps(faults))
     with running(tmp_path, "--faults", tmp_path / "faults.json") as (wires, _, _process):
@@ -198,23 +198,24 @@ def test_a_wire_with_faults_is_reached_through_them(tmp_path):
             number(client, wires["thermometer"], 0, "UINT16")
 
 
-FAULTS = '{"load_cell": [{"kind": "late", "duration": 1}]}'
+FAULTS = '{"load_cell": [{"kind": "delayed", "duration": 1}]}'
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("arguments", "message"),
     [
         (("--scenario", "nowhere"), "no scenario nowhere: neither a file nor one of"),
         (("--out", "no/such/place/bench.toml"), "bench.toml: cannot be written"),
         (("--faults", "none.json"), "none.json: cannot be read"),
-        (("--faults", "faults.json"), "wire faults stand for load_cell: no instrument of that name"),
+        (("--faults", "faults.json"), "wire faults for load_cell: no instrument of that name"),
     ],
 )
-def test_what_cannot_be_served_exits_1_with_one_line(tmp_path, monkeypatch, words, message):
+def test_an_error_exits_1_with_one_line(tmp_path, monkeypatch, arguments, message):
     monkeypatch.setenv("PYTHONPATH", str(EDS.parents[2]))
     monkeypatch.chdir(tmp_path)
     Path("faults.json").write_text(FAULTS)
-    _, complaint = (failed := started(*words)).communicate(timeout=DEADLINE)
-    assert failed.returncode == 1
-    assert message in complaint
-    assert complaint.count("\n") == 1
+    process = start_rig(*arguments)
+    _, stderr = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 1
+    assert message in stderr
+    assert stderr.count("\n") == 1

@@ -1,1 +1,3 @@
-"""How the tables came to be, step by step; run by Alembic whenever a catalogue is opened."""
+"""Migrations of the catalogue's tables, run by Alembic whenever a catalogue is opened."""
+
+__all__: list[str] = []

@@ -1,4 +1,4 @@
-"""What Alembic executes: the steps that a database lacks, on the connection that was handed in."""
+"""Script that Alembic executes: runs the missing migrations on the given connection."""
 
 from alembic import context
 
@@ -7,7 +7,7 @@ from bench.catalogue.models import Base
 context.configure(
     connection=context.config.attributes["connection"],
     target_metadata=Base.metadata,
-    # SQLite cannot alter a column; there, a changed table is written anew.
+    # SQLite cannot alter a column: a changed table is copied instead.
     render_as_batch=True,
 )
 with context.begin_transaction():

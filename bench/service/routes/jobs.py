@@ -5,30 +5,34 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
-from bench.catalogue.models import UNFINISHED
-from bench.service.desk import AtDesk
-from bench.service.problems import conflict
-from bench.service.views import Job, JobList, job_view
+from bench.catalogue import UNFINISHED_STATES
+from bench.service.context import Context
+from bench.service.problems import make_conflict
+from bench.service.views import Job, JobList, make_job_view
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 
 @router.get("")
-def jobs(desk: AtDesk, limit: Annotated[int, Query(ge=1, le=200, description="how many at most")] = 50) -> JobList:
+def list_jobs(
+    desk: Context, limit: Annotated[int, Query(ge=1, le=200, description="how many at most")] = 50
+) -> JobList:
     """Jobs, newest first."""
-    return JobList(items=tuple(job_view(row) for row in desk.catalogue.jobs(limit)))
+    return JobList(items=tuple(make_job_view(row) for row in desk.catalogue.list_jobs(limit)))
 
 
 @router.get("/{job_id}")
-def job(job_id: str, desk: AtDesk) -> Job:
+def get_job(job_id: str, desk: Context) -> Job:
     """One job."""
-    return job_view(desk.job(job_id))
+    return make_job_view(desk.get_job(job_id))
 
 
 @router.post("/{job_id}/cancel")
-async def cancel(job_id: str, desk: AtDesk) -> Job:
+async def cancel_job(job_id: str, desk: Context) -> Job:
     """End a job; one that a worker has begun is `running` until its process has ended."""
-    row = await asyncio.to_thread(desk.job, job_id)
-    if row.state not in UNFINISHED:
-        raise conflict("job-ended", "The job has ended", f"job {job_id} is {row.state}; nothing is left to cancel")
-    return job_view(await desk.keeper.cancel(row))
+    row = await asyncio.to_thread(desk.get_job, job_id)
+    if row.state not in UNFINISHED_STATES:
+        raise make_conflict(
+            "job-ended", "The job has ended", f"job {job_id} is {row.state}; nothing is left to cancel"
+        )
+    return make_job_view(await desk.job_manager.cancel(row))

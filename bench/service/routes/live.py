@@ -4,23 +4,23 @@ import asyncio
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
-from bench.service.desk import AtDesk
-from bench.service.live import Mailbox
+from bench.service.context import Context
+from bench.service.live import SubscriberQueue
 
 router = APIRouter()
-_REFUSED = 4401
+_CLOSE_UNAUTHORISED = 4401
 """Close code for a token that is missing or wrong."""
 
 
 @router.websocket("/live")
-async def live(websocket: WebSocket, desk: AtDesk, token: str = "") -> None:
+async def stream_live(websocket: WebSocket, desk: Context, token: str = "") -> None:
     """Messages `{"topic": ..., "data": ...}` of status, samples, event, job and run, until either side ends it."""
     # Before the token is looked at: a browser is told the code only of a connection that was open.
     await websocket.accept()
-    if not desk.access.allows(token):
-        await websocket.close(_REFUSED, "the token is missing or wrong")
+    if not desk.access.is_allowed(token):
+        await websocket.close(_CLOSE_UNAUTHORISED, "the token is missing or wrong")
         return
-    with desk.live.listener() as mailbox:
+    with desk.live.subscribe() as mailbox:
         sending = asyncio.create_task(_send(websocket, mailbox))
         try:
             while True:
@@ -32,7 +32,7 @@ async def live(websocket: WebSocket, desk: AtDesk, token: str = "") -> None:
             sending.cancel()
 
 
-async def _send(websocket: WebSocket, mailbox: Mailbox) -> None:
+async def _send(websocket: WebSocket, mailbox: SubscriberQueue) -> None:
     try:
         while True:
             for text in await mailbox.take():

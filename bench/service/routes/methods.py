@@ -4,25 +4,25 @@ from functools import cache
 
 from fastapi import APIRouter
 
-from bench.methods import Method, compile_method, load_method, shipped_methods
-from bench.service.problems import not_found
+from bench.methods import Method, compile_method, list_shipped_methods, load_method
+from bench.service.problems import make_not_found
 from bench.service.views import MethodSummary
 
 router = APIRouter(prefix="/methods", tags=["methods"])
 
 
 @router.get("")
-def methods() -> tuple[MethodSummary, ...]:
+def list_methods() -> tuple[MethodSummary, ...]:
     """All of them, in short."""
-    return _summaries()
+    return _list_summaries()
 
 
 @cache
-def _summaries() -> tuple[MethodSummary, ...]:
-    return tuple(_summary(load_method(name)) for name in shipped_methods())
+def _list_summaries() -> tuple[MethodSummary, ...]:
+    return tuple(_make_summary(load_method(name)) for name in list_shipped_methods())
 
 
-def _summary(method: Method) -> MethodSummary:
+def _make_summary(method: Method) -> MethodSummary:
     return MethodSummary(
         name=method.name,
         title=method.title,
@@ -32,17 +32,17 @@ def _summary(method: Method) -> MethodSummary:
 
 
 @router.get("/{name}", response_model_exclude_defaults=True)
-def method(name: str) -> Method:
+def get_method(name: str) -> Method:
     """One of them, as its document."""
-    return shipped(name)
+    return load_shipped_method(name)
 
 
-def shipped(name: str) -> Method:
+def load_shipped_method(name: str) -> Method:
     """A shipped method; a name is never taken for a file.
 
     Raises:
         ProblemError: there is none of that name.
     """
-    if name not in shipped_methods():
-        raise not_found("method", name)
+    if name not in list_shipped_methods():
+        raise make_not_found("method", name)
     return load_method(name)

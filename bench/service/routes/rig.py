@@ -5,55 +5,55 @@ from importlib.metadata import version
 
 from fastapi import APIRouter
 
-from bench.agent.messages import AgentStatus, InstrumentStatus, PrepareCommand, StopCommand
+from bench.agent_protocol import AgentStatus, InstrumentStatus, PrepareCommand, StopCommand
 from bench.errors import BenchError
-from bench.service.desk import AtDesk
-from bench.service.views import Health, Preparation
+from bench.service.context import Context
+from bench.service.views import Health, SetupRequest
 
-open_to_all = APIRouter(tags=["service"])
+public_router = APIRouter(tags=["service"])
 router = APIRouter(tags=["rig"])
 
 
-@open_to_all.get("/health")
-async def health(desk: AtDesk) -> Health:
+@public_router.get("/health")
+async def get_health(desk: Context) -> Health:
     """Whether agent and worker are there; needs no token."""
-    agent, worker = await asyncio.gather(asyncio.to_thread(_agent_words, desk), desk.engine.words())
+    agent, worker = await asyncio.gather(asyncio.to_thread(_describe_agent, desk), desk.engine.describe_state())
     return Health(version=version("mrbench"), agent=agent, worker=worker)
 
 
-def _agent_words(desk: AtDesk) -> str:
+def _describe_agent(desk: Context) -> str:
     try:
-        desk.watch.status()
+        desk.monitor.get_status()
     except BenchError as error:
         return str(error)
     return "ok"
 
 
 @router.get("/agent")
-def agent(desk: AtDesk) -> AgentStatus:
+def get_agent(desk: Context) -> AgentStatus:
     """What the agent says of itself."""
-    return desk.watch.status()
+    return desk.monitor.get_status()
 
 
 @router.post("/agent/reset")
-def reset(desk: AtDesk) -> AgentStatus:
+def reset_agent(desk: Context) -> AgentStatus:
     """Take back a trip whose cause has gone; nothing moves."""
-    return desk.watch.reset()
+    return desk.monitor.reset()
 
 
 @router.post("/agent/stop")
-def stop(desk: AtDesk) -> AgentStatus:
+def stop_agent(desk: Context) -> AgentStatus:
     """End whatever goes on in good order: a run, or a step before one. Harmless when nothing moves."""
-    return desk.watch.command(StopCommand())
+    return desk.monitor.send_command(StopCommand())
 
 
 @router.post("/agent/prepare")
-def prepare(desk: AtDesk, wanted: Preparation) -> AgentStatus:
+def start_setup_step(desk: Context, wanted: SetupRequest) -> AgentStatus:
     """One step before a run; where the answer's state is `preparing`, it goes on."""
-    return desk.watch.command(PrepareCommand(step=wanted.step, position_m=wanted.position_m))
+    return desk.monitor.send_command(PrepareCommand(step=wanted.step, position_m=wanted.position_m))
 
 
 @router.get("/instruments")
-def instruments(desk: AtDesk) -> tuple[InstrumentStatus, ...]:
+def list_instruments(desk: Context) -> tuple[InstrumentStatus, ...]:
     """The instruments and their wires."""
-    return desk.watch.status().instruments
+    return desk.monitor.get_status().instruments

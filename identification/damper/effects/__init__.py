@@ -1,18 +1,21 @@
-"""The effects that the product knows, one file each, by their names in documents."""
+"""Library of effects, one module each, by their names in documents."""
 
+from identification.damper.effects import connection
 from identification.damper.effects.clevis_backlash import CLEVIS_BACKLASH
 from identification.damper.effects.coil_crosstalk import COIL_CROSSTALK
 from identification.damper.effects.coil_lag import COIL_LAG
+from identification.damper.effects.connection import compute_elongation
 from identification.damper.effects.direction_asymmetry import DIRECTION_ASYMMETRY
 from identification.damper.effects.displacement_delay import DISPLACEMENT_DELAY
 from identification.damper.effects.displacement_nonlinearity import DISPLACEMENT_NONLINEARITY
-from identification.damper.effects.effect import Action, Effect, Form
+from identification.damper.effects.effect import STAGES, Action, Effect, Form, Stage
 from identification.damper.effects.end_stop import END_STOP
 from identification.damper.effects.field_saturation import FIELD_SATURATION
 from identification.damper.effects.fixture_compliance import FIXTURE_COMPLIANCE
 from identification.damper.effects.force_delay import FORCE_DELAY
 from identification.damper.effects.force_drift import FORCE_DRIFT
 from identification.damper.effects.force_filter import FORCE_FILTER
+from identification.damper.effects.former_names import rename_form, rename_parameters
 from identification.damper.effects.gas_spring import GAS_SPRING
 from identification.damper.effects.magnetic_remanence import MAGNETIC_REMANENCE
 from identification.damper.effects.mains_hum import MAINS_HUM
@@ -23,7 +26,7 @@ from identification.damper.effects.shear_thinning import SHEAR_THINNING
 from identification.damper.effects.side_load_friction import SIDE_LOAD_FRICTION
 from identification.damper.effects.viscous_heating import VISCOUS_HEATING
 
-_OWED = (
+_REQUIRED = (
     FIELD_SATURATION,
     MAGNETIC_REMANENCE,
     COIL_LAG,
@@ -41,7 +44,7 @@ _OWED = (
     MAINS_HUM,
     DISPLACEMENT_NONLINEARITY,
 )
-_FURTHER = (
+_ADDITIONAL = (
     FORCE_FILTER,
     DISPLACEMENT_DELAY,
     SHEAR_THINNING,
@@ -49,9 +52,21 @@ _FURTHER = (
     COIL_CROSSTALK,
 )
 
-EFFECTS: dict[str, Effect] = {e.name: e for e in (*_OWED, *_FURTHER)}
-"""All effects, in the order of the chain; the usual ones first."""
-USUAL: tuple[str, ...] = tuple(e.name for e in _OWED)
-"""Those that any bench may show."""
+EFFECTS: dict[str, Effect] = {e.name: e for e in (*_REQUIRED, *_ADDITIONAL)}
+"""All effects by name: first the common ones in the order of the chain, then the additional ones."""
+COMMON_EFFECTS: tuple[str, ...] = tuple(e.name for e in _REQUIRED)
+"""Names of the effects that any bench may show."""
 
-__all__ = ["EFFECTS", "USUAL", "Action", "Effect", "Form"]
+__all__ = [
+    "COMMON_EFFECTS",
+    "EFFECTS",
+    "STAGES",
+    "Action",
+    "Effect",
+    "Form",
+    "Stage",
+    "compute_elongation",
+    "connection",
+    "rename_form",
+    "rename_parameters",
+]

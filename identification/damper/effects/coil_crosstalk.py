@@ -1,4 +1,4 @@
-"""A load cell that feels the coil: its zero moves with the drive."""
+"""Crosstalk of the coil into the load cell: the zero of the force moves with the drive."""
 
 from typing import Any
 
@@ -6,8 +6,8 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def felt(time: Any, drive: Any, gain: Any) -> Any:
-    """Force [N] that the channel adds at a drive [V or A]; the time plays no part."""
+def compute_crosstalk(time: Any, drive: Any, gain: Any) -> Any:
+    """Return the added force [N] at a drive [V or A]; the time has no influence."""
     return gain * drive + 0.0 * time
 
 
@@ -18,10 +18,10 @@ COIL_CROSSTALK = Effect(
     forms=(
         Form(
             "proportional",
-            "added_force",
-            (Quantity("gain", "N/{drive}", -1e4, 1e4, 10.0, "force for each unit of drive"),),
+            "additive_force",
+            (Quantity("gain", "N/{drive}", -1e4, 1e4, 10.0, "force per unit of drive"),),
             ((0.0,),),
-            felt,
+            compute_crosstalk,
         ),
     ),
 )

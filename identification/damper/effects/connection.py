@@ -1,51 +1,57 @@
-"""What a connection between load cell and damper carries, over the stretch between the two.
+"""Force of a connection between load cell and damper over its elongation.
 
-A spring that gives way, hardens as it is stretched, and has a gap in its middle, where a pin lies free and a
-bolted joint has not closed yet. Without gap and hardening it is a linear spring.
+The connection is a spring that yields under load, hardens with elongation, and has a gap in its middle: the free
+travel of a pin, or a bolted joint that has not closed. Without gap and hardening it is a linear spring.
 """
 
 from typing import Any
 
-FILM = 1e-4
-"""[1] stiffness inside the gap over that outside: what keeps a pin from lying nowhere."""
-_STEPS = 40
+MIN_STIFFNESS_RATIO = 1e-4
+"""Least stiffness inside the gap over that outside [1]: without it a free pin's position would be undefined."""
+_ITERATIONS = 40
 
 
-def carried(stretch: Any, give: Any, gap: Any, hardening: Any, inside: Any) -> Any:
-    """Force [N] at a stretch [m].
+def compute_transmitted_force(
+    elongation: Any, compliance: Any, gap: Any, hardening: Any, in_gap_ratio: Any
+) -> Any:
+    """Return the transmitted force [N] at an elongation [m].
 
     Args:
-        stretch: actuator less damper [m].
-        give: of the spring, hardly stretched [m/N].
+        elongation: displacement of the actuator less that of the damper [m].
+        compliance: of the spring at small elongation [m/N].
         gap: free travel from side to side [m].
-        hardening: growth of the secant stiffness over the squared stretch [1/m²].
-        inside: stiffness in the gap over that outside, beside what a free pin has [1].
+        hardening: growth of the secant stiffness over the squared elongation [1/m²].
+        in_gap_ratio: stiffness in the gap over that outside, in addition to the least one [1].
     """
     half = 0.5 * gap
-    free = min(max(stretch, -half), half)
-    bent = stretch - free
-    return (bent * (1.0 + hardening * bent * bent) + (FILM + inside) * free) / give
+    free = min(max(elongation, -half), half)
+    engaged = elongation - free
+    return (
+        engaged * (1.0 + hardening * engaged * engaged) + (MIN_STIFFNESS_RATIO + in_gap_ratio) * free
+    ) / compliance
 
 
-def steepness(stretch: Any, give: Any, gap: Any, hardening: Any, inside: Any) -> Any:
-    """Slope of that force over the stretch [N/m]."""
+def compute_tangent_stiffness(
+    elongation: Any, compliance: Any, gap: Any, hardening: Any, in_gap_ratio: Any
+) -> Any:
+    """Return the derivative of the transmitted force over the elongation [N/m]."""
     half = 0.5 * gap
-    if -half < stretch < half:
-        return (FILM + inside) / give
-    bent = stretch - min(max(stretch, -half), half)
-    return (1.0 + 3.0 * hardening * bent * bent) / give
+    if -half < elongation < half:
+        return (MIN_STIFFNESS_RATIO + in_gap_ratio) / compliance
+    engaged = elongation - min(max(elongation, -half), half)
+    return (1.0 + 3.0 * hardening * engaged * engaged) / compliance
 
 
-def stretched(force: Any, give: Any, gap: Any, hardening: Any, inside: Any) -> Any:
-    """Stretch [m] at which the connection carries a force [N]; a free pin lies at an end of its gap."""
-    held = 0.5 * gap * inside
-    if abs(give * force) < held:
-        return give * force / inside
-    loose = give * force - (held if force > 0.0 else -held)
-    bent = loose
-    for _ in range(_STEPS):
+def compute_elongation(force: Any, compliance: Any, gap: Any, hardening: Any, in_gap_ratio: Any) -> Any:
+    """Return the elongation [m] at which a force [N] is transmitted; a free pin is put at an end of its gap."""
+    gap_force = 0.5 * gap * in_gap_ratio
+    if abs(compliance * force) < gap_force:
+        return compliance * force / in_gap_ratio
+    linear = compliance * force - (gap_force if force > 0.0 else -gap_force)
+    engaged = linear
+    for _ in range(_ITERATIONS):
         if hardening == 0.0:
             break
-        rest = bent * (1.0 + hardening * bent * bent) - loose
-        bent -= rest / (1.0 + 3.0 * hardening * bent * bent)
-    return bent + (0.5 * gap if force > 0.0 else -0.5 * gap)
+        error = engaged * (1.0 + hardening * engaged * engaged) - linear
+        engaged -= error / (1.0 + 3.0 * hardening * engaged * engaged)
+    return engaged + (0.5 * gap if force > 0.0 else -0.5 * gap)

@@ -1,7 +1,10 @@
-"""A damper that is not the same in both directions: valves, a check disc, an uneven gap.
+"""Different resistance in extension and compression: valves, a check disc, an uneven gap.
 
-Either yield and viscous parts grow by a share in extension and shrink by it in compression, whatever the drive;
-or something beside the law, which the drive does not reach, resists one direction only. Shares of either sign.
+- ``proportional``: yield and viscous parts grow by a share in extension and shrink by it in compression, at any
+  drive.
+- ``one_sided``: an additional force that is independent of the drive resists one direction only.
+
+Shares and forces may have either sign.
 """
 
 from typing import Any
@@ -12,19 +15,19 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def shares(x: Any, velocity: Any, yielding: Any, viscous: Any, width: Any) -> Any:
-    """Factors [1] of alpha, c0 and c1 at velocity [m/s]; the displacement [m] plays no part."""
-    way = velocity / np.sqrt(velocity * velocity + width * width)
-    return 1.0 + yielding * way, 1.0 + viscous * way, 1.0 + viscous * way
+def scale_by_direction(x: Any, velocity: Any, yielding: Any, viscous: Any, width: Any) -> Any:
+    """Return factors [1] on alpha, c0 and c1 at a velocity [m/s]; the displacement [m] has no influence."""
+    direction = velocity / np.sqrt(velocity * velocity + width * width)
+    return 1.0 + yielding * direction, 1.0 + viscous * direction, 1.0 + viscous * direction
 
 
-def one_way(x: Any, velocity: Any, damping: Any, friction: Any, width: Any) -> Any:
-    """Force [N] beside the law, even in the velocity: adds to one direction what it takes from the other."""
+def compute_one_sided_force(x: Any, velocity: Any, damping: Any, friction: Any, width: Any) -> Any:
+    """Return a parallel force [N], even in the velocity: it adds in one direction and subtracts in the other."""
     speed = np.sqrt(velocity * velocity + width * width)
     return damping * (speed - width) + friction * (velocity / speed) ** 2
 
 
-_WIDTH = Quantity("width", "m/s", 1e-3, 0.1, 0.01, "velocity over which one direction turns into the other")
+_WIDTH = Quantity("width", "m/s", 1e-3, 0.1, 0.01, "width in velocity of the transition between the directions")
 
 DIRECTION_ASYMMETRY = Effect(
     name="direction_asymmetry",
@@ -32,7 +35,7 @@ DIRECTION_ASYMMETRY = Effect(
     meaning="the damper resists one direction more than the other",
     forms=(
         Form(
-            "shares",
+            "proportional",
             "scaling",
             (
                 Quantity("yield_share", "1", -0.8, 0.8, 0.05, "growth of the yield force in extension"),
@@ -40,10 +43,10 @@ DIRECTION_ASYMMETRY = Effect(
                 _WIDTH,
             ),
             ((0.0, 0.0, 0.003), (0.0, 0.0, 0.02)),
-            shares,
+            scale_by_direction,
         ),
         Form(
-            "one_way",
+            "one_sided",
             "parallel_force",
             (
                 Quantity("damping", "N s/m", -2e4, 2e4, 100.0, "viscous force of extension over compression"),
@@ -51,7 +54,7 @@ DIRECTION_ASYMMETRY = Effect(
                 _WIDTH,
             ),
             ((0.0, 0.0, 0.003), (0.0, 0.0, 0.02)),
-            one_way,
+            compute_one_sided_force,
         ),
     ),
 )

@@ -1,4 +1,4 @@
-"""A displacement channel that comes late: the displacement recorded at t was there at t - delay."""
+"""Delay of the displacement channel: the displacement recorded at t occurred at t - delay."""
 
 from typing import Any
 
@@ -6,8 +6,8 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def late(delay: Any) -> Any:
-    """Time [s] by which the channel is late."""
+def make_delay(delay: Any) -> Any:
+    """Return the delay [s] of the channel."""
     return delay
 
 
@@ -19,9 +19,9 @@ DISPLACEMENT_DELAY = Effect(
         Form(
             "pure_delay",
             "displacement_shift",
-            (Quantity("delay", "s", 0.0, 0.05, 2e-3, "time by which the displacement channel lags"),),
+            (Quantity("delay", "s", 0.0, 0.05, 2e-3, "delay of the displacement channel"),),
             ((0.0,), (3e-3,)),
-            late,
+            make_delay,
         ),
     ),
 )

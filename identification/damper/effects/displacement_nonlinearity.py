@@ -1,8 +1,10 @@
-"""A displacement channel that is not straight: what it adds to the true displacement.
+"""Nonlinearity of the displacement channel: an error over the true displacement.
 
-A gain is visible to calibration alone, so bow (even in x) and curve (odd in x) have none at the middle. They level
-off far from it, or follow powers as a polynomial calibration would leave them; or the error is a wave, as uneven
-windings or the pitch of a scale make it.
+A gain error is visible to calibration only, so the even and odd parts have zero slope at the middle.
+
+- ``saturating``: the parts level off far from the middle.
+- ``polynomial``: the parts follow powers, as a polynomial calibration leaves them.
+- ``periodic``: a wave along the stroke, from uneven windings or the pitch of a scale.
 """
 
 from typing import Any
@@ -13,56 +15,56 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def bent(x: Any, bow: Any, curve: Any, reach: Any) -> Any:
-    """What the channel adds [m] at the true displacement x [m]."""
-    part = x / reach
-    even = part * part / (1.0 + part * part)
-    return bow * even + curve * even * part / np.sqrt(1.0 + part * part)
+def compute_saturating_error(x: Any, even: Any, odd: Any, reach: Any) -> Any:
+    """Return the channel's error [m] at the true displacement x [m]."""
+    relative = x / reach
+    level = relative * relative / (1.0 + relative * relative)
+    return even * level + odd * level * relative / np.sqrt(1.0 + relative * relative)
 
 
-def powers(x: Any, bow: Any, curve: Any) -> Any:
-    """The same by powers of x: bow and curve are what the channel adds at ``_ARM`` [m]."""
-    part = x / _ARM
-    return part * part * (bow + curve * part)
+def compute_polynomial_error(x: Any, even: Any, odd: Any) -> Any:
+    """Return the channel's error [m] as a polynomial; ``even`` and ``odd`` [m] hold at 10 mm."""
+    relative = x / _REFERENCE_DISPLACEMENT
+    return relative * relative * (even + odd * relative)
 
 
-def wave(x: Any, cosine: Any, sine: Any, pitch: Any) -> Any:
-    """The same as a wave along the stroke, zero at the middle."""
+def compute_periodic_error(x: Any, cosine: Any, sine: Any, pitch: Any) -> Any:
+    """Return the channel's error [m] as a wave along the stroke, zero at the middle."""
     angle = 2.0 * np.pi * x / pitch
     return cosine * (1.0 - np.cos(angle)) + sine * np.sin(angle)
 
 
-_ARM = 0.01
-"""[m] from the middle at which the coefficients of the powers are told."""
+_REFERENCE_DISPLACEMENT = 0.01
+"""Distance from the middle at which the coefficients of the polynomial hold [m]."""
 
 DISPLACEMENT_NONLINEARITY = Effect(
     name="displacement_nonlinearity",
     stage="displacement_channel",
-    meaning="the displacement channel is not straight",
+    meaning="the displacement channel is not linear",
     forms=(
         Form(
-            "bow_and_curve",
+            "saturating",
             "displacement_map",
             (
-                Quantity("bow", "m", -5e-3, 5e-3, 1e-4, "even part, far from the middle"),
-                Quantity("curve", "m", -5e-3, 5e-3, 1e-4, "odd part, far from the middle"),
-                Quantity("reach", "m", 3e-3, 0.3, 0.015, "displacement at which the parts level off"),
+                Quantity("even", "m", -5e-3, 5e-3, 1e-4, "even part of the error, far from the middle"),
+                Quantity("odd", "m", -5e-3, 5e-3, 1e-4, "odd part of the error, far from the middle"),
+                Quantity("reach", "m", 3e-3, 0.3, 0.015, "displacement at which both parts level off"),
             ),
             ((0.0, 0.0, 0.01), (0.0, 0.0, 0.03)),
-            bent,
+            compute_saturating_error,
         ),
         Form(
-            "powers",
+            "polynomial",
             "displacement_map",
             (
-                Quantity("bow", "m", -5e-3, 5e-3, 5e-5, "even part, 10 mm from the middle"),
-                Quantity("curve", "m", -5e-3, 5e-3, 5e-5, "odd part, 10 mm from the middle"),
+                Quantity("even", "m", -5e-3, 5e-3, 5e-5, "even part of the error, 10 mm from the middle"),
+                Quantity("odd", "m", -5e-3, 5e-3, 5e-5, "odd part of the error, 10 mm from the middle"),
             ),
             ((0.0, 0.0),),
-            powers,
+            compute_polynomial_error,
         ),
         Form(
-            "wave",
+            "periodic",
             "displacement_map",
             (
                 Quantity("cosine", "m", -5e-3, 5e-3, 5e-5, "even part of the wave"),
@@ -70,7 +72,7 @@ DISPLACEMENT_NONLINEARITY = Effect(
                 Quantity("pitch", "m", 4e-3, 0.08, 0.02, "length of the wave"),
             ),
             ((0.0, 0.0, 0.01), (0.0, 0.0, 0.02), (0.0, 0.0, 0.04)),
-            wave,
+            compute_periodic_error,
         ),
     ),
 )

@@ -1,7 +1,7 @@
-"""A rubber at the end of the stroke: silent inside its gap, then a spring that sets in softly.
+"""Rubber stop at the end of the stroke: no force inside its gap, then a spring with a soft onset.
 
-With d the depth beyond the gap, force = k d^2 / (d + s): a straight spring k once d is well above s. The stop may
-stand at both ends, about the middle of the displacement channel, or at one of them.
+With d the depth beyond the gap, force = k d² / (d + s): a linear spring k once d is well above s. The stop is at
+both ends of the stroke, about the middle of the displacement channel, or at one of them.
 """
 
 from typing import Any
@@ -12,38 +12,38 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def extended(x: Any, velocity: Any, stiffness: Any, gap: Any, softness: Any) -> Any:
-    """Force [N] beside the law of a stop at positive displacement [m]; the velocity [m/s] plays no part."""
+def compute_extended_stop(x: Any, velocity: Any, stiffness: Any, gap: Any, softness: Any) -> Any:
+    """Return the parallel force [N] of a stop at positive displacement [m]; the velocity has no influence."""
     depth = np.maximum(x - gap, 0.0)
     return stiffness * depth * depth / (depth + softness)
 
 
-def compressed(x: Any, velocity: Any, stiffness: Any, gap: Any, softness: Any) -> Any:
-    """The same at negative displacement."""
+def compute_compressed_stop(x: Any, velocity: Any, stiffness: Any, gap: Any, softness: Any) -> Any:
+    """Return the parallel force [N] of a stop at negative displacement."""
     depth = np.maximum(-x - gap, 0.0)
     return -stiffness * depth * depth / (depth + softness)
 
 
-def both(x: Any, velocity: Any, stiffness: Any, gap: Any, softness: Any) -> Any:
-    """The same at both ends."""
+def compute_both_stops(x: Any, velocity: Any, stiffness: Any, gap: Any, softness: Any) -> Any:
+    """Return the parallel force [N] of a stop at each end."""
     depth = np.maximum(np.abs(x) - gap, 0.0)
     return np.sign(x) * stiffness * depth * depth / (depth + softness)
 
 
 _PARAMETERS = (
-    Quantity("stiffness", "N/m", 0.0, 1e7, 2e4, "of the rubber, well compressed"),
+    Quantity("stiffness", "N/m", 0.0, 1e7, 2e4, "stiffness of the rubber, well compressed"),
     Quantity("gap", "m", 1e-4, 0.5, 0.008, "stroke from the middle to the stop"),
-    Quantity("softness", "m", 1e-5, 0.05, 1e-3, "depth over which the rubber sets in"),
+    Quantity("softness", "m", 1e-5, 0.05, 1e-3, "depth of the soft onset"),
 )
 _STARTS = tuple((0.0, gap, 1e-3) for gap in (0.004, 0.007, 0.009, 0.012, 0.018, 0.03))
 
 END_STOP = Effect(
     name="end_stop",
     stage="damper",
-    meaning="the piston meets a rubber near the end of its stroke",
+    meaning="the piston meets a rubber stop near the end of its stroke",
     forms=(
-        Form("both_ends", "parallel_force", _PARAMETERS, _STARTS, both),
-        Form("extended_end", "parallel_force", _PARAMETERS, _STARTS, extended),
-        Form("compressed_end", "parallel_force", _PARAMETERS, _STARTS, compressed),
+        Form("both_ends", "parallel_force", _PARAMETERS, _STARTS, compute_both_stops),
+        Form("extended_end", "parallel_force", _PARAMETERS, _STARTS, compute_extended_stop),
+        Form("compressed_end", "parallel_force", _PARAMETERS, _STARTS, compute_compressed_stop),
     ),
 )

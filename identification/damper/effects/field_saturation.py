@@ -1,4 +1,4 @@
-"""Iron that saturates: the field grows ever less with the drive."""
+"""Magnetic saturation of the iron: the field grows less and less with the drive."""
 
 from typing import Any
 
@@ -7,51 +7,53 @@ import numpy as np
 from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
-_STRAIGHT = 1e-9
-"""[1/drive] added to the sharpness, so that none at all leaves the field as it is."""
+_MIN_SHARPNESS = 1e-9
+"""Number added to the sharpness [1/drive]: with zero sharpness the field passes unchanged."""
 
 
-def tanh(field: Any, sharpness: Any) -> Any:
-    """Field that the damper sees [V or A] behind the coil's own; bounded by 1 / sharpness."""
-    return np.tanh((sharpness + _STRAIGHT) * field) / (sharpness + _STRAIGHT)
+def saturate_tanh(field: Any, sharpness: Any) -> Any:
+    """Return the field that the damper sees [V or A], bounded by 1 / sharpness."""
+    return np.tanh((sharpness + _MIN_SHARPNESS) * field) / (sharpness + _MIN_SHARPNESS)
 
 
-def knee(field: Any, sharpness: Any, power: Any) -> Any:
-    """The same with a knee between Froelich's gentle one (power 1) and a hard limit (power 8)."""
-    return field / (1.0 + (np.abs(sharpness * field) + _STRAIGHT) ** power) ** (1.0 / power)
+def saturate_knee(field: Any, sharpness: Any, power: Any) -> Any:
+    """Return the field behind a knee between Froelich's gentle one (power 1) and a hard limit (power 8)."""
+    return field / (1.0 + (np.abs(sharpness * field) + _MIN_SHARPNESS) ** power) ** (1.0 / power)
 
 
-def magnetisation(field: Any, sharpness: Any, missing: Any, rise: Any) -> Any:
-    """The same behind a slow beginning: permeability grows from its initial value first (Rayleigh 1887)."""
-    begun = field * (1.0 - missing * np.exp(-np.abs(field) / rise))
-    return begun / np.sqrt(1.0 + (sharpness * begun) ** 2)
+def saturate_magnetisation(field: Any, sharpness: Any, initial_loss: Any, initial_drive: Any) -> Any:
+    """Return the saturated field where the permeability first grows from its initial value (Rayleigh 1887)."""
+    unsaturated = field * (1.0 - initial_loss * np.exp(-np.abs(field) / initial_drive))
+    return unsaturated / np.sqrt(1.0 + (sharpness * unsaturated) ** 2)
 
 
-_SHARPNESS = Quantity("sharpness", "1/{drive}", 0.0, 50.0, 1.0, "one over the drive at which the iron is full")
+_SHARPNESS = Quantity("sharpness", "1/{drive}", 0.0, 50.0, 1.0, "inverse of the drive at which the iron saturates")
 
 FIELD_SATURATION = Effect(
     name="field_saturation",
     stage="coil",
-    meaning="the iron saturates, so more drive brings ever less field",
+    meaning="the iron saturates, so more drive brings less and less field",
     forms=(
-        Form("tanh", "field", (_SHARPNESS,), ((0.5,), (1.5,), (4.0,)), tanh),
+        Form("tanh", "field", (_SHARPNESS,), ((0.5,), (1.5,), (4.0,)), saturate_tanh),
         Form(
             "knee",
             "field",
             (_SHARPNESS, Quantity("power", "1", 1.0, 8.0, 2.0, "hardness of the knee")),
             ((0.4, 1.2), (1.5, 3.0), (2.5, 6.0)),
-            knee,
+            saturate_knee,
         ),
         Form(
             "magnetisation",
             "field",
             (
                 _SHARPNESS,
-                Quantity("missing", "1", 0.0, 0.95, 0.3, "share of the permeability that a small field lacks"),
-                Quantity("rise", "{drive}", 0.02, 2.0, 0.2, "drive over which that comes"),
+                Quantity(
+                    "initial_loss", "1", 0.0, 0.95, 0.3, "share of the permeability that a small field lacks"
+                ),
+                Quantity("initial_drive", "{drive}", 0.02, 2.0, 0.2, "drive over which the permeability rises"),
             ),
             ((0.7, 0.4, 0.2), (1.5, 0.6, 0.4), (0.4, 0.3, 0.1)),
-            magnetisation,
+            saturate_magnetisation,
         ),
     ),
 )

@@ -1,4 +1,4 @@
-"""A force channel that comes late: the force recorded at t is the one that acted at t - delay."""
+"""Delay of the force channel: the force recorded at t acted at t - delay."""
 
 from typing import Any
 
@@ -6,22 +6,22 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def late(delay: Any) -> Any:
-    """Time [s] by which the channel is late."""
+def make_delay(delay: Any) -> Any:
+    """Return the delay [s] of the channel."""
     return delay
 
 
 FORCE_DELAY = Effect(
     name="force_delay",
     stage="force_channel",
-    meaning="the load cell's filter or wire makes the force arrive late",
+    meaning="the load cell's filter or wire delays the force",
     forms=(
         Form(
             "pure_delay",
             "time_shift",
-            (Quantity("delay", "s", 0.0, 0.05, 2e-3, "time by which the force channel lags"),),
+            (Quantity("delay", "s", 0.0, 0.05, 2e-3, "delay of the force channel"),),
             ((0.0,), (3e-3,)),
-            late,
+            make_delay,
         ),
     ),
 )

@@ -1,7 +1,7 @@
-"""A force channel whose zero wanders: warming electronics, a cell that creeps.
+"""Drift of the force channel's zero: electronics that warm up, a load cell that creeps.
 
-Either the zero settles towards another value, or it swings slowly, or it wanders: a wave with five overtones. All
-stay bounded for all time.
+The zero settles towards another value, oscillates slowly, or follows a wave with five overtones. All forms stay
+bounded for all time.
 """
 
 from typing import Any
@@ -12,19 +12,22 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def settling(time: Any, drive: Any, change: Any, duration: Any) -> Any:
-    """Force [N] that the channel adds at a time [s]; the drive plays no part."""
+def compute_settling_drift(time: Any, drive: Any, change: Any, duration: Any) -> Any:
+    """Return the added force [N] of a zero that settles, at a time [s]; the drive has no influence."""
     return change * (1.0 - np.exp(-time / duration)) + 0.0 * drive
 
 
-def swinging(time: Any, drive: Any, cosine: Any, sine: Any, period: Any) -> Any:
-    """The same as a slow wave."""
+def compute_sinusoidal_drift(time: Any, drive: Any, cosine: Any, sine: Any, period: Any) -> Any:
+    """Return the added force [N] of a zero that follows one slow wave."""
     angle = 2.0 * np.pi * time / period
     return cosine * np.cos(angle) + sine * np.sin(angle) + 0.0 * drive
 
 
-def wandering(time: Any, drive: Any, *parts: Any) -> Any:
-    """The same as a wave with overtones; cosine and sine [N] of each order come first, the period [s] last."""
+def compute_harmonic_drift(time: Any, drive: Any, *parts: Any) -> Any:
+    """Return the added force [N] of a slow wave with overtones.
+
+    ``parts`` holds cosine and sine [N] of each order, then the period [s].
+    """
     angle = 2.0 * np.pi * time / parts[-1]
     wave = 0.0 * angle + 0.0 * drive
     for k in range(len(parts) // 2):
@@ -32,7 +35,7 @@ def wandering(time: Any, drive: Any, *parts: Any) -> Any:
     return wave
 
 
-_PARTS = tuple(
+_HARMONICS = tuple(
     Quantity(f"{part}_{order}", "N", -1e4, 1e4, 5.0, f"{part} of the wave at {order} times its frequency")
     for order in range(1, 7)
     for part in ("cosine", "sine")
@@ -41,35 +44,35 @@ _PARTS = tuple(
 FORCE_DRIFT = Effect(
     name="force_drift",
     stage="force_channel",
-    meaning="the zero of the load cell wanders",
+    meaning="the zero of the load cell drifts",
     forms=(
         Form(
             "settling",
-            "added_force",
+            "additive_force",
             (
-                Quantity("change", "N", -1e4, 1e4, 5.0, "change of the zero in the end"),
+                Quantity("change", "N", -1e4, 1e4, 5.0, "final change of the zero"),
                 Quantity("duration", "s", 3.0, 3000.0, 60.0, "time constant of that change"),
             ),
             ((0.0, 10.0), (0.0, 40.0), (0.0, 400.0)),
-            settling,
+            compute_settling_drift,
         ),
         Form(
-            "swinging",
-            "added_force",
+            "sinusoidal",
+            "additive_force",
             (
-                Quantity("cosine", "N", -1e4, 1e4, 5.0, "wave of the zero, its cosine"),
-                Quantity("sine", "N", -1e4, 1e4, 5.0, "wave of the zero, its sine"),
+                Quantity("cosine", "N", -1e4, 1e4, 5.0, "cosine of the zero's wave"),
+                Quantity("sine", "N", -1e4, 1e4, 5.0, "sine of the zero's wave"),
                 Quantity("period", "s", 10.0, 3000.0, 100.0, "period of that wave"),
             ),
             ((0.0, 0.0, 25.0), (0.0, 0.0, 50.0), (0.0, 0.0, 100.0), (0.0, 0.0, 250.0)),
-            swinging,
+            compute_sinusoidal_drift,
         ),
         Form(
-            "wandering",
-            "added_force",
-            (*_PARTS, Quantity("period", "s", 60.0, 3000.0, 100.0, "period of the slowest wave")),
+            "harmonic",
+            "additive_force",
+            (*_HARMONICS, Quantity("period", "s", 60.0, 3000.0, 100.0, "period of the slowest wave")),
             ((0.0,) * 12 + (70.0,), (0.0,) * 12 + (140.0,)),
-            wandering,
+            compute_harmonic_drift,
         ),
     ),
 )

@@ -1,12 +1,12 @@
 """Gas in the accumulator, compressed by the rod that enters the cylinder.
 
-A polytropic spring about its rest length L: force = -F_g ((1 + x/L)^-kappa - 1). It stiffens in compression
-(x < 0); in a recording with the sense turned round it stiffens the other way.
+``polytropic``: with the rest length L of the gas column, force = -F_g ((1 + x/L)^-kappa - 1). It stiffens in
+compression (x < 0). In a recording with reversed sign it stiffens the other way (``polytropic_reversed``).
 
-Gas that is compressed fast is warm, and gives its heat to the wall within a time constant (Pourmovahed and
-Otis 1990, for accumulators): adiabatic in fast strokes, isothermal in slow ones, with a loop of its own
-between. It is compressed adiabatically from a volume at which it had the wall's temperature, and that volume
-follows the real one.
+``heat_exchange``: gas that is compressed fast warms up and loses its heat to the wall within a time constant
+(Pourmovahed and Otis 1990, for accumulators). It is adiabatic in fast strokes, isothermal in slow ones, and has a
+hysteresis loop in between. The compression is adiabatic from the volume at which the gas had the wall's
+temperature, and that volume follows the actual one.
 """
 
 from typing import Any
@@ -17,35 +17,39 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 KAPPA = 1.3
-"""[1] polytropic exponent of nitrogen between isothermal (1) and adiabatic (1.4)."""
+"""Polytropic exponent of nitrogen between isothermal (1) and adiabatic (1.4) [1]."""
 GAMMA = 1.4
-"""[1] ratio of nitrogen's heat capacities."""
-_SHORTEST = 0.02
-"""[1] part of the column below which the gas is not compressed further: keeps any search finite."""
+"""Heat capacity ratio of nitrogen [1]."""
+_MIN_COLUMN = 0.02
+"""Least fraction of the gas column [1]: the gas is not compressed further, so a search meets no infinite force."""
 
 
-def compressed(x: Any, velocity: Any, preload: Any, length: Any) -> Any:
-    """Force [N] beside the law at displacement x [m]; the velocity [m/s] plays no part."""
-    return -preload * (np.maximum(1.0 + x / length, _SHORTEST) ** -KAPPA - 1.0)
+def compute_polytropic(x: Any, velocity: Any, preload: Any, length: Any) -> Any:
+    """Return the parallel force [N] at displacement x [m]; the velocity [m/s] has no influence."""
+    return -preload * (np.maximum(1.0 + x / length, _MIN_COLUMN) ** -KAPPA - 1.0)
 
 
-def turned(x: Any, velocity: Any, preload: Any, length: Any) -> Any:
-    """The same with the sense turned round: stiffening at positive displacement."""
-    return preload * (np.maximum(1.0 - x / length, _SHORTEST) ** -KAPPA - 1.0)
+def compute_polytropic_reversed(x: Any, velocity: Any, preload: Any, length: Any) -> Any:
+    """Return the parallel force [N] with reversed sign: stiffening at positive displacement."""
+    return preload * (np.maximum(1.0 - x / length, _MIN_COLUMN) ** -KAPPA - 1.0)
 
 
-def cooled(x: Any, velocity: Any, followed: Any, preload: Any, length: Any, exchange: Any) -> Any:
-    """Force [N] of gas that had the wall's temperature at the displacement that follows [m]."""
-    volume = np.maximum(1.0 + x / length, _SHORTEST)
-    as_warm = np.maximum(1.0 + followed / length, _SHORTEST)
-    return -preload * (volume**-GAMMA * as_warm ** (GAMMA - 1.0) - 1.0)
+def compute_heat_exchange(
+    x: Any, velocity: Any, followed: Any, preload: Any, length: Any, exchange_time: Any
+) -> Any:
+    """Return the parallel force [N] of gas that had the wall's temperature at displacement ``followed`` [m]."""
+    volume = np.maximum(1.0 + x / length, _MIN_COLUMN)
+    isothermal_volume = np.maximum(1.0 + followed / length, _MIN_COLUMN)
+    return -preload * (volume**-GAMMA * isothermal_volume ** (GAMMA - 1.0) - 1.0)
 
 
-def cooled_turned(x: Any, velocity: Any, followed: Any, preload: Any, length: Any, exchange: Any) -> Any:
-    """The same with the sense turned round."""
-    volume = np.maximum(1.0 - x / length, _SHORTEST)
-    as_warm = np.maximum(1.0 - followed / length, _SHORTEST)
-    return preload * (volume**-GAMMA * as_warm ** (GAMMA - 1.0) - 1.0)
+def compute_heat_exchange_reversed(
+    x: Any, velocity: Any, followed: Any, preload: Any, length: Any, exchange_time: Any
+) -> Any:
+    """Return the parallel force [N] of such gas with reversed sign."""
+    volume = np.maximum(1.0 - x / length, _MIN_COLUMN)
+    isothermal_volume = np.maximum(1.0 - followed / length, _MIN_COLUMN)
+    return preload * (volume**-GAMMA * isothermal_volume ** (GAMMA - 1.0) - 1.0)
 
 
 _PARAMETERS = (
@@ -53,19 +57,31 @@ _PARAMETERS = (
     Quantity("length", "m", 0.005, 1.0, 0.05, "length of the gas column at rest"),
 )
 _STARTS = ((0.0, 0.025), (0.0, 0.06), (0.0, 0.2))
-_EXCHANGE = Quantity(
-    "exchange", "s", 0.02, 60.0, 0.5, "time constant with which the gas takes the wall's temperature"
+_EXCHANGE_TIME = Quantity(
+    "exchange_time", "s", 0.02, 60.0, 0.5, "time constant with which the gas takes the wall's temperature"
 )
-_COOLED = tuple((*start, exchange) for start in _STARTS[:2] for exchange in (0.1, 1.0))
+_HEAT_EXCHANGE_STARTS = tuple((*start, exchange_time) for start in _STARTS[:2] for exchange_time in (0.1, 1.0))
 
 GAS_SPRING = Effect(
     name="gas_spring",
     stage="damper",
-    meaning="the gas behind the piston pushes back more than a straight spring",
+    meaning="the gas behind the piston pushes back more than a linear spring",
     forms=(
-        Form("polytropic", "parallel_force", _PARAMETERS, _STARTS, compressed),
-        Form("polytropic_turned", "parallel_force", _PARAMETERS, _STARTS, turned),
-        Form("heat_to_wall", "relaxing_force", (*_PARAMETERS, _EXCHANGE), _COOLED, cooled),
-        Form("heat_to_wall_turned", "relaxing_force", (*_PARAMETERS, _EXCHANGE), _COOLED, cooled_turned),
+        Form("polytropic", "parallel_force", _PARAMETERS, _STARTS, compute_polytropic),
+        Form("polytropic_reversed", "parallel_force", _PARAMETERS, _STARTS, compute_polytropic_reversed),
+        Form(
+            "heat_exchange",
+            "relaxation_force",
+            (*_PARAMETERS, _EXCHANGE_TIME),
+            _HEAT_EXCHANGE_STARTS,
+            compute_heat_exchange,
+        ),
+        Form(
+            "heat_exchange_reversed",
+            "relaxation_force",
+            (*_PARAMETERS, _EXCHANGE_TIME),
+            _HEAT_EXCHANGE_STARTS,
+            compute_heat_exchange_reversed,
+        ),
     ),
 )

@@ -1,7 +1,8 @@
-"""Iron that remembers: at the same drive the field is higher on the way down than on the way up.
+"""Magnetic remanence: at the same drive the field is higher while the drive falls than while it rises.
 
-What is remembered is the distance of the seen field from the coil's own. After a long way up it is below by the
-residue, after a long way down above; in between it follows exponentially over a width of drive, or as play does.
+The memory is the difference between the field that the damper sees and the coil's own. After a long rise the field
+is below the coil's own by the residue, after a long fall above it. In between it follows exponentially over a
+width of drive, or as a play operator does.
 """
 
 from typing import Any
@@ -11,76 +12,76 @@ import numpy as np
 from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
-_NARROWEST = 1e-6
+_MIN_WIDTH = 1e-6
 
 
-def lifted(field: Any, remembered: Any, residue: Any, width: Any) -> Any:
-    """Field that the damper sees [V or A]; what is remembered is a share [1] of the residue."""
+def add_remanence(field: Any, remembered: Any, residue: Any, width: Any) -> Any:
+    """Return the field that the damper sees [V or A]; the memory is a share [1] of the residue."""
     return field + residue * remembered
 
 
-def followed(remembered: Any, change: Any, residue: Any, width: Any) -> Any:
-    """Share [1] of the residue after a change of the field [V or A] in one sense."""
+def update_remanence(remembered: Any, change: Any, residue: Any, width: Any) -> Any:
+    """Return the share [1] of the residue after a monotonic change of the field [V or A]."""
     target = -1.0 if change > 0.0 else 1.0
-    return target + (remembered - target) * np.exp(-abs(change) / max(width, _NARROWEST))
+    return target + (remembered - target) * np.exp(-abs(change) / max(width, _MIN_WIDTH))
 
 
-def closing(field: Any, remembered: Any, residue: Any, width: Any, tip: Any) -> Any:
-    """The same of a loop whose branches meet again far beyond a field [V or A]."""
+def add_closing_remanence(field: Any, remembered: Any, residue: Any, width: Any, tip: Any) -> Any:
+    """Return the field of a loop whose branches meet again far beyond the field ``tip`` [V or A]."""
     return field + residue * remembered / (1.0 + (field / tip) ** 2)
 
 
-def followed_closing(remembered: Any, change: Any, residue: Any, width: Any, tip: Any) -> Any:
-    """Share [1] of the residue after a change of the field [V or A] in one sense."""
+def update_closing_remanence(remembered: Any, change: Any, residue: Any, width: Any, tip: Any) -> Any:
+    """Return the share [1] of the residue after a monotonic change of the field [V or A]."""
     target = -1.0 if change > 0.0 else 1.0
-    return target + (remembered - target) * np.exp(-abs(change) / max(width, _NARROWEST))
+    return target + (remembered - target) * np.exp(-abs(change) / max(width, _MIN_WIDTH))
 
 
-def held_back(field: Any, remembered: Any, residue: Any) -> Any:
-    """Field that the damper sees [V or A]; what is remembered is its distance from the coil's own."""
+def add_play_remanence(field: Any, remembered: Any, residue: Any) -> Any:
+    """Return the field that the damper sees [V or A]; the memory is its difference from the coil's own."""
     return field + remembered
 
 
-def dragged(remembered: Any, change: Any, residue: Any) -> Any:
-    """Distance [V or A] after a change of the field."""
+def update_play_remanence(remembered: Any, change: Any, residue: Any) -> Any:
+    """Return the difference [V or A] after a change of the field."""
     return min(max(remembered - change, -residue), residue)
 
+
+_RESIDUE = Quantity("residue", "{drive}", 0.0, 1.0, 0.02, "difference that remains after a long change")
+_WIDTH = Quantity("width", "{drive}", 5e-3, 5.0, 0.1, "change of drive over which the difference reverses")
 
 MAGNETIC_REMANENCE = Effect(
     name="magnetic_remanence",
     stage="coil",
-    meaning="the iron keeps a rest of the field that it had before",
+    meaning="the iron retains part of its former field",
     forms=(
         Form(
             "exponential",
             "field_memory",
-            (
-                Quantity("residue", "{drive}", 0.0, 1.0, 0.02, "distance that remains after a long way"),
-                Quantity("width", "{drive}", 5e-3, 5.0, 0.1, "change of drive over which it turns"),
-            ),
+            (_RESIDUE, _WIDTH),
             ((0.0, 0.05), (0.0, 0.3)),
-            lifted,
-            followed,
+            add_remanence,
+            update_remanence,
         ),
         Form(
             "closing",
             "field_memory",
             (
-                Quantity("residue", "{drive}", 0.0, 1.0, 0.02, "distance that remains after a long way"),
-                Quantity("width", "{drive}", 5e-3, 5.0, 0.1, "change of drive over which it turns"),
-                Quantity("tip", "{drive}", 0.02, 20.0, 0.5, "field at which half of the distance is left"),
+                _RESIDUE,
+                _WIDTH,
+                Quantity("tip", "{drive}", 0.02, 20.0, 0.5, "field at which half of the difference remains"),
             ),
             ((0.0, 0.05, 0.4), (0.0, 0.15, 0.4), (0.0, 0.3, 1.5)),
-            closing,
-            followed_closing,
+            add_closing_remanence,
+            update_closing_remanence,
         ),
         Form(
-            "play",
+            "play_operator",
             "field_memory",
-            (Quantity("residue", "{drive}", 0.0, 1.0, 0.02, "distance that remains after a long way"),),
+            (_RESIDUE,),
             ((0.01,), (0.04,)),
-            held_back,
-            dragged,
+            add_play_remanence,
+            update_play_remanence,
         ),
     ),
 )

@@ -1,4 +1,4 @@
-"""Mass that moves between load cell and damper: rod, clevis, adapter. The cell carries its inertia."""
+"""Mass between load cell and damper (rod, clevis, adapter): the cell measures its inertia force."""
 
 from typing import Any
 
@@ -6,8 +6,8 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def inertia(acceleration: Any, mass: Any) -> Any:
-    """Force [N] on the load cell at the actuator's acceleration [m/s^2]."""
+def compute_inertia(acceleration: Any, mass: Any) -> Any:
+    """Return the force [N] on the load cell at the actuator's acceleration [m/s²]."""
     return mass * acceleration
 
 
@@ -21,7 +21,7 @@ MOVING_MASS = Effect(
             "inertia",
             (Quantity("mass", "kg", 0.0, 200.0, 2.0, "mass between load cell and damper"),),
             ((0.0,),),
-            inertia,
+            compute_inertia,
         ),
     ),
 )

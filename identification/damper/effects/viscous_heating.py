@@ -1,8 +1,8 @@
-"""Oil that gets thinner as it warms: the damper softens with the energy that it has dissipated.
+"""Heating of the oil: the damper softens with the energy that it has dissipated.
 
-The energy leaves to the room with a time constant. What is left of it softens: factor 1 / (1 + s E). The yield
-force of the particles falls less with the temperature than the viscosity of the oil: not at all, as much, or in
-part.
+The energy leaves the damper with a time constant. The energy E that remains softens it by the factor 1 / (1 + s
+E). The yield force of the particles falls less with temperature than the viscosity of the oil: not at all
+(``viscosity_only``), as much (``uniform``), or in part (``partial``).
 """
 
 from typing import Any
@@ -11,38 +11,46 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 
-def viscosity(energy: Any, softening: Any, recovery: Any) -> Any:
-    """Factors [1] of alpha, c0 and c1 at the energy [J] in the damper: the oil alone gets thinner."""
-    left = 1.0 / (1.0 + softening * energy)
-    return left**0, left, left
+def soften_viscosity(energy: Any, softening: Any, recovery_time: Any) -> Any:
+    """Return factors [1] on alpha, c0 and c1 at an energy [J] where only the oil becomes thinner."""
+    factor = 1.0 / (1.0 + softening * energy)
+    return factor**0, factor, factor
 
 
-def whole(energy: Any, softening: Any, recovery: Any) -> Any:
-    """The same where the yield force falls with the viscosity."""
-    left = 1.0 / (1.0 + softening * energy)
-    return left, left, left
+def soften_uniformly(energy: Any, softening: Any, recovery_time: Any) -> Any:
+    """Return the factors [1] where the yield force falls with the viscosity."""
+    factor = 1.0 / (1.0 + softening * energy)
+    return factor, factor, factor
 
 
-def partly(energy: Any, softening: Any, recovery: Any, part: Any) -> Any:
-    """The same where the yield force falls with a power of the viscosity."""
-    left = 1.0 / (1.0 + softening * energy)
-    return left**part, left, left
+def soften_partially(energy: Any, softening: Any, recovery_time: Any, yield_exponent: Any) -> Any:
+    """Return the factors [1] where the yield force falls with a power of the viscosity."""
+    factor = 1.0 / (1.0 + softening * energy)
+    return factor**yield_exponent, factor, factor
 
 
 _PARAMETERS = (
-    Quantity("softening", "1/J", 0.0, 0.1, 2e-4, "loss for each joule in the damper"),
-    Quantity("recovery", "s", 2.0, 1e4, 100.0, "time constant with which the heat leaves"),
+    Quantity("softening", "1/J", 0.0, 0.1, 2e-4, "loss per joule in the damper"),
+    Quantity("recovery_time", "s", 2.0, 1e4, 100.0, "time constant with which the heat leaves"),
 )
-_PART = Quantity("part", "1", 0.05, 1.0, 0.5, "power with which the yield force follows the viscosity")
+_YIELD_EXPONENT = Quantity(
+    "yield_exponent", "1", 0.05, 1.0, 0.5, "power with which the yield force follows the viscosity"
+)
 _STARTS = ((0.0, 15.0), (0.0, 60.0), (0.0, 400.0))
 
 VISCOUS_HEATING = Effect(
     name="viscous_heating",
     stage="damper",
-    meaning="the damper softens with the heat that it has made",
+    meaning="the damper softens with the heat that it has produced",
     forms=(
-        Form("viscosity", "softening", _PARAMETERS, _STARTS, viscosity),
-        Form("whole", "softening", _PARAMETERS, _STARTS, whole),
-        Form("partly", "softening", (*_PARAMETERS, _PART), tuple((*start, 0.5) for start in _STARTS), partly),
+        Form("viscosity_only", "softening", _PARAMETERS, _STARTS, soften_viscosity),
+        Form("uniform", "softening", _PARAMETERS, _STARTS, soften_uniformly),
+        Form(
+            "partial",
+            "softening",
+            (*_PARAMETERS, _YIELD_EXPONENT),
+            tuple((*start, 0.5) for start in _STARTS),
+            soften_partially,
+        ),
     ),
 )

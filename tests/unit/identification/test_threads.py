@@ -1,21 +1,21 @@
-"""Linear algebra on one thread, and as before afterwards."""
+"""Linear algebra runs on one thread inside the context, and as before afterwards."""
 
 import threadpoolctl
 
-from identification.threads import one_thread
+from identification.threads import use_one_thread
 
 
-def threads_of_linear_algebra():
-    found = [pool for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"]
-    assert found
-    return [pool["num_threads"] for pool in found]
+def count_threads():
+    pools = [pool for pool in threadpoolctl.threadpool_info() if pool["user_api"] == "blas"]
+    assert pools
+    return [pool["num_threads"] for pool in pools]
 
 
-def test_within_it_every_library_has_one_thread_and_afterwards_as_many_as_before():
+def test_every_library_has_one_thread_inside_and_as_many_as_before_afterwards():
     with threadpoolctl.threadpool_limits(2, "blas"):
-        before = threads_of_linear_algebra()
+        before = count_threads()
         for _ in range(2):
-            with one_thread():
-                assert set(threads_of_linear_algebra()) == {1}
-            assert threads_of_linear_algebra() == before
+            with use_one_thread():
+                assert set(count_threads()) == {1}
+            assert count_threads() == before
         assert max(before) == 2

@@ -1,1 +1,3 @@
-"""One step a file, each named by its number."""
+"""One migration per file, named by its number."""
+
+__all__: list[str] = []

@@ -4,11 +4,11 @@ import time
 from contextlib import asynccontextmanager
 
 import pytest
-from fake_surroundings import FakeAgent, FakeEngine
 from fastapi.testclient import TestClient
 
 from bench.service.access import open_access
-from bench.service.application import Surroundings, create_app
+from bench.service.application import AppSettings, create_app
+from tests.support.fake_service import FakeAgent, FakeEngine
 
 PATIENCE = 20.0
 """[s] for what happens in another thread."""
@@ -28,7 +28,7 @@ class Service:
         self.end()
         self.engine = FakeEngine()
         given = {"data": self.data, "access": self.access, "link": self.agent, "engine": self._engine}
-        app = create_app(Surroundings(**{**given, **changes}))
+        app = create_app(AppSettings(**{**given, **changes}))
         self.client = TestClient(app, base_url="http://127.0.0.1:8600", raise_server_exceptions=False)
         self.client.headers["Authorization"] = f"Bearer {self.token}"
         return self.client.__enter__()

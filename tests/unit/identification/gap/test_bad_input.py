@@ -1,65 +1,69 @@
-"""Recordings that cannot be diagnosed: an answer in words before anything is fitted."""
+"""Recordings that cannot be diagnosed are refused before anything is fitted."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_runs import NOISE, RATE, run
 
-from identification.errors import NothingToFit
-from identification.gap.diagnose import diagnose
+from identification.errors import UnusableDataError
+from identification.gap.diagnosis import diagnose
+from tests.support.runs import NOISE, RATE, run
 
 WHOLE = run()
 COUNT = len(WHOLE.stretches[0].force)
 
 
-def changed(**channels):
+def replace_channels(**channels):
     """The run with some of its channels replaced."""
     return replace(WHOLE, stretches=(replace(WHOLE.stretches[0], **channels),))
 
 
-def beginning(seconds):
+def cut(seconds):
     """The first seconds of the run."""
     count, stretch = round(seconds * RATE), WHOLE.stretches[0]
     channels = {
         name: getattr(stretch, name)[:count] for name in ("time", "displacement", "force", "drive", "measured")
     }
-    kept = tuple(replace(s, stop=min(s.stop, count)) for s in stretch.segments if s.start < count)
-    return changed(**channels, segments=kept)
+    segments = tuple(replace(s, stop=min(s.stop, count)) for s in stretch.segments if s.start < count)
+    return replace_channels(**channels, segments=segments)
 
 
-def broken(value):
+def replace_force(value):
+    """The run with ten samples of the force replaced."""
     force = WHOLE.stretches[0].force.copy()
     force[1000:1010] = value
-    return changed(force=force)
+    return replace_channels(force=force)
 
 
 FORCE = WHOLE.stretches[0].force
 CASES = {
-    "one cycle": (beginning(1.0), "holds 1 cycle of the stroke, and a diagnosis needs 4"),
-    "no numbers": (broken(np.nan), "10 of 12000 samples of force are no numbers"),
-    "infinite": (broken(np.inf), "10 of 12000 samples of force are no numbers"),
-    "standing still": (changed(displacement=np.zeros(COUNT)), "stands still"),
-    "one force": (changed(force=np.full(COUNT, 3.0)), "the force hardly changes"),
-    "noise": (changed(force=NOISE * np.random.default_rng(1).standard_normal(COUNT)), "the force hardly changes"),
-    "other sign": (changed(force=-FORCE), "has the other sign"),
-    "small range": (changed(force=np.clip(FORCE, -50.0, 50.0)), "stands at its largest value, 50 N"),
+    "one cycle": (cut(1.0), "contains 1 cycle of the stroke; a diagnosis needs at least 4"),
+    "not a number": (replace_force(np.nan), "10 of 12000 samples of force are not finite"),
+    "infinite": (replace_force(np.inf), "10 of 12000 samples of force are not finite"),
+    "standing still": (replace_channels(displacement=np.zeros(COUNT)), "stands still"),
+    "one force": (replace_channels(force=np.full(COUNT, 3.0)), "the force hardly changes"),
+    "noise": (
+        replace_channels(force=NOISE * np.random.default_rng(1).standard_normal(COUNT)),
+        "the force hardly changes",
+    ),
+    "other sign": (replace_channels(force=-FORCE), "has the wrong sign"),
+    "small range": (replace_channels(force=np.clip(FORCE, -50.0, 50.0)), "are clipped at 50 N (limit 20%)"),
     "slow alone": (
-        changed(force_valid=np.abs(np.gradient(WHOLE.stretches[0].displacement)) * RATE < 0.02),
-        "no force was recorded that counts",
+        replace_channels(force_valid=np.abs(np.gradient(WHOLE.stretches[0].displacement)) * RATE < 0.02),
+        "no valid force was recorded above",
     ),
 }
 
 
-@pytest.mark.parametrize(("recording", "words"), CASES.values(), ids=CASES)
-def test_it_is_refused_in_words(recording, words):
-    with pytest.raises(NothingToFit) as refused:
+@pytest.mark.parametrize(("recording", "message"), CASES.values(), ids=CASES)
+def test_it_is_refused_with_the_reason_in_one_line(recording, message):
+    with pytest.raises(UnusableDataError) as refused:
         diagnose([recording])
-    assert words in str(refused.value)
+    assert message in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
-def test_without_repeats_the_floor_is_that_of_high_frequencies_and_it_is_said():
-    found = diagnose([changed(segments=())]).diagnosis
-    assert found.verdict == "no_gap"
-    assert any("high frequencies alone" in note for note in found.notes)
+def test_without_cycles_the_floor_comes_from_high_frequencies_and_a_note_tells():
+    diagnosis = diagnose([replace_channels(segments=())]).diagnosis
+    assert diagnosis.verdict == "no_gap"
+    assert any("high frequencies only" in note for note in diagnosis.notes)

@@ -1,0 +1,128 @@
+"""Run executor: prepares a run from a command and executes it under the limits that apply to it."""
+
+import time
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+from bench.agent.run import Run
+from bench.agent.run_request import validate_request
+from bench.agent.run_supervision import RunSupervision
+from bench.agent.supervisor import SafetySupervisor
+from bench.agent_protocol import RunCommand
+from bench.config import BenchConfig
+from bench.recorder import (
+    EventReporter,
+    LogMetadata,
+    RecordingThread,
+    describe_clocks,
+    describe_decoders,
+    make_attachments,
+    make_run_header,
+)
+from bench.rig import PRIORITY_STEP, Acquisition, Rig, pause_collection, raise_priority
+from bench.safety import Interlocks
+from bench.sequencer import CommandHistory, Sequencer
+from drivers import Clock
+
+_CLOCK_RATE_TIME = 20.0
+"""[s] Time until the rate of a device's clock is known to a few ppm; until then the nominal rate is used."""
+_CLOCK_SETTLING_TIME = 4.0
+"""[s] Time after the wires are opened until the clock maps are accurate enough for a log."""
+
+
+class PreparedRun(NamedTuple):
+    """Run that is ready to be executed."""
+
+    run: Run
+    metadata: LogMetadata
+    supervision: RunSupervision
+
+
+class RunExecutor:
+    """Executor of runs on the instruments of the agent.
+
+    Args:
+        config: configuration of the bench.
+        source: file of the configuration, attached to every log; logs are stored beside it.
+        rig: the instruments.
+        interlocks: limits of the bench.
+        supervisor: applies the actions of exceeded limits.
+        acquisition: reads the instruments.
+        recording_thread: records the samples.
+        clock: bench clock [ns].
+        report_event: receives the events of runs.
+    """
+
+    def __init__(
+        self,
+        config: BenchConfig,
+        source: Path | None,
+        rig: Rig,
+        interlocks: Interlocks,
+        supervisor: SafetySupervisor,
+        acquisition: Acquisition,
+        recording_thread: RecordingThread,
+        clock: Clock,
+        report_event: EventReporter,
+    ) -> None:
+        self._config, self._source, self._rig = config, source, rig
+        self._interlocks, self._supervisor, self._acquisition = interlocks, supervisor, acquisition
+        self._recording_thread, self._clock, self._report_event = recording_thread, clock, report_event
+        self._connected_ns = 0
+
+    def note_connection(self) -> None:
+        """Take the present time as that at which the wires were opened."""
+        self._connected_ns = self._clock()
+
+    def prepare(self, command: RunCommand) -> PreparedRun:
+        """Prepare the run of a command; nothing moves.
+
+        Raises:
+            MethodError, RunError: it cannot be executed.
+        """
+        request = validate_request(command, self._rig, self._config.rig.specimen, self._find_log_folder())
+        method, history = request.method, CommandHistory()
+        supervision = RunSupervision(
+            method, history, self._interlocks, self._supervisor, self._acquisition, self._clock, self._report_event
+        )
+        sequencer = Sequencer(
+            self._rig.actuator,
+            self._rig.amplifier,
+            self._interlocks,
+            history,
+            self._clock,
+            supervision,
+            self._estimate_amplifier_rate,
+        )
+        run = Run(request, history, sequencer, self._recording_thread, self._clock, self._report_event)
+        maps = self._acquisition.maps
+        metadata = LogMetadata(
+            make_run_header(method, request.identity, self._config, self._rig, maps, self._clock()),
+            # Read before anything moves, so that a missing certificate is reported in time.
+            make_attachments(method, self._config, self._rig, self._source),
+            partial(describe_decoders, self._rig),
+            partial(describe_clocks, self._rig, maps),
+        )
+        return PreparedRun(run, metadata, supervision)
+
+    def execute(self, prepared: PreparedRun) -> None:
+        """Play and record a run to its end; afterwards the bench's own limits apply again."""
+        self._wait_for_clocks()
+        with prepared.supervision, pause_collection():
+            raise_priority(-PRIORITY_STEP)
+            prepared.run.execute(prepared.metadata, self._supervisor.wait_until_stopped, self._acquisition.maps)
+
+    def _wait_for_clocks(self) -> None:
+        """Wait until the clocks of the devices were read often enough since the wires were opened."""
+        remaining = self._connected_ns + round(_CLOCK_SETTLING_TIME * 1e9) - self._clock()
+        time.sleep(max(remaining * 1e-9, 0.0))
+
+    def _estimate_amplifier_rate(self) -> float:
+        """Return the relative rate deviation of the amplifier's clock; 0 until it is known."""
+        is_known = self._clock() - self._connected_ns >= _CLOCK_RATE_TIME * 1e9
+        return self._acquisition.maps[self._rig.amplifier.name].estimate_rate() if is_known else 0.0
+
+    def _find_log_folder(self) -> Path:
+        base = Path() if self._source is None else self._source.parent
+        return base / self._config.rig.folder

@@ -1,0 +1,88 @@
+"""Rig agent as a process: one socket receives commands and returns replies, the other publishes."""
+
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from bench.agent.agent import Agent
+from bench.agent.ownership import acquire_agent_lock
+from bench.agent_protocol import (
+    Command,
+    CommandServer,
+    PrepareCommand,
+    Publisher,
+    Reply,
+    ResetCommand,
+    RunCommand,
+    ShutDownCommand,
+    StatusCommand,
+    StopCommand,
+)
+from bench.config import load_config
+from bench.errors import RunError
+from bench.processes import set_on_signals
+from drivers import DriverError
+
+
+def serve_agent(
+    path: Path,
+    commands: str | None,
+    samples: str | None,
+    on_ready: Callable[[str], None],
+    on_warning: Callable[[str], None],
+) -> None:
+    """Run the agent until Ctrl-C, SIGTERM or a command ends it; then bring everything to rest.
+
+    Args:
+        path: ``bench.toml``.
+        commands: address for commands, instead of the configured one.
+        samples: publishing address, instead of the configured one.
+        on_ready: receives the addresses in one line when the agent is ready.
+        on_warning: receives each privilege that the system did not grant.
+
+    Raises:
+        ConfigError: the configuration is not valid.
+        RunError: the bench belongs to another agent, an address is not available, or an instrument does not reply.
+    """
+    config = load_config(path)
+    stopping = threading.Event()
+    with (
+        set_on_signals(stopping),
+        acquire_agent_lock(path),
+        CommandServer(commands or config.agent.commands) as server,
+        Publisher(samples or config.agent.samples) as publisher,
+    ):
+        try:
+            with Agent(config, path, publisher.publish) as agent:
+                for warning in agent.get_status().warnings:
+                    on_warning(warning)
+                on_ready(f"agent of {config.rig.name}: commands {server.address}, samples {publisher.address}")
+                sys.stdout.flush()
+                server.serve(lambda command: handle_command(agent, command, stopping), stopping)
+        except DriverError as error:
+            raise RunError(str(error)) from error
+
+
+def handle_command(agent: Agent, command: Command, stopping: threading.Event) -> Reply:
+    """Execute a command and return its reply.
+
+    Args:
+        agent: the running agent.
+        command: as received.
+        stopping: event that ends the agent.
+    """
+    match command:
+        case StatusCommand():
+            return Reply(ok=True, status=agent.get_status())
+        case RunCommand():
+            return agent.run(command)
+        case StopCommand():
+            return agent.stop()
+        case ResetCommand():
+            return agent.reset()
+        case PrepareCommand():
+            return agent.prepare(command)
+        case ShutDownCommand():
+            stopping.set()
+            return Reply(ok=True, status=agent.get_status())

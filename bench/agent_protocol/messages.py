@@ -1,0 +1,182 @@
+"""Messages between the rig agent and its clients: commands, replies and publications, all as JSON.
+
+Each command is sent to the agent's request socket and is answered by one `Reply`. The publishing socket sends an
+`AgentStatus` at every change and at least four times a second (topic ``status``), bench samples in batches
+(``samples``) and events (``event``).
+"""
+
+from typing import Annotated, Any, Literal, Self, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from bench.setup_steps import SetupStep
+
+STATUS, SAMPLES, EVENT = b"status", b"samples", b"event"
+"""Topics that the agent publishes."""
+
+AgentState: TypeAlias = Literal["idle", "preparing", "running", "stopping", "tripped"]
+"""tripped: a limit was exceeded or an instrument failed; everything is at rest and stays so until a reset."""
+RunOutcome: TypeAlias = Literal["clean", "lossy", "incomplete"]
+SetupOutcome: TypeAlias = Literal["running", "done", "failed"]
+
+
+class Message(BaseModel):
+    """Base class of all messages: frozen, unknown fields refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class StatusCommand(Message):
+    """Request of the `AgentStatus`."""
+
+    command: Literal["status"] = "status"
+
+
+class RunCommand(Message):
+    """Start of a run; refused unless the agent is idle. The reply comes as soon as the run is accepted."""
+
+    command: Literal["run"] = "run"
+    method: dict[str, Any] = Field(description="a document `mrbench.method/1`")
+    specimen: str = Field(default="", description="the damper under test")
+    operator: str = Field(default="", description="name of the operator")
+    resume_after: str = Field(
+        default="", description="checkpoint of the method (segment) after which an interrupted run continues"
+    )
+    log: str | None = Field(
+        default=None, description="file of the log; by default named by the run's id, in the agent's folder"
+    )
+
+
+class StopCommand(Message):
+    """Controlled stop of the run: the motion fades out, the coil goes to zero. Harmless without a run."""
+
+    command: Literal["stop"] = "stop"
+
+
+class ResetCommand(Message):
+    """Reset of a trip whose cause is removed; nothing moves."""
+
+    command: Literal["reset"] = "reset"
+
+
+class PrepareCommand(Message):
+    """Start of a setup step; refused unless the agent is idle.
+
+    The reply comes when the step is done, or soon while it continues. ``home`` and ``move`` move the rod, and a
+    stop ends both; ``home`` is refused with a specimen clamped.
+    """
+
+    command: Literal["prepare"] = "prepare"
+    step: SetupStep = Field(
+        description="home: seek the reference; move: go to `position_m`; mount, unmount: a specimen has been "
+        "clamped, unclamped; centre: the rod is at the specimen's middle; tare, clear-tare: take the present "
+        "force as zero, or no longer"
+    )
+    position_m: float | None = Field(
+        default=None,
+        description="target of `move` [m], from the specimen's middle, or from home before one is centred",
+    )
+
+    @model_validator(mode="after")
+    def _check_move_position(self) -> Self:
+        if self.step == "move" and self.position_m is None:
+            raise ValueError("move needs position_m; nothing was done")
+        return self
+
+
+class ShutDownCommand(Message):
+    """End of the agent, with everything at rest."""
+
+    command: Literal["shut_down"] = "shut_down"
+
+
+Command: TypeAlias = Annotated[
+    StatusCommand | RunCommand | StopCommand | ResetCommand | PrepareCommand | ShutDownCommand,
+    Field(discriminator="command"),
+]
+
+
+class RunStatus(Message):
+    """State of a run in progress, or result of a finished one."""
+
+    id: str
+    method: str = Field(description="name of the method")
+    specimen: str
+    operator: str
+    log: str = Field(description="file of the log on the agent's machine")
+    started: str = Field(description="UTC, ISO 8601")
+    duration_s: float = Field(description="planned duration [s]")
+    elapsed_s: float = Field(default=0.0, description="completed time of the plan [s]")
+    segment: str = Field(default="", description="name of the current segment; empty between segments")
+    outcome: RunOutcome | None = Field(default=None, description="null while the run is in progress")
+    reason: str = Field(default="", description="reason why the outcome is not clean, for a person")
+    lost: dict[str, int] = Field(default_factory=dict, description="number of lost samples by channel")
+
+
+class SetupStatus(Message):
+    """State of a setup step in progress, or result of a finished one."""
+
+    step: SetupStep
+    outcome: SetupOutcome
+    message: str = Field(description="present state of the rod, or reason of the failure, for a person")
+
+
+class InstrumentStatus(Message):
+    """State of one instrument and its wire."""
+
+    name: str
+    driver: str
+    address: str
+    connected: bool
+    received: int = Field(description="number of received frames or replies")
+    lost: int = Field(description="number of samples that were taken and never received")
+    corrupted: int = Field(description="number of discarded frames")
+    resynchronised: int = Field(description="number of times that the start of a frame was searched for")
+    age_s: float | None = Field(description="time since the last valid frame [s]")
+    clock_error_bound_s: float | None = Field(
+        description="95 % bound of the error of the clock map [s]; null without a clock"
+    )
+    message: str = Field(description="fault for a person; empty without a fault")
+
+
+class AgentStatus(Message):
+    """State of the agent."""
+
+    state: AgentState
+    trip: str = Field(default="", description="reason of the trip; empty without a trip")
+    reference_state: str = Field(default="", description="unreferenced, homed, mounted, centred or reference_lost")
+    step: SetupStatus | None = Field(default=None, description="the latest setup step; null before the first")
+    run: RunStatus | None = Field(default=None, description="the run in progress, or the latest one")
+    finished: tuple[RunStatus, ...] = Field(
+        default=(), description="runs that finished since the agent started, newest last"
+    )
+    instruments: tuple[InstrumentStatus, ...] = ()
+    warnings: tuple[str, ...] = Field(default=(), description="such as: no real-time priority, with the reason")
+    drive_kind: str = Field(default="", description="coil_v or coil_a")
+    drive_unit: str = Field(default="", description="V or A")
+
+
+class Samples(Message):
+    """Batch of bench samples for live views: one value per sample in each list, SI units."""
+
+    time_ns: list[int] = Field(description="bench clock")
+    values: dict[str, list[float | None]] = Field(
+        description="by field of `/bench/sample`; null for a missing value"
+    )
+    segment: str = Field(default="", description="segment of the newest sample; empty between segments")
+
+
+class AgentEvent(Message):
+    """Event of the agent or of a run."""
+
+    time_ns: int
+    kind: str = Field(description="state, command, alarm, trip, late, checkpoint, run_finished")
+    text: str
+
+
+class Reply(Message):
+    """Reply to a command."""
+
+    ok: bool
+    error: str = Field(default="", description="what failed, the value and the limit, what to do")
+    status: AgentStatus | None = None

@@ -1,0 +1,51 @@
+"""Velocity for viewers, computed from the displacement.
+
+The velocity is the slope at the middle of a parabola that is fitted to 20 ms of displacement (Savitzky-Golay). It
+has no phase lag, and its noise is ten times lower. An identification computes its own derivatives instead.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy.signal import savgol_coeffs
+
+SMOOTHING_WINDOW = 0.020
+"""Length [s] of the window; at low sampling rates it is five samples."""
+
+
+def smooth_velocity(displacement: npt.NDArray[np.float64], rate: float) -> npt.NDArray[np.float64]:
+    """Compute the velocity of a smoothed displacement.
+
+    Args:
+        displacement: [m], shape (samples,), uniformly sampled.
+        rate: sampling rate [Hz].
+
+    Returns:
+        Velocity [m/s], shape (samples,).
+    """
+    samples = len(displacement)
+    if samples < 2:
+        return np.zeros(samples)
+    half = max(2, round(SMOOTHING_WINDOW * rate / 2))
+    window = min(2 * half + 1, samples - 1 + samples % 2)
+    order = min(2, window - 1)
+    if order < 1:
+        return np.gradient(displacement, 1 / rate)
+    slopes = _compute_slope_weights(window, order) * rate
+    middle = window // 2
+    return np.concatenate([
+        slopes[:middle] @ displacement[:window],
+        np.correlate(displacement, slopes[middle], "valid"),
+        slopes[middle + 1 :] @ displacement[-window:],
+    ])  # fmt: skip
+
+
+@lru_cache
+def _compute_slope_weights(window: int, order: int) -> npt.NDArray[np.float64]:
+    """Compute the weights of the samples for the slope at each position of a window, shape (positions, samples).
+
+    They are cached because live views need them ten times a second.
+    """
+    weights = [savgol_coeffs(window, order, deriv=1, pos=position, use="dot") for position in range(window)]
+    return np.asarray(weights, dtype=np.float64)

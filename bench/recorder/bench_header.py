@@ -1,0 +1,214 @@
+"""Header and attachments of a log: description of the bench, its instruments and its method."""
+
+import platform
+from collections.abc import Callable, Mapping
+from datetime import timedelta
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import orjson
+
+from bench.config import AsciiLoadCellSection, BenchConfig, ChannelSection, LoadCellSection
+from bench.errors import RunError
+from bench.log import DECODERS_FILE, ChannelInfo, Identity, RunHeader
+from bench.methods import Method
+from bench.rig import ClockMap, Rig
+from drivers import load_wire_file
+from drivers.replay import snapshot_decoder
+from drivers.transport import load_register_map
+
+RESAMPLING_NOTE = (
+    "samples are taken at the load cell's own conversions on the bench clock; displacement is interpolated by a "
+    "cubic, drive and actuator position linearly, temperature holds its latest reading"
+)
+NO_CALIBRATION = "none given"
+_UNITS = {
+    "displacement": "m",
+    "force": "N",
+    "actuator_position": "m",
+    "coil_voltage": "V",
+    "coil_current": "A",
+    "temperature": "degC",
+}
+
+
+class Attachment(NamedTuple):
+    """File kept inside a log."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+class LogMetadata(NamedTuple):
+    """Content of a log apart from its samples, marks and events."""
+
+    header: RunHeader
+    attachments: list[Attachment]
+    describe_decoders: Callable[[], Attachment]
+    """Returns the decoder snapshots; called when the recording of frames begins, so that replay starts there."""
+    describe_clocks: Callable[[], dict[str, str]]
+    """Returns the description of each device's clock; called at the end of the run."""
+
+
+def make_run_header(
+    method: Method, identity: Identity, config: BenchConfig, rig: Rig, maps: Mapping[str, ClockMap], bench_ns: int
+) -> RunHeader:
+    """Make the header that is written when the log is opened.
+
+    Args:
+        method: method of the run.
+        identity: specimen, operator and start; the start is UTC now.
+        config: configuration of the bench.
+        rig: instruments of the bench.
+        maps: clock map of each instrument by name.
+        bench_ns: bench clock now [ns].
+    """
+    return RunHeader(
+        id=identity.make_run_id(method.name),
+        specimen=identity.specimen,
+        method=method.name,
+        operator=identity.operator,
+        drive_kind=rig.drive_kind,
+        drive_unit="A" if rig.drive_unit == "A" else "V",
+        source="run",
+        versions={"mrbench": version("mrbench"), "python": platform.python_version(), "numpy": np.__version__},
+        utc_offset=(identity.started - timedelta(microseconds=bench_ns / 1000)).isoformat(),
+        velocity_from="smoothed displacement",
+        resampled=RESAMPLING_NOTE,
+        calibration=_describe_calibration(config, rig),
+        clocks=describe_clocks(rig, maps),
+        channels=_make_channel_infos(config, rig),
+    )
+
+
+def describe_clocks(rig: Rig, maps: Mapping[str, ClockMap]) -> dict[str, str]:
+    """Describe each device's clock as JSON: its channels, rate deviation [ppm], offset [s] and error bound [s]."""
+    descriptions = {}
+    for one in rig.instruments:
+        clock = maps[one.name]
+        is_known = clock.is_known
+        values = {
+            "channels": [channel.name for channel in one.instrument.channels],
+            "ppm": round(clock.estimate_rate() * 1e6, 3) if is_known else None,
+            "offset_s": float(clock.map_instants(0)) * 1e-9 if is_known else None,
+            "clock_error_bound_s": clock.compute_error_bound() if is_known else None,
+        }
+        descriptions[one.name] = orjson.dumps(values).decode()
+    return descriptions
+
+
+def make_attachments(method: Method, config: BenchConfig, rig: Rig, source: Path | None) -> list[Attachment]:
+    """Collect method, configuration, instruments and certificates.
+
+    Args:
+        method: method of the run.
+        config: configuration of the bench.
+        rig: instruments of the bench.
+        source: file of the configuration; None without one.
+
+    Raises:
+        RunError: a certificate that the configuration names cannot be read.
+    """
+    attachments = [Attachment("method.json", "application/json", method.to_json().encode())]
+    if source is not None:
+        attachments.append(Attachment("bench.toml", "application/toml", _read_bytes(source)))
+    instruments = orjson.dumps(_describe_instruments(rig), option=orjson.OPT_INDENT_2)
+    attachments.append(Attachment("instruments.json", "application/json", instruments))
+    folder = Path() if source is None else source.parent
+    certificates = sorted({section.certificate for section in config.channels.values() if section.certificate})
+    attachments += [
+        Attachment(Path(one).name, "application/octet-stream", _read_bytes(folder / one)) for one in certificates
+    ]
+    return attachments
+
+
+def describe_decoders(rig: Rig) -> Attachment:
+    """Return a snapshot of each instrument's decoder."""
+    snapshots = {one.name: snapshot_decoder(one.instrument) for one in rig.instruments}
+    return Attachment(DECODERS_FILE, "application/json", orjson.dumps(snapshots))
+
+
+def _read_bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise RunError(
+            f"{path} cannot be read ({error.strerror}), but belongs in the log; correct its name in bench.toml"
+        ) from None
+
+
+def _describe_instruments(rig: Rig) -> dict[str, Any]:
+    return {
+        one.name: {
+            "driver": one.driver,
+            "address": one.address,
+            "channels": [
+                {"name": channel.name, "unit": channel.unit, "low": channel.low, "high": channel.high}
+                for channel in one.instrument.channels
+            ],
+        }
+        for one in rig.instruments
+    }
+
+
+def _describe_calibration(config: BenchConfig, rig: Rig) -> dict[str, str]:
+    return {
+        name: (section.calibration or NO_CALIBRATION)
+        + (f"; certificate {Path(section.certificate).name}" if section.certificate else "")
+        for name, section in _find_channel_sections(config, rig).items()
+    }
+
+
+def _make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
+    rates = _find_rates(config, rig)
+    return {
+        name: ChannelInfo(
+            unit=rig.drive_unit if name == "coil_drive" else _UNITS[name],
+            rate_hz=rates[name],
+            filter=None
+            if section.filter is None
+            else {"kind": section.filter.kind, "order": section.filter.order, "cutoff_hz": section.filter.cutoff},
+            delay_s=section.delay,
+        )
+        for name, section in _find_channel_sections(config, rig).items()
+    }
+
+
+def _find_channel_sections(config: BenchConfig, rig: Rig) -> dict[str, ChannelSection]:
+    """Return the configuration of each recorded channel; the drive has that of the channel that measures it."""
+    recorded = [name for name in _UNITS if name != "temperature" or rig.thermometer is not None]
+    configured: Mapping[str, ChannelSection] = {str(name): section for name, section in config.channels.items()}
+    sections = {name: configured.get(name, ChannelSection()) for name in recorded}
+    return {**sections, "coil_drive": sections[rig.drive_channel]}
+
+
+def _find_rates(config: BenchConfig, rig: Rig) -> dict[str, float]:
+    """Return the rate [Hz] at which each channel is sampled by its instrument."""
+
+    def get_ring_buffer_rate(instrument: str) -> float:
+        return float(load_register_map(instrument).document["ring"]["rate"])
+
+    amplifier = get_ring_buffer_rate("coil_amplifier")
+    return {
+        "displacement": get_ring_buffer_rate("lvdt"),
+        "force": find_force_rate(config),
+        "actuator_position": 1 / rig.actuator.settings.cycle,
+        "coil_voltage": amplifier,
+        "coil_current": amplifier,
+        "coil_drive": amplifier,
+        "temperature": get_ring_buffer_rate("thermometer"),
+    }
+
+
+def find_force_rate(config: BenchConfig) -> float:
+    """Return the rate [Hz] of the load cell, which is also that of the bench samples."""
+    for section in config.instruments.values():
+        if isinstance(section, LoadCellSection):
+            return float(section.rate)
+        if isinstance(section, AsciiLoadCellSection):
+            break
+    # A weighing indicator does not report its rate; this is the highest that it has.
+    return float(max(load_wire_file("ascii_load_cell")["instrument"]["rates_hz"]))

@@ -1,0 +1,90 @@
+"""Single run on the instruments of a bench, with an agent in this process: no sockets, no service."""
+
+import contextlib
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+from bench.agent import Agent, acquire_agent_lock
+from bench.agent_protocol import RunCommand, RunStatus
+from bench.config import load_config
+from bench.errors import RunError
+from bench.methods import Method
+from bench.processes import set_on_signals
+from bench.progress import Progress
+from drivers import DriverError
+
+_POLL_PERIOD = 0.2
+"""[s] Interval at which the progress is polled."""
+
+
+def run_on_rig(
+    method: Method,
+    config: Path,
+    out: Path,
+    specimen: str = "",
+    operator: str = "",
+    progress: Progress = lambda share: None,
+    on_warning: Callable[[str], None] = lambda warning: None,
+) -> RunStatus:
+    """Record a method on the instruments of a configuration.
+
+    Ctrl-C and SIGTERM stop it softly: the motion fades out, the coil goes to zero, the log is closed.
+
+    Args:
+        method: the method to run.
+        config: ``bench.toml``.
+        out: file of the log.
+        specimen: the damper under test; empty for the configured one.
+        operator: name of the operator.
+        progress: receives the completed share, 0 to 1.
+        on_warning: receives each privilege that the system did not grant.
+
+    Returns:
+        The status with its outcome, clean or lossy.
+
+    Raises:
+        ConfigError: the configuration is not valid.
+        MethodError: the method cannot be compiled within its limits.
+        RunError: the bench belongs to another agent, an instrument does not reply, or the run stopped early; the
+            recorded part is in the log.
+    """
+    bench_config = load_config(config)
+    stopping = threading.Event()
+    # Signals first: one that comes while the wires are opened must not interrupt half-way.
+    with set_on_signals(stopping), acquire_agent_lock(config), contextlib.ExitStack() as opened:
+        try:
+            agent = opened.enter_context(Agent(bench_config, config))
+        except DriverError as error:
+            raise RunError(str(error)) from error
+        for warning in agent.get_status().warnings:
+            on_warning(warning)
+        command = RunCommand(
+            method=method.model_dump(mode="json", by_alias=True),
+            specimen=specimen,
+            operator=operator,
+            log=str(out),
+        )
+        reply = agent.run(command)
+        if not reply.ok:
+            raise RunError(reply.error)
+        return _follow_run(agent, stopping, progress)
+
+
+def _follow_run(agent: Agent, stopping: threading.Event, progress: Progress) -> RunStatus:
+    """Wait for the end of the run, stop it if requested, and return its status."""
+    is_stopping = False
+    while not agent.wait(_POLL_PERIOD):
+        if stopping.is_set() and not is_stopping:
+            is_stopping = True
+            agent.stop()
+        run = agent.get_run_status()
+        if run is not None:
+            progress(min(run.elapsed_s / run.duration_s, 1.0) if run.duration_s else 1.0)
+    status = agent.get_run_status()
+    if status is None or status.outcome == "incomplete":
+        reason = (
+            "it was not recorded" if status is None else f"{status.reason}; the recorded part is in {status.log}"
+        )
+        raise RunError(f"the run stopped early: {reason}")
+    return status

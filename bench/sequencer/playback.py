@@ -1,0 +1,120 @@
+"""Playback sections: parts of a programme that begin and end at rest and whose drive fits the amplifier's table.
+
+The amplifier plays the drive steps exactly, but by its own clock, and its table is limited. A programme with more
+steps, or a long one, is therefore split where the rod rests anyway. The rod waits there until the next section is
+uploaded.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from bench.errors import RunError
+from bench.methods import NO_SEGMENT, Programme
+from bench.sequencer.trajectory import Array, Times, Trajectory
+
+MAX_SECTION_TIME = 60.0
+"""[s] Longest section, if the programme rests often enough.
+
+The clocks of amplifier and bench diverge by about 50 µs per second; each section starts them together again."""
+_REST_VELOCITY = 1e-6
+"""[m/s] Threshold on the velocity: below it, a programme is at rest."""
+
+Indices = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PlaybackSection:
+    """Samples of a programme from ``start`` to ``stop``, both included."""
+
+    programme: Programme
+    start: int
+    stop: int
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """Motion of the section."""
+        part, programme = slice(self.start, self.stop + 1), self.programme
+        return Trajectory(
+            programme.rate, programme.displacement[part], programme.velocity[part], programme.acceleration[part]
+        )
+
+    def list_drive_steps(self) -> tuple[Array, Array]:
+        """Return times from the begin [s] and levels [V or A] of the drive steps, the first at the begin."""
+        drive = self.programme.drive[self.start : self.stop + 1]
+        steps = np.concatenate([[0], np.flatnonzero(np.diff(drive)) + 1])
+        return steps / self.programme.rate, drive[steps]
+
+    def find_samples(self, time: Array) -> Indices:
+        """Return the indices of the programme's samples in force at times from the begin [s]."""
+        # The margin assigns an instant that rounding puts just before a sample to that sample.
+        index = np.floor(time * self.programme.rate + 1e-6).astype(np.int64)
+        return self.start + np.clip(index, 0, self.stop - self.start)
+
+
+def split_into_sections(programme: Programme, capacity: int, first: int = 0) -> tuple[PlaybackSection, ...]:
+    """Split a programme into as few sections as its drive steps allow.
+
+    Args:
+        programme: compiled method.
+        capacity: number of steps in the amplifier's table.
+        first: sample to begin with, at rest.
+
+    Raises:
+        RunError: between two rests the drive has more steps than the table.
+    """
+    step_counts = np.concatenate([[0], np.cumsum(np.diff(programme.drive) != 0)])
+    rests = [int(sample) for sample in find_rest_samples(programme) if sample > first]
+    sections, start = [], first
+    while start < len(programme.time) - 1:
+        later = [rest for rest in rests if rest > start]
+        # The level at the begin takes one entry of the table, so the number of changes must be below its capacity.
+        fitting = [rest for rest in later if step_counts[rest] - step_counts[start] < capacity]
+        if not fitting:
+            raise _make_capacity_error(programme, step_counts, start, later[0], capacity)
+        short = [rest for rest in fitting if rest - start <= MAX_SECTION_TIME * programme.rate]
+        # Without a rest within the longest section time, the first rest after it is used.
+        stop = short[-1] if short else fitting[0]
+        sections.append(PlaybackSection(programme, start, stop))
+        start = stop
+    return tuple(sections)
+
+
+def find_rest_samples(programme: Programme) -> Times:
+    """Return the samples at rest where a run may wait without cutting a segment, including the last sample."""
+    at_rest = np.abs(programme.velocity) < _REST_VELOCITY
+    between = programme.segment == NO_SEGMENT
+    edge = np.concatenate([[True], np.diff(programme.segment) != 0])
+    may_wait = at_rest & (between | edge)
+    may_wait[-1] = True
+    return np.flatnonzero(may_wait)
+
+
+def find_resume_sample(programme: Programme, name: str) -> int:
+    """Return the sample from which an interrupted run continues after a segment.
+
+    Raises:
+        RunError: the segment does not exist, is not a checkpoint, or is the last one.
+    """
+    checkpoints = {segment.name: segment for segment in programme.segments if segment.checkpoint}
+    if name not in checkpoints:
+        names = ", ".join(checkpoints) or "none"
+        raise RunError(f"method {programme.method.name} has no checkpoint after {name}; its checkpoints: {names}")
+    segment = checkpoints[name]
+    later = [int(sample) for sample in find_rest_samples(programme) if sample >= segment.stop]
+    if later[0] >= len(programme.time) - 1 or segment is programme.segments[-1]:
+        raise RunError(
+            f"method {programme.method.name} has no segment after {name}; the run was complete, start a new one"
+        )
+    return later[0]
+
+
+def _make_capacity_error(programme: Programme, counts: Indices, start: int, stop: int, capacity: int) -> RunError:
+    count = int(counts[stop] - counts[start]) + 1
+    inside = [segment.name for segment in programme.segments if start <= segment.start <= stop]
+    place = f"segment {inside[0]}" if inside else f"from {programme.time[start]:.1f} s on"
+    return RunError(
+        f"method {programme.method.name}, {place}: the drive takes {count} values before the rod rests again, but "
+        f"the coil amplifier's table holds {capacity}; shorten the segment, lower rate_hz, or use steps"
+    )

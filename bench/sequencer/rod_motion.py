@@ -1,0 +1,87 @@
+"""Single move of the rod without a run, such as to the position where a specimen is clamped."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from bench.errors import RunError
+from bench.sequencer.command_history import CommandHistory
+from bench.sequencer.setpoint_thread import SetpointGenerator, SetpointThread
+from bench.sequencer.trajectory import plan_approach
+from drivers.actuator import Actuator
+
+_POLL_PERIOD = 0.02
+"""[s] Interval at which the end of the move is polled."""
+_TIME_MARGIN = 10.0
+"""[s] Time by which the move may exceed its planned duration."""
+_STOP_ACCELERATION = 1.0
+"""[m/s²] Acceleration limit of a soft stop of the slow move."""
+
+
+def move_rod(
+    actuator: Actuator,
+    permit: Callable[[float], None],
+    clock: Callable[[], int],
+    on_setpoints_active: Callable[[bool], None],
+    target: float,
+    stop_requested: threading.Event,
+) -> None:
+    """Move the rod slowly to a position, and leave the drive without voltage.
+
+    Args:
+        actuator: referenced actuator.
+        permit: checks each position [m] and raises to forbid it.
+        clock: bench clock [ns].
+        on_setpoints_active: is told when setpoints begin and when they end.
+        target: position [m] from the specimen's middle, or from home if no specimen is centred.
+        stop_requested: event that ends the move early.
+
+    Raises:
+        RunError: the move was stopped, or the rod does not arrive.
+        InterlockError: the target is forbidden.
+        DriverError: the drive refuses or does not reply.
+    """
+    permit(target)
+    if stop_requested.is_set():
+        raise RunError("the move was stopped before it began; the rod did not move")
+    settings = actuator.settings
+    generator = SetpointGenerator(actuator, permit, CommandHistory(), settings.cycle, settings.setpoint_timeout)
+    # The failure is raised below, and a late setpoint of a slow move has no consequence.
+    thread = SetpointThread(generator, clock, lambda now_ns, delay: None, lambda error: None)
+    approach = plan_approach(actuator.arm(), target)
+    generator.start(approach)
+    on_setpoints_active(True)
+    is_at_rest = False
+    try:
+        with thread:
+            deadline = time.monotonic() + approach.duration + _TIME_MARGIN
+            _await_rest(generator, thread, clock, deadline, stop_requested)
+        is_at_rest = thread.failure is None
+    finally:
+        on_setpoints_active(False)
+        # The drive brakes a rod that may still move; without voltage the rod would coast.
+        actuator.disable() if is_at_rest else actuator.make_safe()
+    if thread.failure is not None:
+        raise thread.failure
+    if stop_requested.is_set():
+        raise RunError("the move was stopped; the rod rests before its target")
+
+
+def _await_rest(
+    generator: SetpointGenerator,
+    thread: SetpointThread,
+    clock: Callable[[], int],
+    deadline: float,
+    stop_requested: threading.Event,
+) -> None:
+    """Wait until the rod is at rest or the setpoints have failed."""
+    is_stopping = False
+    while not generator.is_done(clock()) and thread.failure is None:
+        if stop_requested.is_set() and not is_stopping:
+            generator.stop(clock(), _STOP_ACCELERATION)
+            is_stopping = True
+        if time.monotonic() > deadline:
+            raise RunError(
+                f"the rod has not arrived {_TIME_MARGIN:g} s after the planned end of the move; check the actuator"
+            )
+        time.sleep(_POLL_PERIOD)

@@ -1,0 +1,78 @@
+"""What the routes work with, put together once when the service starts."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import Depends
+from starlette.requests import HTTPConnection
+
+from bench.catalogue import Catalogue, JobRow, RunRow
+from bench.jobs import JobEngine, JobManager
+from bench.service.access import Access
+from bench.service.agent_monitor import AgentMonitor
+from bench.service.live import LiveBroadcaster
+from bench.service.problems import make_not_found
+from bench.service.run_registry import RunRegistry
+from bench.service.views import Run, make_run_view
+
+MAX_JOBS = 200
+"""[1] jobs that are looked through for a page of runs."""
+
+
+@dataclass(frozen=True)
+class ServiceContext:
+    """Everything within a route's reach."""
+
+    access: Access
+    catalogue: Catalogue
+    monitor: AgentMonitor
+    live: LiveBroadcaster
+    engine: JobEngine
+    job_manager: JobManager
+    registry: RunRegistry
+    has_local_logs: bool
+    """Whether the agent writes into the service's data folder."""
+
+    @property
+    def data(self) -> Path:
+        """The data folder."""
+        return self.catalogue.folder
+
+    def get_run(self, run_id: str) -> RunRow:
+        """A run.
+
+        Raises:
+            ProblemError: there is none of that id.
+        """
+        row = self.catalogue.get_run(run_id)
+        if row is None:
+            raise make_not_found("run", run_id)
+        return row
+
+    def get_job(self, job_id: str) -> JobRow:
+        """A job.
+
+        Raises:
+            ProblemError: there is none of that id.
+        """
+        row = self.catalogue.get_job(job_id)
+        if row is None:
+            raise make_not_found("job", job_id)
+        return row
+
+    def make_run_views(self, *rows: RunRow) -> list[Run]:
+        """Runs as they are shown, each with its jobs."""
+        jobs = self.catalogue.list_jobs(MAX_JOBS, [row.id for row in rows])
+        return [
+            make_run_view(row, [job for job in jobs if job.run_id == row.id], self.monitor.latest_status)
+            for row in rows
+        ]
+
+
+def _get_context(connection: HTTPConnection) -> ServiceContext:
+    desk: ServiceContext = connection.app.state.desk
+    return desk
+
+
+Context = Annotated[ServiceContext, Depends(_get_context)]

@@ -1,0 +1,133 @@
+"""Keeps the catalogue's runs in step with the agent and the data folder, and has what has ended identified."""
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable
+from datetime import UTC, datetime
+from pathlib import Path
+
+from bench.agent_protocol import AgentStatus, RunStatus
+from bench.catalogue import Catalogue, RunRow, catalogue_log, is_complete, scan_logs
+from bench.jobs import IdentifySettings, JobManager
+
+SCAN_PERIOD = 5.0
+"""[s] between two looks into the data folder."""
+SETTLING_TIME = 10.0
+"""[s] after which a log that has not grown is written by nobody, where no agent can say so."""
+IDENTIFIED_OUTCOMES = ("clean", "lossy")
+_LOG = logging.getLogger(__name__)
+
+
+class RunRegistry:
+    """Writes down runs as they begin and end."""
+
+    def __init__(
+        self,
+        catalogue: Catalogue,
+        keeper: JobManager,
+        status: Callable[[], AgentStatus | None],
+        notify: Callable[[RunRow], Awaitable[None]],
+    ) -> None:
+        """Take its surroundings.
+
+        Args:
+            catalogue: where runs are written down.
+            keeper: has runs identified.
+            status: the agent's present status, none where it does not answer.
+            notify: told of runs that have changed.
+        """
+        self._catalogue, self._job_manager = catalogue, keeper
+        self._get_status, self._on_changed = status, notify
+        self._known_states: set[tuple[str, bool]] = set()
+        self._lock = asyncio.Lock()
+
+    async def observe(self, status: AgentStatus) -> None:
+        """Write down what a status says of runs; what is known already costs nothing."""
+        told = {run.id: run for run in (*status.finished, *([status.run] if status.run else []))}
+        for run in told.values():
+            mark = (run.id, run.outcome is not None)  # a run is news twice: when it begins and when it ends
+            if mark not in self._known_states:
+                async with self._lock:
+                    await (self._finish_run(run) if run.outcome else self._add_run(run))
+                # Only now: what could not be written down is tried again with the next status.
+                self._known_states.add(mark)
+
+    async def scan(self) -> None:
+        """Look into the data folder once."""
+        async with self._lock:
+            for row in await asyncio.to_thread(scan_logs, self._catalogue, self._is_being_written):
+                await self._handle_change(row)
+
+    async def scan_periodically(self) -> None:
+        """Look into the data folder again and again."""
+        while True:
+            try:
+                await self.scan()
+            except Exception as error:  # a task that ends in silence would leave all later logs unseen
+                _LOG.warning("scan_failed", extra={"why": repr(error)})
+            await asyncio.sleep(SCAN_PERIOD)
+
+    async def _add_run(self, run: RunStatus) -> RunRow:
+        row = await asyncio.to_thread(self._catalogue.get_run, run.id)
+        if row is None:
+            row = _make_row(run, self._catalogue)
+            await asyncio.to_thread(self._catalogue.add, row)
+            _LOG.info("run_began", extra={"run": row.id, "method": row.method, "specimen": row.specimen})
+            await self._on_changed(row)
+        return row
+
+    async def _finish_run(self, run: RunStatus) -> None:
+        row = await self._add_run(run)
+        if row.state != "running":
+            return
+        ended = await asyncio.to_thread(self._catalogue_log, Path(run.log))
+        if ended is None:
+            # The log is on the agent's machine, or was never begun: its own word has to do.
+            values = {"state": "ended", "outcome": run.outcome, "reason": run.reason}
+            ended = await asyncio.to_thread(lambda: self._catalogue.update_run(row.id, **values))
+        await self._handle_change(ended)
+
+    def _catalogue_log(self, path: Path) -> RunRow | None:
+        return catalogue_log(self._catalogue, path) if path.is_file() else None
+
+    async def _handle_change(self, row: RunRow) -> None:
+        _LOG.info("run_" + row.state, extra={"run": row.id, "outcome": row.outcome, "reason": row.reason})
+        await self._on_changed(row)
+        worth_a_fit = row.source == "run" and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
+        if worth_a_fit and not await asyncio.to_thread(self._catalogue.list_jobs, 1, [row.id]):
+            await self._job_manager.identify(row, IdentifySettings())
+
+    def _is_being_written(self, path: Path) -> bool:
+        status = self._get_status()
+        run = status.run if status else None
+        if run is not None and run.outcome is None and Path(run.log) == path:
+            return True
+        # The agent is there, and this known log is none that it says it writes.
+        if status is not None and self._catalogue.find_run_by_log(path) is not None:
+            return False
+        # Another program may record into the folder, or an agent that cannot be asked just now.
+        return path.exists() and time.time() - path.stat().st_mtime < SETTLING_TIME and not is_complete(path)
+
+
+def _make_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
+    return RunRow(
+        id=run.id,
+        method=run.method,
+        specimen=run.specimen,
+        operator=run.operator,
+        source="run",
+        started=_parse_utc(run.started),
+        duration_s=run.duration_s,
+        state="running",
+        log=catalogue.make_name(Path(run.log)),
+    )
+
+
+def _parse_utc(text: str) -> datetime:
+    """A time as the agent says it; now, where it is none."""
+    try:
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        return datetime.now(UTC)
+    return found if found.tzinfo else found.replace(tzinfo=UTC)

@@ -1,0 +1,88 @@
+"""Recordings whose effect is withheld: `mrbench import`, then what `mrbench diagnose` does, in one process.
+
+`MRBENCH_SHARED` names the folder that holds `blind/caseNN.csv.gz`. Writes `docs/evidence/blind-predictions.json`
+(case -> diagnosis) and `docs/evidence/blind.md`. `--only case00,case01` takes some, `--keep FOLDER` keeps logs,
+diagnoses and twins there and takes up where an earlier call stopped.
+"""
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from benchmarks.common import make_parser, open_folder, run_mrbench, select_names, time_call
+from identification.documents import write_document
+from identification.gap import diagnose
+from identification.gap.outcome import summarise_diagnosis
+from identification.logs import load
+
+EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
+_HEAD = """# Recordings whose effect is withheld
+
+{count} recordings, one or two effects in each, or none, or something that no library knows. Nobody of this project
+has seen the answers; the diagnoses stand in `blind-predictions.json`. Errors are on strokes kept out of every fit;
+"after" and shrinkage are what another run is expected to show.
+Made by
+
+```
+{command}
+```
+
+| case | verdict | effects (probability of each) | unknown | before N | after N | floor N | shrinkage | CPU s |
+| --- | --- | --- | --- | --- | --- | --- | --- | --- |
+"""
+
+
+def diagnose_recording(source: Path, kept: Path) -> dict[str, Any]:
+    """The diagnosis of one recording, made once."""
+    name = source.name.removesuffix(".csv.gz")
+    out = kept / f"{name}.json"
+    if not out.exists():
+        log = kept / f"{name}.mcap"
+        if not log.exists():
+            run_mrbench("import", source, "--out", log)
+        found, seconds = time_call(lambda: diagnose([load(log)]))
+        write_document(kept / f"{name}.twin.json", found.twin)
+        write_document(out, found.diagnosis)
+        (kept / f"{name}.seconds").write_text(f"{seconds:.1f}", encoding="utf-8")
+        print(f"{name}: {summarise_diagnosis(found.diagnosis)}", flush=True)
+    document: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
+    return document
+
+
+def render_row(name: str, diagnosis: dict[str, Any], seconds: str) -> str:
+    """One line of the table."""
+    gap = diagnosis["gap"]
+    effects = ", ".join(f"{e['name']} ({e['probability']:.2f})" for e in diagnosis["effects"]) or "–"
+    shrinkage = "–" if gap["shrinkage"] is None else f"{gap['shrinkage']:.3f}"
+    figures = [f"{gap[key]:.3g}" for key in ("before_n", "after_n", "noise_floor_n")]
+    cells = [name, diagnosis["verdict"], effects, f"{diagnosis['unknown_probability']:.2f}", *figures, shrinkage]
+    return f"| {' | '.join([*cells, seconds])} |"
+
+
+def main() -> None:
+    """Diagnose every case and write the evidence."""
+    asked = make_parser(__doc__, "logs, diagnoses and twins").parse_args()
+    shared = Path(os.environ.get("MRBENCH_SHARED", "."))
+    sources = {s.name.removesuffix(".csv.gz"): s for s in sorted(shared.glob("blind/case*.csv.gz"))}
+    if not sources:
+        sys.exit("MRBENCH_SHARED: names no folder with blind/caseNN.csv.gz; point it at the recordings")
+    with open_folder(asked.keep) as kept:
+        found = {name: diagnose_recording(sources[name], kept) for name in select_names(asked.only, list(sources))}
+        seconds = {name: (kept / f"{name}.seconds").read_text(encoding="utf-8") for name in found}
+    if len(found) == len(sources):
+        _write_evidence(found, seconds)
+
+
+def _write_evidence(found: dict[str, dict[str, Any]], seconds: dict[str, str]) -> None:
+    EVIDENCE.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(found, separators=(",", ":"), ensure_ascii=False)
+    (EVIDENCE / "blind-predictions.json").write_text(text + "\n", encoding="utf-8")
+    head = _HEAD.format(count=len(found), command="MRBENCH_SHARED=... python -m benchmarks.accuracy.withheld")
+    rows = [render_row(name, diagnosis, seconds[name]) for name, diagnosis in found.items()]
+    (EVIDENCE / "blind.md").write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,3 @@
+"""Quality of the tests, and documents of two versions compared."""
+
+__all__: list[str] = []

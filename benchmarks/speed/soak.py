@@ -1,0 +1,91 @@
+"""Ten minutes of stroking over the wires beside a busy core: what is lost, and what the agent costs.
+
+python -m benchmarks soak              the paper's six voltages, 100 s each
+python -m benchmarks.speed.soak quick        another method
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from bench.log import read_log
+from benchmarks.common import print_line
+
+METHOD = "paper_sines"
+_BUSY_LOOP = "while True: pass"
+_STARTUP_TIMEOUT = 120.0
+_CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
+
+
+def run(method: str = METHOD) -> None:
+    """Record a method over the wires of a simulated rig beside a process that keeps one core busy."""
+    with TemporaryDirectory() as folder:
+        bench, log = Path(folder) / "bench.toml", Path(folder) / "soak.mcap"
+        rig = _start_mrbench("sim", "--out", str(bench))
+        busy = subprocess.Popen([sys.executable, "-c", _BUSY_LOOP])
+        try:
+            _wait_for_file(bench, rig)
+            agent = _start_mrbench("run", method, "--config", str(bench), "--out", str(log))
+            shares = _measure_shares({"agent": agent, "simulated rig": rig, "busy process": busy}, agent)
+        finally:
+            for process in (busy, rig):
+                process.terminate()
+                process.wait()
+        _report(log, shares)
+
+
+def _start_mrbench(*words: str) -> "subprocess.Popen[bytes]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "bench.cli", *words], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    )
+
+
+def _wait_for_file(file: Path, process: "subprocess.Popen[bytes]") -> None:
+    deadline = time.monotonic() + _STARTUP_TIMEOUT
+    while not file.is_file():
+        if process.poll() is not None or time.monotonic() > deadline:
+            sys.exit("the simulated rig did not come up")
+        time.sleep(0.1)
+
+
+def _measure_shares(
+    processes: dict[str, "subprocess.Popen[bytes]"], until: "subprocess.Popen[bytes]"
+) -> dict[str, float]:
+    """Share of a core [1] that each process takes from the tenth second on until one of them ends."""
+    # Imports and connecting are over by then; what is measured is the stroking.
+    time.sleep(10.0)
+    begin, began = time.monotonic(), {name: _read_cpu_time(process) for name, process in processes.items()}
+    # A process that has ended has no times left to read: the last ones before that count.
+    latest, end = dict(began), begin
+    while until.poll() is None:
+        time.sleep(0.5)
+        if until.poll() is None:
+            latest, end = {name: _read_cpu_time(process) for name, process in processes.items()}, time.monotonic()
+    if until.returncode:
+        sys.exit(f"the run failed: {until.stderr.read().decode()[-300:] if until.stderr else ''}")
+    return {name: (latest[name] - began[name]) / (end - begin) for name in processes}
+
+
+def _read_cpu_time(process: "subprocess.Popen[bytes]") -> float:
+    """Processor time [s] of a process so far."""
+    # Fields behind the name, which may itself hold spaces and brackets: utime and stime are the 14th and 15th.
+    words = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return (int(words[11]) + int(words[12])) / _CLOCK_TICKS
+
+
+def _report(log: Path, shares: dict[str, float]) -> None:
+    recorded = read_log(log)
+    lost = json.loads(recorded.metadata["outcome"]["lost"])
+    seconds = float(recorded.samples["time"][-1] - recorded.samples["time"][0])
+    print(f"soak: {seconds:.0f} s recorded, outcome {recorded.outcome}, lost: {lost or 'nothing'}")
+    print_line("samples at the load cell's conversions", len(recorded.samples["time"]), "", "")
+    for name, share in shares.items():
+        print_line(f"processor time of the {name}", 100 * share, "% core", "at most 30" if name == "agent" else "")
+
+
+if __name__ == "__main__":
+    run(*sys.argv[1:])

@@ -1,0 +1,3 @@
+"""Evidence pages of the blind trial."""
+
+__all__: list[str] = []

@@ -1,0 +1,16 @@
+"""Drivers of the Modbus instruments: LVDT, thermometer, coil amplifier."""
+
+from drivers.modbus.coil_amplifier import DRIVE_UNITS, CoilAmplifier
+from drivers.modbus.sample_decoder import ModbusDecoder, RingBufferLayout
+from drivers.modbus.sensors import Lvdt, Thermometer
+from drivers.modbus.step_table import TableState
+
+__all__ = [
+    "DRIVE_UNITS",
+    "CoilAmplifier",
+    "Lvdt",
+    "ModbusDecoder",
+    "RingBufferLayout",
+    "TableState",
+    "Thermometer",
+]

@@ -1,0 +1,53 @@
+"""Modbus sensors: instruments that only measure. Each is one row: its wire file, and its name in messages.
+
+Each sensor samples by its own clock and keeps its latest samples in a ring buffer, see
+`drivers.modbus.ring_buffer_reader`. An LVDT sample is tens of milliseconds old when it arrives
+(`ModbusInstrument.compute_age`): good enough for the record, but too late for fast limits.
+"""
+
+from typing import ClassVar
+
+from drivers.errors import OutOfRangeError
+from drivers.instrument import Clock
+from drivers.modbus.instrument import ModbusInstrument
+from drivers.transport import ModbusAddress
+
+
+class ModbusSensor(ModbusInstrument):
+    """One sensor on its wire."""
+
+    kind: ClassVar[str]
+    """Name of its wire file."""
+    display_name: ClassVar[str]
+    """Name in messages, with its article."""
+
+    def __init__(
+        self, name: str, address: ModbusAddress, clock: Clock, *, unit: int | None = None, timeout: float = 0.2
+    ) -> None:
+        """Prepare, as `ModbusInstrument` does; nothing is opened yet."""
+        super().__init__(name, self.kind, address, clock, unit, timeout)
+
+    def write(self, channel: str, value: float) -> None:
+        """Refuse: a sensor has no writable channel.
+
+        Raises:
+            OutOfRangeError: always.
+        """
+        raise OutOfRangeError(
+            f"{self.name}: {channel} cannot be set to {value:.6g}: {self.display_name} only measures"
+        )
+
+    def make_safe(self) -> None:
+        """Do nothing: a sensor moves nothing."""
+
+
+class Lvdt(ModbusSensor):
+    """LVDT conditioner: displacement at the actuator, 1 kHz."""
+
+    kind, display_name = "lvdt", "an LVDT"
+
+
+class Thermometer(ModbusSensor):
+    """Thermometer: temperature of the damper's cylinder, 10 Hz."""
+
+    kind, display_name = "thermometer", "a thermometer"

@@ -1,0 +1,78 @@
+"""`mrbench diagnose` and `mrbench trend`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Seed = Annotated[int, typer.Option(help="Seed of all random numbers.")]
+Out = Annotated[Path, typer.Option("--out", help="Document to write; `-` prints it.")]
+
+
+def diagnose(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs of one specimen, recorded or imported.")
+    ],
+    out: Out,
+    model: Annotated[
+        Path | None,
+        typer.Option(metavar="FIT|TWIN|SCENARIO", help="A simulation of this damper whose gap is reported too."),
+    ] = None,
+    twin: Annotated[
+        Path | None, typer.Option(help="Scenario to write: the damper with the effects that were found.")
+    ] = None,
+    cross_check: Annotated[
+        bool,
+        typer.Option(
+            "--cross-check",
+            help="Also estimate the named effects with a network that has them in its residual, and compare.",
+        ),
+    ] = False,
+    witness: Annotated[bool, typer.Option("--witness", hidden=True, help="Former name of --cross-check.")] = False,
+    seed: Seed = 1,
+) -> None:
+    """Find where simulation and recording differ, which effects explain it, and how far they close the gap."""
+    from identification.documents import check_output_path, describe_output_path, write_document
+    from identification.fitting import read_damper_model
+    from identification.gap import diagnose as diagnose_recordings
+    from identification.gap.outcome import summarise_diagnosis
+    from identification.logs import load
+    from identification.progress import show_progress
+
+    for path in (out, twin):
+        if path is not None:
+            check_output_path(path)
+    simulation = None if model is None else read_damper_model(model)
+    with show_progress("diagnose") as progress:
+        result = diagnose_recordings(
+            [load(log) for log in logs],
+            simulation,
+            seed=seed,
+            cross_check=cross_check or witness,
+            progress=progress,
+        )
+    write_document(out, result.diagnosis)
+    if twin is not None:
+        write_document(twin, result.twin)
+    typer.echo(f"{describe_output_path(out)}: {summarise_diagnosis(result.diagnosis)}", err=True)
+
+
+def trend(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG...", help="Logs of one specimen, one per run, in the order of time."),
+    ],
+    out: Out,
+    seed: Seed = 1,
+) -> None:
+    """Find quantities that rise or fall over the runs of one specimen, by how much per run and since which run."""
+    from identification.documents import check_output_path, describe_output_path, write_document
+    from identification.gap import analyse_trend
+    from identification.logs import load
+    from identification.progress import show_progress
+
+    check_output_path(out)
+    with show_progress("trend") as progress:
+        document = analyse_trend([load(log) for log in logs], seed=seed, progress=progress)
+    write_document(out, document)
+    typer.echo(f"{describe_output_path(out)}: {document.explanation}", err=True)

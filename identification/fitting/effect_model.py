@@ -1,0 +1,79 @@
+"""Effect in a fit: its form and its search coordinates.
+
+The search coordinate of a parameter that cannot be zero (length, velocity, time constant) is its logarithm, that
+of any other parameter its value over its usual size. Both are of order one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.damper import Quantity
+from identification.damper.effects import EFFECTS, Effect, Form
+from identification.simulate import ActiveEffect
+
+
+@dataclass(frozen=True)
+class EffectModel:
+    """One form of one effect."""
+
+    name: str
+    """Name of the effect."""
+    form_name: str
+    """Name of the form."""
+
+    @staticmethod
+    def from_name(name: str, form_name: str | None = None) -> "EffectModel":
+        """Return a form of an effect; the usual one if ``form_name`` is None."""
+        return EffectModel(name, EFFECTS[name].find_form(form_name).name)
+
+    @property
+    def effect(self) -> Effect:
+        """The effect."""
+        return EFFECTS[self.name]
+
+    @property
+    def form(self) -> Form:
+        """The form of the effect."""
+        return self.effect.find_form(self.form_name)
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The parameters of the form."""
+        return self.form.parameters
+
+    @property
+    def log_mask(self) -> BoolArray:
+        """(P,) True for parameters whose search coordinate is the logarithm."""
+        return np.array([q.low > 0 for q in self.quantities])
+
+    def to_search(self, values: tuple[float, ...]) -> Array:
+        """Return search coordinates (P,) of parameter values, clipped to their bounds."""
+        clipped = [min(max(v, q.low), q.high) for v, q in zip(values, self.quantities, strict=True)]
+        return np.array(
+            [np.log(v) if q.low > 0 else v / q.scale for v, q in zip(clipped, self.quantities, strict=True)]
+        )
+
+    def to_values(self, coordinates: Array) -> tuple[float, ...]:
+        """Return parameter values at search coordinates (P,)."""
+        return tuple(
+            float(np.exp(p)) if q.low > 0 else float(p) * q.scale
+            for p, q in zip(coordinates, self.quantities, strict=True)
+        )
+
+    def differentiate(self, coordinates: Array) -> Array:
+        """Return the derivatives (P,) of the values over their search coordinates."""
+        return np.array(
+            [np.exp(p) if q.low > 0 else q.scale for p, q in zip(coordinates, self.quantities, strict=True)]
+        )
+
+    def get_bounds(self) -> tuple[Array, Array]:
+        """Return lowest and highest search coordinates, (P,) each."""
+        low = [np.log(q.low) if q.low > 0 else q.low / q.scale for q in self.quantities]
+        high = [np.log(q.high) if q.low > 0 else q.high / q.scale for q in self.quantities]
+        return np.array(low), np.array(high)
+
+    def make_active_effect(self, coordinates: Array) -> ActiveEffect:
+        """Return the effect with the values at search coordinates (P,)."""
+        return ActiveEffect(self.effect, self.to_values(coordinates), self.form_name)

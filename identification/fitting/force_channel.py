@@ -1,0 +1,59 @@
+"""Low-pass filter of the force channel, applied to the simulated force.
+
+The filter delays the force and rounds the corners of a loop at its reversals, which determine the yield
+displacement. Of the displacement's filter only the delay matters, because strokes are slow.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import signal
+
+from identification.arrays import Array
+from identification.logs import ChannelFilter
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """Discrete filter, exact for a force that is linear between samples.
+
+    At a reversal a force turns within a millisecond, so it is simulated at ``oversampling`` times the recorded
+    rate.
+    """
+
+    channel_filter: ChannelFilter
+    """The filter as the device reports it."""
+    rate: float
+    """[Hz] rate of the recording."""
+    oversampling: int = 1
+
+    def apply(self, values: Array) -> Array:
+        """Return the filtered values at the N samples of the recording, settled at the first value.
+
+        Args:
+            values: ((N - 1) oversampling + 1,) or (..., U).
+        """
+        numerator, denominator = self._coefficients
+        # Settled at the first force: starting from zero, the filter would ring at the start of every stretch.
+        settled = signal.lfilter_zi(numerator, denominator)
+        start = settled if values.ndim == 1 else settled[:, None]
+        filtered: Array = signal.lfilter(numerator, denominator, values, axis=0, zi=start * values[:1])[0]
+        return filtered[:: self.oversampling]
+
+    @cached_property
+    def _coefficients(self) -> tuple[Array, Array]:
+        """Numerator and denominator of the Butterworth filter at the oversampled rate."""
+        analogue = signal.butter(self.channel_filter.order, 2 * np.pi * self.channel_filter.cutoff, analog=True)
+        numerator, denominator, _ = signal.cont2discrete(
+            analogue, 1 / (self.rate * self.oversampling), method="foh"
+        )
+        # cont2discrete returns the numerator as a matrix with one row.
+        return np.ravel(numerator), np.ravel(denominator)
+
+
+def compute_filter_delay(reported: ChannelFilter | None) -> float:
+    """Return the delay [s] of slow signals in a Butterworth low-pass, 1 / (w_c sin(pi / 2N)); 0 without one."""
+    if reported is None:
+        return 0.0
+    return 1.0 / (2 * np.pi * reported.cutoff * float(np.sin(np.pi / (2 * reported.order))))

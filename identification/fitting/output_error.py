@@ -1,0 +1,171 @@
+"""Output-error fit: Levenberg-Marquardt on the simulated force, started from a regression.
+
+Steps are scaled as a whole. Unknowns that would leave their bounds are fixed at them, and the others are solved
+again. If the best minimum is above the noise floor, further starts are tried.
+"""
+
+import itertools
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.fitting.initial_guess import draw_random_start, make_low_slip_points, make_starting_points
+from identification.fitting.problem import Evaluation, Problem
+from identification.progress import Progress, ignore_progress
+from identification.threads import use_one_thread
+
+_MAX_STEP = 1.5
+"""Largest change of a search coordinate in one step: a factor 4.5 for logarithmic ones."""
+_FLOOR_RATIO = 1.03
+"""Threshold on the mean squared residual over the noise variance: above it, further starts are tried."""
+_SAME_COST = 1e-3
+"""Threshold on the relative cost difference of two minima: below it, they are the same."""
+_MIN_AGREEING = 2
+"""Number of minimisations that must end in the same minimum before it counts as the lowest."""
+_SCATTER_FACTOR = 3.0
+"""Largest factor by which a random start changes a coordinate."""
+_MIN_GAIN = 0.02
+"""Threshold on the expected decrease of the cost, in noise units: below it, a minimisation ends.
+
+A decrease of 0.02 is a seventh of a standard deviation.
+"""
+_PREVIEW_RATE, _PREVIEW_SAMPLES = 250.0, 10_000
+"""Rate [Hz] and number of samples of the preview, a cheaper minimisation on decimated samples that comes first."""
+_DELAY_RELEASE = 0.1
+"""Threshold on the expected relative decrease of the cost: below it, the delays are freed."""
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """End of a minimisation."""
+
+    unknowns: Array
+    """(U,)"""
+    evaluation: Evaluation
+    iterations: int
+    converged: bool
+
+
+@dataclass(frozen=True)
+class OptimiserSettings:
+    """Effort of a fit."""
+
+    iterations: int = 60
+    """Largest number of steps of one minimisation."""
+    restarts: int = 4
+    """Largest number of further starts after the first."""
+    seed: int = 1
+    """Seed of the random starts."""
+    budget: float | None = None
+    """Processor time [s] after which no further start is tried; None for no limit."""
+
+
+def fit_output_error(
+    problem: Problem,
+    settings: OptimiserSettings = OptimiserSettings(),
+    progress: Progress = ignore_progress,
+    start: Array | None = None,
+) -> Minimum:
+    """Fit the unknowns of a problem, and return the best minimum found.
+
+    Args:
+        problem: the least-squares problem.
+        settings: effort of the fit.
+        progress: receives every step.
+        start: starting point (U,); from a regression if None.
+    """
+    with use_one_thread():
+        return _search(problem, settings, progress, start)
+
+
+def _search(problem: Problem, settings: OptimiserSettings, progress: Progress, start: Array | None) -> Minimum:
+    start_time = time.process_time()
+    preview = _decimate_for_preview(problem)
+    starts = make_starting_points(preview) if start is None else [start]
+    first = starts[0]
+    if start is None and preview is not problem:
+        first = minimise(preview, first, settings.iterations, progress).unknowns
+    best = minimise(problem, first, settings.iterations, progress)
+    restarts, agreeing = _generate_restarts(preview, starts, settings.seed), 0
+    for _ in range(settings.restarts):
+        is_late = settings.budget is not None and time.process_time() - start_time > settings.budget
+        is_at_floor = best.evaluation.cost / problem.samples < _FLOOR_RATIO
+        if is_late or is_at_floor or agreeing >= _MIN_AGREEING:
+            break
+        other = minimise(problem, next(restarts), settings.iterations, progress)
+        change = other.evaluation.cost / best.evaluation.cost - 1.0
+        agreeing += abs(change) < _SAME_COST
+        if change < 0.0:
+            best = other
+    return best
+
+
+def _generate_restarts(problem: Problem, starts: list[Array], seed: int) -> Iterator[Array]:
+    """Yield low-slip and remaining starts in turn, then random ones."""
+    if len(starts) > 1:
+        low_slip = make_low_slip_points(problem)
+        yield low_slip[0]
+        for pair in zip(starts[1:], low_slip[1:], strict=True):
+            yield from pair
+    for number in itertools.count(seed):
+        yield draw_random_start(problem, starts[0], _SCATTER_FACTOR, number)
+
+
+def _decimate_for_preview(problem: Problem) -> Problem:
+    """Return the problem on fewer samples, or the problem itself if it has few."""
+    rate = max(p.excitation.rate for p in problem.pieces)
+    factor = int(min(rate / _PREVIEW_RATE, problem.samples / _PREVIEW_SAMPLES))
+    return problem.decimate(factor) if factor > 1 else problem
+
+
+def minimise(problem: Problem, start: Array, iterations: int, progress: Progress) -> Minimum:
+    """Minimise the cost by Levenberg-Marquardt from one start; the delays are fixed far from the minimum."""
+    unknowns, here = start, problem.evaluate(start)
+    damping, scale = 1e-2, np.zeros(len(start))
+    free = problem.free_mask & ~problem.delay_mask
+    for iteration in range(iterations):
+        # Largest curvature so far (Moré 1978): it bounds the step of an unknown that has lost its influence.
+        scale = np.maximum(scale, np.diag(here.hessian))
+        step = solve_bounded_step(problem, here, free, damping * np.maximum(scale, 1e-12 * scale.max()), unknowns)
+        gain = -float(2.0 * here.gradient @ step + step @ here.hessian @ step)
+        small = _MIN_GAIN * max(1.0, here.cost / problem.samples)
+        if gain < (small if free[problem.delay_mask].any() else _DELAY_RELEASE * here.cost):
+            if (free == problem.free_mask).all():
+                return Minimum(unknowns, here, iteration, converged=True)
+            free = problem.free_mask
+            continue
+        there = problem.evaluate(unknowns + step)
+        if there.cost < here.cost:
+            unknowns, here = unknowns + step, there
+            damping = max(damping / 5.0, 1e-9)
+            progress("refine", problem.noise * float(np.sqrt(here.cost / problem.samples)))
+        # The remaining gain may be smaller than the jump of the cost between two step counts (decision 0003).
+        elif gain < 100.0 * small or damping > 1e8:
+            return Minimum(unknowns, here, iteration, converged=True)
+        else:
+            damping *= 6.0
+    return Minimum(unknowns, here, iterations, converged=False)
+
+
+def solve_bounded_step(
+    problem: Problem, here: Evaluation, free: BoolArray, damping: Array, unknowns: Array
+) -> Array:
+    """Return the damped Gauss-Newton step (U,) within the bounds, scaled to the largest allowed length."""
+    low, high = problem.get_bounds()
+    step, moving = np.zeros(len(unknowns)), free.copy()
+    for _ in range(len(unknowns)):
+        fixed = here.hessian[np.ix_(moving, ~moving)] @ step[~moving]
+        matrix = here.hessian[np.ix_(moving, moving)] + np.diag(damping[moving])
+        step[moving] = np.linalg.solve(matrix, -here.gradient[moving] - fixed)
+        longest = problem.measure_step(step)
+        if longest > _MAX_STEP:
+            step *= _MAX_STEP / longest
+        outside = moving & ((unknowns + step < low) | (unknowns + step > high))
+        if not outside.any():
+            break
+        step[outside] = np.clip(unknowns + step, low, high)[outside] - unknowns[outside]
+        moving &= ~outside
+    return step

@@ -1,1 +1,0 @@
-"""What planned strokes can tell of a damper, before anything moves."""

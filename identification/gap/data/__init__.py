@@ -1,0 +1,27 @@
+"""Cycles of a recording, held-out samples, data quality, and the residual on them."""
+
+from identification.gap.data.cycles import Cycles, Indices, split_by_piece
+from identification.gap.data.evaluation import EvaluationData
+from identification.gap.data.quality import (
+    check_cycle_count,
+    check_sliding_recorded,
+    describe_unobservable_effects,
+)
+from identification.gap.data.residual_map import Residual, compute_harmonics, estimate_drift, map_gap
+from identification.gap.data.shrinkage import NEAR_FLOOR_RATIO, Shrinkage
+
+__all__ = [
+    "NEAR_FLOOR_RATIO",
+    "Cycles",
+    "EvaluationData",
+    "Indices",
+    "Residual",
+    "Shrinkage",
+    "check_cycle_count",
+    "check_sliding_recorded",
+    "compute_harmonics",
+    "describe_unobservable_effects",
+    "estimate_drift",
+    "map_gap",
+    "split_by_piece",
+]

@@ -1,0 +1,152 @@
+"""Cycles of a recording: one period of the stroke within one segment.
+
+A cycle is the unit of holding out and of resampling. It is held out or fitted whole, because the errors of
+neighbouring samples within a cycle are not independent.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from identification.arrays import Array, BoolArray
+from identification.fitting import Piece
+from identification.logs import PERIODIC_MOTIONS, Segment, Stretch
+
+Number = TypeVar("Number", bound=np.generic)
+Indices = npt.NDArray[np.intp]
+
+_PSEUDO_CYCLE = 1.0
+"""Length [s] of a cycle where the motion does not repeat."""
+_CYCLE_TOLERANCE = 0.1
+"""Part of a cycle that may be missing at the end of a segment for the last cycle to count as whole."""
+_HOLD_OUT_STRIDE = 4
+"""Every so many segments, or cycles, one is held out."""
+_FEWEST_SEGMENTS = 10
+"""Threshold on the number of segments: below it, cycles are held out instead of whole segments."""
+
+
+def split_by_piece(values: npt.NDArray[Number], pieces: Sequence[Piece]) -> list[npt.NDArray[Number]]:
+    """Split values (N,) of all pieces in sequence into one array for each piece."""
+    edges = np.cumsum([len(p.force) for p in pieces])[:-1]
+    return np.split(values, edges)
+
+
+@dataclass(frozen=True)
+class StrokeCondition:
+    """Drive, amplitude and frequency of one segment."""
+
+    drive: float
+    """[V or A]"""
+    amplitude: float
+    """[m]"""
+    frequency: float
+    """[Hz]; 0 where the motion is not periodic."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """The cycles of all stretches; N counts the samples of all stretches in sequence."""
+
+    cycle: Indices
+    """(N,) number of each sample's cycle; -1 outside all cycles."""
+    phase: Array
+    """(N,) phase of the stroke [cycles]: 0 in the middle in extension, 0.25 at the extended end."""
+    segment: Indices
+    """(cycles,) number of each cycle's segment."""
+    conditions: tuple[StrokeCondition, ...]
+    """(segments,)"""
+
+    @property
+    def count(self) -> int:
+        """Number of cycles."""
+        return len(self.segment)
+
+    @property
+    def stroke_count(self) -> int:
+        """Number of strokes of different amplitude or frequency."""
+        return len({(f"{c.amplitude:.2g}", f"{c.frequency:.2g}") for c in self.conditions if c.frequency})
+
+    def sum_by_cycle(self, values: Array, mask: BoolArray) -> Array:
+        """Sum values (N,) over the samples of each cycle that the mask (N,) selects; (cycles,)."""
+        chosen = mask & (self.cycle >= 0)
+        return np.bincount(self.cycle[chosen], values[chosen], self.count).astype(float)
+
+
+def cut_cycles(stretches: Sequence[Stretch], pieces: Sequence[Piece]) -> Cycles:
+    """Cut stretches into cycles.
+
+    Args:
+        stretches: recorded stretches, with the segments of their method as far as they are known.
+        pieces: the same stretches with their smoothed motion.
+    """
+    cycles: list[Indices] = []
+    phases: list[Array] = []
+    segments: list[int] = []
+    conditions: list[StrokeCondition] = []
+    total = 0
+    for stretch, piece in zip(stretches, pieces, strict=True):
+        numbers, phase = np.full(len(stretch.time), -1), np.zeros(len(stretch.time))
+        for segment in stretch.segments or (_make_whole_segment(stretch),):
+            part = slice(segment.start, segment.stop)
+            local, phase[part] = _number_cycles(segment, piece, stretch.rate)
+            numbers[part] = total + local
+            count = int(local[-1]) + 1
+            total += count
+            segments += [len(conditions)] * count
+            conditions.append(_find_condition(segment, piece))
+        cycles.append(numbers)
+        phases.append(phase)
+    return Cycles(np.concatenate(cycles), np.concatenate(phases), np.array(segments), tuple(conditions))
+
+
+def _make_whole_segment(stretch: Stretch) -> Segment:
+    """Return one segment that covers a stretch without segments."""
+    return Segment(0, stretch.name, 0, len(stretch.time), "table", None, None, None)
+
+
+def _number_cycles(segment: Segment, piece: Piece, rate: float) -> tuple[Indices, Array]:
+    """Return cycle number and phase of each sample; a part of a cycle at the end joins the last whole one."""
+    count = segment.stop - segment.start
+    if segment.motion not in PERIODIC_MOTIONS or not segment.frequency:
+        last = max(int(count / rate / _PSEUDO_CYCLE) - 1, 0)
+        numbers = np.minimum((np.arange(count) / (_PSEUDO_CYCLE * rate)).astype(int), last)
+        return numbers, np.zeros(count)
+    turns = np.arange(count) * segment.frequency / rate
+    part = slice(segment.start, segment.stop)
+    wave = np.exp(-2j * np.pi * turns)
+    first = np.sum(piece.excitation.displacement[part] * wave)
+    phase = (turns + (np.angle(first) / (2 * np.pi) + 0.25)) % 1.0
+    whole = max(int(count * segment.frequency / rate + _CYCLE_TOLERANCE), 1)
+    return np.minimum(turns.astype(int), whole - 1), phase
+
+
+def _find_condition(segment: Segment, piece: Piece) -> StrokeCondition:
+    part = slice(segment.start, segment.stop)
+    periodic = segment.motion in PERIODIC_MOTIONS and segment.frequency
+    amplitude = segment.amplitude or float(np.ptp(piece.excitation.displacement[part])) / 2.0
+    drive = segment.drive_value
+    return StrokeCondition(
+        float(np.mean(piece.excitation.drive[part])) if drive is None else drive,
+        amplitude,
+        float(segment.frequency or 0.0) if periodic else 0.0,
+    )
+
+
+def select_held_out_cycles(cycles: Cycles) -> BoolArray:
+    """Select the held-out cycles, (cycles,): every fourth segment, or every fourth cycle where segments are few.
+
+    A held-out segment is a stroke condition that no fit has used. In each of few segments, the cycles start at
+    another offset, so that some held-out cycle follows a step of the drive.
+    """
+    if len(cycles.conditions) >= _FEWEST_SEGMENTS:
+        return np.asarray(cycles.segment % _HOLD_OUT_STRIDE == _HOLD_OUT_STRIDE // 2)
+    held_out = np.zeros(cycles.count, bool)
+    for offset, segment in enumerate(np.unique(cycles.segment), _HOLD_OUT_STRIDE // 2):
+        members = np.flatnonzero(cycles.segment == segment)
+        held_out[members[offset % _HOLD_OUT_STRIDE :: _HOLD_OUT_STRIDE]] = True
+    if not held_out.any():
+        held_out[1::_HOLD_OUT_STRIDE] = True
+    return held_out

@@ -1,0 +1,64 @@
+"""Checks of a recording before its diagnosis, and effects that its strokes cannot show."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.errors import UnusableDataError
+from identification.fitting import Piece
+from identification.gap.data.cycles import Cycles
+from identification.signals import NoiseFloorEstimate
+
+_FEWEST_CYCLES = 4
+"""Smallest number of cycles, or of seconds where nothing repeats: with fewer, nothing can be held out."""
+_SLIDING_SPEED = 0.5
+"""Speed relative to the largest speed of a stroke: above it, a damper slides."""
+_SPEED_QUANTILE = 0.99
+"""Quantile of the speed that counts as the largest; a shock is faster than any stroke."""
+
+
+def check_sliding_recorded(pieces: Sequence[Piece]) -> None:
+    """Check that valid force was recorded while the damper slid.
+
+    Raises:
+        UnusableDataError: all valid samples are slow.
+    """
+    speeds = [np.abs(p.excitation.velocity) for p in pieces]
+    limits = [_SLIDING_SPEED * float(np.quantile(v, _SPEED_QUANTILE)) for v in speeds]
+    measured = zip(speeds, limits, pieces, strict=True)
+    if not any(((v > limit) & (p.train > 0)).any() for v, limit, p in measured):
+        raise UnusableDataError(
+            f"no valid force was recorded above {max(limits):.2g} m/s (clipped or not measured), so the damping "
+            "force at speed cannot be identified; record again with a larger range of the load cell"
+        )
+
+
+def check_cycle_count(cycles: Cycles) -> None:
+    """Check that there are enough cycles to hold some out.
+
+    Raises:
+        UnusableDataError: fewer than four cycles.
+    """
+    if cycles.count < _FEWEST_CYCLES:
+        raise UnusableDataError(
+            f"the recording contains {cycles.count} cycle{'s' if cycles.count != 1 else ''} of the stroke; a "
+            f"diagnosis needs at least {_FEWEST_CYCLES} to hold some out of its fits; record longer"
+        )
+
+
+def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> list[str]:
+    """Return notes about effects that these strokes cannot show or separate."""
+    notes = []
+    drives = {float(f"{c.drive:.2g}") for c in cycles.conditions}
+    frequencies = {float(f"{c.frequency:.2g}") for c in cycles.conditions if c.frequency}
+    amplitudes = {float(f"{c.amplitude:.2g}") for c in cycles.conditions}
+    if len(drives) == 1:
+        notes.append("only one drive: effects of the coil cannot be observed")
+    if len(frequencies) == 1:
+        notes.append("only one frequency: force delay, moving mass and fixture compliance look alike")
+    if len(amplitudes) == 1:
+        notes.append("only one amplitude: gas spring, end stop and displacement nonlinearity look alike")
+    if floor.cycle_to_cycle is None:
+        notes.append(f"the noise floor is estimated from high frequencies only: {floor.basis}")
+    notes.append("a gain error of the force or displacement channel can only be found by calibration")
+    return notes

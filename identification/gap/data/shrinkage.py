@@ -1,0 +1,138 @@
+"""Shrinkage of the gap by named effects, as it is expected on another run of the same damper."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.gap.data.cycles import Indices
+
+NEAR_FLOOR_RATIO = 1.02
+"""Threshold on the RMSE relative to the noise floor: below it, the gap is too small for parts of it."""
+_DRAWS = 1000
+"""Other runs that are drawn."""
+_FORM_DEVIATION = 0.8
+"""Standard deviation of the logarithm of the form error between many strokes. Origin: 25 trial cases."""
+_FEW_STROKES_DEVIATION = 0.4
+"""Further deviation of that logarithm, divided by the number of strokes. Origin: 25 trial cases."""
+_GAP_DEVIATION = 0.35
+"""Standard deviation of the logarithm of the gap between runs. Origin: 25 trial cases."""
+_MIN_GAP_SHARE = 1e-2
+"""Smallest gap by which others are divided, relative to the variance of the noise."""
+
+
+@dataclass(frozen=True)
+class Shrinkage:
+    """Shrinkage of the gap on the held-out cycles."""
+
+    before: float
+    """RMSE without effects [N]."""
+    after: float
+    """RMSE with effects [N], as expected of another run."""
+    value: float | None
+    """Expected shrinkage [1]; None where there is no gap to shrink."""
+    ci95: tuple[float, float] | None
+    """95 % interval of the shrinkage for other runs."""
+    expected_benefit: float | None = None
+    """Part of a whole run's gap that the effects are expected to close if the run is repeated [1]."""
+
+
+class CycleErrors(NamedTuple):
+    """Errors of all fitted and held-out cycles; each array is (cycles,)."""
+
+    before: Array
+    """Sum of squared residuals without effects [N²]."""
+    after: Array
+    """Sum of squared residuals with effects [N²]."""
+    counts: Array
+    """Number of samples."""
+    segment: Indices
+    """Number of the cycle's segment."""
+    held_out: BoolArray
+    """True where the cycle was kept out of every fit."""
+
+    def compute_means(self) -> tuple[float, float]:
+        """Return the mean squares [N²] without and with effects on the held-out cycles."""
+        total = float(self.counts[self.held_out].sum())
+        return float(self.before[self.held_out].sum()) / total, float(self.after[self.held_out].sum()) / total
+
+
+class Replicates(NamedTuple):
+    """Mean squared changes of the simulated force in simulations of the same strokes with new input noise."""
+
+    evaluated: float
+    """Over all fitted and held-out samples [N²]."""
+    held_out: float
+    """Over the held-out samples [N²]."""
+    runs: Array
+    """(runs,) over all recorded samples, including starts and ends [N²]."""
+    before: float
+    """Mean squared residual without effects [N²] over all recorded samples."""
+
+
+def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates, strokes: int) -> Shrinkage:
+    """Estimate the expected shrinkage on another run of the same damper, with an interval (decision 0014).
+
+    With effects, two errors remain on another run:
+
+    - The form error: the error of all cycles beyond noise and input noise. Fitted cycles count as well, because
+      two dozen parameters hide next to nothing of it and the held-out cycles are a small sample. It is never
+      negative. It differs between strokes, the more so the fewer strokes were recorded. Segments and then cycles
+      are resampled. Many strokes are a sample, whose mean holds for other strokes. Few strokes are not: on others
+      the form error is larger on average.
+    - The input noise of that run. It is largest at starts and ends, where the motion is known from one side only.
+      Fits exclude these samples; a prediction contains them.
+
+    Args:
+        errors: errors of the cycles.
+        noise: standard deviation of the noise in the recorded force [N].
+        replicates: simulations with effects and with new input noise.
+        strokes: number of recorded strokes of different amplitude or frequency.
+    """
+    before, after = errors.compute_means()
+    if before < (NEAR_FLOOR_RATIO * noise) ** 2:
+        return Shrinkage(math.sqrt(before), math.sqrt(after), None, None)
+    if errors.before is errors.after or np.array_equal(errors.before, errors.after):
+        return Shrinkage(math.sqrt(before), math.sqrt(after), 0.0, (0.0, 0.0))
+    remaining = _sample_remaining_gap(errors, noise, replicates, strokes)
+    value = 1.0 - float(remaining.mean())
+    low, high = np.quantile(1.0 - remaining, [0.025, 0.975])
+    expected = math.sqrt(noise**2 + (1.0 - value) * (before - noise**2))
+    interval = (min(float(low), value), max(float(high), value))
+    return Shrinkage(math.sqrt(before), expected, value, interval, _estimate_benefit(after, noise, replicates))
+
+
+def _estimate_benefit(after: float, noise: float, replicates: Replicates) -> float:
+    """Estimate the part [1] of the whole run's gap that the effects close if the run is repeated.
+
+    ``after`` [N²] is the mean square on the held-out cycles, where an overfitted set does harm.
+    """
+    remaining = max(after - noise**2 - replicates.held_out, 0.0) + float(replicates.runs.mean())
+    return 1.0 - remaining / max(replicates.before - noise**2, _MIN_GAP_SHARE * noise**2)
+
+
+def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replicates, strokes: int) -> Array:
+    """Draw the parts of the gap [1] that remain on other runs, (draws,)."""
+    random = np.random.default_rng(0)
+    before, after = _resample_cycles(errors, random)
+    gap = np.maximum(before - noise**2, _MIN_GAP_SHARE * noise**2)
+    form_error = np.maximum(after - noise**2 - replicates.evaluated, 0.0) / gap
+    deviation = _FORM_DEVIATION + _FEW_STROKES_DEVIATION / max(strokes, 1)
+    form_error *= np.exp(deviation * random.standard_normal(_DRAWS) - 0.5 * _FORM_DEVIATION**2)
+    size = (replicates.before - noise**2) * np.exp(_GAP_DEVIATION * random.standard_normal(_DRAWS))
+    input_noise = random.choice(replicates.runs, _DRAWS) / np.maximum(size, _MIN_GAP_SHARE * noise**2)
+    return np.asarray(form_error + input_noise)
+
+
+def _resample_cycles(errors: CycleErrors, random: np.random.Generator) -> Array:
+    """Resample segments, then cycles; return mean squares [N²] without and with effects, (2, draws)."""
+    segments, index = np.unique(errors.segment, return_inverse=True)
+    members = [np.flatnonzero(index == k) for k in range(len(segments))]
+    sums, means = np.stack(errors[:2]), np.empty((2, _DRAWS))
+    for draw in range(_DRAWS):
+        chosen = random.integers(0, len(segments), len(segments))
+        rows = np.concatenate([random.choice(members[k], len(members[k])) for k in chosen])
+        means[:, draw] = sums[:, rows].sum(axis=1) / errors.counts[rows].sum()
+    return means

@@ -1,0 +1,151 @@
+"""Diagnosis of one or several logs of one damper."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from identification.fitting import DELAY_LIMIT, DamperModel, Dataset, Piece, Problem, assemble
+from identification.gap.data import (
+    EvaluationData,
+    check_cycle_count,
+    check_sliding_recorded,
+)
+from identification.gap.noise import NoiseModel
+from identification.gap.outcome import DiagnosisResult, ReportBuilder, cross_check_effects
+from identification.gap.selection import (
+    DEFAULT_SETTINGS,
+    CandidatePool,
+    SearchSettings,
+    compute_final_posterior,
+    search_forward,
+)
+from identification.logs import Recording
+from identification.pipeline import make_problem
+from identification.progress import Progress, ignore_progress
+from identification.signals import NoiseFloorEstimate, check_recordings, check_single_specimen, mask_clipping
+from identification.threads import use_one_thread
+
+_CLOCK_DEVIATION = 5e-5
+"""Standard deviation of the delay between channels that clocks and filters usually leave [s]."""
+_REPEAT_RATIO = 1.1
+"""Threshold on the ratio of cycle-to-cycle to high-frequency floor: above it, something does not repeat."""
+
+
+def diagnose(
+    recordings: Sequence[Recording],
+    model: DamperModel | None = None,
+    *,
+    seed: int = 1,
+    cross_check: bool = False,
+    progress: Progress = ignore_progress,
+    settings: SearchSettings = DEFAULT_SETTINGS,
+) -> DiagnosisResult:
+    """Diagnose the gap between the law and recordings of one damper.
+
+    Args:
+        recordings: one or several logs of one specimen.
+        model: a simulation whose own gap is reported as well.
+        seed: seed of all random numbers.
+        cross_check: train a network with the named effects and compare its estimates.
+        progress: receives the fitted effects and the force error on held-out cycles [N].
+        settings: limits and thresholds of the search.
+
+    Raises:
+        UnusableDataError: the recordings are too short, clipped, of different specimens, or do not contain force
+            and motion of a damper.
+    """
+    prepared = prepare_recordings(recordings)
+    return diagnose_prepared(
+        prepared, model, seed=seed, cross_check=cross_check, progress=progress, settings=settings
+    )
+
+
+@dataclass(frozen=True)
+class PreparedRecordings:
+    """Recordings prepared for a diagnosis."""
+
+    dataset: Dataset
+    evaluation: EvaluationData
+    notes: list[str]
+    """Messages about excluded samples."""
+
+
+def prepare_recordings(recordings: Sequence[Recording]) -> PreparedRecordings:
+    """Check, clean and smooth recordings of one damper, and cut them into cycles.
+
+    Raises:
+        UnusableDataError: as in ``diagnose``.
+    """
+    with use_one_thread():
+        check_single_specimen(recordings, "diagnose")
+        check_recordings(recordings)
+        cleaned, notes = mask_clipping(recordings)
+        dataset = assemble(cleaned)
+        evaluation = EvaluationData.make(dataset)
+    check_cycle_count(evaluation.cycles)
+    check_sliding_recorded(dataset.pieces)
+    return PreparedRecordings(dataset, evaluation, [*dataset.notes, *evaluation.notes, *notes])
+
+
+def diagnose_prepared(
+    prepared: PreparedRecordings,
+    model: DamperModel | None = None,
+    *,
+    seed: int = 1,
+    cross_check: bool = False,
+    progress: Progress = ignore_progress,
+    settings: SearchSettings = DEFAULT_SETTINGS,
+) -> DiagnosisResult:
+    """Diagnose prepared recordings; the arguments are those of ``diagnose``."""
+    dataset, evaluation = prepared.dataset, prepared.evaluation
+    pool = make_candidate_pool(prepared, seed=seed, progress=progress, settings=settings)
+    with use_one_thread():
+        search_forward(pool)
+        posterior = compute_final_posterior(pool)
+        notes = [*prepared.notes, *pool.notes]
+        result = ReportBuilder(dataset, evaluation, pool, posterior, model, notes, seed).build_result()
+        named = frozenset(effect.name for effect in result.diagnosis.effects)
+        if not cross_check or not named:
+            return result
+        fit = pool.candidates[named].fit
+        problem = pool.full_problem.replace_effects(fit.effects)
+        comparison = cross_check_effects(fit, problem, dataset.drive_unit, seed, progress)
+    return replace(result, diagnosis=result.diagnosis.model_copy(update={"cross_check": comparison}))
+
+
+def make_candidate_pool(
+    prepared: PreparedRecordings,
+    *,
+    seed: int = 1,
+    progress: Progress = ignore_progress,
+    settings: SearchSettings = DEFAULT_SETTINGS,
+) -> CandidatePool:
+    """Make an empty candidate pool for prepared recordings."""
+    dataset, evaluation = prepared.dataset, prepared.evaluation
+    problem = make_diagnosis_problem(dataset, evaluation.select_fitted_pieces())
+    noise_model = NoiseModel(select_white_floor(dataset.floor), dataset.stretches, seed)
+    clock_deviation = dataset.clock_deviation if dataset.clock_deviation > _CLOCK_DEVIATION else 0.0
+    return CandidatePool(problem, evaluation, noise_model, clock_deviation, progress, settings)
+
+
+def select_white_floor(floor: NoiseFloorEstimate) -> float:
+    """Return the white noise [N], which no model explains; effects may explain noise that does not repeat."""
+    if floor.cycle_to_cycle is None or floor.cycle_to_cycle > _REPEAT_RATIO * floor.high_frequency:
+        return floor.high_frequency
+    return floor.noise
+
+
+def make_diagnosis_problem(dataset: Dataset, pieces: tuple[Piece, ...]) -> Problem:
+    """Make the fit problem of a diagnosis.
+
+    It uses the white noise floor. Delays are limited to the error of the clocks, because a larger delay is an
+    effect. Each log after the first has its own force offset, because the zero of the load cell differs from
+    run to run.
+    """
+    problem = make_problem(dataset, _CLOCK_DEVIATION)
+    return replace(
+        problem,
+        pieces=pieces,
+        noise=select_white_floor(dataset.floor),
+        delay_limit=DELAY_LIMIT,
+        per_log=("offset",) if len(dataset.recordings) > 1 else (),
+    )

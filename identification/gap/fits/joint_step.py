@@ -1,0 +1,56 @@
+"""Joint step: one Gauss-Newton step in the law's coordinates and the effects together."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.fitting import Evaluation, Problem, solve_bounded_step
+
+STEP_FRACTIONS = (1.0, 0.5, 0.2, 0.05)
+"""Fractions of a step that a line search tries."""
+_DAMPING = 1e-4
+"""Damping of a joint step, relative to the curvature of each unknown."""
+_SUFFICIENT_DECREASE = 0.7
+"""Achieved part of the predicted decrease, above which no shorter step is tried."""
+
+
+@dataclass(frozen=True)
+class StartPoint:
+    """Unknowns from which a descent can start."""
+
+    unknowns: Array
+    """(U,) unknowns of the problem with its effects."""
+    cost: float = field(default=float("inf"))
+    """Cost there [1]."""
+
+
+def take_joint_step(problem: Problem, unknowns: Array) -> tuple[StartPoint, Evaluation, float]:
+    """Take one Gauss-Newton step in all unknowns, shortened until the cost decreases.
+
+    Returns:
+        The best point, the evaluation at the given unknowns, and the cost that the full step predicts.
+    """
+    here = problem.evaluate(unknowns)
+    if not np.isfinite(here.cost):
+        return StartPoint(unknowns), here, np.inf
+    step, predicted = predict_joint_step(problem, here, unknowns)
+    best = StartPoint(unknowns, here.cost)
+    for fraction in STEP_FRACTIONS:
+        there = StartPoint(unknowns + fraction * step, problem.compute_cost(unknowns + fraction * step))
+        if there.cost < best.cost:
+            best = there
+            if here.cost - there.cost > _SUFFICIENT_DECREASE * (here.cost - predicted):
+                break
+        elif best.cost < here.cost:
+            break
+    return best, here, predicted
+
+
+def predict_joint_step(problem: Problem, here: Evaluation, unknowns: Array) -> tuple[Array, float]:
+    """Return the Gauss-Newton step (U,) inside the bounds, with fixed delays, and the cost that it predicts."""
+    free = problem.free_mask & ~problem.delay_mask
+    scale = np.diag(here.hessian)
+    damping = _DAMPING * np.maximum(scale, 1e-9 * scale.max())
+    step = solve_bounded_step(problem, here, free, damping, unknowns)
+    return step, here.cost + 2.0 * float(here.gradient @ step) + float(step @ here.hessian @ step)

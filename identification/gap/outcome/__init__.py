@@ -1,0 +1,15 @@
+"""Results of a diagnosis: verdict, explanation, twin, next stroke and cross-check."""
+
+from identification.gap.outcome.cross_check import cross_check_effects
+from identification.gap.outcome.explanation import suggest_check, summarise_diagnosis
+from identification.gap.outcome.interval import NORMAL_QUANTILE
+from identification.gap.outcome.report import DiagnosisResult, ReportBuilder
+
+__all__ = [
+    "NORMAL_QUANTILE",
+    "DiagnosisResult",
+    "ReportBuilder",
+    "cross_check_effects",
+    "suggest_check",
+    "summarise_diagnosis",
+]

@@ -1,0 +1,240 @@
+"""Report of a diagnosis: its documents, from the candidates and their posterior."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+
+import numpy as np
+
+from identification.damper.effects import STAGES
+from identification.documents import Diagnosis, Gap, GapLocation, NextStroke, Provenance, Twin, Verdict
+from identification.fitting import DamperModel, Dataset
+from identification.gap.data import (
+    NEAR_FLOOR_RATIO,
+    EvaluationData,
+    Shrinkage,
+    compute_harmonics,
+    describe_unobservable_effects,
+    estimate_drift,
+    map_gap,
+)
+from identification.gap.fits import Candidate
+from identification.gap.outcome.explainable_share import build_features, estimate_explainable_share
+from identification.gap.outcome.explanation import describe_nearest, explain_diagnosis
+from identification.gap.outcome.next_stroke import RivalModel, compute_information, find_best_segment
+from identification.gap.outcome.trial_segments import StrokeLimits
+from identification.gap.outcome.twin import make_baseline_fit, make_twin
+from identification.gap.outcome.verdict import (
+    build_named_effects,
+    compute_shares,
+    decide_unnamed_verdict,
+    decide_verdict,
+    list_alternatives,
+)
+from identification.gap.selection import (
+    MAX_TIED_SETS,
+    MIN_TIED_PROBABILITY,
+    CandidatePool,
+    Posterior,
+    compute_stage_probabilities,
+)
+
+_NEAREST_SHARE = 0.95
+"""Largest error that unnamed effects may leave to be mentioned, relative to that of the baseline."""
+_MIN_STAGE_PROBABILITY = 0.05
+"""Smallest probability of a stage that is reported as the most probable one."""
+_EXPLAINABLE_THRESHOLD = 0.3
+"""Explainable share above which the remainder counts as explainable."""
+_SPEED_QUANTILE = 0.999
+"""Quantile of the speed that counts as the largest recorded one."""
+_LOWEST_FREQUENCY_LIMIT = 0.5
+"""Smallest limit on the frequency of a proposed stroke [Hz]."""
+
+
+@dataclass(frozen=True)
+class DiagnosisResult:
+    """Documents of a diagnosis."""
+
+    diagnosis: Diagnosis
+    twin: Twin
+
+
+@dataclass(frozen=True)
+class ReportBuilder:
+    """Inputs of the documents."""
+
+    dataset: Dataset
+    evaluation: EvaluationData
+    pool: CandidatePool
+    posterior: Posterior
+    model: DamperModel | None
+    notes: Sequence[str]
+    seed: int
+
+    def build_result(self) -> DiagnosisResult:
+        """Build the documents."""
+        verdict, named, shrinkage = self._choose_named_set()
+        gap = self._build_gap(verdict, named, shrinkage)
+        shares = compute_shares(self.pool.candidates, named.names, sorted(named.names))
+        effects = build_named_effects(named, self.posterior, shares, self.dataset.drive_unit)
+        alternatives = list_alternatives(self.posterior, named.names)
+        remainder = self._describe_remainder(named)
+        provenance = self._make_provenance()
+        diagnosis = Diagnosis(
+            verdict=verdict,
+            effects=effects,
+            alternatives=alternatives,
+            probability=self.posterior.sets[named.names],
+            unknown_probability=self.posterior.unknown,
+            gap=gap,
+            where=self._locate_gap(),
+            next_stroke=self._propose_next_stroke(),
+            explanation=explain_diagnosis(verdict, gap, effects, alternatives, remainder),
+            notes=[
+                *self.notes,
+                *self._describe_nearest(verdict),
+                *describe_unobservable_effects(self.evaluation.cycles, self.dataset.floor),
+            ],
+            provenance=provenance,
+        )
+        noise = self.pool.noise_model.noise
+        fit = make_baseline_fit(self.dataset, self.evaluation, self.pool.baseline, noise, provenance)
+        return DiagnosisResult(diagnosis, make_twin(self.dataset, named, fit, noise, fit.specimen, provenance))
+
+    def _choose_named_set(self) -> tuple[Verdict, Candidate, Shrinkage]:
+        """Return the verdict, the named set (the baseline if none is named) and its shrinkage."""
+        baseline, floor = self.pool.baseline, self.pool.floor
+        named = self.pool.candidates[self.posterior.rank_sets()[0][0]]
+        verdict = decide_verdict(baseline, named, floor, self.posterior)
+        shrinkage = self._estimate_shrinkage(named)
+        benefit = shrinkage.expected_benefit
+        if named.names and benefit is not None and benefit < 0.0:
+            verdict = decide_unnamed_verdict(baseline, floor)
+        if named.names and verdict in ("no_gap", "unexplained"):
+            return verdict, baseline, self._estimate_shrinkage(baseline)
+        return verdict, named, shrinkage
+
+    def _describe_nearest(self, verdict: Verdict) -> list[str]:
+        """Return the note on the most similar known effects where none is named."""
+        best = min(self.pool.candidates.values(), key=lambda c: c.held_out_rmse)
+        before = self.pool.baseline.held_out_rmse
+        if verdict != "unexplained" or best.held_out_rmse > _NEAREST_SHARE * before:
+            return []
+        return [describe_nearest(sorted(best.names), before, best.held_out_rmse, self.pool.floor)]
+
+    def _estimate_shrinkage(self, named: Candidate) -> Shrinkage:
+        noise_model = self.pool.noise_model
+        if named.names:
+            input_noise = noise_model.sample_other_runs(named, self.pool.full_problem)
+        else:
+            input_noise = np.zeros((1, len(self.evaluation.force)))
+        noise = noise_model.estimate_noise(named)
+        return self.evaluation.estimate_shrinkage(self.pool.baseline.residual, named.residual, noise, input_noise)
+
+    def _build_gap(self, verdict: Verdict, named: Candidate, shrinkage: Shrinkage) -> Gap:
+        no_gap = verdict == "no_gap"
+        return Gap(
+            before_n=shrinkage.before,
+            after_n=shrinkage.after,
+            noise_floor_n=self.pool.noise_model.estimate_noise(named),
+            shrinkage=None if no_gap else shrinkage.value,
+            shrinkage_ci95=None if no_gap else shrinkage.ci95,
+            nominal_n=self._compute_nominal_rmse(),
+            train_before_n=self.pool.baseline.train_rmse,
+            train_after_n=named.train_rmse,
+        )
+
+    def _compute_nominal_rmse(self) -> float | None:
+        """Compute the RMSE [N] of the given simulation on the held-out cycles."""
+        if self.model is None:
+            return None
+        forces = [self.model.simulate_force(p) for p in self.evaluation.select_fitted_pieces()]
+        return self.evaluation.compute_rmse(self.evaluation.compute_residual(forces))[1]
+
+    def _locate_gap(self) -> GapLocation:
+        baseline, floor, cycles = self.pool.baseline, self.pool.floor, self.evaluation.cycles
+        stages = compute_stage_probabilities(self.posterior, STAGES)
+        no_stage = baseline.held_out_rmse <= floor or max(stages.values()) < _MIN_STAGE_PROBABILITY
+        return GapLocation(
+            stage=None if no_stage else sorted(STAGES, key=stages.__getitem__)[-1],
+            stages={name: stages[name] for name in STAGES},
+            map=map_gap(baseline.residual, cycles, floor),
+            harmonics=compute_harmonics(baseline.residual, cycles),
+            drift=estimate_drift(baseline.residual, cycles),
+            explainable=self._estimate_explainable_share(baseline),
+        )
+
+    def _estimate_explainable_share(self, candidate: Candidate) -> float:
+        if candidate.held_out_rmse < NEAR_FLOOR_RATIO * self.pool.floor:
+            return 0.0
+        return estimate_explainable_share(
+            build_features(self.evaluation.pieces),
+            candidate.residual.values,
+            self.evaluation.fitted_samples,
+            self.evaluation.held_out_samples,
+            self.pool.floor,
+        )
+
+    def _describe_remainder(self, named: Candidate) -> str:
+        """Return the sentence on the residual with the named effects."""
+        largest = map_gap(named.residual, self.evaluation.cycles, self.pool.floor)[0]
+        share = self._estimate_explainable_share(named)
+        dependence = (
+            f"a flexible model of stroke and drive explains {share:.0%} of it"
+            if share > _EXPLAINABLE_THRESHOLD
+            else "it does not correlate with any recorded stroke or drive quantity"
+        )
+        return (
+            f"The remainder is largest at {largest.drive:.3g} {self.dataset.drive_unit}, "
+            f"{1e3 * largest.amplitude_m:.3g} mm and {largest.frequency_hz:.3g} Hz ({largest.gap_n:.3g} N), and "
+            f"{dependence}."
+        )
+
+    def _propose_next_stroke(self) -> NextStroke | None:
+        tied = [(names, p) for names, p in self.posterior.rank_sets() if p > MIN_TIED_PROBABILITY][:MAX_TIED_SETS]
+        rivals = [self._make_rival_model(names, p) for names, p in tied]
+        law = self.pool.baseline.fit.coordinates
+        chosen = find_best_segment(rivals, law, self._find_limits(), self.pool.floor)
+        if chosen is None:
+            return None
+        return NextStroke(
+            segment=chosen.segment,
+            separates=chosen.separated_sets,
+            expected_n=chosen.difference,
+            detectability=chosen.detectability,
+        )
+
+    def _make_rival_model(self, names: frozenset[str], probability: float) -> RivalModel:
+        candidate = self.pool.candidates[names]
+        form_error = max(self.pool.compute_excess(candidate), 0.0) / max(self.pool.baseline_excess, 1e-3)
+        fit = candidate.fit
+        return RivalModel(
+            tuple(sorted(names)),
+            fit.coordinates,
+            fit.active_effects,
+            probability,
+            min(form_error, 1.0),
+            compute_information(fit),
+        )
+
+    def _find_limits(self) -> StrokeLimits:
+        """Return the limits of motion and drive that the recording reached."""
+        strokes = [p.excitation for p in self.evaluation.pieces]
+        low = min(float(s.displacement.min()) for s in strokes)
+        high = max(float(s.displacement.max()) for s in strokes)
+        space = self.pool.full_problem.space
+        return StrokeLimits(
+            amplitude=0.5 * (high - low),
+            centre=0.5 * (high + low),
+            velocity=max(float(np.quantile(np.abs(s.velocity), _SPEED_QUANTILE)) for s in strokes),
+            frequency=max([c.frequency for c in self.evaluation.cycles.conditions] + [_LOWEST_FREQUENCY_LIMIT]),
+            drives=(space.lowest_drive, space.highest_drive),
+        )
+
+    def _make_provenance(self) -> Provenance:
+        return Provenance(
+            logs={r.path.name: r.sha256 for r in self.dataset.recordings},
+            version=version("mrbench"),
+            seed=self.seed,
+            settings={"held_out": "every fourth segment, or cycle where segments are few"},
+        )

@@ -1,0 +1,25 @@
+"""Selection of the sets of effects that explain a recording."""
+
+from identification.gap.selection.candidate_pool import CandidatePool
+from identification.gap.selection.plan import compute_final_posterior, search_forward
+from identification.gap.selection.posterior import (
+    MAX_TIED_SETS,
+    MIN_TIED_PROBABILITY,
+    UNKNOWN_THRESHOLD,
+    Posterior,
+    compute_stage_probabilities,
+)
+from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
+
+__all__ = [
+    "DEFAULT_SETTINGS",
+    "MAX_TIED_SETS",
+    "MIN_TIED_PROBABILITY",
+    "UNKNOWN_THRESHOLD",
+    "CandidatePool",
+    "Posterior",
+    "SearchSettings",
+    "compute_final_posterior",
+    "compute_stage_probabilities",
+    "search_forward",
+]

@@ -1,0 +1,196 @@
+"""Candidate pool: the sets of effects that were fitted to one recording.
+
+The pool fits, screens and compares sets. It keeps the best fit of each set. The strategies in this package
+decide which sets are fitted.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.fitting import EffectModel, Problem, make_starting_points
+from identification.gap.data import EvaluationData, split_by_piece
+from identification.gap.fits import Candidate, FitOptions, JointFit, fit_jointly, refit_all_samples
+from identification.gap.noise import NoiseModel, find_mains_frequency
+from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
+from identification.gap.selection.screening import ScreeningResult
+from identification.gap.selection.screening_cache import ScreeningCache
+from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
+from identification.gap.selection.size_prior import compute_size_weight
+from identification.progress import Progress, ignore_progress
+
+_CHANCE_DEVIATIONS = 2.0
+"""Standard deviations of a sample variance that count as chance."""
+QUICK_FIT = FitOptions(decimation=1, starts=0, descents=1, iterations=25, regression_start=False, refit_full=False)
+"""One descent from the best of the given starts, on decimated data."""
+
+
+@dataclass
+class CandidatePool:
+    """The sets of effects that were fitted to one recording."""
+
+    full_problem: Problem
+    """Problem of all fitted samples."""
+    evaluation: EvaluationData
+    noise_model: NoiseModel
+    clock_deviation: float = 0.0
+    """Standard deviation of the delay between the channels [s]; 0 where it is small enough to be ignored."""
+    progress: Progress = ignore_progress
+    settings: SearchSettings = DEFAULT_SETTINGS
+    candidates: dict[frozenset[str], Candidate] = field(default_factory=dict)
+    """Best fit of each set."""
+    full_fits: set[frozenset[str]] = field(default_factory=set)
+    """Sets that were fitted on all samples."""
+    block_evidence: dict[frozenset[str], BlockEvidence] = field(default_factory=dict)
+    """Block evidence of the sets for which it was computed."""
+    fit_count: int = 0
+    """Number of fits."""
+    notes: list[str] = field(default_factory=list)
+    """Messages about the search for a person."""
+    _screenings: ScreeningCache = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Create the cache of screenings."""
+        self._screenings = ScreeningCache(self.settings.screening_rate)
+
+    @property
+    def budget_spent(self) -> bool:
+        """True after as many fits as the budget allows; a count gives the same result on every machine."""
+        return self.fit_count >= self.settings.fit_budget
+
+    @property
+    def floor(self) -> float:
+        """Noise floor [N]."""
+        return self.noise_model.floor
+
+    @property
+    def baseline(self) -> Candidate:
+        """Candidate without effects."""
+        return self.candidates[frozenset()]
+
+    @property
+    def baseline_excess(self) -> float:
+        """Excess of the baseline [1]."""
+        return self.compute_excess(self.baseline)
+
+    def compute_excess(self, candidate: Candidate) -> float:
+        """Compute the excess of a candidate over the present noise floor [1]."""
+        return candidate.compute_excess(self.floor)
+
+    def is_at_floor(self, candidate: Candidate) -> bool:
+        """Return True if the excess is negligible, so that no further effect is searched for."""
+        share = self.settings.negligible_share * max(self.baseline_excess, 0.0)
+        return self.compute_excess(candidate) < self.settings.negligible_excess + share
+
+    def find_best(self) -> Candidate:
+        """Return the candidate with the smallest excess."""
+        return min(self.candidates.values(), key=self.compute_excess)
+
+    def collect_evidence(self) -> list[SetEvidence]:
+        """Return the evidence of every set, with a floor that lies below the residual of every candidate."""
+        part = float(np.mean(self.evaluation.held_out_samples[self.evaluation.usable]))
+        lowest = min(
+            math.sqrt((1.0 - part) * c.train_rmse**2 + part * c.held_out_rmse**2) for c in self.candidates.values()
+        )
+        floor = min(self.floor, lowest)
+        x = np.concatenate([p.excitation.displacement for p in self.full_problem.pieces])
+        return [
+            SetEvidence(
+                names,
+                c.compute_relative_excess(self.baseline, floor),
+                math.prod(compute_size_weight(e, x) for e in c.fit.active_effects),
+                self.block_evidence.get(names),
+            )
+            for names, c in self.candidates.items()
+        ]
+
+    def compute_posterior(self) -> Posterior:
+        """Compute the posterior of all fitted sets."""
+        return compute_posterior(
+            self.collect_evidence(), self.full_problem.samples, self.noise_model.coloured_share
+        )
+
+    def fit(
+        self, effects: tuple[EffectModel, ...], starts: Sequence[Array] = (), options: FitOptions = QUICK_FIT
+    ) -> Candidate:
+        """Fit a set on decimated data, evaluate it on all samples, and keep it if it is the best of its names.
+
+        Args:
+            effects: forms of the effects.
+            starts: unknowns (U,) of the joint problem.
+            options: further starts, and iterations.
+
+        Returns:
+            The best known candidate of this set, which may come from an earlier fit.
+        """
+        self.fit_count += 1
+        candidate = self._evaluate(fit_jointly(self.decimated_problem, effects, None, options, starts))
+        self.progress(" and ".join(model.name for model in effects) or "law alone", candidate.held_out_rmse)
+        known = self.candidates.get(candidate.names)
+        if known is None or self.compute_excess(candidate) < self.compute_excess(known):
+            self.candidates[candidate.names] = candidate
+        return self.candidates[candidate.names]
+
+    def fit_fully(self, names: frozenset[str]) -> None:
+        """Fit a set on all samples, once, starting from its best fit on decimated data."""
+        if names not in self.full_fits:
+            self._continue_fit(names)
+            self.candidates[names] = self._refit_all_samples(self.candidates[names])
+            self.full_fits.add(names)
+
+    def screen(self, parent: Candidate, without: frozenset[str]) -> list[ScreeningResult]:
+        """Estimate the gain of every further effect in addition to a set, except of those named."""
+        return self._screenings.find_gains(
+            parent, without, self.compute_excess(parent), self.decimated_problem, self._find_mains_frequency
+        )
+
+    @cached_property
+    def decimated_problem(self) -> Problem:
+        """Problem of the decimated data on which sets are searched, as a fast variant."""
+        rate = max(p.excitation.rate for p in self.full_problem.pieces)
+        samples = sum(len(p.force) for p in self.full_problem.pieces)
+        factor = max(rate / self.settings.decimation_rate, samples / self.settings.long_recording)
+        factor = min(factor, rate / self.settings.screening_rate)
+        return self.full_problem.make_fast().decimate(max(1, round(factor)))
+
+    @cached_property
+    def regression_start(self) -> Array:
+        """Unknowns (U,) of the law alone from the regression."""
+        return make_starting_points(self.decimated_problem)[0]
+
+    def _evaluate(self, fit: JointFit) -> Candidate:
+        """Compute the residual of a fit on all samples."""
+        forces = self.full_problem.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
+        residual = self.evaluation.compute_residual(forces)
+        held_out = max(int(np.count_nonzero(self.evaluation.held_out_samples)), 1)
+        chance = _CHANCE_DEVIATIONS * math.sqrt(2.0 / held_out)
+        return Candidate(fit, residual, *self.evaluation.compute_rmse(residual), chance)
+
+    def _continue_fit(self, names: frozenset[str]) -> None:
+        """Continue a descent that stopped at its limit of iterations."""
+        for _ in range(self.settings.refit_rounds):
+            known = self.candidates[names]
+            if known.fit.converged or self.budget_spent:
+                return
+            self.fit(known.fit.effects, [known.fit.minimum.unknowns])
+
+    def _refit_all_samples(self, candidate: Candidate) -> Candidate:
+        for _ in range(self.settings.refit_rounds):
+            simulated = split_by_piece(candidate.residual.simulated_force, self.full_problem.pieces)
+            fit = refit_all_samples(self.full_problem, candidate.fit, simulated, self.settings.refit_iterations)
+            candidate = self._evaluate(fit)
+            if abs(candidate.train_rmse - fit.rmse) < self.settings.refit_tolerance * self.floor:
+                break
+        return candidate
+
+    def _find_mains_frequency(self, parent: Candidate) -> float:
+        """Find the mains frequency [Hz] in the residual of the longest stretch."""
+        counts = [len(p.force) for p in self.full_problem.pieces]
+        longest = counts.index(max(counts))
+        part = slice(sum(counts[:longest]), sum(counts[: longest + 1]))
+        error = np.where(parent.residual.valid, parent.residual.values, 0.0)[part]
+        return find_mains_frequency(error, self.full_problem.pieces[longest].excitation.rate)

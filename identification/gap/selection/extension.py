@@ -1,0 +1,64 @@
+"""Extension of the most probable set by one effect, after its full fit (decision 0016).
+
+The forward search uses decimated data and ends where the form error could hide what remains. Here the set is
+fitted on all samples, and the most promising further effects are compared by block evidence. A confusable
+effect, which acts on the same variable as one in the set, can take up its form error. Block evidence cannot
+separate the two, so a confusable effect pays an additional penalty, and only sets that the search has already
+fitted are considered.
+"""
+
+from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
+from identification.gap.selection.candidate_pool import CandidatePool
+from identification.gap.selection.neighbours import find_subset, fit_extension
+from identification.gap.selection.posterior import BlockEvidence, compute_complexity_penalty
+from identification.gap.selection.screening import select_shortlist
+
+_CONFUSABLE_EFFECTS = (
+    {"clevis_backlash", "fixture_compliance", "end_stop", "side_load_friction"},
+    {"gas_spring", "end_stop", "side_load_friction", "displacement_nonlinearity"},
+    {"seal_friction", "orifice_turbulence", "shear_thinning", "direction_asymmetry"},
+    {"field_saturation", "magnetic_remanence", "coil_crosstalk"},
+    {"moving_mass", "force_delay", "force_filter", "displacement_delay"},
+    {"viscous_heating", "force_drift"},
+)
+"""Effects that act at stroke reversals, or on displacement, velocity, field, acceleration or time."""
+
+
+def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
+    """Fit a set with one more effect; return True if block evidence of any exceeds the complexity penalty."""
+    if not _is_extension_promising(pool, names):
+        return False
+    confusable = set[str]().union(*(group for group in _CONFUSABLE_EFFECTS if names & group))
+    penalty = compute_complexity_penalty(names)
+    extended = _fit_extensions(pool, names, names | confusable)
+    for larger in extended:
+        pool.fit_fully(larger)
+        evidence = compute_evidence(pool.candidates[names].residual, pool.candidates[larger].residual)
+        confusion = pool.settings.confusion_penalty if larger & confusable - names else 0.0
+        pool.block_evidence[larger] = BlockEvidence(names, evidence - confusion)
+    accepted = [larger for larger in extended if pool.block_evidence[larger].log_odds > penalty]
+    for larger in accepted:
+        for model in pool.candidates[larger].fit.effects:
+            find_subset(pool, pool.candidates[larger], model)
+    return bool(accepted)
+
+
+def _fit_extensions(pool: CandidatePool, names: frozenset[str], without: frozenset[str]) -> list[frozenset[str]]:
+    """Return the sets with the most promising further effects, and the best extension that is already known."""
+    known, sets = pool.candidates[names], []
+    for gain in select_shortlist(pool.screen(known, without), pool.settings.extension_effects):
+        sets.append(names | {gain.effect_model.name})
+        if sets[-1] not in pool.full_fits:
+            fit_extension(pool, known, gain)
+    extensions = [n for n in pool.candidates if len(n) == len(names) + 1 and names < n]
+    best = sorted(extensions, key=lambda n: pool.compute_excess(pool.candidates[n]))[:1]
+    return list(dict.fromkeys([*sets, *best]))
+
+
+def _is_extension_promising(pool: CandidatePool, names: frozenset[str]) -> bool:
+    """Return True if the set closes most of the gap and one more effect could pay the complexity penalty."""
+    if not 0 < len(names) < pool.settings.max_effects:
+        return False
+    known = pool.candidates[names]
+    explains = pool.compute_excess(known) < pool.settings.max_remaining_share * pool.baseline_excess
+    return explains and bound_evidence(known.residual, pool.floor) > compute_complexity_penalty(names)

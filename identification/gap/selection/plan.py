@@ -1,0 +1,131 @@
+"""Order in which sets of effects are fitted to a recording.
+
+The search goes forward: every effect is screened, and the most promising are fitted together with the law. The
+best sets grow by a second and a third effect. Then each effect of a set is left out once, and others are tried
+in its place. All of this uses decimated data. Finally the most probable sets are fitted on all samples.
+"""
+
+from identification.gap.fits import Candidate, FitOptions
+from identification.gap.noise import describe_drift_explanation, subtract_clock_drift
+from identification.gap.selection.candidate_pool import CandidatePool
+from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
+from identification.gap.selection.extension import try_extension
+from identification.gap.selection.mounting import fit_mounting, is_mounting_promising
+from identification.gap.selection.neighbours import fit_extension
+from identification.gap.selection.posterior import (
+    MAX_TIED_SETS,
+    MIN_TIED_PROBABILITY,
+    UNKNOWN_THRESHOLD,
+    Posterior,
+)
+from identification.gap.selection.screening import MOUNTING_EFFECTS, compute_expected_gain, select_shortlist
+
+_BASELINE_FIT = FitOptions(decimation=1, starts=1, descents=1, iterations=40, refit_full=False)
+
+
+def search_forward(pool: CandidatePool) -> None:
+    """Fit the promising sets of effects on decimated data."""
+    baseline = pool.fit((), options=_BASELINE_FIT)
+    pool.noise_model.update(baseline, pool.full_problem, pool.evaluation)
+    if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
+        return
+    beam = [baseline]
+    for size, count in enumerate(pool.settings.shortlist_sizes, 1):
+        if pool.budget_spent or pool.is_at_floor(beam[0]):
+            break
+        for parent in beam:
+            _fit_extensions(pool, parent, count)
+        sets = sorted((c for n, c in pool.candidates.items() if len(n) == size), key=pool.compute_excess)
+        beam = _select_beam(pool, size, sets, beam[0])
+        if not beam:
+            break
+    fit_subsets(pool)
+    exchange_effects(pool)
+
+
+def _select_beam(pool: CandidatePool, size: int, sets: list[Candidate], parent: Candidate) -> list[Candidate]:
+    """Return the sets of one size that are extended next, the best first; empty at the end of the search."""
+    settings = pool.settings
+    if not sets or size > len(settings.beam_widths) or not _is_worth_extending(pool, sets[0], parent):
+        return []
+    pool.noise_model.update(sets[0], pool.full_problem, pool.evaluation)
+    limit = settings.beam_ratio * max(pool.compute_excess(sets[0]), settings.negligible_excess)
+    return [c for c in sets if pool.compute_excess(c) < limit][: settings.beam_widths[size - 1]]
+
+
+def _is_gap_negligible(pool: CandidatePool, baseline: Candidate) -> bool:
+    """Return True if the baseline is so close to the noise floor that no effect is searched for."""
+    return max(baseline.train_rmse, baseline.held_out_rmse) < pool.settings.no_gap_ratio * pool.floor
+
+
+def _is_explained_by_clocks(pool: CandidatePool) -> bool:
+    """Return True if no gap remains once the delay may drift as far as the clocks in the log allow."""
+    if not pool.clock_deviation:
+        return False
+    corrected, drift = subtract_clock_drift(
+        pool.baseline, pool.full_problem, pool.evaluation, pool.clock_deviation
+    )
+    if not _is_gap_negligible(pool, corrected):
+        return False
+    pool.candidates[corrected.names] = corrected
+    pool.full_fits.add(corrected.names)
+    pool.notes.append(describe_drift_explanation(drift))
+    return True
+
+
+def _is_worth_extending(pool: CandidatePool, best: Candidate, parent: Candidate) -> bool:
+    """Return True if a set closes enough of its parent's excess; with a large gap, one effect may close little."""
+    excess = pool.compute_excess(best)
+    closes = excess < pool.settings.extension_share * pool.compute_excess(parent)
+    return closes or (not parent.names and excess > pool.settings.large_excess)
+
+
+def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
+    """Fit a set with each of the most promising further effects, and with each mounting effect."""
+    settings, excess = pool.settings, pool.compute_excess(parent)
+    gains = pool.screen(parent, parent.names)
+    if not parent.names and excess > settings.large_excess:
+        count = settings.large_shortlist
+    if excess < settings.small_excess and compute_expected_gain(gains[0]) < settings.small_excess_gain:
+        return
+    for gain in select_shortlist(gains, count):
+        if pool.budget_spent:
+            return
+        fit_extension(pool, parent, gain)
+    for name in MOUNTING_EFFECTS:
+        if not pool.budget_spent and is_mounting_promising(pool, parent, name):
+            fit_mounting(pool, parent, gains, name)
+
+
+def compute_final_posterior(pool: CandidatePool) -> Posterior:
+    """Fit the most probable sets on all samples, extend the first, and compute the posterior of all sets."""
+    _fit_probable_sets(pool)
+    most_probable = _fit_most_probable_set(pool)
+    for _ in range(pool.settings.max_extensions):
+        if not try_extension(pool, most_probable):
+            break
+        most_probable = pool.compute_posterior().rank_sets()[0][0]
+        pool.fit_fully(most_probable)
+    exchange_mounting(pool, most_probable)
+    return pool.compute_posterior()
+
+
+def _fit_probable_sets(pool: CandidatePool) -> None:
+    """Fit on all samples: the baseline, the most probable sets, and the subsets of the first."""
+    posterior = pool.compute_posterior()
+    likely = [names for names, p in posterior.rank_sets()[:MAX_TIED_SETS] if p > MIN_TIED_PROBABILITY]
+    if posterior.unknown > UNKNOWN_THRESHOLD:
+        likely.append(pool.find_best().names)
+    subsets = [names - {name} for names in likely[:1] if len(names) > 1 for name in sorted(names)]
+    for names in dict.fromkeys([frozenset[str](), *likely, *(s for s in subsets if s in pool.candidates)]):
+        pool.fit_fully(names)
+
+
+def _fit_most_probable_set(pool: CandidatePool) -> frozenset[str]:
+    """Fit the most probable set on all samples, until the set that is then most probable has a full fit."""
+    for _ in range(pool.settings.max_refits):
+        most_probable = pool.compute_posterior().rank_sets()[0][0]
+        if most_probable in pool.full_fits:
+            break
+        pool.fit_fully(most_probable)
+    return most_probable

@@ -1,0 +1,183 @@
+"""Posterior of the sets of effects, from the part of the gap that each leaves.
+
+The likelihood of white noise would be far too certain: with a hundred thousand samples, one per cent of misfit
+decides everything, while the form error of every library is larger. So the odds follow the *ratio* of the
+excesses of two sets, to a fixed power, down to a resolution: the noise of the floor itself, and a small part of
+the gap that even the correct effect leaves because its form is not exact. Smaller sets are more probable
+beforehand. An unknown cause is one of the alternatives: known effects are expected to leave a part of its gap
+that the correct effects hardly ever leave.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.damper.effects import COMMON_EFFECTS, EFFECTS, Stage
+
+_LIKELIHOOD_EXPONENT = 6.0
+"""Exponent of the ratio of excesses in the odds. Origin: calibrated on recordings with a known effect."""
+_EXCESS_RESOLUTION = 0.004
+"""Smallest significant excess, from the input noise that a fit propagates [1]."""
+_RESOLUTION_SAMPLES = 10.0
+"""Further insignificant excess of a short recording: this over the number of fitted samples."""
+_COLOURED_RESOLUTION = 0.05
+"""Further insignificant excess of slow noise: this times the coloured share of the variance of the noise."""
+_FORM_ERROR = 0.01
+"""Part of the baseline's excess that the correct effect leaves because its form is not exact."""
+_UNKNOWN_FORM_ERROR = 0.2
+"""Smallest part of the baseline's excess that known effects leave of an unknown cause."""
+_LARGE_GAP = 1.0
+"""Threshold on the baseline's excess: above it, a set that leaves more than this part of it is incomplete."""
+_INPUT_NOISE_EXCESS = 0.03
+"""Largest excess that input noise explains [1]."""
+_FLOOR_DEVIATIONS = 3.0
+"""Error of the noise floor that explains an excess [standard deviations of the floor's variance]."""
+_LOGISTIC_WIDTH = 0.25
+"""Width of the transition to a significant excess, relative to that excess."""
+_COUNT_PRIOR = (0.2, 0.5, 0.25, 0.045, 0.005)
+"""Prior probability of no, one, two, ... effects."""
+_UNKNOWN_ODDS = 3.0
+"""Prior odds of an unknown cause over the most probable set, if both leave as much."""
+_COMPLEXITY_FACTOR = 0.1
+"""Factor on the prior of each effect for the freedom of its parameters."""
+_MISATTRIBUTION = 0.02
+"""Probability that a set which leaves nothing is not the cause."""
+_MISATTRIBUTION_SLOPE = 0.4
+"""Further probability of that, per part of the gap that the set leaves."""
+_RARE_WEIGHT = 0.3
+"""Factor on the prior of an effect that is not among the common ones."""
+
+MAX_TIED_SETS = 3
+"""Largest number of sets that a proposed stroke separates."""
+MIN_TIED_PROBABILITY = 0.05
+"""Smallest probability of such a set."""
+UNKNOWN_THRESHOLD = 0.5
+"""Threshold on the probability of an unknown cause: above it, a gap without a known cause counts as one."""
+
+
+class BlockEvidence(NamedTuple):
+    """Block evidence of a set over another with one effect less."""
+
+    parent: frozenset[str]
+    """Names of the smaller set."""
+    log_odds: float
+    """Natural logarithm of the odds, before the complexity penalty."""
+
+
+@dataclass(frozen=True)
+class SetEvidence:
+    """Evidence of one set of effects."""
+
+    names: frozenset[str]
+    excess: float
+    """Excess of the set, on the worse of fitted and held-out samples [1]."""
+    weight: float = 1.0
+    """Weight of the sizes of its effects [1]."""
+    block_evidence: BlockEvidence | None = None
+    """Block evidence, where it was computed."""
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Probabilities of the sets of effects and of an unknown cause."""
+
+    sets: dict[frozenset[str], float]
+    """Probability of exactly each set."""
+    unknown: float
+    """Probability of an unknown cause."""
+
+    def compute_effect_probability(self, name: str) -> float:
+        """Return the probability that an effect is active, alone or with others."""
+        return float(sum(p for names, p in self.sets.items() if name in names))
+
+    def rank_sets(self) -> list[tuple[frozenset[str], float]]:
+        """Return the sets with their probabilities, the most probable first."""
+        return sorted(self.sets.items(), key=lambda item: -item[1])
+
+
+def compute_posterior(sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0) -> Posterior:
+    """Compute the probabilities of sets of effects and of an unknown cause.
+
+    Args:
+        sets: evidence of every fitted set, the empty one included.
+        samples: number of fitted samples.
+        coloured_share: part of the variance of the noise [1] that is not white; slow noise varies more by chance.
+    """
+    gap = max(next(s.excess for s in sets if not s.names), 0.0)
+    resolution = (
+        _EXCESS_RESOLUTION
+        + _RESOLUTION_SAMPLES / max(samples, 1)
+        + _COLOURED_RESOLUTION * coloured_share
+        + _FORM_ERROR * gap
+    )
+    scores = _compute_scores(sets, resolution, gap)
+    insignificant = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
+    best = max(sets, key=lambda s: scores[s.names])
+    unknown = _compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
+    unknown -= _LIKELIHOOD_EXPONENT * math.log(_UNKNOWN_FORM_ERROR * gap + resolution + insignificant)
+    unknown -= _penalise_incomplete(best, gap)
+    # An unknown cause is only an alternative where known effects leave an excess that the floor cannot explain.
+    weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
+    shares = _normalise(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
+    remaining = (max(best.excess, 0.0) + resolution) / (gap + resolution)
+    any_effect = 1.0 - float(shares[list(scores).index(frozenset())])
+    misattributed = (_MISATTRIBUTION + _MISATTRIBUTION_SLOPE * remaining) * any_effect
+    known = (1.0 - misattributed) * shares[:-1]
+    return Posterior(dict(zip(scores, map(float, known), strict=True)), 1.0 - float(known.sum()))
+
+
+def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) -> dict[frozenset[str], float]:
+    """Return the log odds of each set, from its excess or from its block evidence, whichever is larger."""
+    prior = {s.names: _compute_log_prior(s.names) + math.log(s.weight) for s in sets}
+    loss = {
+        s.names: _LIKELIHOOD_EXPONENT * math.log(max(s.excess, 0.0) + resolution) + _penalise_incomplete(s, gap)
+        for s in sets
+    }
+    scores = {names: prior[names] - loss[names] for names in prior}
+    with_blocks = [(s.names, s.block_evidence) for s in sets if s.block_evidence]
+    for names, (parent, log_odds) in sorted(with_blocks, key=lambda item: len(item[0])):
+        scores[names] = max(scores[names], scores[parent] + log_odds + prior[names] - prior[parent])
+    return scores
+
+
+def _penalise_incomplete(evidence: SetEvidence, gap: float) -> float:
+    """Return the loss of a set that leaves more of a large gap than any correct set does."""
+    ratio = evidence.excess / (_UNKNOWN_FORM_ERROR * gap) if gap > _LARGE_GAP else 0.0
+    return _LIKELIHOOD_EXPONENT * math.log(max(ratio, 1.0))
+
+
+def compute_complexity_penalty(names: frozenset[str]) -> float:
+    """Return the logarithm of the odds that one more common effect has to bring to a set."""
+    larger = names | {next(name for name in COMMON_EFFECTS if name not in names)}
+    return _compute_log_prior(names) - _compute_log_prior(larger)
+
+
+def _compute_log_prior(names: frozenset[str]) -> float:
+    """Return the logarithm of the prior of a set: that of its size, shared among all sets of this size."""
+    count = len(names)
+    size_prior = _COUNT_PRIOR[min(count, len(_COUNT_PRIOR) - 1)]
+    rare = sum(name not in COMMON_EFFECTS for name in names)
+    log_share = math.log(size_prior / math.comb(len(COMMON_EFFECTS), count))
+    return log_share + count * math.log(_COMPLEXITY_FACTOR) + rare * math.log(_RARE_WEIGHT)
+
+
+def _compute_logistic(value: float, width: float) -> float:
+    return 1.0 / (1.0 + math.exp(-min(max(value / width, -40.0), 40.0)))
+
+
+def _normalise(scores: Array) -> Array:
+    shares = np.exp(scores - scores.max())
+    return np.asarray(shares / shares.sum())
+
+
+def compute_stage_probabilities(posterior: Posterior, stages: Sequence[Stage]) -> dict[Stage, float]:
+    """Return the probability of a missing effect at each stage; that of an unknown cause is spread evenly."""
+    shares: dict[Stage, float] = dict.fromkeys(stages, posterior.unknown / len(stages))
+    for names, probability in posterior.sets.items():
+        for stage in {EFFECTS[name].stage for name in names}:
+            shares[stage] += probability
+    return {stage: min(share, 1.0) for stage, share in shares.items()}

@@ -1,0 +1,68 @@
+"""Cache of screenings.
+
+The gains of further effects are needed several times for the same set: when it grows, when its effects are
+exchanged, and when it is extended in the end. A screening holds while the excess of the set stays nearly the
+same.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from identification.damper.effects import EFFECTS
+from identification.fitting import Problem
+from identification.gap.fits import Candidate
+from identification.gap.selection.screening import ScreeningResult, list_effect_models, screen
+
+_CACHE_TOLERANCE = 0.05
+"""Relative change of a set's excess within which its screening holds."""
+
+
+class _Screening(NamedTuple):
+    """Gains in addition to one set."""
+
+    excess: float
+    """Excess of the set at the time [1]."""
+    names: frozenset[str]
+    """Names of the screened effects."""
+    gains: list[ScreeningResult]
+
+
+@dataclass
+class ScreeningCache:
+    """Screenings of a search, by the names of the sets."""
+
+    rate: float
+    """Sampling rate of a screening [Hz]."""
+    _entries: dict[frozenset[str], _Screening] = field(default_factory=dict)
+
+    def find_gains(
+        self,
+        parent: Candidate,
+        without: frozenset[str],
+        excess: float,
+        problem: Problem,
+        find_mains_frequency: Callable[[Candidate], float],
+    ) -> list[ScreeningResult]:
+        """Return the gains of further effects in addition to a set, the form with the largest first.
+
+        Args:
+            parent: the set.
+            without: names of effects that are not screened.
+            excess: excess of the set [1].
+            problem: decimated data.
+            find_mains_frequency: finds the mains frequency [Hz] in the residual of a set.
+        """
+        wanted = frozenset(EFFECTS) - without
+        entry = self._entries.get(parent.names)
+        if (
+            entry is None
+            or not wanted <= entry.names
+            or abs(excess - entry.excess) > _CACHE_TOLERANCE * entry.excess
+        ):
+            highest = max(p.excitation.rate for p in problem.pieces)
+            models = list_effect_models([name for name in EFFECTS if name in wanted])
+            decimation = max(1, round(highest / self.rate))
+            gains = screen(problem, parent.fit, models, decimation, find_mains_frequency(parent))
+            entry = self._entries[parent.names] = _Screening(excess, wanted, gains)
+        return [gain for gain in entry.gains if gain.effect_model.name in wanted]

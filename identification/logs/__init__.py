@@ -1,0 +1,19 @@
+"""Log files to arrays."""
+
+from identification.logs.recording import (
+    PERIODIC_MOTIONS,
+    ChannelFilter,
+    Recording,
+    Segment,
+    Stretch,
+    load,
+)
+
+__all__ = [
+    "PERIODIC_MOTIONS",
+    "ChannelFilter",
+    "Recording",
+    "Segment",
+    "Stretch",
+    "load",
+]

@@ -1,0 +1,53 @@
+"""Choice of the smoother's cutoff that minimises the estimated error of the velocity."""
+
+import numpy as np
+import numpy.typing as npt
+
+from identification.arrays import Array
+from identification.signals.smoother import compute_penalty, compute_step_covariance, smooth_signal
+
+Indices = npt.NDArray[np.intp]
+
+_CUTOFF_RATIO = 1.35
+"""Ratio of successive trial cutoffs."""
+_MIN_CUTOFF, _MAX_CUTOFF = 0.003, 0.25
+"""Range of the trial cutoffs in cycles a sample."""
+_STROKE_BAND = 200.0
+"""Frequency [Hz] above which no hydraulic or electric actuator moves: a sensor shows only noise there."""
+
+
+def choose_cutoffs(
+    values: Array,
+    weights: Array,
+    expected: Array,
+    regions: Indices,
+    rate: float,
+    noise: float,
+    *,
+    twicing: bool = False,
+) -> Array:
+    """Return the cutoff [Hz] of each region by Mallows' Cp of the first differences.
+
+    Args:
+        values: (N,) displacement [m].
+        weights: (N,) 1 where measured, 0 elsewhere.
+        expected: (N-3,) expected third differences [m].
+        regions: (N,) index of the region of each sample.
+        rate: [Hz]
+        noise: standard deviation of the displacement's noise [m].
+        twicing: whether the smoother smooths its remainder again.
+    """
+    highest = max(min(_MAX_CUTOFF * rate, _STROKE_BAND), 2.0 * _MIN_CUTOFF * rate)
+    steps = int(np.log(highest / (_MIN_CUTOFF * rate)) / np.log(_CUTOFF_RATIO)) + 1
+    trials = np.geomspace(highest, _MIN_CUTOFF * rate, steps + 1)[::-1]
+    both_measured = weights[1:] * weights[:-1]
+    count = int(regions.max()) + 1
+    sizes = np.bincount(regions[1:], both_measured, count)
+    costs = np.empty((len(trials), count))
+    for cost, cutoff in zip(costs, trials, strict=True):
+        penalty = np.full(len(expected), float(compute_penalty(cutoff, rate)))
+        smooth = smooth_signal(values, weights, penalty, expected, twicing=twicing)
+        cost[:] = np.bincount(regions[1:], both_measured * np.diff(values - smooth) ** 2, count)
+        # A high cutoff has a small remainder because the smooth follows the noise. The second term adds that part.
+        cost += 2.0 * noise**2 * sizes * compute_step_covariance(cutoff, rate, twicing=twicing)
+    return np.asarray(trials[np.argmin(costs, axis=0)])

@@ -1,0 +1,127 @@
+"""Division of a stretch into regions of like motion: repeating strokes, transitions, remainders, disturbances.
+
+A disturbance is a short departure of the rod from the wave that it repeats: a late setpoint, or a shock. It is
+smoothed as a region of its own, because its fast motion would let noise into the whole segment. Far off the wave,
+the motion between samples is unknown, and a force that is steep over some micrometres cannot be simulated there.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from scipy.ndimage import binary_dilation
+
+from identification.arrays import Array, BoolArray
+from identification.logs import Stretch
+from identification.signals.drive import find_drive_steps
+from identification.signals.harmonics import Harmonics
+
+Indices = npt.NDArray[np.intp]
+
+_TRANSITION_TIME = 0.03
+"""Time [s] left for transients around disturbances and around the ends of periodic parts."""
+MAX_COMPLIANCE_MOTION = 0.03
+"""Threshold on compliance motion over the stroke's standard deviation: above it, it cannot be the actuator's."""
+_UNRESOLVED_FRACTION = 0.004
+"""Threshold on a disturbance over the stroke's standard deviation: above it, its samples are unresolved."""
+
+
+class MotionRegions(NamedTuple):
+    """Division of a stretch, (N,) each."""
+
+    regions: Indices
+    """Region of each sample: 0 for transitions, then the repeating parts, the parts between, the disturbances."""
+    disturbed: BoolArray
+    """True in a disturbance."""
+    unresolved: BoolArray
+    """True in a disturbance so large that the motion between samples is unknown."""
+
+
+def divide_stretch(stretch: Stretch, waves: list[Harmonics], is_compliant: bool) -> MotionRegions:
+    """Divide a stretch into regions.
+
+    Args:
+        stretch: the recording.
+        waves: its repeating parts.
+        is_compliant: whether its actuator deforms under load, which adds transitions at the stretch's ends.
+    """
+    count, reach = len(stretch.time), _compute_reach(stretch)
+    edges = {edge for wave in waves for edge in (wave.start, wave.stop)} - {0, count}
+    transitions = _mark_around(edges | ({0, count} if is_compliant else set()), count, reach)
+    deviation = np.zeros(count)
+    for wave in waves:
+        deviation[wave.start : wave.stop] = wave.disturbance
+    disturbances = find_disturbances(stretch, deviation)
+    disturbed = mark_runs(disturbances, count)
+    large = disturbed & (deviation > _UNRESOLVED_FRACTION * _compute_amplitude(stretch))
+    return MotionRegions(_label_regions(waves, transitions, disturbances), disturbed, _widen(large, reach))
+
+
+def find_disturbances(stretch: Stretch, deviation: Array) -> list[Indices]:
+    """Return the samples of each disturbance.
+
+    A small departure that begins at a change of drive or stroke is the actuator's response and not a disturbance.
+
+    Args:
+        stretch: the recording.
+        deviation: (N,) distance of the rod from its wave in candidate disturbances [m]; 0 elsewhere.
+    """
+    if not deviation.any():
+        return []
+    reach = _compute_reach(stretch)
+    seams = {s.start for s in stretch.segments} & {s.stop for s in stretch.segments}
+    changes = _mark_around(seams | set(find_drive_steps(stretch.drive).tolist()), len(deviation), reach)
+    runs = _find_runs(_widen(deviation > 0.0, reach))
+    # The runs were widened: the disturbance itself begins a reach later.
+    starts = [min(run[0] + reach, len(deviation) - 1) for run in runs]
+    limit = MAX_COMPLIANCE_MOTION * _compute_amplitude(stretch)
+    return [
+        run for run, start in zip(runs, starts, strict=True) if not changes[start] or deviation[run].max() > limit
+    ]
+
+
+def _compute_reach(stretch: Stretch) -> int:
+    return int(_TRANSITION_TIME * stretch.rate) + 1
+
+
+def _compute_amplitude(stretch: Stretch) -> float:
+    return float(np.std(stretch.displacement)) or 1.0
+
+
+def _mark_around(edges: set[int], count: int, reach: int) -> BoolArray:
+    """Return a mask (count,) of the samples around some edges."""
+    mask = np.zeros(count, bool)
+    for edge in edges:
+        mask[max(edge - reach, 0) : edge + reach] = True
+    return mask
+
+
+def _label_regions(waves: list[Harmonics], transitions: BoolArray, disturbances: list[Indices]) -> Indices:
+    """Return the region (N,) of each sample, in the order that `MotionRegions` states."""
+    # A transition overrides the wave that it overlaps, a disturbance overrides both.
+    regions = np.full(len(transitions), -1)
+    for k, wave in enumerate(waves):
+        regions[wave.start : wave.stop] = 1 + k
+    regions[transitions] = 0
+    for k, run in enumerate([*_find_runs(regions < 0), *disturbances], 1 + len(waves)):
+        regions[run] = k
+    return regions
+
+
+def mark_runs(runs: list[Indices], count: int) -> BoolArray:
+    """Return a mask (count,) of the samples of some runs."""
+    mask = np.zeros(count, bool)
+    for run in runs:
+        mask[run] = True
+    return mask
+
+
+def _widen(mask: BoolArray, reach: int) -> BoolArray:
+    """Return the mask (N,) with ``reach`` samples added on either side."""
+    return np.asarray(binary_dilation(mask, iterations=reach)) if mask.any() else mask
+
+
+def _find_runs(mask: BoolArray) -> list[Indices]:
+    """Return the indices of each run of True in a mask (N,)."""
+    indices = np.flatnonzero(mask)
+    return np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1) if len(indices) else []

@@ -1,0 +1,285 @@
+"""The march where the fixture gives way: the damper's displacement is a third state.
+
+With R = carried(x - X) + d (x' - X') - k1 X + f0 - p the force that is left for the dashpot c1 (X where the damper
+stands, x where the actuator does, d the film of the connection, p the force beside the law), the law reads
+
+    y' = R / c1      X' = slip + y'      slip = (R - F zeta - k0 (X - y)) / c0      zeta' = g(slip, zeta)
+
+so that each implicit stage of a linear spring is linear in y and X and leaves one scalar equation in zeta, as on a
+rigid fixture; one with a gap, or one that hardens, is taken straight about where it stands until it stands there.
+The force on the cell is what the connection carries. Forces beside the law are taken at the actuator's motion.
+
+``p`` below holds 17 fixed numbers: the ten structural coordinates, k1, f0, and compliance, gap, hardening, film and
+stiffness in the gap of the connection; ``g`` the seven inputs at one instant: x, u, factors of alpha, c0, c1,
+force beside the law, x'.
+"""
+
+import numpy as np
+
+from identification.arrays import Array, njit_cached
+from identification.damper.effects import connection
+from identification.simulate.curves import interpolate_midpoints
+from identification.simulate.inputs import DamperField
+from identification.simulate.kernel import StepCounts
+from identification.simulate.motion import DamperMotion
+from identification.simulate.scaling import ScaleFactors
+from identification.simulate.step import (
+    GAMMA,
+    MAX_ITERATIONS,
+    MAX_MOVE,
+    RATE_WEIGHT,
+    TOLERANCE,
+    WEIGHT_STAGE,
+    WEIGHT_START,
+    choose_steps,
+    compute_hysteresis_rate,
+    differentiate_hysteresis_rate,
+    evaluate_coefficient,
+    interpolate_parabola,
+)
+
+FIXED_COUNT, INPUT_COUNT = 17, 7
+K1, F0, COMPLIANCE, GAP, HARDENING, FILM_DAMPING, IN_GAP_RATIO = 10, 11, 12, 13, 14, 15, 16
+_MAX_LINEARISATIONS = 12
+"""Times that a connection is taken straight anew in one stage."""
+_FORCE_TOLERANCE = 1e-8
+"""[1] relative error of what it carries at which it stands there."""
+_EDGE_OFFSET = 1e-12
+"""[m] past the edge of its gap, from where it is taken straight on the other side."""
+
+compute_transmitted_force = njit_cached(connection.compute_transmitted_force)
+compute_tangent_stiffness = njit_cached(connection.compute_tangent_stiffness)
+_compute_elongation = njit_cached(connection.compute_elongation)
+
+
+def stack_inputs(
+    motion: DamperMotion, field: DamperField, scales: ScaleFactors, parallel_force: Array, h: float
+) -> tuple[Array, Array]:
+    """The seven inputs at the samples (7, N) and half way between them (7, N-1)."""
+    x, v = interpolate_midpoints(motion.x, motion.v, h)
+    ones, middles = np.ones((3, len(motion.x))), np.ones((3, len(x)))
+    scaled = scales.values.shape[1] > 0
+    between = 0.5 * (parallel_force[1:] + parallel_force[:-1])
+    at = np.vstack([motion.x, field.u, scales.values if scaled else ones, parallel_force, motion.v])
+    middle = np.vstack([x, field.middle, scales.midpoints if scaled else middles, between, v])
+    return np.ascontiguousarray(at), np.ascontiguousarray(middle)
+
+
+def stack_derivatives(
+    motion: DamperMotion,
+    field: DamperField,
+    scales: ScaleFactors,
+    over_motion: Array,
+    own: list[tuple[int, Array]],
+    h: float,
+) -> tuple[Array, Array]:
+    """Their derivatives (E, 7, N) and (E, 7, N-1): unknowns of field, motion and factors, then of forces."""
+    first, count = len(field.du) - 1, len(motion.x)
+    inner = first + max(1 + len(motion.columns), len(scales.derivatives))
+    at = np.zeros((inner + len(own), INPUT_COUNT, count))
+    middle = np.zeros((inner + len(own), INPUT_COUNT, count - 1))
+    at[: first + 1, 1], middle[: first + 1, 1] = field.du, field.dmiddle
+    moving = slice(first, first + len(motion.dx))
+    at[moving, 0], at[moving, 6] = motion.dx, motion.dv
+    middle[moving, 0], middle[moving, 6] = interpolate_midpoints(motion.dx, motion.dv, h)
+    scaling = slice(first, first + len(scales.derivatives))
+    if len(scales.derivatives):
+        at[scaling, 2:5], middle[scaling, 2:5] = scales.derivatives, scales.midpoint_derivatives
+    at[moving, 5] = over_motion
+    for k, (_, row) in enumerate(own):
+        at[inner + k, 5] = row
+    middle[:, 5] = 0.5 * (at[:, 5, 1:] + at[:, 5, :-1])
+    return at, middle
+
+
+@njit_cached
+def interpolate_inputs(g: Array, at: Array, middle: Array, i: int, t: float) -> None:
+    """The inputs at the fraction t of sample i."""
+    for k in range(INPUT_COUNT):
+        g[k] = at[k, i] if t == 0.0 else interpolate_parabola(at[k, i], middle[k, i], at[k, i + 1], t)
+
+
+@njit_cached
+def evaluate_law(p: Array, g: Array) -> tuple[float, float, float]:
+    """Yield force, c0 and c1 at the inputs."""
+    return (
+        g[2] * evaluate_coefficient(p[0], p[1], g[1]),
+        g[3] * evaluate_coefficient(p[5], p[6], g[1]),
+        g[4] * evaluate_coefficient(p[7], p[8], g[1]),
+    )
+
+
+@njit_cached
+def _compute_rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple[float, float, float]:
+    """Rates of y, zeta and X."""
+    F, c0, c1 = evaluate_law(p, g)
+    held = F * zeta + p[9] * (X - y)
+    R = compute_dashpot_force(p, g, X, held, c0, c1)
+    y_rate = R / c1
+    slip = (R - held) / c0
+    beta = p[3] / p[2]
+    return y_rate, compute_hysteresis_rate(slip, zeta, 1.0 / p[2], beta, 1.0 / p[2] - beta, p[4]), slip + y_rate
+
+
+@njit_cached
+def compute_dashpot_force(p: Array, g: Array, X: float, held: float, c0: float, c1: float) -> float:
+    """The force R that is left for the dashpot c1; ``held`` is what hysteresis and k0 hold of it."""
+    spring = (
+        compute_transmitted_force(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+        - p[K1] * X
+        + p[F0]
+        - g[5]
+    )
+    film = p[FILM_DAMPING]
+    return float((spring + film * (g[6] + held / c0)) / (1.0 + film * (1.0 / c0 + 1.0 / c1)))
+
+
+@njit_cached
+def solve_stage(
+    p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, X: float
+) -> tuple[float, float, float]:
+    """State at the end of a stage: state = known + w * rates(state), by Newton from ``zeta`` and ``X``."""
+    compliance, gap, hardening, in_gap_ratio = p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]
+    elongation, y = g[0] - X, yk
+    for _ in range(_MAX_LINEARISATIONS):
+        force = compute_transmitted_force(elongation, compliance, gap, hardening, in_gap_ratio)
+        steep = compute_tangent_stiffness(elongation, compliance, gap, hardening, in_gap_ratio)
+        y, zeta, X = _solve_linearised(p, g, yk, zk, Xk, w, zeta, force - steep * elongation, steep)
+        # A linear spring is straight everywhere.
+        if gap == 0.0 and hardening == 0.0:
+            break
+        moved = g[0] - X
+        straight = force + steep * (moved - elongation)
+        if abs(
+            compute_transmitted_force(moved, compliance, gap, hardening, in_gap_ratio) - straight
+        ) < _FORCE_TOLERANCE * (1.0 + abs(straight)):
+            break
+        elongation = _choose_elongation(elongation, moved, 0.5 * gap)
+    return y, zeta, X
+
+
+@njit_cached
+def _choose_elongation(elongation: float, moved: float, half: float) -> float:
+    """Where to take the connection straight next: at most on the other side of the next edge of its gap."""
+    if elongation <= -half < moved:
+        return -half + _EDGE_OFFSET
+    if elongation >= half > moved:
+        return half - _EDGE_OFFSET
+    if abs(elongation) < half <= abs(moved):
+        return half + _EDGE_OFFSET if moved > 0.0 else -half - _EDGE_OFFSET
+    return moved
+
+
+@njit_cached
+def _solve_linearised(
+    p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, force: float, steep: float
+) -> tuple[float, float, float]:
+    """The same where the connection carries ``force + steep * elongation``."""
+    F, c0, c1 = evaluate_law(p, g)
+    k0, k1 = p[9], p[K1]
+    # The film's force d (x' - X') is one more spring over this stage: X' = (X - known) / w there.
+    rho = force + steep * g[0] + p[F0] - g[5] + p[FILM_DAMPING] * (g[6] + Xk / w)
+    stiffness = steep + k1 + p[FILM_DAMPING] / w
+    q = 1.0 + c0 / c1 + k0 * w / c1
+    inverse = 1.0 / (c0 / w + k0 + stiffness * q)
+    constant, slope = (c0 * Xk / w + k0 * yk + rho * q) * inverse, -F * inverse
+    slip0 = (constant - Xk) / w - (rho - stiffness * constant) / c1
+    slip1 = slope / w + stiffness * slope / c1
+    A = 1.0 / p[2]
+    beta = p[3] * A
+    for _ in range(MAX_ITERATIONS):
+        slip = slip0 + slip1 * zeta
+        rate = compute_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
+        over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
+        steepness = 1.0 - w * (over_zeta + over_slip * slip1)
+        move = (zk + w * rate - zeta) / max(steepness, 0.2)
+        zeta += min(max(move, -MAX_MOVE), MAX_MOVE)
+        if abs(move) < TOLERANCE:
+            break
+    X = constant + slope * zeta
+    return yk + w * (rho - stiffness * X) / c1, zeta, X
+
+
+@njit_cached
+def find_start_position(p: Array, g: Array, y0: float, zeta0: float, v0: float) -> float:
+    """Where the damper stands at first: the fixture loaded as by the saturated law."""
+    F, c0, _ = evaluate_law(p, g)
+    load = F * zeta0 + c0 * v0 + g[5] - p[F0]
+    X = g[0]
+    # k1 pulls where the damper stands: each round leaves k1 times the compliance of the error, a small part.
+    for _ in range(_MAX_LINEARISATIONS):
+        X = g[0] - _compute_elongation(load + p[K1] * X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+    return float(X)
+
+
+@njit_cached
+def integrate(
+    p: Array, at: Array, middle: Array, h: float, start: Array, max_travel: float, step_counts: StepCounts
+) -> tuple[Array, Array, Array]:
+    """States and force along a recording.
+
+    Args:
+        p: (17,) fixed numbers.
+        at, middle: (7, N) and (7, N-1) inputs.
+        h: [s] time between samples.
+        start: y [m], zeta [1] and velocity of the actuator [m/s] at the first sample.
+        max_travel, step_counts: as on a rigid fixture.
+
+    Returns:
+        y [m], zeta [1], force on the load cell [N], each (N,).
+    """
+    count = at.shape[1]
+    ys, zetas, forces, g = np.empty(count), np.empty(count), np.empty(count), np.empty(INPUT_COUNT)
+    y, zeta = start[0], start[1]
+    interpolate_inputs(g, at, middle, 0, 0.0)
+    X = find_start_position(p, g, y, zeta, start[2])
+    y_rate, zeta_rate, X_rate = _compute_rates(p, g, y, zeta, X)
+    for i in range(count):
+        ys[i], zetas[i] = y, zeta
+        forces[i] = compute_cell_force(p, at[:, i], X, X_rate)
+        if i == count - 1:
+            break
+        if step_counts[i] == 0:
+            step_counts[i] = choose_sample_steps(max_travel, p, at, h, i, X_rate, y_rate, zeta, zeta_rate)
+        w = RATE_WEIGHT * h / step_counts[i]
+        for k in range(step_counts[i]):
+            interpolate_inputs(g, at, middle, i, (k + GAMMA) / step_counts[i])
+            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta, X)
+            interpolate_inputs(g, at, middle, i, (k + 1.0) / step_counts[i])
+            y, zeta, X = solve_stage(
+                p, g, combine_stages(y1, y), combine_stages(z1, zeta), combine_stages(X1, X), w, z1, X1
+            )
+            y_rate, zeta_rate, X_rate = _compute_rates(p, g, y, zeta, X)
+    return ys, zetas, forces
+
+
+@njit_cached
+def combine_stages(stage: float, start: float) -> float:
+    """What the second stage knows of the first, and of the start of the step."""
+    return WEIGHT_STAGE * stage - WEIGHT_START * start
+
+
+@njit_cached
+def choose_sample_steps(
+    max_travel: float,
+    p: Array,
+    at: Array,
+    h: float,
+    i: int,
+    X_rate: float,
+    y_rate: float,
+    zeta: float,
+    zeta_rate: float,
+) -> int:
+    """Steps for one sample: as many as the actuator's change of velocity asks for, taken to the damper."""
+    speed = (at[0, i + 1] - at[0, i]) / h
+    return choose_steps(max_travel, p, h, X_rate, speed, at[1, i], at[1, i + 1], y_rate, zeta, zeta_rate)
+
+
+@njit_cached
+def compute_cell_force(p: Array, g: Array, X: float, X_rate: float) -> float:
+    """What the connection carries [N]."""
+    return float(
+        compute_transmitted_force(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+        + p[FILM_DAMPING] * (g[6] - X_rate)
+    )

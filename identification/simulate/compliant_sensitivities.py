@@ -1,0 +1,322 @@
+"""Slopes of the march where the fixture gives way: the same steps, and what every unknown does to each of them.
+
+``p`` and ``g`` hold the same numbers as in yielding.py. Each implicit stage is differentiated as it stands: the
+sensitivities are those of the forces that come out, step by step, and not of the law in the limit.
+"""
+
+import math
+
+import numpy as np
+
+from identification.arrays import Array, njit_cached
+from identification.damper import law
+from identification.damper.effects import connection
+from identification.simulate.compliant_mount import (
+    COMPLIANCE,
+    F0,
+    FILM_DAMPING,
+    FIXED_COUNT,
+    GAP,
+    HARDENING,
+    IN_GAP_RATIO,
+    INPUT_COUNT,
+    K1,
+    choose_sample_steps,
+    combine_stages,
+    compute_cell_force,
+    compute_dashpot_force,
+    compute_tangent_stiffness,
+    compute_transmitted_force,
+    evaluate_law,
+    find_start_position,
+    interpolate_inputs,
+    solve_stage,
+)
+from identification.simulate.kernel import StepCounts
+from identification.simulate.step import (
+    GAMMA,
+    RATE_WEIGHT,
+    compute_hysteresis_rate,
+    differentiate_hysteresis_rate,
+    evaluate_coefficient,
+    interpolate_parabola,
+)
+
+
+@njit_cached
+def integrate_with_sensitivities(
+    p: Array,
+    at: Array,
+    middle: Array,
+    h: float,
+    start: Array,
+    max_travel: float,
+    step_counts: StepCounts,
+    over: Array,
+    over_middle: Array,
+) -> tuple[Array, Array, Array, Array]:
+    """States and force along a recording, and the force's sensitivities.
+
+    Args:
+        p, at, middle, h, start, max_travel, step_counts: as in ``march``.
+        over, over_middle: (E, 7, N) and (E, 7, N-1) derivatives of the inputs over further unknowns.
+
+    Returns:
+        y [m], zeta [1], force [N], each (N,), and sensitivities (N, 17 + 1 + E): the fixed numbers, y0, the further ones.
+    """
+    count, extra = at.shape[1], len(over)
+    columns = FIXED_COUNT + 1 + extra
+    ys, zetas, forces, sensitivities = (
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty((count, columns)),
+    )
+    S, S1, f, f1 = np.zeros((3, columns)), np.zeros((3, columns)), np.zeros((3, columns)), np.zeros((3, columns))
+    J, J1, g = np.zeros((3, 3)), np.zeros((3, 3)), np.empty(INPUT_COUNT)
+    S[0, FIXED_COUNT] = 1.0
+    y, zeta = start[0], start[1]
+    interpolate_inputs(g, at, middle, 0, 0.0)
+    X = find_start_position(p, g, y, zeta, start[2])
+    _differentiate_start(p, g, zeta, start[2], X, over, S)
+    y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, over, over_middle, 0, 0.0, J, f)
+    for i in range(count):
+        ys[i], zetas[i] = y, zeta
+        forces[i] = compute_cell_force(p, at[:, i], X, X_rate)
+        _record_row(sensitivities[i], S, J, f, over[:, :, i], at[0, i] - X, at[6, i] - X_rate, p)
+        if i == count - 1:
+            break
+        if step_counts[i] == 0:
+            step_counts[i] = choose_sample_steps(max_travel, p, at, h, i, X_rate, y_rate, zeta, zeta_rate)
+        w = RATE_WEIGHT * h / step_counts[i]
+        for k in range(step_counts[i]):
+            t = (k + GAMMA) / step_counts[i]
+            interpolate_inputs(g, at, middle, i, t)
+            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta, X)
+            _differentiate_rates(p, g, y1, z1, X1, over, over_middle, i, t, J1, f1)
+            _propagate_first_stage(w, J, S, f, f1, S1)
+            _solve(w, J1, S1)
+            t = (k + 1.0) / step_counts[i]
+            interpolate_inputs(g, at, middle, i, t)
+            y, zeta, X = solve_stage(
+                p, g, combine_stages(y1, y), combine_stages(z1, zeta), combine_stages(X1, X), w, z1, X1
+            )
+            y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, over, over_middle, i, t, J, f)
+            _propagate_second_stage(w, f, S1, S)
+            _solve(w, J, S)
+    return ys, zetas, forces, sensitivities
+
+
+@njit_cached
+def _record_row(
+    row: Array, S: Array, J: Array, f: Array, over: Array, elongation: float, elongation_rate: float, p: Array
+) -> None:
+    """Write the sensitivities of the force at one sample into its row."""
+    # The film feels the damper's velocity, which the state moves through the sensitivities of its rates.
+    steep, film = (
+        compute_tangent_stiffness(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]),
+        p[FILM_DAMPING],
+    )
+    for j in range(len(row)):
+        X_rate = J[2, 0] * S[0, j] + J[2, 1] * S[1, j] + J[2, 2] * S[2, j] + f[2, j]
+        row[j] = -S[2, j] * steep - film * X_rate
+    for e in range(len(over)):
+        row[FIXED_COUNT + 1 + e] += over[e, 0] * steep + film * over[e, 6]
+    row[FILM_DAMPING] += elongation_rate
+    over_compliance, over_gap, over_hardening, over_in_gap_ratio = _differentiate_connection(elongation, p)
+    row[COMPLIANCE] += over_compliance
+    row[GAP] += over_gap
+    row[HARDENING] += over_hardening
+    row[IN_GAP_RATIO] += over_in_gap_ratio
+
+
+@njit_cached
+def _differentiate_connection(elongation: float, p: Array) -> tuple[float, float, float, float]:
+    """Slopes of what the connection carries over its compliance, gap, hardening and stiffness in the gap."""
+    compliance, gap, hardening, in_gap_ratio = p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]
+    half = 0.5 * gap
+    free = min(max(elongation, -half), half)
+    engaged = elongation - free
+    over_compliance = -compute_transmitted_force(elongation, compliance, gap, hardening, in_gap_ratio) / compliance
+    if engaged == 0.0:
+        return over_compliance, 0.0, 0.0, free / compliance
+    side = 0.5 if engaged > 0.0 else -0.5
+    over_gap = side * (
+        (connection.MIN_STIFFNESS_RATIO + in_gap_ratio) / compliance
+        - compute_tangent_stiffness(elongation, compliance, gap, hardening, in_gap_ratio)
+    )
+    return over_compliance, over_gap, engaged**3 / compliance, free / compliance
+
+
+@njit_cached
+def _propagate_first_stage(w: float, J: Array, S: Array, f: Array, f1: Array, S1: Array) -> None:
+    """Slopes of what the first stage knows, and its own explicit part, into S1."""
+    for j in range(S.shape[1]):
+        for a in range(3):
+            moved = J[a, 0] * S[0, j] + J[a, 1] * S[1, j] + J[a, 2] * S[2, j]
+            S1[a, j] = S[a, j] + w * (moved + f[a, j] + f1[a, j])
+
+
+@njit_cached
+def _propagate_second_stage(w: float, f: Array, S1: Array, S: Array) -> None:
+    """The same of the second stage, in place."""
+    for j in range(S.shape[1]):
+        for a in range(3):
+            S[a, j] = combine_stages(S1[a, j], S[a, j]) + w * f[a, j]
+
+
+@njit_cached
+def _differentiate_start(p: Array, g: Array, zeta0: float, v0: float, X: float, over: Array, S: Array) -> None:
+    """Slopes of where the damper stands at first, written into S."""
+    u = g[1]
+    compliance = 1.0 / compute_tangent_stiffness(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+    stiff = 1.0 + compliance * p[K1]
+    S[2, 0], S[2, 1] = -compliance * g[2] * zeta0 / stiff, -compliance * u * g[2] * zeta0 / stiff
+    S[2, 5], S[2, 6] = -compliance * g[3] * v0 / stiff, -compliance * u * g[3] * v0 / stiff
+    S[2, K1], S[2, F0] = -compliance * X / stiff, compliance / stiff
+    over_compliance, over_gap, over_hardening, over_in_gap_ratio = _differentiate_connection(g[0] - X, p)
+    S[2, COMPLIANCE] = compliance * over_compliance / stiff
+    S[2, GAP] = compliance * over_gap / stiff
+    S[2, HARDENING] = compliance * over_hardening / stiff
+    S[2, IN_GAP_RATIO] = compliance * over_in_gap_ratio / stiff
+    for e in range(len(over)):
+        d = over[e, :, 0]
+        change = (g[2] * p[1] * zeta0 + g[3] * p[6] * v0) * d[1] + d[5]
+        change += (
+            d[2] * evaluate_coefficient(p[0], p[1], u) * zeta0 + d[3] * evaluate_coefficient(p[5], p[6], u) * v0
+        )
+        S[2, FIXED_COUNT + 1 + e] = (d[0] - compliance * change) / stiff
+
+
+@njit_cached
+def _differentiate_rates(
+    p: Array,
+    g: Array,
+    y: float,
+    zeta: float,
+    X: float,
+    over: Array,
+    over_middle: Array,
+    i: int,
+    t: float,
+    J: Array,
+    f: Array,
+) -> tuple[float, float, float]:
+    """Rates of y, zeta and X; their sensitivities over the state into J (3, 3), over all else into f (3, columns)."""
+    F, c0, c1 = evaluate_law(p, g)
+    k0 = p[9]
+    steep = compute_tangent_stiffness(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+    held = F * zeta + k0 * (X - y)
+    R = compute_dashpot_force(p, g, X, held, c0, c1)
+    y_rate, slip = R / c1, (R - held) / c0
+    A = 1.0 / p[2]
+    beta = p[3] * A
+    rate = compute_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
+    over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
+    stiffness = steep + p[K1]
+    J[0, 0] = J[0, 1] = 0.0
+    J[0, 2] = -stiffness / c1
+    J[1, 0], J[1, 1], J[1, 2] = k0 / c0, -F / c0, -(stiffness + k0) / c0
+    # Row 1 of J and f holds sensitivities of the slip until the end, where they become those of zeta' and X'.
+    _differentiate_by_fixed(p, g, X, y, zeta, y_rate, slip, c0, c1, f)
+    for e in range(len(over)):
+        f[0, FIXED_COUNT + 1 + e] = f[1, FIXED_COUNT + 1 + e] = 0.0
+        for k in range(INPUT_COUNT):
+            d = over[e, k, i]
+            if t > 0.0:
+                d = interpolate_parabola(d, over_middle[e, k, i], over[e, k, i + 1], t)
+            if d != 0.0:
+                over_y, over_s = _differentiate_by_input(p, g, k, steep, zeta, y_rate, slip, c0, c1)
+                f[0, FIXED_COUNT + 1 + e] += over_y * d
+                f[1, FIXED_COUNT + 1 + e] += over_s * d
+    _apply_film_damping(p[FILM_DAMPING], c0, c1, over_slip, f)
+    _apply_film_damping(p[FILM_DAMPING], c0, c1, over_slip, J)
+    J[1, 1] += over_zeta
+    size = abs(zeta)
+    power = (size + law.Z_GUARD) ** (p[4] - 1.0)
+    f[1, 2] -= rate * A
+    f[1, 3] += (abs(slip) * zeta - slip * size) * power * A
+    turned = (A - beta) * abs(slip) * zeta + beta * slip * size
+    f[1, 4] -= turned * power * math.log(size + law.Z_GUARD)
+    return y_rate, rate, slip + y_rate
+
+
+@njit_cached
+def _apply_film_damping(film: float, c0: float, c1: float, over_slip: float, rows: Array) -> None:
+    """Slopes of y' and of the slip at a fixed X' become those of y', zeta' and X': the film feels X', too."""
+    weaker = 1.0 / (1.0 + film * (1.0 / c0 + 1.0 / c1))
+    for j in range(rows.shape[1]):
+        X_rate = weaker * (rows[0, j] + rows[1, j])
+        rows[0, j] -= film / c1 * X_rate
+        rows[1, j] = over_slip * (rows[1, j] - film / c0 * X_rate)
+        rows[2, j] = X_rate
+
+
+@njit_cached
+def _differentiate_by_input(
+    p: Array, g: Array, k: int, steep: float, zeta: float, y_rate: float, slip: float, c0: float, c1: float
+) -> tuple[float, float]:
+    """Slopes of y' and of the slip over the k-th input."""
+    u = g[1]
+    if k == 0:
+        return steep / c1, steep / c0
+    if k == 1:
+        return -y_rate * g[4] * p[8] / c1, -(g[2] * p[1] * zeta + slip * g[3] * p[6]) / c0
+    if k == 2:
+        return 0.0, -evaluate_coefficient(p[0], p[1], u) * zeta / c0
+    if k == 3:
+        return 0.0, -slip * evaluate_coefficient(p[5], p[6], u) / c0
+    if k == 4:
+        return -y_rate * evaluate_coefficient(p[7], p[8], u) / c1, 0.0
+    if k == 5:
+        return -1.0 / c1, -1.0 / c0
+    return p[FILM_DAMPING] / c1, p[FILM_DAMPING] / c0
+
+
+@njit_cached
+def _differentiate_by_fixed(
+    p: Array,
+    g: Array,
+    X: float,
+    y: float,
+    zeta: float,
+    y_rate: float,
+    slip: float,
+    c0: float,
+    c1: float,
+    f: Array,
+) -> None:
+    """Slopes of y' (row 0) and of the slip (row 1) over the fixed numbers and y0."""
+    u = g[1]
+    for j in range(FIXED_COUNT + 1):
+        f[0, j] = f[1, j] = 0.0
+    f[1, 0], f[1, 1] = -g[2] * zeta / c0, -u * g[2] * zeta / c0
+    f[1, 5], f[1, 6] = -slip * g[3] / c0, -u * slip * g[3] / c0
+    f[0, 7], f[0, 8] = -y_rate * g[4] / c1, -u * y_rate * g[4] / c1
+    f[1, 9] = -(X - y) / c0
+    f[0, K1], f[1, K1] = -X / c1, -X / c0
+    f[0, F0], f[1, F0] = 1.0 / c1, 1.0 / c0
+    over_compliance, over_gap, over_hardening, over_in_gap_ratio = _differentiate_connection(g[0] - X, p)
+    f[0, COMPLIANCE], f[1, COMPLIANCE] = over_compliance / c1, over_compliance / c0
+    f[0, GAP], f[1, GAP] = over_gap / c1, over_gap / c0
+    f[0, HARDENING], f[1, HARDENING] = over_hardening / c1, over_hardening / c0
+    f[0, IN_GAP_RATIO], f[1, IN_GAP_RATIO] = over_in_gap_ratio / c1, over_in_gap_ratio / c0
+    elongation_rate = g[6] - slip - y_rate
+    f[0, FILM_DAMPING], f[1, FILM_DAMPING] = elongation_rate / c1, elongation_rate / c0
+
+
+@njit_cached
+def _solve(w: float, J: Array, S: Array) -> None:
+    """Solve (1 - w J) S = S in place for every unknown at once, by the inverse of the 3 by 3 matrix."""
+    a, b, c = 1.0 - w * J[0, 0], -w * J[0, 1], -w * J[0, 2]
+    d, e, f = -w * J[1, 0], 1.0 - w * J[1, 1], -w * J[1, 2]
+    g, h, i = -w * J[2, 0], -w * J[2, 1], 1.0 - w * J[2, 2]
+    A, B, C = e * i - f * h, c * h - b * i, b * f - c * e
+    D, E, F = f * g - d * i, a * i - c * g, c * d - a * f
+    G, H, K = d * h - e * g, b * g - a * h, a * e - b * d
+    inverse = 1.0 / (a * A + b * D + c * G)
+    for j in range(S.shape[1]):
+        x, y, z = S[0, j], S[1, j], S[2, j]
+        S[0, j] = (A * x + B * y + C * z) * inverse
+        S[1, j] = (D * x + E * y + F * z) * inverse
+        S[2, j] = (G * x + H * y + K * z) * inverse

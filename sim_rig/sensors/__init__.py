@@ -1,0 +1,17 @@
+"""Sensor models: from true signals to readings."""
+
+from sim_rig.sensors.channels import CHANNELS, compute_true_values, make_readings, make_streams
+from sim_rig.sensors.faults import apply_channel_faults, apply_faults, select_faults
+from sim_rig.sensors.sensor import ChannelErrors, ChannelStream
+
+__all__ = [
+    "CHANNELS",
+    "ChannelErrors",
+    "ChannelStream",
+    "apply_channel_faults",
+    "apply_faults",
+    "compute_true_values",
+    "make_readings",
+    "make_streams",
+    "select_faults",
+]

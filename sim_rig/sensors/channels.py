@@ -1,0 +1,133 @@
+"""All channels of the rig: their units and devices, their true values, and their readings.
+
+`sim_rig.sensors.sensor` turns true values into readings. The amplifier's channels are read half way through each
+update, when the output has settled, and stamped with its start: the drive at a sample is held until the next one.
+"""
+
+import numpy as np
+
+from sim_rig.plant import Array, EffectFunctions, TrueSignals, apply_displacement_channel, count_substeps
+from sim_rig.scenario import Scenario, Sensor
+from sim_rig.sensors.sensor import ChannelErrors, ChannelStream, SamplingModel, sample_channel_errors
+
+CHANNELS: dict[str, tuple[str, str]] = {
+    "displacement": ("m", "lvdt"),
+    "force": ("N", "load_cell"),
+    "coil_drive": ("drive", "coil_amplifier"),
+    "actuator_position": ("m", "actuator"),
+    "coil_current": ("A", "coil_amplifier"),
+    "coil_voltage": ("V", "coil_amplifier"),
+    "temperature": ("degC", "thermometer"),
+}
+"""Unit and device of each channel; the unit ``drive`` is V or A."""
+
+
+def make_streams(
+    scenario: Scenario, step: float, mapped: bool = True
+) -> tuple[dict[str, ChannelStream], dict[str, ChannelErrors]]:
+    """Return every channel at the start of a run, and the errors drawn for each.
+
+    Args:
+        scenario: sensors, clocks, effects on channels, seed.
+        step: [s] sample period of the bench.
+        mapped: whether the devices' clocks were mapped onto the bench clock before. Each reading then has the
+            offset that the mapping leaves.
+    """
+    streams, channel_errors = {}, {}
+    for index, (name, model) in enumerate(_make_models(scenario, step).items()):
+        # Seeded by its index, so that the numbers drawn for a channel do not depend on the other channels.
+        random = np.random.default_rng([scenario.seed, index])
+        sensor: Sensor = getattr(scenario.sensors, name)
+        errors = sample_channel_errors(sensor, getattr(scenario.clocks, CHANNELS[name][1]), random)
+        # Over the wires the bench maps the clocks itself, so the mapping error is real there and not drawn.
+        channel_errors[name] = errors if mapped else errors._replace(offset=0.0)
+        streams[name] = ChannelStream(model, sensor.rate or 1 / step, sensor, channel_errors[name], random)
+    return streams, channel_errors
+
+
+def make_readings(
+    scenario: Scenario, time: Array, truth: TrueSignals
+) -> tuple[dict[str, Array], dict[str, ChannelErrors]]:
+    """Return all channels of a run, and the errors drawn for each.
+
+    Args:
+        scenario: sensors, clocks, effects on channels, seed.
+        time: (N,) on the bench clock, from 0 [s], N at least 2.
+        truth: true signals of N samples.
+    """
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    streams, channel_errors = make_streams(scenario, step)
+    true_values = compute_true_values(scenario, truth, 0.0, step)
+    values = {name: read_channel(stream, true_values[name], time) for name, stream in streams.items()}
+    return values, channel_errors
+
+
+def read_channel(stream: ChannelStream, true_values: Array, time: Array) -> Array:
+    """Return the readings of a channel over a whole run, held between two readings.
+
+    Args:
+        stream: the channel at its start.
+        true_values: (K,) from time 0 on, in the channel's unit.
+        time: (N,) on the bench clock, from 0 [s].
+
+    Returns:
+        (N,) readings in the channel's unit.
+    """
+    ticks = np.floor(time * stream.rate + 1e-6).astype(np.int64)
+    stream.feed(true_values)
+    return stream.make_readings(int(ticks[-1]) + 1)[1][ticks]
+
+
+def compute_true_values(scenario: Scenario, truth: TrueSignals, start: float, step: float) -> dict[str, Array]:
+    """Return the true value of each channel in its unit, in the order of ``CHANNELS``.
+
+    Args:
+        scenario: the amplifier, and effects on channels.
+        truth: true signals.
+        start: [s] their first instant, since the start of the run.
+        step: [s] sample period of the bench.
+    """
+    resistance, drive = scenario.amplifier.resistance, truth.output
+    current_driven = scenario.drive_unit == "A"
+    effects = EffectFunctions(scenario)
+    return {
+        "displacement": _apply_displacement_map(effects, apply_displacement_channel(scenario, truth.position)),
+        "force": truth.force + _compute_added_force(effects, truth, start, step),
+        "coil_drive": drive,
+        "actuator_position": truth.position,
+        "coil_current": drive if current_driven else drive / resistance,
+        "coil_voltage": drive * resistance if current_driven else drive,
+        "temperature": truth.temperature,
+    }
+
+
+def _apply_displacement_map(effects: EffectFunctions, position: Array) -> Array:
+    """Return the actuator's position [m] with the errors that the displacement channel adds."""
+    maps = effects.select("displacement_map")
+    return np.asarray(position + sum(form.function(position, *values) for form, values in maps))
+
+
+def _compute_added_force(effects: EffectFunctions, truth: TrueSignals, start: float, step: float) -> Array:
+    """Return the force [N] that the force channel adds, at the start of each substep."""
+    substeps = len(truth.force) // len(truth.output)
+    time = start + np.arange(len(truth.force)) * (step / substeps)
+    drive = np.repeat(truth.output, substeps)
+    added = effects.select("additive_force")
+    # The zeros give the sum its shape when there are no such effects.
+    return np.asarray(0.0 * time + sum(form.function(time, drive, *values) for form, values in added))
+
+
+def _make_models(scenario: Scenario, step: float) -> dict[str, SamplingModel]:
+    """Return the sampling model of each channel; ``step`` [s] is the sample period of the bench."""
+    effects = EffectFunctions(scenario)
+    fine, held = SamplingModel(step / count_substeps(step)), SamplingModel(step, held=True)
+    force_delay, force_lag = effects.sum_values("time_shift"), effects.sum_values("force_lag")
+    return {
+        "displacement": fine._replace(hidden_delay=effects.sum_values("displacement_shift")),
+        "force": fine._replace(hidden_delay=force_delay, hidden_lag=force_lag),
+        "coil_drive": held,
+        "actuator_position": fine,
+        "coil_current": held,
+        "coil_voltage": held,
+        "temperature": SamplingModel(step),
+    }

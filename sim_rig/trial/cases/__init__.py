@@ -1,0 +1,41 @@
+"""Cases of the blind trial: random draw, strokes, sealed truth, folder."""
+
+from sim_rig.trial.cases.calibrate import compute_noise_floor
+from sim_rig.trial.cases.draw import GRID_RATIOS, SampledCase, draw_cases, draw_grid, size_case
+from sim_rig.trial.cases.folder import DiagnosisOutcome, Seal, TrialFolder, TrialKind
+from sim_rig.trial.cases.specimens import SIZES
+from sim_rig.trial.cases.strokes import VARIANTS, RunKind, make_method_document, make_strokes
+from sim_rig.trial.cases.truth import (
+    CaseKind,
+    Magnitude,
+    MethodKind,
+    SealedTruth,
+    TrueCase,
+    read_sealed_truth,
+    write_sealed_truth,
+)
+
+__all__ = [
+    "GRID_RATIOS",
+    "SIZES",
+    "VARIANTS",
+    "CaseKind",
+    "DiagnosisOutcome",
+    "Magnitude",
+    "MethodKind",
+    "RunKind",
+    "SampledCase",
+    "Seal",
+    "SealedTruth",
+    "TrialFolder",
+    "TrialKind",
+    "TrueCase",
+    "compute_noise_floor",
+    "draw_cases",
+    "draw_grid",
+    "make_method_document",
+    "make_strokes",
+    "read_sealed_truth",
+    "size_case",
+    "write_sealed_truth",
+]

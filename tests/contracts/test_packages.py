@@ -1,0 +1,67 @@
+"""The structure of the code: faces, sizes of packages, one direction of imports between processes."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+ROOTS = ("bench", "drivers", "identification", "sim_rig", "benchmarks")
+MOST_MODULES = 14
+TABLES = {"identification/damper/effects", "sim_rig/effect_forms"}
+"""Packages that hold one module for each effect."""
+PACKAGES = sorted(
+    path.parent.relative_to(ROOT).as_posix() for root in ROOTS for path in (ROOT / root).rglob("__init__.py")
+)
+
+
+def modules(package):
+    return [path for path in (ROOT / package).glob("*.py") if path.name not in ("__init__.py", "__main__.py")]
+
+
+def exported(package):
+    """Names in ``__all__``, and names that the face binds."""
+    tree = ast.parse((ROOT / package / "__init__.py").read_text("utf-8"))
+    listed = None
+    bound = set()
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        names = {target.id for target in targets if isinstance(target, ast.Name)}
+        if "__all__" in names:
+            listed = ast.literal_eval(node.value)
+        bound |= names
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            bound |= {alias.asname or alias.name for alias in node.names}
+    return listed, bound
+
+
+def test_there_are_packages():
+    assert len(PACKAGES) > 40
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_a_package_has_a_face_whose_names_exist(package):
+    listed, bound = exported(package)
+    assert listed is not None, f"{package}/__init__.py has no __all__"
+    assert set(listed) <= bound
+
+
+@pytest.mark.parametrize("package", [p for p in PACKAGES if p not in TABLES])
+def test_a_package_is_small_enough_to_be_held_in_mind(package):
+    assert len(modules(package)) <= MOST_MODULES
+
+
+@pytest.mark.parametrize("root", ROOTS)
+def test_every_folder_with_modules_is_a_package(root):
+    folders = {path.parent for path in (ROOT / root).rglob("*.py")}
+    assert all((folder / "__init__.py").is_file() for folder in folders)
+
+
+def test_identification_starts_no_process():
+    """The bench starts identification; the other direction would be a cycle that no import shows."""
+    starting = [
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "identification").rglob("*.py")
+        if "subprocess" in path.read_text("utf-8")
+    ]
+    assert starting == []

@@ -1,0 +1,54 @@
+"""The closing line of several test runs."""
+
+import sys
+
+import pytest
+
+from tests import summary
+
+CASE = '<testcase classname="{}" name="{}">{}</testcase>'
+
+
+def results(folder, name, *cases):
+    path = folder / name
+    body = "".join(CASE.format("tests.unit", test, f"<{outcome}/>" if outcome else "") for test, outcome in cases)
+    path.write_text(f'<testsuites><testsuite time="1.5">{body}</testsuite></testsuites>')
+    return path
+
+
+def closing_line(monkeypatch, capsys, *words):
+    monkeypatch.setattr(sys, "argv", ["summary", *map(str, words)])
+    code = summary.main()
+    return code, capsys.readouterr().out.splitlines()[-1]
+
+
+def test_a_test_that_was_repeated_counts_with_its_last_result(tmp_path, monkeypatch, capsys):
+    first = results(tmp_path, "a.xml", ("one", ""), ("two", "failure"))
+    again = results(tmp_path, "b.xml", ("two", ""))
+    assert closing_line(monkeypatch, capsys, first)[0] == 1
+    assert closing_line(monkeypatch, capsys, first, again) == (
+        0,
+        "==== 0 failed, 2 passed, 0 skipped, 0 deselected in 3.00s ====",
+    )
+
+
+@pytest.mark.parametrize("outcome", ["skipped", "error", "failure"])
+def test_a_test_that_did_not_pass_fails_the_whole(tmp_path, monkeypatch, capsys, outcome):
+    code, _ = closing_line(monkeypatch, capsys, results(tmp_path, "a.xml", ("one", ""), ("two", outcome)))
+    assert code == 1
+
+
+def test_no_result_at_all_is_a_failure(tmp_path, monkeypatch, capsys):
+    assert closing_line(monkeypatch, capsys, results(tmp_path, "a.xml"))[0] == 1
+
+
+def test_tests_that_were_left_out_are_listed_and_counted(tmp_path, monkeypatch, capsys):
+    listing = tmp_path / "slow.txt"
+    listing.write_text("tests/unit/test_a.py::test_long\n\n1/900 tests collected\n")
+    monkeypatch.setattr(
+        sys, "argv", ["summary", str(results(tmp_path, "a.xml", ("one", ""))), "--deselected", str(listing)]
+    )
+    assert summary.main() == 0
+    shown = capsys.readouterr().out
+    assert "  tests/unit/test_a.py::test_long\n" in shown
+    assert "1 deselected" in shown

@@ -1,0 +1,109 @@
+"""A rig agent and an engine under the control of a test."""
+
+import queue
+
+from bench.agent_protocol.messages import (
+    AgentStatus,
+    Reply,
+    ResetCommand,
+    RunCommand,
+    RunStatus,
+    StopCommand,
+)
+from bench.errors import AgentUnreachableError
+
+
+class FakeAgent:
+    """Accepts runs as the agent does, without a rig; the test ends them."""
+
+    def __init__(self):
+        self.status = AgentStatus(state="idle")
+        self.published = queue.Queue()
+        self.reachable = True
+        self.refuses = ""
+        self.commands = []
+        self.defect = None
+
+    def send(self, command, timeout=5.0):
+        if self.defect:
+            raise self.defect
+        if not self.reachable:
+            raise AgentUnreachableError(
+                "no rig agent answered at tcp://127.0.0.1:5570 within 1 s; start one: mrbench rig"
+            )
+        self.commands.append(command)
+        if self.refuses:
+            return Reply(ok=False, error=self.refuses, status=self.status)
+        match command:
+            case RunCommand():
+                self._begin(command)
+            case StopCommand():
+                self._set(state="stopping")
+            case ResetCommand():
+                self._set(state="idle", trip="")
+        return Reply(ok=True, status=self.status)
+
+    def subscribe(self, stopping):
+        while not stopping.is_set():
+            try:
+                yield self.published.get(timeout=0.01)
+            except queue.Empty:
+                yield None
+
+    def publish(self, message=None):
+        self.published.put(message or self.status)
+
+    def progress(self, elapsed_s, segment):
+        self._set(run=self.status.run.model_copy(update={"elapsed_s": elapsed_s, "segment": segment}))
+        self.publish()
+
+    def finish(self, outcome="clean", reason=""):
+        ended = self.status.run.model_copy(update={"outcome": outcome, "reason": reason})
+        self._set(state="idle", run=ended, finished=(*self.status.finished, ended))
+        self.publish()
+
+    def forget(self):
+        """Forget all runs, as a restarted agent does."""
+        self.status = AgentStatus(state="idle")
+
+    def _begin(self, command):
+        number = len(self.status.finished) + 1
+        run = RunStatus(
+            id=f"run-{number}",
+            method=command.method["name"],
+            specimen=command.specimen,
+            operator=command.operator,
+            log=command.log or f"/elsewhere/run-{number}.mcap",
+            started=f"2026-03-0{number}T10:00:00+00:00",
+            duration_s=23.1,
+        )
+        self._set(state="running", run=run)
+
+    def _set(self, **changes):
+        self.status = self.status.model_copy(update=changes)
+
+
+class FakeEngine:
+    """Keeps submitted jobs; the test reports their results on the service's event loop."""
+
+    def __init__(self):
+        self.listener = None
+        self.specs = {}
+        self.cancelled = []
+        self.state = "ok"
+
+    async def start(self, listener):
+        self.listener = listener
+        await listener.on_connected()
+
+    async def submit(self, spec):
+        self.specs[spec.job_id] = spec
+
+    async def cancel(self, job_id, *, started):
+        self.cancelled.append((job_id, started))
+
+    async def describe_state(self):
+        return self.state
+
+    async def close(self):
+        self.listener = None

@@ -1,0 +1,35 @@
+"""Fit problems of the laboratory damper with known noise of the force and exact motion."""
+
+import numpy as np
+
+from identification.damper.coordinates import to_coordinates
+from identification.damper.parameter_sets import find_parameter_set
+from identification.fitting.piece import Piece
+from identification.fitting.problem import Problem
+from identification.fitting.search_space import SearchSpace
+from identification.simulate import Excitation, SimulationModel, simulate
+
+LABORATORY = to_coordinates(find_parameter_set("laboratory").parameters)
+RATE, NOISE = 1000.0, 2.5
+LEVELS = (0.0, 0.3, 0.1, 0.5, 0.2, 0.4)
+
+
+def sine(amplitude, frequency, seconds=6.0, levels=LEVELS):
+    t = np.arange(round(seconds * RATE)) / RATE
+    w = 2 * np.pi * frequency
+    drive = np.array(levels)[np.minimum((t * len(levels) / seconds).astype(int), len(levels) - 1)]
+    x = amplitude * np.sin(w * t)
+    return Excitation(RATE, x, amplitude * w * np.cos(w * t), -w * w * x, drive)
+
+
+def recorded(c, stroke, seed, noise=NOISE):
+    force = simulate(SimulationModel(c, y0=2e-4), stroke, max_travel=0.005).force
+    return force + noise * np.random.default_rng(seed).standard_normal(len(force))
+
+
+def problem_of(c, strokes, seed=0, drives=(0.0, 0.5), prior=20e-6):
+    pieces = [Piece(f"s{i}", s, recorded(c, s, seed + i), np.ones(len(s.drive))) for i, s in enumerate(strokes)]
+    return Problem(tuple(pieces), SearchSpace(*drives), NOISE, prior)
+
+
+STROKES = [sine(0.005, 2.5), sine(0.010, 1.0), sine(0.015, 2.0)]

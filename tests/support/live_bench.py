@@ -1,0 +1,137 @@
+"""The simulated rig in this process, its wires, and agents as processes beside it."""
+
+import contextlib
+import gc
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from bench.rig.priority import raise_priority
+from sim_rig.live.clock import RunningClock
+from sim_rig.scenario.scenario import load_scenario
+from sim_rig.server.bench_toml import write_bench_toml
+from sim_rig.server.server import RigServer, TransportOptions
+
+COMMAND = Path(sys.executable).parent / "mrbench"
+DEADLINE = 90.0
+
+
+TCP = TransportOptions(load_cell="tcp")
+_PATIENT = "setpoint_timeout = 0.3"
+"""The other processes of a busy machine, and what they do to a simulated drive, are not what is tested here."""
+
+
+def constant(value):
+    return {"kind": "constant", "value": value}
+
+
+def method(**more):
+    """A few seconds of strokes at two drives."""
+    sine = {"kind": "sine", "amplitude_m": 0.008, "frequency_hz": 2.0}
+    return {
+        "schema": "mrbench.method/1",
+        "name": "short",
+        "title": "Short",
+        "description": "Two stretches.",
+        "rate_hz": 1000.0,
+        "drive_kind": "coil_v",
+        "limits": {
+            "stroke_m": 0.02, "velocity_mps": 2.0, "acceleration_mps2": 8.0, "force_n": 1500.0, "drive": 0.5,
+        },
+        "segments": [
+            {"name": "a", "motion": sine, "cycles": 3, "drive": constant(0.2), "checkpoint": True},
+            {"name": "b", "motion": sine, "cycles": 4, "drive": constant(0.4)},
+        ],
+        **more,
+    }  # fmt: skip
+
+
+class Bench:
+    """A served rig, the file that reaches it, and what has happened on it."""
+
+    def __init__(self, served, folder):
+        self.served, self.folder = served, folder
+        self.toml = folder / "bench.toml"
+
+    def write_method(self, **more):
+        path = self.folder / "short.json"
+        path.write_text(json.dumps(method(**more)))
+        return path
+
+    def run(self, *words, **more):
+        """Start ``mrbench run`` on this bench."""
+        return subprocess.Popen(
+            [COMMAND, "run", self.write_method(**more), "--config", self.toml, "--out", self.log, *words],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    @property
+    def log(self):
+        return self.folder / "run.mcap"
+
+    def truth(self):
+        return self.served.rig.read_truth().truth
+
+    def strokes(self):
+        """Whether the rod moves with the coil on."""
+        truth = self.truth()
+        return len(truth.output) > 100 and truth.output[-1] > 0.1 and np.ptp(truth.position[-400:]) > 4e-3
+
+    def rests(self):
+        """Whether the rod has stood for a fifth of a second, with the coil off."""
+        truth = self.truth()
+        return np.all(truth.output[-200:] == 0) and np.ptp(truth.position[-400:]) < 1e-6
+
+
+def until(condition, deadline=DEADLINE):
+    """Poll until a condition holds."""
+    end = time.monotonic() + deadline
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.05)
+
+
+@contextlib.contextmanager
+def as_punctual_as_hardware():
+    """Real-time priority for what this thread starts, where there is any; short waits for the interpreter."""
+    before = sys.getswitchinterval()
+    raise_priority(-10)
+    sys.setswitchinterval(5e-4)
+    gc.collect()
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
+        sys.setswitchinterval(before)
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+@contextlib.contextmanager
+def live_bench(folder, choices=TCP, faults=None, limits=""):
+    """A rig with its wires open."""
+    scenario = load_scenario("default")
+    with as_punctual_as_hardware(), RigServer(scenario, RunningClock(), choices, faults) as served:
+        until(lambda: len(served.rig.read_truth().truth.output) > 500)
+        write_bench_toml(folder / "bench.toml", served.wires, scenario)
+        bench = Bench(served, folder)
+        text = bench.toml.read_text().replace("setpoint_timeout = 0.2", _PATIENT)
+        bench.toml.write_text(f"{text}{limits}\n")
+        yield bench
+
+
+@contextlib.contextmanager
+def ended(process):
+    """A process that is not left behind."""
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate(timeout=DEADLINE)

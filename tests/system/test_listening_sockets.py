@@ -1,0 +1,79 @@
+"""Nothing of a running bench listens beyond the loopback interface."""
+
+import ipaddress
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+MRBENCH = (sys.executable, "-m", "bench.cli")
+DEADLINE = 120.0
+PROMPT = os.environ | {"MRBENCH_NICE": "0"}
+
+
+def started(words, folder, log):
+    with log.open("w") as file:
+        return subprocess.Popen([*MRBENCH, *words], cwd=folder, stdout=file, stderr=file, env=PROMPT)
+
+
+def wait_for(condition, what):
+    end = time.monotonic() + DEADLINE
+    while not condition():
+        assert time.monotonic() < end, what()
+        time.sleep(0.1)
+
+
+def process_tree(process):
+    parent = psutil.Process(process.pid)
+    return [parent, *parent.children(recursive=True)]
+
+
+def listening(process):
+    """Address, port and command of every listening TCP socket and bound UDP socket of a process tree."""
+    found = []
+    for one in process_tree(process):
+        for socket in one.net_connections("inet"):
+            if socket.status in (psutil.CONN_LISTEN, psutil.CONN_NONE) and socket.laddr:
+                found.append((socket.laddr.ip, socket.laddr.port, " ".join(one.cmdline()[2:5])))
+    return found
+
+
+@pytest.fixture
+def bench(tmp_path):
+    """The simulated rig, and a service with agent, scheduler and worker."""
+    sim = started(["sim", "--out", "bench.toml"], tmp_path, tmp_path / "sim.log")
+    processes = [sim]
+    try:
+        wait_for((tmp_path / "bench.toml").is_file, (tmp_path / "sim.log").read_text)
+        log = tmp_path / "service.log"
+        words = ["serve", "--config", "bench.toml", "--port", "0", "--data", "runs"]
+        processes.append(started(words, tmp_path, log))
+        wait_for(lambda: re.search(r"worker_started", log.read_text()), log.read_text)
+        yield processes
+    finally:
+        for process in reversed(processes):
+            process.send_signal(signal.SIGINT)
+        for process in reversed(processes):
+            process.wait(60)
+
+
+@pytest.mark.timeout(300)
+def test_every_socket_of_a_running_bench_is_on_the_loopback_interface(bench):
+    sim, service = bench
+
+    def worker_listens():
+        return any("worker" in command for _, _, command in listening(service))
+
+    wait_for(worker_listens, lambda: f"the worker never listened: {listening(service)}")
+    sockets = [*listening(sim), *listening(service)]
+    commands = {command for _, _, command in sockets}
+    assert any("sim" in command for command in commands)
+    assert any("rig" in command for command in commands)
+    assert any("serve" in command for command in commands)
+    beyond = [socket for socket in sockets if not ipaddress.ip_address(socket[0]).is_loopback]
+    assert beyond == []

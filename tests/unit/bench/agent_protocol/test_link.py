@@ -1,0 +1,136 @@
+"""Commands and publications over real sockets on loopback."""
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+import zmq
+
+from bench.agent_protocol.link import AgentClient, CommandServer, Publisher
+from bench.agent_protocol.messages import AgentEvent, AgentStatus, Reply, RunCommand, StatusCommand, StopCommand
+from bench.errors import AgentUnreachableError, RunError
+
+ANY_PORT = "tcp://127.0.0.1:*"
+
+
+@pytest.fixture
+def stopping() -> Iterator[threading.Event]:
+    event = threading.Event()
+    yield event
+    event.set()
+
+
+@pytest.fixture
+def server(stopping: threading.Event) -> Iterator[CommandServer]:
+    def handle(command):
+        if isinstance(command, RunCommand):
+            return Reply(ok=False, error=f"no {command.method['name']} today")
+        return Reply(ok=True, status=AgentStatus(state="idle"))
+
+    with CommandServer(ANY_PORT) as server:
+        thread = threading.Thread(target=server.serve, args=(handle, stopping))
+        thread.start()
+        yield server
+        stopping.set()
+        thread.join()
+
+
+def test_every_command_gets_its_own_reply(server):
+    client = AgentClient(server.address, "")
+    assert client.send(StatusCommand()).status == AgentStatus(state="idle")
+    assert client.send(RunCommand(method={"name": "polka"})).error == "no polka today"
+    assert client.send(StopCommand()).ok
+
+
+@pytest.mark.parametrize(
+    "request_",
+    [
+        b"nonsense",
+        b'{"command": "explode"}',
+        b'{"command": "stop", "now": 1}',
+        b'{"command": "prepare", "step": "move"}',
+    ],
+)
+def test_invalid_command_is_answered_with_its_error_and_the_next_one_works(server, request_):
+    with zmq.Context.instance().socket(zmq.REQ) as socket:
+        socket.linger = 0
+        socket.connect(server.address)
+        socket.send(request_)
+        assert socket.poll(5000)
+        reply = Reply.model_validate_json(socket.recv())
+    assert not reply.ok
+    assert "invalid command" in reply.error
+    assert AgentClient(server.address, "").send(StopCommand()).ok
+
+
+def test_missing_agent_is_reported_in_time():
+    with CommandServer(ANY_PORT) as bound:
+        address = bound.address
+    with pytest.raises(AgentUnreachableError, match=r"within 0\.2 s; start one: mrbench rig"):
+        AgentClient(address, "").send(StatusCommand(), timeout=0.2)
+
+
+def test_address_in_use_is_refused():
+    with CommandServer(ANY_PORT) as first, pytest.raises(RunError, match="cannot listen at"):
+        CommandServer(first.address)
+
+
+def test_publications_arrive_with_their_types(stopping):
+    with Publisher(ANY_PORT) as publisher:
+        messages = AgentClient("", publisher.address).subscribe(stopping)
+        event = AgentEvent(time_ns=7, kind="alarm", text="warm")
+        received = None
+        # A subscriber receives only messages that are sent after it has joined, so the event is repeated.
+        for _ in range(200):
+            publisher.publish(event)
+            received = next(messages)
+            if received is not None:
+                break
+        assert received == event
+
+
+def test_closed_publisher_drops_messages():
+    with Publisher(ANY_PORT) as publisher:
+        pass
+    publisher.publish(AgentStatus(state="idle"))
+
+
+def test_internal_error_is_a_reply_and_the_next_command_works(stopping):
+    def handle(command):
+        if isinstance(command, RunCommand):
+            raise ZeroDivisionError("division by zero")
+        return Reply(ok=True)
+
+    with CommandServer(ANY_PORT) as server:
+        thread = threading.Thread(target=server.serve, args=(handle, stopping))
+        thread.start()
+        client = AgentClient(server.address, "")
+        reply = client.send(RunCommand(method={}))
+        assert not reply.ok
+        assert "ZeroDivisionError" in reply.error
+        assert client.send(StopCommand()).ok
+        stopping.set()
+        thread.join()
+
+
+def test_invalid_address_is_reported(stopping):
+    client = AgentClient("localhost:5570", "nowhere")
+    with pytest.raises(AgentUnreachableError, match="'localhost:5570' is not an address of a rig agent"):
+        client.send(StatusCommand())
+    with pytest.raises(AgentUnreachableError, match="'nowhere' is not an address"):
+        next(client.subscribe(stopping))
+
+
+def test_reply_of_another_version_is_reported(stopping):
+    with zmq.Context.instance().socket(zmq.REP) as other:
+        port = other.bind_to_random_port("tcp://127.0.0.1")
+
+        def reply():
+            other.recv()
+            other.send(b'{"fine": true}')
+
+        thread = threading.Thread(target=reply)
+        thread.start()
+        with pytest.raises(AgentUnreachableError, match=r"not a rig agent of this version \(ok: is missing"):
+            AgentClient(f"tcp://127.0.0.1:{port}", "").send(StatusCommand())
+        thread.join()

@@ -1,0 +1,195 @@
+"""Tables of the catalogue, their migrations, and the scan of logs."""
+
+import os
+import sqlite3
+from datetime import UTC, datetime, timedelta, timezone
+
+import pytest
+from alembic import command
+from alembic.autogenerate import compare_metadata
+from alembic.config import Config
+from alembic.migration import MigrationContext
+from sqlalchemy import create_engine
+
+from bench.catalogue.catalogue import Catalogue
+from bench.catalogue.database import make_sqlite_url, open_database
+from bench.catalogue.errors import CatalogueError
+from bench.catalogue.log_summary import is_complete, read_log_summary
+from bench.catalogue.models import Base, JobRow, RunRow
+from bench.catalogue.scan import scan_logs
+from bench.errors import LogError
+from tests.support.service_logs import write_complete_log, write_truncated_log
+
+
+def not_being_written(path):
+    return False
+
+
+@pytest.fixture
+def catalogue(tmp_path):
+    catalogue = Catalogue(open_database(make_sqlite_url(tmp_path / "catalogue.db")), tmp_path)
+    yield catalogue
+    catalogue.close()
+
+
+def run(number, **changes):
+    values = {
+        "id": f"run-{number}",
+        "method": "quick",
+        "started": datetime(2026, 3, 1, 10, number, tzinfo=UTC),
+        "state": "ended",
+        "log": f"run-{number}.mcap",
+    }
+    return RunRow(**{**values, **changes})
+
+
+def job(number, **changes):
+    values = {"id": f"job-{number}", "run_id": "run-1", "key": "k", "settings": {}, "state": "queued"}
+    return JobRow(**{**values, "created": datetime(2026, 3, 1, 11, number, tzinfo=UTC), **changes})
+
+
+def test_migrations_create_the_tables_of_the_models(tmp_path):
+    engine = open_database(make_sqlite_url(tmp_path / "catalogue.db"))
+    with engine.connect() as connection:
+        assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
+    engine.dispose()
+
+
+def migrate_to(url, revision):
+    """Create or change a database as the version of mrbench with this revision did."""
+    engine = create_engine(url)
+    config = Config()
+    config.set_main_option("script_location", "bench.catalogue:migrations")
+    with engine.begin() as connection:
+        config.attributes["connection"] = connection
+        command.upgrade(config, revision)
+    return engine
+
+
+def test_a_catalogue_of_revision_0001_is_opened_and_its_state_renamed(tmp_path):
+    url = make_sqlite_url(tmp_path / "catalogue.db")
+    engine = migrate_to(url, "0001")
+    columns = "id, method, specimen, operator, source, started, state, reason, log"
+    started = "2026-03-01 10:00:00.000000"
+    with engine.begin() as connection:
+        for name, state in (("a", "cut_off"), ("b", "ended")):
+            values = f"'{name}', 'quick', '', '', 'run', '{started}', '{state}', '', '{name}.mcap'"
+            connection.exec_driver_sql(f"INSERT INTO runs ({columns}) VALUES ({values})")
+        job = f"'j', 'a', 'identify', 'k', '{{}}', 'running', 1, '{started}', 'identify', ''"
+        columns = "id, run_id, kind, key, settings, state, attempts, created, doing, error"
+        connection.exec_driver_sql(f"INSERT INTO jobs ({columns}) VALUES ({job})")
+    engine.dispose()
+    catalogue = Catalogue(open_database(url), tmp_path)
+    assert {row.id: row.state for row in catalogue.list_runs(10)} == {"a": "truncated", "b": "ended"}
+    assert catalogue.get_job("j").activity == "identify"
+    assert catalogue.update_job("j", activity="report").activity == "report"
+    catalogue.close()
+
+
+def test_a_catalogue_keeps_its_rows_when_it_is_opened_again(tmp_path):
+    url = make_sqlite_url(tmp_path / "catalogue.db")
+    for number in (1, 2):
+        catalogue = Catalogue(open_database(url), tmp_path)
+        catalogue.add(run(number))
+        assert len(catalogue.list_runs(10)) == number
+        catalogue.close()
+
+
+def test_readers_never_wait_for_a_writer(catalogue):
+    with sqlite3.connect(catalogue.folder / "catalogue.db") as other:
+        assert other.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        other.execute("BEGIN IMMEDIATE")
+        assert catalogue.list_runs(10) == []
+    other.close()
+
+
+def test_a_catalogue_of_a_later_version_is_refused(tmp_path):
+    path = tmp_path / "catalogue.db"
+    open_database(make_sqlite_url(path)).dispose()
+    with sqlite3.connect(path) as other:
+        other.execute("UPDATE alembic_version SET version_num = '9999'")
+    other.close()
+    with pytest.raises(CatalogueError, match="later version"):
+        open_database(make_sqlite_url(path))
+
+
+def test_a_file_that_is_not_a_database_is_refused_by_name(tmp_path):
+    path = tmp_path / "catalogue.db"
+    path.write_text("not a database, but text that is long enough to be taken for one" * 20)
+    with pytest.raises(CatalogueError, match=r"catalogue\.db"):
+        open_database(make_sqlite_url(path))
+
+
+def test_times_are_returned_in_utc(catalogue):
+    started = datetime(2026, 3, 1, 12, 0, tzinfo=timezone(timedelta(hours=2)))
+    catalogue.add(run(1, started=started))
+    assert catalogue.get_run("run-1").started == started
+    assert catalogue.get_run("run-1").started.tzinfo is UTC
+
+
+def test_runs_of_the_same_instant_are_all_found_page_by_page(catalogue):
+    same = datetime(2026, 3, 1, 10, 0, tzinfo=UTC)
+    for number in range(5):
+        catalogue.add(run(number, started=same))
+    ids, before = [], None
+    while page := catalogue.list_runs(2, before):
+        ids += [row.id for row in page]
+        before = page[-1]
+    assert ids == [f"run-{number}" for number in (4, 3, 2, 1, 0)]
+
+
+def test_a_job_is_added_once_unless_the_last_one_failed(catalogue):
+    catalogue.add(run(1))
+    assert catalogue.add_job_once(job(1))[1]
+    assert catalogue.add_job_once(job(2))[0].id == "job-1"
+    catalogue.update_job("job-1", state="failed")
+    assert catalogue.add_job_once(job(3))[1]
+    assert catalogue.update_job("job-1", state="running") is None
+
+
+def test_the_summary_of_a_log_is_read_complete_or_truncated(tmp_path):
+    complete = read_log_summary(write_complete_log(tmp_path / "a.mcap", "a", "lossy", first_s=2.5))
+    identity = (complete.id, complete.specimen, complete.operator, complete.outcome)
+    assert identity == ("a", "damper 7", "M. Curie", "lossy")
+    assert complete.started == datetime(2026, 3, 1, 10, 0, 2, 500_000, tzinfo=UTC)
+    assert complete.duration_s == pytest.approx(1.998)
+    truncated = read_log_summary(write_truncated_log(tmp_path / "b.mcap", "b"))
+    assert (truncated.id, truncated.specimen, truncated.outcome) == ("b", "damper 7", None)
+    assert (is_complete(tmp_path / "a.mcap"), is_complete(tmp_path / "b.mcap")) == (True, False)
+
+
+def test_files_that_are_not_logs_are_skipped(catalogue):
+    (catalogue.folder / "foreign.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\0" * 100)
+    (catalogue.folder / "empty.mcap").write_bytes(b"")
+    assert scan_logs(catalogue, not_being_written) == []
+    with pytest.raises(LogError):
+        read_log_summary(catalogue.folder / "empty.mcap")
+
+
+def test_a_scan_finds_each_new_log_once(catalogue):
+    write_complete_log(catalogue.folder / "a.mcap", "a")
+    assert [row.id for row in scan_logs(catalogue, not_being_written)] == ["a"]
+    assert scan_logs(catalogue, not_being_written) == []
+    assert catalogue.get_run("a").log == "a.mcap"
+    assert len(catalogue.get_run("a").log_sha256) == 64
+
+
+def test_a_log_that_is_being_written_is_skipped(catalogue):
+    write_truncated_log(catalogue.folder / "a.mcap", "a")
+    assert scan_logs(catalogue, lambda path: True) == []
+    assert [row.state for row in scan_logs(catalogue, not_being_written)] == ["truncated"]
+
+
+def test_a_changed_log_is_read_again(catalogue):
+    path = write_truncated_log(catalogue.folder / "a.mcap", "a")
+    scan_logs(catalogue, not_being_written)
+    write_complete_log(path, "a")
+    os.utime(path, ns=(1, 1))
+    (row,) = scan_logs(catalogue, not_being_written)
+    assert (row.state, row.outcome) == ("ended", "clean")
+
+
+def test_a_copy_of_a_log_is_not_a_second_run(catalogue):
+    write_complete_log(catalogue.folder / "a.mcap", "a")
+    write_complete_log(catalogue.folder / "b.mcap", "a")
+    assert [row.log for row in scan_logs(catalogue, not_being_written)] == ["a.mcap"]

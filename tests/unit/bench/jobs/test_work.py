@@ -1,0 +1,179 @@
+"""Execution of a job by a worker, with a command line that the test provides."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from bench.jobs.errors import JobCancelledError, JobError
+from bench.jobs.job_spec import (
+    FIT_FILE,
+    REPORT_FILE,
+    IdentifySettings,
+    JobSpec,
+    compute_content_key,
+    get_result_folder,
+)
+from bench.jobs.work import WATCHDOG_COMMAND, JobCallbacks, execute_job
+from tests.support.reports import fit_document
+
+COMMAND = """
+import json, os, pathlib, sys, time
+folder = pathlib.Path(sys.argv[0]).parent
+arguments = sys.argv[1:]
+with (folder / "calls").open("a") as calls:
+    print(json.dumps([os.getpid(), *arguments]), file=calls)
+print("half way", file=sys.stderr, flush=True)
+{act}
+out = pathlib.Path(arguments[arguments.index("--out") + 1])
+out.write_text((folder / "fit.json").read_text() if arguments[0] == "identify" else "<title>page</title>")
+"""
+HANG = "time.sleep(600)"
+FAIL = "sys.exit('mrbench: too little is left to fit')"
+
+
+class Bench:
+    """A log, a job on it, and a command line with a given action."""
+
+    def __init__(self, folder, fit):
+        self.folder = folder
+        (folder / "fit.json").write_text(json.dumps(fit))
+        log = folder / "run.mcap"
+        log.write_bytes(b"log")
+        settings = IdentifySettings()
+        key = compute_content_key("ab" * 32, settings)
+        self.spec = JobSpec("job", key, str(log), str(get_result_folder(log, key)), settings)
+        self.messages = []
+
+    def command(self, act="pass"):
+        script = self.folder / "command.py"
+        script.write_text(COMMAND.format(act=act))
+        return (sys.executable, str(script))
+
+    def execute(self, act="pass", cancelled=lambda: False, **changes):
+        spec = replace(self.spec, **changes)
+        return execute_job(spec, JobCallbacks(self.messages.append, cancelled), self.command(act))
+
+    def calls(self):
+        try:
+            lines = (self.folder / "calls").read_text().splitlines()
+        except FileNotFoundError:
+            return []
+        return [json.loads(line) for line in lines if line.endswith("]")]
+
+    @property
+    def results(self):
+        return sorted(path.name for path in self.folder.iterdir() if ".fit-" in path.name)
+
+
+@pytest.fixture
+def bench(tmp_path):
+    return Bench(tmp_path, fit_document())
+
+
+def is_running(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_until(condition):
+    deadline = time.monotonic() + 30
+    while not (value := condition()):
+        assert time.monotonic() < deadline
+    return value
+
+
+def test_fit_and_report_appear_together_next_to_the_log(bench):
+    summary = bench.execute()
+    result = Path(bench.spec.result)
+    assert result.parent == bench.folder
+    assert sorted(path.name for path in result.iterdir()) == [FIT_FILE, REPORT_FILE]
+    assert summary["result"] == "converged"
+    assert summary["rmse_n"] == json.loads((result / FIT_FILE).read_text())["rmse_n"]["train"]
+    assert [call[1] for call in bench.calls()] == ["identify", "report"]
+    assert bench.calls()[0][-1] == "--stages=pinn,refine"
+    assert bench.messages == ["identify", "identify: half way", "report", "report: half way"]
+    assert bench.results == [result.name]
+
+
+def test_an_existing_result_is_not_computed_again(bench):
+    first = bench.execute()
+    assert bench.execute(FAIL) == first
+    assert len(bench.calls()) == 2
+
+
+def test_a_failure_carries_the_message_of_the_command(bench):
+    with pytest.raises(JobError, match=r"^identify: too little is left to fit$"):
+        bench.execute(FAIL)
+    assert bench.results == []
+
+
+def test_cancel_ends_the_running_process(bench):
+    with pytest.raises(JobCancelledError):
+        bench.execute(HANG, cancelled=lambda: bool(bench.calls()))
+    ((pid, *_),) = bench.calls()
+    wait_until(lambda: not is_running(pid))
+    assert bench.results == []
+
+
+def test_a_job_beyond_its_time_limit_is_ended(bench):
+    with pytest.raises(JobError, match="time limit"):
+        bench.execute(HANG, settings=IdentifySettings(time_limit_s=0.01))
+    assert all(not is_running(pid) for pid, *_ in bench.calls())
+
+
+def test_the_work_folder_of_a_killed_attempt_is_deleted(bench):
+    leftover = bench.folder / f".{Path(bench.spec.result).name}.dead"
+    leftover.mkdir()
+    (leftover / FIT_FILE).write_text("{")
+    bench.execute()
+    assert not leftover.exists()
+
+
+def test_a_log_that_the_worker_cannot_read_is_an_error(bench):
+    with pytest.raises(JobError, match="same path"):
+        bench.execute(log="/nowhere/run.mcap")
+
+
+def test_the_key_depends_on_the_content_alone():
+    settings = IdentifySettings()
+    assert compute_content_key("a", settings) == compute_content_key(
+        "a", IdentifySettings(stages=("pinn", "refine"))
+    )
+    assert compute_content_key("a", settings) != compute_content_key("b", settings)
+    assert compute_content_key("a", settings) != compute_content_key("a", IdentifySettings(hold_out=("5mm*",)))
+
+
+@pytest.mark.parametrize("status", [0, 3])
+def test_a_watched_command_ends_with_its_own_status(status):
+    command = [*WATCHDOG_COMMAND, sys.executable, "-c", f"raise SystemExit({status})"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        assert process.wait(60) == status
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_a_watched_command_ends_with_its_parent(tmp_path, number):
+    mark = tmp_path / "pids"
+    inner = f"""
+import os, pathlib, subprocess
+child = subprocess.Popen(["sleep", "600"])
+pathlib.Path({str(mark)!r}).write_text(f"{{os.getpid()}} {{child.pid}} ;")
+child.wait()
+"""
+    parent = f"""
+import subprocess
+subprocess.Popen({[*WATCHDOG_COMMAND, sys.executable, "-c", inner]!r}, stdin=subprocess.PIPE).wait()
+"""
+    with subprocess.Popen([sys.executable, "-c", parent]) as process:
+        pids = wait_until(lambda: mark.exists() and ";" in mark.read_text() and mark.read_text().split()[:2])
+        assert all(is_running(pid) for pid in pids)
+        os.kill(process.pid, number)
+    wait_until(lambda: not any(is_running(pid) for pid in pids))

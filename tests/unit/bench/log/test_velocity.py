@@ -1,0 +1,33 @@
+import numpy as np
+import pytest
+
+from bench.log.velocity import smooth_velocity
+
+
+@pytest.mark.parametrize("rate", [200.0, 1000.0, 5000.0])
+def test_velocity_of_a_sine_is_within_half_a_percent_at_any_rate(rate):
+    time = np.arange(int(2 * rate)) / rate
+    velocity = smooth_velocity(0.01 * np.sin(2 * np.pi * 2 * time), rate)
+
+    peak = 0.01 * 2 * np.pi * 2
+    expected = peak * np.cos(2 * np.pi * 2 * time)
+    inner = slice(len(time) // 10, -len(time) // 10)
+    assert np.max(np.abs(velocity - expected)[inner]) < 0.005 * peak
+
+
+def test_noise_of_displacement_is_smoothed():
+    noise = np.random.default_rng(2).normal(0, 3e-6, 5000)
+
+    assert np.std(smooth_velocity(noise, 1000.0)) < 0.1 * np.std(np.gradient(noise, 0.001))
+
+
+@pytest.mark.parametrize("samples", [0, 1])
+def test_velocity_of_fewer_than_two_samples_is_zero(samples):
+    assert smooth_velocity(np.ones(samples), 1000.0).tolist() == [0.0] * samples
+
+
+@pytest.mark.parametrize("samples", [2, 3, 4])
+def test_velocity_of_a_few_samples_is_their_slope(samples):
+    displacement = 0.5 * np.arange(samples) / 100.0
+
+    np.testing.assert_allclose(smooth_velocity(displacement, 100.0), 0.5)

@@ -1,0 +1,110 @@
+"""Recording thread whose parts fail."""
+
+import threading
+from types import MappingProxyType, SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bench.errors import LogError
+from bench.recorder.recording_thread import RecordingThread
+
+TIMEOUT = 10.0
+
+
+class IdleAligner:
+    """Aligner to which no samples came."""
+
+    lost = MappingProxyType({})
+
+    def align(self):
+        return None
+
+
+class BrokenAligner(IdleAligner):
+    """Aligner with an internal error."""
+
+    def align(self):
+        raise ZeroDivisionError("division by zero")
+
+
+def succeed():
+    pass
+
+
+def fail():
+    raise KeyError("segment")
+
+
+@pytest.mark.parametrize(
+    ("aligner", "on_cycle", "message"),
+    [(BrokenAligner(), succeed, "ZeroDivisionError"), (IdleAligner(), fail, "segment")],
+)
+def test_internal_error_ends_the_run_but_not_the_thread(aligner, on_cycle, message):
+    failures, cycles, later = [], [], threading.Event()
+
+    def run_cycle():
+        cycles.append(None)
+        if len(cycles) == 3:
+            later.set()
+        on_cycle()
+
+    with RecordingThread(aligner, 1000.0, lambda samples: None, run_cycle, failures.append):
+        assert later.wait(TIMEOUT)
+    assert len(failures) == 1
+    assert message in str(failures[0])
+
+
+def test_live_samples_name_their_segment():
+    published = []
+    thread = RecordingThread(IdleAligner(), 1000.0, published.append, succeed, published.append)
+    for recording in (SimpleNamespace(segment="5mm_3Hz"), None):
+        thread._recording = recording
+        thread._live.append((SimpleNamespace(time_ns=np.arange(4)), {"force": np.ones(4)}))
+        thread._published_at = 0.0
+        thread._publish_live()
+    assert [(samples.segment, samples.values) for samples in published] == [
+        ("5mm_3Hz", {"force": [1.0]}),
+        ("", {"force": [1.0]}),
+    ]
+
+
+class FullDiskRecording:
+    """Recording whose disk is full."""
+
+    def add_samples(self, aligned):
+        raise LogError("a.mcap: no space left on device")
+
+
+class ReadyAligner(IdleAligner):
+    """Aligner that returns one sample in every turn."""
+
+    def align(self):
+        return SimpleNamespace(time_ns=np.arange(1), columns={"force": np.ones(1)})
+
+
+def test_receiver_of_a_full_disk_can_count_the_lost_samples():
+    """The agent stops the run, and a status that is requested at the same time counts the losses."""
+    failures = []
+    thread = RecordingThread(
+        ReadyAligner(),
+        1000.0,
+        lambda samples: None,
+        succeed,
+        lambda error: failures.append((str(error), thread.count_lost())),
+    )
+    thread.start_recording(FullDiskRecording())
+    turn = threading.Thread(target=thread._process_samples, daemon=True)
+    turn.start()
+    turn.join(TIMEOUT / 5)
+    assert failures == [("a.mcap: no space left on device", {})]
+
+
+def test_only_losses_during_the_recording_are_counted():
+    aligner = IdleAligner()
+    aligner.lost = {"force": 5}
+    thread = RecordingThread(aligner, 1000.0, lambda samples: None, succeed, lambda error: None)
+    thread.start_recording(SimpleNamespace(finish=succeed))
+    aligner.lost = {"force": 7, "temperature": 1}
+    assert thread.count_lost() == {"force": 2, "temperature": 1}
+    assert thread.finish_recording() == {"force": 2, "temperature": 1}

@@ -1,0 +1,104 @@
+import json
+from datetime import UTC, datetime
+
+import numpy as np
+import pytest
+
+from bench.errors import ReportError
+from bench.report import diagnosis_plots, page
+from bench.report.diagnosis import make_context, read_diagnosis
+from tests.support.reports import write_log
+
+STAGES = ("coil", "damper", "mounting", "force_channel", "displacement_channel")
+
+
+def document(**changes):
+    """A diagnosis that names a late force, as `mrbench diagnose` writes it."""
+    late = {
+        "name": "force_delay", "stage": "force_channel", "form": "pure_delay",
+        "parameters": {"delay": {"value": 0.0041, "unit": "s", "ci95": [0.004, 0.0042]}},
+        "share": 1.0, "probability": 0.91, "note": "",
+    }  # fmt: skip
+    place = {"drive": 0.5, "amplitude_m": 0.01, "frequency_hz": 2.0, "phase": 0.3125, "gap_n": 12.0}
+    found = {
+        "schema": "mrbench.diagnosis/1", "verdict": "explained", "effects": [late],
+        "alternatives": [{"effects": ["coil_lag", "gas_spring"], "probability": 0.05}],
+        "probability": 0.9, "unknown_probability": 0.04,
+        "gap": {
+            "before_n": 13.2, "after_n": 2.6, "noise_floor_n": 2.5, "shrinkage": 0.97,
+            "shrinkage_ci95": [0.95, 0.99], "nominal_n": 31.0, "train_before_n": 13.0, "train_after_n": 2.5,
+        },
+        "where": {
+            "stage": "force_channel", "stages": dict.fromkeys(STAGES, 0.01) | {"force_channel": 0.96},
+            "map": [place, place | {"drive": 0.0, "phase": 0.0625, "gap_n": 3.0}], "harmonics": [],
+            "drift": {}, "explainable": 0.9,
+        },
+        "next_stroke": {
+            "segment": {
+                "name": "next", "motion": {"kind": "sine", "amplitude_m": 0.0036, "frequency_hz": 7.86},
+                "drive": {"kind": "constant", "value": 1.5},
+            },
+            "separates": [["force_delay"], ["coil_lag", "gas_spring"]], "expected_n": 2.0, "detectability": 40.0,
+        },
+        "explanation": "The force lags by 4.1 ms; check the load cell's filter.",
+        "notes": ["a gain is visible to calibration only"],
+    }  # fmt: skip
+    return found | changes
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(**changes):
+        path = tmp_path / "diagnosis.json"
+        path.write_text(json.dumps(document(**changes)))
+        return path
+
+    return write
+
+
+def test_the_page_names_the_effect_its_size_and_what_else_it_could_be(written, tmp_path):
+    log = write_log(tmp_path / "strokes.mcap")
+    report = page.gather(log, None, written())
+    drawn = page.make_figures(report)
+    assert {"gap", "where"} <= drawn.keys()
+    text = page.render(report, drawn, "mrbench report", datetime(2026, 5, 4, tzinfo=UTC))
+    for words in (
+        "Something is missing in the simulation, and it is known what.",
+        "The force lags by 4.1 ms",
+        "delay: 4.10 ± 0.10 ms",
+        "97 % (95 % to 99 %)",
+        "coil lag and gas spring",
+        "31.0 N",
+        "a sine of 3.60 mm, 7.86 Hz, 1.50 V",
+        "a gain is visible to calibration only",
+    ):
+        assert words in text, words
+
+
+def test_without_a_gap_nothing_is_named_and_no_map_is_drawn(written):
+    found = read_diagnosis(written(verdict="no_gap", effects=[], alternatives=[], next_stroke=None))
+    assert diagnosis_plots.plot_gap_map(found, "V") is None
+    said = make_context(found, "V")
+    assert (said["effects"], said["next"], said["mood"]) == ([], "", "good")
+    assert ("Part of the gap that this closes", "97 % (95 % to 99 %)") not in said["gap"]
+
+
+def test_what_stays_unexplained_is_a_warning_with_its_probability(written):
+    said = make_context(read_diagnosis(written(verdict="unexplained", effects=[], unknown_probability=0.93)), "V")
+    assert said["mood"] == "warning"
+    assert said["sets"][-1] == ("something that the library does not have", "93 %")
+
+
+def test_the_map_puts_each_gap_where_its_condition_and_phase_are(written):
+    figure = diagnosis_plots.plot_gap_map(read_diagnosis(written()), "V")
+    grid = np.asarray(figure.axes[0].images[0].get_array())
+    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert names == ["10.0 mm, 2.00 Hz, 0 V", "10.0 mm, 2.00 Hz, 0.500 V"]
+    assert (grid[0, 0], grid[1, 2], grid.sum()) == (3.0, 12.0, 15.0)
+
+
+def test_a_fit_in_its_place_is_refused_with_what_is_wanted(tmp_path):
+    path = tmp_path / "fit.json"
+    path.write_text('{"schema": "mrbench.fit/1"}')
+    with pytest.raises(ReportError, match=r"fit\.json: not a diagnosis made by `mrbench diagnose`"):
+        read_diagnosis(path)

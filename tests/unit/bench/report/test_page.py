@@ -1,0 +1,215 @@
+import dataclasses
+import hashlib
+import re
+from datetime import UTC, datetime
+from html.parser import HTMLParser
+
+import pytest
+from typer import BadParameter
+
+from bench.commands.report import report
+from bench.errors import LogError, ReportError
+from bench.log.reader import read_log
+from bench.report import page
+from bench.report.content import make_header_rows
+from bench.report.documents import Fit
+from bench.report.summary import make_findings
+from tests.support.reports import fit_document, prediction, series, write_fit, write_log
+
+VOID = {"meta", "img", "br", "link", "hr", "input"}
+MADE = datetime(2026, 5, 4, 3, 2, tzinfo=UTC)
+
+
+class Checked(HTMLParser):
+    """Fails on tags that do not close in order; keeps sources, links and text."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.sources, self.words = [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attributes):
+        self.sources += [value for name, value in attributes if name in ("src", "href")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+    @property
+    def text(self):
+        return " ".join(" ".join(self.words).split())
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    return write_log(tmp_path_factory.mktemp("report") / "strokes.mcap")
+
+
+@pytest.fixture(scope="module")
+def made(log):
+    """The report of a log with the fit made from it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(page, "predict", lambda fit, log: (prediction(), series(held_out=True)))
+        sha256 = hashlib.sha256(log.read_bytes()).hexdigest()
+        return page.gather(log, write_fit(log.with_name("fit.json"), sha256))
+
+
+@pytest.fixture(scope="module")
+def drawn(made):
+    return page.make_figures(made)
+
+
+@pytest.fixture(scope="module")
+def html(made, drawn):
+    return page.render(made, drawn, "mrbench report strokes.mcap", MADE)
+
+
+def test_the_page_is_well_formed_and_needs_nothing_from_elsewhere(html):
+    sources = Checked(html).sources
+    assert len(sources) == 5
+    assert all(source.startswith("data:image/png;base64,") for source in sources)
+    assert not re.search(r"https?://|@import|url\(", html)
+    assert len(html) < 3_000_000
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        "The law repeats the recorded force to 2.00 N",
+        "the noise floor of the recording is 1.90 N",
+        "On the strokes held out of the fit the error is 2.04 N (1.7 %), on those fitted 1.98 N (1.6 %).",
+        "0.1 V 2.00 N 1.05 times 2.1 % 1500",
+        "F a 44.862 ± 0.097 N",
+        "D y 29.24 ± 0.20 µm",
+        "c 0b 2200 ± 3100 N·s/(m·V)",
+        "not fixed hardly seen",
+        "Lag of force behind displacement 4 ± 14 µs (within what the clocks explain",
+        "k0 and k1 −0.939",
+        "cycle to cycle over 6 cycles",
+        "simulated minus recorded force is −0.23 N in the mean",
+        "Recorded 2026-05-04 03:02:01 UTC",
+        "force N 1000 Hz none 1 ms",
+        "Made 2026-05-04 03:02 UTC",
+        "mrbench report strokes.mcap",
+        "The recording is clean",
+    ],
+)
+def test_the_page_says_its_numbers_with_their_units(html, said):
+    assert said in Checked(html).text
+
+
+def test_the_page_names_what_it_was_made_from(html, made):
+    assert made.sha256 in html
+    assert made.is_fitted_log
+
+
+def test_names_from_a_log_or_a_fit_are_escaped(made, drawn):
+    fit = Fit.model_validate(fit_document(result="<script>alert(1)</script>"))
+    attacked = page.render(dataclasses.replace(made, fit=fit), drawn, "<b>", MADE)
+    assert "<script>" not in attacked
+    assert "&lt;script&gt;" in attacked
+    assert "<b>" not in attacked
+
+
+def test_a_recording_alone_makes_a_page(log):
+    alone = page.gather(log, None)
+    html = page.render(alone, page.make_figures(alone), "mrbench report", MADE)
+    assert "this page shows the recording alone" in Checked(html).text
+    assert len(Checked(html).sources) == 3
+    assert "RMSE" not in html
+
+
+def told(log, fit_changes=None, seen=True, **errors):
+    fit = Fit.model_validate(fit_document(**(fit_changes or {})))
+    return {f.text: f.severity for f in make_findings(read_log(log), fit, prediction(**errors), seen)}
+
+
+def test_a_fit_from_another_log_is_said(log):
+    said = " ".join(told(log, seen=False))
+    assert "made from another recording (strokes.mcap)" in said
+    assert "a prediction on strokes that the fit never saw" in said
+    assert "held out" not in said
+
+
+@pytest.mark.parametrize(
+    ("rmse", "mood", "words"),
+    [
+        (1.92, "good", "No model could come noticeably closer"),
+        (2.14, "plain", "13 % above the floor"),
+        (9.5, "warning", "5.0 times the floor"),
+    ],
+)
+def test_the_error_is_weighed_against_the_floor(log, rmse, mood, words):
+    (found,) = [(text, m) for text, m in told(log, rmse=rmse).items() if text.startswith("The law repeats")]
+    assert words in found[0]
+    assert found[1] == mood
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"drive_range": [0.15, 0.3]}, "drive goes from 0.1 to 0.3 V, the fit knows 0.15 to 0.3 V"),
+        ({"specimen": "damper 8"}, "The fit is of specimen “damper 8”, this recording of “damper 7”."),
+        ({"result": "not converged: stopped"}, "The fit says of itself: not converged: stopped."),
+    ],
+)
+def test_what_a_reader_must_beware_of_is_a_warning(log, changes, words):
+    (mood,) = [mood for text, mood in told(log, changes).items() if words in text]
+    assert mood == "warning"
+
+
+def test_what_cannot_be_known_is_said(log):
+    said = " ".join(told(log))
+    assert "1 of the 2 parameters that a force can show are fixed by the strokes; these are not: c0_b." in said
+    assert "A, is a gauge" in said
+    assert "they rest on the calibration" in said
+
+
+def test_a_lag_that_clocks_do_not_explain_is_said(log):
+    nuisances = fit_document()["nuisances"]
+    late = {**nuisances["force_delay"], "value": 2e-3, "ci95": [1.9e-3, 2.1e-3], "outside_prior": True}
+    said = told(log, {"nuisances": {**nuisances, "force_delay": late}})
+    assert "The force channel's lag of 2.00 ± 0.10 ms is more than the clocks explain." in said
+
+
+def test_a_lossy_recording_is_a_warning(tmp_path):
+    lossy = read_log(write_log(tmp_path / "lossy.mcap", outcome="lossy"))
+    assert make_findings(lossy, None, None, seen=False)[0].severity == "warning"
+
+
+def test_the_command_writes_the_page_and_its_plots(log, tmp_path):
+    report(log, tmp_path / "page.html", plots=tmp_path / "plots")
+    assert "<!doctype html>" in (tmp_path / "page.html").read_text()
+    assert {one.name for one in (tmp_path / "plots").iterdir()} == {
+        f"{name}.{kind}" for name in ("loops", "time", "whole") for kind in ("png", "svg")
+    }
+
+
+def test_a_bad_fit_or_log_leaves_no_page(log, tmp_path):
+    (tmp_path / "fit.json").write_text("{}")
+    with pytest.raises(ReportError, match="not a fit"):
+        report(log, tmp_path / "page.html", tmp_path / "fit.json")
+    with pytest.raises(LogError):
+        report(tmp_path / "none.mcap", tmp_path / "page.html")
+    with pytest.raises(BadParameter):
+        report(log, "-")
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_a_fit_without_its_prediction_is_refused(made, drawn):
+    with pytest.raises(ReportError, match="only with its prediction"):
+        page.render(dataclasses.replace(made, prediction=None), drawn, "", MADE)
+
+
+def test_the_recording_begins_at_its_first_sample_not_when_the_agent_was_started(made):
+    log = made.log
+    later = dataclasses.replace(
+        log, samples={**log.samples, "time_ns": log.samples["time_ns"] + 3_600_000_000_000}
+    )
+    assert dict(make_header_rows(log, ""))["Recorded"] == "2026-05-04 03:02:01 UTC"
+    assert dict(make_header_rows(later, ""))["Recorded"] == "2026-05-04 04:02:01 UTC"

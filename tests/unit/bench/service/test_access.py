@@ -1,0 +1,75 @@
+"""Who gets in, and what those are told who do not."""
+
+import re
+
+import pytest
+from starlette.websockets import WebSocketDisconnect
+
+from bench.service.access import TOKEN_FILE, open_access
+
+OPEN = {"/api/v1/health", "/api/v1/openapi.json"}
+
+
+def routes(client):
+    described = client.get("/api/v1/openapi.json").json()["paths"]
+    for path, methods in described.items():
+        for method in methods:
+            yield method.upper(), re.sub(r"\{\w+\}", "any", path)
+
+
+def test_the_token_is_kept_as_a_hash_that_only_its_owner_reads(tmp_path):
+    access, token = open_access(tmp_path)
+    assert access.is_allowed(token)
+    assert token not in (tmp_path / TOKEN_FILE).read_text()
+    assert (tmp_path / TOKEN_FILE).stat().st_mode & 0o777 == 0o600
+
+
+def test_the_token_is_told_once_and_stays_valid(tmp_path):
+    _, token = open_access(tmp_path)
+    again, nothing = open_access(tmp_path)
+    assert nothing is None
+    assert again.is_allowed(token)
+    assert not again.is_allowed(token + "x")
+    assert not again.is_allowed("")
+
+
+def test_a_new_token_ends_the_old_one(tmp_path):
+    _, old = open_access(tmp_path)
+    access, new = open_access(tmp_path, new=True)
+    assert access.is_allowed(new)
+    assert not access.is_allowed(old)
+    assert (tmp_path / TOKEN_FILE).stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("authorization", [None, "Bearer wrong", "Basic dXNlcjpwdw=="])
+def test_nothing_but_health_and_description_is_answered_without_the_token(client, authorization):
+    del client.headers["Authorization"]
+    headers = {} if authorization is None else {"Authorization": authorization}
+    closed = [(method, path) for method, path in routes(client) if path not in OPEN]
+    assert len(closed) >= 17
+    for method, path in closed:
+        answer = client.request(method, path, headers=headers, json={})
+        assert answer.status_code == 401, (method, path)
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert answer.json()["type"] == "urn:mrbench:problem:unauthorised"
+
+
+def test_health_and_description_are_open(client):
+    del client.headers["Authorization"]
+    assert all(client.get(path).status_code == 200 for path in OPEN)
+
+
+@pytest.mark.parametrize("token", ["", "wrong"])
+def test_the_websocket_is_closed_without_the_token(client, token):
+    with (
+        client.websocket_connect(f"ws://127.0.0.1:8600/api/v1/live?token={token}") as socket,
+        pytest.raises(WebSocketDisconnect) as closed,
+    ):
+        socket.receive_text()
+    assert closed.value.code == 4401
+
+
+def test_another_sites_name_for_this_machine_is_refused(client):
+    assert client.get("/api/v1/health", headers={"Host": "evil.example"}).status_code == 400
+    assert client.get("/api/v1/health", headers={"Host": "localhost:8600"}).status_code == 200
+    assert client.get("/api/v1/health", headers={"Host": "[::1]:8600"}).status_code == 200

@@ -1,0 +1,168 @@
+"""The websocket, and what a slow listener loses."""
+
+import asyncio
+import time
+
+import orjson
+
+from bench.agent_protocol.messages import AgentEvent, RunCommand, Samples
+from bench.service import run_book
+from bench.service.agent_monitor import join_batches
+from bench.service.live import MAX_QUEUED_BATCHES, MAX_QUEUED_EVENTS, SubscriberQueue
+from tests.support.service_logs import write_complete_log
+
+
+def samples(*time_ns, **values):
+    return Samples(time_ns=list(time_ns), values={name: list(column) for name, column in values.items()})
+
+
+def messages(socket, topic):
+    while True:
+        said = orjson.loads(socket.receive_text())
+        assert set(said) == {"topic", "data"}
+        if said["topic"] == topic:
+            yield said["data"]
+
+
+def eventually(found):
+    deadline = time.monotonic() + 20
+    while not found():
+        assert time.monotonic() < deadline, "waited in vain"
+        time.sleep(0.001)
+
+
+def listening(service):
+    return service.client.websocket_connect(f"ws://127.0.0.1:8600/api/v1/live?token={service.token}")
+
+
+def test_what_the_agent_publishes_comes_over_the_websocket(service):
+    with listening(service) as socket:
+        service.agent.publish()
+        assert next(messages(socket, "status"))["state"] == "idle"
+        service.agent.publish(AgentEvent(time_ns=5, kind="alarm", text="temperature 61 degC over 60 degC"))
+        assert next(messages(socket, "event"))["kind"] == "alarm"
+        service.agent.publish(samples(1, 2, force=[3.0, None]))
+        found = next(messages(socket, "samples"))
+        assert found["time_ns"] == [1, 2]
+        assert found["values"] == {"force": [3.0, None]}
+
+
+def test_every_sample_comes_once_and_in_order_though_fewer_batches_do(service):
+    with listening(service) as socket:
+        for k in range(50):
+            service.agent.publish(samples(2 * k, 2 * k + 1, force=[1.0, 2.0]))
+        times, batches = [], 0
+        for found in messages(socket, "samples"):
+            times += found["time_ns"]
+            batches += 1
+            if times[-1] == 99:
+                break
+        assert times == sorted(times)
+        assert batches < 50
+
+
+def test_runs_and_jobs_are_told_as_they_change(service):
+    with listening(service) as socket:
+        run = service.post("/runs", {"method": "quick"}, 201)
+        told = messages(socket, "run")
+        assert next(told)["state"] == "running"
+        write_complete_log(service.data / run["log"], run["id"])
+        service.agent.finish()
+        assert next(told)["outcome"] == "clean"
+        job = next(messages(socket, "job"))
+        assert (job["run"], job["state"]) == (run["id"], "queued")
+        service.tell("began", job["id"])
+        service.tell("says", job["id"], "identify")
+        assert next(found for found in messages(socket, "job") if found["doing"])["doing"] == "identify"
+
+
+def test_a_new_listener_learns_the_status_at_once(service):
+    service.agent.publish()
+    service.await_("/agent", lambda found: found["state"] == "idle")
+    with listening(service) as socket:
+        service.agent.publish()
+        next(messages(socket, "status"))
+    with listening(service) as socket:
+        assert next(messages(socket, "status"))["state"] == "idle"
+
+
+def test_a_slow_listener_gets_the_newest_and_a_bounded_number():
+    async def slow():
+        mailbox = SubscriberQueue()
+        for k in range(1000):
+            mailbox.put("samples", "", f"samples {k}")
+            mailbox.put("event", "", f"event {k}")
+            mailbox.put("status", "", f"status {k}")
+            mailbox.put("job", f"job {k % 2}", f"job {k}")
+        return await mailbox.take()
+
+    found = asyncio.run(slow())
+    assert [text for text in found if text.startswith("status")] == ["status 999"]
+    assert sorted(text for text in found if text.startswith("job")) == ["job 998", "job 999"]
+    assert [text for text in found if text.startswith("samples")] == [
+        f"samples {k}" for k in range(1000 - MAX_QUEUED_BATCHES, 1000)
+    ]
+    assert len([text for text in found if text.startswith("event")]) == MAX_QUEUED_EVENTS
+
+
+def test_batches_are_joined_with_null_where_one_lacks_a_field():
+    both = join_batches([samples(1, 2, force=[1.0, 2.0]), samples(3, force=[3.0], temperature=[20.0])])
+    assert both.time_ns == [1, 2, 3]
+    assert both.values == {"force": [1.0, 2.0, 3.0], "temperature": [None, None, 20.0]}
+
+
+def test_health_says_what_is_missing(service):
+    assert service.get("/health")["agent"] == "ok"
+    assert service.get("/health")["worker"] == "ok"
+    service.engine.state = "no worker; start one: mrbench worker"
+    assert service.get("/health")["worker"].startswith("no worker")
+
+
+def test_a_silent_agent_shows_in_health(service):
+    service.agent.reachable = False
+    assert "no rig agent answered" in service.get("/health")["agent"]
+
+
+def test_what_cannot_be_used_of_the_agent_does_not_end_the_listening(service, caplog, monkeypatch):
+    monkeypatch.setattr("bench.service.agent_monitor._AGAIN", 0.001)
+    with listening(service) as socket:
+        service.agent.publish(
+            AgentEvent.model_construct(time_ns=object(), kind="alarm", text="of another version")
+        )
+        service.agent.publish(AgentEvent(time_ns=6, kind="alarm", text="understood"))
+        assert next(messages(socket, "event"))["text"] == "understood"
+    assert "agent_message_unused" in caplog.text
+
+
+def test_a_status_that_cannot_be_written_down_is_said_and_taken_up_again(service, caplog, monkeypatch):
+    book = service.client.app.state.desk.book
+    begin, refusals = book._add_run, iter([RuntimeError("the catalogue is locked")])
+
+    async def refuses_once(run):
+        if (error := next(refusals, None)) is not None:
+            raise error
+        return await begin(run)
+
+    monkeypatch.setattr(book, "_begin", refuses_once)
+    service.agent.send(RunCommand(method={"name": "quick"}))
+    service.agent.publish()
+    eventually(lambda: "status_unused" in caplog.text)
+    service.agent.publish()
+    service.await_("/runs", lambda found: [run["id"] for run in found["items"]] == ["run-1"])
+
+
+def test_a_folder_that_cannot_be_looked_through_once_is_looked_through_again(service, caplog, monkeypatch):
+    monkeypatch.setattr("bench.service.run_registry.SCAN_EVERY", 0.01)
+    refusals = iter([ValueError("a defect")])
+    look = run_book.scan
+
+    def refuses_once(*given):
+        if (error := next(refusals, None)) is not None:
+            raise error
+        return look(*given)
+
+    monkeypatch.setattr(run_book, "scan", refuses_once)
+    service.start()
+    eventually(lambda: "scan_failed" in caplog.text)
+    write_complete_log(service.data / "found.mcap", "found")
+    service.await_("/runs", lambda found: [run["id"] for run in found["items"]] == ["found"])

@@ -1,0 +1,66 @@
+"""Checks of a recording before its diagnosis, and notes on effects that it cannot show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.errors import UnusableDataError
+from identification.fitting import Piece
+from identification.gap.data.cycles import Cycles, StrokeCondition
+from identification.gap.data.quality import (
+    check_cycle_count,
+    check_sliding_recorded,
+    describe_unobservable_effects,
+)
+from identification.signals.noise_floor import NoiseFloorEstimate
+from identification.simulate import Excitation
+
+FLOOR = NoiseFloorEstimate(2.0, 2.0, 2.0, "cycle to cycle")
+
+
+def make_cycles(count, *conditions):
+    return Cycles(np.zeros(10, int), np.zeros(10), np.zeros(count, int), conditions)
+
+
+def make_piece(velocity, train):
+    zero = 0.0 * velocity
+    return Piece("sine", Excitation(500.0, zero, velocity, zero, zero), zero, train)
+
+
+def test_an_excluded_shock_does_not_raise_the_speed_of_the_stroke():
+    velocity, train = 0.1 * np.sin(np.arange(4000) / 100.0), np.ones(4000)
+    velocity[2000:2010], train[1990:2020] = 0.4, 0.0
+    check_sliding_recorded([make_piece(velocity, train)])
+
+
+def test_a_recording_without_force_at_speed_is_refused():
+    velocity = 0.1 * np.sin(np.arange(4000) / 100.0)
+    slow = make_piece(velocity, np.where(np.abs(velocity) > 0.04, 0.0, 1.0))
+    with pytest.raises(UnusableDataError, match=r"no valid force was recorded above 0\.05 m/s"):
+        check_sliding_recorded([slow])
+
+
+def test_one_cycle_is_refused_and_four_are_enough():
+    with pytest.raises(UnusableDataError, match="contains 1 cycle of the stroke; a diagnosis needs at least 4"):
+        check_cycle_count(make_cycles(1))
+    check_cycle_count(make_cycles(4))
+
+
+def test_poor_strokes_are_noted():
+    notes = " ".join(describe_unobservable_effects(make_cycles(6, StrokeCondition(0.0, 0.01, 1.0)), FLOOR))
+    assert "one drive" in notes
+    assert "one frequency" in notes
+    assert "one amplitude" in notes
+
+
+def test_rich_strokes_only_lack_a_calibration():
+    rich = make_cycles(6, StrokeCondition(0.0, 0.01, 1.0), StrokeCondition(0.2, 0.005, 3.0))
+    (note,) = describe_unobservable_effects(rich, FLOOR)
+    assert "calibration" in note
+
+
+def test_a_floor_without_repeating_cycles_is_noted():
+    floor = replace(FLOOR, cycle_to_cycle=None, basis="no cycles")
+    notes = describe_unobservable_effects(make_cycles(6, StrokeCondition(0.0, 0.01, 0.0)), floor)
+    assert any("high frequencies only: no cycles" in note for note in notes)

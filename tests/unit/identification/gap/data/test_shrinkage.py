@@ -1,0 +1,109 @@
+"""Expected shrinkage on another run, with its interval."""
+
+import numpy as np
+import pytest
+from numpy.random import default_rng
+
+from identification.gap.data.shrinkage import CycleErrors, Replicates, estimate_shrinkage
+
+NOISE = 2.0
+
+
+def make_errors(before, after, segments=5):
+    """Cycles of 500 samples with these mean squares [N²] without and with effects."""
+    counts, segment = np.full(len(before), 500.0), np.arange(len(before)) * segments // len(before)
+    return CycleErrors(counts * before, counts * after, counts, segment, segment % 4 == 2)
+
+
+def close_gap(gap, share, cycles=30):
+    """Cycles whose effects leave a share of a gap [N²], both with some scatter."""
+    random = default_rng(2)
+    excess = gap * random.uniform(0.5, 1.5, cycles)
+    return make_errors(NOISE**2 + excess, NOISE**2 + share * excess * random.uniform(0.7, 1.3, cycles))
+
+
+def replicate(*runs, cycles=0.0, gap=9.0):
+    """Mean squares [N²] from the input noise of other runs, over whole runs and over the cycles."""
+    return Replicates(cycles, cycles, np.array(runs or (0.0,)), NOISE**2 + gap)
+
+
+def test_the_interval_contains_the_shrinkage():
+    shrinkage = estimate_shrinkage(close_gap(9.0, 0.02), NOISE, replicate(), strokes=5)
+    assert shrinkage.value == pytest.approx(0.97, abs=0.015)
+    low, high = shrinkage.ci95
+    assert low < shrinkage.value < high
+    assert high - low < 0.15
+
+
+def test_the_shrinkage_follows_from_the_reported_errors():
+    shrinkage = estimate_shrinkage(close_gap(9.0, 0.1), NOISE, replicate(0.4), strokes=5)
+    closed = 1.0 - (shrinkage.after**2 - NOISE**2) / (shrinkage.before**2 - NOISE**2)
+    assert shrinkage.value == pytest.approx(closed, abs=1e-9)
+
+
+def test_few_strokes_and_input_noise_lower_the_shrinkage_and_widen_the_interval():
+    rich = estimate_shrinkage(close_gap(9.0, 0.1), NOISE, replicate(), strokes=5)
+    poor = estimate_shrinkage(close_gap(9.0, 0.1), NOISE, replicate(), strokes=1)
+    noisy = estimate_shrinkage(close_gap(9.0, 0.1), NOISE, replicate(0.5, 1.3), strokes=5)
+    assert poor.value < rich.value
+    assert poor.ci95[0] < rich.ci95[0] - 0.1
+    assert noisy.value == pytest.approx(rich.value - 0.1, abs=0.02)
+    assert noisy.ci95[0] < rich.ci95[0] - 0.05
+
+
+def test_of_many_strokes_the_mean_is_expected_of_others():
+    alike = make_errors(np.full(30, NOISE**2 + 9.0), np.full(30, NOISE**2 + 0.9))
+    assert estimate_shrinkage(alike, NOISE, replicate(), strokes=50).value == pytest.approx(0.9, abs=0.01)
+
+
+def test_one_bad_held_out_stroke_counts_as_one_of_all():
+    errors = close_gap(9.0, 0.02)
+    bad = errors._replace(after=np.where(errors.held_out, errors.counts * NOISE**2 + 2700.0, errors.after))
+    on_held_out = 1.0 - bad.compute_means()[1] / 9.0 + NOISE**2 / 9.0
+    shrinkage = estimate_shrinkage(bad, NOISE, replicate(), strokes=5)
+    assert shrinkage.value > on_held_out + 0.3
+    assert shrinkage.ci95[0] < on_held_out
+
+
+def test_a_set_that_does_harm_on_held_out_cycles_has_no_benefit():
+    errors = close_gap(9.0, 0.02)
+    harm = errors._replace(after=np.where(errors.held_out, errors.before + 1000.0, errors.after))
+    assert estimate_shrinkage(harm, NOISE, replicate(), strokes=5).expected_benefit < 0.0
+    assert estimate_shrinkage(errors, NOISE, replicate(), strokes=5).expected_benefit > 0.9
+
+
+def test_input_noise_larger_than_the_gap_leaves_no_benefit():
+    gap = 0.1 * NOISE**2
+    errors = close_gap(gap, 0.2)
+    assert estimate_shrinkage(errors, NOISE, replicate(1.2 * gap, gap=gap), strokes=1).expected_benefit < 0.0
+    assert estimate_shrinkage(errors, NOISE, replicate(0.2 * gap, gap=gap), strokes=1).expected_benefit > 0.0
+
+
+def test_input_noise_on_the_cycles_is_not_form_error():
+    errors = close_gap(9.0, 0.1)
+    without, with_noise = (
+        estimate_shrinkage(errors, NOISE, replicate(0.5, cycles=cycles), strokes=5) for cycles in (0.0, 0.5)
+    )
+    assert with_noise.value > without.value + 0.03
+
+
+def test_errors_below_the_floor_by_chance_close_no_more_than_the_gap():
+    errors = close_gap(1.0, 0.0)
+    lucky = errors._replace(after=0.98 * errors.after)
+    shrinkage = estimate_shrinkage(lucky, NOISE, replicate(0.1, gap=1.0), strokes=5)
+    assert shrinkage.value == pytest.approx(0.9, abs=0.03)
+    assert shrinkage.after > NOISE
+
+
+def test_without_effects_nothing_shrinks():
+    errors = close_gap(9.0, 0.1)
+    same = errors._replace(after=errors.before)
+    shrinkage = estimate_shrinkage(same, NOISE, replicate(), strokes=5)
+    assert (shrinkage.value, shrinkage.ci95) == (0.0, (0.0, 0.0))
+
+
+def test_at_the_floor_there_is_no_shrinkage():
+    errors = make_errors(np.full(30, NOISE**2 * 1.02), np.full(30, NOISE**2))
+    shrinkage = estimate_shrinkage(errors, NOISE, replicate(), strokes=5)
+    assert shrinkage.value is None
+    assert shrinkage.ci95 is None

@@ -1,0 +1,77 @@
+"""The noise model is updated from candidates, in their order."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.fits import Candidate
+from identification.gap.noise.noise_model import NoiseModel
+from tests.support.candidate_pools import NOISE, fit_baseline
+from tests.support.effects import active
+
+BACKLASH = frozenset({"clevis_backlash"})
+
+
+@pytest.fixture(scope="module")
+def pool():
+    """A free pin, with the law alone and with the true effect."""
+    pool = fit_baseline(active("clevis_backlash", "free_pin"))
+    pool.extend("clevis_backlash")
+    return pool
+
+
+def make_model(pool, *names):
+    """A noise model after updates with some candidates."""
+    model = NoiseModel(pool.noise_model.white_noise, pool.noise_model.stretches)
+    for name in names:
+        model.update(pool.candidates[name], pool.full_problem, pool.evaluation)
+    return model
+
+
+def test_the_first_update_adds_the_input_noise_of_the_law(pool):
+    model = make_model(pool, frozenset())
+    assert 0.0 < model.input_noise < NOISE
+    assert model.floor == pytest.approx(np.hypot(model.noise, model.input_noise))
+    assert make_model(pool).input_noise is None
+
+
+def test_later_updates_never_raise_the_input_noise(pool):
+    first = make_model(pool, frozenset()).input_noise
+    then = make_model(pool, frozenset(), BACKLASH).input_noise
+    assert then <= first
+    assert make_model(pool, frozenset(), BACKLASH, frozenset()).input_noise == then
+
+
+def test_a_candidate_at_the_floor_changes_nothing(pool):
+    candidate = pool.candidates[BACKLASH]
+    at_floor = replace(candidate, train_rmse=0.5 * NOISE, held_out_rmse=0.5 * NOISE)
+    model = make_model(pool)
+    model.update(at_floor, pool.full_problem, pool.evaluation)
+    assert model.input_noise is None
+
+
+def test_motions_are_drawn_for_the_first_candidate_and_reused(pool):
+    model = make_model(pool, frozenset())
+    runs = model.sample_other_runs(pool.candidates[BACKLASH], pool.full_problem)
+    assert runs.shape == (8, len(pool.evaluation.force))
+    first_two = runs[:2][:, pool.evaluation.fitted_samples]
+    updated = make_model(pool, frozenset(), BACKLASH).input_noise
+    assert min(np.sqrt(first_two.mean()), model.input_noise) == pytest.approx(updated)
+
+
+@pytest.mark.parametrize(("estimate", "remaining", "noise"), [(2.4, 2.2, 2.2), (2.4, 2.6, 2.4), (2.4, 1.5, 2.0)])
+def test_the_noise_lies_between_white_noise_and_the_residual(pool, estimate, remaining, noise):
+    model = NoiseModel(2.0, ())
+    model.noise, model.input_noise = estimate, 0.3
+    residual = pool.baseline.residual
+    values = np.full(len(residual.values), np.hypot(remaining, 0.3))
+    candidate = Candidate(pool.baseline.fit, replace(residual, values=values), 0.0, 0.0, 0.0)
+    assert model.estimate_noise(candidate) == pytest.approx(noise)
+
+
+def test_the_coloured_share_is_the_part_of_the_variance_that_is_not_white():
+    model = NoiseModel(2.0, ())
+    assert model.coloured_share == 0.0
+    model.noise = 4.0
+    assert model.coloured_share == pytest.approx(0.75)

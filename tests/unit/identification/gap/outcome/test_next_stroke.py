@@ -1,0 +1,98 @@
+"""The proposed stroke separates rival models by a difference that no refit removes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.methods.compile import compile_method
+from bench.methods.document import Method, MethodSegment
+from identification.damper.effects import EFFECTS
+from identification.gap.outcome.next_stroke import RivalModel, compute_information, find_best_segment
+from identification.gap.outcome.trial_segments import StrokeLimits, generate_trial_segments
+from identification.simulate import ActiveEffect
+from tests.support.candidate_pools import fit_baseline
+from tests.support.effects import LABORATORY
+
+LIMITS = StrokeLimits(amplitude=0.015, centre=0.0, velocity=0.2, frequency=3.0, drives=(0.0, 0.5))
+NOISE = 2.0
+
+
+def make_rival(name, *values):
+    active = ActiveEffect(EFFECTS[name], values)
+    return RivalModel((name,), LABORATORY, (active,), 0.5, 0.0, np.diag(np.full(13 + len(values), 1e-6)))
+
+
+def propose(*rivals):
+    return find_best_segment(rivals, LABORATORY, LIMITS, NOISE)
+
+
+def test_one_set_needs_no_stroke():
+    assert propose(make_rival("moving_mass", 2.0)) is None
+
+
+def test_delay_and_mass_are_separated_inside_the_limits():
+    proposed = propose(make_rival("moving_mass", 2.0), make_rival("force_delay", 1e-3))
+    motion = MethodSegment.model_validate(proposed.segment).motion
+    assert motion.amplitude_m <= LIMITS.amplitude * 1.001
+    assert 2 * np.pi * motion.amplitude_m * motion.frequency_hz <= LIMITS.velocity * 1.01
+    assert proposed.separated_sets == [["moving_mass"], ["force_delay"]]
+    assert proposed.detectability > 10.0
+
+
+def test_a_difference_that_a_refit_removes_does_not_count():
+    uncertain = make_rival("moving_mass", 0.05)
+    certain = replace(uncertain, information=np.diag(np.full(14, 1e12)))
+    other = replace(make_rival("force_delay", 2e-4), information=certain.information)
+    assert propose(certain, other).detectability >= propose(uncertain, other).detectability
+
+
+def test_form_errors_hide_a_difference_as_noise_does():
+    rivals = [make_rival("moving_mass", 2.0), make_rival("force_delay", 1e-3)]
+    inexact = [replace(r, form_error=0.3) for r in rivals]
+    assert propose(*inexact).detectability < 0.5 * propose(*rivals).detectability
+
+
+def test_a_parameter_without_sensitivity_hides_no_refit_of_the_others():
+    information = np.diag(np.full(14, 1e-6))
+    information[LABORATORY._fields.index("eta")] *= 1e14
+    mass = (ActiveEffect(EFFECTS["moving_mass"], (0.5,)),)
+    damped = LABORATORY._replace(c0_a=1.01 * LABORATORY.c0_a)
+    proposed = propose(
+        RivalModel(("law",), LABORATORY, mass, 0.5, 0.0, information),
+        RivalModel(("damped",), damped, mass, 0.5, 0.0, information),
+    )
+    assert proposed.difference > 0.1
+    assert proposed.detectability < 0.05 * proposed.difference / NOISE * np.sqrt(6000)
+
+
+def test_the_information_of_a_fit_gives_the_deviation_of_an_effect():
+    pool = fit_baseline("moving_mass")
+    fit = pool.candidates[pool.extend("moving_mass")].fit
+    information = compute_information(fit)
+    assert information.shape == (14, 14)
+    size = np.sqrt(np.diag(information))
+    covariance = np.linalg.pinv(information / np.outer(size, size), rcond=1e-12) / np.outer(size, size)
+    assert np.sqrt(covariance[13, 13]) == pytest.approx(fit.deviations["moving_mass"]["mass"], rel=0.2)
+
+
+def test_the_bench_compiles_every_trial_segment():
+    for segment, excitation in generate_trial_segments(LIMITS):
+        document = {
+            "schema": "mrbench.method/1",
+            "name": "next",
+            "title": "Proposed",
+            "description": "One segment.",
+            "rate_hz": 1000.0,
+            "drive_kind": "coil_v",
+            "limits": {
+                "stroke_m": 0.05,
+                "velocity_mps": 1.0,
+                "acceleration_mps2": 30.0,
+                "force_n": 5000.0,
+                "drive": 0.5,
+            },
+            "segments": [segment],
+        }
+        programme = compile_method(Method.model_validate(document))
+        assert len(programme.displacement) >= len(excitation.displacement)

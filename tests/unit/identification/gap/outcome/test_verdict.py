@@ -1,0 +1,90 @@
+"""The verdict, from the errors of sets on fitted and held-out samples and their posterior."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from identification.gap.fits.candidate import Candidate
+from identification.gap.outcome.verdict import (
+    compute_shares,
+    decide_unnamed_verdict,
+    decide_verdict,
+    list_alternatives,
+)
+from identification.gap.selection.posterior import Posterior
+
+FLOOR = 2.0
+
+
+def make_candidate(names, train, held_out):
+    """A set with these errors on fitted and held-out samples, relative to the floor."""
+    fit = SimpleNamespace(effects=tuple(SimpleNamespace(name=name) for name in names))
+    return Candidate(fit, None, train * FLOOR, held_out * FLOOR, 0.01)
+
+
+def decide(named, train, held_out, *, baseline=(3.0, 3.0), unknown=0.1):
+    candidate = make_candidate(named, train, held_out)
+    posterior = Posterior({candidate.names: 1.0 - unknown}, unknown)
+    return decide_verdict(make_candidate((), *baseline), candidate, FLOOR, posterior)
+
+
+@pytest.mark.parametrize(
+    ("train", "held_out", "unknown", "verdict"),
+    [
+        (1.01, 1.01, 0.1, "explained"),
+        (1.2, 1.2, 0.1, "explained"),
+        (1.6, 1.6, 0.1, "partly_explained"),
+        (2.9, 2.9, 0.1, "unexplained"),
+        (1.6, 1.6, 0.9, "unexplained"),
+    ],
+)
+def test_the_verdict_follows_the_part_of_the_gap_that_is_closed(train, held_out, unknown, verdict):
+    assert decide(("gas_spring",), train, held_out, unknown=unknown) == verdict
+
+
+@pytest.mark.parametrize(("train", "held_out"), [(1.0, 2.0), (2.0, 1.0)])
+def test_a_set_that_closes_the_gap_on_one_side_alone_does_not_explain_it(train, held_out):
+    assert decide(("force_drift",), train, held_out) == "partly_explained"
+    assert decide(("force_drift",), train, held_out, unknown=0.9) == "unexplained"
+
+
+@pytest.mark.parametrize(
+    ("probability", "unknown", "verdict"), [(0.25, 0.48, "unexplained"), (0.48, 0.25, "partly_explained")]
+)
+def test_a_set_is_not_named_where_an_unknown_cause_is_more_probable(probability, unknown, verdict):
+    candidate, baseline = make_candidate(("fixture_compliance",), 1.6, 1.6), make_candidate((), 3.0, 3.0)
+    posterior = Posterior({candidate.names: probability}, unknown)
+    assert decide_verdict(baseline, candidate, FLOOR, posterior) == verdict
+
+
+def test_without_a_named_set_there_is_no_gap_unless_an_unknown_cause_is_probable():
+    assert decide((), 1.005, 1.02, baseline=(1.005, 1.02)) == "no_gap"
+    assert decide((), 3.0, 3.0, unknown=0.9) == "unexplained"
+    assert decide(("gas_spring",), 1.0, 1.0, baseline=(1.0, 1.007)) == "no_gap"
+
+
+def test_a_gap_on_the_fitted_samples_alone_is_one():
+    assert decide(("coil_lag",), 1.005, 1.0, baseline=(1.08, 1.0)) == "explained"
+    assert decide(("coil_lag",), 1.005, 1.0, baseline=(1.02, 1.0)) == "no_gap"
+
+
+def test_an_unnamed_set_leaves_a_gap_only_where_there_is_one():
+    assert decide_unnamed_verdict(make_candidate((), 1.005, 1.025), FLOOR) == "no_gap"
+    assert decide_unnamed_verdict(make_candidate((), 1.3, 1.02), FLOOR) == "unexplained"
+
+
+def test_alternatives_are_the_most_probable_other_sets():
+    sets = {frozenset({name}): p for name, p in zip("abcdef", (0.5, 0.2, 0.1, 0.05, 0.03, 0.001), strict=True)}
+    alternatives = list_alternatives(Posterior(sets, 0.1), frozenset({"a"}))
+    assert [(a.effects, a.probability) for a in alternatives] == [(["b"], 0.2), (["c"], 0.1), (["d"], 0.05)]
+
+
+def test_shares_are_the_parts_of_the_explained_variance_that_are_lost_without_an_effect():
+    both = frozenset({"gas_spring", "moving_mass"})
+    candidates = {
+        frozenset(): make_candidate((), 3.0, 3.0),
+        frozenset({"gas_spring"}): make_candidate(("gas_spring",), 2.0, 2.0),
+        both: make_candidate(both, 1.0, 1.0),
+    }
+    shares = compute_shares(candidates, both, sorted(both))
+    assert shares == pytest.approx({"gas_spring": 1.0, "moving_mass": 3.0 / 8.0})

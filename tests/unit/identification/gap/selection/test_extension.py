@@ -1,0 +1,71 @@
+"""One effect more is added to the most probable set if its block evidence exceeds the complexity penalty."""
+
+import pytest
+
+from identification.damper.effects import EFFECTS
+from identification.gap.selection.block_evidence import compute_evidence
+from identification.gap.selection.extension import try_extension
+from identification.gap.selection.posterior import compute_complexity_penalty
+from identification.simulate import ActiveEffect
+from tests.support.candidate_pools import fit_baseline
+
+GAS, STOP = frozenset({"gas_spring"}), frozenset({"gas_spring", "end_stop"})
+BOTH = frozenset({"gas_spring", "seal_friction"})
+
+
+@pytest.fixture(scope="module")
+def pool():
+    """A large gas spring beside which a small friction was not found, fitted on all samples."""
+    large = ActiveEffect(EFFECTS["gas_spring"], (300.0, 0.05))
+    small = ActiveEffect(EFFECTS["seal_friction"], (9.0, 4.0, 0.015))
+    pool = fit_baseline(large, small)
+    pool.extend("gas_spring", "end_stop")
+    pool.fit_fully(GAS)
+    return pool.copy()
+
+
+def test_an_effect_with_block_evidence_is_accepted_and_its_subsets_are_fitted(pool):
+    pool = pool.copy()
+    assert try_extension(pool, GAS)
+    assert pool.block_evidence[BOTH].log_odds > compute_complexity_penalty(GAS)
+    assert pool.block_evidence[BOTH].parent == GAS
+    assert BOTH in pool.full_fits
+    assert frozenset({"seal_friction"}) in pool.candidates
+    others = [e.log_odds for names, e in pool.block_evidence.items() if names != BOTH]
+    assert max(others) < 1.0
+
+
+def test_confusable_effects_are_not_fitted(pool):
+    pool = pool.copy(extension_effects=100)
+    try_extension(pool, GAS)
+    fitted = {model.name for effects in pool.fitted for model in effects}
+    assert "seal_friction" in fitted
+    assert not fitted & {"end_stop", "side_load_friction", "displacement_nonlinearity"}
+
+
+def test_a_confusable_effect_that_the_search_has_fitted_pays_a_penalty(pool):
+    pool = pool.copy(extension_effects=0)
+    assert not try_extension(pool, GAS)
+    evidence = compute_evidence(pool.candidates[GAS].residual, pool.candidates[STOP].residual)
+    assert pool.block_evidence[STOP].log_odds == pytest.approx(evidence - 8.0)
+    assert set(pool.block_evidence) == {STOP}
+
+
+def test_the_best_extension_of_the_search_is_considered_without_a_shortlist(pool):
+    pool = pool.copy()
+    pool.extend("gas_spring", "seal_friction")
+    found = pool.copy(extension_effects=0)
+    assert try_extension(found, GAS)
+    assert set(found.block_evidence) == {BOTH}
+
+
+@pytest.mark.parametrize(
+    ("names", "settings"),
+    [(frozenset(), {}), (GAS, {"max_effects": 1}), (GAS, {"max_remaining_share": 0.01})],
+    ids=["no effect", "largest set", "most of the gap remains"],
+)
+def test_no_extension_is_tried_where_none_can_be_named(pool, names, settings):
+    pool = pool.copy(**settings)
+    assert not try_extension(pool, names)
+    assert pool.fitted == []
+    assert pool.block_evidence == {}

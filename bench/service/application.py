@@ -84,9 +84,9 @@ _BEARER = HTTPBearer(auto_error=False, description="the token that `mrbench serv
 
 
 def _check_token(
-    desk: Context, credentials: Annotated[HTTPAuthorizationCredentials | None, Depends(_BEARER)]
+    context: Context, credentials: Annotated[HTTPAuthorizationCredentials | None, Depends(_BEARER)]
 ) -> None:
-    if credentials is None or not desk.access.is_allowed(credentials.credentials):
+    if credentials is None or not context.access.is_allowed(credentials.credentials):
         raise problems.make_unauthorised()
 
 
@@ -100,11 +100,11 @@ async def _run_lifespan(app: FastAPI, surroundings: AppSettings) -> AsyncIterato
         catalogue = Catalogue(database, surroundings.data)
         living.callback(catalogue.close)
         engine = await living.enter_async_context(surroundings.engine())
-        desk = app.state.desk = _make_context(surroundings, catalogue, engine)
+        context = app.state.context = _make_context(surroundings, catalogue, engine)
         living.push_async_callback(engine.close)
-        await engine.start(desk.job_manager)
-        living.enter_context(desk.monitor)
-        living.push_async_callback(_cancel_task, asyncio.create_task(desk.registry.scan_periodically()))
+        await engine.start(context.job_manager)
+        living.enter_context(context.monitor)
+        living.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
         yield
 
 
@@ -116,7 +116,7 @@ def _make_context(surroundings: AppSettings, catalogue: Catalogue, engine: JobEn
         live_messages.publish("job", serialise_message("job", make_job_view(row)), row.id)
 
     async def run_changed(row: RunRow) -> None:
-        shown = (await asyncio.to_thread(desk.make_run_views, row))[0]
+        shown = (await asyncio.to_thread(context.make_run_views, row))[0]
         live_messages.publish("run", serialise_message("run", shown), row.id)
 
     def observed(status: AgentStatus) -> None:
@@ -126,10 +126,10 @@ def _make_context(surroundings: AppSettings, catalogue: Catalogue, engine: JobEn
     keeper = JobManager(catalogue, engine, job_changed)
     watch = AgentMonitor(surroundings.link, live_messages.make_publisher(loop), observed)
     book = RunRegistry(catalogue, keeper, lambda: watch.latest_status, run_changed)
-    desk = ServiceContext(
+    context = ServiceContext(
         surroundings.access, catalogue, watch, live_messages, engine, keeper, book, surroundings.has_local_logs
     )
-    return desk
+    return context
 
 
 def _log_failure(writing: "Future[None]") -> None:

@@ -71,8 +71,8 @@ class ServiceContext:
 
 
 def _get_context(connection: HTTPConnection) -> ServiceContext:
-    desk: ServiceContext = connection.app.state.desk
-    return desk
+    context: ServiceContext = connection.app.state.context
+    return context
 
 
 Context = Annotated[ServiceContext, Depends(_get_context)]

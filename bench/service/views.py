@@ -85,8 +85,12 @@ class Run(View):
     operator: str
     source: str = Field(description="`run`, or `import` for a recording made elsewhere")
     started: datetime = Field(description="UTC; of an import that does not say, when its log was written")
-    duration_s: float | None = Field(description="[s] recorded; while it goes on, planned; null of a log cut off")
-    state: RunState = Field(description="cut_off: the log has no end, nobody writes to it; mend it with `salvage`")
+    duration_s: float | None = Field(
+        description="recorded time [s]; planned time while it runs; null for a truncated log"
+    )
+    state: RunState = Field(
+        description="truncated: the log has no end and is no longer being written; repair it with `salvage`"
+    )
     outcome: RunOutcome | None = Field(description="null until it has ended")
     reason: str = Field(description="why the outcome is not clean")
     log: str = Field(description="the log's file, from the data folder or absolute")

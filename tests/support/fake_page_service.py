@@ -37,7 +37,7 @@ def instrument(name: str, driver: str, address: str, **more: Any) -> dict[str, A
     """One instrument's status."""
     well = {
         "connected": True, "received": 1_234_567, "lost": 0, "corrupted": 0, "resynchronised": 0, "age_s": 0.0021,
-        "skew_s": 1.8e-5, "words": "",
+        "clock_error_bound_s": 1.8e-5, "message": "",
     }  # fmt: skip
     return {"name": name, "driver": driver, "address": address} | well | more
 
@@ -46,16 +46,16 @@ INSTRUMENTS = [
     instrument("actuator", "canopen", "socketcand://127.0.0.1:29536/can0 node 5", age_s=0.004),
     instrument("load_cell", "serial", "/dev/pts/3", lost=12, corrupted=2, resynchronised=1),
     instrument("lvdt", "serial", "/dev/pts/4"),
-    instrument("coil_amplifier", "modbus_tcp", "127.0.0.1:1502 unit 1", received=40_211, skew_s=None),
-    instrument("thermometer", "modbus_rtu", "/dev/pts/5 unit 2", connected=False, age_s=83.0, skew_s=None,
-               words="no reply for 83 s; is it powered?"),
+    instrument("coil_amplifier", "modbus_tcp", "127.0.0.1:1502 unit 1", received=40_211, clock_error_bound_s=None),
+    instrument("thermometer", "modbus_rtu", "/dev/pts/5 unit 2", connected=False, age_s=83.0, clock_error_bound_s=None,
+               message="no reply for 83 s; is it powered?"),
 ]  # fmt: skip
 
 
 def fit_job(run_id: str, state: str, **more: Any) -> dict[str, Any]:
     """A job of a run."""
     return {
-        "id": f"job-{run_id}", "run": run_id, "kind": "identify", "state": state, "doing": "", "attempts": 1,
+        "id": f"job-{run_id}", "run": run_id, "kind": "identify", "state": state, "activity": "", "attempts": 1,
         "error": "", "settings": {}, "created": "2025-03-04T09:20:00Z", "started": None, "finished": None,
         "rmse_n": None, "noise_floor_n": None, "result": "",
     } | more  # fmt: skip
@@ -79,7 +79,7 @@ class FakeBench:
         self.state = "idle"
         self.trip = ""
         self.run: dict[str, Any] | None = None
-        self.mounting = "homed"
+        self.reference_state = "homed"
         self.step: dict[str, Any] | None = None
         self.refusals = 1
         self.silent = False
@@ -87,9 +87,9 @@ class FakeBench:
         found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost"),
-            "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", doing="identify: refine, start 3 of 8")]),
+            "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity="identify: refine, start 3 of 8")]),
             "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
-            "run-0": run(0, None, state="cut_off", duration_s=None, reason="the log has no end"),
+            "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
         self.began = time.monotonic()
 
@@ -98,7 +98,7 @@ class FakeBench:
         return {
             "state": self.state, "trip": self.trip, "run": self.run, "finished": [], "instruments": INSTRUMENTS,
             "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
-            "drive_kind": "coil_v", "drive_unit": "V", "mounting": self.mounting, "step": self.step,
+            "drive_kind": "coil_v", "drive_unit": "V", "reference_state": self.reference_state, "step": self.step,
         }  # fmt: skip
 
     def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
@@ -175,10 +175,10 @@ def rig_routes(bench: FakeBench) -> APIRouter:
 
     @router.post("/agent/prepare")
     async def prepare(wanted: dict[str, Any]) -> Any:
-        if wanted["step"] == "home" and bench.mounting == "mounted":
+        if wanted["step"] == "home" and bench.reference_state == "mounted":
             return problem(409, "Not possible", CLAMPED)
-        bench.mounting = {"mount": "mounted"}.get(wanted["step"], bench.mounting)
-        bench.step = {"step": wanted["step"], "outcome": "done", "words": f"{wanted['step']} is done"}
+        bench.reference_state = {"mount": "mounted"}.get(wanted["step"], bench.reference_state)
+        bench.step = {"step": wanted["step"], "outcome": "done", "message": f"{wanted['step']} is done"}
         return bench.status()
 
     @router.post("/silence")

@@ -9,7 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.fake_page_service import CLAMPED, REFUSAL, SILENCE, STATIC, TOKEN, TRIP, FakeBench, served
+from bench.agent_protocol import AgentStatus
+from bench.service.views import MethodSummary, Run
+from tests.support.fake_page_service import (
+    CLAMPED,
+    METHODS,
+    REFUSAL,
+    SILENCE,
+    STATIC,
+    TOKEN,
+    TRIP,
+    FakeBench,
+    served,
+)
 
 FOLDER = Path(__file__).with_name("javascript")
 NODE = shutil.which("node")
@@ -40,6 +52,16 @@ def seen(bench):
     return json.loads(result.stdout)
 
 
+def test_the_fake_service_answers_in_the_forms_of_the_service():
+    bench = FakeBench()
+    bench.begin({"method": "quick", "specimen": "MR-0042", "operator": "A. Meyer"})
+    AgentStatus.model_validate(bench.status())
+    for run in bench.runs.values():
+        Run.model_validate_json(json.dumps(run))
+    for method in METHODS:
+        MethodSummary.model_validate(method)
+
+
 def browser_test(function):
     for mark in needs_browser:
         function = mark(function)
@@ -64,12 +86,12 @@ def test_every_plot_moves_and_every_reading_has_its_unit(seen):
 
 @browser_test
 def test_runs_and_instruments_say_what_is_wrong(seen):
-    lossy, identified, done, cut_off = seen["runs"]
+    lossy, identified, done, truncated = seen["runs"]
     assert "12 samples of force were lost" in lossy
     assert "refine, start 3 of 8" in identified
     assert "1.31\u00a0N / 1.26\u00a0N" in done
     assert "1.04 times the floor" in done
-    assert "the log has no end" in cut_off
+    assert "the log has no end" in truncated
     assert "no reply for 83 s" in seen["instruments"][-1]
     assert "1 min 23 s" in seen["instruments"][-1]
 

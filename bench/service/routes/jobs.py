@@ -15,24 +15,24 @@ router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 @router.get("")
 def list_jobs(
-    desk: Context, limit: Annotated[int, Query(ge=1, le=200, description="how many at most")] = 50
+    context: Context, limit: Annotated[int, Query(ge=1, le=200, description="how many at most")] = 50
 ) -> JobList:
     """Jobs, newest first."""
-    return JobList(items=tuple(make_job_view(row) for row in desk.catalogue.list_jobs(limit)))
+    return JobList(items=tuple(make_job_view(row) for row in context.catalogue.list_jobs(limit)))
 
 
 @router.get("/{job_id}")
-def get_job(job_id: str, desk: Context) -> Job:
+def get_job(job_id: str, context: Context) -> Job:
     """One job."""
-    return make_job_view(desk.get_job(job_id))
+    return make_job_view(context.get_job(job_id))
 
 
 @router.post("/{job_id}/cancel")
-async def cancel_job(job_id: str, desk: Context) -> Job:
+async def cancel_job(job_id: str, context: Context) -> Job:
     """End a job; one that a worker has begun is `running` until its process has ended."""
-    row = await asyncio.to_thread(desk.get_job, job_id)
+    row = await asyncio.to_thread(context.get_job, job_id)
     if row.state not in UNFINISHED_STATES:
         raise make_conflict(
             "job-ended", "The job has ended", f"job {job_id} is {row.state}; nothing is left to cancel"
         )
-    return make_job_view(await desk.job_manager.cancel(row))
+    return make_job_view(await context.job_manager.cancel(row))

@@ -13,14 +13,14 @@ _CLOSE_UNAUTHORISED = 4401
 
 
 @router.websocket("/live")
-async def stream_live(websocket: WebSocket, desk: Context, token: str = "") -> None:
+async def stream_live(websocket: WebSocket, context: Context, token: str = "") -> None:
     """Messages `{"topic": ..., "data": ...}` of status, samples, event, job and run, until either side ends it."""
     # Before the token is looked at: a browser is told the code only of a connection that was open.
     await websocket.accept()
-    if not desk.access.is_allowed(token):
+    if not context.access.is_allowed(token):
         await websocket.close(_CLOSE_UNAUTHORISED, "the token is missing or wrong")
         return
-    with desk.live.subscribe() as mailbox:
+    with context.live.subscribe() as mailbox:
         sending = asyncio.create_task(_send(websocket, mailbox))
         try:
             while True:

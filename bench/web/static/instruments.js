@@ -35,13 +35,13 @@ function fill(row, instrument) {
   const [name, connection, ...numbers] = row.children;
   write(name.firstChild, instrument.name);
   write(name.lastChild, `${instrument.driver}, ${instrument.address}`);
-  const well = instrument.connected && !instrument.words;
+  const well = instrument.connected && !instrument.message;
   connection.firstChild.className = `mark ${well ? "good" : instrument.connected ? "fair" : "bad"}`;
   write(connection.firstChild, instrument.connected ? "connected" : "not connected");
-  write(connection.lastChild, instrument.words);
-  const { age_s, received, lost, corrupted, resynchronised, skew_s } = instrument;
-  const skew = skew_s === null ? "no clock" : `± ${shortTime(skew_s)}`;
-  const texts = [shortTime(age_s), count(received), count(lost), count(corrupted), count(resynchronised), skew];
+  write(connection.lastChild, instrument.message);
+  const { age_s, received, lost, corrupted, resynchronised, clock_error_bound_s: bound } = instrument;
+  const clockError = bound === null ? "no clock" : `± ${shortTime(bound)}`;
+  const texts = [shortTime(age_s), count(received), count(lost), count(corrupted), count(resynchronised), clockError];
   texts.forEach((text, k) => write(numbers[k], text));
   [lost, corrupted, resynchronised].forEach((number, k) => numbers[k + 2].classList.toggle("worth-a-look", number > 0));
 }

@@ -13,11 +13,11 @@ export class Preparation {
   }
 
   /** Takes a status of the agent. */
-  take({ state, mounting, step }) {
-    write(byId("mounting"), mounting || "unknown");
+  take({ state, reference_state: reference, step }) {
+    write(byId("reference-state"), reference.replaceAll("_", " ") || "unknown");
     if (step && JSON.stringify(step) !== this.shown) {
       this.shown = JSON.stringify(step);
-      write(byId("prepare-note"), step.words);
+      write(byId("prepare-note"), step.message);
     }
     for (const button of byId("prepare").querySelectorAll("button")) button.disabled = state !== "idle";
   }

@@ -4,7 +4,7 @@ import { file, get, post } from "./api.js";
 import { byId, duration, element, fixed, instant, write } from "./format.js";
 
 const PAGE = 20;
-const OUTCOMES = { clean: "good", lossy: "fair", truncated: "fair", incomplete: "bad", cut_off: "bad" };
+const OUTCOMES = { clean: "good", lossy: "fair", truncated: "fair", incomplete: "bad" };
 const GOING_ON = ["queued", "running"];
 
 export class RunList {
@@ -86,7 +86,7 @@ export class RunList {
     if (job && GOING_ON.includes(job.state)) {
       const path = `jobs/${encodeURIComponent(job.id)}/cancel`;
       button = this.button(run, "job", "Cancel", true, () => this.attempt(run, "Not cancelled", path));
-    } else if (run.state === "cut_off") {
+    } else if (run.state === "truncated") {
       button = this.button(run, "job", "Salvage", true, () => this.attempt(run, "Not salvaged", `runs/${id}/salvage`));
     }
     return element("td", { className: "actions" },
@@ -156,5 +156,5 @@ const newtons = (force) => (force === null ? "–" : `${fixed(force, 2)}\u00a0N`
 const whole = (text) => element("span", { className: "number whole" }, `${text} `);
 
 function jobWords(job) {
-  return [job.state, job.state === "running" ? job.doing : "", job.error].filter(Boolean).join(": ");
+  return [job.state, job.state === "running" ? job.activity : "", job.error].filter(Boolean).join(": ");
 }

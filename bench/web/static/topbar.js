@@ -87,8 +87,8 @@ export class TopBar {
     const { run, trip } = this.status ?? {};
     if (state === "unknown") return this.stale ? `No data for ${fixed(this.age, 0)} s. ${this.silence}` : "";
     if (state === "tripped") return trip;
-    if (state === "preparing" && !this.run) return this.status.step?.words ?? "";
-    if (!run) return this.status?.step?.words ?? "Ready for a run.";
+    if (state === "preparing" && !this.run) return this.status.step?.message ?? "";
+    if (!run) return this.status?.step?.message ?? "Ready for a run.";
     const what = `${run.method} on ${run.specimen || "an unnamed specimen"}`;
     if (state === "idle") return `Last run: ${what}: ${[run.outcome, run.reason].filter(Boolean).join(", ")}.`;
     const by = run.operator ? ` by ${run.operator}` : "";

@@ -92,7 +92,7 @@ async function prepare() {
   await page.click("#prepare button[data-step=move]");
   await hasText("#prepare-note", "move is done");
   await page.click("#prepare button[data-step=mount]");
-  await hasText("#mounting", "mounted");
+  await hasText("#reference-state", "mounted");
   await page.click("#prepare button[data-step=home]");
   await page.click("#home-dialog button[value=cancel]");
   await page.click("#prepare button[data-step=home]");

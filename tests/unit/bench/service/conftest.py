@@ -48,16 +48,16 @@ class Service:
         assert answer.status_code == status, answer.text
         return answer.json()
 
-    def await_(self, path, wanted):
-        """What a path answers, once it is as wanted."""
+    def wait_for(self, path, wanted):
+        """Return the answer at a path as soon as it is as wanted."""
         deadline = time.monotonic() + PATIENCE
         while not wanted(found := self.get(path)):
             assert time.monotonic() < deadline, found
         return found
 
-    def tell(self, what, *given):
-        """Have the engine say what became of a job, on the service's own loop."""
-        self.client.portal.call(getattr(self.engine.listener, what), *given)
+    def report(self, event, *given):
+        """Have the engine report an event of a job, on the service's event loop."""
+        self.client.portal.call(getattr(self.engine.listener, event), *given)
 
     @asynccontextmanager
     async def _engine(self):

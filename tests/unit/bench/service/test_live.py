@@ -6,7 +6,7 @@ import time
 import orjson
 
 from bench.agent_protocol.messages import AgentEvent, RunCommand, Samples
-from bench.service import run_book
+from bench.service import run_registry
 from bench.service.agent_monitor import join_batches
 from bench.service.live import MAX_QUEUED_BATCHES, MAX_QUEUED_EVENTS, SubscriberQueue
 from tests.support.service_logs import write_complete_log
@@ -71,14 +71,14 @@ def test_runs_and_jobs_are_told_as_they_change(service):
         assert next(told)["outcome"] == "clean"
         job = next(messages(socket, "job"))
         assert (job["run"], job["state"]) == (run["id"], "queued")
-        service.tell("began", job["id"])
-        service.tell("says", job["id"], "identify")
-        assert next(found for found in messages(socket, "job") if found["doing"])["doing"] == "identify"
+        service.report("on_started", job["id"])
+        service.report("on_progress", job["id"], "identify")
+        assert next(found for found in messages(socket, "job") if found["activity"])["activity"] == "identify"
 
 
 def test_a_new_listener_learns_the_status_at_once(service):
     service.agent.publish()
-    service.await_("/agent", lambda found: found["state"] == "idle")
+    service.wait_for("/agent", lambda found: found["state"] == "idle")
     with listening(service) as socket:
         service.agent.publish()
         next(messages(socket, "status"))
@@ -88,13 +88,13 @@ def test_a_new_listener_learns_the_status_at_once(service):
 
 def test_a_slow_listener_gets_the_newest_and_a_bounded_number():
     async def slow():
-        mailbox = SubscriberQueue()
+        subscriber = SubscriberQueue()
         for k in range(1000):
-            mailbox.put("samples", "", f"samples {k}")
-            mailbox.put("event", "", f"event {k}")
-            mailbox.put("status", "", f"status {k}")
-            mailbox.put("job", f"job {k % 2}", f"job {k}")
-        return await mailbox.take()
+            subscriber.put("samples", "", f"samples {k}")
+            subscriber.put("event", "", f"event {k}")
+            subscriber.put("status", "", f"status {k}")
+            subscriber.put("job", f"job {k % 2}", f"job {k}")
+        return await subscriber.take()
 
     found = asyncio.run(slow())
     assert [text for text in found if text.startswith("status")] == ["status 999"]
@@ -124,7 +124,7 @@ def test_a_silent_agent_shows_in_health(service):
 
 
 def test_what_cannot_be_used_of_the_agent_does_not_end_the_listening(service, caplog, monkeypatch):
-    monkeypatch.setattr("bench.service.agent_monitor._AGAIN", 0.001)
+    monkeypatch.setattr("bench.service.agent_monitor._RETRY_TIME", 0.001)
     with listening(service) as socket:
         service.agent.publish(
             AgentEvent.model_construct(time_ns=object(), kind="alarm", text="of another version")
@@ -135,34 +135,34 @@ def test_what_cannot_be_used_of_the_agent_does_not_end_the_listening(service, ca
 
 
 def test_a_status_that_cannot_be_written_down_is_said_and_taken_up_again(service, caplog, monkeypatch):
-    book = service.client.app.state.desk.book
-    begin, refusals = book._add_run, iter([RuntimeError("the catalogue is locked")])
+    registry = service.client.app.state.context.registry
+    add_run, refusals = registry._add_run, iter([RuntimeError("the catalogue is locked")])
 
     async def refuses_once(run):
         if (error := next(refusals, None)) is not None:
             raise error
-        return await begin(run)
+        return await add_run(run)
 
-    monkeypatch.setattr(book, "_begin", refuses_once)
+    monkeypatch.setattr(registry, "_add_run", refuses_once)
     service.agent.send(RunCommand(method={"name": "quick"}))
     service.agent.publish()
     eventually(lambda: "status_unused" in caplog.text)
     service.agent.publish()
-    service.await_("/runs", lambda found: [run["id"] for run in found["items"]] == ["run-1"])
+    service.wait_for("/runs", lambda found: [run["id"] for run in found["items"]] == ["run-1"])
 
 
 def test_a_folder_that_cannot_be_looked_through_once_is_looked_through_again(service, caplog, monkeypatch):
-    monkeypatch.setattr("bench.service.run_registry.SCAN_EVERY", 0.01)
+    monkeypatch.setattr("bench.service.run_registry.SCAN_PERIOD", 0.01)
     refusals = iter([ValueError("a defect")])
-    look = run_book.scan
+    scan_logs = run_registry.scan_logs
 
     def refuses_once(*given):
         if (error := next(refusals, None)) is not None:
             raise error
-        return look(*given)
+        return scan_logs(*given)
 
-    monkeypatch.setattr(run_book, "scan", refuses_once)
+    monkeypatch.setattr(run_registry, "scan_logs", refuses_once)
     service.start()
     eventually(lambda: "scan_failed" in caplog.text)
     write_complete_log(service.data / "found.mcap", "found")
-    service.await_("/runs", lambda found: [run["id"] for run in found["items"]] == ["found"])
+    service.wait_for("/runs", lambda found: [run["id"] for run in found["items"]] == ["found"])

@@ -174,10 +174,10 @@ class TestProcesses:
             start_agent(tmp_path / "bench.toml", Link(silent=10**9), tmp_path, command)
 
     def test_one_that_never_answers_is_ended(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(processes, "AGENT_WITHIN", 0.05)
+        monkeypatch.setattr(processes, "AGENT_TIMEOUT", 0.05)
         ended = []
         monkeypatch.setattr(
-            processes, "end", lambda process, within: (ended.append(within), terminate(process, within))
+            processes, "terminate", lambda process, within: (ended.append(within), terminate(process, within))
         )
         command = (sys.executable, "-c", "import time; time.sleep(60)")
         with pytest.raises(ServiceError, match=r"did not answer within 0\.05 s; see"):
@@ -214,7 +214,7 @@ class TestProcesses:
             if len(begun) == 3:
                 raise asyncio.CancelledError
 
-        monkeypatch.setattr(processes, "_start", counted)
+        monkeypatch.setattr(processes, "_start_process", counted)
         monkeypatch.setattr(processes.asyncio, "sleep", not_long)
         with contextlib.suppress(asyncio.CancelledError):
             asyncio.run(processes._keep_alive(speaking("no scheduler", 3), tmp_path / "worker.log"))

@@ -1,5 +1,7 @@
 """A run from its start to its fit, as the REST interface tells it."""
 
+from pathlib import Path
+
 import pytest
 
 from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
@@ -11,23 +13,21 @@ SUMMARY = {"result": "converged", "rmse_n": 2.5, "held_out_rmse_n": None, "noise
 def finish(service, run, outcome="clean"):
     write_complete_log(service.data / run["log"], run["id"], outcome)
     service.agent.finish(outcome)
-    return service.await_(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
+    return service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
 
 
 def the_job(service, run):
-    return service.await_(f"/runs/{run}", lambda found: found["jobs"])["jobs"][-1]
+    return service.wait_for(f"/runs/{run}", lambda found: found["jobs"])["jobs"][-1]
 
 
 def complete(service, job):
     spec = service.engine.specs[job["id"]]
-    service.tell("began", job["id"])
-    from pathlib import Path
-
-    result = Path(order.result)
+    service.report("on_started", job["id"])
+    result = Path(spec.result)
     result.mkdir()
     (result / FIT_FILE).write_text('{"schema": "mrbench.fit/1"}')
     (result / REPORT_FILE).write_text("<!doctype html><title>report</title>")
-    service.tell("done", job["id"], SUMMARY)
+    service.report("on_done", job["id"], SUMMARY)
 
 
 def start(service, **more):
@@ -56,7 +56,7 @@ def test_progress_is_told_while_it_runs(service):
     run = start(service)
     service.agent.progress(11.5, "10mm_1Hz_0.2V")
     path = f"/runs/{run['id']}"
-    found = service.await_(path, lambda found: found["progress"] and found["progress"]["elapsed_s"] > 0)
+    found = service.wait_for(path, lambda found: found["progress"] and found["progress"]["elapsed_s"] > 0)
     assert found["progress"] == {"elapsed_s": 11.5, "duration_s": 23.1, "segment": "10mm_1Hz_0.2V"}
     assert finish(service, run)["progress"] is None
 
@@ -85,7 +85,7 @@ def test_a_finished_run_is_identified_and_its_files_are_served(service, outcome)
 def test_an_incomplete_run_is_catalogued_and_not_identified(service):
     run = start(service)
     assert finish(service, run, "incomplete")["reason"] == "said so"
-    service.await_(f"/runs/{run['id']}", lambda found: found["outcome"] == "incomplete")
+    service.wait_for(f"/runs/{run['id']}", lambda found: found["outcome"] == "incomplete")
     assert service.engine.specs == {}
 
 
@@ -98,15 +98,15 @@ def test_the_same_work_is_never_ordered_twice(service):
     assert service.post(f"/runs/{run['id']}/identify")["id"] == job["id"]
     other = service.post(f"/runs/{run['id']}/identify", {"hold_out_after": 0.8}, 201)
     assert other["id"] != job["id"]
-    assert service.engine.specs[other["id"]].key != service.engine.orders[job["id"]].key
+    assert service.engine.specs[other["id"]].key != service.engine.specs[job["id"]].key
 
 
 def test_a_job_that_failed_says_why_and_can_be_asked_for_again(service):
     run = start(service)
     finish(service, run)
     job = the_job(service, run["id"])
-    service.tell("began", job["id"])
-    service.tell("failed", job["id"], "identify: too little is left to fit")
+    service.report("on_started", job["id"])
+    service.report("on_failed", job["id"], "identify: too little is left to fit")
     assert service.get(f"/jobs/{job['id']}")["error"] == "identify: too little is left to fit"
     detail = service.client.get(f"/api/v1/runs/{run['id']}/fit").json()["detail"]
     assert "too little is left to fit" in detail
@@ -120,9 +120,9 @@ def test_a_job_that_waits_is_cancelled_at_once_and_one_that_runs_when_it_has_sto
     waiting = the_job(service, run["id"])
     assert service.post(f"/jobs/{waiting['id']}/cancel")["state"] == "cancelled"
     running = service.post(f"/runs/{run['id']}/identify", status=201)
-    service.tell("began", running["id"])
+    service.report("on_started", running["id"])
     assert service.post(f"/jobs/{running['id']}/cancel")["state"] == "running"
-    service.tell("cancelled", running["id"])
+    service.report("on_cancelled", running["id"])
     assert service.get(f"/jobs/{running['id']}")["state"] == "cancelled"
     assert service.engine.cancelled == [(waiting["id"], False), (running["id"], True)]
     assert service.client.post(f"/api/v1/jobs/{running['id']}/cancel").status_code == 409
@@ -133,8 +133,8 @@ def test_what_has_ended_stays_as_it_ended(service):
     finish(service, run)
     job = the_job(service, run["id"])
     service.post(f"/jobs/{job['id']}/cancel")
-    service.tell("began", job["id"])
-    service.tell("done", job["id"], SUMMARY)
+    service.report("on_started", job["id"])
+    service.report("on_done", job["id"], SUMMARY)
     assert service.get(f"/jobs/{job['id']}")["state"] == "cancelled"
 
 
@@ -143,9 +143,9 @@ def test_a_job_that_never_ends_is_given_up_after_three_attempts(service):
     finish(service, run)
     job = the_job(service, run["id"])
     for _ in range(3):
-        service.tell("began", job["id"])
+        service.report("on_started", job["id"])
     assert service.get(f"/jobs/{job['id']}")["attempts"] == 3
-    service.tell("began", job["id"])
+    service.report("on_started", job["id"])
     found = service.get(f"/jobs/{job['id']}")
     assert (found["state"], found["attempts"]) == ("failed", 3)
     assert "3 times" in found["error"]
@@ -189,7 +189,7 @@ def test_a_remote_agent_is_not_told_where_to_write(service):
     run = start(service)
     assert service.agent.commands[-1].log is None
     service.agent.finish("clean")
-    service.await_(f"/runs/{run['id']}", lambda found: found["outcome"] == "clean")
+    service.wait_for(f"/runs/{run['id']}", lambda found: found["outcome"] == "clean")
     assert service.client.get(f"/api/v1/runs/{run['id']}/log").status_code == 404
     assert service.client.post(f"/api/v1/runs/{run['id']}/identify").status_code == 409
 
@@ -200,7 +200,7 @@ def test_a_run_that_ended_while_the_service_was_away_is_found(service):
     write_complete_log(service.data / run["log"], run["id"])
     service.agent.finish()
     service.start()
-    found = service.await_(f"/runs/{run['id']}", lambda found: found["outcome"])
+    found = service.wait_for(f"/runs/{run['id']}", lambda found: found["outcome"])
     assert found["outcome"] == "clean"
     assert the_job(service, run["id"])["state"] == "queued"
 
@@ -210,8 +210,8 @@ def test_a_run_that_nobody_has_announced_is_found(service):
     write_complete_log(service.data / "from_elsewhere.mcap", "foreign", first_s=3600.0)
     write_complete_log(service.data / "bought.mcap", "bought.csv", source="import", started=None)
     service.start()
-    service.await_("/runs", lambda found: len(found["items"]) == 2)
-    found = service.await_("/runs/foreign", lambda found: found["jobs"])
+    service.wait_for("/runs", lambda found: len(found["items"]) == 2)
+    found = service.wait_for("/runs/foreign", lambda found: found["jobs"])
     assert found["started"] == STARTED.replace(hour=11).isoformat().replace("+00:00", "Z")
     imported = service.get("/runs/bought")
     assert (imported["source"], imported["jobs"]) == ("import", [])
@@ -225,7 +225,7 @@ def test_a_log_without_its_end_is_flagged_and_can_be_mended(service):
     service.agent.forget()
     service.start()
     service.agent.publish()
-    found = service.await_(f"/runs/{run['id']}", lambda found: found["state"] == "cut_off")
+    found = service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "truncated")
     assert "salvage" in found["reason"]
     assert service.client.post(f"/api/v1/runs/{run['id']}/identify").status_code == 409
     mended = service.post(f"/runs/{run['id']}/salvage")
@@ -240,7 +240,7 @@ def test_a_run_that_left_no_log_is_not_said_to_go_on(service):
     service.end()
     service.start()
     service.agent.publish()
-    found = service.await_(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
+    found = service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
     assert found["outcome"] == "incomplete"
     assert "before it wrote a log" in found["reason"]
 
@@ -249,11 +249,11 @@ def test_unfinished_jobs_are_submitted_again_under_their_key(service):
     run = start(service)
     finish(service, run)
     job = the_job(service, run["id"])
-    service.tell("began", job["id"])
+    service.report("on_started", job["id"])
     key = service.engine.specs[job["id"]].key
     service.start()
     assert service.engine.specs[job["id"]].key == key
-    service.tell("began", job["id"])
+    service.report("on_started", job["id"])
     assert service.get(f"/jobs/{job['id']}")["attempts"] == 2
     complete_folder = service.engine.specs[job["id"]].result
     assert complete_folder == str(service.data / f"{run['log'].removesuffix('.mcap')}.fit-{key[:12]}")

@@ -23,7 +23,7 @@ Numbers = npt.NDArray[np.float64]
 
 
 def plot_shrinkage(diagnosis: Diagnosis) -> Figure:
-    """Plot the force errors on held-out strokes with and without the named effects, and the stages' probabilities."""
+    """Plot the force errors on held-out strokes with and without the effects, and the stages' probabilities."""
     figure = make_figure(9.0, 2.9)
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     _draw_errors(left, diagnosis)

@@ -188,7 +188,7 @@ def compute_plot_envelope(time: Array, values: Array, drive: Array, bins: int = 
 
 
 def draw_envelope(axes: Axes, envelope: PlotEnvelope, colours: DriveColours | str) -> None:
-    """Draw an envelope as vertical lines, coloured by drive or in one colour, with a line through their middles."""
+    """Draw an envelope as vertical lines in colours by drive or one colour, with a line through their middles."""
     low, high = np.stack([envelope.time, envelope.low], 1), np.stack([envelope.time, envelope.high], 1)
     line_colours = colours if isinstance(colours, str) else list(colours.scale.to_rgba(envelope.drive))
     verticals = list(np.stack([low, high], axis=1))

@@ -29,8 +29,8 @@ CAPTIONS = {
     "time": ("Force against time", "Steady cycles at each drive, overlaid."),
     "residual": (
         "Force error",
-        "Simulated minus recorded force over the whole recording: lowest and highest value of each short interval. "
-        "Noise alone extends slightly beyond twice the noise floor.",
+        "Simulated minus recorded force over the whole recording: lowest and highest value of each short interval."
+        " Noise alone extends slightly beyond twice the noise floor.",
     ),
     "drives": ("Force error by drive", "Root mean square over all samples at each drive, with the noise floor."),
     "gap": (

@@ -160,7 +160,7 @@ def _find_time_step(recording: Recording) -> float:
 
 
 def _find_first_rise(time: Array, displacement: Array, frequency: float) -> float:
-    """Return the time [s] at which a periodic motion first rises through its mean, or slightly before its start."""
+    """Return the time [s] of a periodic motion's first rise through its mean, possibly just before its start."""
     # Computed from the phase, because with noise the motion passes its mean several times at each rise.
     wave = np.sum((displacement - displacement.mean()) * np.exp(-2j * math.pi * frequency * time))
     turns = (-0.25 - float(np.angle(wave)) / (2 * math.pi)) % 1.0

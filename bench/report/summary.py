@@ -59,8 +59,8 @@ def _describe_origin(log: Log, fit: Fit, is_fitted_log: bool) -> list[Finding]:
         findings.append(
             Finding(
                 "plain",
-                f"The law was fitted to another recording ({names}). All simulated forces here are predictions for "
-                "strokes that the fit did not use.",
+                f"The law was fitted to another recording ({names}). All simulated forces here are predictions for"
+                " strokes that the fit did not use.",
             )
         )
     elif len(fit.provenance.logs) > 1:
@@ -86,8 +86,8 @@ def _describe_error(prediction: Prediction) -> Finding:
         return Finding("plain", f"{text} The error is {100 * (ratio - 1):.0f} % above the noise floor.")
     return Finding(
         "warning",
-        f"{text} The error is {format_significant(ratio, 2)} times the noise floor: damper or bench have an effect "
-        "that the fitted law lacks. `mrbench diagnose` searches for it.",
+        f"{text} The error is {format_significant(ratio, 2)} times the noise floor: damper or bench have an effect"
+        " that the fitted law lacks. `mrbench diagnose` searches for it.",
     )
 
 
@@ -169,6 +169,6 @@ def _format_delay(delay: DelayEstimate) -> str:
 def _describe_calibration() -> Finding:
     return Finding(
         "plain",
-        "Gain errors of the force and displacement channels cannot be distinguished from parameters of the damper: "
-        "the parameters rely on the calibration.",
+        "Gain errors of the force and displacement channels cannot be distinguished from parameters of the damper:"
+        " the parameters rely on the calibration.",
     )

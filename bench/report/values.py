@@ -66,7 +66,7 @@ def format_unit(unit: str) -> str:
 def format_quantity(value: float, interval: tuple[float, float] | None, unit: str) -> FormattedQuantity:
     """Format a number with its interval, in a suitable multiple of its unit.
 
-    An interval is written as ``± h`` with the larger half if both halves are similar, otherwise as ``(from … to)``.
+    An interval is written as ``± h`` with the larger half if both halves are similar, else as ``(from … to)``.
     The number is rounded to two significant digits of the half interval.
     """
     scale, prefix, power = _choose_multiple(value, interval, unit)
@@ -103,6 +103,6 @@ def _append_power(text: str, power: int) -> str:
 
 
 def _format_fixed(value: float, decimals: int) -> str:
-    """Format a number rounded to decimals, which may be negative, with a minus sign but without a negative zero."""
+    """Format a number rounded to decimals (may be negative), with a minus sign but without a negative zero."""
     rounded = round(value, decimals) + 0.0  # removes the sign of a zero
     return f"{rounded:.{max(0, decimals)}f}".replace("-", "−")

@@ -1,7 +1,7 @@
 """Assessment of planned strokes by the identification, a process of its own that exchanges files.
 
-The bench writes the exact samples of a method and of strokes that could be added to it; the identification predicts
-the uncertainty of the parameters that they determine.
+The bench writes the exact samples of a method and of strokes that could be added to it. The identification
+predicts the uncertainty of the parameters that they determine.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Single run on the simulated plant without wires: method to samples, samples to the rig, its channels to a log."""
+"""Single run on the simulated plant without wires, from the method to the log."""
 
 import platform
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -58,7 +58,7 @@ def run_from_plant(
 
     Raises:
         MethodError: the method cannot be compiled within its limits.
-        RunError: the folder of the log does not exist, the rig fails, or the method drives in another unit than the rig.
+        RunError: the folder of the log does not exist, the rig fails, or method and rig drive in different units.
         LogError: the log cannot be written.
     """
     if not out.parent.is_dir():
@@ -69,8 +69,9 @@ def run_from_plant(
     rig_channels = play_scenario(scenario, commands, progress, (*rig, *options))
     if rig_channels.info["drive_unit"] != method.drive_unit:
         raise RunError(
-            f"method {method.name} drives in {method.drive_unit}, the scenario {scenario} in "
-            f"{rig_channels.info['drive_unit']}; use a method with the drive_kind {rig_channels.info['drive_kind']}"
+            f"method {method.name} drives in {method.drive_unit}, the scenario {scenario} in"
+            f" {rig_channels.info['drive_unit']}; use a method with the drive_kind"
+            f" {rig_channels.info['drive_kind']}"
         )
     values = _make_columns(programme, rig_channels)
     with LogWriter(out, _make_header(method, rig_channels, identity, seed)) as log:

@@ -180,7 +180,7 @@ class Actuator:
             if blocks := self._decoder.pop_blocks():
                 return blocks
             if time.monotonic() >= deadline:
-                self._node.check_alive()
+                self._node.heartbeat.check_alive()
                 return []
 
     def snapshot_decoder(self) -> dict[str, Any]:

@@ -87,7 +87,7 @@ class ServoDrive:
             NoReplyError, NotConnectedError: the drive or the bus is gone.
         """
         node = self._node
-        node.wait_for_heartbeat(_STEP_TIMEOUT)
+        node.heartbeat.wait_for_next(_STEP_TIMEOUT)
         self._identify()
         # An earlier master may have left it in motion.
         self.stop(settings.stop_timeout)

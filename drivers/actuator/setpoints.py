@@ -52,7 +52,7 @@ class SetpointSender:
 
     def start_session(self) -> None:
         """Record that the drive has just been set up; after a restart it must be set up again."""
-        self._boot_count = self._node.boot_count
+        self._boot_count = self._node.heartbeat.boot_count
         self.disarm()
 
     def arm(self, position: float) -> None:
@@ -113,7 +113,7 @@ class SetpointSender:
         """Check that the drive still follows setpoints."""
         if self._armed_ns is None:
             raise RefusedError(f"{self._name}: not armed; call arm first")
-        self._node.check_alive()
+        self._node.heartbeat.check_alive()
         reason = self._find_stop_reason(self._armed_ns, decoder)
         if reason:
             self._armed_ns = None
@@ -123,7 +123,7 @@ class SetpointSender:
 
     def _find_stop_reason(self, armed_ns: int, decoder: ActuatorDecoder) -> str:
         """Return why the drive no longer follows setpoints; empty if it does."""
-        if self._node.boot_count != self._boot_count:
+        if self._node.heartbeat.boot_count != self._boot_count:
             return "it has restarted (connect again)"
         if faults := self._drive.faults:
             return "; ".join(map(str, faults))

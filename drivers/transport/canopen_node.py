@@ -1,9 +1,9 @@
-"""One CANopen node: state, objects, process data, heartbeat and emergencies.
+"""One CANopen node: objects, process data and emergencies; `canopen_heartbeat` monitors its state.
 
-The `canopen` library provides object dictionary, object access and the layout of process data. It does not
-monitor heartbeats, and it reports timeouts, invalid replies and refusals by one class of error. This module adds
-both. After a timeout it waits once more for the late reply before the next request, so that the late reply is not
-taken for the reply to that request.
+The `canopen` library provides object dictionary, object access and the layout of process data. It reports
+timeouts, invalid replies and refusals by one class of error; this module distinguishes them. After a timeout it
+waits once more for the late reply before the next request, so that the late reply is not taken for the reply to
+that request.
 """
 
 import contextlib
@@ -21,6 +21,7 @@ import canopen
 from drivers.errors import InvalidReplyError, NoReplyError, NotConnectedError, OutOfRangeError, RefusedError
 from drivers.instrument import Clock
 from drivers.transport.can_bus import CanBus
+from drivers.transport.canopen_heartbeat import HeartbeatConsumer
 from drivers.transport.canopen_pdo import read_mapping
 
 # Errors are raised or counted here; without a handler the library writes them to standard error as well.
@@ -29,7 +30,6 @@ logging.getLogger("canopen").addHandler(logging.NullHandler())
 # The library raises one class for timeouts and for invalid replies; its text distinguishes them.
 _TIMEOUT_MESSAGE = "No SDO response received"
 _EMERGENCY = struct.Struct("<HB5s")
-_STATES = {0: "boot-up", 4: "stopped", 5: "operational", 127: "pre-operational"}
 _MAX_EMERGENCIES = 1000
 """Emergencies that are kept."""
 _SYNC_FRAME = (0x80, b"")
@@ -85,12 +85,9 @@ class CanopenNode:
         self.node_id = node_id
         self.emergencies: list[Emergency] = []
         """Latest emergencies, oldest first."""
-        self.boot_count = 0
-        """Boot-up messages received."""
+        self.heartbeat = HeartbeatConsumer(name, bus, clock, heartbeat_timeout)
         self._name = name
         self._bus = bus
-        self._clock = clock
-        self._heartbeat_timeout = heartbeat_timeout
         self._network = _Network(bus)
         self._node = canopen.RemoteNode(node_id, str(eds))
         self._sdo_timeout = self._node.sdo.RESPONSE_TIMEOUT = sdo_timeout
@@ -104,41 +101,14 @@ class CanopenNode:
         self._setpoint_mapping = read_mapping(self._node.rpdo[1])
         self._setpoint_values: dict[int, int] = {}
         self._sdo_lock = threading.Lock()
-        self._heartbeat = threading.Condition()
-        self._state: int | None = None
-        self._heartbeat_ns: int | None = None
         self._reply_pending = False
 
     def attach(self) -> None:
         """Begin to receive on the bus."""
-        self._state = self._heartbeat_ns = None
+        self.heartbeat.reset()
         self._reply_pending = False
         self._bus.unsubscribe(self._on_frame)  # otherwise each connection would add another subscription
         self._bus.subscribe(self._on_frame)
-
-    @property
-    def state(self) -> str:
-        """Network state in the last heartbeat."""
-        if self._state is None:
-            return "unknown, without a heartbeat"
-        return _STATES.get(self._state, f"unknown state {self._state}")
-
-    def check_alive(self) -> None:
-        """Check the age of the last heartbeat.
-
-        Raises:
-            NotConnectedError: the bus is gone.
-            NoReplyError: the last heartbeat is older than the heartbeat timeout.
-        """
-        self._bus.check_open()
-        if self._heartbeat_ns is None:
-            raise NoReplyError(f"{self._name}: no heartbeat since it was connected; check its power and node id")
-        age = (self._clock() - self._heartbeat_ns) / 1e9
-        if age > self._heartbeat_timeout:
-            raise NoReplyError(
-                f"{self._name}: no heartbeat for {age:.3f} s, {self._heartbeat_timeout:g} s are allowed; "
-                f"last state {self.state}; check its power and its cable"
-            )
 
     def command_state(self, state: int, timeout: float) -> None:
         """Send a network command and wait until a heartbeat confirms it.
@@ -151,17 +121,7 @@ class CanopenNode:
             NoReplyError: it was not confirmed in time.
         """
         self._bus.send(0x000, bytes([{5: 1, 4: 2, 127: 128}[state], self.node_id]))
-        self._wait_until(lambda: self._state == state, f"state {_STATES[state]}", timeout)
-
-    def wait_for_heartbeat(self, timeout: float) -> None:
-        """Wait for the next heartbeat.
-
-        Raises:
-            NoReplyError: none arrived within ``timeout`` [s].
-        """
-        # Compare times, not states: a node in the wrong state is still there.
-        previous_ns = self._heartbeat_ns
-        self._wait_until(lambda: self._heartbeat_ns != previous_ns, "a heartbeat", timeout)
+        self.heartbeat.wait_for_state(state, timeout)
 
     def upload(self, index: int, sub: int = 0) -> int | str:
         """Read an object, in the unit of the wire.
@@ -279,26 +239,13 @@ class CanopenNode:
     def _on_frame(self, received_ns: int, identifier: int, data: bytes) -> None:
         """Handle a frame, on the receiving thread."""
         if identifier == 0x700 + self.node_id:
-            with self._heartbeat:
-                # The highest bit does not belong to the state.
-                self._state, self._heartbeat_ns = data[0] & 0x7F, received_ns
-                self.boot_count += self._state == 0
-                self._heartbeat.notify_all()
+            self.heartbeat.on_heartbeat(received_ns, data)
         elif identifier == 0x80 + self.node_id:
             code, register, _ = _EMERGENCY.unpack(data)
             # A new list each time: other threads iterate over the old one.
             self.emergencies = [*self.emergencies, Emergency(code, register, received_ns)][-_MAX_EMERGENCIES:]
         elif identifier == 0x580 + self.node_id:
             self._network.notify(identifier, bytearray(data), received_ns / 1e9)
-
-    def _wait_until(self, condition: Callable[[], bool], event: str, timeout: float) -> None:
-        with self._heartbeat:
-            if not self._heartbeat.wait_for(condition, timeout):
-                self._bus.check_open()
-                raise NoReplyError(
-                    f"{self._name}: waited {timeout:g} s for {event}; last state: {self.state}; "
-                    "check its power, its cable and its node id"
-                )
 
 
 def _format_object(index: int, sub: int) -> str:

@@ -13,7 +13,9 @@ from tests.support.reference import generator
 
 HIDDEN = {".venv", "node_modules", "build", "runs"}
 ALL_PAGES = [p for p in sorted(blocks.ROOT.rglob("*.md")) if not HIDDEN & set(p.relative_to(blocks.ROOT).parts)]
-REFERENCE = sorted(blocks.ROOT.glob("docs/reference/*.md"))
+GENERATED = [
+    p for p in sorted(blocks.ROOT.glob("docs/reference/*.md")) if "<!-- generated: " in p.read_text("utf-8")
+]
 COMMAND_LINE = blocks.ROOT / "docs" / "reference" / "command-line.md"
 
 
@@ -44,20 +46,23 @@ def test_every_page_of_the_documentation_is_reached_from_its_index(page):
     assert page == index or str(page.relative_to(index.parent)) in index.read_text()
 
 
-@pytest.mark.parametrize("page", REFERENCE, ids=name)
+def test_most_pages_of_the_reference_have_generated_parts():
+    assert len(GENERATED) == 5
+
+
+@pytest.mark.parametrize("page", GENERATED, ids=name)
 def test_generated_parts_of_the_reference_are_up_to_date(page):
     text = page.read_text()
-    assert "<!-- generated: " in text
     assert text == generator.fill_page(text), "run: python docs/generate_reference.py"
 
 
 @pytest.mark.parametrize("command", sorted(entry.name for entry in entry_points(group="mrbench.commands")))
-def test_every_command_stands_in_the_reference(command):
+def test_every_command_is_in_the_reference(command):
     assert f"\n## {command}\n" in COMMAND_LINE.read_text()
 
 
 @pytest.mark.parametrize("readme", sorted(blocks.ROOT.glob("*/**/README.md")), ids=name)
-def test_a_room_is_described_in_at_most_sixty_lines(readme):
+def test_a_package_is_described_in_at_most_sixty_lines(readme):
     if not HIDDEN & set(readme.relative_to(blocks.ROOT).parts):
         assert len(readme.read_text().splitlines()) <= 60
 

@@ -16,7 +16,8 @@ from drivers.actuator.actuator import Actuator
 from drivers.errors import DriverError
 from drivers.load_cell.load_cell import LoadCell
 from drivers.modbus.coil_amplifier import CoilAmplifier
-from drivers.modbus.sensors import Lvdt, Thermometer
+from drivers.modbus.lvdt import Lvdt
+from drivers.modbus.thermometer import Thermometer
 from drivers.transport.can_bus import CanAddress
 from drivers.transport.modbus_address import ModbusAddress
 from sim_rig.live.clock import RunningClock

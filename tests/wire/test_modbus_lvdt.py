@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import DriverError, InvalidReplyError, NotConnectedError, OutOfRangeError
-from drivers.modbus.sensors import Lvdt
+from drivers.modbus.lvdt import Lvdt
 from drivers.transport.modbus_address import ModbusAddress
 from sim_rig.instruments.modbus_sensor import SensorDevice
 from sim_rig.live.device_clock import DeviceClock

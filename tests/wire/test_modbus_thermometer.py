@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import OutOfRangeError
-from drivers.modbus.sensors import Thermometer
+from drivers.modbus.thermometer import Thermometer
 from sim_rig.instruments.modbus_sensor import SensorDevice
 from sim_rig.protocols.modbus_server import ReplyFault
 from tests.support.modbus_bench import TIMEOUT, WIRES, FakeSignals, serve, truth, wait_until

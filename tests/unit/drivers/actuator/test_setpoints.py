@@ -21,8 +21,7 @@ class Bench:
     def __init__(self):
         self.now, self.sent, self.heartbeat_count = 0, [], 0
         node = SimpleNamespace(
-            boot_count=0,
-            check_alive=lambda: None,
+            heartbeat=SimpleNamespace(boot_count=0, check_alive=lambda: None),
             send_process_data=self.sent.append,
             send_heartbeat=self.count_heartbeat,
         )

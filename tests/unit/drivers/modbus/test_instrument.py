@@ -4,7 +4,7 @@ import pytest
 
 from drivers.errors import NoReplyError, NotConnectedError, RefusedError
 from drivers.modbus.coil_amplifier import CoilAmplifier
-from drivers.modbus.sensors import Lvdt
+from drivers.modbus.lvdt import Lvdt
 from drivers.transport.modbus_address import ModbusAddress
 
 SOMEWHERE = ModbusAddress("tcp://127.0.0.1:5020")

@@ -1,8 +1,6 @@
-"""Modbus sensors: instruments that only measure. Each is one row: its wire file, and its name in messages.
+"""Modbus sensor: an instrument that only measures. Each sensor is a subclass: its wire file, its name in messages.
 
-Each sensor samples by its own clock and keeps its latest samples in a ring buffer, see
-`drivers.modbus.ring_buffer_reader`. An LVDT sample is tens of milliseconds old when it arrives
-(`ModbusInstrument.compute_age`): good enough for the record, but too late for fast limits.
+It samples by its own clock and keeps its latest samples in a ring buffer, see `drivers.modbus.ring_buffer_reader`.
 """
 
 from typing import ClassVar
@@ -39,15 +37,3 @@ class ModbusSensor(ModbusInstrument):
 
     def make_safe(self) -> None:
         """Do nothing: a sensor moves nothing."""
-
-
-class Lvdt(ModbusSensor):
-    """LVDT conditioner: displacement at the actuator, 1 kHz."""
-
-    kind, display_name = "lvdt", "an LVDT"
-
-
-class Thermometer(ModbusSensor):
-    """Thermometer: temperature of the damper's cylinder, 10 Hz."""
-
-    kind, display_name = "thermometer", "a thermometer"

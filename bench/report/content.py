@@ -147,7 +147,7 @@ def make_header_rows(log: Log, sha256: str) -> PropertyRows:
         ("Run", _shorten(run.get("id", ""))),
         ("Specimen", run.get("specimen", "")),
         ("Method", _shorten(run.get("method", ""))),
-        ("Recorded", _start(run.get("utc_offset", ""), int(log.samples["time_ns"][0]))),
+        ("Recorded", _format_start_time(run.get("utc_offset", ""), int(log.samples["time_ns"][0]))),
         ("Operator", run.get("operator", "")),
         ("Length", f"{len(time)} samples, {format_significant(float(time[-1]), 4)} s"),
         ("Drive", f"{run.get('drive_kind', '')} [{run.get('drive_unit', '')}]"),
@@ -158,7 +158,7 @@ def make_header_rows(log: Log, sha256: str) -> PropertyRows:
     return [(name, value) for name, value in rows if value]
 
 
-def _start(utc_offset: str, first_ns: int) -> str:
+def _format_start_time(utc_offset: str, first_ns: int) -> str:
     """Format UTC of the first sample; the bench clock may have started weeks before."""
     start = utc_at(utc_offset, first_ns)
     return "not known" if start is None else f"{start:%Y-%m-%d %H:%M:%S} UTC"

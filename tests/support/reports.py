@@ -1,4 +1,4 @@
-"""A small log, a fit and a series for the tests of the report."""
+"""Small log, fit and series for the tests of reports."""
 
 import json
 
@@ -58,7 +58,7 @@ def write_log(path, outcome="clean", specimen="damper 7"):
             log.write_samples(time_ns[rows], {name: column[rows] for name, column in samples.items()})
             log.write_segment(int(time_ns[rows][-1]), phase="end", **mark)
         if outcome != "clean":
-            log.lost("force", 3)
+            log.count_lost("force", 3)
     return path
 
 

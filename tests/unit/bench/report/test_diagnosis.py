@@ -56,14 +56,14 @@ def written(tmp_path):
     return write
 
 
-def test_the_page_names_the_effect_its_size_and_what_else_it_could_be(written, tmp_path):
+def test_the_page_names_the_effect_its_size_and_the_alternatives(written, tmp_path):
     log = write_log(tmp_path / "strokes.mcap")
     report = page.gather(log, None, written())
     drawn = page.make_figures(report)
     assert {"gap", "where"} <= drawn.keys()
     text = page.render(report, drawn, "mrbench report", datetime(2026, 5, 4, tzinfo=UTC))
     for words in (
-        "Something is missing in the simulation, and it is known what.",
+        "The simulation lacks effects, which the diagnosis names.",
         "The force lags by 4.1 ms",
         "delay: 4.10 ± 0.10 ms",
         "97 % (95 % to 99 %)",
@@ -78,18 +78,20 @@ def test_the_page_names_the_effect_its_size_and_what_else_it_could_be(written, t
 def test_without_a_gap_nothing_is_named_and_no_map_is_drawn(written):
     found = read_diagnosis(written(verdict="no_gap", effects=[], alternatives=[], next_stroke=None))
     assert diagnosis_plots.plot_gap_map(found, "V") is None
-    said = make_context(found, "V")
-    assert (said["effects"], said["next"], said["mood"]) == ([], "", "good")
-    assert ("Part of the gap that this closes", "97 % (95 % to 99 %)") not in said["gap"]
+    context = make_context(found, "V")
+    assert (context["effects"], context["next"], context["severity"]) == ([], "", "good")
+    assert ("Part of the gap that they close", "97 % (95 % to 99 %)") not in context["gap"]
 
 
-def test_what_stays_unexplained_is_a_warning_with_its_probability(written):
-    said = make_context(read_diagnosis(written(verdict="unexplained", effects=[], unknown_probability=0.93)), "V")
-    assert said["mood"] == "warning"
-    assert said["sets"][-1] == ("something that the library does not have", "93 %")
+def test_an_unexplained_gap_is_a_warning_with_its_probability(written):
+    context = make_context(
+        read_diagnosis(written(verdict="unexplained", effects=[], unknown_probability=0.93)), "V"
+    )
+    assert context["severity"] == "warning"
+    assert context["sets"][-1] == ("an effect outside the library", "93 %")
 
 
-def test_the_map_puts_each_gap_where_its_condition_and_phase_are(written):
+def test_the_map_shows_each_gap_at_its_condition_and_phase(written):
     figure = diagnosis_plots.plot_gap_map(read_diagnosis(written()), "V")
     grid = np.asarray(figure.axes[0].images[0].get_array())
     names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
@@ -97,8 +99,8 @@ def test_the_map_puts_each_gap_where_its_condition_and_phase_are(written):
     assert (grid[0, 0], grid[1, 2], grid.sum()) == (3.0, 12.0, 15.0)
 
 
-def test_a_fit_in_its_place_is_refused_with_what_is_wanted(tmp_path):
+def test_a_fit_in_place_of_a_diagnosis_is_refused(tmp_path):
     path = tmp_path / "fit.json"
     path.write_text('{"schema": "mrbench.fit/1"}')
-    with pytest.raises(ReportError, match=r"fit\.json: not a diagnosis made by `mrbench diagnose`"):
+    with pytest.raises(ReportError, match=r"fit\.json: not a diagnosis written by `mrbench diagnose`"):
         read_diagnosis(path)

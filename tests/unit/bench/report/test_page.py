@@ -80,26 +80,26 @@ def test_the_page_is_well_formed_and_needs_nothing_from_elsewhere(html):
 @pytest.mark.parametrize(
     "said",
     [
-        "The law repeats the recorded force to 2.00 N",
-        "the noise floor of the recording is 1.90 N",
-        "On the strokes held out of the fit the error is 2.04 N (1.7 %), on those fitted 1.98 N (1.6 %).",
+        "The law reproduces the recorded force with an error of 2.00 N",
+        "The noise floor of the recording is 1.90 N",
+        "On held-out strokes the force error is 2.04 N (1.7 %), on fitted strokes 1.98 N (1.6 %).",
         "0.1 V 2.00 N 1.05 times 2.1 % 1500",
         "F a 44.862 ± 0.097 N",
         "D y 29.24 ± 0.20 µm",
         "c 0b 2200 ± 3100 N·s/(m·V)",
-        "not fixed hardly seen",
-        "Lag of force behind displacement 4 ± 14 µs (within what the clocks explain",
+        "not known hardly seen",
+        "Delay of force behind displacement 4 ± 14 µs (explained by the clock errors",
         "k0 and k1 −0.939",
         "cycle to cycle over 6 cycles",
-        "simulated minus recorded force is −0.23 N in the mean",
+        "mean of simulated minus recorded force over all 3000 samples is −0.23 N",
         "Recorded 2026-05-04 03:02:01 UTC",
         "force N 1000 Hz none 1 ms",
-        "Made 2026-05-04 03:02 UTC",
+        "Created 2026-05-04 03:02 UTC",
         "mrbench report strokes.mcap",
         "The recording is clean",
     ],
 )
-def test_the_page_says_its_numbers_with_their_units(html, said):
+def test_the_page_shows_numbers_with_their_units(html, said):
     assert said in Checked(html).text
 
 
@@ -119,74 +119,74 @@ def test_names_from_a_log_or_a_fit_are_escaped(made, drawn):
 def test_a_recording_alone_makes_a_page(log):
     alone = page.gather(log, None)
     html = page.render(alone, page.make_figures(alone), "mrbench report", MADE)
-    assert "this page shows the recording alone" in Checked(html).text
+    assert "this page shows only the recording" in Checked(html).text
     assert len(Checked(html).sources) == 3
     assert "RMSE" not in html
 
 
-def told(log, fit_changes=None, seen=True, **errors):
+def describe(log, fit_changes=None, is_fitted_log=True, **errors):
     fit = Fit.model_validate(fit_document(**(fit_changes or {})))
-    return {f.text: f.severity for f in make_findings(read_log(log), fit, prediction(**errors), seen)}
+    return {f.text: f.severity for f in make_findings(read_log(log), fit, prediction(**errors), is_fitted_log)}
 
 
-def test_a_fit_from_another_log_is_said(log):
-    said = " ".join(told(log, seen=False))
-    assert "made from another recording (strokes.mcap)" in said
-    assert "a prediction on strokes that the fit never saw" in said
-    assert "held out" not in said
+def test_a_fit_from_another_log_is_noted(log):
+    said = " ".join(describe(log, is_fitted_log=False))
+    assert "fitted to another recording (strokes.mcap)" in said
+    assert "predictions for strokes that the fit did not use" in said
+    assert "held-out" not in said
 
 
 @pytest.mark.parametrize(
-    ("rmse", "mood", "words"),
+    ("rmse", "severity", "words"),
     [
-        (1.92, "good", "No model could come noticeably closer"),
-        (2.14, "plain", "13 % above the floor"),
-        (9.5, "warning", "5.0 times the floor"),
+        (1.92, "good", "No model could be noticeably better"),
+        (2.14, "plain", "13 % above the noise floor"),
+        (9.5, "warning", "5.0 times the noise floor"),
     ],
 )
-def test_the_error_is_weighed_against_the_floor(log, rmse, mood, words):
-    (found,) = [(text, m) for text, m in told(log, rmse=rmse).items() if text.startswith("The law repeats")]
+def test_the_error_is_weighed_against_the_floor(log, rmse, severity, words):
+    (found,) = [(text, m) for text, m in describe(log, rmse=rmse).items() if text.startswith("The law reproduces")]
     assert words in found[0]
-    assert found[1] == mood
+    assert found[1] == severity
 
 
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"drive_range": [0.15, 0.3]}, "drive goes from 0.1 to 0.3 V, the fit knows 0.15 to 0.3 V"),
+        ({"drive_range": [0.15, 0.3]}, "is 0.1 to 0.3 V, the fitted range is 0.15 to 0.3 V"),
         ({"specimen": "damper 8"}, "The fit is of specimen “damper 8”, this recording of “damper 7”."),
-        ({"result": "not converged: stopped"}, "The fit says of itself: not converged: stopped."),
+        ({"result": "not converged: stopped"}, "Result of the fit: not converged: stopped."),
     ],
 )
-def test_what_a_reader_must_beware_of_is_a_warning(log, changes, words):
-    (mood,) = [mood for text, mood in told(log, changes).items() if words in text]
-    assert mood == "warning"
+def test_limits_of_a_fit_are_warnings(log, changes, words):
+    (severity,) = [severity for text, severity in describe(log, changes).items() if words in text]
+    assert severity == "warning"
 
 
-def test_what_cannot_be_known_is_said(log):
-    said = " ".join(told(log))
-    assert "1 of the 2 parameters that a force can show are fixed by the strokes; these are not: c0_b." in said
+def test_undetermined_parameters_are_named(log):
+    said = " ".join(describe(log))
+    assert "The strokes determine 1 of the 2 parameters that affect the force. Not determined: c0_b." in said
     assert "A, is a gauge" in said
-    assert "they rest on the calibration" in said
+    assert "the parameters rely on the calibration" in said
 
 
-def test_a_lag_that_clocks_do_not_explain_is_said(log):
+def test_a_delay_that_clock_errors_do_not_explain_is_noted(log):
     nuisances = fit_document()["nuisances"]
     late = {**nuisances["force_delay"], "value": 2e-3, "ci95": [1.9e-3, 2.1e-3], "outside_prior": True}
-    said = told(log, {"nuisances": {**nuisances, "force_delay": late}})
-    assert "The force channel's lag of 2.00 ± 0.10 ms is more than the clocks explain." in said
+    said = describe(log, {"nuisances": {**nuisances, "force_delay": late}})
+    assert "The delay of the force channel, 2.00 ± 0.10 ms, exceeds what clock errors explain." in said
 
 
 def test_a_lossy_recording_is_a_warning(tmp_path):
     lossy = read_log(write_log(tmp_path / "lossy.mcap", outcome="lossy"))
-    assert make_findings(lossy, None, None, seen=False)[0].severity == "warning"
+    assert make_findings(lossy, None, None, is_fitted_log=False)[0].severity == "warning"
 
 
 def test_the_command_writes_the_page_and_its_plots(log, tmp_path):
     report(log, tmp_path / "page.html", plots=tmp_path / "plots")
     assert "<!doctype html>" in (tmp_path / "page.html").read_text()
     assert {one.name for one in (tmp_path / "plots").iterdir()} == {
-        f"{name}.{kind}" for name in ("loops", "time", "whole") for kind in ("png", "svg")
+        f"{name}.{kind}" for name in ("loops", "time", "recording") for kind in ("png", "svg")
     }
 
 
@@ -202,7 +202,7 @@ def test_a_bad_fit_or_log_leaves_no_page(log, tmp_path):
 
 
 def test_a_fit_without_its_prediction_is_refused(made, drawn):
-    with pytest.raises(ReportError, match="only with its prediction"):
+    with pytest.raises(ReportError, match="needs its prediction"):
         page.render(dataclasses.replace(made, prediction=None), drawn, "", MADE)
 
 

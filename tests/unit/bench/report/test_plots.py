@@ -42,7 +42,7 @@ def test_one_stroke_shows_its_constant_drives_and_another_the_varying_one(record
     assert varying.title == "sine, 10 mm, 2 Hz, drive steps"
 
 
-def test_a_loop_is_one_whole_cycle_and_a_time_picture_two(recording):
+def test_a_loop_shows_one_cycle_and_a_plot_over_time_two(recording):
     trace = choose_strokes(recording)[0].traces[0]
     assert trace.loop.stop - trace.loop.start == pytest.approx(250, abs=2)
     assert trace.rows.stop - trace.rows.start == pytest.approx(500, abs=2)
@@ -58,9 +58,9 @@ def test_without_segments_the_middle_of_the_recording_is_shown(recording):
     assert rows.stop - rows.start == 2000
 
 
-def test_of_a_swift_motion_less_is_shown(recording):
-    swift = np.sin(2 * np.pi * 40 * recording.time)
-    (middle,) = choose_strokes(dataclasses.replace(recording, segments=(), displacement=swift))
+def test_a_fast_motion_is_shown_for_a_shorter_time(recording):
+    fast = np.sin(2 * np.pi * 40 * recording.time)
+    (middle,) = choose_strokes(dataclasses.replace(recording, segments=(), displacement=fast))
     rows = middle.traces[0].rows
     assert np.ptp(recording.time[rows]) == pytest.approx(0.25, abs=0.02)
 
@@ -68,24 +68,24 @@ def test_of_a_swift_motion_less_is_shown(recording):
 def test_of_many_strokes_the_slowest_and_the_fastest_are_among_those_shown(recording):
     one = recording.segments[0]
     segments = tuple(dataclasses.replace(one, amplitude=0.01 * 2**k, start=one.start + k) for k in range(6))
-    assert len(choose_strokes(dataclasses.replace(recording, segments=segments), most=3)) == 3
+    assert len(choose_strokes(dataclasses.replace(recording, segments=segments), limit=3)) == 3
 
 
-def test_a_drive_has_the_same_colour_in_every_picture(recording):
+def test_a_drive_has_the_same_colour_in_every_plot(recording):
     colours = DriveColours.from_recording(recording)
     assert colours.get_colour(0.1) != colours.get_colour(0.3)
     first = plots.plot_error_by_drive(prediction().per_drive, 1.9, recording).axes[0].patches[0]
     assert first.get_facecolor()[:3] == pytest.approx(colours.get_colour(0.10003))
 
 
-def test_no_line_has_more_than_so_many_points():
+def test_no_line_has_more_than_the_largest_number_of_points():
     for length in (10, MAX_POINTS, 50_001):
         kept = np.arange(length)[decimate(slice(0, length))]
         assert len(kept) <= MAX_POINTS
         assert kept[0] == 0
 
 
-def test_an_envelope_keeps_the_extremes_and_reaches_over_no_gap():
+def test_an_envelope_keeps_the_extremes_and_does_not_extend_over_a_gap():
     time = np.concatenate([np.arange(1000) * 1e-3, 5 + np.arange(1000) * 1e-3])
     values = np.sin(40 * time)
     values[777] = 9.0
@@ -95,7 +95,7 @@ def test_an_envelope_keeps_the_extremes_and_reaches_over_no_gap():
     assert not np.any((found.time > 1.0) & (found.time < 5.0))
 
 
-def test_a_constant_drive_is_drawn_as_a_line_and_over_no_gap():
+def test_a_constant_drive_is_drawn_as_a_line_with_gaps():
     time = np.concatenate([np.arange(1000) * 1e-3, 5 + np.arange(1000) * 1e-3])
     axes = make_figure(4.0, 3.0).subplots()
     draw_envelope(axes, compute_plot_envelope(time, np.full(2000, 0.3), time, bins=20), "black")
@@ -117,7 +117,7 @@ def test_every_axis_has_its_unit(recording, draw, labels):
     assert all("[" in label for label in said if label)
 
 
-def test_the_residual_is_drawn_with_the_floor_and_what_was_held_out(recording):
+def test_the_residual_is_drawn_with_the_floor_and_the_held_out_part(recording):
     figure = plots.plot_residual(recording, 1.9)
     said = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert said == ["± twice the noise floor", "held out of the fit"]
@@ -130,7 +130,7 @@ def test_there_is_no_residual_without_a_fit(log):
 
 def test_a_log_without_a_shown_channel_is_refused_by_its_name(log):
     without = {name: values for name, values in log.samples.items() if name != "force"}
-    with pytest.raises(ReportError, match=r"run\.mcap: no channel 'force' in the samples"):
+    with pytest.raises(ReportError, match=r"run\.mcap: the samples have no channel 'force'"):
         make_recording(dataclasses.replace(log, samples=without), None)
 
 
@@ -140,9 +140,9 @@ def test_plots_are_saved_as_png_and_svg(recording, tmp_path):
     assert "<svg" in (tmp_path / "plots" / "whole.svg").read_text()
 
 
-def test_plots_that_cannot_be_saved_cost_one_line(tmp_path):
+def test_plots_that_cannot_be_saved_give_one_message(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(ReportError, match="plots cannot be written there"):
+    with pytest.raises(ReportError, match="plots cannot be written"):
         plots.save_figures({}, tmp_path / "file")
 
 

@@ -1,4 +1,4 @@
-"""Compiled trajectories against scipy's LSODA with a right-hand side in Python, both against a tight reference."""
+"""Compiled simulation against scipy's LSODA with a right-hand side in Python, both against a tight reference."""
 
 import time
 

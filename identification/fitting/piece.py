@@ -44,13 +44,13 @@ class Piece:
     def _simulate_channel(self, model: SimulationModel, sensitivities: bool) -> tuple[Array, Array]:
         if self.low_pass is not None:
             excitation = self._oversample(self.low_pass.oversampling)
-            trajectory = simulate(model, excitation, sensitivities=sensitivities)
-            force, J = self.low_pass.apply(trajectory.force), trajectory.sensitivities
+            response = simulate(model, excitation, sensitivities=sensitivities)
+            force, J = self.low_pass.apply(response.force), response.sensitivities
             return force, self.low_pass.apply(J) if sensitivities else J
         # Backlash begins and ends within a sample, where the damper's velocity jumps.
         factor = self.backlash_oversampling if model.select_forms("displacement_backlash") else 1
-        trajectory = simulate(model, self._oversample(factor), sensitivities=sensitivities)
-        return trajectory.force[::factor], trajectory.sensitivities[::factor]
+        response = simulate(model, self._oversample(factor), sensitivities=sensitivities)
+        return response.force[::factor], response.sensitivities[::factor]
 
     def make_fast(self) -> "Piece":
         """Return the fast variant: filter and backlash at the samples only, slightly inexact."""

@@ -1,5 +1,6 @@
-"""Compiled trajectories of the law with chosen effects, and their exact sensitivities."""
+"""Compiled simulation of the law with chosen effects, and its exact sensitivities."""
 
+from identification.simulate.chain import MAX_TRAVEL, simulate
 from identification.simulate.channel import (
     apply_force_channel,
     compute_parallel_force,
@@ -13,25 +14,24 @@ from identification.simulate.simulation_model import (
     SENSITIVITY_COLUMNS,
     ActiveEffect,
     Excitation,
+    Response,
     SimulationModel,
-    Trajectory,
 )
-from identification.simulate.trajectory import MAX_TRAVEL, simulate
 
 __all__ = [
     "MAX_TRAVEL",
     "SENSITIVITY_COLUMNS",
     "ActiveEffect",
     "DamperMotion",
-    "StepCounts",
-    "SimulationModel",
     "Excitation",
-    "Trajectory",
-    "compute_parallel_force",
-    "differentiate_parallel_force",
+    "Response",
+    "SimulationModel",
+    "StepCounts",
+    "apply_force_channel",
     "compute_damper_field",
     "compute_damper_motion",
+    "compute_parallel_force",
     "compute_scale_factors",
-    "apply_force_channel",
+    "differentiate_parallel_force",
     "simulate",
 ]

@@ -1,4 +1,4 @@
-"""What stands between the damper's own force and the recorded one: forces beside the law, inertia, the channel."""
+"""Path from the law's force to the recorded force: parallel forces, inertia and the force channel."""
 
 from functools import partial
 from typing import Any
@@ -13,27 +13,27 @@ from identification.simulate.motion import DamperMotion, compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
 
 _DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-8, 1e-7
-"""[m], [m/s] of differences of forces beside the law."""
+"""Steps of differences of parallel forces [m], [m/s]."""
 _ACCELERATION_STEP = 1e-3
-"""[m/s^2] of differences of inertia."""
+"""Step of differences of inertia [m/s^2]."""
 _LAG_STEP = 1e-7
-"""[s] of differences of the channel's lag."""
+"""Step of differences of the channel's lag [s]."""
 _DEADBAND = 1e-6
-"""[m] to either side that a lip does not feel: the noise of a rest would wear away what it keeps."""
+"""Half width of the deadband of a seal's displacement [m]; without it, noise at rest would erase the memory."""
 
 
-def compute_parallel_force(setting: SimulationModel, motion: DamperMotion, h: float) -> Array:
-    """(N,) sum of the forces beside the law [N]; samples are h [s] apart."""
+def compute_parallel_force(model: SimulationModel, motion: DamperMotion, h: float) -> Array:
+    """Compute the sum of all parallel forces (N,) [N]; samples are h [s] apart."""
     total = np.zeros(len(motion.x))
-    for _, form, values in setting.select_forms("parallel_force"):
+    for _, form, values in model.select_forms("parallel_force"):
         total += form.function(motion.x, motion.v, *values)
-    for _, form, values in setting.select_forms("hysteretic_force", "relaxation_force"):
+    for _, form, values in model.select_forms("hysteretic_force", "relaxation_force"):
         total += _compute_memory_force(form, h, motion.x, motion.v, *values)
     return total
 
 
 def _compute_memory_force(form: Form, h: float, x: Array, v: Array, *values: float) -> Array:
-    """(N,) force [N] beside the law of a form that remembers the way, or follows it in time."""
+    """Compute the parallel force (N,) [N] of a form with memory or relaxation."""
     if form.action == "relaxation_force":
         exchange = values[[q.symbol for q in form.parameters].index("exchange_time")]
         return np.asarray(form.function(x, v, apply_lag(x, exchange, h), *values))
@@ -46,7 +46,7 @@ def _compute_memory_force(form: Form, h: float, x: Array, v: Array, *values: flo
 
 @njit_cached
 def _apply_deadband(x: Array, still: float) -> Array:
-    """(N,) displacement [m] that follows another one only where that goes beyond so much to either side."""
+    """Return the displacement (N,) [m] that follows x only where x leaves a band of ``still`` to either side."""
     found = np.empty(len(x))
     held = x[0]
     for i in range(len(x)):
@@ -56,16 +56,16 @@ def _apply_deadband(x: Array, still: float) -> Array:
 
 
 def differentiate_parallel_force(
-    setting: SimulationModel, motion: DamperMotion, h: float
+    model: SimulationModel, motion: DamperMotion, h: float
 ) -> tuple[Array, list[tuple[int, Array]]]:
-    """Slopes of ``beside`` over the motion's unknowns (M, N), and over parameters by their columns."""
+    """Differentiate the parallel forces over the unknowns of the motion (M, N), and over parameters by column."""
     moving, own = np.zeros_like(motion.dx), []
-    for at, form, values in setting.select_forms("parallel_force"):
+    for at, form, values in model.select_forms("parallel_force"):
         over_x, over_v = _differentiate_by_motion(form, values, motion)
         moving += over_x * motion.dx + over_v * motion.dv
         rows = differentiate_by_parameters(partial(form.function, motion.x, motion.v), values, form.parameters)
         own += [(at + k, np.broadcast_to(row, len(motion.x))) for k, row in enumerate(rows)]
-    for at, form, values in setting.select_forms("hysteretic_force", "relaxation_force"):
+    for at, form, values in model.select_forms("hysteretic_force", "relaxation_force"):
         moving += np.stack(
             [
                 _differentiate_memory_force(form, h, values, motion, dx, dv)
@@ -80,7 +80,7 @@ def differentiate_parallel_force(
 def _differentiate_memory_force(
     form: Form, h: float, values: tuple[float, ...], motion: DamperMotion, dx: Array, dv: Array
 ) -> Array:
-    """(N,) slope of a force that remembers the way, over an unknown that moves the motion by dx and dv."""
+    """Differentiate a force with memory over an unknown with derivatives dx, dv (N,) of the motion."""
     step = _DISPLACEMENT_STEP / max(float(np.abs(dx).max()), 1e-9)
     ahead, back = (
         _compute_memory_force(form, h, motion.x + s * dx, motion.v + s * dv, *values) for s in (step, -step)
@@ -95,42 +95,44 @@ def _differentiate_by_motion(form: Form, values: tuple[float, ...], motion: Damp
 
 
 def apply_force_channel(
-    setting: SimulationModel,
-    stroke: Excitation,
+    model: SimulationModel,
+    excitation: Excitation,
     motion: DamperMotion,
     force: Array,
     J: Array | None,
     first: int,
     delays: list[int],
 ) -> Array:
-    """The force as the channel sees it; its sensitivities are moved along in place.
+    """Apply inertia and the force channel to a force; its sensitivities are transformed in place.
 
     Args:
-        setting, stroke, motion: as in the trajectory.
-        force: (N,) of the damper on its mounting [N].
-        J: (N, U) its sensitivities; None where they are not asked for.
-        first: column of the effects' first parameter.
-        delays: columns that the delay of the motion moves.
+        model, excitation, motion: as in the simulation.
+        force: (N,) force of the damper on its mounting [N].
+        J: (N, U) sensitivities of the force, or None.
+        first: column of the first parameter of the effects.
+        delays: columns of the unknowns that delay the motion.
 
     Returns:
-        (N,) [N].
+        (N,) recorded force [N].
     """
-    # In the order of the chain: the channel's lag comes last and holds back all that was added before it.
-    for at, form, values in setting.select_forms("inertia"):
+    # In the order of the chain: the channel's lag comes last and acts on all forces added before it.
+    for at, form, values in model.select_forms("inertia"):
         force = force + form.function(motion.a, *values)
         if J is not None:
             _add_columns(J, first + at, partial(form.function, motion.a), form, values)
             steepness = _differentiate_inertia(form, values, motion)
             J[:, delays] += (steepness * motion.da)[:, None]
-            for early, _, _ in setting.select_forms("displacement_shift"):
-                # A displacement that is late is a force that is early.
+            for early, _, _ in model.select_forms("displacement_shift"):
+                # A delay of the displacement acts as a negative delay of the force.
                 J[:, first + early] -= steepness * motion.da
-    for at, form, values in setting.select_forms("additive_force"):
-        force = force + form.function(stroke.time, stroke.sampled_drive, *values)
+    for at, form, values in model.select_forms("additive_force"):
+        force = force + form.function(excitation.time, excitation.sampled_drive, *values)
         if J is not None:
-            _add_columns(J, first + at, partial(form.function, stroke.time, stroke.sampled_drive), form, values)
-    for at, _, values in setting.select_forms("force_lag"):
-        force = _apply_lag_to_both(force, values[0], 1.0 / stroke.rate, J, first + at)
+            _add_columns(
+                J, first + at, partial(form.function, excitation.time, excitation.sampled_drive), form, values
+            )
+    for at, _, values in model.select_forms("force_lag"):
+        force = _apply_lag_to_both(force, values[0], 1.0 / excitation.rate, J, first + at)
     return force
 
 
@@ -144,11 +146,11 @@ def _add_columns(J: Array, at: int, function: Any, form: Form, values: tuple[flo
 
 
 def _apply_lag_to_both(force: Array, lag: float, h: float, J: Array | None, at: int) -> Array:
-    """The force behind a first-order lag; sensitivities J are lagged in place."""
+    """Return the force after a first-order lag; the sensitivities J are lagged in place."""
     found = apply_lag(force, lag, h)
     if J is not None:
         J[:] = apply_lag(J, lag, h)
-        # No channel is early: at a lag of zero the difference is one-sided.
+        # A lag cannot be negative, so the difference is one-sided at zero.
         lower = max(lag - _LAG_STEP, 0.0)
         J[:, at] = (apply_lag(force, lag + _LAG_STEP, h) - apply_lag(force, lower, h)) / (lag + _LAG_STEP - lower)
     return found

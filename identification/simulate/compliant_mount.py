@@ -1,17 +1,17 @@
-"""The march where the fixture gives way: the damper's displacement is a third state.
+"""Integration on a compliant mount, where the displacement X of the damper is a third state.
 
-With R = carried(x - X) + d (x' - X') - k1 X + f0 - p the force that is left for the dashpot c1 (X where the damper
-stands, x where the actuator does, d the film of the connection, p the force beside the law), the law reads
+With the force on the dashpot c1, R = transmitted(x - X) + d (x' - X') - k1 X + f0 - p (x displacement of the
+actuator, d film damping of the connection, p parallel force), the law reads
 
     y' = R / c1      X' = slip + y'      slip = (R - F zeta - k0 (X - y)) / c0      zeta' = g(slip, zeta)
 
-so that each implicit stage of a linear spring is linear in y and X and leaves one scalar equation in zeta, as on a
-rigid fixture; one with a gap, or one that hardens, is taken straight about where it stands until it stands there.
-The force on the cell is what the connection carries. Forces beside the law are taken at the actuator's motion.
+For a linear spring, each implicit stage is linear in y and X. It reduces to one scalar equation in zeta, as on a
+rigid mount. A connection with gap or hardening is linearised repeatedly until its elongation no longer changes.
+The force on the load cell is the force of the connection. Parallel forces are evaluated at the actuator's motion.
 
-``p`` below holds 17 fixed numbers: the ten structural coordinates, k1, f0, and compliance, gap, hardening, film and
-stiffness in the gap of the connection; ``g`` the seven inputs at one instant: x, u, factors of alpha, c0, c1,
-force beside the law, x'.
+``p`` holds 17 fixed values: the ten structural coordinates, k1, f0, and compliance, gap, hardening, film damping
+and in-gap stiffness ratio of the connection. ``g`` holds the seven inputs at one instant: x, u, factors of alpha,
+c0 and c1, parallel force, x'.
 """
 
 import numpy as np
@@ -41,11 +41,11 @@ from identification.simulate.step import (
 FIXED_COUNT, INPUT_COUNT = 17, 7
 K1, F0, COMPLIANCE, GAP, HARDENING, FILM_DAMPING, IN_GAP_RATIO = 10, 11, 12, 13, 14, 15, 16
 _MAX_LINEARISATIONS = 12
-"""Times that a connection is taken straight anew in one stage."""
+"""Largest number of linearisations of a connection in one stage."""
 _FORCE_TOLERANCE = 1e-8
-"""[1] relative error of what it carries at which it stands there."""
+"""Relative error of the connection's force below which the linearisation is accepted [1]."""
 _EDGE_OFFSET = 1e-12
-"""[m] past the edge of its gap, from where it is taken straight on the other side."""
+"""Distance beyond an edge of the gap at which the other side is linearised [m]."""
 
 compute_transmitted_force = njit_cached(connection.compute_transmitted_force)
 compute_tangent_stiffness = njit_cached(connection.compute_tangent_stiffness)
@@ -55,7 +55,7 @@ _compute_elongation = njit_cached(connection.compute_elongation)
 def stack_inputs(
     motion: DamperMotion, field: DamperField, scales: ScaleFactors, parallel_force: Array, h: float
 ) -> tuple[Array, Array]:
-    """The seven inputs at the samples (7, N) and half way between them (7, N-1)."""
+    """Return the seven inputs at the samples (7, N) and half way between them (7, N-1)."""
     x, v = interpolate_midpoints(motion.x, motion.v, h)
     ones, middles = np.ones((3, len(motion.x))), np.ones((3, len(x)))
     scaled = scales.values.shape[1] > 0
@@ -73,7 +73,10 @@ def stack_derivatives(
     own: list[tuple[int, Array]],
     h: float,
 ) -> tuple[Array, Array]:
-    """Their derivatives (E, 7, N) and (E, 7, N-1): unknowns of field, motion and factors, then of forces."""
+    """Return the derivatives of the inputs, (E, 7, N) at the samples and (E, 7, N-1) half way between.
+
+    The E unknowns are those of field, motion and factors, then those of parallel forces.
+    """
     first, count = len(field.du) - 1, len(motion.x)
     inner = first + max(1 + len(motion.columns), len(scales.derivatives))
     at = np.zeros((inner + len(own), INPUT_COUNT, count))
@@ -94,14 +97,14 @@ def stack_derivatives(
 
 @njit_cached
 def interpolate_inputs(g: Array, at: Array, middle: Array, i: int, t: float) -> None:
-    """The inputs at the fraction t of sample i."""
+    """Write the inputs at the fraction t of sample i into g (7,)."""
     for k in range(INPUT_COUNT):
         g[k] = at[k, i] if t == 0.0 else interpolate_parabola(at[k, i], middle[k, i], at[k, i + 1], t)
 
 
 @njit_cached
 def evaluate_law(p: Array, g: Array) -> tuple[float, float, float]:
-    """Yield force, c0 and c1 at the inputs."""
+    """Return yield force [N], c0 and c1 [N s/m] at the inputs."""
     return (
         g[2] * evaluate_coefficient(p[0], p[1], g[1]),
         g[3] * evaluate_coefficient(p[5], p[6], g[1]),
@@ -111,7 +114,7 @@ def evaluate_law(p: Array, g: Array) -> tuple[float, float, float]:
 
 @njit_cached
 def _compute_rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple[float, float, float]:
-    """Rates of y, zeta and X."""
+    """Return the rates of y [m/s], zeta [1/s] and X [m/s]."""
     F, c0, c1 = evaluate_law(p, g)
     held = F * zeta + p[9] * (X - y)
     R = compute_dashpot_force(p, g, X, held, c0, c1)
@@ -123,7 +126,7 @@ def _compute_rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple
 
 @njit_cached
 def compute_dashpot_force(p: Array, g: Array, X: float, held: float, c0: float, c1: float) -> float:
-    """The force R that is left for the dashpot c1; ``held`` is what hysteresis and k0 hold of it."""
+    """Compute the force R [N] on the dashpot c1; ``held`` is the part of hysteresis and k0."""
     spring = (
         compute_transmitted_force(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
         - p[K1] * X
@@ -138,14 +141,14 @@ def compute_dashpot_force(p: Array, g: Array, X: float, held: float, c0: float, 
 def solve_stage(
     p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, X: float
 ) -> tuple[float, float, float]:
-    """State at the end of a stage: state = known + w * rates(state), by Newton from ``zeta`` and ``X``."""
+    """Solve state = known + w * rates(state) for y, zeta and X at the end of a stage, from ``zeta`` and ``X``."""
     compliance, gap, hardening, in_gap_ratio = p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]
     elongation, y = g[0] - X, yk
     for _ in range(_MAX_LINEARISATIONS):
         force = compute_transmitted_force(elongation, compliance, gap, hardening, in_gap_ratio)
         steep = compute_tangent_stiffness(elongation, compliance, gap, hardening, in_gap_ratio)
         y, zeta, X = _solve_linearised(p, g, yk, zk, Xk, w, zeta, force - steep * elongation, steep)
-        # A linear spring is straight everywhere.
+        # A linear spring needs one linearisation.
         if gap == 0.0 and hardening == 0.0:
             break
         moved = g[0] - X
@@ -160,7 +163,7 @@ def solve_stage(
 
 @njit_cached
 def _choose_elongation(elongation: float, moved: float, half: float) -> float:
-    """Where to take the connection straight next: at most on the other side of the next edge of its gap."""
+    """Return the elongation of the next linearisation: at most just beyond the next edge of the gap."""
     if elongation <= -half < moved:
         return -half + _EDGE_OFFSET
     if elongation >= half > moved:
@@ -174,10 +177,10 @@ def _choose_elongation(elongation: float, moved: float, half: float) -> float:
 def _solve_linearised(
     p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, force: float, steep: float
 ) -> tuple[float, float, float]:
-    """The same where the connection carries ``force + steep * elongation``."""
+    """Solve the stage for a connection that transmits ``force + steep * elongation``."""
     F, c0, c1 = evaluate_law(p, g)
     k0, k1 = p[9], p[K1]
-    # The film's force d (x' - X') is one more spring over this stage: X' = (X - known) / w there.
+    # With X' = (X - known) / w, the film's force d (x' - X') acts as one more spring in this stage.
     rho = force + steep * g[0] + p[F0] - g[5] + p[FILM_DAMPING] * (g[6] + Xk / w)
     stiffness = steep + k1 + p[FILM_DAMPING] / w
     q = 1.0 + c0 / c1 + k0 * w / c1
@@ -202,11 +205,11 @@ def _solve_linearised(
 
 @njit_cached
 def find_start_position(p: Array, g: Array, y0: float, zeta0: float, v0: float) -> float:
-    """Where the damper stands at first: the fixture loaded as by the saturated law."""
+    """Find the initial X [m], at which the connection carries the force of the saturated law."""
     F, c0, _ = evaluate_law(p, g)
     load = F * zeta0 + c0 * v0 + g[5] - p[F0]
     X = g[0]
-    # k1 pulls where the damper stands: each round leaves k1 times the compliance of the error, a small part.
+    # k1 acts at X. Each iteration reduces the error by the factor k1 times compliance, which is small.
     for _ in range(_MAX_LINEARISATIONS):
         X = g[0] - _compute_elongation(load + p[K1] * X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
     return float(X)
@@ -216,14 +219,14 @@ def find_start_position(p: Array, g: Array, y0: float, zeta0: float, v0: float) 
 def integrate(
     p: Array, at: Array, middle: Array, h: float, start: Array, max_travel: float, step_counts: StepCounts
 ) -> tuple[Array, Array, Array]:
-    """States and force along a recording.
+    """Integrate the states and the force along an excitation.
 
     Args:
-        p: (17,) fixed numbers.
+        p: (17,) fixed values.
         at, middle: (7, N) and (7, N-1) inputs.
-        h: [s] time between samples.
+        h: time between samples [s].
         start: y [m], zeta [1] and velocity of the actuator [m/s] at the first sample.
-        max_travel, step_counts: as on a rigid fixture.
+        max_travel, step_counts: as on a rigid mount.
 
     Returns:
         y [m], zeta [1], force on the load cell [N], each (N,).
@@ -255,7 +258,7 @@ def integrate(
 
 @njit_cached
 def combine_stages(stage: float, start: float) -> float:
-    """What the second stage knows of the first, and of the start of the step."""
+    """Return the known part of the second stage, from the first stage and the start of the step."""
     return WEIGHT_STAGE * stage - WEIGHT_START * start
 
 
@@ -271,14 +274,14 @@ def choose_sample_steps(
     zeta: float,
     zeta_rate: float,
 ) -> int:
-    """Steps for one sample: as many as the actuator's change of velocity asks for, taken to the damper."""
+    """Choose the number of steps for one sample as if the damper's velocity changed to that of the actuator."""
     speed = (at[0, i + 1] - at[0, i]) / h
     return choose_steps(max_travel, p, h, X_rate, speed, at[1, i], at[1, i + 1], y_rate, zeta, zeta_rate)
 
 
 @njit_cached
 def compute_cell_force(p: Array, g: Array, X: float, X_rate: float) -> float:
-    """What the connection carries [N]."""
+    """Compute the force of the connection on the load cell [N]."""
     return float(
         compute_transmitted_force(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
         + p[FILM_DAMPING] * (g[6] - X_rate)

@@ -1,7 +1,7 @@
-"""Slopes of the march where the fixture gives way: the same steps, and what every unknown does to each of them.
+"""Sensitivities of the integration on a compliant mount.
 
-``p`` and ``g`` hold the same numbers as in yielding.py. Each implicit stage is differentiated as it stands: the
-sensitivities are those of the forces that come out, step by step, and not of the law in the limit.
+``p`` and ``g`` are those of ``compliant_mount``, and the steps are the same. Each implicit stage is differentiated
+as it was taken, so the sensitivities are derivatives of the discrete solution, not of the exact one.
 """
 
 import math
@@ -55,14 +55,15 @@ def integrate_with_sensitivities(
     over: Array,
     over_middle: Array,
 ) -> tuple[Array, Array, Array, Array]:
-    """States and force along a recording, and the force's sensitivities.
+    """Integrate states and force along an excitation, and the sensitivities of the force.
 
     Args:
-        p, at, middle, h, start, max_travel, step_counts: as in ``march``.
+        p, at, middle, h, start, max_travel, step_counts: as in ``integrate``.
         over, over_middle: (E, 7, N) and (E, 7, N-1) derivatives of the inputs over further unknowns.
 
     Returns:
-        y [m], zeta [1], force [N], each (N,), and sensitivities (N, 17 + 1 + E): the fixed numbers, y0, the further ones.
+        y [m], zeta [1], force [N], each (N,), and sensitivities (N, 17 + 1 + E) over fixed values, y0 and further
+        unknowns.
     """
     count, extra = at.shape[1], len(over)
     columns = FIXED_COUNT + 1 + extra
@@ -112,7 +113,7 @@ def _record_row(
     row: Array, S: Array, J: Array, f: Array, over: Array, elongation: float, elongation_rate: float, p: Array
 ) -> None:
     """Write the sensitivities of the force at one sample into its row."""
-    # The film feels the damper's velocity, which the state moves through the sensitivities of its rates.
+    # The film's force depends on X', whose derivative over the unknowns follows from the state.
     steep, film = (
         compute_tangent_stiffness(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]),
         p[FILM_DAMPING],
@@ -132,7 +133,7 @@ def _record_row(
 
 @njit_cached
 def _differentiate_connection(elongation: float, p: Array) -> tuple[float, float, float, float]:
-    """Slopes of what the connection carries over its compliance, gap, hardening and stiffness in the gap."""
+    """Differentiate the force of the connection over compliance, gap, hardening and in-gap stiffness ratio."""
     compliance, gap, hardening, in_gap_ratio = p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]
     half = 0.5 * gap
     free = min(max(elongation, -half), half)
@@ -150,7 +151,7 @@ def _differentiate_connection(elongation: float, p: Array) -> tuple[float, float
 
 @njit_cached
 def _propagate_first_stage(w: float, J: Array, S: Array, f: Array, f1: Array, S1: Array) -> None:
-    """Slopes of what the first stage knows, and its own explicit part, into S1."""
+    """Write the derivatives of the known part of the first stage and of its explicit part into S1."""
     for j in range(S.shape[1]):
         for a in range(3):
             moved = J[a, 0] * S[0, j] + J[a, 1] * S[1, j] + J[a, 2] * S[2, j]
@@ -159,7 +160,7 @@ def _propagate_first_stage(w: float, J: Array, S: Array, f: Array, f1: Array, S1
 
 @njit_cached
 def _propagate_second_stage(w: float, f: Array, S1: Array, S: Array) -> None:
-    """The same of the second stage, in place."""
+    """Replace S by the derivatives of the known part of the second stage and of its explicit part."""
     for j in range(S.shape[1]):
         for a in range(3):
             S[a, j] = combine_stages(S1[a, j], S[a, j]) + w * f[a, j]
@@ -167,7 +168,7 @@ def _propagate_second_stage(w: float, f: Array, S1: Array, S: Array) -> None:
 
 @njit_cached
 def _differentiate_start(p: Array, g: Array, zeta0: float, v0: float, X: float, over: Array, S: Array) -> None:
-    """Slopes of where the damper stands at first, written into S."""
+    """Write the derivatives of the initial X into S."""
     u = g[1]
     compliance = 1.0 / compute_tangent_stiffness(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
     stiff = 1.0 + compliance * p[K1]
@@ -202,7 +203,10 @@ def _differentiate_rates(
     J: Array,
     f: Array,
 ) -> tuple[float, float, float]:
-    """Rates of y, zeta and X; their sensitivities over the state into J (3, 3), over all else into f (3, columns)."""
+    """Return the rates of y, zeta and X.
+
+    Their derivatives over the state are written into J (3, 3), those over all unknowns into f (3, columns).
+    """
     F, c0, c1 = evaluate_law(p, g)
     k0 = p[9]
     steep = compute_tangent_stiffness(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
@@ -217,7 +221,7 @@ def _differentiate_rates(
     J[0, 0] = J[0, 1] = 0.0
     J[0, 2] = -stiffness / c1
     J[1, 0], J[1, 1], J[1, 2] = k0 / c0, -F / c0, -(stiffness + k0) / c0
-    # Row 1 of J and f holds sensitivities of the slip until the end, where they become those of zeta' and X'.
+    # Row 1 of J and f holds derivatives of the slip. At the end they are converted to those of zeta' and X'.
     _differentiate_by_fixed(p, g, X, y, zeta, y_rate, slip, c0, c1, f)
     for e in range(len(over)):
         f[0, FIXED_COUNT + 1 + e] = f[1, FIXED_COUNT + 1 + e] = 0.0
@@ -243,7 +247,7 @@ def _differentiate_rates(
 
 @njit_cached
 def _apply_film_damping(film: float, c0: float, c1: float, over_slip: float, rows: Array) -> None:
-    """Slopes of y' and of the slip at a fixed X' become those of y', zeta' and X': the film feels X', too."""
+    """Convert derivatives of y' and slip at fixed X' to those of y', zeta' and X', on which the film depends."""
     weaker = 1.0 / (1.0 + film * (1.0 / c0 + 1.0 / c1))
     for j in range(rows.shape[1]):
         X_rate = weaker * (rows[0, j] + rows[1, j])
@@ -256,7 +260,7 @@ def _apply_film_damping(film: float, c0: float, c1: float, over_slip: float, row
 def _differentiate_by_input(
     p: Array, g: Array, k: int, steep: float, zeta: float, y_rate: float, slip: float, c0: float, c1: float
 ) -> tuple[float, float]:
-    """Slopes of y' and of the slip over the k-th input."""
+    """Return the derivatives of y' and of the slip over the k-th input."""
     u = g[1]
     if k == 0:
         return steep / c1, steep / c0
@@ -286,7 +290,7 @@ def _differentiate_by_fixed(
     c1: float,
     f: Array,
 ) -> None:
-    """Slopes of y' (row 0) and of the slip (row 1) over the fixed numbers and y0."""
+    """Write the derivatives of y' (row 0) and of the slip (row 1) over the fixed values and y0 into f."""
     u = g[1]
     for j in range(FIXED_COUNT + 1):
         f[0, j] = f[1, j] = 0.0
@@ -307,7 +311,7 @@ def _differentiate_by_fixed(
 
 @njit_cached
 def _solve(w: float, J: Array, S: Array) -> None:
-    """Solve (1 - w J) S = S in place for every unknown at once, by the inverse of the 3 by 3 matrix."""
+    """Replace S by the solution of (1 - w J) X = S for all unknowns, by the inverse of the 3 by 3 matrix."""
     a, b, c = 1.0 - w * J[0, 0], -w * J[0, 1], -w * J[0, 2]
     d, e, f = -w * J[1, 0], 1.0 - w * J[1, 1], -w * J[1, 2]
     g, h, i = -w * J[2, 0], -w * J[2, 1], 1.0 - w * J[2, 2]

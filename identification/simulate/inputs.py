@@ -1,7 +1,7 @@
-"""The field behind the drive, at the samples and half way between them, with its derivatives.
+"""Field in the damper at the samples and half way between them, with its derivatives.
 
-Without an effect of the coil it comes in closed form. With one, the derivatives are differences of the whole
-transform: it is cheap beside the march.
+Without an effect of the coil, the field and its derivatives have closed forms. With one, the derivatives are
+differences of the whole transform, which takes little time compared with the integration.
 """
 
 import math
@@ -16,48 +16,50 @@ from identification.simulate.motion import compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
 
 _MIN_LAG = 1e-6
-"""[s] a second lag below which the drive passes as it is."""
+"""Second lag below which the drive passes without lag [s]."""
 _REST_SPEED = 1e-3
-"""[m/s] below which a damper that starts counts as resting rather than as sliding."""
+"""Initial velocity below which the damper counts as resting, not as sliding [m/s]."""
 _ETA = Quantity("eta", "1/s", 0.0, math.inf, 100.0, "")
 _DELAY = Quantity("delay", "s", -math.inf, math.inf, 0.1, "")
 
 
 class DamperField(NamedTuple):
-    """Field that the damper sees, and its derivatives over A unknowns: eta, drive delay, coil, force delay."""
+    """Field in the damper, and its derivatives over A unknowns: eta, drive delay, coil, force delay."""
 
     u: Array
-    """(N,) [V or A]"""
+    """(N,) field at the samples [V or A]."""
     middle: Array
-    """(N-1,) half way between samples."""
+    """(N-1,) field half way between the samples."""
     du: Array
-    """(A, N)"""
+    """(A, N) derivatives of the field."""
     dmiddle: Array
-    """(A, N-1)"""
+    """(A, N-1) derivatives of the field half way between the samples."""
     columns: tuple[int, ...]
-    """Columns of the unknowns between the first two and the last, among the parameters of the effects."""
+    """Columns of the coil's unknowns, among the parameters of the effects."""
 
 
-def compute_damper_field(setting: SimulationModel, stroke: Excitation, sensitivities: bool = True) -> DamperField:
-    """Field behind the drive of a stroke; derivatives through effects of the coil only on request."""
-    late = sum(values[0] for _, _, values in setting.select_forms("time_shift"))
-    delay, h = setting.force_delay + setting.drive_delay + late, 1.0 / (stroke.rate * stroke.drive_oversampling)
-    coil = setting.select_forms("drive_delay", "field", "field_memory")
+def compute_damper_field(
+    model: SimulationModel, excitation: Excitation, sensitivities: bool = True
+) -> DamperField:
+    """Compute the field along an excitation; derivatives over effects of the coil only with ``sensitivities``."""
+    late = sum(values[0] for _, _, values in model.select_forms("time_shift"))
+    finer = excitation.drive_oversampling
+    delay, h = model.force_delay + model.drive_delay + late, 1.0 / (excitation.rate * finer)
+    coil = model.select_forms("drive_delay", "field", "field_memory")
     if not coil:
-        u, middle, du, dmiddle = compute_field(stroke.drive, setting.coordinates.eta, delay, h)
-        u, middle = _decimate_field(u, middle, stroke.drive_oversampling)
-        du, dmiddle = _decimate_field(du, dmiddle, stroke.drive_oversampling)
-        # A late force shows an earlier field, as a late drive does: the last row is that of the delay again.
+        u, middle, du, dmiddle = compute_field(excitation.drive, model.coordinates.eta, delay, h)
+        u, middle = _decimate_field(u, middle, finer)
+        du, dmiddle = _decimate_field(du, dmiddle, finer)
+        # A delay of the force acts on the field as a delay of the drive does, so the last row repeats that row.
         return DamperField(u, middle, np.vstack([du, du[1:]]), np.vstack([dmiddle, dmiddle[1:]]), ())
-    values = (setting.coordinates.eta, delay, *(v for _, _, some in coil for v in some))
+    values = (model.coordinates.eta, delay, *(v for _, _, some in coil for v in some))
     quantities = (_ETA, _DELAY, *(q for _, form, _ in coil for q in form.parameters))
 
     def whole(*parameters: float) -> Array:
-        return _apply_coil(coil, parameters, stroke.drive, h)
+        return _apply_coil(coil, parameters, excitation.drive, h)
 
     both = whole(*values)
     columns = tuple(at + k for at, _, some in coil for k in range(len(some)))
-    finer = stroke.drive_oversampling
     if not sensitivities:
         return DamperField(*_split_half_samples(both, finer), np.empty((0, 0)), np.empty((0, 0)), columns)
     rows = differentiate_by_parameters(whole, values, quantities)
@@ -67,12 +69,12 @@ def compute_damper_field(setting: SimulationModel, stroke: Excitation, sensitivi
 
 
 def _split_half_samples(both: Array, finer: int) -> tuple[Array, Array]:
-    """Values at the samples of the motion, and half way between them, from half samples of the drive."""
+    """Return the values at the samples of the motion, and half way between, from half samples of the drive."""
     return np.ascontiguousarray(both[..., :: 2 * finer]), np.ascontiguousarray(both[..., finer :: 2 * finer])
 
 
 def _decimate_field(at: Array, middle: Array, finer: int) -> tuple[Array, Array]:
-    """The same from samples of the drive and the values half way between those."""
+    """Return the values at the samples of the motion, and half way between, from those of the drive."""
     if finer == 1:
         return at, middle
     halves = at[..., finer // 2 :: finer] if finer % 2 == 0 else middle[..., finer // 2 :: finer]
@@ -80,7 +82,7 @@ def _decimate_field(at: Array, middle: Array, finer: int) -> tuple[Array, Array]
 
 
 def _apply_coil(coil: Any, parameters: tuple[float, ...], drive: Array, h: float) -> Array:
-    """(2N-1,) field on the grid of half samples, through every effect of the coil in the order of the chain."""
+    """Apply all effects of the coil in the order of the chain; return the field at half samples (2N-1,)."""
     eta, delay, lag, part, layers, at = parameters[0], parameters[1], 0.0, 1.0, 1, 2
     maps = []
     for _, form, some in coil:
@@ -106,18 +108,18 @@ def _apply_coil(coil: Any, parameters: tuple[float, ...], drive: Array, h: float
 
 @njit_uncached
 def trace_memory(memory: Any, u: Array, *values: float) -> Array:
-    """What a form with memory remembers along a field or a displacement (N,); nothing at its start."""
+    """Return the memory of a form along a field or displacement (N,); it starts at zero."""
     found = np.zeros(len(u))
     for i in range(1, len(u)):
         change = u[i] - u[i - 1]
-        # Held levels are most of a drive and change no memory.
+        # Most of a drive is constant, and a constant drive does not change the memory.
         found[i] = found[i - 1] if change == 0.0 else memory(found[i - 1], change, *values)
     return found
 
 
 @njit_cached
 def apply_two_lags(drive: Array, eta: float, lag: float, delay: float, h: float) -> Array:
-    """(2N-1,) field on the grid of half samples behind two lags and a dead time (exact for a held drive)."""
+    """Return the field at half samples (2N-1,) after two lags and a dead time; exact for a held drive."""
     count = len(drive)
     found = np.empty(2 * count - 1)
     whole = math.floor(delay / h)
@@ -143,21 +145,21 @@ def apply_two_lags(drive: Array, eta: float, lag: float, delay: float, h: float)
 
 @njit_cached
 def _advance_lags(w: float, u: float, drive: float, weights: tuple[float, float, float]) -> tuple[float, float]:
-    """Lagged drive and field after some time towards a drive."""
+    """Advance the lagged drive and the field towards a constant drive."""
     slow, fade, mixed = weights
     return drive + (w - drive) * slow, drive + (u - drive) * fade + (w - drive) * mixed
 
 
 @njit_cached
 def _compute_decay_weights(eta: float, lag: float, t: float) -> tuple[float, float, float]:
-    """What is left after t [s] of the lagged drive, of the field, and of the first in the second."""
+    """Return the decay factors after t [s]: of the lagged drive, the field, and the drive in the field [1]."""
     fade = math.exp(-eta * t)
     if lag < _MIN_LAG:
         return 0.0, fade, 0.0
     slow = math.exp(-t / lag)
     difference = eta - 1.0 / lag
-    # The difference of two fades that are nearly alike would lose its digits; neither exponent below is positive,
-    # so that nothing overflows.
+    # The difference of two nearly equal decay factors would lose precision. No exponent below is positive, so
+    # nothing overflows.
     if abs(difference * t) < 1e-7:
         mixed = t * slow
     elif difference > 0.0:
@@ -169,12 +171,12 @@ def _compute_decay_weights(eta: float, lag: float, t: float) -> tuple[float, flo
 
 @njit_cached
 def compute_field(drive: Array, eta: float, delay: float, h: float) -> tuple[Array, Array, Array, Array]:
-    """Field u behind a drive that is held between samples and arrives ``delay`` [s] late (eq. 8).
+    """Compute the field u for a drive that is held between samples and delayed by ``delay`` [s] (eq. 8).
 
     Args:
         drive: (N,) measured drive [V or A].
         eta: rate constant [1/s].
-        delay: [s] of either sign; the field starts in equilibrium with the first drive.
+        delay: delay of either sign [s]; the field starts in equilibrium with the first drive.
         h: time between samples [s].
 
     Returns:
@@ -207,7 +209,7 @@ def compute_field(drive: Array, eta: float, delay: float, h: float) -> tuple[Arr
 def _advance_field(
     value: float, over_eta: float, old: float, new: float, eta: float, first: float, second: float
 ) -> tuple[float, float]:
-    """Field and its slope over eta after ``first`` [s] towards ``old``, then ``second`` [s] towards ``new``."""
+    """Advance field and derivative over eta by ``first`` [s] towards ``old``, then ``second`` [s] to ``new``."""
     fade = math.exp(-eta * first)
     slope = (over_eta - first * (value - old)) * fade
     value = old + (value - old) * fade
@@ -217,5 +219,5 @@ def _advance_field(
 
 @njit_cached
 def estimate_settled_hysteresis(velocity: float) -> float:
-    """Hysteretic state [1] to start from at a velocity [m/s]: saturated in motion, relaxed at rest."""
+    """Estimate the initial hysteretic variable [1] from the velocity [m/s]: saturated in motion, zero at rest."""
     return velocity / (abs(velocity) + _REST_SPEED)

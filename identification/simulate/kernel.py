@@ -1,9 +1,10 @@
-"""The march through a recording: states alone, or with the sensitivities of the force over everything.
+"""Integration of the law along an excitation, with or without the sensitivities of the force.
 
-The sensitivities are exact derivatives of the discrete solution: each implicit step is differentiated as it was
-taken, so that they agree with finite differences to rounding. Each sample is one step, but more where the
-hysteretic variable turns: the number is chosen on the first march from how far zeta is about to move, and kept
-as a step_counts, so that later marches with sensitivities or with nearby coordinates are smooth in them.
+The sensitivities are exact derivatives of the discrete solution, because each implicit step is differentiated as
+it was taken. They agree with finite differences to rounding. A sample is one step, or several where the hysteretic
+variable changes fast. The first integration chooses the number from the expected change of zeta. Later
+integrations with sensitivities or nearby coordinates reuse these step counts, which keeps the force smooth in the
+unknowns.
 """
 
 from typing import NamedTuple
@@ -28,27 +29,27 @@ from identification.simulate.step import (
 )
 
 StepCounts = npt.NDArray[np.uint8]
-"""(samples - 1,) steps in each sample; 0 where they are still to be chosen."""
+"""(N-1,) number of steps in each sample; 0 where it is not yet chosen."""
 
 ColumnIndices = npt.NDArray[np.int64]
-"""Columns of a table of sensitivities."""
+"""Column numbers in a matrix of sensitivities."""
 
 _MIN_SENSITIVITY = 1e-200
-"""[1] slope of zeta below which it counts as none."""
+"""Size of a derivative of zeta below which it is set to zero."""
 
 
 @njit_inline
 def _interpolate_inputs(
     x: Array, v: Array, u: Array, u_middle: Array, h: float, i: int, t: float
 ) -> tuple[float, float, float]:
-    """Displacement, velocity and field at the fraction t of sample i."""
+    """Return displacement, velocity and field at the fraction t of sample i."""
     xs, vs = interpolate_motion(x[i], x[i + 1], v[i], v[i + 1], h, t)
     return xs, vs, interpolate_parabola(u[i], u_middle[i], u[i + 1], t)
 
 
 @njit_inline
 def scale_coefficients(s: Array, factors: Array, middle: Array, i: int, t: float, out: Array) -> None:
-    """Alpha, c0 and c1 of structural coordinates (10,), scaled, at the fraction t of sample i."""
+    """Write alpha, c0 and c1 of coordinates ``s`` (10,), scaled at the fraction t of sample i, into ``out``."""
     a, b, c = factors[0, i], factors[1, i], factors[2, i]
     if t > 0.0:
         a = interpolate_parabola(a, middle[0, i], factors[0, i + 1], t)
@@ -74,17 +75,17 @@ def integrate(
     max_travel: float,
     step_counts: StepCounts,
 ) -> tuple[Array, Array, Array]:
-    """States along a recording.
+    """Integrate the states along an excitation.
 
     Args:
         s: (10,) structural coordinates.
-        factors, factors_middle: (3, N) and (3, N-1) of alpha, c0 and c1 [1]; (3, 0) where nothing scales.
         x, v, u: (N,) displacement [m], velocity [m/s] and field [V or A] at the samples.
-        u_middle: (N-1,) field half way between them.
-        h: [s] time between samples.
+        u_middle: (N-1,) field half way between the samples.
+        factors, factors_middle: (3, N) and (3, N-1) factors of alpha, c0 and c1 [1]; (3, 0) without scaling.
+        h: time between samples [s].
         y0, zeta0: state at the first sample [m], [1].
-        max_travel: [1] travel of zeta in a sample above which it takes more than one step, where the step_counts is open.
-        step_counts: filled in place where it is 0.
+        max_travel: change of zeta above which a sample without a step count takes more than one step [1].
+        step_counts: (N-1,) steps per sample; zeros are filled in place.
 
     Returns:
         y [m], zeta [1] and y' [m/s], each (N,).
@@ -120,23 +121,24 @@ def integrate(
 
 
 class InputDerivatives(NamedTuple):
-    """Derivatives of the inputs over E further unknowns: A of the field, then motion and factors.
+    """Derivatives of the inputs over E further unknowns: A of the field, then those of motion and factors.
 
-    Those of the motion and of the factors both begin at the last of the field's: the delay moves everything.
+    The unknowns of the motion and of the factors both begin at the last one of the field, the force delay, which
+    shifts all inputs.
     """
 
     du: Array
-    """(A, N) field."""
+    """(A, N) derivatives of the field."""
     du_middle: Array
-    """(A, N-1)"""
+    """(A, N-1) derivatives of the field half way between samples."""
     dx: Array
-    """(M, N) displacement."""
+    """(M, N) derivatives of the displacement."""
     dv: Array
-    """(M, N) velocity."""
+    """(M, N) derivatives of the velocity."""
     df: Array
-    """(S, 3, N) factors; S is 0 where nothing scales."""
+    """(S, 3, N) derivatives of the factors; S is 0 without scaling."""
     df_middle: Array
-    """(S, 3, N-1)"""
+    """(S, 3, N-1) derivatives of the factors half way between samples."""
 
 
 @njit_cached
@@ -158,14 +160,14 @@ def integrate_with_sensitivities(
     columns: ColumnIndices,
     sensitivities: Array,
 ) -> tuple[Array, Array, Array]:
-    """States along a recording, and the sensitivities of the dashpot force c1 y' over coordinates, y0 and inputs.
+    """Integrate the states, and the sensitivities of the dashpot force c1 y' over coordinates, y0 and inputs.
 
     Args:
-        s, x, v, u, u_middle, factors, factors_middle, h, y0, zeta0, max_travel, step_counts: as in ``march``.
+        s, x, v, u, u_middle, factors, factors_middle, h, y0, zeta0, max_travel, step_counts: as in ``integrate``.
         c1: (N,) roll-off dashpot at the samples [N s/m], unscaled.
         over: derivatives of the inputs over E further unknowns.
-        columns: (10 + 1 + E,) where the sensitivities over structural coordinates, y0 and the further unknowns go.
-        sensitivities: (N, U), filled in those columns.
+        columns: (10 + 1 + E,) columns of structural coordinates, y0 and further unknowns in ``sensitivities``.
+        sensitivities: (N, U), filled in place in these columns.
 
     Returns:
         y [m], zeta [1] and y' [m/s], each (N,).
@@ -173,7 +175,7 @@ def integrate_with_sensitivities(
     count = len(x)
     ys, zetas, y_rates = np.empty(count), np.empty(count), np.empty(count)
     width = len(columns)
-    # Of y in the first row and of zeta in the second: the state, at the stage and after the step, and the rates.
+    # Row 0 belongs to y, row 1 to zeta. S1: state at the first stage; S: state after the step; S_rate: its rate.
     S1, S, S_rate = np.zeros((2, width)), np.zeros((2, width)), np.zeros((2, width))
     f1, f = np.zeros((2, width)), np.zeros((2, width))
     J1, J, over_inputs = np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 3))
@@ -206,7 +208,7 @@ def integrate_with_sensitivities(
             y1, zeta1 = solve_first_stage(sc, xs, vs, us, weight, y, zeta, y_rate, zeta_rate)
             differentiate_rates(sc, xs, vs, us, y1, zeta1, J1, over_inputs, f1)
             _propagate_inputs(over_inputs, over, s, sc, i, t, h, f1)
-            # The sensitivities take the very steps that the states took, so they are those of the discrete solution.
+            # The sensitivities take the same steps as the states: they differentiate the discrete solution.
             _advance_first_stage(weight, J1, f1, S, S_rate, S1)
             t = (k + 1.0) / step_counts[i]
             xs, vs, us = _interpolate_inputs(x, v, u, u_middle, h, i, t)
@@ -221,9 +223,9 @@ def integrate_with_sensitivities(
 
 @njit_inline
 def _advance_first_stage(weight: float, J: Array, f: Array, S: Array, S_rate: Array, S1: Array) -> None:
-    """Slopes S1 of the first stage, from those of the step's start and their rates; all (2, columns).
+    """Write the sensitivities S1 of the first stage, from those of the step's start; all (2, columns).
 
-    Each is the solution of (1 - weight J) S1 = S + weight (S' + f); J is the 2 by 2 slope of the rates.
+    S1 solves (1 - weight J) S1 = S + weight (S' + f), where J (2, 2) holds the derivatives of rates over states.
     """
     a, b, c, d = _invert_stage_matrix(weight, J)
     for j in range(S.shape[1]):
@@ -231,13 +233,13 @@ def _advance_first_stage(weight: float, J: Array, f: Array, S: Array, S_rate: Ar
         second = S[1, j] + weight * (S_rate[1, j] + f[1, j])
         S1[0, j] = a * first + b * second
         steep = c * first + d * second
-        # In saturation sensitivities fade away; the last digits before zero would be a hundred times slower to carry on.
+        # In saturation the sensitivities decay. Denormal numbers would slow the integration a hundred times.
         S1[1, j] = steep if abs(steep) > _MIN_SENSITIVITY else 0.0
 
 
 @njit_inline
 def _advance_second_stage(weight: float, J: Array, f: Array, S1: Array, S: Array, S_rate: Array) -> None:
-    """Slopes S after the step and their rates, from those of its start, in S, and of its first stage, S1."""
+    """Replace the sensitivities S of the step's start by those of its end, and write their rates."""
     a, b, c, d = _invert_stage_matrix(weight, J)
     per_weight = 1.0 / weight
     for j in range(S.shape[1]):
@@ -253,7 +255,7 @@ def _advance_second_stage(weight: float, J: Array, f: Array, S1: Array, S: Array
 
 @njit_inline
 def _invert_stage_matrix(weight: float, J: Array) -> tuple[float, float, float, float]:
-    """Of the 2 by 2 matrix 1 - weight J, row by row."""
+    """Return the inverse of the matrix 1 - weight J (2, 2), row by row."""
     a, b = 1.0 - weight * J[0, 0], -weight * J[0, 1]
     c, d = -weight * J[1, 0], 1.0 - weight * J[1, 1]
     per_determinant = 1.0 / (a * d - b * c)
@@ -264,7 +266,7 @@ def _invert_stage_matrix(weight: float, J: Array) -> tuple[float, float, float, 
 def _propagate_inputs(
     over_inputs: Array, over: InputDerivatives, s: Array, sc: Array, i: int, t: float, h: float, f: Array
 ) -> None:
-    """Slopes of the two rates over the unknowns that act through the inputs, at the fraction t of sample i."""
+    """Write the derivatives of the rates over the unknowns of the inputs into f, at the fraction t of sample i."""
     first = STRUCTURAL_COUNT + 1
     for j in range(first, f.shape[1]):
         f[0, j] = f[1, j] = 0.0
@@ -289,7 +291,7 @@ def _propagate_inputs(
 def _propagate_factors(
     over: InputDerivatives, s: Array, sc: Array, i: int, t: float, f: Array, first: int
 ) -> None:
-    """Slopes over the scaled coordinates stand in f: carried to the three factors, and made those of ``s``."""
+    """Convert derivatives over scaled coordinates in f to those over the factors and over ``s``."""
     for m in range(len(over.df)):
         for k in range(3):
             a, b = _SCALED_PAIRS[k]
@@ -308,7 +310,7 @@ def _propagate_factors(
 
 
 _SCALED_PAIRS = ((0, 1), (5, 6), (7, 8))
-"""Structural coordinates that each factor scales."""
+"""Pairs of structural coordinates that each factor scales."""
 
 
 @njit_inline

@@ -1,4 +1,4 @@
-"""The motion of the damper behind a recorded displacement: delays, the channel's bend, play in the mounting."""
+"""Motion of the damper from the recorded displacement: delays, nonlinearity of the channel, backlash."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -12,44 +12,48 @@ from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.step import interpolate_motion
 
 _FIRST_STEP, _SECOND_STEP = 1e-6, 1e-5
-"""[m] of first and second differences of a channel's bend."""
+"""Steps of first and second differences of a channel's error [m]."""
 _CONTACT_STEP = 1e-8
-"""[m] of differences of a follower: it is straight on both sides of its corners."""
+"""Step of differences of backlash [m]; backlash is linear on both sides of its corners."""
 _INVERSION_STEPS = 3
+"""Number of Newton steps in which the displacement channel is inverted."""
 
 
 class DamperMotion(NamedTuple):
-    """Displacement and velocity, (N,) each, and their derivatives over M unknowns."""
+    """Motion of the damper, (N,) each, and its derivatives over M unknowns."""
 
     x: Array
-    """[m]"""
+    """Displacement [m]."""
     v: Array
-    """[m/s]"""
+    """Velocity [m/s]."""
     a: Array
-    """[m/s^2] of the actuator, whatever the mounting does."""
+    """Acceleration of the actuator [m/s^2], without effects of the mounting."""
     dx: Array
-    """(M, N)"""
+    """(M, N) derivatives of the displacement."""
     dv: Array
-    """(M, N)"""
+    """(M, N) derivatives of the velocity."""
     da: Array
-    """(N,) derivative of the acceleration over the delay."""
+    """(N,) derivative of the acceleration over the force delay."""
     columns: tuple[int, ...]
-    """Columns of the unknowns behind the first, which is the delay, among the parameters of the effects."""
+    """Columns of all unknowns but the first, among the parameters of the effects; the first is the force delay."""
 
 
 def compute_damper_motion(
-    setting: SimulationModel, stroke: Excitation, sensitivities: bool = True
+    model: SimulationModel, excitation: Excitation, sensitivities: bool = True
 ) -> DamperMotion:
-    """Motion of the damper, with derivatives over the force channel's delay first; on request without others."""
-    late = sum(values[0] for _, _, values in setting.select_forms("time_shift"))
-    early = sum(values[0] for _, _, values in setting.select_forms("displacement_shift"))
-    motion = _delay_motion(stroke, setting.force_delay + late - early)
-    # A displacement that is late shows the force's motion early: the delay's sensitivities with the other sign.
-    for at, _, _ in setting.select_forms("displacement_shift"):
+    """Compute the motion of the damper and its derivatives.
+
+    Those over the force delay come first and are always computed; the others only with ``sensitivities``.
+    """
+    late = sum(values[0] for _, _, values in model.select_forms("time_shift"))
+    early = sum(values[0] for _, _, values in model.select_forms("displacement_shift"))
+    motion = _delay_motion(excitation, model.force_delay + late - early)
+    # A delay of the displacement acts as a negative delay of the force.
+    for at, _, _ in model.select_forms("displacement_shift"):
         motion = _append_rows(motion, -motion.dx[:1], -motion.dv[:1], (at,))
-    for at, form, values in setting.select_forms("displacement_map"):
+    for at, form, values in model.select_forms("displacement_map"):
         motion = _invert_channel(motion, form, values, at, sensitivities)
-    for at, form, values in setting.select_forms("displacement_backlash"):
+    for at, form, values in model.select_forms("displacement_backlash"):
         followed = _apply_backlash(
             compile_once(form.function), motion.x, motion.v, motion.dx, motion.dv, values[0]
         )
@@ -63,10 +67,10 @@ def _append_rows(motion: DamperMotion, dx: Array, dv: Array, columns: tuple[int,
     )
 
 
-def _delay_motion(stroke: Excitation, delay: float) -> DamperMotion:
-    """Motion ``delay`` [s] ago, by Hermite cubics, and its derivative over the delay."""
-    x, v, a = stroke.displacement, stroke.velocity, stroke.acceleration
-    h = 1.0 / stroke.rate
+def _delay_motion(excitation: Excitation, delay: float) -> DamperMotion:
+    """Return the motion ``delay`` [s] earlier, by Hermite cubics, and its derivatives over the delay."""
+    x, v, a = excitation.displacement, excitation.velocity, excitation.acceleration
+    h = 1.0 / excitation.rate
     if delay == 0.0:
         return DamperMotion(x, v, a, -v[None, :], -a[None, :], -np.gradient(a, h), ())
     shifted, speed, pushed, dx, dv, da = _interpolate_earlier(x, v, a, delay / h, h)
@@ -75,9 +79,9 @@ def _delay_motion(stroke: Excitation, delay: float) -> DamperMotion:
 
 @njit_cached
 def _interpolate_earlier(x: Array, v: Array, a: Array, samples: float, h: float) -> tuple[Array, ...]:
-    """Displacement, velocity and acceleration (N,) some samples ago, and their derivatives over that time [s].
+    """Return displacement, velocity and acceleration (N,) some samples earlier, and their derivatives over time.
 
-    Before the first sample and behind the last the motion stands still.
+    The motion is constant before the first and after the last sample.
     """
     count = len(x)
     found = np.empty((6, count))
@@ -97,7 +101,7 @@ def _interpolate_earlier(x: Array, v: Array, a: Array, samples: float, h: float)
 def _invert_channel(
     motion: DamperMotion, form: Form, values: tuple[float, ...], at: int, sensitivities: bool
 ) -> DamperMotion:
-    """The true motion behind a channel that is bent: x + bend(x) was recorded."""
+    """Return the true motion x behind a nonlinear channel, which recorded x + error(x)."""
     x = motion.x
     for _ in range(_INVERSION_STEPS):
         x = x - (x + form.function(x, *values) - motion.x) / _compute_gain(form.function, x, values)
@@ -120,9 +124,9 @@ def _invert_channel(
 
 
 def _compute_gain(bend: Callable[..., Any], x: Array, values: tuple[float, ...]) -> Array:
-    """Gain [1] of the channel at x."""
+    """Compute the gain [1] of the channel at displacements x (N,)."""
     steepness = (bend(x + _FIRST_STEP, *values) - bend(x - _FIRST_STEP, *values)) / (2.0 * _FIRST_STEP)
-    # A channel that stands still or runs backwards has no inverse; on the way a search may ask for one.
+    # A channel with zero or negative gain has no inverse, but a search may try one.
     return np.asarray(np.maximum(1.0 + steepness, 0.1))
 
 
@@ -130,8 +134,8 @@ _COMPILED: dict[Any, Any] = {}
 
 
 def compile_once(function: Any) -> Any:
-    """The compiled form of a scalar function, made once."""
-    # Once each: a new object would be a new type to whatever takes it, which would be compiled again, too.
+    """Return the compiled form of a scalar function; compile it at the first call."""
+    # Each new compiled object is a new type, for which every function that takes it would be compiled again.
     if function not in _COMPILED:
         _COMPILED[function] = njit_cached(function)
     return _COMPILED[function]
@@ -141,7 +145,7 @@ def compile_once(function: Any) -> Any:
 def _apply_backlash(
     act: Any, x: Array, v: Array, dx: Array, dv: Array, value: float
 ) -> tuple[Array, Array, Array, Array]:
-    """Run a follower of one parameter along a motion; its derivative becomes the last row."""
+    """Apply backlash of one parameter to a motion; the derivative over the parameter becomes the last row."""
     count, extra, e = len(x), len(dx), _CONTACT_STEP
     out, speed = np.empty(count), np.empty(count)
     dout, dspeed = np.zeros((extra + 1, count)), np.zeros((extra + 1, count))

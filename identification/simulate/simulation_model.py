@@ -1,4 +1,4 @@
-"""What a trajectory depends on, and what it answers."""
+"""Inputs of a simulation and its response."""
 
 from dataclasses import dataclass
 from dataclasses import field as default
@@ -18,28 +18,28 @@ SENSITIVITY_COLUMNS: tuple[str, ...] = (*(q.symbol for q in COORDINATES), "y0", 
 
 @dataclass(frozen=True)
 class Excitation:
-    """What acts on the damper, sampled at one rate."""
+    """Input of a simulation: motion and drive, sampled at one rate."""
 
     rate: float
-    """[Hz]"""
+    """Sampling rate of the motion [Hz]."""
     displacement: Array
-    """(N,) at the actuator [m], smooth: noise in it becomes force."""
+    """(N,) displacement at the actuator [m]; smooth, because noise in it becomes force."""
     velocity: Array
-    """(N,) its derivative [m/s]."""
+    """(N,) first derivative of the displacement [m/s]."""
     acceleration: Array
-    """(N,) its second derivative [m/s^2]."""
+    """(N,) second derivative of the displacement [m/s^2]."""
     drive: Array
-    """(N,) held between samples [V or A]; with ``drive_finer`` as many more, ((N - 1) drive_finer + 1,)."""
+    """((N - 1) drive_oversampling + 1,) drive [V or A], held between samples."""
     start: float = 0.0
-    """[s] first sample, since the start of the run: drifts and hums know the time."""
+    """Time of the first sample since the start of the run [s]; drift and mains hum depend on it."""
     power: Array | None = None
-    """(N,) that the damper dissipates [W], where it is known: it warms the damper. Without it, nothing does."""
+    """(N,) power that the damper dissipates [W] and that heats it; None if unknown, then nothing heats it."""
     drive_oversampling: int = 1
-    """[1] samples of the drive for each of the motion."""
+    """Samples of the drive per sample of the motion [1]."""
 
     @property
     def time(self) -> Array:
-        """(N,) since the start of the run [s]."""
+        """(N,) time since the start of the run [s]."""
         return self.start + np.arange(len(self.displacement)) / self.rate
 
     @property
@@ -48,7 +48,7 @@ class Excitation:
         return self.drive[:: self.drive_oversampling]
 
     def decimate(self, times: int) -> "Excitation":
-        """Every so many samples of the motion; the drive keeps its own, so that its steps stay where they are."""
+        """Return every n-th sample of the motion; the drive keeps all samples, so its steps keep their times."""
         count = (len(self.displacement) - 1) // times * times + 1
         thin = slice(0, count, times)
         power = None if self.power is None else self.power[thin]
@@ -57,7 +57,7 @@ class Excitation:
         return Excitation(self.rate / times, x, v, a, drive, self.start, power, finer)
 
     def oversample(self, times: int) -> "Excitation":
-        """The same stroke at ``times`` the rate: (N - 1) times + 1 samples."""
+        """Return the excitation at ``times`` the rate, with (N - 1) times + 1 samples."""
         if times == 1:
             return self
         count = len(self.displacement)
@@ -67,7 +67,7 @@ class Excitation:
         x, _ = interpolate_hermite(self.displacement, self.velocity, i, t, h)
         v, a = interpolate_hermite(self.velocity, self.acceleration, i, t, h)
         power = None if self.power is None else np.interp(place, np.arange(len(self.power)), self.power)
-        # Held between samples, as it came: its steps must not become ramps.
+        # The drive is held between samples, because its steps must not become ramps.
         drive = np.repeat(self.sampled_drive, times)[: len(place)]
         return Excitation(self.rate * times, x, v, a, drive, self.start, power)
 
@@ -78,29 +78,32 @@ class ActiveEffect(NamedTuple):
     effect: Effect
     values: tuple[float, ...]
     form_name: str | None = None
-    """Which of its forms; the usual one if None."""
+    """Name of its form; None for the usual form."""
 
     @property
     def form(self) -> Form:
-        """The form that acts."""
+        """Form of the effect."""
         return self.effect.find_form(self.form_name)
 
 
 @dataclass(frozen=True)
 class SimulationModel:
-    """Everything that a trajectory depends on beside its inputs."""
+    """All values on which a simulation depends in addition to its excitation."""
 
     coordinates: Coordinates
     y0: float = 0.0
-    """[m] inner displacement at the first sample."""
+    """Inner displacement at the first sample [m]."""
     force_delay: float = 0.0
-    """[s] lag of the force channel behind the displacement channel."""
+    """Delay of the force channel after the displacement channel [s]."""
     drive_delay: float = 0.0
-    """[s] lag of the force channel behind the drive channel, in addition."""
+    """Additional delay of the force channel after the drive channel [s]."""
     effects: tuple[ActiveEffect, ...] = ()
 
     def select_forms(self, *actions: Action) -> list[tuple[int, Form, tuple[float, ...]]]:
-        """The effects that act in certain ways: column of the first parameter among the effects', form, values."""
+        """Return column, form and values of the effects with one of these actions.
+
+        The column is that of the first parameter, counted over the parameters of all effects.
+        """
         starts = np.cumsum([0, *(len(e.values) for e in self.effects)])
         return [
             (int(at), e.form, e.values)
@@ -110,19 +113,19 @@ class SimulationModel:
 
 
 @dataclass(frozen=True)
-class Trajectory:
-    """What the model answers."""
+class Response:
+    """Result of a simulation over time."""
 
     force: Array
-    """(N,) [N]"""
+    """(N,) recorded force that the model predicts [N]."""
     y: Array
     """(N,) inner displacement [m]."""
     zeta: Array
-    """(N,) hysteretic state over its saturation [1]."""
+    """(N,) hysteretic variable relative to its saturation [1]."""
     field: Array
-    """(N,) field that the damper sees [V or A]."""
+    """(N,) field in the damper [V or A]."""
     step_counts: StepCounts
-    """(N-1,) steps taken in each sample; hand it back to keep later trajectories smooth in their unknowns."""
+    """(N-1,) steps in each sample; a later simulation with the same steps is smooth in the unknowns."""
     sensitivities: Array = default(default_factory=lambda: np.empty((0, 0)))
-    """(N, unknowns) derivative of the force over each of ``columns``; empty unless asked for."""
+    """(N, U) derivatives of the force over ``columns``; empty unless requested."""
     columns: tuple[str, ...] = ()

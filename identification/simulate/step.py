@@ -1,12 +1,12 @@
-"""One implicit step of the damper, how many of them a sample takes, and the sensitivities of its rates.
+"""One implicit integration step of the law, the number of steps per sample, and derivatives of the rates.
 
 TR-BDF2 (Bank et al. 1985): a trapezoidal stage to gamma h, then a second-order backward difference to h. It is
-L-stable, which the law needs: at a reversal the hysteretic variable relaxes at some 2e4 1/s. In the regular
-coordinates the hysteretic variable is zeta = z / z_ss with A = 1/D_y, and y is linear in it, so that each stage
-is one scalar Newton iteration.
+L-stable. The law needs this, because the hysteretic variable relaxes at about 2e4 1/s after a reversal. In the
+regular coordinates the hysteretic variable is zeta = z / z_ss with A = 1/D_y, and y is linear in it. Each stage is
+therefore one scalar Newton iteration.
 
-``s`` below always holds the ten structural coordinates, those that enter the rates of the state by themselves:
-F_a F_b D_y rho n c0_a c0_b c1_a c1_b k0.
+``s`` holds the ten structural coordinates, which enter the rates of the states directly: F_a F_b D_y rho n c0_a
+c0_b c1_a c1_b k0.
 """
 
 import math
@@ -15,26 +15,26 @@ from identification.arrays import Array, njit_inline
 from identification.damper import law
 
 GAMMA = 2.0 - math.sqrt(2.0)
-"""[1] where the first stage stands inside the step; makes both stages share one matrix."""
+"""Position of the first stage in the step [1]; with this value both stages have the same matrix."""
 RATE_WEIGHT = GAMMA / 2.0
-"""[1] of the step: weight of the rates at the end of either stage."""
+"""Weight of the rates at the end of each stage, relative to the step [1]."""
 WEIGHT_STAGE = 1.0 / (GAMMA * (2.0 - GAMMA))
 WEIGHT_START = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
 
 STRUCTURAL_COUNT = 10
-"""How many structural coordinates there are."""
+"""Number of structural coordinates."""
 
 TOLERANCE = 1e-11
-"""[1] move of zeta at which Newton's iteration of a stage ends."""
+"""Change of zeta below which the Newton iteration of a stage ends [1]."""
 MAX_MOVE = 0.5
-"""[1] largest move of zeta in one iteration; it runs from -1 to 1."""
+"""Largest change of zeta in one iteration [1]; zeta lies between -1 and 1."""
 MAX_ITERATIONS = 40
 _MAX_STEPS = 64
-"""In a sample, so that no set of parameters inside the bounds can stall a fit; a step_counts holds bytes."""
+"""Largest number of steps in a sample; it bounds the time of a fit for all parameters inside the bounds."""
 _STEPS_AT_TURN = 4
-"""Least number of steps in a sample in which slip or field turn."""
+"""Smallest number of steps in a sample in which the slip reverses or the field jumps."""
 _FIELD_JUMP = 0.05
-"""[1] relative change of the yield force in one sample above which the field counts as turning."""
+"""Threshold on the relative change of the yield force in one sample [1]: above it, the field jumps."""
 
 evaluate_coefficient = njit_inline(law.evaluate_coefficient)
 compute_inner_velocity = njit_inline(law.compute_inner_velocity)
@@ -44,7 +44,7 @@ differentiate_hysteresis_rate = njit_inline(law.differentiate_hysteresis_rate)
 
 @njit_inline
 def interpolate_motion(x0: float, x1: float, v0: float, v1: float, h: float, t: float) -> tuple[float, float]:
-    """Displacement [m] and velocity [m/s] at the fraction t of a sample of h [s], by a Hermite cubic."""
+    """Return displacement [m] and velocity [m/s] at the fraction t of a sample of h [s], by a Hermite cubic."""
     d = x1 - x0
     square = 3.0 * d - h * (2.0 * v0 + v1)
     cube = h * (v0 + v1) - 2.0 * d
@@ -53,14 +53,14 @@ def interpolate_motion(x0: float, x1: float, v0: float, v1: float, h: float, t: 
 
 @njit_inline
 def interpolate_parabola(start: float, middle: float, end: float, t: float) -> float:
-    """Value at the fraction t of a sample, by the parabola through its start, middle and end."""
+    """Return the value at the fraction t of a sample, by the parabola through its start, middle and end."""
     bend = 2.0 * (start + end) - 4.0 * middle
     return start + t * (end - start - bend + t * bend)
 
 
 @njit_inline
 def _compute_y_rate(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> float:
-    """Rate y' [m/s]."""
+    """Return the rate y' [m/s]."""
     alpha, c0, c1 = (
         evaluate_coefficient(s[0], s[1], u),
         evaluate_coefficient(s[5], s[6], u),
@@ -71,7 +71,7 @@ def _compute_y_rate(s: Array, x: float, v: float, u: float, y: float, zeta: floa
 
 @njit_inline
 def compute_rates(s: Array, x: float, v: float, u: float, y: float, zeta: float) -> tuple[float, float]:
-    """Rates y' [m/s] and zeta' [1/s]."""
+    """Return the rates y' [m/s] and zeta' [1/s]."""
     y_rate = _compute_y_rate(s, x, v, u, y, zeta)
     return y_rate, compute_hysteresis_rate(v - y_rate, zeta, 1.0 / s[2], s[3] / s[2], (1.0 - s[3]) / s[2], s[4])
 
@@ -89,14 +89,15 @@ def choose_steps(
     zeta: float,
     zeta_rate: float,
 ) -> int:
-    """Steps for one sample: the root of zeta's travel over ``max_travel``; a few more where slip or field turn.
+    """Choose the number of steps for one sample from the expected change (travel) of zeta.
 
-    The root, because the error of a step falls with its third power: many small travels add up as one large.
+    It is the square root of the travel over ``max_travel``, because the error of a step falls with its third
+    power. A sample in which the slip reverses or the field jumps takes at least ``_STEPS_AT_TURN`` steps.
     """
     slip_before = v0 - y_rate
     slip_after = v1 - y_rate
     travel = abs(zeta_rate) * h
-    # After a reversal zeta moves at up to twice slip / D_y, of which its rate before the turn tells nothing.
+    # After a reversal zeta changes at up to twice slip / D_y, whatever its rate before the reversal.
     if slip_after * zeta < 0.0:
         travel = max(travel, 2.0 * abs(slip_after) * h / s[2])
     steps = min(max(math.ceil(math.sqrt(travel / max_travel)), 1), _MAX_STEPS)
@@ -109,7 +110,7 @@ def choose_steps(
 def solve_stage(
     s: Array, x: float, v: float, u: float, y_known: float, zeta_known: float, weight: float, zeta: float
 ) -> tuple[float, float]:
-    """State at the end of a stage: state = known + weight * rates(state), by Newton from ``zeta``."""
+    """Solve state = known + weight * rates(state) for y [m] and zeta [1], by Newton's method from ``zeta``."""
     c0 = evaluate_coefficient(s[5], s[6], u)
     both = c0 + evaluate_coefficient(s[7], s[8], u)
     inverse = 1.0 / (both + weight * s[9])
@@ -123,7 +124,7 @@ def solve_stage(
         rate = compute_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         steepness = 1.0 - weight * over_zeta + over_slip * slope
-        # Just after a reversal the slope may be nearly flat or negative; a bounded move gets past it.
+        # Just after a reversal the derivative may be small or negative. A bounded change passes this region.
         move = (zeta_known + weight * rate - zeta) / max(steepness, 0.2)
         zeta += min(max(move, -MAX_MOVE), MAX_MOVE)
         if abs(move) < TOLERANCE:
@@ -135,7 +136,10 @@ def solve_stage(
 def solve_first_stage(
     s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y_rate: float, zeta_rate: float
 ) -> tuple[float, float]:
-    """State at the fraction GAMMA of a step from (y, zeta), inputs there; the weight is HALF times the step."""
+    """Return the state at the fraction GAMMA of a step from (y, zeta), for the inputs there.
+
+    The weight is RATE_WEIGHT times the step.
+    """
     return solve_stage(s, x, v, u, y + weight * y_rate, zeta + weight * zeta_rate, weight, zeta)
 
 
@@ -143,11 +147,11 @@ def solve_first_stage(
 def solve_second_stage(
     s: Array, x: float, v: float, u: float, weight: float, y: float, zeta: float, y1: float, zeta1: float
 ) -> tuple[float, float, float, float]:
-    """State at the end of the step and its rates, from its start (y, zeta) and its first stage (y1, zeta1)."""
+    """Return the state at the end of the step and its rates, from its start and its first stage (y1, zeta1)."""
     y_known = WEIGHT_STAGE * y1 - WEIGHT_START * y
     zeta_known = WEIGHT_STAGE * zeta1 - WEIGHT_START * zeta
     y, zeta = solve_stage(s, x, v, u, y_known, zeta_known, weight, zeta1)
-    # The stage holds for zeta', whose power is dear; y' makes the force and is asked of the law to the last digit.
+    # zeta' follows from the stage equation, which saves a power. y' determines the force and comes from the law.
     return y, zeta, _compute_y_rate(s, x, v, u, y, zeta), (zeta - zeta_known) / weight
 
 
@@ -155,13 +159,15 @@ def solve_second_stage(
 def differentiate_rates(
     s: Array, x: float, v: float, u: float, y: float, zeta: float, over_state: Array, over_inputs: Array, of: Array
 ) -> tuple[float, float]:
-    """Slopes of y' and zeta' over everything, written into the arrays given; returns the rates too.
+    """Compute the rates y' and zeta', and write their derivatives into the given arrays.
 
     Args:
-        s, x, v, u, y, zeta: where; as everywhere.
-        over_state: (2, 2) sensitivities of y' and zeta' over y and zeta.
-        over_inputs: (2, 3) sensitivities of y' and zeta' over x, v and u.
-        of: (2, 10 or more) sensitivities of y' and zeta' over the structural coordinates come first.
+        s: (10,) structural coordinates.
+        x, v, u: displacement [m], velocity [m/s] and field [V or A].
+        y, zeta: state [m], [1].
+        over_state: (2, 2) derivatives of y' and zeta' over y and zeta.
+        over_inputs: (2, 3) derivatives of y' and zeta' over x, v and u.
+        of: (2, 10 or more); the derivatives over the structural coordinates fill the first ten columns.
     """
     yield_force = evaluate_coefficient(s[0], s[1], u)
     c0 = evaluate_coefficient(s[5], s[6], u)

@@ -1,4 +1,4 @@
-"""Compiled trajectories against an independent integrator, and their slopes against differences."""
+"""Compiled simulation against an independent integrator, and its sensitivities against differences."""
 
 from dataclasses import replace
 

@@ -12,7 +12,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
-    """Turn a run with skipped tests into a failure where that was asked for."""
+    """Turn a run with skipped tests into a failure if ``--fail-on-skip`` is given."""
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or not session.config.getoption("--fail-on-skip"):
         return
@@ -22,7 +22,7 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Name the skipped tests that make the run fail."""
+    """List the skipped tests that make the run fail."""
     skipped = terminalreporter.stats.get("skipped", [])
     if skipped and terminalreporter.config.getoption("--fail-on-skip"):
         terminalreporter.section("skipped tests are failures here (--fail-on-skip)")

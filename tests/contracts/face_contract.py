@@ -1,4 +1,4 @@
-"""An import contract: a package is imported through its face, not through its modules."""
+"""Import contract: a package is imported through its face, its ``__init__.py``, not through its modules."""
 
 from grimp import ImportGraph
 from importlinter import Contract, ContractCheck, fields, output
@@ -17,17 +17,17 @@ class FaceContract(Contract):
     exposed = fields.SetField(subfield=fields.StringField(), required=False)
 
     def check(self, graph: ImportGraph, verbose: bool) -> ContractCheck:
-        """Find every import of a module that passes by the face of its package."""
+        """Find every import of a module that bypasses the face of its package."""
         exposed = self.exposed or set()
         found = sorted(
             (importer, imported)
             for importer in graph.modules
             for imported in graph.find_modules_directly_imported_by(importer)
-            if imported not in exposed and self._passes_by(graph, importer, imported)
+            if imported not in exposed and self._bypasses_face(graph, importer, imported)
         )
         return ContractCheck(kept=not found, metadata={"imports": found})
 
-    def _passes_by(self, graph: ImportGraph, importer: str, imported: str) -> bool:
+    def _bypasses_face(self, graph: ImportGraph, importer: str, imported: str) -> bool:
         package = imported.rpartition(".")[0]
         if imported.partition(".")[0] not in self.roots or not package or graph.find_children(imported):
             return False

@@ -1,4 +1,4 @@
-"""What every command holds to: help, exit codes, one line on what could not be done."""
+"""Help, exit codes and one-line error messages that all commands have in common."""
 
 import subprocess
 import sys
@@ -19,33 +19,33 @@ def mrbench(*words, folder):
 @pytest.mark.parametrize(
     "words", [(), *((command,) for command in COMMANDS)], ids=lambda w: " ".join(w) or "mrbench"
 )
-def test_help_is_given(words, tmp_path):
+def test_a_command_has_help(words, tmp_path):
     done = mrbench(*words, "--help", folder=tmp_path)
     assert done.returncode == 0
     assert len(done.stdout) > 80
     assert done.stderr == ""
 
 
-def test_all_commands_are_listed_with_what_they_do(tmp_path):
+def test_help_lists_all_commands_with_descriptions(tmp_path):
     listed = mrbench("--help", folder=tmp_path).stdout.partition("Commands:")[2].splitlines()
     assert [line.split()[0] for line in listed if line.strip()] == COMMANDS
     assert all(len(line.split()) > 3 for line in listed if line.strip())
 
 
-def test_help_waits_for_nothing_heavy():
+def test_help_imports_no_heavy_package():
     words = f"""if True:
         import contextlib, io, sys
         from bench.cli import main
-        with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()) as told:
+        with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()) as output:
             main(["--help"])
-        assert "Commands:" in told.getvalue()
+        assert "Commands:" in output.getvalue()
         print([name for name in {HEAVY!r} if name in sys.modules])
     """
     done = subprocess.run([sys.executable, "-c", words], capture_output=True, text=True, timeout=60, check=True)
     assert done.stdout.strip() == "[]"
 
 
-def test_the_version_is_told(tmp_path):
+def test_the_version_is_printed(tmp_path):
     assert mrbench("--version", folder=tmp_path).stdout.startswith("mrbench ")
 
 
@@ -69,7 +69,7 @@ def test_the_version_is_told(tmp_path):
     ],
     ids=" ".join,
 )
-def test_misuse_ends_with_2_and_leaves_nothing(words, tmp_path):
+def test_misuse_ends_with_2_and_writes_nothing(words, tmp_path):
     done = mrbench(*words, folder=tmp_path)
     assert done.returncode == 2
     assert "Error" in done.stderr
@@ -95,7 +95,7 @@ def test_misuse_ends_with_2_and_leaves_nothing(words, tmp_path):
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
-def test_what_cannot_be_done_ends_with_1_and_one_line_that_names_it(words, named, tmp_path):
+def test_a_failure_ends_with_1_and_one_line_that_names_the_cause(words, named, tmp_path):
     done = mrbench(*words, folder=tmp_path)
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1

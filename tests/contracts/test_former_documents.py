@@ -1,4 +1,4 @@
-"""Documents written by commit 47f8566 open, and are written again under the present names."""
+"""Documents of commit 47f8566 can be read, and are written again under the present names."""
 
 import json
 from pathlib import Path
@@ -32,7 +32,7 @@ RENAMED = {
     "trend": {"way": "direction", "per_run": "change_per_run", "sizes": "values"},
     "twin": {"how": "basis", "each_log": "per_log"},
 }
-"""Former and present keys of each document; keys of a name with two meanings are tested by themselves."""
+"""Former and present keys of each document; keys with two meanings have tests of their own."""
 
 
 def rename_keys(content, names):

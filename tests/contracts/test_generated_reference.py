@@ -1,4 +1,4 @@
-"""The committed schemas and the OpenAPI description are those of the code."""
+"""Committed schemas and OpenAPI description, compared with those generated from the code."""
 
 import json
 
@@ -22,7 +22,7 @@ def read(name):
 
 
 @pytest.mark.parametrize("name", ["openapi.json", *(f"schemas/{name}.json" for name in SCHEMAS)])
-def test_the_committed_file_is_that_of_the_code(name, files):
+def test_the_committed_file_equals_the_generated_one(name, files):
     assert read(name) == files[name], "run: python docs/generate_reference.py"
 
 
@@ -37,6 +37,6 @@ def test_a_schema_is_valid(name):
 
 
 @pytest.mark.parametrize("name", sorted(generator.DOCUMENTS.keys() - UNVERSIONED))
-def test_the_schema_of_a_document_names_its_version(name):
+def test_the_schema_of_a_document_contains_its_version(name):
     schema = json.loads(generator.make_schema(name))
     assert schema["properties"]["schema"]["const"] == f"mrbench.{name}/1"

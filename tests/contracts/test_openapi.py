@@ -1,4 +1,4 @@
-"""Every path of the REST interface describes its errors, and the service imports no heavy packages."""
+"""Error descriptions of all REST paths, and imports of the service."""
 
 import subprocess
 import sys

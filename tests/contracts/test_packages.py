@@ -1,4 +1,4 @@
-"""The structure of the code: faces, sizes of packages, one direction of imports between processes."""
+"""Structure of the packages: public names, number of modules, and which package starts processes."""
 
 import ast
 from pathlib import Path
@@ -20,7 +20,7 @@ def modules(package):
 
 
 def exported(package):
-    """Names in ``__all__``, and names that the face binds."""
+    """Return the names in ``__all__``, and the names that ``__init__.py`` binds."""
     tree = ast.parse((ROOT / package / "__init__.py").read_text("utf-8"))
     listed = None
     bound = set()
@@ -40,14 +40,14 @@ def test_there_are_packages():
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_a_package_has_a_face_whose_names_exist(package):
+def test_the_public_names_of_a_package_exist(package):
     listed, bound = exported(package)
     assert listed is not None, f"{package}/__init__.py has no __all__"
     assert set(listed) <= bound
 
 
 @pytest.mark.parametrize("package", [p for p in PACKAGES if p not in TABLES])
-def test_a_package_is_small_enough_to_be_held_in_mind(package):
+def test_a_package_has_few_modules(package):
     assert len(modules(package)) <= MOST_MODULES
 
 

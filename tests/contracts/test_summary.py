@@ -1,4 +1,4 @@
-"""The closing line of several test runs."""
+"""Last line of the summary of several test runs."""
 
 import sys
 
@@ -16,33 +16,33 @@ def results(folder, name, *cases):
     return path
 
 
-def closing_line(monkeypatch, capsys, *words):
+def summarise(monkeypatch, capsys, *words):
     monkeypatch.setattr(sys, "argv", ["summary", *map(str, words)])
     code = summary.main()
     return code, capsys.readouterr().out.splitlines()[-1]
 
 
-def test_a_test_that_was_repeated_counts_with_its_last_result(tmp_path, monkeypatch, capsys):
+def test_the_last_result_of_a_repeated_test_counts(tmp_path, monkeypatch, capsys):
     first = results(tmp_path, "a.xml", ("one", ""), ("two", "failure"))
     again = results(tmp_path, "b.xml", ("two", ""))
-    assert closing_line(monkeypatch, capsys, first)[0] == 1
-    assert closing_line(monkeypatch, capsys, first, again) == (
+    assert summarise(monkeypatch, capsys, first)[0] == 1
+    assert summarise(monkeypatch, capsys, first, again) == (
         0,
         "==== 0 failed, 2 passed, 0 skipped, 0 deselected in 3.00s ====",
     )
 
 
 @pytest.mark.parametrize("outcome", ["skipped", "error", "failure"])
-def test_a_test_that_did_not_pass_fails_the_whole(tmp_path, monkeypatch, capsys, outcome):
-    code, _ = closing_line(monkeypatch, capsys, results(tmp_path, "a.xml", ("one", ""), ("two", outcome)))
+def test_one_test_without_success_fails_the_summary(tmp_path, monkeypatch, capsys, outcome):
+    code, _ = summarise(monkeypatch, capsys, results(tmp_path, "a.xml", ("one", ""), ("two", outcome)))
     assert code == 1
 
 
-def test_no_result_at_all_is_a_failure(tmp_path, monkeypatch, capsys):
-    assert closing_line(monkeypatch, capsys, results(tmp_path, "a.xml"))[0] == 1
+def test_a_run_without_results_is_a_failure(tmp_path, monkeypatch, capsys):
+    assert summarise(monkeypatch, capsys, results(tmp_path, "a.xml"))[0] == 1
 
 
-def test_tests_that_were_left_out_are_listed_and_counted(tmp_path, monkeypatch, capsys):
+def test_deselected_tests_are_listed_and_counted(tmp_path, monkeypatch, capsys):
     listing = tmp_path / "slow.txt"
     listing.write_text("tests/unit/test_a.py::test_long\n\n1/900 tests collected\n")
     monkeypatch.setattr(

@@ -16,13 +16,13 @@ def test_every_block_of_the_page_works(page, folder, environment):
 
 
 @pytest.mark.parametrize("page", blocks.PAGES, ids=lambda page: page.stem)
-def test_a_block_that_is_not_run_says_why(page):
+def test_a_block_that_is_not_run_has_a_reason(page):
     for block in blocks.blocks(page):
-        assert block.mark != "not run" or len(block.said) > 10
+        assert block.mark != "not run" or len(block.argument) > 10
 
 
 @pytest.mark.parametrize(
-    ("said", "expected", "same"),
+    ("output", "expected", "same"),
     [
         ("a.mcap: 100 samples", "a.mcap: 100 samples", True),
         ("a.mcap: 103 samples", "a.mcap: 100 samples", True),
@@ -31,5 +31,5 @@ def test_a_block_that_is_not_run_says_why(page):
         ("first\nand more", "first", False),
     ],
 )
-def test_outputs_shown_are_compared_with_outputs(said, expected, same):
-    assert blocks.as_shown(said, expected) is same
+def test_an_output_is_compared_with_the_expected_one(output, expected, same):
+    assert blocks.is_expected(output, expected) is same

@@ -1,4 +1,4 @@
-"""The fenced blocks of a page that can be run, and what a reader is told to expect of them."""
+"""Fenced blocks of a documentation page that can be run, with their expected output."""
 
 import re
 import subprocess
@@ -12,17 +12,17 @@ PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/tutorial/*.md")), *sorted(R
 
 _BLOCK = re.compile(r"(?:<!-- (not run|file): (.+?) -->\n)?```(\w+)\n(.*?)```", re.DOTALL)
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
-_CLOSE = 0.05
-"""[1] relative difference at which a number shown still counts as the one printed."""
+_TOLERANCE = 0.05
+"""Largest relative difference [1] between a number in the page and the printed number."""
 
 
 class Block(NamedTuple):
     language: str
     text: str
     mark: str
-    """``not run``, ``file`` or nothing."""
-    said: str
-    """Why it is not run, or the file's name."""
+    """``not run``, ``file`` or empty."""
+    argument: str
+    """Reason why the block is not run, or name of the file."""
 
 
 def blocks(page: Path) -> list[Block]:
@@ -31,9 +31,9 @@ def blocks(page: Path) -> list[Block]:
 
 
 def carry_out(block: Block, folder: Path, environment: dict[str, str]) -> None:
-    """Do what a reader would do with a block; fails where a command fails or says something else."""
+    """Execute a block as a reader would; fail if a command fails or prints another output."""
     if block.mark == "file":
-        (folder / block.said).write_text(block.text, encoding="utf-8")
+        (folder / block.argument).write_text(block.text, encoding="utf-8")
     elif block.mark == "not run":
         return
     elif block.language == "sh":
@@ -41,8 +41,8 @@ def carry_out(block: Block, folder: Path, environment: dict[str, str]) -> None:
     elif block.language == "console":
         for command in re.split(r"^\$ ", block.text, flags=re.MULTILINE)[1:]:
             words, _, expected = command.partition("\n")
-            said = run(words, folder, environment)
-            assert as_shown(said, expected), f"$ {words}\nsays\n{said}\nand not\n{expected}"
+            output = run(words, folder, environment)
+            assert is_expected(output, expected), f"$ {words}\nprints\n{output}\ninstead of\n{expected}"
 
 
 def run(script: str, folder: Path, environment: dict[str, str]) -> str:
@@ -60,12 +60,12 @@ def run(script: str, folder: Path, environment: dict[str, str]) -> str:
     return done.stdout
 
 
-def as_shown(said: str, expected: str) -> bool:
-    """Whether an output is the one shown: ``...`` stands for anything, numbers may differ by five per cent."""
+def is_expected(output: str, expected: str) -> bool:
+    """Return whether an output is the expected one; ``...`` matches any text, numbers may differ by 5 %."""
     pattern = "".join(
         ".*?" if part == "..." else f"({_NUMBER.pattern})" if _NUMBER.fullmatch(part) else re.escape(part)
         for part in re.split(rf"(\.\.\.|{_NUMBER.pattern})", expected.strip())
     )
-    found = re.fullmatch(pattern, said.strip(), re.DOTALL)
+    found = re.fullmatch(pattern, output.strip(), re.DOTALL)
     shown = [float(number) for number in _NUMBER.findall(expected)]
-    return found is not None and [float(n) for n in found.groups()] == pytest.approx(shown, rel=_CLOSE)
+    return found is not None and [float(n) for n in found.groups()] == pytest.approx(shown, rel=_TOLERANCE)

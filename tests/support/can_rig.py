@@ -93,7 +93,7 @@ PATIENT = ActuatorSettings(
 
 
 def sine(t: float) -> float:
-    """10 mm at 2 Hz."""
+    """Return a sine of 10 mm at 2 Hz [m]."""
     return 0.01 * math.sin(2 * math.pi * 2 * t)
 
 

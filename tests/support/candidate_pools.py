@@ -22,13 +22,13 @@ from tests.support.strokes import stretch
 RATE = 500.0
 NOISE = 2.0
 STROKES = ((0.012, 1.0, 2.0), (0.006, 3.0, 1.0))
-"""[m], [Hz] and [s] at each drive."""
+"""Amplitude [m], frequency [Hz] and duration [s] at each drive."""
 DRIVES = (0.0, 0.5, 0.2)
 BASELINE_FIT = FitOptions(decimation=1, starts=1, descents=1, refit_full=False)
 
 
 def record(*effects: str | ActiveEffect, seed: int = 1) -> Recording:
-    """Nine seconds of the laboratory damper with some effects at their medium sizes."""
+    """Return nine seconds of the laboratory damper with some effects at their medium sizes."""
     size, rate, drive, segments = _plan()
     angle = 2 * np.pi * np.cumsum(rate) / RATE
     x = size * np.sin(angle)
@@ -43,7 +43,7 @@ def record(*effects: str | ActiveEffect, seed: int = 1) -> Recording:
 
 
 def _plan() -> tuple[Array, Array, Array, list[Segment]]:
-    """Amplitude, frequency and drive of every sample, and the segments."""
+    """Return amplitude [m], frequency [Hz] and drive [V] of every sample, and the segments."""
     rows, segments, start = [], [], 0
     for size, rate, seconds in STROKES:
         for level in DRIVES:
@@ -73,7 +73,7 @@ class WatchedPool(CandidatePool):
         return super().fit(effects, starts, options)
 
     def copy(self, **settings: float) -> "WatchedPool":
-        """The pool with the same candidates, no record of fits, and other settings."""
+        """Return a pool with the same candidates, no recorded fits, and other settings."""
         return replace(
             self,
             settings=replace(self.settings, **settings),
@@ -94,12 +94,12 @@ class WatchedPool(CandidatePool):
         return candidate.names
 
     def get_excess(self, *names: str) -> float:
-        """Excess of a fitted set."""
+        """Return the excess of a fitted set."""
         return self.compute_excess(self.candidates[frozenset(names)])
 
 
 def make_pool(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:
-    """An empty pool of a short recording."""
+    """Return an empty pool of a short recording."""
     prepared = prepare_recordings([record(*effects)])
     pool = make_candidate_pool(prepared, settings=SearchSettings(**settings))
     return WatchedPool(
@@ -108,7 +108,7 @@ def make_pool(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:
 
 
 def fit_baseline(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:
-    """A pool of a short recording with the fit of the law alone."""
+    """Return a pool of a short recording with the fit of the law alone."""
     pool = make_pool(*effects, **settings)
     pool.fit((), options=BASELINE_FIT)
     return pool.copy()

@@ -22,7 +22,7 @@ class ClockWire:
         return BENCH + (np.asarray(device_ns) - DEVICE) / (1 + self.ppm * 1e-6)
 
     def read_clock(self, bench_ns):
-        """A reading that was requested at an instant of the bench clock."""
+        """Return a reading that was requested at an instant of the bench clock [ns]."""
         read_ns = bench_ns + int(self._request(self.random) * 1e9)
         received_ns = read_ns + int(self._reply(self.random) * 1e9)
         return ClockReading(self.find_device_time(read_ns) // 1000 * 1000, bench_ns, received_ns)

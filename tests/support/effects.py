@@ -1,4 +1,4 @@
-"""A medium size of every form of every effect, and a stroke on which all of them show."""
+"""Medium sizes of all forms of all effects, and a stroke on which each of them changes the force."""
 
 import numpy as np
 
@@ -66,13 +66,13 @@ IDS = [f"{name}-{form}" for name, form in FORMS]
 
 
 def active(name: str, form: str | None = None) -> ActiveEffect:
-    """An effect at its medium size."""
+    """Return an effect at its medium size."""
     form = form or EFFECTS[name].forms[0].name
     return ActiveEffect(EFFECTS[name], MEDIUM[name][form], form)
 
 
 def sine(amplitude: float = 0.015, frequency: float = 2.5, seconds: float = 2.0) -> Excitation:
-    """A sine across drives, with the power that a damper of this size dissipates in it."""
+    """Return a sine at several drives, with the power that a damper of this size dissipates."""
     t = np.arange(round(seconds * RATE)) / RATE
     w = 2 * np.pi * frequency
     drive = np.array([0.0, 0.3, 0.1, 0.5, 0.2])[(t / 0.41).astype(int) % 5]

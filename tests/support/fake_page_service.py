@@ -1,4 +1,4 @@
-"""A service that looks like ours from the page's side, with a bench that moves on paper only."""
+"""Fake service for the web page, with a simple fake bench."""
 
 import asyncio
 import contextlib
@@ -34,12 +34,12 @@ METHODS = [
 
 
 def instrument(name: str, driver: str, address: str, **more: Any) -> dict[str, Any]:
-    """One instrument's status."""
-    well = {
+    """Return the status of one instrument."""
+    healthy = {
         "connected": True, "received": 1_234_567, "lost": 0, "corrupted": 0, "resynchronised": 0, "age_s": 0.0021,
         "clock_error_bound_s": 1.8e-5, "message": "",
     }  # fmt: skip
-    return {"name": name, "driver": driver, "address": address} | well | more
+    return {"name": name, "driver": driver, "address": address} | healthy | more
 
 
 INSTRUMENTS = [
@@ -47,13 +47,13 @@ INSTRUMENTS = [
     instrument("load_cell", "serial", "/dev/pts/3", lost=12, corrupted=2, resynchronised=1),
     instrument("lvdt", "serial", "/dev/pts/4"),
     instrument("coil_amplifier", "modbus_tcp", "127.0.0.1:1502 unit 1", received=40_211, clock_error_bound_s=None),
-    instrument("thermometer", "modbus_rtu", "/dev/pts/5 unit 2", connected=False, age_s=83.0, clock_error_bound_s=None,
-               message="no reply for 83 s; is it powered?"),
+    instrument("thermometer", "modbus_rtu", "/dev/pts/5 unit 2", connected=False, age_s=83.0,
+               clock_error_bound_s=None, message="no reply for 83 s; is it powered?"),
 ]  # fmt: skip
 
 
 def fit_job(run_id: str, state: str, **more: Any) -> dict[str, Any]:
-    """A job of a run."""
+    """Return a job of a run."""
     return {
         "id": f"job-{run_id}", "run": run_id, "kind": "identify", "state": state, "activity": "", "attempts": 1,
         "error": "", "settings": {}, "created": "2025-03-04T09:20:00Z", "started": None, "finished": None,
@@ -62,7 +62,7 @@ def fit_job(run_id: str, state: str, **more: Any) -> dict[str, Any]:
 
 
 def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
-    """A run of the list."""
+    """Return a run of the list."""
     return {
         "id": f"run-{number}", "method": "quick", "specimen": "MR-0042", "operator": "A. Meyer",
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
@@ -72,7 +72,7 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
 
 
 class FakeBench:
-    """State of the bench on paper; every request that changes something is kept in `posted`."""
+    """State of the fake bench; all requests that change something are kept in ``posted``."""
 
     def __init__(self) -> None:
         self.posted: list[tuple[str, Any]] = []
@@ -85,16 +85,17 @@ class FakeBench:
         self.silent = False
         self.over = False
         found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
+        activity = "identify: refine, start 3 of 8"
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost"),
-            "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity="identify: refine, start 3 of 8")]),
+            "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity=activity)]),
             "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
         self.began = time.monotonic()
 
     def status(self) -> dict[str, Any]:
-        """The agent's status as published."""
+        """Return the status of the agent as it is published."""
         return {
             "state": self.state, "trip": self.trip, "run": self.run, "finished": [], "instruments": INSTRUMENTS,
             "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
@@ -102,7 +103,7 @@ class FakeBench:
         }  # fmt: skip
 
     def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """A run that goes on."""
+        """Start a run that does not end."""
         known = {"id": "run-4", "started": "2025-03-04T09:30:00Z", **wanted}
         self.run = known | {
             "log": "run-4.mcap", "duration_s": 14.0, "elapsed_s": 5.0, "segment": "sine_10mm_1Hz", "outcome": None,
@@ -113,7 +114,7 @@ class FakeBench:
         return self.runs["run-4"]
 
     def samples(self, first: int) -> dict[str, Any]:
-        """A batch: a sine of 10 mm at 1.5 Hz, and a force with a loop."""
+        """Return a batch of samples: a sine of 10 mm at 1.5 Hz, and a force with a hysteresis loop."""
         times = [(first + k) / RATE for k in range(BATCH)]
         omega = 2 * math.pi * 1.5
         displacement = [0.01 * math.sin(omega * t) for t in times]
@@ -125,23 +126,23 @@ class FakeBench:
         ]
         values = {"displacement": displacement, "velocity": velocity, "force": force, "coil_drive": drive}
         values["coil_current"] = [u / 5 for u in drive]
-        # A slow instrument has a value in some samples only.
+        # A slow instrument has values only in some samples.
         values["temperature"] = [24 + 0.05 * t if not k % BATCH else None for k, t in enumerate(times)]
         return {"time_ns": [round(t * 1e9) for t in times], "values": values, "segment": "sine_10mm_1Hz"}
 
 
 def problem(status: int, title: str, detail: str) -> JSONResponse:
-    """An error as the service words it."""
+    """Return an error in the form of the service."""
     content = {"type": "about:blank", "title": title, "status": status, "detail": detail}
     return JSONResponse(content, status_code=status, media_type="application/problem+json")
 
 
 def application(bench: FakeBench) -> FastAPI:
-    """The routes that the page uses."""
+    """Create the application with the routes that the page uses."""
     app = FastAPI()
 
     @app.middleware("http")
-    async def let_in(request: Request, call_next: Any) -> Any:
+    async def authorise(request: Request, call_next: Any) -> Any:
         allowed = request.headers.get("authorization") == f"Bearer {TOKEN}"
         if request.url.path.startswith("/api/") and not allowed:
             return problem(401, "Not allowed", "the token is missing or wrong")
@@ -157,7 +158,7 @@ def application(bench: FakeBench) -> FastAPI:
 
 
 def rig_routes(bench: FakeBench) -> APIRouter:
-    """The agent and its methods; `silence` is the tests' own, and cuts the agent off."""
+    """Create the routes of agent and methods; ``silence`` exists for tests and disconnects the agent."""
     router = APIRouter()
 
     @router.get("/agent")
@@ -182,14 +183,14 @@ def rig_routes(bench: FakeBench) -> APIRouter:
         return bench.status()
 
     @router.post("/silence")
-    async def fall_silent() -> Any:
+    async def disconnect_agent() -> Any:
         bench.silent = True
 
     return router
 
 
 def run_routes(bench: FakeBench) -> APIRouter:
-    """Runs and jobs."""
+    """Create the routes of runs and jobs."""
     router = APIRouter()
 
     @router.get("/runs")
@@ -223,7 +224,7 @@ def run_routes(bench: FakeBench) -> APIRouter:
 
 
 def live_routes(bench: FakeBench) -> APIRouter:
-    """The websocket."""
+    """Create the route of the websocket."""
     router = APIRouter()
 
     @router.websocket("/live")
@@ -239,7 +240,7 @@ def live_routes(bench: FakeBench) -> APIRouter:
 
 
 async def publish(socket: WebSocket, bench: FakeBench) -> None:
-    """Sends what a bench of this rate would, late batches together."""
+    """Send samples at the rate of the bench, late batches together."""
     await socket.send_json(
         {"topic": "event", "data": {"time_ns": 0, "kind": "state", "text": "the agent is ready"}}
     )
@@ -258,7 +259,7 @@ async def publish(socket: WebSocket, bench: FakeBench) -> None:
 
 @contextlib.contextmanager
 def served(bench: FakeBench) -> Any:
-    """Runs the service on a free port of the loopback; gives its address."""
+    """Run the service on a free port of the loopback interface; yield its address."""
     listener = socket.create_server(("127.0.0.1", 0))
     server = uvicorn.Server(uvicorn.Config(application(bench), log_level="warning", timeout_graceful_shutdown=1))
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})

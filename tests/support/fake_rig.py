@@ -1,6 +1,6 @@
-"""Doubles of a bench's parts in one shape: instruments, guard, observer, clock map and recording thread.
+"""Fakes of the parts of a bench: instruments, guard, observer, clock map and recording thread.
 
-Doubles of instruments append their calls to one list, which tests pass in to see the order.
+Fake instruments append their calls to one list, which tests pass in to check the order.
 """
 
 import threading
@@ -141,7 +141,7 @@ class FakeClockMap:
 
 
 class FakeRecordingThread:
-    """Recording thread to which no samples come."""
+    """Recording thread that receives no samples."""
 
     newest_ns = 0
 

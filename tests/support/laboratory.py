@@ -16,7 +16,7 @@ LEVELS = (0.0, 0.3, 0.1, 0.5)
 
 
 def stretch(name, amplitude, frequency, seed, seconds=8.0, levels=LEVELS, **changes) -> Stretch:
-    """One sine stroke of the laboratory damper, two seconds a level, as a bench would record it."""
+    """Return one sine stroke of the laboratory damper as a bench would record it, two seconds at each level."""
     t = np.arange(round(seconds * RATE)) / RATE
     w = 2 * np.pi * frequency
     x = amplitude * np.sin(w * t)

@@ -1,4 +1,4 @@
-"""The simulated rig in this process, its wires, and agents as processes beside it."""
+"""Simulated rig with its wires in this process, and agents in processes of their own."""
 
 import contextlib
 import gc
@@ -22,8 +22,8 @@ DEADLINE = 90.0
 
 
 TCP = TransportOptions(load_cell="tcp")
-_PATIENT = "setpoint_timeout = 0.3"
-"""The other processes of a busy machine, and what they do to a simulated drive, are not what is tested here."""
+_LONG_TIMEOUT = "setpoint_timeout = 0.3"
+"""Setpoint timeout that a simulated drive needs on a machine with other busy processes."""
 
 
 def constant(value):
@@ -31,7 +31,7 @@ def constant(value):
 
 
 def method(**more):
-    """A few seconds of strokes at two drives."""
+    """Return a method of a few seconds with strokes at two drives."""
     sine = {"kind": "sine", "amplitude_m": 0.008, "frequency_hz": 2.0}
     return {
         "schema": "mrbench.method/1",
@@ -52,7 +52,7 @@ def method(**more):
 
 
 class Bench:
-    """A served rig, the file that reaches it, and what has happened on it."""
+    """Served rig, its bench.toml, and the true signals of its plant."""
 
     def __init__(self, served, folder):
         self.served, self.folder = served, folder
@@ -80,12 +80,12 @@ class Bench:
         return self.served.rig.read_truth().truth
 
     def strokes(self):
-        """Whether the rod moves with the coil on."""
+        """Return whether the rod moves with the coil on."""
         truth = self.truth()
         return len(truth.output) > 100 and truth.output[-1] > 0.1 and np.ptp(truth.position[-400:]) > 4e-3
 
     def rests(self):
-        """Whether the rod has stood for a fifth of a second, with the coil off."""
+        """Return whether the rod has been at rest for 0.2 s with the coil off."""
         truth = self.truth()
         return np.all(truth.output[-200:] == 0) and np.ptp(truth.position[-400:]) < 1e-6
 
@@ -94,13 +94,13 @@ def until(condition, deadline=DEADLINE):
     """Poll until a condition holds."""
     end = time.monotonic() + deadline
     while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
+        assert time.monotonic() < end, "the condition did not become true in time"
         time.sleep(0.05)
 
 
 @contextlib.contextmanager
-def as_punctual_as_hardware():
-    """Real-time priority for what this thread starts, where there is any; short waits for the interpreter."""
+def raised_priority():
+    """Give threads of this process real-time priority if possible, and switch between them often."""
     before = sys.getswitchinterval()
     raise_priority(-10)
     sys.setswitchinterval(5e-4)
@@ -116,20 +116,20 @@ def as_punctual_as_hardware():
 
 @contextlib.contextmanager
 def live_bench(folder, choices=TCP, faults=None, limits=""):
-    """A rig with its wires open."""
+    """Serve a rig on its wires."""
     scenario = load_scenario("default")
-    with as_punctual_as_hardware(), RigServer(scenario, RunningClock(), choices, faults) as served:
+    with raised_priority(), RigServer(scenario, RunningClock(), choices, faults) as served:
         until(lambda: len(served.rig.read_truth().truth.output) > 500)
         write_bench_toml(folder / "bench.toml", served.wires, scenario)
         bench = Bench(served, folder)
-        text = bench.toml.read_text().replace("setpoint_timeout = 0.2", _PATIENT)
+        text = bench.toml.read_text().replace("setpoint_timeout = 0.2", _LONG_TIMEOUT)
         bench.toml.write_text(f"{text}{limits}\n")
         yield bench
 
 
 @contextlib.contextmanager
 def ended(process):
-    """A process that is not left behind."""
+    """Kill a process at the end."""
     try:
         yield process
     finally:

@@ -92,8 +92,8 @@ def write_spoilt_csv(path, line, column, text, samples=1000):
     """Write a recording in which one cell of one line is replaced."""
     write_csv(path, csv_columns(samples))
     lines = path.read_text().splitlines()
-    place = lines[0].split(",").index(column)
+    index = lines[0].split(",").index(column)
     cells = lines[line - 1].split(",")
-    lines[line - 1] = ",".join([*cells[:place], text, *cells[place + 1 :]])
+    lines[line - 1] = ",".join([*cells[:index], text, *cells[index + 1 :]])
     path.write_text("\n".join(lines) + "\n")
     return path

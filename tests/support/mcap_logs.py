@@ -10,7 +10,7 @@ UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "coil_drive": "V"
 
 
 class Log:
-    """Writer of messages as a bench writes them."""
+    """Writer of messages in the format of the bench."""
 
     def __init__(self, writer):
         self.writer = writer

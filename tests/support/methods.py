@@ -10,7 +10,7 @@ def constant(value):
 
 
 def sine(name, amplitude, frequency, drive, **more):
-    """A segment of three cycles that is a checkpoint."""
+    """Return a segment of three cycles that is a checkpoint."""
     motion = {"kind": "sine", "amplitude_m": amplitude, "frequency_hz": frequency}
     return {"name": name, "motion": motion, "cycles": 3, "drive": drive, "checkpoint": True, **more}
 

@@ -1,4 +1,4 @@
-"""A small rig for the Modbus tests: known signals on a clock that the test steps, and servers on every wire."""
+"""Small rig for the Modbus tests: known signals on a clock that the test steps, and servers on all wires."""
 
 import contextlib
 import threading
@@ -20,7 +20,7 @@ RESOLUTION = {"displacement": 1e-7, "coil_voltage": 1e-4, "coil_current": 1e-4, 
 
 
 def truth(channel: str, times: np.ndarray) -> np.ndarray:
-    """True values of a channel at instants [ns]."""
+    """Return the true values of a channel at instants [ns]."""
     seconds = times * 1e-9
     return {
         "displacement": 0.02 * np.sin(2 * np.pi * seconds),
@@ -31,7 +31,7 @@ def truth(channel: str, times: np.ndarray) -> np.ndarray:
 
 
 class FakeSignals:
-    """The rig as the simulated instruments use it; only the test moves its time."""
+    """Rig interface of the simulated instruments; only the test moves its time."""
 
     def __init__(self, now_ns: int = 5_000 * MS) -> None:
         self._now = now_ns
@@ -64,7 +64,7 @@ class FakeSignals:
 
 @contextlib.contextmanager
 def serve(device: ModbusDevice, wire: str, unit: int = 1) -> Iterator[tuple[ModbusServer, ModbusAddress]]:
-    """Serve a device on one of the WIRES; yields the server and its address."""
+    """Serve a device on one of the WIRES; yield the server and its address."""
     server = ModbusServer(device, unit, MBAP if wire == "tcp" else RTU)
     (server.listen_pty if wire == "rtu over pty" else server.listen)()
     with server:
@@ -75,5 +75,5 @@ def wait_until(condition: Callable[[], bool], timeout: float = 5.0) -> None:
     """Wait for a condition that another thread fulfils."""
     deadline = time.monotonic() + timeout
     while not condition():
-        assert time.monotonic() < deadline, "it did not happen in time"
+        assert time.monotonic() < deadline, "the condition did not become true in time"
         time.sleep(0.002)

@@ -1,4 +1,4 @@
-"""A short recording of the laboratory damper with known truth, on which the networks are trained."""
+"""Short recording of the laboratory damper with known truth, for the training of the networks."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""The generator of the reference, loaded from its file: `docs` is not a package."""
+"""Generator of the reference, loaded from its file because ``docs`` is not a package."""
 
 import importlib.util
 from pathlib import Path

@@ -12,7 +12,7 @@ from bench.report.series import ForceSeries
 RATE = 500.0
 DRIVES = (0.1, 0.3)
 CYCLES = 4
-"""A sine of 10 mm and 2 Hz at each drive; then one whose drive varies."""
+"""Cycles of each part: a sine of 10 mm and 2 Hz at each drive, then one with a varying drive."""
 
 
 def columns():
@@ -114,7 +114,7 @@ def fit_document(sha256="", **changes):
         },
         "nuisances": {"y0": {"strokes": -3.8e-6}, "force_delay": delay, "drive_delay": delay},
         "noise_floor_n": 1.9,
-        "floor": {"cycle_to_cycle": 1.91, "high_frequency": 1.89, "how": "cycle to cycle over 6 cycles"},
+        "floor": {"cycle_to_cycle": 1.91, "high_frequency": 1.89, "basis": "cycle to cycle over 6 cycles"},
         "rmse_n": {"train": 1.98, "validation": None, "held_out": 2.04},
         "nrmse": {"train": 0.016, "validation": None, "held_out": 0.017},
         "per_drive": [],

@@ -1,4 +1,4 @@
-"""Short recordings of the laboratory damper, with an effect in a form that the library does not have."""
+"""Short recordings of the laboratory damper, with an effect in a form outside the library."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,26 +16,26 @@ from tests.support.strokes import stretch
 RATE = 500.0
 NOISE = 2.5
 STROKES = ((0.012, 1.0, 2.0), (0.006, 3.0, 1.0), (0.01, 2.0, 1.0))
-"""[m], [Hz], [s] of each drive."""
+"""Amplitude [m], frequency [Hz] and duration [s] at each drive."""
 DRIVES = (0.0, 0.2, 0.4, 0.5, 0.3, 0.1)
 
 
 def stiffening(x: Array, v: Array) -> Array:
-    """Force [N] of gas that is compressed at negative displacement, isothermal and not polytropic."""
+    """Return the force [N] of isothermal gas that is compressed at negative displacement."""
     return -60.0 * (1.0 / (1.0 + x / 0.03) - 1.0)
 
 
 def run(
-    beside: Callable[[Array, Array], Array] | None = None, specimen: str = "LAB-001", seed: int = 0
+    extra_force: Callable[[Array, Array], Array] | None = None, specimen: str = "LAB-001", seed: int = 0
 ) -> Recording:
-    """A recording; ``beside`` gives a force [N] beside the law from displacement [m] and velocity [m/s]."""
+    """Return a recording; ``extra_force`` computes a force [N] from displacement [m] and velocity [m/s]."""
     amplitude, frequency, drive, segments = _plan()
     angle = 2 * np.pi * np.cumsum(frequency) / RATE
     x = amplitude * np.sin(angle)
     v = np.gradient(x) * RATE
     stroke = Excitation(RATE, x, v, np.gradient(v) * RATE, drive)
     point = to_coordinates(PARAMETER_SETS["laboratory"].parameters)
-    force = simulate(SimulationModel(point), stroke).force + (0.0 if beside is None else beside(x, v))
+    force = simulate(SimulationModel(point), stroke).force + (0.0 if extra_force is None else extra_force(x, v))
     random = default_rng(seed)
     recorded = x + 2e-6 * random.standard_normal(len(x))
     made = stretch(recorded, force + NOISE * random.standard_normal(len(x)), drive, segments, rate=RATE)
@@ -44,7 +44,7 @@ def run(
 
 
 def _plan() -> tuple[Array, Array, Array, tuple[Segment, ...]]:
-    """Amplitude, frequency and drive of every sample, and the segments."""
+    """Return amplitude [m], frequency [Hz] and drive [V] of every sample, and the segments."""
     amplitude, frequency, drive, segments, start = [], [], [], [], 0
     for size, rate, seconds in STROKES:
         for level in DRIVES:

@@ -1,4 +1,4 @@
-"""A rig with a known force only, and helpers that wait for samples without sleeping."""
+"""Rig with a known force, and helpers that wait for samples without sleeping."""
 
 import socket
 import threading
@@ -16,7 +16,7 @@ DEADLINE = 10.0
 
 
 class KnownForce:
-    """A force that is known at every instant, sampled every millisecond; in real time unless a test steps it."""
+    """Force known at every instant, sampled every millisecond; in real time unless a test steps it."""
 
     def __init__(self, force: Callable[[np.ndarray], np.ndarray], step_ns: int | None = None) -> None:
         self.force = force
@@ -34,17 +34,17 @@ class KnownForce:
 
 
 def saw(ticks: np.ndarray) -> np.ndarray:
-    """[N] A sawtooth of 4000 different values, one per millisecond."""
+    """Return a sawtooth of 4000 different values [N], one per millisecond."""
     return (ticks % 4000) * 0.25 - 500.0
 
 
 def still(ticks: np.ndarray) -> np.ndarray:
-    """[N] A constant force of 123.5."""
+    """Return a constant force of 123.5 N."""
     return np.full(len(ticks), 123.5)
 
 
 def moving(ticks: np.ndarray) -> np.ndarray:
-    """[N] The force of a stroke at 2 Hz."""
+    """Return the force of a stroke at 2 Hz [N]."""
     return 900.0 * np.sin(4e-3 * np.pi * ticks)
 
 
@@ -56,7 +56,7 @@ def wait_until(condition: Callable[[], bool], event: str) -> None:
 
 
 def collect(instrument, samples: int, channel: str = "force") -> list[SampleBlock]:
-    """Acquire blocks of a channel until there are so many samples."""
+    """Acquire blocks of a channel until they contain a number of samples."""
     blocks: list[SampleBlock] = []
 
     def is_enough() -> bool:
@@ -76,14 +76,14 @@ def numbers(blocks: Sequence[SampleBlock]) -> np.ndarray:
 
 
 def is_equal(one: SampleBlock, other: SampleBlock) -> bool:
-    """Whether two blocks are equal bit for bit."""
+    """Return whether two blocks are bit-identical."""
     return all(
         np.array_equal(a, b) if isinstance(a, np.ndarray) else a == b for a, b in zip(one, other, strict=True)
     )
 
 
 class Rfc2217Server:
-    """A serial device server: pyserial's own, between one client and a port."""
+    """Serial device server of pyserial between one client and a port."""
 
     def __init__(self, port: str) -> None:
         self._port = port

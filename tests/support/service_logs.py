@@ -32,7 +32,7 @@ def write_complete_log(path, run="run-1", outcome="clean", source="run", first_s
             "coil_drive": np.full(1000, 0.2),
         }
         log.write_samples(np.round((first_s + time) * 1e9).astype(np.int64), columns)
-        log.close(outcome, "" if outcome == "clean" else "said so")
+        log.close(outcome, "" if outcome == "clean" else "stopped by the test")
     return path
 
 

@@ -1,4 +1,4 @@
-"""A six-second recording of the laboratory damper, and its fit."""
+"""Six-second recording of the laboratory damper, and its fit."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ RATE, NOISE, LEVELS, SECONDS = 1000.0, 2.5, (0.0, 0.3, 0.5), 2.0
 
 
 def recording() -> Recording:
-    """One sine of the laboratory damper through three voltages."""
+    """Return one sine of the laboratory damper at three voltages."""
     count = round(RATE * SECONDS * len(LEVELS))
     t, w = np.arange(count) / RATE, 2 * np.pi * 1.5
     x = 0.010 * np.sin(w * t)

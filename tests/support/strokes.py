@@ -49,7 +49,7 @@ def sine(amplitude: float, frequency: float, seconds: float = 8.0, rate: float =
 
 
 def recorded(displacement: Array, noise: float, digit: float = 1e-6, seed: int = 0) -> Array:
-    """Return a displacement as a sensor with white noise and digits [m] records it."""
+    """Return a displacement as recorded by a sensor with white noise and resolution [m]."""
     noisy = displacement + noise * default_rng(seed).standard_normal(len(displacement))
     return np.round(noisy / digit) * digit
 

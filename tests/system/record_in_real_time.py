@@ -1,4 +1,4 @@
-"""Writes samples at 1 kHz in real time until it is killed, and prints each sample's time [ns] once it is written.
+"""Recorder that writes samples at 1 kHz in real time until it is killed, and prints the time [ns] of each.
 
 python record_in_real_time.py LOG
 """

@@ -1,4 +1,4 @@
-"""What `docker-compose up` would start: the file itself, and its processes on this machine, without containers."""
+"""``docker-compose.yml``: the file itself, and its processes on this machine without containers."""
 
 import contextlib
 import json
@@ -15,7 +15,7 @@ import yaml
 
 from tests.support.live_bench import until
 from tests.system.test_page import CHROMIUM, FOLDER, NODE, browser_test
-from tests.system.test_service import PATIENCE, PROMPT, TINY
+from tests.system.test_service import DEADLINE, ENVIRONMENT, TINY
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docker-compose.yml"
@@ -29,19 +29,21 @@ def services():
 
 
 def dockerfile(word):
-    """What an instruction of the Dockerfile says, at its last place."""
+    """Return the arguments of the last such instruction of the Dockerfile."""
     return re.findall(rf"^{word} (.*)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)[-1]
 
 
-@pytest.mark.skipif(COMPOSE is None, reason="`apt-get install docker-compose` brings what reads the file")
-def test_compose_reads_its_file():
+@pytest.mark.skipif(
+    COMPOSE is None, reason="docker-compose is not installed; run `apt-get install docker-compose`"
+)
+def test_docker_compose_reads_the_file():
     words = [COMPOSE, "-f", FILE, "config", "--services"]
     read = subprocess.run(words, capture_output=True, text=True, check=False)
     assert read.returncode == 0, read.stderr
     assert set(read.stdout.split()) == set(ORDER)
 
 
-def test_every_container_waits_for_what_it_needs():
+def test_every_container_waits_for_its_dependencies():
     waits = {name: set(service.get("depends_on", ())) for name, service in services().items()}
     assert waits == {
         "sim": set(), "rig": {"sim"}, "scheduler": {"sim"}, "worker": {"scheduler"},
@@ -51,7 +53,7 @@ def test_every_container_waits_for_what_it_needs():
     assert networks == {name: "service:sim" if name != "sim" else None for name in networks}
 
 
-def test_image_holds_all_that_the_package_is_made_of():
+def test_the_image_contains_all_packages():
     packages = {path.parent.name for path in ROOT.glob("*/__init__.py")} - {"tests", "benchmarks"}
     copied = re.findall(r"^COPY (\w+) \1$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
     assert set(copied) == packages
@@ -68,7 +70,7 @@ def free_port():
 
 
 def words(service, data, scheduler):
-    """The command line of a container, its volume in a folder and its network on loopback."""
+    """Return the command line of a container, with its volume in a folder and its network on loopback."""
     line = [*service.get("entrypoint", ["mrbench"]), *service["command"]]
     here = [word.replace("/data", str(data)).replace("0.0.0.0", "127.0.0.1").replace("8786", str(scheduler))
             for word in line]  # fmt: skip
@@ -84,19 +86,19 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def address(folder):
-    """Of the service, once every process of the file runs, and its token."""
+    """Return the address and token of the service as soon as every process of the file runs."""
     scheduler = free_port()
     with contextlib.ExitStack() as stack:
         for name in ORDER:
             log = stack.enter_context((folder / f"{name}.log").open("w"))
             line = words(services()[name], folder, scheduler)
-            process = subprocess.Popen(line, stdout=log, stderr=subprocess.STDOUT, cwd=folder, env=PROMPT)
-            stack.callback(process.wait, PATIENCE)
+            process = subprocess.Popen(line, stdout=log, stderr=subprocess.STDOUT, cwd=folder, env=ENVIRONMENT)
+            stack.callback(process.wait, DEADLINE)
             stack.callback(process.terminate)
             if name == "sim":
-                until(lambda: (folder / "bench.toml").is_file(), PATIENCE)
+                until(lambda: (folder / "bench.toml").is_file(), DEADLINE)
         text = folder / "service.log"
-        until(lambda: "#token=" in text.read_text(), PATIENCE)
+        until(lambda: "#token=" in text.read_text(), DEADLINE)
         yield re.search(r"(http://127\.0\.0\.1:\d+/)#token=(\S+)", text.read_text()).groups()
 
 
@@ -104,22 +106,22 @@ def address(folder):
 def test_processes_of_the_file_record_and_identify(address, folder):
     def call(path, body=None):
         headers = {"Authorization": f"Bearer {address[1]}", "Content-Type": "application/json"}
-        with urlopen(Request(f"{address[0]}api/v1/{path}", body, headers), timeout=30) as answer:
-            return json.load(answer)
+        with urlopen(Request(f"{address[0]}api/v1/{path}", body, headers), timeout=30) as reply:
+            return json.load(reply)
 
-    until(lambda: call("agent")["state"] == "idle", PATIENCE)
-    begun = call("runs", json.dumps({"method": TINY}).encode())["id"]
-    until(lambda: [job["state"] for job in call(f"runs/{begun}")["jobs"]] == ["done"], PATIENCE)
-    assert call(f"runs/{begun}")["outcome"] == "clean"
-    assert call(f"runs/{begun}/fit")["schema"] == "mrbench.fit/1"
+    until(lambda: call("agent")["state"] == "idle", DEADLINE)
+    run_id = call("runs", json.dumps({"method": TINY}).encode())["id"]
+    until(lambda: [job["state"] for job in call(f"runs/{run_id}")["jobs"]] == ["done"], DEADLINE)
+    assert call(f"runs/{run_id}")["outcome"] == "clean"
+    assert call(f"runs/{run_id}/fit")["schema"] == "mrbench.fit/1"
 
 
 @pytest.mark.wire
 @browser_test
-def test_a_technician_starts_and_watches_a_run_at_the_page_of_a_real_bench(address, folder):
+def test_the_page_of_a_real_bench_starts_and_shows_a_run(address, folder):
     picture = folder / "page.png"
     command = [str(NODE), str(FOLDER / "watch_run.mjs"), *address, str(CHROMIUM), str(picture)]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=2 * PATIENCE, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=2 * DEADLINE, check=False)
     assert result.returncode == 0, result.stderr
     seen = json.loads(result.stdout)
     assert seen["errors"] == []

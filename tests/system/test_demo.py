@@ -1,4 +1,4 @@
-"""`mrbench demo` as a process."""
+"""``mrbench demo`` as a process."""
 
 import json
 import subprocess
@@ -58,7 +58,7 @@ def test_the_agent_is_shut_down_at_the_end(demo):
         AgentClient(agent.commands, agent.samples).send(StatusCommand(), timeout=0.5)
 
 
-def test_the_numbers_printed_are_those_of_the_fit(demo):
+def test_the_printed_numbers_equal_those_of_the_fit(demo):
     result, folder = demo
     fit = json.loads((folder / "fit.json").read_text())
     rmse, floor = fit["rmse_n"]["train"], fit["noise_floor_n"]
@@ -70,7 +70,7 @@ def test_the_numbers_printed_are_those_of_the_fit(demo):
         assert value == pytest.approx(estimate["value"], rel=0.05)
 
 
-def test_the_files_named_exist(demo):
+def test_the_printed_files_exist(demo):
     result, folder = demo
     named = [Path(word) for word in result.stdout.split() if word.startswith(str(folder))]
     assert len(named) == 4

@@ -1,3 +1,5 @@
+"""Log read by the independent reader ``@mcap/core``, compared with the reader of the bench."""
+
 import json
 import shutil
 import subprocess
@@ -51,7 +53,7 @@ def read_with_javascript(path):
 
 @pytest.fixture(scope="module", params=["clean", "truncated"])
 def both(request, tmp_path_factory):
-    """One log as our reader and as the independent one sees it."""
+    """Return one log as read by the bench and by the independent reader."""
     path = write_log(tmp_path_factory.mktemp("log") / "run.mcap")
     if request.param == "truncated":
         path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
@@ -67,7 +69,7 @@ def test_every_message_is_counted(both):
     assert seen["counts"]["/bench/sample"] == len(log.samples["time"]) > 500
 
 
-def test_values_are_the_same_to_the_last_bit(both):
+def test_values_are_bit_identical(both):
     log, seen = both
 
     for name in ("displacement", "velocity", "force", "coil_drive", "temperature"):

@@ -1,4 +1,4 @@
-"""Nothing of a running bench listens beyond the loopback interface."""
+"""Listening sockets of a running bench: all are on the loopback interface."""
 
 import ipaddress
 import os
@@ -13,18 +13,18 @@ import pytest
 
 MRBENCH = (sys.executable, "-m", "bench.cli")
 DEADLINE = 120.0
-PROMPT = os.environ | {"MRBENCH_NICE": "0"}
+ENVIRONMENT = os.environ | {"MRBENCH_NICE": "0"}
 
 
-def started(words, folder, log):
+def start(words, folder, log):
     with log.open("w") as file:
-        return subprocess.Popen([*MRBENCH, *words], cwd=folder, stdout=file, stderr=file, env=PROMPT)
+        return subprocess.Popen([*MRBENCH, *words], cwd=folder, stdout=file, stderr=file, env=ENVIRONMENT)
 
 
-def wait_for(condition, what):
+def wait_for(condition, message):
     end = time.monotonic() + DEADLINE
     while not condition():
-        assert time.monotonic() < end, what()
+        assert time.monotonic() < end, message()
         time.sleep(0.1)
 
 
@@ -33,8 +33,8 @@ def process_tree(process):
     return [parent, *parent.children(recursive=True)]
 
 
-def listening(process):
-    """Address, port and command of every listening TCP socket and bound UDP socket of a process tree."""
+def list_sockets(process):
+    """Return address, port and command of all listening TCP and bound UDP sockets of a process tree."""
     found = []
     for one in process_tree(process):
         for socket in one.net_connections("inet"):
@@ -45,14 +45,14 @@ def listening(process):
 
 @pytest.fixture
 def bench(tmp_path):
-    """The simulated rig, and a service with agent, scheduler and worker."""
-    sim = started(["sim", "--out", "bench.toml"], tmp_path, tmp_path / "sim.log")
+    """Start the simulated rig, and a service with agent, scheduler and worker."""
+    sim = start(["sim", "--out", "bench.toml"], tmp_path, tmp_path / "sim.log")
     processes = [sim]
     try:
         wait_for((tmp_path / "bench.toml").is_file, (tmp_path / "sim.log").read_text)
         log = tmp_path / "service.log"
         words = ["serve", "--config", "bench.toml", "--port", "0", "--data", "runs"]
-        processes.append(started(words, tmp_path, log))
+        processes.append(start(words, tmp_path, log))
         wait_for(lambda: re.search(r"worker_started", log.read_text()), log.read_text)
         yield processes
     finally:
@@ -67,10 +67,10 @@ def test_every_socket_of_a_running_bench_is_on_the_loopback_interface(bench):
     sim, service = bench
 
     def worker_listens():
-        return any("worker" in command for _, _, command in listening(service))
+        return any("worker" in command for _, _, command in list_sockets(service))
 
-    wait_for(worker_listens, lambda: f"the worker never listened: {listening(service)}")
-    sockets = [*listening(sim), *listening(service)]
+    wait_for(worker_listens, lambda: f"the worker did not listen: {list_sockets(service)}")
+    sockets = [*list_sockets(sim), *list_sockets(service)]
     commands = {command for _, _, command in sockets}
     assert any("sim" in command for command in commands)
     assert any("rig" in command for command in commands)

@@ -13,7 +13,7 @@ RECORDER = Path(__file__).with_name("record_in_real_time.py")
 
 
 def record_and_kill(log, moment):
-    """Record until the bench clock has passed a moment [s], kill; the time of the last sample written [s]."""
+    """Record until the bench clock has passed a moment [s], then kill; return the last sample's time [s]."""
     with subprocess.Popen(
         [sys.executable, str(RECORDER), str(log)], stdout=subprocess.PIPE, text=True
     ) as recorder:
@@ -34,7 +34,7 @@ def mrbench(*words):
 
 @pytest.fixture(scope="module", params=[0.31, 0.64, 1.0, 1.73])
 def killed(request, tmp_path_factory):
-    """A log killed at some moment, as it was and salvaged, with the time of the last sample written."""
+    """Return a salvaged log, the time of the last sample written [s], and the result of the salvage."""
     log = tmp_path_factory.mktemp("killed") / "run.mcap"
     last = record_and_kill(log, request.param)
     with pytest.raises(LogError, match="mrbench salvage"):
@@ -42,20 +42,20 @@ def killed(request, tmp_path_factory):
     return log, last, mrbench("salvage", log)
 
 
-def test_a_kill_loses_at_most_half_a_second(killed):
+def test_kill_loses_at_most_half_a_second(killed):
     log, last, _ = killed
 
     assert 0 <= last - read_log(log).samples["time_ns"][-1] * 1e-9 <= 0.5
 
 
-def test_what_is_kept_is_what_was_written_without_a_gap(killed):
+def test_kept_samples_have_no_gap(killed):
     samples = read_log(killed[0]).samples
 
     np.testing.assert_array_equal(samples["force"], samples["time_ns"] * 1e-9)
     assert set(samples["segment"]) == {0}
 
 
-def test_salvage_says_what_was_lost(killed):
+def test_salvage_reports_the_loss(killed):
     log, _, result = killed
 
     kept = len(read_log(log).samples["time"])
@@ -64,15 +64,15 @@ def test_salvage_says_what_was_lost(killed):
     assert "bytes dropped" in result.stdout
 
 
-def test_salvaged_log_says_of_itself_that_it_is_truncated(killed):
+def test_salvaged_log_is_marked_as_truncated(killed):
     log = read_log(killed[0])
 
     assert log.outcome == "truncated"
-    # Of what the file itself speaks of, at most the chunk that was being written.
+    # Of the samples whose times are known from the file, at most those of the open chunk are lost.
     assert 0 <= float(log.metadata["outcome"]["seconds_lost"]) < 0.5
     assert log.metadata["run"]["id"] == "endless"
 
 
-def test_salvaged_log_can_be_exported_and_has_nothing_left_to_mend(killed):
+def test_salvaged_log_can_be_exported_and_needs_no_further_repair(killed):
     assert mrbench("export", killed[0], "--format", "csv").returncode == 0
-    assert "nothing to mend" in mrbench("salvage", killed[0]).stdout
+    assert "nothing to repair" in mrbench("salvage", killed[0]).stdout

@@ -1,4 +1,4 @@
-"""The service's page in a real browser, against a service that plays canned answers and moving samples."""
+"""Web page of the service in a real browser, with a fake service that sends fixed replies and moving samples."""
 
 import json
 import re
@@ -44,7 +44,7 @@ def bench():
 
 @pytest.fixture(scope="module")
 def seen(bench):
-    """What a technician sees who lets himself in, starts a run, stops it, resets the trip and loses the agent."""
+    """Return what the page shows while a user signs in, starts, stops, resets, and loses the agent."""
     with served(bench) as address:
         command = [str(NODE), str(FOLDER / "look_at_page.mjs"), address, TOKEN, str(CHROMIUM)]
         result = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
@@ -52,7 +52,7 @@ def seen(bench):
     return json.loads(result.stdout)
 
 
-def test_the_fake_service_answers_in_the_forms_of_the_service():
+def test_the_fake_service_replies_with_the_types_of_the_service():
     bench = FakeBench()
     bench.begin({"method": "quick", "specimen": "MR-0042", "operator": "A. Meyer"})
     AgentStatus.model_validate(bench.status())
@@ -69,13 +69,13 @@ def browser_test(function):
 
 
 @browser_test
-def test_token_is_asked_for_and_leaves_the_address(seen):
+def test_the_token_is_requested_and_removed_from_the_address(seen):
     assert "token" not in seen["address"]
     assert seen["errors"] == []
 
 
 @browser_test
-def test_every_plot_moves_and_every_reading_has_its_unit(seen):
+def test_all_plots_move_and_all_readings_have_units(seen):
     assert seen["canvases"] == 5
     units = {"Force": "N", "Displacement": "mm", "Velocity": "mm/s", "Coil voltage": "V", "Coil current": "A",
              "Temperature": "°C"}  # fmt: skip
@@ -85,7 +85,7 @@ def test_every_plot_moves_and_every_reading_has_its_unit(seen):
 
 
 @browser_test
-def test_runs_and_instruments_say_what_is_wrong(seen):
+def test_runs_and_instruments_show_their_errors(seen):
     lossy, identified, done, truncated = seen["runs"]
     assert "12 samples of force were lost" in lossy
     assert "refine, start 3 of 8" in identified
@@ -97,12 +97,12 @@ def test_runs_and_instruments_say_what_is_wrong(seen):
 
 
 @browser_test
-def test_refusal_stands_beside_the_start_button(seen):
+def test_a_refusal_is_shown_next_to_the_start_button(seen):
     assert seen["refusal"] == f"Not started: {REFUSAL}."
 
 
 @browser_test
-def test_run_shows_its_progress_and_hands_the_focus_to_stop(seen, bench):
+def test_a_run_shows_its_progress_and_moves_the_focus_to_stop(seen, bench):
     assert seen["progress"] == ["sine_10mm_1Hz", "9 s left of 14 s", pytest.approx(5 / 14)]
     assert seen["focused"] == "stop"
     assert seen["startWhileRunning"]
@@ -111,7 +111,7 @@ def test_run_shows_its_progress_and_hands_the_focus_to_stop(seen, bench):
 
 
 @browser_test
-def test_escape_stops_from_a_field_where_space_only_types(seen, bench):
+def test_in_a_text_field_escape_stops_and_space_types(seen, bench):
     assert seen["stateAfterSpaceInField"] == "Running"
     assert seen["specimen"].endswith(" ")
     assert seen["stopped"] == "/api/v1/runs/run-4/stop"
@@ -120,14 +120,14 @@ def test_escape_stops_from_a_field_where_space_only_types(seen, bench):
 
 
 @browser_test
-def test_reset_asks_first(seen, bench):
+def test_reset_needs_confirmation(seen, bench):
     assert seen["stateAfterKeeping"] == "Tripped"
     assert [path for path, _ in bench.posted].count("agent/reset") == 1
     assert ("jobs/job-run-2/cancel", "") in bench.posted
 
 
 @browser_test
-def test_what_comes_before_a_run_is_asked_of_the_agent_and_homing_asks_first(seen, bench):
+def test_setup_steps_are_sent_to_the_agent_and_homing_needs_confirmation(seen, bench):
     asked = [json.loads(body) for path, body in bench.posted if path == "agent/prepare"]
     assert asked == [
         {"step": "move", "position_m": pytest.approx(0.0125)},
@@ -139,7 +139,7 @@ def test_what_comes_before_a_run_is_asked_of_the_agent_and_homing_asks_first(see
 
 
 @browser_test
-def test_lost_connection_greys_the_values_and_says_why(seen):
+def test_a_lost_connection_greys_the_values_and_shows_the_reason(seen):
     words, stopped = seen["lost"]
     assert re.fullmatch(r"No data for \d+ s\. Trying again: " + re.escape(SILENCE) + r"\.", words)
     assert stopped == f"Stop was not confirmed, use the emergency stop of the hardware: {SILENCE}."
@@ -147,18 +147,18 @@ def test_lost_connection_greys_the_values_and_says_why(seen):
 
 
 @browser_test
-def test_page_fits_a_tablet_and_a_telephone(seen):
+def test_the_page_fits_a_tablet_and_a_telephone(seen):
     assert seen["overflow"] == {"1280": 0, "768": 0, "390": 0}
     assert all(place["left"] >= 0 and place["right"] <= int(width) for width, place in seen["stopPlaces"].items())
 
 
 @browser_test
-def test_nothing_shifts_while_the_page_fills(seen):
+def test_the_layout_is_stable_while_the_page_loads(seen):
     assert sum(shift["value"] for shift in seen["shifts"]) < 0.01, seen["shifts"]
 
 
 @browser_test
-def test_thinned_trace_keeps_every_extreme_and_shows_holes(seen):
+def test_a_decimated_trace_keeps_all_extremes_and_shows_gaps(seen):
     thinned = seen["thinned"]
     given, times, values = thinned["given"], thinned["times"], thinned["values"]
     newest = len(given) - 1
@@ -180,7 +180,7 @@ def test_thinned_trace_keeps_every_extreme_and_shows_holes(seen):
 
 
 def schemes():
-    """The style sheet's colours: of the light scheme, and of the dark one over it."""
+    """Return the colours of the style sheet in the light and in the dark scheme."""
     blocks = re.findall(r":root \{(.*?)\n *\}", (STATIC / "style.css").read_text("utf-8"), re.DOTALL)
     light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", block)) for block in blocks)
     return {"light": light, "dark": light | dark}

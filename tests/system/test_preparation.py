@@ -1,4 +1,4 @@
-"""What a technician does before a run, on the wires of the simulated rig."""
+"""Setup steps before a run, on the wires of the simulated rig."""
 
 import subprocess
 
@@ -24,7 +24,7 @@ def bench(tmp_path_factory):
             )
         ),
     ):
-        until(lambda: answers(bench))
+        until(lambda: is_answering(bench))
         yield bench
 
 
@@ -33,7 +33,7 @@ def client(bench):
     return AgentClient(agent.commands, agent.samples)
 
 
-def answers(bench):
+def is_answering(bench):
     try:
         return client(bench).send(StatusCommand()).ok
     except AgentUnreachableError:
@@ -45,49 +45,49 @@ def status(bench):
 
 
 def prepare(bench, step, *more):
-    """Exit status of ``mrbench prepare``, and what it said."""
+    """Return the exit status of ``mrbench prepare`` and its output."""
     done = subprocess.run(
         [COMMAND, "prepare", step, *more, "--config", bench.toml], capture_output=True, text=True, timeout=DEADLINE
     )
     return done.returncode, (done.stdout + done.stderr).strip()
 
 
-def test_homing_is_refused_with_a_specimen_clamped(bench):
-    code, said = prepare(bench, "home")
+def test_homing_is_refused_while_a_specimen_is_clamped(bench):
+    code, output = prepare(bench, "home")
     assert code == 1
-    assert "a specimen is clamped" in said
-    assert len(said.splitlines()) == 1
+    assert "a specimen is clamped" in output
+    assert len(output.splitlines()) == 1
 
 
-def test_taring_makes_the_present_force_zero_and_can_be_taken_back(bench):
-    code, said = prepare(bench, "tare")
-    assert (code, "are taken off the force" in said) == (0, True), said
-    code, said = prepare(bench, "clear-tare")
-    assert (code, "nothing is taken off" in said) == (0, True), said
+def test_taring_makes_the_present_force_zero_and_can_be_cleared(bench):
+    code, output = prepare(bench, "tare")
+    assert (code, "are subtracted from the force" in output) == (0, True), output
+    code, output = prepare(bench, "clear-tare")
+    assert (code, "nothing is subtracted" in output) == (0, True), output
 
 
-def test_the_way_from_an_empty_rig_to_a_centred_specimen(bench):
+def test_setup_from_an_empty_rig_to_a_centred_specimen(bench):
     steps = (("unmount",), ("home",), ("mount",), ("move", "--to", "0.01"), ("centre",))
-    said = [prepare(bench, *step) for step in steps]
-    assert [code for code, _ in said] == [0] * 5, said
-    assert [words.split(":")[0] for _, words in said] == ["homed", "homed", "mounted", "mounted", "centred"]
-    assert "10.0" in said[3][1]
+    results = [prepare(bench, *step) for step in steps]
+    assert [code for code, _ in results] == [0] * 5, results
+    assert [words.split(":")[0] for _, words in results] == ["homed", "homed", "mounted", "mounted", "centred"]
+    assert "10.0" in results[3][1]
     assert bench.truth().position[-1] == pytest.approx(0.01, abs=1e-4)
     assert status(bench).reference_state == "centred"
 
 
-def test_a_move_out_of_the_limits_is_refused_before_anything_moves(bench):
+def test_a_move_beyond_the_limits_is_refused_before_any_motion(bench):
     before = bench.truth().position[-1]
-    code, said = prepare(bench, "move", "--to", "0.2")
-    assert (code, "200 mm exceeds the limit of 55 mm" in said, len(said.splitlines())) == (1, True, 1), said
+    code, output = prepare(bench, "move", "--to", "0.2")
+    assert (code, "200 mm exceeds the limit of 55 mm" in output, len(output.splitlines())) == (1, True, 1), output
     assert bench.truth().position[-1] == pytest.approx(before, abs=1e-5)
 
 
-def test_a_stop_breaks_homing_off_and_the_rod_rests(bench):
+def test_a_stop_interrupts_homing_and_the_rod_comes_to_rest(bench):
     assert prepare(bench, "unmount")[0] == 0
     agent = client(bench)
-    begun = agent.send(PrepareCommand(step="home"), DEADLINE)
-    assert begun.status.state == "preparing", begun
+    reply = agent.send(PrepareCommand(step="home"), DEADLINE)
+    assert reply.status.state == "preparing", reply
     refused = agent.send(RunCommand(method=method()))
     assert (refused.ok, "the agent is preparing" in refused.error) == (False, True)
     agent.send(StopCommand())
@@ -97,14 +97,14 @@ def test_a_stop_breaks_homing_off_and_the_rod_rests(bench):
     until(bench.rests)
 
 
-def test_an_unknown_step_is_misuse_and_answered_with_those_that_exist(bench):
-    code, said = prepare(bench, "lubricate")
+def test_an_unknown_step_is_misuse_and_the_message_lists_the_steps(bench):
+    code, output = prepare(bench, "lubricate")
     assert code == 2
-    assert "home, move, mount, centre, unmount, tare, clear-tare" in said
+    assert "home, move, mount, centre, unmount, tare, clear-tare" in output
 
 
-def test_nobody_else_has_the_wires_meanwhile(bench):
-    """The coil's and the drive's would let a second agent in, and be brought to rest by it."""
+def test_a_second_agent_is_refused(bench):
+    """The wires of coil and drive would accept a second agent, which would bring them to rest."""
     done = subprocess.run(
         [COMMAND, "run", bench.write_method(), "--config", bench.toml, "--out", bench.log],
         capture_output=True,

@@ -1,4 +1,4 @@
-"""`mrbench run`, as a person would call it."""
+"""``mrbench run`` as a process."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ def recorded(tmp_path_factory):
     return done, out
 
 
-def test_a_run_from_the_plant_leaves_a_clean_log(recorded):
+def test_a_run_from_the_plant_writes_a_clean_log(recorded):
     done, out = recorded
     assert done.returncode == 0, done.stderr
     assert done.stderr.strip() == f"{out}: 13 segments, 23.1 s, 23101 samples"
@@ -34,7 +34,7 @@ def test_a_run_from_the_plant_leaves_a_clean_log(recorded):
     assert log.metadata["run"]["specimen"] == "MR-7"
 
 
-def test_the_recorded_damper_resists_and_resists_more_with_more_drive(recorded):
+def test_the_recorded_damper_dissipates_and_its_force_grows_with_the_drive(recorded):
     log = read_log(recorded[1])
     force, velocity = log.samples["force"], log.samples["velocity"]
     assert np.mean(force * velocity) > 0
@@ -43,14 +43,14 @@ def test_the_recorded_damper_resists_and_resists_more_with_more_drive(recorded):
     assert sizes == sorted(sizes)
 
 
-def test_the_log_holds_nothing_of_what_the_scenario_hides(recorded):
+def test_the_log_contains_no_hidden_value_of_the_scenario(recorded):
     log = read_log(recorded[1])
-    said = json.dumps([log.metadata, log.events]) + str(log.attachments)
+    content = json.dumps([log.metadata, log.events]) + str(log.attachments)
     for hidden in ("alpha", "c0_a", "F_a", "noise", "effects"):
-        assert hidden not in said
+        assert hidden not in content
 
 
-def test_a_rig_that_fails_costs_one_line_and_leaves_an_older_log_alone(tmp_path):
+def test_a_failing_rig_gives_a_one_line_message_and_keeps_an_older_log(tmp_path):
     out = tmp_path / "run.mcap"
     out.write_bytes(b"an older log")
     done = mrbench("run", "quick", "--scenario", "nonsense", "--out", out)
@@ -68,19 +68,19 @@ def test_a_dry_run_prints_the_envelope_and_writes_nothing(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_dry_run_prints_json_where_asked():
+def test_a_dry_run_prints_json_on_request():
     done = mrbench("run", "quick", "--dry-run", "--out", "-")
     assert json.loads(done.stdout)["verdict"] == "within limits"
 
 
 @pytest.mark.parametrize(
-    ("words", "complaint"),
+    ("words", "message"),
     [
-        ((), "--scenario NAME or FILE, or --dry-run"),
-        (("--scenario", "default", "--out", "-"), "a log goes to a file"),
+        ((), "--scenario NAME or FILE, and --dry-run"),
+        (("--scenario", "default", "--out", "-"), "a log cannot be printed"),
     ],
 )
-def test_misuse_is_told_apart(words, complaint):
+def test_each_misuse_has_its_own_message(words, message):
     done = mrbench("run", "quick", *words)
     assert done.returncode == 2
-    assert complaint in done.stderr
+    assert message in done.stderr

@@ -1,4 +1,4 @@
-"""The service as a user starts it, with its worker; either is killed while a job runs."""
+"""Service and worker as processes; each of them is killed during a job."""
 
 import contextlib
 import json
@@ -15,15 +15,15 @@ from urllib.request import Request, urlopen
 import pytest
 
 MRBENCH = (sys.executable, "-m", "bench.cli")
-PATIENCE = 200.0
-"""[s] for a job on a machine that has other work."""
-PROMPT = os.environ | {"MRBENCH_NICE": "0"}
-"""At the lowest priority a worker would wait for all other tests."""
+DEADLINE = 200.0
+"""Time limit of a job on a busy machine [s]."""
+ENVIRONMENT = os.environ | {"MRBENCH_NICE": "0"}
+"""Workers at normal priority: at the lowest they would wait for all other tests."""
 TINY = {
     "schema": "mrbench.method/1",
     "name": "tiny",
     "title": "Four cycles",
-    "description": "As short as a fit bears.",
+    "description": "Shortest method that can be identified.",
     "rate_hz": 500,
     "drive_kind": "coil_v",
     "limits": {"stroke_m": 0.02, "velocity_mps": 0.3, "acceleration_mps2": 6, "force_n": 1500, "drive": 0.5},
@@ -38,7 +38,7 @@ TINY = {
 }
 
 
-class Served:
+class ServiceProcess:
     """A service process on a data folder."""
 
     def __init__(self, data, token=None):
@@ -46,35 +46,35 @@ class Served:
         self.log.unlink(missing_ok=True)
         command = [*MRBENCH, "serve", "--port", "0", "--data", str(data)]
         with self.log.open("w") as log:
-            self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True, env=PROMPT)
+            self.process = subprocess.Popen(
+                command, stdout=subprocess.PIPE, stderr=log, text=True, env=ENVIRONMENT
+            )
         line = self.process.stdout.readline()
         found = re.match(r"(http://127\.0\.0\.1:\d+/)(?:#token=(\S+))?", line)
         if not found:
             self.kill()
-            pytest.fail(f"no address but {line!r}: {self.log.read_text()}")
+            pytest.fail(f"no address, got {line!r}: {self.log.read_text()}")
         self.address, self.token = found[1], found[2] or token
 
     def call(self, path, method="GET"):
         headers = {"Authorization": f"Bearer {self.token}"}
-        with urlopen(
-            Request(f"{self.address}api/v1/{path}", method=method, headers=headers), timeout=30
-        ) as answer:
-            return json.load(answer)
+        with urlopen(Request(f"{self.address}api/v1/{path}", method=method, headers=headers), timeout=30) as reply:
+            return json.load(reply)
 
-    def the_job(self, wanted):
-        """The only job, once it is as wanted."""
-        deadline = time.monotonic() + PATIENCE
+    def wait_for_job(self, condition):
+        """Return the only job as soon as it fulfils a condition."""
+        deadline = time.monotonic() + DEADLINE
         while True:
             with contextlib.suppress(OSError):
                 jobs = self.call("jobs")["items"]
-                if jobs and wanted(jobs[0]):
+                if jobs and condition(jobs[0]):
                     assert len(jobs) == 1
                     return jobs[0]
             assert time.monotonic() < deadline, self.log.read_text()
             time.sleep(0.02)
 
-    def worker(self):
-        """Number of the worker process that was started last."""
+    def find_worker(self):
+        """Return the process id of the worker that was started last."""
         return int(re.findall(r"worker_started pid=(\d+)", self.log.read_text())[-1])
 
     def end(self):
@@ -89,37 +89,37 @@ class Served:
         self.process.stdout.close()
 
 
-def runs(pid):
-    """Whether a process is there and has not ended."""
+def is_running(pid):
+    """Return whether a process exists and has not ended."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
 
 
-def working_on(data):
-    """Processes that a job has started on the logs of a folder."""
+def find_job_processes(data):
+    """Return the ids of the processes that a job has started on the logs of a folder."""
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             words = (process / "cmdline").read_bytes().split(b"\0")
             if any(word.startswith(bytes(data)) for word in words) and b"serve" not in words:
                 found.append(int(process.name))
-    return [pid for pid in found if runs(pid)]
+    return [pid for pid in found if is_running(pid)]
 
 
-def gone(condition, what):
-    deadline = time.monotonic() + PATIENCE
+def wait_until_false(condition, message):
+    deadline = time.monotonic() + DEADLINE
     while condition():
-        assert time.monotonic() < deadline, what
+        assert time.monotonic() < deadline, message
         time.sleep(0.02)
 
 
-def identifies(job):
-    return job["state"] == "running" and job["doing"] == "identify"
+def is_identifying(job):
+    return job["state"] == "running" and job["activity"] == "identify"
 
 
-def ended(job):
+def has_ended(job):
     return job["state"] in ("done", "failed", "cancelled")
 
 
@@ -143,7 +143,7 @@ def data(log, tmp_path):
 
 @pytest.fixture
 def served(data):
-    service = Served(data)
+    service = ServiceProcess(data)
     yield service
     if service.process.poll() is None:
         service.end()
@@ -156,54 +156,56 @@ def check_results(service, data):
     assert service.call(f"runs/{run['id']}/fit")["schema"] == "mrbench.fit/1"
     (results,) = data.glob("*.fit-*")
     assert sorted(path.name for path in results.iterdir()) == ["fit.json", "report.html"]
-    assert not list(data.glob(".*.fit-*")), "an attempt has left its folder"
+    assert not list(data.glob(".*.fit-*")), "the folder of an attempt still exists"
 
 
-def test_a_job_ends_though_its_worker_is_killed(served, data):
-    served.the_job(identifies)
-    worker, commands = served.worker(), working_on(data)
+def test_a_job_succeeds_after_its_worker_was_killed(served, data):
+    served.wait_for_job(is_identifying)
+    worker, commands = served.find_worker(), find_job_processes(data)
     assert commands
     os.kill(worker, signal.SIGKILL)
-    gone(lambda: any(map(runs, commands)), "the killed worker's commands go on")
-    job = served.the_job(ended)
+    wait_until_false(lambda: any(map(is_running, commands)), "commands of the killed worker still run")
+    job = served.wait_for_job(has_ended)
     assert (job["state"], job["attempts"]) == ("done", 2), job["error"]
-    assert served.worker() != worker
+    assert served.find_worker() != worker
     check_results(served, data)
 
 
-def test_a_job_ends_though_the_service_is_killed(served, data):
-    job = served.the_job(identifies)
-    worker, commands = served.worker(), working_on(data)
+def test_a_job_succeeds_after_the_service_was_killed(served, data):
+    job = served.wait_for_job(is_identifying)
+    worker, commands = served.find_worker(), find_job_processes(data)
     served.kill()
-    gone(lambda: any(map(runs, [worker, *commands])), "what the killed service has started goes on")
-    again = Served(data, served.token)
+    wait_until_false(
+        lambda: any(map(is_running, [worker, *commands])), "processes of the killed service still run"
+    )
+    again = ServiceProcess(data, served.token)
     try:
-        found = again.the_job(ended)
+        found = again.wait_for_job(has_ended)
         assert (found["id"], found["state"], found["attempts"]) == (job["id"], "done", 2), found["error"]
         check_results(again, data)
     finally:
         again.end()
 
 
-def test_cancel_stops_the_process_and_leaves_nothing(served, data):
-    job = served.the_job(identifies)
-    commands = working_on(data)
+def test_cancel_stops_the_process_and_leaves_no_files(served, data):
+    job = served.wait_for_job(is_identifying)
+    commands = find_job_processes(data)
     assert commands
     served.call(f"jobs/{job['id']}/cancel", "POST")
-    assert served.the_job(ended)["state"] == "cancelled"
-    gone(lambda: any(map(runs, commands)), "a cancelled command goes on")
+    assert served.wait_for_job(has_ended)["state"] == "cancelled"
+    wait_until_false(lambda: any(map(is_running, commands)), "a cancelled command still runs")
     assert not list(data.glob("*fit-*"))
     assert served.call("health")["worker"] == "ok"
 
 
 def test_an_interrupt_ends_the_service_and_its_worker(served, data):
-    served.the_job(identifies)
-    worker, commands = served.worker(), working_on(data)
+    served.wait_for_job(is_identifying)
+    worker, commands = served.find_worker(), find_job_processes(data)
     assert served.end() == 0
-    gone(lambda: any(map(runs, [worker, *commands])), "what the service has started goes on")
+    wait_until_false(lambda: any(map(is_running, [worker, *commands])), "processes of the service still run")
 
 
-def test_two_services_never_share_a_folder(served, data):
+def test_a_second_service_on_the_same_folder_is_refused(served, data):
     command = [*MRBENCH, "serve", "--port", "0", "--data", str(data)]
     second = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert second.returncode == 1

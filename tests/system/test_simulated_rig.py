@@ -1,4 +1,4 @@
-"""The whole path on the simulated rig: record, identify, predict strokes that the fit never saw."""
+"""Whole path on the simulated rig: record, identify, predict strokes that no fit has read."""
 
 import json
 import subprocess
@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 COMMAND = Path(sys.executable).parent / "mrbench"
-SEED, UNSEEN_SEED = 7, 1007
-"""The unseen strokes have noise, clocks and load cell zero of their own."""
+SEED, VALIDATION_SEED = 7, 1007
+"""The validation strokes have their own noise, clock errors and zero of the load cell."""
 LABORATORY = {
     "F_a": 45.0,
     "F_b": 900.0,
@@ -24,7 +24,7 @@ LABORATORY = {
     "k0": 2200.0,
     "k1": 800.0,
 }
-"""What scenario `default` hides, f0 aside: the zero of the load cell is drawn anew for each run."""
+"""True coordinates of scenario ``default``, except f0: the zero of the load cell differs between runs."""
 
 
 def mrbench(*words):
@@ -38,26 +38,33 @@ def documents(tmp_path_factory):
     fit, prediction = folder / "fit.json", folder / "prediction.json"
     mrbench("run", "quick", "--scenario", "default", "--seed", SEED, "--out", folder / "quick.mcap")
     mrbench(
-        "run", "validation", "--scenario", "default", "--seed", UNSEEN_SEED, "--out", folder / "validation.mcap"
+        "run",
+        "validation",
+        "--scenario",
+        "default",
+        "--seed",
+        VALIDATION_SEED,
+        "--out",
+        folder / "validation.mcap",
     )
     mrbench("identify", folder / "quick.mcap", "--out", fit)
     mrbench("predict", fit, folder / "validation.mcap", "--free", "offset", "--out", prediction)
     return json.loads(fit.read_text()), json.loads(prediction.read_text())
 
 
-def test_the_fit_of_half_a_minute_reaches_the_noise(documents):
+def test_a_fit_of_half_a_minute_reaches_the_noise_floor(documents):
     fit, _ = documents
     assert fit["result"] == "converged"
     assert fit["rmse_n"]["train"] <= 1.05 * fit["noise_floor_n"]
 
 
-def test_strokes_never_seen_are_repeated_to_the_noise(documents):
+def test_validation_strokes_are_predicted_to_the_noise_floor(documents):
     _, prediction = documents
     assert prediction["freed"] == ["y0 of each stretch", "force offset of each stretch"]
     assert prediction["rmse_n"] <= 1.05 * prediction["noise_floor_n"]
 
 
-def test_the_hidden_damper_lies_inside_the_intervals(documents):
+def test_the_true_coordinates_are_inside_the_intervals(documents):
     fit, _ = documents
     intervals = {name: fit["coordinates"][name]["ci99"] for name in LABORATORY}
     inside = [name for name, (low, high) in intervals.items() if low <= LABORATORY[name] <= high]

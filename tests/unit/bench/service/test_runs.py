@@ -84,7 +84,7 @@ def test_a_finished_run_is_identified_and_its_files_are_served(service, outcome)
 
 def test_an_incomplete_run_is_catalogued_and_not_identified(service):
     run = start(service)
-    assert finish(service, run, "incomplete")["reason"] == "said so"
+    assert finish(service, run, "incomplete")["reason"] == "stopped by the test"
     service.wait_for(f"/runs/{run['id']}", lambda found: found["outcome"] == "incomplete")
     assert service.engine.specs == {}
 

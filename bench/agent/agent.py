@@ -20,6 +20,7 @@ from bench.agent.run_executor import RunExecutor
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
 from bench.agent.supervisor import SafetySupervisor
+from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import (
     AgentEvent,
     AgentState,
@@ -67,10 +68,15 @@ class Agent:
         config: configuration of the bench.
         source: file of the configuration, attached to every log; logs are stored beside it.
         publish: receives the published messages from any thread; must not wait.
+        timing: waiting times.
     """
 
     def __init__(
-        self, config: BenchConfig, source: Path | None = None, publish: MessageSink = lambda message: None
+        self,
+        config: BenchConfig,
+        source: Path | None = None,
+        publish: MessageSink = lambda message: None,
+        timing: AgentTiming = OPERATION_TIMING,
     ) -> None:
         """Build everything without opening a wire.
 
@@ -98,12 +104,12 @@ class Agent:
         )
         self._executor = RunExecutor(
             config, source, self._rig, self._interlocks, self._supervisor, self._acquisition,
-            self._recording_thread, self._clock, self._report_event,
+            self._recording_thread, self._clock, self._report_event, timing,
         )  # fmt: skip
         self._lock = threading.RLock()
         self._state: AgentState = "idle"
         self._setup = SetupExecutor(
-            self._rig, self._interlocks, self._clock, self._move, self._report_event, self._on_setup_ended
+            self._rig, self._interlocks, self._clock, self._move, self._report_event, self._on_setup_ended, timing
         )
         self._run_slot = RunSlot(self._lock, self._executor.execute, self._on_run_ended)
         self._published_state: tuple[AgentState, str] | None = None

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 
 from bench.agent.run_request import RunRequest
+from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import RunOutcome, RunStatus
 from bench.errors import BenchError
 from bench.methods import NO_SEGMENT
@@ -14,8 +15,6 @@ from bench.rig import ClockMap
 from bench.sequencer import CommandHistory, Sequencer
 from drivers import Clock, DriverError
 
-_FINAL_SAMPLES_TIMEOUT = 2.0
-"""[s] Time for the last samples of a run to arrive; those of the LVDT take tens of milliseconds."""
 _POST_RUN_TIME = 0.2
 """[s] Time that is recorded after everything is at rest."""
 _POLL_PERIOD = 0.02
@@ -32,6 +31,7 @@ class Run:
         recording_thread: records the samples.
         clock: bench clock [ns].
         report_event: receives the events of the run.
+        timing: waiting times.
     """
 
     def __init__(
@@ -42,9 +42,11 @@ class Run:
         recording_thread: RecordingThread,
         clock: Clock,
         report_event: EventReporter,
+        timing: AgentTiming = OPERATION_TIMING,
     ) -> None:
         self.request, self.history, self.sequencer = request, history, sequencer
         self._recording_thread, self._clock, self._report_event = recording_thread, clock, report_event
+        self._timing = timing
         self._log: LiveRecorder | None = None
         self._reason = ""
         self._outcome: RunOutcome | None = None
@@ -139,7 +141,7 @@ class Run:
 
     def _await_samples(self, until_ns: int) -> None:
         """Wait for samples up to an instant [ns]; if a channel has failed, until the timeout."""
-        deadline = time.monotonic() + _FINAL_SAMPLES_TIMEOUT
+        deadline = time.monotonic() + self._timing.final_samples
         while self._recording_thread.newest_ns < until_ns and time.monotonic() < deadline:
             time.sleep(_POLL_PERIOD)
 

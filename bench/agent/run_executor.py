@@ -9,6 +9,7 @@ from bench.agent.run import Run
 from bench.agent.run_request import validate_request
 from bench.agent.run_supervision import RunSupervision
 from bench.agent.supervisor import SafetySupervisor
+from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import RunCommand
 from bench.config import BenchConfig
 from bench.recorder import (
@@ -27,8 +28,6 @@ from drivers import Clock
 
 _CLOCK_RATE_TIME = 20.0
 """[s] Time until the rate of a device's clock is known to a few ppm; until then the nominal rate is used."""
-_CLOCK_SETTLING_TIME = 4.0
-"""[s] Time after the wires are opened until the clock maps are accurate enough for a log."""
 
 
 class PreparedRun(NamedTuple):
@@ -52,6 +51,7 @@ class RunExecutor:
         recording_thread: records the samples.
         clock: bench clock [ns].
         report_event: receives the events of runs.
+        timing: waiting times.
     """
 
     def __init__(
@@ -65,10 +65,12 @@ class RunExecutor:
         recording_thread: RecordingThread,
         clock: Clock,
         report_event: EventReporter,
+        timing: AgentTiming = OPERATION_TIMING,
     ) -> None:
         self._config, self._source, self._rig = config, source, rig
         self._interlocks, self._supervisor, self._acquisition = interlocks, supervisor, acquisition
         self._recording_thread, self._clock, self._report_event = recording_thread, clock, report_event
+        self._timing = timing
         self._connected_ns = 0
 
     def note_connection(self) -> None:
@@ -95,7 +97,9 @@ class RunExecutor:
             supervision,
             self._estimate_amplifier_rate,
         )
-        run = Run(request, history, sequencer, self._recording_thread, self._clock, self._report_event)
+        run = Run(
+            request, history, sequencer, self._recording_thread, self._clock, self._report_event, self._timing
+        )
         maps = self._acquisition.maps
         metadata = LogMetadata(
             make_run_header(method, request.identity, self._config, self._rig, maps, self._clock()),
@@ -115,7 +119,7 @@ class RunExecutor:
 
     def _wait_for_clocks(self) -> None:
         """Wait until the clocks of the devices were read often enough since the wires were opened."""
-        remaining = self._connected_ns + round(_CLOCK_SETTLING_TIME * 1e9) - self._clock()
+        remaining = self._connected_ns + round(self._timing.clock_settling * 1e9) - self._clock()
         time.sleep(max(remaining * 1e-9, 0.0))
 
     def _estimate_amplifier_rate(self) -> float:

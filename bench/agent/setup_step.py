@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import TypeAlias
 
+from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import SetupStatus
 from bench.errors import RunError
 from bench.recorder import EventReporter
@@ -20,8 +21,6 @@ from drivers.load_cell import LoadCell
 
 MoveFunction: TypeAlias = Callable[[float, threading.Event], None]
 """Move of the rod to a position [m], which an event stops."""
-_REPLY_TIMEOUT = 2.0
-"""[s] Longest wait before `SetupExecutor.start` returns; enough for all steps without motion."""
 
 
 class SetupExecutor:
@@ -34,6 +33,7 @@ class SetupExecutor:
         move: moves the rod.
         report_event: receives the events of the step.
         on_ended: is called when a step has ended.
+        timing: waiting times.
     """
 
     def __init__(
@@ -44,9 +44,11 @@ class SetupExecutor:
         move: MoveFunction,
         report_event: EventReporter,
         on_ended: Callable[[], None],
+        timing: AgentTiming = OPERATION_TIMING,
     ) -> None:
         self._rig, self._interlocks, self._clock = rig, interlocks, clock
         self._move, self._report_event, self._on_ended = move, report_event, on_ended
+        self._timing = timing
         self._status: SetupStatus | None = None
         self._stop_requested = threading.Event()
         self._stop_reason = ""
@@ -80,7 +82,7 @@ class SetupExecutor:
         self._stop_reason = ""
         self._thread = threading.Thread(target=self._execute, args=(step, position), name=step, daemon=True)
         self._thread.start()
-        self._thread.join(_REPLY_TIMEOUT)
+        self._thread.join(self._timing.setup_reply)
         return self._status
 
     def stop(self, reason: str) -> None:

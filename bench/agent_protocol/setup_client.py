@@ -9,19 +9,20 @@ from bench.config import load_config
 from bench.errors import RunError
 from bench.setup_steps import SetupStep
 
-_POLL_PERIOD = 0.2
-"""[s] Interval at which the end of the step is polled."""
 _REPLY_TIMEOUT = 10.0
 """[s] Time for the agent's reply."""
 
 
-def request_setup_step(config: Path, step: SetupStep, position: float | None = None) -> str:
+def request_setup_step(
+    config: Path, step: SetupStep, position: float | None = None, poll_period: float = 0.2
+) -> str:
     """Request a setup step and wait for its end; an interrupt stops the rod.
 
     Args:
         config: ``bench.toml``, which contains the agent's addresses.
         step: the setup step.
         position: target of ``move`` [m].
+        poll_period: interval at which the end of the step is polled [s].
 
     Returns:
         The reference state and the result of the step, for a person.
@@ -34,7 +35,7 @@ def request_setup_step(config: Path, step: SetupStep, position: float | None = N
     agent = load_config(config).agent
     client = AgentClient(agent.commands, agent.samples)
     try:
-        status = _await_end(client, PrepareCommand(step=step, position_m=position))
+        status = _await_end(client, PrepareCommand(step=step, position_m=position), poll_period)
     except KeyboardInterrupt:
         # The agent would continue the step without its client.
         client.send(StopCommand())
@@ -46,7 +47,7 @@ def request_setup_step(config: Path, step: SetupStep, position: float | None = N
     return f"{status.reference_state}: {status.step.message}"
 
 
-def _await_end(client: AgentClient, command: PrepareCommand) -> AgentStatus:
+def _await_end(client: AgentClient, command: PrepareCommand, poll_period: float) -> AgentStatus:
     """Return the agent's status once the step has ended and the next one may begin."""
     reply = client.send(command, _REPLY_TIMEOUT)
     if not reply.ok or reply.status is None:
@@ -54,7 +55,7 @@ def _await_end(client: AgentClient, command: PrepareCommand) -> AgentStatus:
     status = reply.status
     # The agent accepts the next step only a moment after this one has ended.
     while status.state == "preparing" or (status.step is not None and status.step.outcome == "running"):
-        time.sleep(_POLL_PERIOD)
+        time.sleep(poll_period)
         status = _get_status(client)
     return status
 

@@ -74,15 +74,19 @@ class Programme:
         return float(self.time[-1])
 
 
-def compile_method(method: Method) -> Programme:
+def compile_method(method: Method, max_samples: int = MAX_SAMPLES) -> Programme:
     """Compile a method to samples.
+
+    Args:
+        method: as planned.
+        max_samples: largest number of samples, which limits the memory.
 
     Raises:
         MethodError: a segment cannot be sampled, the programme is too long, or a limit is exceeded.
     """
     parts = list(plan(method))
     starts = np.concatenate([[0.0], np.cumsum([part.duration for part in parts])])
-    programme = _allocate(method, float(starts[-1]))
+    programme = _allocate(method, float(starts[-1]), max_samples)
     for part, start, end in zip(parts, starts, starts[1:], strict=False):
         _write_part(part, float(start), _find_sample(float(end), method.rate_hz), programme)
     segments = _make_segments(parts, starts, method.rate_hz)
@@ -93,13 +97,13 @@ def compile_method(method: Method) -> Programme:
     return compiled
 
 
-def _allocate(method: Method, duration: float) -> Programme:
+def _allocate(method: Method, duration: float, max_samples: int) -> Programme:
     """Return a programme of empty samples; the last sample is at the end of the last part, at rest."""
     count = _find_sample(duration, method.rate_hz) + 1
-    if count > MAX_SAMPLES:
+    if count > max_samples:
         raise MethodError(
             f"method {method.name}: {duration:.0f} s at {method.rate_hz:g} Hz are {count} samples, more than "
-            f"{MAX_SAMPLES}; divide it into several runs"
+            f"{max_samples}; divide it into several runs"
         )
     return Programme(
         method=method,

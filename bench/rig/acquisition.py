@@ -18,8 +18,6 @@ ACQUIRE_TIMEOUT = 0.1
 """[s] Longest wait for samples in one turn, and so the time that stopping takes unless a wire hangs."""
 IDLE_PERIOD = 0.05
 """[s] Interval of requests to a polled instrument while no setpoint thread triggers it."""
-MIN_RETRY_PAUSE, MAX_RETRY_PAUSE = 0.5, 10.0
-"""[s] First and longest pause before a failed instrument is connected again."""
 STOP_TIMEOUT = 3.0
 """[s] Time for all threads to end."""
 
@@ -33,6 +31,19 @@ class Batch(NamedTuple):
 
 BatchSink = Callable[[Batch], None]
 FailureSink = Callable[[str, DriverError], None]
+
+
+class RetryPauses(NamedTuple):
+    """Pauses before a failed instrument is connected again; each is twice the one before."""
+
+    first: float = 0.5
+    """First pause [s]."""
+    longest: float = 10.0
+    """Longest pause [s]."""
+
+
+RETRY_PAUSES = RetryPauses()
+"""Pauses in operation."""
 
 
 class PolledInstrument(Protocol):
@@ -70,6 +81,7 @@ class Acquisition:
         on_failed: FailureSink,
         *,
         idle: Mapping[str, PolledInstrument] | None = None,
+        retry_pauses: RetryPauses = RETRY_PAUSES,
     ) -> None:
         """Create the threads; `start` begins to read.
 
@@ -78,6 +90,7 @@ class Acquisition:
             on_batch: receives each batch on the thread of its wire; must not block.
             on_failed: receives name and error of a failed instrument once, on the thread of its wire.
             idle: polled instruments by name, which are asked for samples while they are not externally triggered.
+            retry_pauses: pauses before a failed instrument is connected again.
         """
         self.maps = {name: ClockMap() for name in instruments}
         """Clock map of each instrument; unknown for instruments without a clock."""
@@ -85,7 +98,14 @@ class Acquisition:
         idle = idle or {}
         self._threads = [
             _AcquisitionThread(
-                name, instrument, idle.get(name), self.maps[name], self._controls, on_batch, on_failed
+                name,
+                instrument,
+                idle.get(name),
+                self.maps[name],
+                self._controls,
+                on_batch,
+                on_failed,
+                retry_pauses,
             )
             for name, instrument in instruments.items()
         ]
@@ -161,6 +181,7 @@ class _AcquisitionThread:
         controls: _Controls,
         on_batch: BatchSink,
         on_failed: FailureSink,
+        retry_pauses: RetryPauses,
     ) -> None:
         self.name = name
         self.has_failed = False
@@ -170,7 +191,7 @@ class _AcquisitionThread:
         self._instrument, self._idle = instrument, idle
         self._clocked = instrument if isinstance(instrument, ClockedInstrument) else None
         self._clock_map, self._controls = clock_map, controls
-        self._on_batch, self._on_failed = on_batch, on_failed
+        self._on_batch, self._on_failed, self._retry_pauses = on_batch, on_failed, retry_pauses
         self._next_request = 0.0
         self._last_reading: ClockReading | None = None
 
@@ -224,7 +245,7 @@ class _AcquisitionThread:
         """Report an error, and return once the instrument is connected again or the acquisition stops."""
         self.has_failed = True
         self._on_failed(self.name, error)
-        pause = MIN_RETRY_PAUSE
+        pause = self._retry_pauses.first
         while not self._controls.stopping.wait(pause):
             if not self._controls.may_reconnect.is_set():
                 continue
@@ -232,7 +253,7 @@ class _AcquisitionThread:
                 self.has_failed = False
                 self.reconnect_count += 1
                 return
-            pause = min(2 * pause, MAX_RETRY_PAUSE)
+            pause = min(2 * pause, self._retry_pauses.longest)
 
     def _try_reconnect(self) -> bool:
         # The failure was reported, and no further error may end the thread.

@@ -44,6 +44,7 @@ def play_scenario(
     commands: dict[str, Array],
     progress: Progress = lambda share: None,
     rig: Sequence[str] = RIG_COMMAND,
+    silence_timeout: float = SILENCE_TIMEOUT,
 ) -> RigChannels:
     """Play commands on the simulated rig.
 
@@ -52,6 +53,7 @@ def play_scenario(
         commands: ``time`` [s], ``displacement`` [m] and ``drive`` [V or A], each of shape (samples,).
         progress: receives the completed share, 0 to 1.
         rig: command that starts the rig.
+        silence_timeout: time without output after which the rig is stopped [s].
 
     Raises:
         RunError: the rig cannot be started, fails, is silent for too long or returns no usable channels.
@@ -60,11 +62,11 @@ def play_scenario(
         given, measured = Path(folder) / "commands.npz", Path(folder) / "channels.npz"
         np.savez(given, **commands)  # type: ignore[arg-type]  # its stub takes every keyword for allow_pickle
         options = ("--scenario", scenario, "--commands", str(given), "--out", str(measured))
-        _run_rig([*rig, *options], progress)
+        _run_rig([*rig, *options], progress, silence_timeout)
         return _read_channels(measured, len(commands["time"]))
 
 
-def _run_rig(command: list[str], progress: Progress) -> None:
+def _run_rig(command: list[str], progress: Progress, silence_timeout: float) -> None:
     """Run the process to its end and pass on its progress; its last other line is its error message."""
     try:
         process = subprocess.Popen(
@@ -75,10 +77,10 @@ def _run_rig(command: list[str], progress: Progress) -> None:
     with process:
         lines, reader = start_line_reader(process)
         try:
-            message = _follow_progress(lines, progress)
-            process.wait(SILENCE_TIMEOUT)
+            message = _follow_progress(lines, progress, silence_timeout)
+            process.wait(silence_timeout)
         except (queue.Empty, subprocess.TimeoutExpired):
-            raise RunError(f"the simulated rig was silent for {SILENCE_TIMEOUT:g} s and was stopped") from None
+            raise RunError(f"the simulated rig was silent for {silence_timeout:g} s and was stopped") from None
         finally:
             # Harmless after its end; before it, the reader would wait for an open pipe.
             process.kill()
@@ -88,10 +90,10 @@ def _run_rig(command: list[str], progress: Progress) -> None:
         raise RunError(f"the simulated rig failed: {message or f'exit status {process.returncode}'}")
 
 
-def _follow_progress(lines: LineQueue, progress: Progress) -> str:
-    """Read lines until the end of the process, each within the silence timeout; return the error message."""
+def _follow_progress(lines: LineQueue, progress: Progress, silence_timeout: float) -> str:
+    """Read lines until the end of the process, each within the silence timeout [s]; return the error message."""
     message = ""
-    while (line := lines.get(timeout=SILENCE_TIMEOUT)) is not None:
+    while (line := lines.get(timeout=silence_timeout)) is not None:
         share = _parse_progress(line)
         if share is not None:
             progress(share)

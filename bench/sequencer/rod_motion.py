@@ -12,8 +12,6 @@ from drivers.actuator import Actuator
 
 _POLL_PERIOD = 0.02
 """[s] Interval at which the end of the move is polled."""
-_TIME_MARGIN = 10.0
-"""[s] Time by which the move may exceed its planned duration."""
 _STOP_ACCELERATION = 1.0
 """[m/s²] Acceleration limit of a soft stop of the slow move."""
 
@@ -25,6 +23,7 @@ def move_rod(
     on_setpoints_active: Callable[[bool], None],
     target: float,
     stop_requested: threading.Event,
+    time_margin: float = 10.0,
 ) -> None:
     """Move the rod slowly to a position, and leave the drive without voltage.
 
@@ -32,9 +31,10 @@ def move_rod(
         actuator: referenced actuator.
         permit: checks each position [m] and raises to forbid it.
         clock: bench clock [ns].
-        on_setpoints_active: is told when setpoints begin and when they end.
+        on_setpoints_active: receives True when setpoints begin and False when they end.
         target: position [m] from the specimen's middle, or from home if no specimen is centred.
         stop_requested: event that ends the move early.
+        time_margin: time by which the move may exceed its planned duration [s].
 
     Raises:
         RunError: the move was stopped, or the rod does not arrive.
@@ -54,8 +54,11 @@ def move_rod(
     is_at_rest = False
     try:
         with thread:
-            deadline = time.monotonic() + approach.duration + _TIME_MARGIN
-            _await_rest(generator, thread, clock, deadline, stop_requested)
+            if not _await_rest(generator, thread, clock, approach.duration + time_margin, stop_requested):
+                raise RunError(
+                    f"the rod has not arrived {time_margin:g} s after the planned end of the move; check the "
+                    "actuator"
+                )
         is_at_rest = thread.failure is None
     finally:
         on_setpoints_active(False)
@@ -71,17 +74,16 @@ def _await_rest(
     generator: SetpointGenerator,
     thread: SetpointThread,
     clock: Callable[[], int],
-    deadline: float,
+    timeout: float,
     stop_requested: threading.Event,
-) -> None:
-    """Wait until the rod is at rest or the setpoints have failed."""
-    is_stopping = False
+) -> bool:
+    """Wait until the rod is at rest or the setpoints have failed; return False after the timeout [s]."""
+    deadline, is_stopping = time.monotonic() + timeout, False
     while not generator.is_done(clock()) and thread.failure is None:
         if stop_requested.is_set() and not is_stopping:
             generator.stop(clock(), _STOP_ACCELERATION)
             is_stopping = True
         if time.monotonic() > deadline:
-            raise RunError(
-                f"the rod has not arrived {_TIME_MARGIN:g} s after the planned end of the move; check the actuator"
-            )
+            return False
         time.sleep(_POLL_PERIOD)
+    return True

@@ -7,7 +7,7 @@ was awaited, for how long, and the last value.
 import threading
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -26,14 +26,23 @@ _POLL_PERIOD = 0.02
 """[s] Interval of polling while waiting."""
 _TIME_MARGIN = 1.0
 """[s] Time by which a motion may exceed its planned duration."""
-_TABLE_START_TIMEOUT = 1.0
-"""[s] Time for the armed table to start with the SYNC."""
-_ZERO_TIMEOUT = 2.0
-"""[s] Time for the coil to reach zero, including its ramp."""
 _MAX_ATTEMPTS = 3
 """Number of attempts to arm the table if its reply exceeds the suspension of setpoints."""
 _MAX_HOLD_TIME = 600.0
 """[s] Longest hold; after it, the run ends."""
+
+
+class AmplifierTimeouts(NamedTuple):
+    """Deadlines for the coil amplifier, in seconds."""
+
+    table_start: float = 1.0
+    """Time [s] for the armed table to start with the SYNC."""
+    zero_output: float = 2.0
+    """Time [s] for the coil to reach zero, including its ramp."""
+
+
+OPERATION_TIMEOUTS = AmplifierTimeouts()
+"""Deadlines in operation."""
 
 
 class Guard(Protocol):
@@ -58,6 +67,7 @@ class Sequencer:
         clock: bench clock [ns].
         observer: receives the events of the run.
         get_amplifier_rate: returns the relative rate deviation of the amplifier's clock (50e-6 for 50 ppm fast).
+        timeouts: deadlines for the amplifier.
     """
 
     def __init__(
@@ -69,10 +79,12 @@ class Sequencer:
         clock: Clock,
         observer: RunObserver,
         get_amplifier_rate: Callable[[], float],
+        timeouts: AmplifierTimeouts = OPERATION_TIMEOUTS,
     ) -> None:
         settings = actuator.settings
         self._actuator, self._amplifier, self._guard, self._history = actuator, amplifier, guard, history
         self._clock, self._observer, self._get_amplifier_rate = clock, observer, get_amplifier_rate
+        self._timeouts = timeouts
         self._generator = SetpointGenerator(
             actuator, self._permit, history, settings.cycle, settings.setpoint_timeout
         )
@@ -204,14 +216,14 @@ class Sequencer:
 
     def _check_table_started(self) -> None:
         """Wait for the start of the table; without it, the coil would stay undriven and no error would appear."""
-        deadline = time.monotonic() + _TABLE_START_TIMEOUT
+        deadline = time.monotonic() + self._timeouts.table_start
         while (state := self._amplifier.read_table_progress().state) not in (TableState.RUNNING, TableState.DONE):
             if self._stop_requested.wait(_POLL_PERIOD):
                 return
             if time.monotonic() > deadline:
                 raise RunError(
-                    f"{self._amplifier.name}: waited {_TABLE_START_TIMEOUT:g} s for its table to start with the "
-                    f"SYNC; it is {state.name.lower()}; check the line from the bus to its SYNC input"
+                    f"{self._amplifier.name}: waited {self._timeouts.table_start:g} s for its table to start with "
+                    f"the SYNC; it is {state.name.lower()}; check the line from the bus to its SYNC input"
                 )
 
     # Waiting and ending
@@ -279,12 +291,12 @@ class Sequencer:
         return self._check_zero_output()
 
     def _check_zero_output(self) -> None:
-        deadline = time.monotonic() + _ZERO_TIMEOUT
+        deadline = time.monotonic() + self._timeouts.zero_output
         while (output := self._amplifier.read_status().output) != 0.0:
             if time.monotonic() > deadline:
                 raise RunError(
-                    f"{self._amplifier.name}: waited {_ZERO_TIMEOUT:g} s for its output to reach zero; it is "
-                    f"{output:.4g}; if its watchdog does not switch it off, use the main switch"
+                    f"{self._amplifier.name}: waited {self._timeouts.zero_output:g} s for its output to reach "
+                    f"zero; it is {output:.4g}; if its watchdog does not switch it off, use the main switch"
                 )
             time.sleep(_POLL_PERIOD)
 

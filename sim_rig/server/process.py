@@ -23,8 +23,6 @@ _SWITCH_INTERVAL = 5e-4
 """[s] switch interval of the interpreter: short, so that wires do not wait for the plant."""
 _REALTIME_PRIORITY = 10
 """Priority of SCHED_FIFO: hardware is on time under any load. An agent on the same machine has a higher one."""
-_POLL_PERIOD = 0.2
-"""[s] between two checks for a failure of the plant."""
 
 
 class ServerSettings(NamedTuple):
@@ -33,6 +31,8 @@ class ServerSettings(NamedTuple):
     transports: TransportOptions
     faults: WireFaults
     speed: float
+    poll_period: float = 0.2
+    """Interval [s] at which the plant is checked for a failure."""
 
 
 def run_until_stopped(scenario: Scenario, out: Path, settings: ServerSettings) -> None:
@@ -57,7 +57,7 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: ServerSettings) -
         _reduce_latency()
         typer.echo(f"{format_table(served.wires)}\n{out} reaches them all; Ctrl-C ends the rig")
         sys.stdout.flush()
-        while not stopping.wait(_POLL_PERIOD):
+        while not stopping.wait(settings.poll_period):
             if served.rig.failure is not None:
                 raise served.rig.failure
         if thread_errors:

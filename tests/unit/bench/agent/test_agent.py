@@ -9,10 +9,12 @@ import pytest
 from bench.agent.agent import Agent
 from bench.agent_protocol.messages import AgentEvent, PrepareCommand, RunCommand
 from bench.config import BenchConfig
+from bench.errors import InterlockError
 from bench.safety.limits import Action
 from drivers.errors import NotConnectedError, RefusedError
 from tests.support.fake_rig import BENCH_TOML
 from tests.support.methods import constant, method_document, sine
+from tests.support.run_bench import NO_WAITING
 
 TIMEOUT = 10.0
 BENCH = BenchConfig.model_validate(tomllib.loads(BENCH_TOML))
@@ -26,7 +28,7 @@ def messages():
 @pytest.fixture
 def agent(messages, monkeypatch):
     """An agent whose moves continue until they are stopped."""
-    agent = Agent(BENCH, publish=messages.append)
+    agent = Agent(BENCH, publish=messages.append, timing=NO_WAITING)
     actuator = agent._rig.actuator
     monkeypatch.setattr(actuator, "read", lambda channel: SimpleNamespace(value=0.0))
     monkeypatch.setattr(actuator, "reset", lambda: None)
@@ -39,7 +41,6 @@ def agent(messages, monkeypatch):
         raise RefusedError("stopped")
 
     agent._setup._move = move
-    monkeypatch.setattr("bench.agent.setup_step._REPLY_TIMEOUT", 0.05)
     yield agent
     agent.shut_down()
 
@@ -146,6 +147,67 @@ def test_run_whose_execution_fails_is_reported_and_the_agent_idle_again(agent, m
     events = [event.text for event in messages if isinstance(event, AgentEvent) and event.kind == "run_finished"]
     assert len(events) == 1
     assert status.run.reason in events[0]
+
+
+class TestRunsInSuccession:
+    """Runs whose sequencer is replaced; the fixture's limits apply again after each."""
+
+    OUTSIDE_METHOD = 0.03
+    """[m] Position beyond the limit of the method and within that of the fixture."""
+
+    @staticmethod
+    def start(agent, play, log):
+        """Start a run whose sequencer calls a function with the supervision and the sequencer."""
+        prepare = agent._executor.prepare
+
+        def prepare_with_double(command):
+            prepared = prepare(command)
+            sequencer = prepared.run.sequencer
+            sequencer.run = lambda programme, first: play(prepared.supervision, sequencer)
+            return prepared
+
+        agent._executor.prepare = prepare_with_double
+        method = method_document(sine("a", 0.01, 2.0, constant(0.2)))
+        reply = agent.run(RunCommand(method=method, log=str(log)))
+        agent._executor.prepare = prepare
+        assert reply.ok, reply.error
+
+    def finish(self, agent):
+        """Wait for the end of the run; return outcome and reason once the limits are those of the fixture."""
+        assert agent.wait(TIMEOUT)
+        agent._interlocks.permit(position=self.OUTSIDE_METHOD)
+        with pytest.raises(InterlockError):
+            agent._interlocks.permit(position=2 * self.OUTSIDE_METHOD)
+        assert agent._interlocks.compute_force_age(agent._clock() + 10**9) == 0.0
+        status = agent.get_status()
+        assert status.state == "idle"
+        return status.run.outcome, status.run.reason
+
+    def test_failed_run_does_not_affect_the_next_one(self, agent, tmp_path):
+        def fail(supervision, sequencer):
+            supervision.on_arrived()
+            raise ZeroDivisionError("division by zero")
+
+        self.start(agent, fail, tmp_path / "a.mcap")
+        outcome, reason = self.finish(agent)
+        assert (outcome, "ZeroDivisionError" in reason) == ("incomplete", True)
+        self.start(agent, lambda supervision, sequencer: supervision.on_arrived(), tmp_path / "b.mcap")
+        assert self.finish(agent) == ("clean", "")
+
+    def test_stop_ends_the_run_that_has_narrower_limits(self, agent, tmp_path):
+        arrived = threading.Event()
+
+        def wait_for_stop(supervision, sequencer):
+            supervision.on_arrived()
+            arrived.set()
+            assert sequencer._stop_requested.wait(TIMEOUT)
+
+        self.start(agent, wait_for_stop, tmp_path / "a.mcap")
+        assert arrived.wait(TIMEOUT)
+        with pytest.raises(InterlockError):
+            agent._interlocks.permit(position=self.OUTSIDE_METHOD)
+        assert agent.stop().status.state == "stopping"
+        assert self.finish(agent) == ("incomplete", "stopped on request")
 
 
 def test_missing_priority_of_all_threads_is_one_warning(agent):

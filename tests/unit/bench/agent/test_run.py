@@ -6,9 +6,9 @@ from datetime import UTC, datetime
 import pytest
 from mcap.reader import make_reader
 
-from bench.agent import run as run_module
 from bench.agent.run import Run
 from bench.agent.run_request import RunRequest
+from bench.agent.timing import AgentTiming
 from bench.errors import LogError
 from bench.log import Identity
 from bench.log.reader import read_log
@@ -40,12 +40,14 @@ def raising(error):
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch):
-    monkeypatch.setattr(run_module, "_FINAL_SAMPLES_TIMEOUT", 0.0)
+def run(tmp_path):
     ticks = itertools.count()
     identity = Identity("D1", "", datetime.now(UTC))
     request = RunRequest(compile_method(load_method("quick")), 0, identity, tmp_path / "a.mcap")
-    return Run(request, CommandHistory(), FakeSequencer(), FakeRecordingThread(), lambda: next(ticks), EventLog())
+    return Run(
+        request, CommandHistory(), FakeSequencer(), FakeRecordingThread(), lambda: next(ticks), EventLog(),
+        AgentTiming(final_samples=0.0),
+    )  # fmt: skip
 
 
 def execute(run, clocks=dict, trip_reason=""):

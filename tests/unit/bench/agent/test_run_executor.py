@@ -2,86 +2,44 @@
 
 import contextlib
 import gc
+import time
 import tomllib
 
 import pytest
 
-from bench.agent import run_executor as run_executor_module
-from bench.agent.run_executor import RunExecutor
-from bench.agent.supervisor import SafetySupervisor
 from bench.agent_protocol.messages import RunCommand
 from bench.config import BenchConfig
-from bench.errors import InterlockError, LogError, RunError
+from bench.errors import LogError, RunError
 from bench.recorder import make_attachments
-from bench.rig.acquisition import Acquisition
-from bench.rig.instruments import build_rig
-from bench.safety.interlocks import Interlocks
-from tests.support.fake_rig import BENCH_TOML, EventLog, FakeRecordingThread
-from tests.support.methods import constant, method_document, sine
+from tests.support.fake_rig import BENCH_TOML
+from tests.support.run_bench import METHOD, RunBench
 
 SECOND = 1_000_000_000
-METHOD = method_document(sine("a", 0.01, 2.0, constant(0.2)))
-"""Its limits are 20 mm and 900 N; those of the fixture 55 mm and 5000 N."""
 OUTSIDE_METHOD, OUTSIDE_FIXTURE = 0.03, 0.06
 """[m] Positions beyond the limits of the method and of the fixture."""
+BETWEEN_FORCES = 950.0
+"""[N] Force beyond the limit of the method and within that of the fixture."""
+REFUSAL = "actuator: the drive has stopped by itself"
 
 
-class Bench:
-    """A run executor with real limits and supervision, and a sequencer that the test replaces."""
-
-    def __init__(self, folder):
-        config = BenchConfig.model_validate(tomllib.loads(BENCH_TOML))
-        self.now_ns = 0
-        self.rig = build_rig(config, self.read_clock, realtime=True)
-        self.interlocks = Interlocks(config.limits.make_limit_matrix(), "coil_voltage")
-        self.acquisition = Acquisition(
-            {one.name: one.instrument for one in self.rig.instruments}, lambda batch: None, lambda *failure: None
-        )
-        self.acquisition.enable_reconnection()
-        self.events = EventLog()
-        self.supervisor = SafetySupervisor(
-            self.rig, self.interlocks, self.read_clock, self.acquisition.maps, self.events, lambda *stop: None
-        )
-        self.executor = RunExecutor(
-            config, folder / "bench.toml", self.rig, self.interlocks, self.supervisor, self.acquisition,
-            FakeRecordingThread(), self.read_clock, self.events,
-        )  # fmt: skip
-        (folder / "bench.toml").write_text(BENCH_TOML)
-
-    def read_clock(self):
-        return self.now_ns
-
-    def prepare(self, play, log):
-        """Prepare a run whose sequencer calls a function with the run's supervision instead of playing."""
-        prepared = self.executor.prepare(RunCommand(method=METHOD, log=str(log)))
-        prepared.run.sequencer.run = lambda programme, first: play(prepared.supervision)
-        return prepared
-
-    def is_permitted(self, position):
-        try:
-            self.interlocks.permit(position=position)
-        except InterlockError:
-            return False
-        return True
-
-    def describe_limits(self):
-        """Return everything that a run changes."""
-        return {
-            "outside method": self.is_permitted(OUTSIDE_METHOD),
-            "outside fixture": self.is_permitted(OUTSIDE_FIXTURE),
-            "method force": self.interlocks.check_value("force", 950.0, self.now_ns) == [],
-            "force age": self.interlocks.compute_force_age(self.now_ns + SECOND),
-            "following": self.supervisor._history is not None,
-            "may reconnect": self.acquisition._controls.may_reconnect.is_set(),
-            "collects garbage": gc.isenabled(),
-        }
+def describe_limits(bench):
+    """Return everything that a run changes."""
+    return {
+        "outside method": bench.is_permitted(OUTSIDE_METHOD),
+        "outside fixture": bench.is_permitted(OUTSIDE_FIXTURE),
+        "method force": bench.interlocks.check_value("force", BETWEEN_FORCES, bench.clock()) == [],
+        "force age is limited": bench.interlocks.compute_force_age(bench.clock() + SECOND) > 0,
+        "following": bench.supervisor._history is not None,
+        "may reconnect": bench.acquisition._controls.may_reconnect.is_set(),
+        "collects garbage": gc.isenabled(),
+    }
 
 
 IDLE = {
     "outside method": True,
     "outside fixture": False,
     "method force": True,
-    "force age": 0.0,
+    "force age is limited": False,
     "following": False,
     "may reconnect": True,
     "collects garbage": True,
@@ -90,130 +48,191 @@ APPROACH = {
     "outside method": True,
     "outside fixture": False,
     "method force": False,
-    "force age": 1.0,
+    "force age is limited": True,
     "following": True,
     "may reconnect": False,
     "collects garbage": False,
 }
+STROKE = APPROACH | {"outside method": False}
 
 
 @pytest.fixture
-def bench(tmp_path, monkeypatch):
-    monkeypatch.setattr(run_executor_module, "_CLOCK_SETTLING_TIME", 0.0)
-    monkeypatch.setattr("bench.agent.run._FINAL_SAMPLES_TIMEOUT", 0.0)
-    return Bench(tmp_path)
+def bench(tmp_path):
+    return RunBench(tmp_path, lambda: 0)
 
 
-def test_method_limits_apply_during_the_run_and_its_range_from_the_arrival_on(bench, tmp_path):
-    limits = []
+class TestDuringTheRun:
+    def test_method_limits_apply_and_its_range_from_the_arrival_on(self, bench, tmp_path):
+        limits = []
 
-    def play(supervision):
-        limits.append(bench.describe_limits())
-        bench.interlocks.reset()  # so that the same violation is reported again
-        supervision.on_arrived()
-        limits.append(bench.describe_limits())
-
-    assert bench.describe_limits() == IDLE
-    prepared = bench.prepare(play, tmp_path / "a.mcap")
-    bench.executor.execute(prepared)
-    assert limits == [APPROACH, APPROACH | {"outside method": False}]
-    bench.interlocks.reset()
-    assert bench.describe_limits() == IDLE
-    assert prepared.run.get_status().outcome == "clean"
-
-
-@pytest.mark.parametrize("error", [RunError("refused"), ZeroDivisionError("division by zero")])
-@pytest.mark.parametrize("arrived", [False, True])
-def test_limits_are_restored_after_an_error(bench, tmp_path, error, arrived):
-    def play(supervision):
-        if arrived:
+        def play(supervision):
+            limits.append(describe_limits(bench))
+            bench.interlocks.reset()  # so that the same violation is reported again
             supervision.on_arrived()
-        raise error
+            limits.append(describe_limits(bench))
 
-    prepared = bench.prepare(play, tmp_path / "a.mcap")
-    bench.executor.execute(prepared)
-    assert bench.describe_limits() == IDLE
-    assert prepared.run.get_status().outcome == "incomplete"
-
-
-def test_limits_are_restored_after_a_trip(bench, tmp_path, monkeypatch):
-    monkeypatch.setattr(bench.supervisor, "_bring_to_rest", lambda: None)
-
-    def play(supervision):
-        supervision.on_arrived()
-        supervision.on_setpoints_failed("actuator: the drive has stopped by itself")
-
-    prepared = bench.prepare(play, tmp_path / "a.mcap")
-    bench.executor.execute(prepared)
-    assert not bench.is_permitted(0.0)
-    assert prepared.run.get_status().reason == "actuator: the drive has stopped by itself"
-    bench.interlocks.reset()
-    assert bench.describe_limits() == IDLE
-
-
-def test_limits_are_restored_if_the_log_cannot_be_opened(bench, tmp_path):
-    (tmp_path / "a.mcap").mkdir()
-    prepared = bench.prepare(lambda supervision: pytest.fail("it was played"), tmp_path / "a.mcap")
-    bench.executor.execute(prepared)
-    assert bench.describe_limits() == IDLE
-    assert prepared.run.get_status().outcome == "incomplete"
-
-
-def test_limits_are_restored_if_the_supervision_fails_half_way(bench, tmp_path, monkeypatch):
-    @contextlib.contextmanager
-    def follow(history):
-        raise ZeroDivisionError("division by zero")
-        yield
-
-    monkeypatch.setattr(bench.supervisor, "follow", follow)
-    prepared = bench.prepare(lambda supervision: pytest.fail("it was played"), tmp_path / "a.mcap")
-    with pytest.raises(ZeroDivisionError):
+        assert describe_limits(bench) == IDLE
+        prepared = bench.prepare(play, tmp_path / "a.mcap")
         bench.executor.execute(prepared)
-    assert bench.describe_limits() == IDLE
+        assert limits == [APPROACH, STROKE]
+        assert describe_limits(bench) == IDLE
+        assert prepared.run.get_status().outcome == "clean"
+
+    def test_events_of_the_sequencer_reach_acquisition_and_interlocks(self, bench, tmp_path):
+        supervision = bench.prepare(lambda supervision: None, tmp_path / "a.mcap").supervision
+        supervision.on_state("moving")
+        supervision.on_setpoints_active(True)
+        assert bench.acquisition._controls.externally_triggered.is_set()
+        supervision.on_setpoints_active(False)
+        assert not bench.acquisition._controls.externally_triggered.is_set()
+        supervision.on_late_setpoint(0, 0.025)
+        assert bench.events.list_texts("state") == ["moving"]
+        assert bench.events.list_texts("alarm") == ["setpoint lateness 25 ms exceeds the limit of 20 ms"]
 
 
-def test_limits_are_restored_if_the_execution_raises(bench, tmp_path, monkeypatch):
-    prepared = bench.prepare(lambda supervision: None, tmp_path / "a.mcap")
-    monkeypatch.setattr(prepared.run, "execute", lambda *_: (_ for _ in ()).throw(LogError("defect")))
-    with pytest.raises(LogError):
+class TestPlayback:
+    """The real sequencer plays on doubles; it is interrupted when the first stroke has started."""
+
+    @pytest.fixture
+    def bench(self, tmp_path):
+        return RunBench(tmp_path, time.monotonic_ns)
+
+    @staticmethod
+    def execute(bench, log, action=lambda: None):
+        """Execute a run with an action at the start of its stroke; return its status and the limits then."""
+        prepared, limits = bench.prepare_playback(log), []
+        read_progress = bench.doubles.amplifier.read_table_progress
+
+        def read_table_progress():
+            if not limits:
+                limits.append(describe_limits(bench))
+                bench.interlocks.reset()  # so that the same violation is reported again
+                action()
+            return read_progress()
+
+        bench.doubles.amplifier.read_table_progress = read_table_progress
         bench.executor.execute(prepared)
-    assert bench.describe_limits() == IDLE
+        bench.doubles.amplifier.read_table_progress = read_progress
+        return prepared.run.get_status(), limits
+
+    def test_run_to_its_end(self, bench, tmp_path):
+        status, limits = self.execute(bench, tmp_path / "a.mcap")
+        assert (status.outcome, status.reason, limits) == ("clean", "", [STROKE])
+        assert describe_limits(bench) == IDLE
+
+    def test_stop_on_request(self, bench, tmp_path):
+        status, limits = self.execute(bench, tmp_path / "a.mcap", lambda: bench.stop("stopped on request"))
+        assert (status.outcome, status.reason) == ("incomplete", "stopped on request")
+        assert limits == [STROKE]
+        assert bench.doubles.calls[-2:] == ["coil safe", "actuator disabled"]
+        assert describe_limits(bench) == IDLE
+
+    def test_stop_by_a_limit_of_the_method(self, bench, tmp_path):
+        status, _ = self.execute(bench, tmp_path / "a.mcap", lambda: bench.receive_force(BETWEEN_FORCES))
+        assert (status.outcome, status.reason) == ("incomplete", "force 950 N exceeds the limit of 900 N")
+        assert bench.interlocks.trip_reason == ""
+        assert describe_limits(bench) == IDLE
+        bench.receive_force(BETWEEN_FORCES)
+        assert bench.events.list_texts("alarm") == ["force 950 N exceeds the limit of 900 N"]
+
+    def test_trip_by_a_limit_of_the_method(self, bench, tmp_path):
+        status, _ = self.execute(bench, tmp_path / "a.mcap", lambda: bench.receive_force(1200.0))
+        assert (status.outcome, status.reason) == ("incomplete", "force 1200 N exceeds the limit of 1125 N")
+        assert bench.interlocks.trip_reason == status.reason
+        assert {"coil safe", "actuator safe"} <= set(bench.doubles.calls)
+        assert not bench.is_permitted(0.0)
+        bench.interlocks.reset()
+        assert describe_limits(bench) == IDLE
+
+    def test_drive_that_refuses_a_setpoint_trips(self, tmp_path):
+        bench = RunBench(tmp_path, time.monotonic_ns, refuses_at=40)
+        status, _ = self.execute(bench, tmp_path / "a.mcap")
+        assert (status.outcome, status.reason) == ("incomplete", REFUSAL)
+        assert bench.interlocks.trip_reason == REFUSAL
+        bench.interlocks.reset()
+        assert describe_limits(bench) == IDLE
+
+    def test_next_run_after_a_stopped_one_has_its_limits_and_is_clean(self, bench, tmp_path):
+        self.execute(bench, tmp_path / "a.mcap", lambda: bench.stop("stopped on request"))
+        status, limits = self.execute(bench, tmp_path / "b.mcap")
+        assert (status.outcome, limits) == ("clean", [STROKE])
+        assert describe_limits(bench) == IDLE
 
 
-@pytest.mark.parametrize(
-    ("command", "message"),
-    [
-        ({"method": METHOD | {"drive_kind": "coil_a"}}, "drives by coil_a, this bench by coil_v"),
-        ({"method": METHOD, "resume_after": "b"}, "its checkpoints: a"),
-    ],
-)
-def test_preparation_that_fails_leaves_the_limits_unchanged(bench, command, message):
-    with pytest.raises(RunError, match=message):
-        bench.executor.prepare(RunCommand(**command))
-    assert bench.describe_limits() == IDLE
+class TestFailure:
+    @pytest.mark.parametrize("error", [RunError("refused"), ZeroDivisionError("division by zero")])
+    @pytest.mark.parametrize("arrived", [False, True])
+    def test_error_during_playback(self, bench, tmp_path, error, arrived):
+        def play(supervision):
+            if arrived:
+                supervision.on_arrived()
+            raise error
+
+        prepared = bench.prepare(play, tmp_path / "a.mcap")
+        bench.executor.execute(prepared)
+        assert describe_limits(bench) == IDLE
+        assert prepared.run.get_status().outcome == "incomplete"
+
+    @pytest.mark.parametrize("interrupt", [KeyboardInterrupt, SystemExit])
+    def test_interrupt_during_playback(self, bench, tmp_path, interrupt):
+        def play(supervision):
+            supervision.on_arrived()
+            raise interrupt
+
+        prepared = bench.prepare(play, tmp_path / "a.mcap")
+        with pytest.raises(interrupt):
+            bench.executor.execute(prepared)
+        assert describe_limits(bench) == IDLE
+        prepared.run.fail("interrupted")
+
+    def test_log_that_cannot_be_opened(self, bench, tmp_path):
+        (tmp_path / "a.mcap").mkdir()
+        prepared = bench.prepare(lambda supervision: pytest.fail("it was played"), tmp_path / "a.mcap")
+        bench.executor.execute(prepared)
+        assert describe_limits(bench) == IDLE
+        assert prepared.run.get_status().outcome == "incomplete"
+
+    def test_supervision_that_begins_only_in_part(self, bench, tmp_path, monkeypatch):
+        @contextlib.contextmanager
+        def follow(history):
+            raise ZeroDivisionError("division by zero")
+            yield
+
+        monkeypatch.setattr(bench.supervisor, "follow", follow)
+        prepared = bench.prepare(lambda supervision: pytest.fail("it was played"), tmp_path / "a.mcap")
+        with pytest.raises(ZeroDivisionError):
+            bench.executor.execute(prepared)
+        assert describe_limits(bench) == IDLE
+
+    def test_execution_that_raises(self, bench, tmp_path, monkeypatch):
+        prepared = bench.prepare(lambda supervision: None, tmp_path / "a.mcap")
+        monkeypatch.setattr(prepared.run, "execute", lambda *_: (_ for _ in ()).throw(LogError("defect")))
+        with pytest.raises(LogError):
+            bench.executor.execute(prepared)
+        assert describe_limits(bench) == IDLE
 
 
-def test_log_is_stored_beside_the_configuration_by_default(bench, tmp_path):
-    request = bench.executor.prepare(RunCommand(method=METHOD)).run.request
-    assert request.path.parent == tmp_path / "runs"
-    assert request.path.name.endswith("-test_method.mcap")
+class TestPreparation:
+    @pytest.mark.parametrize(
+        ("command", "message"),
+        [
+            ({"method": METHOD | {"drive_kind": "coil_a"}}, "drives by coil_a, this bench by coil_v"),
+            ({"method": METHOD, "resume_after": "b"}, "its checkpoints: a"),
+        ],
+    )
+    def test_refused_command_leaves_the_limits_unchanged(self, bench, command, message):
+        with pytest.raises(RunError, match=message):
+            bench.executor.prepare(RunCommand(**command))
+        assert describe_limits(bench) == IDLE
 
+    def test_log_is_stored_beside_the_configuration_by_default(self, bench, tmp_path):
+        request = bench.executor.prepare(RunCommand(method=METHOD)).run.request
+        assert request.path.parent == tmp_path / "runs"
+        assert request.path.name.endswith("-test_method.mcap")
 
-def test_missing_certificate_is_reported_before_anything_moves(bench, tmp_path):
-    text = f'{BENCH_TOML}[channels.force]\ncertificate = "none.pdf"\n'
-    config = BenchConfig.model_validate(tomllib.loads(text))
-    method = bench.executor.prepare(RunCommand(method=METHOD)).run.request.method
-    with pytest.raises(RunError, match=r"none\.pdf cannot be read"):
-        make_attachments(method, config, bench.rig, tmp_path / "bench.toml")
-
-
-def test_events_of_the_sequencer_reach_acquisition_and_interlocks(bench, tmp_path):
-    supervision = bench.prepare(lambda supervision: None, tmp_path / "a.mcap").supervision
-    supervision.on_state("moving")
-    supervision.on_setpoints_active(True)
-    assert bench.acquisition._controls.externally_triggered.is_set()
-    supervision.on_setpoints_active(False)
-    assert not bench.acquisition._controls.externally_triggered.is_set()
-    supervision.on_late_setpoint(0, 0.025)
-    assert bench.events.list_texts("state") == ["moving"]
-    assert bench.events.list_texts("alarm") == ["setpoint lateness 25 ms exceeds the limit of 20 ms"]
+    def test_missing_certificate_is_reported_before_anything_moves(self, bench, tmp_path):
+        text = f'{BENCH_TOML}[channels.force]\ncertificate = "none.pdf"\n'
+        config = BenchConfig.model_validate(tomllib.loads(text))
+        method = bench.executor.prepare(RunCommand(method=METHOD)).run.request.method
+        with pytest.raises(RunError, match=r"none\.pdf cannot be read"):
+            make_attachments(method, config, bench.rig, tmp_path / "bench.toml")

@@ -43,11 +43,10 @@ class ScriptedAgent:
 def request_step(tmp_path, monkeypatch):
     config = tmp_path / "bench.toml"
     config.write_text(BENCH_TOML)
-    monkeypatch.setattr(module, "_POLL_PERIOD", 0.0)
 
     def request(agent):
         monkeypatch.setattr(module, "AgentClient", lambda commands, samples: agent)
-        return request_setup_step(config, "home")
+        return request_setup_step(config, "home", poll_period=0.0)
 
     return request
 

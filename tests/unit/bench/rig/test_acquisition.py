@@ -7,8 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from bench.rig import acquisition as acquisition_module
-from bench.rig.acquisition import Acquisition
+from bench.rig.acquisition import Acquisition, RetryPauses
 from drivers.channel import ClockReading, SampleBlock
 from drivers.errors import DriverError, NoReplyError
 
@@ -66,21 +65,19 @@ def wait_until(condition):
         time.sleep(0.001)
 
 
-@pytest.fixture(autouse=True)
-def _short_pauses(monkeypatch):
-    monkeypatch.setattr(acquisition_module, "MIN_RETRY_PAUSE", 0.001)
-    monkeypatch.setattr(acquisition_module, "MAX_RETRY_PAUSE", 0.002)
-
-
 @pytest.fixture
 def acquire():
-    """Returns a function that makes an acquisition of one instrument, with queues of its batches and failures."""
+    """Return a function that makes an acquisition of one instrument, with queues of its batches and failures."""
     acquisitions = []
 
     def make(instrument, **more):
         batches, failures = queue.SimpleQueue(), queue.SimpleQueue()
         acquisition = Acquisition(
-            {"cell": instrument}, batches.put, lambda name, error: failures.put((name, error)), **more
+            {"cell": instrument},
+            batches.put,
+            lambda name, error: failures.put((name, error)),
+            retry_pauses=RetryPauses(0.001, 0.002),
+            **more,
         )
         acquisitions.append(acquisition)
         return acquisition, batches, failures
@@ -226,7 +223,7 @@ def test_hanging_wires_are_named(acquire):
 
 
 def test_same_warning_of_several_threads_is_listed_once(monkeypatch):
-    monkeypatch.setattr(acquisition_module, "raise_priority", lambda: "no real-time priority")
+    monkeypatch.setattr("bench.rig.acquisition.raise_priority", lambda: "no real-time priority")
     instruments = {name: ScriptedInstrument() for name in ("a", "b")}
     acquisition = Acquisition(instruments, lambda batch: None, lambda name, error: None)
     acquisition.start()

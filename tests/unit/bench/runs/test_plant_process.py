@@ -1,4 +1,4 @@
-"""The rig as a process: what goes in, what comes out, and every way in which it can fail."""
+"""Simulated rig as a process: commands in, channels out, and its failures."""
 
 import sys
 import textwrap
@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from bench.errors import RunError
-from bench.runs import plant_process
 from bench.runs.plant_process import play_scenario
 
 GIVEN = {name: np.linspace(0, 1, 20) for name in ("time", "displacement", "drive")}
@@ -21,7 +20,7 @@ WRITES = """
 
 
 def rig(code: str) -> tuple[str, ...]:
-    """A rig that is nothing but this code."""
+    """Return the command of a rig that executes this code."""
     return (sys.executable, "-c", textwrap.dedent(code))
 
 
@@ -38,36 +37,35 @@ def test_commands_reach_the_rig_and_its_channels_come_back():
     assert shares == [0.5]
 
 
-def test_a_failing_rig_is_quoted_by_its_last_line():
+def test_last_line_of_a_failing_rig_is_its_error():
     code = "import sys; sys.stderr.write('first\\nsim_rig: no such scenario\\n'); sys.exit(1)"
     with pytest.raises(RunError, match=r"^the simulated rig failed: no such scenario$"):
         play_scenario("any", GIVEN, rig=rig(code))
 
 
-def test_a_rig_that_fails_in_silence_is_reported_by_its_exit_status():
+def test_failure_without_output_is_reported_by_its_exit_status():
     with pytest.raises(RunError, match="exit status 3"):
         play_scenario("any", GIVEN, rig=rig("import sys; sys.exit(3)"))
 
 
-def test_a_rig_that_cannot_be_started_is_an_error_of_ours():
+def test_rig_that_cannot_be_started_is_an_error():
     with pytest.raises(RunError, match="cannot be started"):
         play_scenario("any", GIVEN, rig=("/nowhere/rig",))
 
 
-def test_a_silent_rig_is_stopped(monkeypatch):
-    monkeypatch.setattr(plant_process, "LONGEST_SILENCE", 0.3)
+def test_silent_rig_is_stopped():
     with pytest.raises(RunError, match=r"was silent for 0\.3 s and was stopped"):
-        play_scenario("any", GIVEN, rig=rig("import time; time.sleep(60)"))
+        play_scenario("any", GIVEN, rig=rig("import time; time.sleep(60)"), silence_timeout=0.3)
 
 
 @pytest.mark.parametrize(
     ("code", "words"),
     [
-        ("", "left no usable channels"),
-        ("open(out, 'w').write('no zip')", "left no usable channels"),
-        ("del found['info']; np.savez(out, **found)", "left no usable channels"),
-        ("del found['force']; np.savez(out, **found)", "left no channel force"),
-        ("found['force'] = np.zeros(3); np.savez(out, **found)", "left 3 values of force for 20 commands"),
+        ("", "returned no usable channels"),
+        ("open(out, 'w').write('no zip')", "returned no usable channels"),
+        ("del found['info']; np.savez(out, **found)", "returned no usable channels"),
+        ("del found['force']; np.savez(out, **found)", "returned no channel force"),
+        ("found['force'] = np.zeros(3); np.savez(out, **found)", "returned 3 values of force for 20 commands"),
     ],
 )
 def test_unusable_channels_are_refused(code, words):

@@ -7,7 +7,6 @@ import time
 import pytest
 
 from bench.errors import InterlockError, RunError
-from bench.sequencer import rod_motion
 from bench.sequencer.rod_motion import move_rod
 from drivers.errors import NoReplyError, RefusedError
 from tests.support.fake_rig import FakeActuator
@@ -15,9 +14,10 @@ from tests.support.fake_rig import FakeActuator
 TIMEOUT = 10.0
 
 
-def move(actuator, target=0.0005, permit=lambda position: None, stop_requested=None, active=None):
+def move(actuator, target=0.0005, permit=lambda position: None, stop_requested=None, active=None, **more):
     report_active = ([] if active is None else active).append
-    move_rod(actuator, permit, time.monotonic_ns, report_active, target, stop_requested or threading.Event())
+    stop_requested = stop_requested or threading.Event()
+    move_rod(actuator, permit, time.monotonic_ns, report_active, target, stop_requested, **more)
 
 
 def test_rod_arrives_smoothly_and_the_drive_is_left_without_voltage():
@@ -65,11 +65,10 @@ def test_failed_drive_is_made_safe_and_its_error_raised():
     assert actuator.calls == ["actuator armed", "actuator safe"]
 
 
-def test_rod_that_does_not_arrive_is_an_error(monkeypatch):
-    monkeypatch.setattr(rod_motion, "_TIME_MARGIN", -1.0)
+def test_rod_that_does_not_arrive_is_an_error():
     actuator = FakeActuator()
     with pytest.raises(RunError, match="has not arrived"):
-        move(actuator, target=0.009)
+        move(actuator, target=0.009, time_margin=-1.0)
     assert actuator.calls[-1] == "actuator safe"
 
 

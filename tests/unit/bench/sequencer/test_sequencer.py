@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from bench.errors import RunError
-from bench.sequencer import sequencer as sequencer_module
 from bench.sequencer.command_history import CommandHistory
-from bench.sequencer.sequencer import Sequencer
+from bench.sequencer.sequencer import OPERATION_TIMEOUTS, AmplifierTimeouts, Sequencer
 from drivers.channel import Channel
 from drivers.errors import OutOfRangeError, RefusedError
 from drivers.modbus.step_table import TableState
@@ -31,7 +30,7 @@ SHORT, LONG = stroke(), stroke(cycles=300)
 class Bench:
     """A sequencer with doubles of everything around it."""
 
-    def __init__(self, actuator=None, amplifier=None, amplifier_rate=0.0):
+    def __init__(self, actuator=None, amplifier=None, amplifier_rate=0.0, timeouts=OPERATION_TIMEOUTS):
         self.calls = []
         self.actuator = FakeActuator(self.calls, **(actuator or {}))
         self.amplifier = FakeAmplifier(self.calls, **(amplifier or {}))
@@ -44,6 +43,7 @@ class Bench:
             time.monotonic_ns,
             self.observer,
             lambda: amplifier_rate,
+            timeouts,
         )
 
     def while_moving(self, action):
@@ -127,9 +127,8 @@ def test_hold_continues_setpoints_until_a_stop():
     assert bench.sequencer.stop_reason == "held"
 
 
-def test_table_that_does_not_start_ends_the_run(monkeypatch):
-    monkeypatch.setattr(sequencer_module, "_TABLE_START_TIMEOUT", 0.02)
-    bench = Bench(amplifier={"state": TableState.ARMED})
+def test_table_that_does_not_start_ends_the_run():
+    bench = Bench(amplifier={"state": TableState.ARMED}, timeouts=AmplifierTimeouts(table_start=0.02))
     with pytest.raises(RunError, match=r"waited 0.02 s for its table to start with the SYNC; it is armed; check"):
         bench.sequencer.run(LONG)
     assert bench.calls[-2:] == ["coil safe", "actuator disabled"]
@@ -165,9 +164,8 @@ def test_after_a_trip_the_sequencer_leaves_the_stop_to_the_supervisor():
     assert not {"coil safe", "actuator disabled", "actuator safe"} & set(bench.calls)
 
 
-def test_coil_that_stays_on_is_reported(monkeypatch):
-    monkeypatch.setattr(sequencer_module, "_ZERO_TIMEOUT", 0.02)
-    bench = Bench(amplifier={"output": 0.4})
+def test_coil_that_stays_on_is_reported():
+    bench = Bench(amplifier={"output": 0.4}, timeouts=AmplifierTimeouts(zero_output=0.02))
     with pytest.raises(RunError, match=r"waited 0.02 s for its output to reach zero; it is 0.4; if its watchdog"):
         bench.sequencer.run(SHORT)
 

@@ -12,7 +12,7 @@ from sim_rig.server import process
 from sim_rig.server.process import ServerSettings, run_until_stopped
 from sim_rig.server.server import TransportOptions
 
-PLAIN = ServerSettings(TransportOptions(), {}, 1.0)
+PLAIN = ServerSettings(TransportOptions(), {}, 1.0, poll_period=0.001)
 
 
 class FakeServer:
@@ -37,7 +37,6 @@ def run(monkeypatch, tmp_path, varied):
     monkeypatch.setattr(threading, "excepthook", threading.excepthook)
     monkeypatch.setattr(process, "_set_realtime_priority", lambda: None)
     monkeypatch.setattr(process, "_reduce_latency", lambda: None)
-    monkeypatch.setattr(process, "_POLL_PERIOD", 0.001)
 
     def run_with(action, out=tmp_path / "bench.toml"):
         served = FakeServer(action)

@@ -1,4 +1,4 @@
-"""The service: REST, live values and the page, in front of the rig agent, the catalogue and the jobs."""
+"""Service: REST interface, live values and web page for the rig agent, the catalogue and the jobs."""
 
 from bench.service.serving import ServeOptions, serve
 

@@ -1,4 +1,4 @@
-"""Who may talk to the service: whoever has the token that was printed once."""
+"""Access to the service by a token, which is printed once."""
 
 import hashlib
 import hmac
@@ -7,32 +7,32 @@ import secrets
 from pathlib import Path
 
 TOKEN_FILE = "token.sha256"
-"""In the data folder; holds what the token is checked against, not the token."""
+"""File in the data folder with the hash of the token, not the token itself."""
 
 
 class Access:
-    """Knows a token by its hash.
+    """Check of tokens against the hash of the valid one.
 
-    The token is 256 random bits, so a plain hash of it tells as little as a slow one.
+    The token has 256 random bits, so a fast hash is as safe as a slow one.
     """
 
     def __init__(self, sha256: str) -> None:
         self._sha256 = sha256
 
     def is_allowed(self, token: str) -> bool:
-        """Whether this is the token; takes as long for every wrong one."""
+        """Return whether a token is valid, in a time that does not depend on its content."""
         return hmac.compare_digest(_compute_sha256(token), self._sha256)
 
 
 def open_access(data: Path, *, new: bool = False) -> tuple[Access, str | None]:
-    """The access to the service of a data folder.
+    """Open the access to the service of a data folder.
 
     Args:
-        data: the folder.
-        new: make another token; the old one opens nothing any more.
+        data: data folder.
+        new: replace the token; the old one becomes invalid.
 
     Returns:
-        The access, and the token if it was made now; later it cannot be had.
+        The access, and the token if it was created now; it cannot be recovered later.
     """
     path = data / TOKEN_FILE
     if path.exists() and not new:
@@ -47,7 +47,7 @@ def _compute_sha256(token: str) -> str:
 
 
 def _write_privately(path: Path, text: str) -> None:
-    """Write a file that nobody else could read at any moment."""
+    """Write a file that other users cannot read at any time."""
     path.unlink(missing_ok=True)
     with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w", encoding="ascii") as file:
         file.write(text)

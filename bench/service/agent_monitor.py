@@ -1,4 +1,4 @@
-"""Listens to the rig agent: keeps its last status, and passes on what it publishes."""
+"""Connection of the service to the rig agent: keeps its latest status and forwards its messages."""
 
 import logging
 import threading
@@ -12,51 +12,51 @@ from bench.agent_protocol import AgentEvent, AgentStatus, Message, Reply, ResetC
 from bench.errors import AgentUnreachableError, RunError
 
 BATCH_TIME = 0.04
-"""[s] of samples that go to listeners at once: 25 batches a second."""
+"""Time between two batches of samples to subscribers [s]: 25 batches per second suit a live plot."""
 STATUS_LIFETIME = 2.0
-"""[s] for which a status counts as the present one; the agent sends four a second."""
+"""Age up to which a status counts as current [s]; the agent publishes four per second."""
 _RETRY_TIME = 0.5
-"""[s] before the agent is listened to anew, after something that cannot be used."""
+"""Pause before a new subscription after a message that cannot be used [s]."""
 _LOG = logging.getLogger(__name__)
 
 PublishedMessage = AgentStatus | Samples | AgentEvent | None
 
 
 class AgentLink(Protocol):
-    """A way to the agent; `bench.agent_protocol.link.AgentClient` is one."""
+    """Connection to the agent, such as `bench.agent_protocol.AgentClient`."""
 
     def send(self, command: Message, timeout: float = 5.0) -> Reply:
-        """Send one command and wait for its answer.
+        """Send one command and wait for its reply.
 
         Raises:
-            AgentUnreachable: no answer came in time [s].
+            AgentUnreachableError: no reply arrived within the timeout [s].
         """
 
     def subscribe(self, stopping: threading.Event) -> Iterator[PublishedMessage]:
-        """What the agent publishes; None now and then while it is silent."""
+        """Yield the messages that the agent publishes, and None at intervals while it is silent."""
 
 
 class NoAgent:
-    """Stands where no agent was named: recordings are still catalogued, identified and shown."""
+    """Replacement for an agent that is not configured; recordings are still catalogued, identified and shown."""
 
-    _MESSAGE = "the service knows no rig agent; start it with --config bench.toml or --agent ADDRESS"
+    _MESSAGE = "no rig agent is configured; start the service with --config bench.toml or --agent ADDRESS"
 
     def send(self, command: Message, timeout: float = 5.0) -> Reply:
-        """Say so.
+        """Refuse the command.
 
         Raises:
-            AgentUnreachable: always.
+            AgentUnreachableError: always.
         """
         raise AgentUnreachableError(self._MESSAGE)
 
     def subscribe(self, stopping: threading.Event) -> Iterator[PublishedMessage]:
-        """Nothing, until the end."""
+        """Yield only None, until the service stops."""
         while not stopping.wait(0.5):
             yield None
 
 
 class AgentMonitor:
-    """The agent as the service sees it; a context manager that listens meanwhile."""
+    """Connection of the service to the agent; as a context manager, it runs the thread that subscribes."""
 
     def __init__(
         self,
@@ -64,12 +64,12 @@ class AgentMonitor:
         publish: Callable[[str, BaseModel], None],
         observe: Callable[[AgentStatus], None],
     ) -> None:
-        """Take the way to the agent.
+        """Use a connection to the agent.
 
         Args:
-            link: the way.
-            publish: takes a topic and its message; called in the listening thread.
-            observe: takes every status, in the listening thread.
+            link: connection to the agent.
+            publish: receives a topic and its message; called in the subscribing thread.
+            observe: receives every status; called in the thread that receives it.
         """
         self._link, self._publish, self._observe = link, publish, observe
         self._status: AgentStatus | None = None
@@ -77,59 +77,61 @@ class AgentMonitor:
         self._pending: list[Samples] = []
         self._forwarded_at = float("-inf")
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._listen, name="agent-watch", daemon=True)
+        self._thread = threading.Thread(target=self._listen, name="agent-monitor", daemon=True)
 
     def __enter__(self) -> "AgentMonitor":
-        """Begin to listen."""
+        """Start the subscribing thread."""
         self._thread.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Listen no more."""
+        """Stop the subscribing thread."""
         self._stopping.set()
         self._thread.join()
 
     @property
     def latest_status(self) -> AgentStatus | None:
-        """The present status, as far as one came lately."""
+        """Latest status, or None if it is older than `STATUS_LIFETIME`."""
         return self._status if time.monotonic() - self._status_at < STATUS_LIFETIME else None
 
     def get_status(self, timeout: float = 1.0) -> AgentStatus:
-        """The present status, asked for where none came lately.
+        """Return the current status; request it if the latest one is too old.
 
         Args:
-            timeout: [s] to wait for the answer.
+            timeout: time to wait for the reply [s].
 
         Raises:
-            AgentUnreachable: it does not answer.
+            AgentUnreachableError: the agent does not answer.
         """
         return self.latest_status or self.send_command(StatusCommand(), timeout)
 
     def reset(self) -> AgentStatus:
-        """Take back a trip.
+        """Reset a trip.
 
         Raises:
-            AgentUnreachable: it does not answer.
-            RunError: it refuses.
+            AgentUnreachableError: the agent does not answer.
+            RunError: the agent refuses the reset.
         """
         return self.send_command(ResetCommand())
 
     def send_command(self, command: Message, timeout: float = 5.0) -> AgentStatus:
-        """Send a command; the status that its answer carries.
+        """Send a command and return the status of the agent after it.
 
         Raises:
-            AgentUnreachable: the agent does not answer.
-            RunError: it refuses, in its own words.
+            AgentUnreachableError: the agent does not answer.
+            RunError: the agent refuses the command; the message is that of the agent.
         """
-        answer = self._link.send(command, timeout)
-        if not answer.ok:
-            raise RunError(answer.error or "the rig agent refuses, and does not say why")
-        if answer.status is None:  # some answers carry none
-            answer = self._link.send(StatusCommand(), timeout)
-        if answer.status is None:
-            raise AgentUnreachableError("the rig agent answers without its status; it is of another version")
-        self._set_status(answer.status)
-        return answer.status
+        reply = self._link.send(command, timeout)
+        if not reply.ok:
+            raise RunError(reply.error or "the rig agent refused the command without a reason; see its log")
+        if reply.status is None:  # some replies contain no status
+            reply = self._link.send(StatusCommand(), timeout)
+        if reply.status is None:
+            raise AgentUnreachableError(
+                "the rig agent replied without a status; it must have the service's version"
+            )
+        self._set_status(reply.status)
+        return reply.status
 
     def _listen(self) -> None:
         while not self._stopping.is_set():
@@ -137,7 +139,7 @@ class AgentMonitor:
                 for message in self._link.subscribe(self._stopping):
                     self._handle_message(message)
             except Exception as error:
-                # Such as a message of another version. Whoever listens no more sees an agent that never answers.
+                # For example a message of another version. Without resubscribing, the agent would seem silent.
                 _LOG.warning("agent_message_unused", extra={"why": repr(error)})
                 self._stopping.wait(_RETRY_TIME)
 
@@ -159,7 +161,7 @@ class AgentMonitor:
 
 
 def join_batches(batches: list[Samples]) -> Samples:
-    """Several batches as one; a field that one of them lacks is null there."""
+    """Join batches into one; a field that is missing in a batch is None there."""
     if len(batches) == 1:
         return batches[0]
     names = dict.fromkeys(name for batch in batches for name in batch.values)

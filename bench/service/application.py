@@ -1,4 +1,4 @@
-"""The web application: routes, access, problems, the page; and what lives as long as it does."""
+"""Web application: routes, access check, errors, static page, and the objects with the same lifetime."""
 
 import asyncio
 import logging
@@ -32,12 +32,12 @@ _LOG = logging.getLogger(__name__)
 API = "/api/v1"
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]", "::1")
 PAGE_FOLDER = Path(__file__).parent.parent / "web" / "static"
-"""The page's files."""
+"""Files of the web page."""
 
 
 @dataclass(frozen=True)
 class AppSettings:
-    """What the application is put into."""
+    """Folder, access, agent and engine of the application."""
 
     data: Path
     """Data folder, absolute."""
@@ -45,32 +45,32 @@ class AppSettings:
     link: AgentLink
     engine: Callable[[], AbstractAsyncContextManager[JobEngine]]
     has_local_logs: bool = True
-    """Whether the agent writes into the data folder."""
+    """True if the agent writes into the data folder."""
     hosts: tuple[str, ...] = LOOPBACK_NAMES
-    """Names by which a browser may call; `*` for any. Keeps other sites' names off the loopback interface."""
+    """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
     database: str | None = None
-    """Address of the catalogue; an SQLite file in the data folder by default."""
+    """URL of the catalogue's database; by default an SQLite file in the data folder."""
 
 
-def create_app(surroundings: AppSettings | None = None) -> FastAPI:
-    """The application.
+def create_app(settings: AppSettings | None = None) -> FastAPI:
+    """Create the application.
 
     Args:
-        surroundings: what it is put into; without, it can only describe itself.
+        settings: settings; without them, the application can only return its OpenAPI description.
     """
     app = FastAPI(
         title="mrbench",
         version=version("mrbench"),
         description="Test bench for magnetorheological dampers. SI throughout; times are UTC.",
         openapi_url=f"{API}/openapi.json",
-        docs_url=None,  # its pages of documentation load scripts from elsewhere
+        docs_url=None,  # FastAPI's documentation pages load scripts from other servers
         redoc_url=None,
-        lifespan=None if surroundings is None else lambda app: _run_lifespan(app, surroundings),
+        lifespan=None if settings is None else lambda app: _run_lifespan(app, settings),
     )
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
     app.add_middleware(RequestLogMiddleware)
-    app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(surroundings.hosts if surroundings else ("*",)))
+    app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(settings.hosts if settings else ("*",)))
     for router in PUBLIC_ROUTERS:
         app.include_router(router, prefix=API)
     for router in PROTECTED_ROUTERS:
@@ -80,7 +80,7 @@ def create_app(surroundings: AppSettings | None = None) -> FastAPI:
     return app
 
 
-_BEARER = HTTPBearer(auto_error=False, description="the token that `mrbench serve` printed at its first start")
+_BEARER = HTTPBearer(auto_error=False, description="token that `mrbench serve` prints at its first start")
 
 
 def _check_token(
@@ -91,50 +91,50 @@ def _check_token(
 
 
 @asynccontextmanager
-async def _run_lifespan(app: FastAPI, surroundings: AppSettings) -> AsyncIterator[None]:
-    """Everything that goes on beside the requests; it ends in the opposite order, whatever happens meanwhile."""
+async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[None]:
+    """Run catalogue, engine, agent monitor and scans; they end in reverse order, also after an error."""
     database = await asyncio.to_thread(
-        open_database, surroundings.database or make_sqlite_url(surroundings.data / "catalogue.db")
+        open_database, settings.database or make_sqlite_url(settings.data / "catalogue.db")
     )
-    async with AsyncExitStack() as living:
-        catalogue = Catalogue(database, surroundings.data)
-        living.callback(catalogue.close)
-        engine = await living.enter_async_context(surroundings.engine())
-        context = app.state.context = _make_context(surroundings, catalogue, engine)
-        living.push_async_callback(engine.close)
+    async with AsyncExitStack() as stack:
+        catalogue = Catalogue(database, settings.data)
+        stack.callback(catalogue.close)
+        engine = await stack.enter_async_context(settings.engine())
+        context = app.state.context = _make_context(settings, catalogue, engine)
+        stack.push_async_callback(engine.close)
         await engine.start(context.job_manager)
-        living.enter_context(context.monitor)
-        living.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
+        stack.enter_context(context.monitor)
+        stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
         yield
 
 
-def _make_context(surroundings: AppSettings, catalogue: Catalogue, engine: JobEngine) -> ServiceContext:
-    """What the routes work with, each told of what the others do; called in the event loop."""
-    loop, live_messages = asyncio.get_running_loop(), LiveBroadcaster()
+def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine) -> ServiceContext:
+    """Create the objects of the routes and connect their callbacks; called in the event loop."""
+    loop, broadcaster = asyncio.get_running_loop(), LiveBroadcaster()
 
-    def job_changed(row: JobRow) -> None:
-        live_messages.publish("job", serialise_message("job", make_job_view(row)), row.id)
+    def on_job_changed(row: JobRow) -> None:
+        broadcaster.publish("job", serialise_message("job", make_job_view(row)), row.id)
 
-    async def run_changed(row: RunRow) -> None:
-        shown = (await asyncio.to_thread(context.make_run_views, row))[0]
-        live_messages.publish("run", serialise_message("run", shown), row.id)
+    async def on_run_changed(row: RunRow) -> None:
+        view = (await asyncio.to_thread(context.make_run_views, row))[0]
+        broadcaster.publish("run", serialise_message("run", view), row.id)
 
-    def observed(status: AgentStatus) -> None:
+    def on_status(status: AgentStatus) -> None:
         if not loop.is_closed():
-            asyncio.run_coroutine_threadsafe(book.observe(status), loop).add_done_callback(_log_failure)
+            asyncio.run_coroutine_threadsafe(registry.observe(status), loop).add_done_callback(_log_failure)
 
-    keeper = JobManager(catalogue, engine, job_changed)
-    watch = AgentMonitor(surroundings.link, live_messages.make_publisher(loop), observed)
-    book = RunRegistry(catalogue, keeper, lambda: watch.latest_status, run_changed)
+    job_manager = JobManager(catalogue, engine, on_job_changed)
+    monitor = AgentMonitor(settings.link, broadcaster.make_publisher(loop), on_status)
+    registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
-        surroundings.access, catalogue, watch, live_messages, engine, keeper, book, surroundings.has_local_logs
+        settings.access, catalogue, monitor, broadcaster, engine, job_manager, registry, settings.has_local_logs
     )
     return context
 
 
-def _log_failure(writing: "Future[None]") -> None:
-    """Nobody waits for what a status says of runs: what goes wrong with it would be lost without a word."""
-    if not writing.cancelled() and (error := writing.exception()) is not None:
+def _log_failure(task: "Future[None]") -> None:
+    """Log the error of a task that has no other receiver."""
+    if not task.cancelled() and (error := task.exception()) is not None:
         _LOG.error("status_unused", extra={"why": repr(error)})
 
 
@@ -145,10 +145,10 @@ async def _cancel_task(task: "asyncio.Task[None]") -> None:
 
 
 def _make_openapi(app: FastAPI) -> dict[str, Any]:
-    """The description with the form of problems, which no route has as its answer."""
-    # FastAPI keeps the description that it has made, and gives this very one again: what is added stays.
+    """Return the OpenAPI description, with the schema of problems, which no route declares as its response."""
+    # FastAPI caches the description and returns the same object again, so that the addition is kept.
     if app.openapi_schema is None:
-        found = FastAPI.openapi(app)
-        form = problems.Problem.model_json_schema(mode="serialization")
-        found["components"]["schemas"]["Problem"] = form
+        description = FastAPI.openapi(app)
+        schema = problems.Problem.model_json_schema(mode="serialization")
+        description["components"]["schemas"]["Problem"] = schema
     return FastAPI.openapi(app)

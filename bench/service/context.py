@@ -1,4 +1,4 @@
-"""What the routes work with, put together once when the service starts."""
+"""Objects shared by all routes, created when the service starts."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,12 +17,12 @@ from bench.service.run_registry import RunRegistry
 from bench.service.views import Run, make_run_view
 
 MAX_JOBS = 200
-"""[1] jobs that are looked through for a page of runs."""
+"""Largest number of jobs read for a page of runs."""
 
 
 @dataclass(frozen=True)
 class ServiceContext:
-    """Everything within a route's reach."""
+    """Objects shared by all routes."""
 
     access: Access
     catalogue: Catalogue
@@ -32,18 +32,18 @@ class ServiceContext:
     job_manager: JobManager
     registry: RunRegistry
     has_local_logs: bool
-    """Whether the agent writes into the service's data folder."""
+    """True if the agent writes into the service's data folder."""
 
     @property
     def data(self) -> Path:
-        """The data folder."""
+        """Data folder."""
         return self.catalogue.folder
 
     def get_run(self, run_id: str) -> RunRow:
-        """A run.
+        """Return the run with this id.
 
         Raises:
-            ProblemError: there is none of that id.
+            ProblemError: there is no such run.
         """
         row = self.catalogue.get_run(run_id)
         if row is None:
@@ -51,10 +51,10 @@ class ServiceContext:
         return row
 
     def get_job(self, job_id: str) -> JobRow:
-        """A job.
+        """Return the job with this id.
 
         Raises:
-            ProblemError: there is none of that id.
+            ProblemError: there is no such job.
         """
         row = self.catalogue.get_job(job_id)
         if row is None:
@@ -62,7 +62,7 @@ class ServiceContext:
         return row
 
     def make_run_views(self, *rows: RunRow) -> list[Run]:
-        """Runs as they are shown, each with its jobs."""
+        """Return the views of runs, each with its jobs."""
         jobs = self.catalogue.list_jobs(MAX_JOBS, [row.id for row in rows])
         return [
             make_run_view(row, [job for job in jobs if job.run_id == row.id], self.monitor.latest_status)

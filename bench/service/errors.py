@@ -1,4 +1,4 @@
-"""The service's own error."""
+"""Error of the service."""
 
 from bench.errors import BenchError
 

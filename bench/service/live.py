@@ -1,4 +1,4 @@
-"""Live messages to every listener; one that is slow gets fewer, the newest, and holds nobody up."""
+"""Live messages to all websocket clients; a slow client gets only the newest and does not delay the others."""
 
 import asyncio
 from collections import deque
@@ -9,23 +9,23 @@ import orjson
 from pydantic import BaseModel
 
 MAX_QUEUED_EVENTS = 64
-"""Events that wait for a slow listener."""
+"""Largest number of events that wait for a slow client."""
 MAX_QUEUED_BATCHES = 4
-"""Batches of samples that wait for a slow listener."""
+"""Largest number of sample batches that wait for a slow client."""
 
 
 class SubscriberQueue:
-    """What waits for one listener, as JSON text; used in the event loop only."""
+    """Messages that wait for one client, as JSON text; used in the event loop only."""
 
     def __init__(self) -> None:
-        # Of what has a state the newest word is enough; events and samples are each their own, and have an end.
+        # Of a status, run or job only the latest state matters. Each event and batch counts, up to a limit.
         self._latest: dict[tuple[str, str], str] = {}
         self._events: deque[str] = deque(maxlen=MAX_QUEUED_EVENTS)
         self._samples: deque[str] = deque(maxlen=MAX_QUEUED_BATCHES)
         self._has_messages = asyncio.Event()
 
     def put(self, topic: str, key: str, text: str) -> None:
-        """Take a message; of status, runs and jobs only the latest of each key is kept."""
+        """Add a message; of status, runs and jobs only the latest for each key is kept."""
         if topic == "samples":
             self._samples.append(text)
         elif topic == "event":
@@ -35,7 +35,7 @@ class SubscriberQueue:
         self._has_messages.set()
 
     async def take(self) -> list[str]:
-        """Everything that waits, as soon as there is something."""
+        """Wait for messages, and remove and return all of them."""
         await self._has_messages.wait()
         self._has_messages.clear()
         waiting = [*self._latest.values(), *self._events, *self._samples]
@@ -46,7 +46,7 @@ class SubscriberQueue:
 
 
 class LiveBroadcaster:
-    """Hands what happens to all listeners."""
+    """Distributor of messages to all subscribers."""
 
     def __init__(self) -> None:
         self._queues: set[SubscriberQueue] = set()
@@ -54,25 +54,25 @@ class LiveBroadcaster:
 
     @contextmanager
     def subscribe(self) -> Iterator[SubscriberQueue]:
-        """A mailbox that is filled as long as the context lasts; it begins with the last status."""
-        mailbox = SubscriberQueue()
+        """Return a queue that is filled while the context lasts; it begins with the latest status."""
+        queue = SubscriberQueue()
         if self._last_status is not None:
-            mailbox.put("status", "", self._last_status)
-        self._queues.add(mailbox)
+            queue.put("status", "", self._last_status)
+        self._queues.add(queue)
         try:
-            yield mailbox
+            yield queue
         finally:
-            self._queues.discard(mailbox)
+            self._queues.discard(queue)
 
     def publish(self, topic: str, text: str, key: str = "") -> None:
-        """Hand a message, made by `as_text`, to everybody; in the event loop."""
+        """Send a text from `serialise_message` to all subscribers; called in the event loop."""
         if topic == "status":
             self._last_status = text
-        for mailbox in self._queues:
-            mailbox.put(topic, key, text)
+        for queue in self._queues:
+            queue.put(topic, key, text)
 
     def make_publisher(self, loop: asyncio.AbstractEventLoop) -> Callable[[str, BaseModel], None]:
-        """The same for other threads; once the loop has ended, nobody listens."""
+        """Return a function that publishes from other threads, and does nothing once the loop is closed."""
 
         def publish(topic: str, data: BaseModel) -> None:
             text = serialise_message(topic, data)
@@ -83,5 +83,5 @@ class LiveBroadcaster:
 
 
 def serialise_message(topic: str, data: BaseModel) -> str:
-    """A message as it goes over the websocket."""
+    """Return the text of a message on the websocket."""
     return orjson.dumps({"topic": topic, "data": data.model_dump(mode="json")}).decode()

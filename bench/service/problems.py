@@ -1,4 +1,4 @@
-"""Errors as `application/problem+json` (RFC 9457), each kind with a stable type, never with a traceback."""
+"""Errors as `application/problem+json` (RFC 9457), with a stable type for each kind and without traceback."""
 
 import logging
 from http import HTTPStatus
@@ -17,16 +17,16 @@ _LOG = logging.getLogger(__name__)
 
 
 class Problem(BaseModel):
-    """What went wrong."""
+    """Error of a request."""
 
-    type: str = Field(description="`urn:mrbench:problem:NAME`; the names stay as they are")
-    title: str = Field(description="the kind, for a person")
+    type: str = Field(description="`urn:mrbench:problem:NAME` with a stable name, for programs")
+    title: str = Field(description="kind of error, for a person")
     status: int = Field(description="HTTP status")
     detail: str = Field(description="what failed, the value and the limit with unit, what to do")
 
 
 class ProblemError(Exception):
-    """Raised by routes; answered as a problem."""
+    """Error raised by a route and returned as a problem."""
 
     def __init__(self, status: HTTPStatus, name: str, title: str, detail: str) -> None:
         super().__init__(detail)
@@ -34,36 +34,39 @@ class ProblemError(Exception):
 
 
 def make_not_found(what: str, name: str) -> ProblemError:
-    """There is no such thing."""
+    """Return the error for an object that does not exist."""
     return ProblemError(HTTPStatus.NOT_FOUND, "not-found", "Not found", f"there is no {what} {name}")
 
 
 def make_unauthorised() -> ProblemError:
-    """The token is missing or wrong."""
-    words = "give the token as `Authorization: Bearer ...`; `mrbench serve --new-token` makes another"
-    return ProblemError(HTTPStatus.UNAUTHORIZED, "unauthorised", "The token is missing or wrong", words)
+    """Return the error for a missing or wrong token."""
+    detail = "give the token as `Authorization: Bearer ...`; `mrbench serve --new-token` creates a new one"
+    return ProblemError(HTTPStatus.UNAUTHORIZED, "unauthorised", "The token is missing or wrong", detail)
 
 
 def make_conflict(name: str, title: str, detail: str) -> ProblemError:
-    """It cannot be done in the present state."""
+    """Return the error for a request that is not possible in the present state."""
     return ProblemError(HTTPStatus.CONFLICT, name, title, detail)
 
 
 RESPONSES: dict[int | str, dict[str, Any]] = {
-    status: {"description": words, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
-    for status, words in (
+    status: {
+        "description": description,
+        "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
+    }
+    for status, description in (
         (401, "The token is missing or wrong"),
-        (404, "There is no such thing"),
+        (404, "The object does not exist"),
         (409, "Not possible in the present state"),
-        (422, "The request does not have its form"),
+        (422, "The request is invalid"),
         (503, "The rig agent does not answer"),
     )
 }
-"""What any call may answer instead."""
+"""Error responses of every route."""
 
-# The first that fits counts: the base of all stands last.
+# The first matching class applies, so that the base class is last.
 _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
-    (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method is refused"),
+    (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method was refused"),
     (AgentUnreachableError, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),
@@ -71,34 +74,35 @@ _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
 
 
 def install_handlers(app: FastAPI) -> None:
-    """Have an application answer every error as a problem."""
+    """Make an application return every error as a problem."""
 
     @app.exception_handler(ProblemError)
-    async def _problem(request: Request, error: ProblemError) -> JSONResponse:
+    async def _handle_problem(request: Request, error: ProblemError) -> JSONResponse:
         return _make_response(error.problem)
 
     @app.exception_handler(BenchError)
-    async def _of_bench(request: Request, error: BenchError) -> JSONResponse:
+    async def _handle_bench_error(request: Request, error: BenchError) -> JSONResponse:
         status, name, title = next(kind[1:] for kind in _BENCH_PROBLEMS if isinstance(error, kind[0]))
         return _make_response(ProblemError(status, name, title, str(error)).problem)
 
     @app.exception_handler(RequestValidationError)
-    async def _validation(request: Request, error: RequestValidationError) -> JSONResponse:
+    async def _handle_invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:
         return _make_response(_make_validation_problem(error))
 
-    # Starlette's, not FastAPI's own: a path that nobody serves raises it, too.
+    # Starlette's class, not FastAPI's: it is also raised for an unknown path.
     @app.exception_handler(HTTPException)
-    async def _http(request: Request, error: HTTPException) -> JSONResponse:
+    async def _handle_http_error(request: Request, error: HTTPException) -> JSONResponse:
         status = HTTPStatus(error.status_code)
         name = status.phrase.lower().replace(" ", "-")
         problem = ProblemError(status, name, status.phrase, f"{request.method} {request.url.path}: {error.detail}")
         return _make_response(problem.problem, error.headers)
 
     @app.exception_handler(Exception)
-    async def _defect(request: Request, error: Exception) -> JSONResponse:
+    async def _handle_internal_error(request: Request, error: Exception) -> JSONResponse:
         _LOG.error("defect", exc_info=error, extra={"path": request.url.path})
-        words = "the service has a defect; its log says more"
-        return _make_response(ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "Defect", words).problem)
+        detail = "internal error of the service; its log contains the details, please report it"
+        internal = ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "Internal error", detail)
+        return _make_response(internal.problem)
 
 
 def _make_validation_problem(error: RequestValidationError) -> Problem:

@@ -1,4 +1,4 @@
-"""The processes that the service starts: a worker that it keeps alive, an agent that outlives it."""
+"""Processes that the service starts: a worker, restarted whenever it ends, and an agent that outlives it."""
 
 import asyncio
 import contextlib
@@ -16,36 +16,36 @@ from bench.service.agent_monitor import AgentLink
 from bench.service.errors import ServiceError
 
 AGENT_TIMEOUT = 90.0
-"""[s] from its start to an agent's first answer."""
+"""Time limit from the start of an agent to its first reply [s]."""
 MAX_RESTART_PAUSE = 30.0
-"""[s] between two starts of a worker that ends at once."""
+"""Longest pause between two starts of a worker that keeps failing [s]."""
 _TERMINATE_TIMEOUT = 5.0
-"""[s] for a process to end in good order."""
+"""Time for a process to end after SIGTERM before it is killed [s]."""
 _LOG = logging.getLogger(__name__)
 
 
 @contextlib.asynccontextmanager
 async def start_local_engine(data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> AsyncIterator[DaskEngine]:
-    """An engine with a scheduler in this process and one worker process, which is started again whenever it ends.
+    """Start a scheduler in this process and one worker process, which is restarted whenever it ends.
 
     Args:
-        data: the data folder; the scheduler's address and the worker's words go there.
-        mrbench: the command line.
+        data: data folder; it receives the scheduler's address and the worker's output.
+        mrbench: command that starts mrbench.
     """
     async with start_local_scheduler(data) as address:
         command = [*mrbench, "worker", "--scheduler", address]
-        keeping = asyncio.create_task(_keep_alive(command, data / "worker.log"))
+        worker_task = asyncio.create_task(_keep_alive(command, data / "worker.log"))
         try:
             yield DaskEngine(address)
         finally:
-            keeping.cancel()
+            worker_task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
-                await keeping
+                await worker_task
 
 
 @contextlib.asynccontextmanager
 async def connect_engine(address: str) -> AsyncIterator[DaskEngine]:
-    """An engine whose scheduler and workers somebody else has started."""
+    """Connect to an engine whose scheduler and workers were started separately."""
     yield DaskEngine(address)
 
 
@@ -58,7 +58,7 @@ async def _keep_alive(command: Sequence[str], log: Path) -> None:
         try:
             status = await asyncio.to_thread(process.wait)
         finally:
-            # Cancelled: the thread that waits ends as soon as the process does.
+            # After a cancellation, the waiting thread ends together with the process.
             await asyncio.shield(asyncio.to_thread(terminate, process, _TERMINATE_TIMEOUT))
         _LOG.warning("worker_ended", extra={"pid": process.pid, "status": status, "log": str(log)})
         pause = 1.0 if time.monotonic() - began > MAX_RESTART_PAUSE else min(2.0 * pause, MAX_RESTART_PAUSE)
@@ -66,19 +66,19 @@ async def _keep_alive(command: Sequence[str], log: Path) -> None:
 
 
 def _start_process(command: Sequence[str], log: Path) -> "subprocess.Popen[bytes]":
-    """Start a process in a session of its own, so that a Ctrl-C meant for the service does not reach it."""
-    with log.open("ab") as words:
+    """Start a process in a new session, so that it does not receive a Ctrl-C meant for the service."""
+    with log.open("ab") as output:
         return subprocess.Popen(
-            command, stdin=subprocess.DEVNULL, stdout=words, stderr=words, start_new_session=True
+            command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
         )
 
 
 def is_answering(link: AgentLink, timeout: float = 1.0) -> bool:
-    """Whether an agent is there.
+    """Return whether an agent answers.
 
     Args:
-        link: the way to it.
-        timeout: [s]
+        link: connection to the agent.
+        timeout: time to wait for the reply [s].
     """
     try:
         return link.send(StatusCommand(), timeout).ok
@@ -87,16 +87,16 @@ def is_answering(link: AgentLink, timeout: float = 1.0) -> bool:
 
 
 def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> None:
-    """Start a rig agent that goes on when the service ends; returns once it answers.
+    """Start a rig agent that continues when the service ends, and wait until it answers.
 
     Args:
         config: ``bench.toml``.
-        link: the way to it.
-        data: its words go there, into ``agent.log``.
-        mrbench: the command line.
+        link: connection to the agent.
+        data: data folder; ``agent.log`` there receives the agent's output.
+        mrbench: command that starts mrbench.
 
     Raises:
-        ServiceError: it ends, or does not answer in time.
+        ServiceError: the agent ends, or does not answer within `AGENT_TIMEOUT`.
     """
     log = data / "agent.log"
     process = _start_process([*mrbench, "rig", "--config", str(config)], log)
@@ -111,20 +111,20 @@ def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str
 
 
 def shut_down_idle_agent(link: AgentLink) -> str:
-    """End an agent if nothing goes on there.
+    """Shut down an agent if it is idle.
 
     Returns:
-        What became of it, for a person.
+        Message on the state of the agent, for a person.
     """
     try:
         status = link.send(StatusCommand(), 2.0).status
         if status is None or status.state != "idle":
-            state = status.state if status else "of unknown state"
-            return f"the rig agent is {state} and goes on; `mrbench serve` finds it again"
+            state = status.state if status else "in an unknown state"
+            return f"the rig agent is {state} and continues; `mrbench serve` connects to it again"
         link.send(ShutDownCommand(), 10.0)
     except AgentUnreachableError as error:
         return f"the rig agent does not answer: {error}"
-    return "the rig agent was idle and has ended"
+    return "the rig agent was idle and was shut down"
 
 
 def _read_last_line(log: Path) -> str:

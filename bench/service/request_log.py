@@ -1,4 +1,4 @@
-"""One line for every call that changes something or fails; a token in an address is never written down."""
+"""Log of the requests that change something or fail, one line each, without tokens in URLs."""
 
 import logging
 import time
@@ -10,29 +10,29 @@ _QUIET_METHODS = ("GET", "HEAD")
 
 
 class RequestLogMiddleware:
-    """Wraps an application."""
+    """ASGI middleware that logs requests."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass on, and write down what came of it."""
+        """Handle a request by the application and log its status."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
             return
         began, status = time.monotonic(), 500
 
-        async def note(message: Message) -> None:
+        async def record_status(message: Message) -> None:
             nonlocal status
             if message["type"] == "http.response.start":
                 status = message["status"]
             await send(message)
 
         try:
-            await self._app(scope, receive, note)
+            await self._app(scope, receive, record_status)
         finally:
             if scope["method"] not in _QUIET_METHODS or status >= 400:
-                took = round(time.monotonic() - began, 4)
-                # The path alone: a query may hold the token.
-                said = {"method": scope["method"], "path": scope["path"], "status": status, "seconds": took}
-                _LOG.info("request", extra=said)
+                seconds = round(time.monotonic() - began, 4)
+                # Only the path, because a query may contain the token.
+                record = {"method": scope["method"], "path": scope["path"], "status": status, "seconds": seconds}
+                _LOG.info("request", extra=record)

@@ -1,4 +1,4 @@
-"""Keeps the catalogue's runs in step with the agent and the data folder, and has what has ended identified."""
+"""Run registry: updates the catalogue from the agent and the data folder, and starts identifications."""
 
 import asyncio
 import logging
@@ -12,59 +12,60 @@ from bench.catalogue import Catalogue, RunRow, catalogue_log, is_complete, scan_
 from bench.jobs import IdentifySettings, JobManager
 
 SCAN_PERIOD = 5.0
-"""[s] between two looks into the data folder."""
+"""Period of the scans of the data folder [s]."""
 SETTLING_TIME = 10.0
-"""[s] after which a log that has not grown is written by nobody, where no agent can say so."""
+"""Time without growth after which a log counts as no longer written, if the agent does not report it [s]."""
 IDENTIFIED_OUTCOMES = ("clean", "lossy")
+"""Outcomes after which a run is identified automatically."""
 _LOG = logging.getLogger(__name__)
 
 
 class RunRegistry:
-    """Writes down runs as they begin and end."""
+    """Record of runs in the catalogue as they start and end."""
 
     def __init__(
         self,
         catalogue: Catalogue,
-        keeper: JobManager,
+        job_manager: JobManager,
         status: Callable[[], AgentStatus | None],
         notify: Callable[[RunRow], Awaitable[None]],
     ) -> None:
-        """Take its surroundings.
+        """Use a catalogue, a job manager and an agent.
 
         Args:
-            catalogue: where runs are written down.
-            keeper: has runs identified.
-            status: the agent's present status, none where it does not answer.
-            notify: told of runs that have changed.
+            catalogue: catalogue of the runs.
+            job_manager: creates the identification jobs.
+            status: returns the current status of the agent, or None if it does not answer.
+            notify: receives every changed run.
         """
-        self._catalogue, self._job_manager = catalogue, keeper
+        self._catalogue, self._job_manager = catalogue, job_manager
         self._get_status, self._on_changed = status, notify
         self._known_states: set[tuple[str, bool]] = set()
         self._lock = asyncio.Lock()
 
     async def observe(self, status: AgentStatus) -> None:
-        """Write down what a status says of runs; what is known already costs nothing."""
-        told = {run.id: run for run in (*status.finished, *([status.run] if status.run else []))}
-        for run in told.values():
-            mark = (run.id, run.outcome is not None)  # a run is news twice: when it begins and when it ends
-            if mark not in self._known_states:
+        """Record the runs in a status; runs without a change are skipped."""
+        runs = {run.id: run for run in (*status.finished, *([status.run] if status.run else []))}
+        for run in runs.values():
+            key = (run.id, run.outcome is not None)  # a run is recorded when it starts and when it ends
+            if key not in self._known_states:
                 async with self._lock:
                     await (self._finish_run(run) if run.outcome else self._add_run(run))
-                # Only now: what could not be written down is tried again with the next status.
-                self._known_states.add(mark)
+                # Added last, so that a failed update is tried again with the next status.
+                self._known_states.add(key)
 
     async def scan(self) -> None:
-        """Look into the data folder once."""
+        """Scan the data folder once."""
         async with self._lock:
             for row in await asyncio.to_thread(scan_logs, self._catalogue, self._is_being_written):
                 await self._handle_change(row)
 
     async def scan_periodically(self) -> None:
-        """Look into the data folder again and again."""
+        """Scan the data folder periodically."""
         while True:
             try:
                 await self.scan()
-            except Exception as error:  # a task that ends in silence would leave all later logs unseen
+            except Exception as error:  # the task must not end, or later logs would not be found
                 _LOG.warning("scan_failed", extra={"why": repr(error)})
             await asyncio.sleep(SCAN_PERIOD)
 
@@ -83,7 +84,7 @@ class RunRegistry:
             return
         ended = await asyncio.to_thread(self._catalogue_log, Path(run.log))
         if ended is None:
-            # The log is on the agent's machine, or was never begun: its own word has to do.
+            # The log is on the agent's machine or was never started, so that the agent's report is used.
             values = {"state": "ended", "outcome": run.outcome, "reason": run.reason}
             ended = await asyncio.to_thread(lambda: self._catalogue.update_run(row.id, **values))
         await self._handle_change(ended)
@@ -94,8 +95,8 @@ class RunRegistry:
     async def _handle_change(self, row: RunRow) -> None:
         _LOG.info("run_" + row.state, extra={"run": row.id, "outcome": row.outcome, "reason": row.reason})
         await self._on_changed(row)
-        worth_a_fit = row.source == "run" and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
-        if worth_a_fit and not await asyncio.to_thread(self._catalogue.list_jobs, 1, [row.id]):
+        is_identifiable = row.source == "run" and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
+        if is_identifiable and not await asyncio.to_thread(self._catalogue.list_jobs, 1, [row.id]):
             await self._job_manager.identify(row, IdentifySettings())
 
     def _is_being_written(self, path: Path) -> bool:
@@ -103,10 +104,10 @@ class RunRegistry:
         run = status.run if status else None
         if run is not None and run.outcome is None and Path(run.log) == path:
             return True
-        # The agent is there, and this known log is none that it says it writes.
+        # The agent answers and does not write this known log.
         if status is not None and self._catalogue.find_run_by_log(path) is not None:
             return False
-        # Another program may record into the folder, or an agent that cannot be asked just now.
+        # Another program may record into the folder, or an agent that does not answer at present.
         return path.exists() and time.time() - path.stat().st_mtime < SETTLING_TIME and not is_complete(path)
 
 
@@ -125,9 +126,9 @@ def _make_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
 
 
 def _parse_utc(text: str) -> datetime:
-    """A time as the agent says it; now, where it is none."""
+    """Parse a time of the agent; return the current time if it is invalid."""
     try:
-        found = datetime.fromisoformat(text)
+        time_utc = datetime.fromisoformat(text)
     except ValueError:
         return datetime.now(UTC)
-    return found if found.tzinfo else found.replace(tzinfo=UTC)
+    return time_utc if time_utc.tzinfo else time_utc.replace(tzinfo=UTC)

@@ -1,4 +1,4 @@
-"""Puts the service together and serves until it is told to end."""
+"""Start of the service: data folder, port, agent, token, web server."""
 
 import fcntl
 import logging
@@ -30,83 +30,83 @@ from bench.service.processes import (
 
 _LOG = logging.getLogger(__name__)
 _SHUTDOWN_TIMEOUT = 5
-"""[s] for open calls at the end."""
+"""Time for open requests to finish at shutdown [s]."""
 
 
 @dataclass(frozen=True)
 class ServeOptions:
-    """How the service is wanted."""
+    """Options of the service."""
 
     data: Path
     host: str = "127.0.0.1"
     port: int = 8600
-    """0 for any free one."""
+    """Port; 0 for any free one."""
     config: Path | None = None
-    """``bench.toml``; an agent is started with it where none answers."""
+    """``bench.toml``; an agent is started with it if none answers."""
     agent: str | None = None
-    """Address of an agent's commands; it publishes at the next port."""
+    """Address of the agent's command socket; the agent publishes at the next port."""
     scheduler: str | None = None
     new_token: bool = False
 
 
-def serve(wanted: ServeOptions, say: Callable[[str], None]) -> None:
-    """Serve until the process is told to end.
+def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
+    """Serve until the process receives a signal.
 
     Args:
-        wanted: how.
-        say: takes lines for a person, the page's address first.
+        options: options of the service.
+        print_line: receives lines for a person; the first contains the address of the page.
 
     Raises:
-        ServiceError: folder, port or agent cannot be had.
-        ConfigError: ``bench.toml`` does not describe a bench.
+        ServiceError: the data folder, the port or the agent is not available.
+        ConfigError: ``bench.toml`` is invalid.
         CatalogueError: the catalogue cannot be opened.
     """
     log_to_stderr()
-    data = wanted.data.resolve()
-    link, commands = _make_agent_link(wanted)
-    with _lock_data_folder(data), _open_listener(wanted.host, wanted.port) as listener:
-        started = _start_missing_agent(wanted, link, data)
-        access, token = open_access(data, new=wanted.new_token)
-        loopback = wanted.host in LOOPBACK_NAMES
+    data = options.data.resolve()
+    link, commands = _make_agent_link(options)
+    with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
+        started = _start_missing_agent(options, link, data)
+        access, token = open_access(data, new=options.new_token)
+        loopback = options.host in LOOPBACK_NAMES
         app = create_app(
             AppSettings(
                 data=data,
                 access=access,
                 link=link,
-                engine=_choose_engine(wanted, data),
+                engine=_choose_engine(options, data),
                 has_local_logs=commands is None or _is_local(commands),
                 hosts=LOOPBACK_NAMES if loopback else ("*",),
             )
         )
         host, port = listener.getsockname()[:2]
-        say(_format_address(f"http://{f'[{host}]' if ':' in host else host}:{port}/", token))
+        print_line(_format_address(f"http://{f'[{host}]' if ':' in host else host}:{port}/", token))
         if not loopback:
-            say("anyone on the network can reach this address, and nothing is encrypted: put TLS in front of it")
+            print_line("this address is open to the network and not encrypted; put a TLS proxy in front of it")
         _run_server(app, listener)
         if started:
-            say(shut_down_idle_agent(link))
+            print_line(shut_down_idle_agent(link))
 
 
 def _format_address(page: str, token: str | None) -> str:
     if token is None:
-        return f"{page} (the token is as before; --new-token makes another)"
+        return f"{page} (the token is unchanged; --new-token creates a new one)"
     return f"{page}#token={token}"
 
 
 @contextmanager
 def _lock_data_folder(data: Path) -> Iterator[None]:
-    """The data folder, for one service at a time."""
-    # The lock is the system's, not the file's presence: a service that was killed leaves none behind.
+    """Lock the data folder for one service at a time."""
+    # The operating system holds the lock, so that it is released when a service is killed.
     try:
         data.mkdir(parents=True, exist_ok=True)
         lock = (data / "service.lock").open("w")
     except OSError as error:
-        raise ServiceError(f"{data}: cannot be written to ({error.strerror}); give another --data") from error
+        raise ServiceError(f"{data}: cannot be written to ({error.strerror}); use another --data") from error
     with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
-            raise ServiceError(f"another service works on {data}; end it, or give another --data") from None
+            raise ServiceError(f"another service uses {data}; end it, or use another --data") from None
         yield
 
 
@@ -116,18 +116,18 @@ def _open_listener(host: str, port: int) -> Iterator[socket.socket]:
     try:
         listener = socket.create_server((host, port), family=family)
     except OSError as error:
-        words = error.strerror or str(error)
-        raise ServiceError(f"{host} port {port}: {words.lower()}; give another --port") from error
+        reason = error.strerror or str(error)
+        raise ServiceError(f"{host} port {port}: {reason.lower()}; use another --port") from error
     with listener:
         yield listener
 
 
-def _make_agent_link(wanted: ServeOptions) -> tuple[AgentLink, str | None]:
-    """The way to the agent, and its address; none where no agent was named."""
-    if wanted.agent is not None:
-        return AgentClient(wanted.agent, _make_sample_address(wanted.agent)), wanted.agent
-    if wanted.config is not None:
-        agent = load_config(wanted.config).agent
+def _make_agent_link(options: ServeOptions) -> tuple[AgentLink, str | None]:
+    """Return the connection to the agent and its address; the address is None without an agent."""
+    if options.agent is not None:
+        return AgentClient(options.agent, _make_sample_address(options.agent)), options.agent
+    if options.config is not None:
+        agent = load_config(options.config).agent
         return AgentClient(agent.commands, agent.samples), agent.commands
     return NoAgent(), None
 
@@ -146,26 +146,26 @@ def _is_local(address: str) -> bool:
     return not address.startswith("tcp://") or urlsplit(address).hostname in LOOPBACK_NAMES
 
 
-def _start_missing_agent(wanted: ServeOptions, link: AgentLink, data: Path) -> bool:
-    """Start an agent where one is configured and none answers; whether that was done."""
-    if wanted.config is None or wanted.agent is not None:
+def _start_missing_agent(options: ServeOptions, link: AgentLink, data: Path) -> bool:
+    """Start an agent if one is configured and none answers; return whether it was started."""
+    if options.config is None or options.agent is not None:
         return False
     if is_answering(link):
-        _LOG.info("agent_found", extra={"config": str(wanted.config)})
+        _LOG.info("agent_found", extra={"config": str(options.config)})
         return False
-    start_agent(wanted.config, link, data)
+    start_agent(options.config, link, data)
     return True
 
 
-def _choose_engine(wanted: ServeOptions, data: Path) -> Callable[[], AbstractAsyncContextManager[JobEngine]]:
-    if wanted.scheduler is None:
+def _choose_engine(options: ServeOptions, data: Path) -> Callable[[], AbstractAsyncContextManager[JobEngine]]:
+    if options.scheduler is None:
         return lambda: start_local_engine(data)
-    address = wanted.scheduler
+    address = options.scheduler
     return lambda: connect_engine(address)
 
 
 class _Server(uvicorn.Server):
-    """Ends at a signal without raising it again: what comes after serving must still be done."""
+    """Web server that ends at a signal without raising it again, so that the caller can clean up."""
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -179,7 +179,7 @@ class _Server(uvicorn.Server):
 
 
 def _run_server(app: object, listener: socket.socket) -> None:
-    # Uvicorn's own lines would write down the token that a browser gives in the websocket's address.
+    # Uvicorn's own log would contain the token that a browser sends in the URL of the websocket.
     settings = uvicorn.Config(
         app,  # type: ignore[arg-type]
         log_config=None,
@@ -191,4 +191,4 @@ def _run_server(app: object, listener: socket.socket) -> None:
     server = _Server(settings)
     server.run(sockets=[listener])
     if not server.started:
-        raise ServiceError("the service could not start; its log above says why")
+        raise ServiceError("the service could not start; see its log above")

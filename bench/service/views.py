@@ -1,4 +1,4 @@
-"""What the REST interface answers: frozen types, units in every field's description."""
+"""Request and response models of the REST interface, frozen, with units in the descriptions."""
 
 from datetime import datetime
 from typing import Any, Self
@@ -12,25 +12,26 @@ from bench.setup_steps import SetupStep
 
 
 class View(BaseModel):
-    """Ground of all of them."""
+    """Base class of all models: frozen, unknown fields refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class Health(View):
-    """Whether everything is there."""
+    """Availability of agent and worker."""
 
     version: str
-    agent: str = Field(description="`ok`, or what is missing")
-    worker: str = Field(description="`ok`, or what is missing")
+    agent: str = Field(description="`ok`, or the reason why it is not available")
+    worker: str = Field(description="`ok`, or the reason why it is not available")
 
 
 class SetupRequest(View):
-    """A step before a run."""
+    """Request of a setup step."""
 
     step: SetupStep = Field(description="home, move, mount, centre, unmount, tare or clear-tare")
     position_m: float | None = Field(
-        default=None, description="[m] where `move` goes, from the middle or from home; no other step needs it"
+        default=None,
+        description="target of `move` [m], from the specimen's middle, or from home; unused by other steps",
     )
 
     @model_validator(mode="after")
@@ -41,92 +42,96 @@ class SetupRequest(View):
 
 
 class MethodSummary(View):
-    """A method that ships with the product."""
+    """Summary of a method that is part of mrbench."""
 
     name: str
     title: str
-    duration_s: float = Field(description="[s] with its conditioning, fades and moves")
-    drive_kind: DriveKind = Field(description="what commands the damper")
+    duration_s: float = Field(description="duration with conditioning, fades and moves [s]")
+    drive_kind: DriveKind = Field(description="quantity that drives the damper")
 
 
 class RunProgress(View):
-    """How far a run is."""
+    """Progress of a run."""
 
-    elapsed_s: float = Field(description="[s] of the plan that are done")
-    duration_s: float = Field(description="[s] of the plan")
-    segment: str = Field(description="what runs; empty between segments")
+    elapsed_s: float = Field(description="completed time of the plan [s]")
+    duration_s: float = Field(description="planned duration [s]")
+    segment: str = Field(description="name of the current segment; empty between segments")
 
 
 class Job(View):
-    """One piece of work on a run."""
+    """One identification of a run."""
 
     id: str
     run: str = Field(description="id of the run")
     kind: str = Field(description="`identify`")
     state: JobState
-    activity: str = Field(description="what it says of itself while it runs")
-    attempts: int = Field(description="times that a worker began")
-    error: str = Field(description="why it has failed")
-    settings: dict[str, Any] = Field(description="as asked")
+    activity: str = Field(description="present activity of a running job")
+    attempts: int = Field(description="number of starts by a worker")
+    error: str = Field(description="reason of the failure")
+    settings: dict[str, Any] = Field(description="requested settings")
     created: datetime = Field(description="UTC")
-    started: datetime | None = Field(description="UTC, last time that a worker began")
+    started: datetime | None = Field(description="UTC of the last start by a worker")
     finished: datetime | None = Field(description="UTC")
-    rmse_n: float | None = Field(description="[N] force error on the samples fitted; null until done")
-    noise_floor_n: float | None = Field(description="[N] noise of the recorded force; null until done")
-    result: str = Field(description="`converged`, or why not; empty until done")
+    rmse_n: float | None = Field(description="force error on the fitted samples [N]; null until done")
+    noise_floor_n: float | None = Field(description="noise floor of the recorded force [N]; null until done")
+    result: str = Field(description="`converged`, or the reason why not; empty until done")
 
 
 class Run(View):
-    """One run and what was made of it."""
+    """One run with its jobs and the result of its newest fit."""
 
     id: str
     method: str
     specimen: str
     operator: str
     source: str = Field(description="`run`, or `import` for a recording made elsewhere")
-    started: datetime = Field(description="UTC; of an import that does not say, when its log was written")
+    started: datetime = Field(description="UTC; time of the log file for an import without a start time")
     duration_s: float | None = Field(
         description="recorded time [s]; planned time while it runs; null for a truncated log"
     )
     state: RunState = Field(
         description="truncated: the log has no end and is no longer being written; repair it with `salvage`"
     )
-    outcome: RunOutcome | None = Field(description="null until it has ended")
-    reason: str = Field(description="why the outcome is not clean")
-    log: str = Field(description="the log's file, from the data folder or absolute")
-    progress: RunProgress | None = Field(description="while it runs")
-    rmse_n: float | None = Field(description="[N] force error of the newest fit; null without fit")
-    noise_floor_n: float | None = Field(description="[N] noise of the recorded force; null without fit")
-    result: str = Field(description="of the newest fit: `converged`, or why not; empty without fit")
+    outcome: RunOutcome | None = Field(description="null while the run is in progress")
+    reason: str = Field(description="reason why the outcome is not clean")
+    log: str = Field(description="file of the log, relative to the data folder or absolute")
+    progress: RunProgress | None = Field(description="null unless the run is in progress")
+    rmse_n: float | None = Field(description="force error of the newest fit [N]; null without a fit")
+    noise_floor_n: float | None = Field(description="noise floor of the recorded force [N]; null without a fit")
+    result: str = Field(
+        description="result of the newest fit: `converged`, or the reason why not; empty without a fit"
+    )
     jobs: tuple[Job, ...] = Field(description="oldest first")
 
 
 class RunPage(View):
-    """Some runs, newest first."""
+    """One page of runs, newest first."""
 
     items: tuple[Run, ...]
-    next: str | None = Field(description="what to give as `before` for the next page; null on the last one")
+    next: str | None = Field(description="value of `before` for the next page; null on the last page")
 
 
 class JobList(View):
-    """Jobs, newest first."""
+    """List of jobs, newest first."""
 
     items: tuple[Job, ...]
 
 
 class StartRunRequest(View):
-    """A run that is wanted."""
+    """Request of a run."""
 
-    method: str | dict[str, Any] = Field(description="name of a shipped method, or a document `mrbench.method/1`")
-    specimen: str = Field(default="", max_length=200, description="the damper under test, with its serial number")
-    operator: str = Field(default="", max_length=200, description="who runs it")
+    method: str | dict[str, Any] = Field(
+        description="name of an included method, or a document `mrbench.method/1`"
+    )
+    specimen: str = Field(default="", max_length=200, description="damper under test, with its serial number")
+    operator: str = Field(default="", max_length=200, description="name of the operator")
     resume_after: str = Field(
-        default="", description="segment after which an interrupted run goes on, a checkpoint of the method"
+        default="", description="checkpoint of the method (segment) after which an interrupted run continues"
     )
 
 
 def make_job_view(row: JobRow) -> Job:
-    """A job as it is shown."""
+    """Return the view of a job."""
     summary = row.summary or {}
     return Job(
         id=row.id,
@@ -147,15 +152,15 @@ def make_job_view(row: JobRow) -> Job:
 
 
 def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run:
-    """A run as it is shown.
+    """Return the view of a run.
 
     Args:
-        row: the run.
-        jobs: its jobs, newest first.
-        status: of the agent, for the progress; none where it is not known.
+        row: run in the catalogue.
+        jobs: jobs of the run, newest first.
+        status: status of the agent, for the progress; None if it is not known.
     """
-    shown = [make_job_view(job) for job in jobs]
-    fit = next((job for job in shown if job.state == "done"), None)
+    job_views = [make_job_view(job) for job in jobs]
+    fit = next((job for job in job_views if job.state == "done"), None)
     return Run(
         id=row.id,
         method=row.method,
@@ -172,7 +177,7 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         rmse_n=fit.rmse_n if fit else None,
         noise_floor_n=fit.noise_floor_n if fit else None,
         result=fit.result if fit else "",
-        jobs=tuple(reversed(shown)),
+        jobs=tuple(reversed(job_views)),
     )
 
 

@@ -209,5 +209,5 @@ def test_a_second_service_on_the_same_folder_is_refused(served, data):
     command = [*MRBENCH, "serve", "--port", "0", "--data", str(data)]
     second = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert second.returncode == 1
-    assert "another service works on" in second.stderr
+    assert "another service uses" in second.stderr
     assert served.call("health")["worker"] == "ok"

@@ -1,4 +1,4 @@
-"""Jobs: listed, looked at, cancelled."""
+"""Routes that list, show and cancel jobs."""
 
 import asyncio
 from typing import Annotated
@@ -15,24 +15,24 @@ router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 @router.get("")
 def list_jobs(
-    context: Context, limit: Annotated[int, Query(ge=1, le=200, description="how many at most")] = 50
+    context: Context, limit: Annotated[int, Query(ge=1, le=200, description="largest number of items")] = 50
 ) -> JobList:
-    """Jobs, newest first."""
+    """List the jobs, newest first."""
     return JobList(items=tuple(make_job_view(row) for row in context.catalogue.list_jobs(limit)))
 
 
 @router.get("/{job_id}")
 def get_job(job_id: str, context: Context) -> Job:
-    """One job."""
+    """Return one job."""
     return make_job_view(context.get_job(job_id))
 
 
 @router.post("/{job_id}/cancel")
 async def cancel_job(job_id: str, context: Context) -> Job:
-    """End a job; one that a worker has begun is `running` until its process has ended."""
+    """Cancel a job; a job on a worker stays `running` until its process has ended."""
     row = await asyncio.to_thread(context.get_job, job_id)
     if row.state not in UNFINISHED_STATES:
         raise make_conflict(
-            "job-ended", "The job has ended", f"job {job_id} is {row.state}; nothing is left to cancel"
+            "job-ended", "The job has ended", f"job {job_id} cannot be cancelled; its state is {row.state}"
         )
     return make_job_view(await context.job_manager.cancel(row))

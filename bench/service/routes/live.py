@@ -1,4 +1,4 @@
-"""The websocket that tells what happens as it happens."""
+"""Websocket with live messages."""
 
 import asyncio
 
@@ -14,29 +14,29 @@ _CLOSE_UNAUTHORISED = 4401
 
 @router.websocket("/live")
 async def stream_live(websocket: WebSocket, context: Context, token: str = "") -> None:
-    """Messages `{"topic": ..., "data": ...}` of status, samples, event, job and run, until either side ends it."""
-    # Before the token is looked at: a browser is told the code only of a connection that was open.
+    """Send messages `{"topic": ..., "data": ...}` with the topics status, samples, event, job and run."""
+    # Accepted before the token is checked: a browser receives the close code only of an open connection.
     await websocket.accept()
     if not context.access.is_allowed(token):
         await websocket.close(_CLOSE_UNAUTHORISED, "the token is missing or wrong")
         return
-    with context.live.subscribe() as mailbox:
-        sending = asyncio.create_task(_send(websocket, mailbox))
+    with context.live.subscribe() as queue:
+        sender = asyncio.create_task(_send(websocket, queue))
         try:
             while True:
                 await websocket.receive_text()
         except (WebSocketDisconnect, KeyError):
-            # It has gone, or sends bytes where words are expected: either way, this is its end.
+            # The client has disconnected, or has sent bytes instead of text: the connection ends.
             pass
         finally:
-            sending.cancel()
+            sender.cancel()
 
 
-async def _send(websocket: WebSocket, mailbox: SubscriberQueue) -> None:
+async def _send(websocket: WebSocket, queue: SubscriberQueue) -> None:
     try:
         while True:
-            for text in await mailbox.take():
+            for text in await queue.take():
                 await websocket.send_text(text)
     except (WebSocketDisconnect, RuntimeError):
-        # Gone while something was on its way; the receiving side sees it, too, and ends this.
+        # The client has disconnected during a transmission; the receiving task ends the connection.
         return

@@ -1,4 +1,4 @@
-"""The methods that ship with the product."""
+"""Routes that list and return the included methods."""
 
 from functools import cache
 
@@ -13,7 +13,7 @@ router = APIRouter(prefix="/methods", tags=["methods"])
 
 @router.get("")
 def list_methods() -> tuple[MethodSummary, ...]:
-    """All of them, in short."""
+    """List the included methods with their summaries."""
     return _list_summaries()
 
 
@@ -33,15 +33,15 @@ def _make_summary(method: Method) -> MethodSummary:
 
 @router.get("/{name}", response_model_exclude_defaults=True)
 def get_method(name: str) -> Method:
-    """One of them, as its document."""
+    """Return the document of one method."""
     return load_shipped_method(name)
 
 
 def load_shipped_method(name: str) -> Method:
-    """A shipped method; a name is never taken for a file.
+    """Load an included method; a name is never interpreted as a path.
 
     Raises:
-        ProblemError: there is none of that name.
+        ProblemError: there is no method with this name.
     """
     if name not in list_shipped_methods():
         raise make_not_found("method", name)

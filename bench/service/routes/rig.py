@@ -1,4 +1,4 @@
-"""The rig agent, its instruments, and whether everything is there."""
+"""Routes of the rig agent, its instruments, and the health of the service."""
 
 import asyncio
 from importlib.metadata import version
@@ -16,7 +16,7 @@ router = APIRouter(tags=["rig"])
 
 @public_router.get("/health")
 async def get_health(context: Context) -> Health:
-    """Whether agent and worker are there; needs no token."""
+    """Return whether agent and worker are available; needs no token."""
     agent, worker = await asyncio.gather(
         asyncio.to_thread(_describe_agent, context), context.engine.describe_state()
     )
@@ -33,29 +33,29 @@ def _describe_agent(context: Context) -> str:
 
 @router.get("/agent")
 def get_agent(context: Context) -> AgentStatus:
-    """What the agent says of itself."""
+    """Return the status of the agent."""
     return context.monitor.get_status()
 
 
 @router.post("/agent/reset")
 def reset_agent(context: Context) -> AgentStatus:
-    """Take back a trip whose cause has gone; nothing moves."""
+    """Reset a trip whose cause is removed; nothing moves."""
     return context.monitor.reset()
 
 
 @router.post("/agent/stop")
 def stop_agent(context: Context) -> AgentStatus:
-    """End whatever goes on in good order: a run, or a step before one. Harmless when nothing moves."""
+    """Stop a run or a setup step in a controlled way. Harmless when nothing moves."""
     return context.monitor.send_command(StopCommand())
 
 
 @router.post("/agent/prepare")
-def start_setup_step(context: Context, wanted: SetupRequest) -> AgentStatus:
-    """One step before a run; where the answer's state is `preparing`, it goes on."""
-    return context.monitor.send_command(PrepareCommand(step=wanted.step, position_m=wanted.position_m))
+def start_setup_step(context: Context, request: SetupRequest) -> AgentStatus:
+    """Start a setup step; it continues if the returned state is `preparing`."""
+    return context.monitor.send_command(PrepareCommand(step=request.step, position_m=request.position_m))
 
 
 @router.get("/instruments")
 def list_instruments(context: Context) -> tuple[InstrumentStatus, ...]:
-    """The instruments and their wires."""
+    """List the instruments with the state of their wires."""
     return context.monitor.get_status().instruments

@@ -1,4 +1,4 @@
-"""A service with a rig agent and an engine that the test plays itself."""
+"""Service with a rig agent and an engine under the control of the test."""
 
 import time
 from contextlib import asynccontextmanager
@@ -10,12 +10,12 @@ from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from tests.support.fake_service import FakeAgent, FakeEngine
 
-PATIENCE = 20.0
-"""[s] for what happens in another thread."""
+TIMEOUT = 20.0
+"""Time limit for events in other threads [s]."""
 
 
 class Service:
-    """A service that can be started and ended again and again on one data folder."""
+    """Service that can be started and ended repeatedly on one data folder."""
 
     def __init__(self, data):
         self.data = data
@@ -50,7 +50,7 @@ class Service:
 
     def wait_for(self, path, wanted):
         """Return the answer at a path as soon as it is as wanted."""
-        deadline = time.monotonic() + PATIENCE
+        deadline = time.monotonic() + TIMEOUT
         while not wanted(found := self.get(path)):
             assert time.monotonic() < deadline, found
         return found

@@ -1,4 +1,4 @@
-"""Who gets in, and what those are told who do not."""
+"""Access with and without the token."""
 
 import re
 
@@ -17,14 +17,14 @@ def routes(client):
             yield method.upper(), re.sub(r"\{\w+\}", "any", path)
 
 
-def test_the_token_is_kept_as_a_hash_that_only_its_owner_reads(tmp_path):
+def test_the_token_is_kept_as_a_hash_readable_by_its_owner_only(tmp_path):
     access, token = open_access(tmp_path)
     assert access.is_allowed(token)
     assert token not in (tmp_path / TOKEN_FILE).read_text()
     assert (tmp_path / TOKEN_FILE).stat().st_mode & 0o777 == 0o600
 
 
-def test_the_token_is_told_once_and_stays_valid(tmp_path):
+def test_the_token_is_printed_once_and_stays_valid(tmp_path):
     _, token = open_access(tmp_path)
     again, nothing = open_access(tmp_path)
     assert nothing is None
@@ -33,7 +33,7 @@ def test_the_token_is_told_once_and_stays_valid(tmp_path):
     assert not again.is_allowed("")
 
 
-def test_a_new_token_ends_the_old_one(tmp_path):
+def test_a_new_token_makes_the_old_one_invalid(tmp_path):
     _, old = open_access(tmp_path)
     access, new = open_access(tmp_path, new=True)
     assert access.is_allowed(new)
@@ -42,7 +42,7 @@ def test_a_new_token_ends_the_old_one(tmp_path):
 
 
 @pytest.mark.parametrize("authorization", [None, "Bearer wrong", "Basic dXNlcjpwdw=="])
-def test_nothing_but_health_and_description_is_answered_without_the_token(client, authorization):
+def test_only_health_and_description_are_available_without_the_token(client, authorization):
     del client.headers["Authorization"]
     headers = {} if authorization is None else {"Authorization": authorization}
     closed = [(method, path) for method, path in routes(client) if path not in OPEN]
@@ -69,7 +69,7 @@ def test_the_websocket_is_closed_without_the_token(client, token):
     assert closed.value.code == 4401
 
 
-def test_another_sites_name_for_this_machine_is_refused(client):
+def test_a_request_for_another_host_name_is_refused(client):
     assert client.get("/api/v1/health", headers={"Host": "evil.example"}).status_code == 400
     assert client.get("/api/v1/health", headers={"Host": "localhost:8600"}).status_code == 200
     assert client.get("/api/v1/health", headers={"Host": "[::1]:8600"}).status_code == 200

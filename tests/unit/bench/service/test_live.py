@@ -1,4 +1,4 @@
-"""The websocket, and what a slow listener loses."""
+"""Websocket, and the messages that a slow client misses."""
 
 import asyncio
 import time
@@ -18,25 +18,25 @@ def samples(*time_ns, **values):
 
 def messages(socket, topic):
     while True:
-        said = orjson.loads(socket.receive_text())
-        assert set(said) == {"topic", "data"}
-        if said["topic"] == topic:
-            yield said["data"]
+        message = orjson.loads(socket.receive_text())
+        assert set(message) == {"topic", "data"}
+        if message["topic"] == topic:
+            yield message["data"]
 
 
-def eventually(found):
+def wait_until(condition):
     deadline = time.monotonic() + 20
-    while not found():
-        assert time.monotonic() < deadline, "waited in vain"
+    while not condition():
+        assert time.monotonic() < deadline, "the condition was not met in time"
         time.sleep(0.001)
 
 
-def listening(service):
+def subscribe(service):
     return service.client.websocket_connect(f"ws://127.0.0.1:8600/api/v1/live?token={service.token}")
 
 
-def test_what_the_agent_publishes_comes_over_the_websocket(service):
-    with listening(service) as socket:
+def test_messages_of_the_agent_arrive_on_the_websocket(service):
+    with subscribe(service) as socket:
         service.agent.publish()
         assert next(messages(socket, "status"))["state"] == "idle"
         service.agent.publish(AgentEvent(time_ns=5, kind="alarm", text="temperature 61 degC over 60 degC"))
@@ -47,8 +47,8 @@ def test_what_the_agent_publishes_comes_over_the_websocket(service):
         assert found["values"] == {"force": [3.0, None]}
 
 
-def test_every_sample_comes_once_and_in_order_though_fewer_batches_do(service):
-    with listening(service) as socket:
+def test_samples_arrive_once_and_in_order_in_fewer_batches(service):
+    with subscribe(service) as socket:
         for k in range(50):
             service.agent.publish(samples(2 * k, 2 * k + 1, force=[1.0, 2.0]))
         times, batches = [], 0
@@ -61,14 +61,14 @@ def test_every_sample_comes_once_and_in_order_though_fewer_batches_do(service):
         assert batches < 50
 
 
-def test_runs_and_jobs_are_told_as_they_change(service):
-    with listening(service) as socket:
+def test_changes_of_runs_and_jobs_are_published(service):
+    with subscribe(service) as socket:
         run = service.post("/runs", {"method": "quick"}, 201)
-        told = messages(socket, "run")
-        assert next(told)["state"] == "running"
+        runs = messages(socket, "run")
+        assert next(runs)["state"] == "running"
         write_complete_log(service.data / run["log"], run["id"])
         service.agent.finish()
-        assert next(told)["outcome"] == "clean"
+        assert next(runs)["outcome"] == "clean"
         job = next(messages(socket, "job"))
         assert (job["run"], job["state"]) == (run["id"], "queued")
         service.report("on_started", job["id"])
@@ -76,17 +76,17 @@ def test_runs_and_jobs_are_told_as_they_change(service):
         assert next(found for found in messages(socket, "job") if found["activity"])["activity"] == "identify"
 
 
-def test_a_new_listener_learns_the_status_at_once(service):
+def test_a_new_client_gets_the_status_at_once(service):
     service.agent.publish()
     service.wait_for("/agent", lambda found: found["state"] == "idle")
-    with listening(service) as socket:
+    with subscribe(service) as socket:
         service.agent.publish()
         next(messages(socket, "status"))
-    with listening(service) as socket:
+    with subscribe(service) as socket:
         assert next(messages(socket, "status"))["state"] == "idle"
 
 
-def test_a_slow_listener_gets_the_newest_and_a_bounded_number():
+def test_a_slow_client_gets_a_limited_number_of_the_newest_messages():
     async def slow():
         subscriber = SubscriberQueue()
         for k in range(1000):
@@ -105,27 +105,27 @@ def test_a_slow_listener_gets_the_newest_and_a_bounded_number():
     assert len([text for text in found if text.startswith("event")]) == MAX_QUEUED_EVENTS
 
 
-def test_batches_are_joined_with_null_where_one_lacks_a_field():
+def test_joined_batches_have_null_for_a_missing_field():
     both = join_batches([samples(1, 2, force=[1.0, 2.0]), samples(3, force=[3.0], temperature=[20.0])])
     assert both.time_ns == [1, 2, 3]
     assert both.values == {"force": [1.0, 2.0, 3.0], "temperature": [None, None, 20.0]}
 
 
-def test_health_says_what_is_missing(service):
+def test_health_reports_a_missing_worker(service):
     assert service.get("/health")["agent"] == "ok"
     assert service.get("/health")["worker"] == "ok"
     service.engine.state = "no worker; start one: mrbench worker"
     assert service.get("/health")["worker"].startswith("no worker")
 
 
-def test_a_silent_agent_shows_in_health(service):
+def test_health_reports_a_silent_agent(service):
     service.agent.reachable = False
     assert "no rig agent answered" in service.get("/health")["agent"]
 
 
-def test_what_cannot_be_used_of_the_agent_does_not_end_the_listening(service, caplog, monkeypatch):
+def test_an_unusable_message_does_not_end_the_subscription(service, caplog, monkeypatch):
     monkeypatch.setattr("bench.service.agent_monitor._RETRY_TIME", 0.001)
-    with listening(service) as socket:
+    with subscribe(service) as socket:
         service.agent.publish(
             AgentEvent.model_construct(time_ns=object(), kind="alarm", text="of another version")
         )
@@ -134,35 +134,35 @@ def test_what_cannot_be_used_of_the_agent_does_not_end_the_listening(service, ca
     assert "agent_message_unused" in caplog.text
 
 
-def test_a_status_that_cannot_be_written_down_is_said_and_taken_up_again(service, caplog, monkeypatch):
+def test_a_status_that_cannot_be_recorded_is_logged_and_tried_again(service, caplog, monkeypatch):
     registry = service.client.app.state.context.registry
-    add_run, refusals = registry._add_run, iter([RuntimeError("the catalogue is locked")])
+    add_run, failures = registry._add_run, iter([RuntimeError("the catalogue is locked")])
 
-    async def refuses_once(run):
-        if (error := next(refusals, None)) is not None:
+    async def fail_once(run):
+        if (error := next(failures, None)) is not None:
             raise error
         return await add_run(run)
 
-    monkeypatch.setattr(registry, "_add_run", refuses_once)
+    monkeypatch.setattr(registry, "_add_run", fail_once)
     service.agent.send(RunCommand(method={"name": "quick"}))
     service.agent.publish()
-    eventually(lambda: "status_unused" in caplog.text)
+    wait_until(lambda: "status_unused" in caplog.text)
     service.agent.publish()
     service.wait_for("/runs", lambda found: [run["id"] for run in found["items"]] == ["run-1"])
 
 
-def test_a_folder_that_cannot_be_looked_through_once_is_looked_through_again(service, caplog, monkeypatch):
+def test_a_failed_scan_is_logged_and_repeated(service, caplog, monkeypatch):
     monkeypatch.setattr("bench.service.run_registry.SCAN_PERIOD", 0.01)
-    refusals = iter([ValueError("a defect")])
+    failures = iter([ValueError("a defect")])
     scan_logs = run_registry.scan_logs
 
-    def refuses_once(*given):
-        if (error := next(refusals, None)) is not None:
+    def fail_once(*given):
+        if (error := next(failures, None)) is not None:
             raise error
         return scan_logs(*given)
 
-    monkeypatch.setattr(run_registry, "scan_logs", refuses_once)
+    monkeypatch.setattr(run_registry, "scan_logs", fail_once)
     service.start()
-    eventually(lambda: "scan_failed" in caplog.text)
+    wait_until(lambda: "scan_failed" in caplog.text)
     write_complete_log(service.data / "found.mcap", "found")
     service.wait_for("/runs", lambda found: [run["id"] for run in found["items"]] == ["found"])

@@ -1,4 +1,4 @@
-"""Errors have one form, name what is wrong, and never show the inside."""
+"""Errors have one form, name the cause and show no internals."""
 
 import pytest
 
@@ -24,15 +24,15 @@ NO_METHOD = {
 def problem(answer, status, name):
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
-    said = answer.json()
-    assert set(said) == {"type", "title", "status", "detail"}
-    assert said["type"] == f"urn:mrbench:problem:{name}"
-    assert said["status"] == status
-    return said["detail"]
+    content = answer.json()
+    assert set(content) == {"type", "title", "status", "detail"}
+    assert content["type"] == f"urn:mrbench:problem:{name}"
+    assert content["status"] == status
+    return content["detail"]
 
 
 @pytest.mark.parametrize("path", ["runs/none", "runs/none/log", "runs/none/fit", "jobs/none", "methods/none"])
-def test_what_is_not_there_is_named(client, path):
+def test_a_missing_object_is_named(client, path):
     assert "none" in problem(client.get(f"/api/v1/{path}"), 404, "not-found")
 
 
@@ -44,18 +44,18 @@ def test_an_unknown_path_is_a_problem_too(client):
     ("path", "place"),
     [("runs?limit=0", "query.limit"), ("runs?limit=many", "query.limit"), ("jobs?limit=999", "limit")],
 )
-def test_a_query_without_its_form_is_named(client, path, place):
+def test_an_invalid_query_is_named(client, path, place):
     assert place in problem(client.get(f"/api/v1/{path}"), 422, "invalid-request")
 
 
-def test_a_body_without_its_form_is_named(client):
+def test_an_invalid_body_is_named(client):
     answer = client.post("/api/v1/runs", json={"method": "quick", "specimen": 7})
     assert "body.specimen" in problem(answer, 422, "invalid-request")
     answer = client.post("/api/v1/runs", content="{", headers={"Content-Type": "application/json"})
     assert "JSON" in problem(answer, 422, "invalid-request")
 
 
-def test_a_method_is_refused_before_the_agent_hears_of_it(service, client):
+def test_an_invalid_method_is_not_sent_to_the_agent(service, client):
     detail = problem(client.post("/api/v1/runs", json={"method": NO_METHOD}), 422, "method-refused")
     assert "0.01" in detail
     assert "m/s" in detail
@@ -70,7 +70,7 @@ def test_the_name_of_a_method_is_never_a_file(service, client):
         problem(client.post("/api/v1/runs", json={"method": name}), 404, "not-found")
 
 
-def test_a_silent_agent_is_a_problem_that_says_what_to_do(service, client):
+def test_a_silent_agent_is_a_problem_with_a_remedy(service, client):
     service.agent.reachable = False
     for answer in (
         client.get("/api/v1/agent"),
@@ -81,13 +81,13 @@ def test_a_silent_agent_is_a_problem_that_says_what_to_do(service, client):
         assert "mrbench rig" in problem(answer, 503, "agent-unreachable")
 
 
-def test_a_refusal_of_the_agent_comes_in_its_own_words(service, client):
+def test_a_refusal_contains_the_message_of_the_agent(service, client):
     service.agent.refuses = "the agent is tripped (force 5100 N over 5000 N); find the cause, then reset"
     answer = client.post("/api/v1/runs", json={"method": "quick"})
     assert problem(answer, 409, "not-possible") == service.agent.refuses
 
 
-def test_a_defect_shows_nothing_of_the_inside(service, client):
+def test_an_internal_error_shows_no_internals(service, client):
     service.agent.defect = ZeroDivisionError("secret /root/path")
     detail = problem(client.get("/api/v1/agent"), 500, "defect")
     assert "secret" not in detail

@@ -1,4 +1,4 @@
-"""Parts of the service that stand for themselves: lines of log, lock, port, the processes that it starts."""
+"""Parts of the service without an application: log lines, lock, port, and the processes that it starts."""
 
 import asyncio
 import contextlib
@@ -19,7 +19,7 @@ from bench.service.request_log import RequestLogMiddleware
 from bench.service.serving import ServeOptions
 
 
-def line(message="run_ended", error=None, **extra):
+def format_line(message="run_ended", error=None, **extra):
     record = logging.makeLogRecord({"msg": message, "levelno": logging.INFO, "levelname": "INFO", **extra})
     record.created = 1_772_000_000.25
     if error is not None:
@@ -28,31 +28,31 @@ def line(message="run_ended", error=None, **extra):
 
 
 class TestLogLines:
-    """One event, one line."""
+    """One line for each event."""
 
     def test_it_begins_with_time_level_and_event(self):
-        assert line(run="run-1").endswith("Z info run_ended run=run-1")
-        assert line().startswith("2026-02-25T")
+        assert format_line(run="run-1").endswith("Z info run_ended run=run-1")
+        assert format_line().startswith("2026-02-25T")
 
-    def test_what_is_not_plain_is_quoted_so_that_a_line_can_be_taken_apart(self):
-        assert line(reason='two words, "quoted"\nand a second line') == line() + (
+    def test_special_characters_are_quoted_so_that_a_line_can_be_parsed(self):
+        assert format_line(reason='two words, "quoted"\nand a second line') == format_line() + (
             ' reason="two words, \\"quoted\\"\\nand a second line"'
         )
 
-    def test_what_is_empty_is_left_out_and_zero_is_not(self):
-        assert line(outcome=None, reason="", lost=0) == line() + " lost=0"
+    def test_empty_values_are_left_out_but_zero_is_not(self):
+        assert format_line(outcome=None, reason="", lost=0) == format_line() + " lost=0"
 
-    def test_a_traceback_stays_within_the_line(self):
+    def test_a_traceback_stays_within_the_format_line(self):
         try:
             raise ValueError("a defect")
         except ValueError as error:
-            found = line("defect", error)
+            found = format_line("defect", error)
         assert "\n" not in found
         assert "ValueError: a defect" in found
 
 
-def called(method, status, kind="http", fails=None):
-    """One call that goes through a request log."""
+def send_request(method, status, kind="http", fails=None):
+    """Send one request through the request log."""
 
     async def application(scope, receive, send):
         if fails is not None:
@@ -60,15 +60,15 @@ def called(method, status, kind="http", fails=None):
         if scope["type"] == "http":
             await send({"type": "http.response.start", "status": status})
 
-    async def ignored(*message):
+    async def ignore(*message):
         return None
 
     scope = {"type": kind, "method": method, "path": "/api/v1/runs", "query_string": b"token=secret"}
-    asyncio.run(RequestLogMiddleware(application)(scope, ignored, ignored))
+    asyncio.run(RequestLogMiddleware(application)(scope, ignore, ignore))
 
 
 class TestRequestLog:
-    """Calls that change something, or fail."""
+    """Requests that change something or fail."""
 
     @pytest.fixture
     def lines(self, caplog):
@@ -76,55 +76,55 @@ class TestRequestLog:
         return caplog
 
     @pytest.mark.parametrize(("method", "status", "written"), [("GET", 200, 0), ("GET", 404, 1), ("POST", 201, 1)])
-    def test_what_only_looks_is_not_written_down(self, lines, method, status, written):
-        called(method, status)
+    def test_a_successful_read_is_not_logged(self, lines, method, status, written):
+        send_request(method, status)
         assert [record.status for record in lines.records] == [status] * written
 
-    def test_a_call_that_falls_through_counts_as_a_defect(self, lines):
+    def test_an_unhandled_error_is_logged_with_status_500(self, lines):
         with pytest.raises(ZeroDivisionError):
-            called("GET", 200, fails=ZeroDivisionError())
+            send_request("GET", 200, fails=ZeroDivisionError())
         assert [record.status for record in lines.records] == [500]
 
-    def test_a_token_in_an_address_is_never_written_down(self, lines):
-        called("POST", 200)
-        called("GET", 101, kind="websocket")
+    def test_a_token_in_a_url_is_not_logged(self, lines):
+        send_request("POST", 200)
+        send_request("GET", 101, kind="websocket")
         assert len(lines.records) == 1
         assert "secret" not in str(vars(lines.records[0]))
 
 
 class TestServing:
-    """What can be wrong before anything is served."""
+    """Errors before the server starts."""
 
-    def test_a_data_folder_belongs_to_one_service_at_a_time(self, tmp_path):
+    def test_a_data_folder_is_used_by_one_service_at_a_time(self, tmp_path):
         folder = tmp_path / "new" / "runs"
         with (
             serving._lock_data_folder(folder),
-            pytest.raises(ServiceError, match="another service works on"),
+            pytest.raises(ServiceError, match="another service uses"),
             serving._lock_data_folder(folder),
         ):
             pass
         with serving._lock_data_folder(folder):
             pass
 
-    def test_a_folder_that_cannot_be_made_is_said(self, tmp_path):
+    def test_a_folder_that_cannot_be_created_is_reported(self, tmp_path):
         (tmp_path / "file").write_text("")
         with (
-            pytest.raises(ServiceError, match="give another --data"),
+            pytest.raises(ServiceError, match="use another --data"),
             serving._lock_data_folder(tmp_path / "file" / "runs"),
         ):
             pass
 
-    def test_a_port_that_is_taken_is_said(self):
+    def test_a_port_in_use_is_reported(self):
         with socket.create_server(("127.0.0.1", 0)) as taken:
             port = taken.getsockname()[1]
             with (
-                pytest.raises(ServiceError, match=f"127.0.0.1 port {port}: .*; give another --port"),
+                pytest.raises(ServiceError, match=f"127.0.0.1 port {port}: .*; use another --port"),
                 serving._open_listener("127.0.0.1", port),
             ):
                 pass
 
     @pytest.mark.parametrize("address", ["5570", "tcp://host", "http://host:1", "tcp://host:port"])
-    def test_an_address_of_no_agent_is_refused(self, address, tmp_path):
+    def test_an_invalid_address_of_the_agent_is_refused(self, address, tmp_path):
         with pytest.raises(ServiceError, match="not of the form tcp://HOST:PORT"):
             serving._make_agent_link(ServeOptions(tmp_path, agent=address))
 
@@ -140,16 +140,16 @@ class TestServing:
             ("tcp://rig:1", False),
         ],
     )
-    def test_whether_the_agent_writes_on_this_machine(self, address, here):
+    def test_a_local_agent_is_recognised(self, address, here):
         assert serving._is_local(address) is here
 
-    def test_a_token_stands_in_the_address_once(self):
+    def test_a_new_token_is_in_the_address(self):
         assert serving._format_address("http://h:1/", "abc") == "http://h:1/#token=abc"
-        assert "as before" in serving._format_address("http://h:1/", None)
+        assert "unchanged" in serving._format_address("http://h:1/", None)
 
 
-class Link:
-    """A way to an agent that is there after so many questions."""
+class FakeLink:
+    """Connection to an agent that answers after a number of unanswered requests."""
 
     def __init__(self, silent=0, state="idle"):
         self.silent, self.status, self.sent = silent, AgentStatus(state=state), []
@@ -161,19 +161,19 @@ class Link:
         return Reply(ok=True, status=self.status)
 
 
-def speaking(words, status):
-    return (sys.executable, "-c", f"import sys; print({words!r}, file=sys.stderr); sys.exit({status})")
+def make_failing_command(message, status):
+    return (sys.executable, "-c", f"import sys; print({message!r}, file=sys.stderr); sys.exit({status})")
 
 
 class TestProcesses:
-    """An agent that outlives the service, and a worker that it keeps alive."""
+    """Agent that outlives the service, and worker that is restarted."""
 
-    def test_an_agent_that_ends_at_once_is_quoted(self, tmp_path):
-        command = speaking("mrbench: bench.toml: cannot be read", 1)
+    def test_the_message_of_an_agent_that_ends_at_once_is_reported(self, tmp_path):
+        command = make_failing_command("mrbench: bench.toml: cannot be read", 1)
         with pytest.raises(ServiceError, match=r"ended at once: bench\.toml: cannot be read"):
-            start_agent(tmp_path / "bench.toml", Link(silent=10**9), tmp_path, command)
+            start_agent(tmp_path / "bench.toml", FakeLink(silent=10**9), tmp_path, command)
 
-    def test_one_that_never_answers_is_ended(self, tmp_path, monkeypatch):
+    def test_an_agent_that_never_answers_is_ended(self, tmp_path, monkeypatch):
         monkeypatch.setattr(processes, "AGENT_TIMEOUT", 0.05)
         ended = []
         monkeypatch.setattr(
@@ -181,27 +181,27 @@ class TestProcesses:
         )
         command = (sys.executable, "-c", "import time; time.sleep(60)")
         with pytest.raises(ServiceError, match=r"did not answer within 0\.05 s; see"):
-            start_agent(tmp_path / "bench.toml", Link(silent=10**9), tmp_path, command)
+            start_agent(tmp_path / "bench.toml", FakeLink(silent=10**9), tmp_path, command)
         assert ended == [processes._TERMINATE_TIMEOUT]
 
-    def test_whether_one_is_there(self):
-        assert is_answering(Link())
-        assert not is_answering(Link(silent=1))
+    def test_an_answering_agent_is_recognised(self):
+        assert is_answering(FakeLink())
+        assert not is_answering(FakeLink(silent=1))
 
-    def test_an_idle_agent_is_ended_with_the_service(self):
-        link = Link()
-        assert shut_down_idle_agent(link) == "the rig agent was idle and has ended"
+    def test_an_idle_agent_is_shut_down_with_the_service(self):
+        link = FakeLink()
+        assert shut_down_idle_agent(link) == "the rig agent was idle and was shut down"
         assert isinstance(link.sent[-1], ShutDownCommand)
 
-    def test_one_that_runs_goes_on(self):
-        link = Link(state="running")
-        assert shut_down_idle_agent(link).startswith("the rig agent is running and goes on")
+    def test_a_running_agent_continues(self):
+        link = FakeLink(state="running")
+        assert shut_down_idle_agent(link).startswith("the rig agent is running and continues")
         assert len(link.sent) == 1
 
-    def test_one_that_is_silent_is_said(self):
-        assert shut_down_idle_agent(Link(silent=1)) == "the rig agent does not answer: no rig agent answered"
+    def test_a_silent_agent_is_reported(self):
+        assert shut_down_idle_agent(FakeLink(silent=1)) == "the rig agent does not answer: no rig agent answered"
 
-    def test_a_worker_that_ends_is_started_again(self, tmp_path, monkeypatch, caplog):
+    def test_a_worker_that_ends_is_restarted(self, tmp_path, monkeypatch, caplog):
         caplog.set_level(logging.INFO, "bench.service.processes")
         begun = []
         start = processes._start_process
@@ -210,14 +210,14 @@ class TestProcesses:
             begun.append(command)
             return start(command, log)
 
-        async def not_long(pause):
+        async def skip_pause(pause):
             if len(begun) == 3:
                 raise asyncio.CancelledError
 
         monkeypatch.setattr(processes, "_start_process", counted)
-        monkeypatch.setattr(processes.asyncio, "sleep", not_long)
+        monkeypatch.setattr(processes.asyncio, "sleep", skip_pause)
         with contextlib.suppress(asyncio.CancelledError):
-            asyncio.run(processes._keep_alive(speaking("no scheduler", 3), tmp_path / "worker.log"))
+            asyncio.run(processes._keep_alive(make_failing_command("no scheduler", 3), tmp_path / "worker.log"))
         assert len(begun) == 3
         assert (tmp_path / "worker.log").read_text().splitlines() == ["no scheduler"] * 3
         assert [record.status for record in caplog.records if record.message == "worker_ended"] == [3] * 3

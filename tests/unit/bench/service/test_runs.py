@@ -1,4 +1,4 @@
-"""A run from its start to its fit, as the REST interface tells it."""
+"""Run from its start to its fit, by the REST interface."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def finish(service, run, outcome="clean"):
     return service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
 
 
-def the_job(service, run):
+def get_last_job(service, run):
     return service.wait_for(f"/runs/{run}", lambda found: found["jobs"])["jobs"][-1]
 
 
@@ -34,7 +34,7 @@ def start(service, **more):
     return service.post("/runs", {"method": "quick", "specimen": "damper 7", "operator": "M. Curie", **more}, 201)
 
 
-def test_methods_are_listed_and_given_whole(service):
+def test_methods_are_listed_and_returned_as_documents(service):
     quick = next(method for method in service.get("/methods") if method["name"] == "quick")
     assert quick["drive_kind"] == "coil_v"
     assert quick["duration_s"] == pytest.approx(23.1)
@@ -52,7 +52,7 @@ def test_a_run_is_started_at_the_agent_and_catalogued_at_once(service):
     assert [found["id"] for found in service.get("/runs")["items"]] == [run["id"]]
 
 
-def test_progress_is_told_while_it_runs(service):
+def test_progress_is_reported_during_a_run(service):
     run = start(service)
     service.agent.progress(11.5, "10mm_1Hz_0.2V")
     path = f"/runs/{run['id']}"
@@ -67,7 +67,7 @@ def test_a_finished_run_is_identified_and_its_files_are_served(service, outcome)
     ended = finish(service, run, outcome)
     assert ended["outcome"] == outcome
     assert ended["duration_s"] == pytest.approx(1.998)
-    job = the_job(service, run["id"])
+    job = get_last_job(service, run["id"])
     assert job["state"] == "queued"
     complete(service, job)
     found = service.get(f"/runs/{run['id']}")
@@ -89,10 +89,10 @@ def test_an_incomplete_run_is_catalogued_and_not_identified(service):
     assert service.engine.specs == {}
 
 
-def test_the_same_work_is_never_ordered_twice(service):
+def test_an_equal_job_is_not_created_twice(service):
     run = start(service)
     finish(service, run)
-    job = the_job(service, run["id"])
+    job = get_last_job(service, run["id"])
     assert service.post(f"/runs/{run['id']}/identify")["id"] == job["id"]
     complete(service, job)
     assert service.post(f"/runs/{run['id']}/identify")["id"] == job["id"]
@@ -101,10 +101,10 @@ def test_the_same_work_is_never_ordered_twice(service):
     assert service.engine.specs[other["id"]].key != service.engine.specs[job["id"]].key
 
 
-def test_a_job_that_failed_says_why_and_can_be_asked_for_again(service):
+def test_a_failed_job_has_a_reason_and_can_be_requested_again(service):
     run = start(service)
     finish(service, run)
-    job = the_job(service, run["id"])
+    job = get_last_job(service, run["id"])
     service.report("on_started", job["id"])
     service.report("on_failed", job["id"], "identify: too little is left to fit")
     assert service.get(f"/jobs/{job['id']}")["error"] == "identify: too little is left to fit"
@@ -114,10 +114,10 @@ def test_a_job_that_failed_says_why_and_can_be_asked_for_again(service):
     assert again["id"] != job["id"]
 
 
-def test_a_job_that_waits_is_cancelled_at_once_and_one_that_runs_when_it_has_stopped(service):
+def test_a_queued_job_is_cancelled_at_once_and_a_running_one_when_it_has_stopped(service):
     run = start(service)
     finish(service, run)
-    waiting = the_job(service, run["id"])
+    waiting = get_last_job(service, run["id"])
     assert service.post(f"/jobs/{waiting['id']}/cancel")["state"] == "cancelled"
     running = service.post(f"/runs/{run['id']}/identify", status=201)
     service.report("on_started", running["id"])
@@ -128,20 +128,20 @@ def test_a_job_that_waits_is_cancelled_at_once_and_one_that_runs_when_it_has_sto
     assert service.client.post(f"/api/v1/jobs/{running['id']}/cancel").status_code == 409
 
 
-def test_what_has_ended_stays_as_it_ended(service):
+def test_a_cancelled_job_stays_cancelled(service):
     run = start(service)
     finish(service, run)
-    job = the_job(service, run["id"])
+    job = get_last_job(service, run["id"])
     service.post(f"/jobs/{job['id']}/cancel")
     service.report("on_started", job["id"])
     service.report("on_done", job["id"], SUMMARY)
     assert service.get(f"/jobs/{job['id']}")["state"] == "cancelled"
 
 
-def test_a_job_that_never_ends_is_given_up_after_three_attempts(service):
+def test_a_job_that_never_ends_fails_after_three_attempts(service):
     run = start(service)
     finish(service, run)
-    job = the_job(service, run["id"])
+    job = get_last_job(service, run["id"])
     for _ in range(3):
         service.report("on_started", job["id"])
     assert service.get(f"/jobs/{job['id']}")["attempts"] == 3
@@ -152,7 +152,7 @@ def test_a_job_that_never_ends_is_given_up_after_three_attempts(service):
     assert service.engine.cancelled == [(job["id"], True)]
 
 
-def test_stop_goes_to_the_agent_unless_another_run_goes_on(service):
+def test_stop_is_sent_to_the_agent_unless_another_run_is_in_progress(service):
     run = start(service)
     assert service.post(f"/runs/{run['id']}/stop")["state"] == "stopping"
     assert service.agent.commands[-1].command == "stop"
@@ -177,14 +177,14 @@ def test_runs_are_listed_newest_first_page_by_page(service):
 def test_jobs_are_listed_newest_first(service):
     run = start(service)
     finish(service, run)
-    first = the_job(service, run["id"])
+    first = get_last_job(service, run["id"])
     second = service.post(f"/runs/{run['id']}/identify", {"budget_s": 5}, 201)
     assert [job["id"] for job in service.get("/jobs")["items"]] == [second["id"], first["id"]]
     assert [job["id"] for job in service.get(f"/runs/{run['id']}")["jobs"]] == [first["id"], second["id"]]
     assert service.get("/jobs")["items"][0]["settings"]["budget_s"] == 5
 
 
-def test_a_remote_agent_is_not_told_where_to_write(service):
+def test_a_remote_agent_chooses_the_file_of_the_log(service):
     service.start(has_local_logs=False)
     run = start(service)
     assert service.agent.commands[-1].log is None
@@ -194,7 +194,7 @@ def test_a_remote_agent_is_not_told_where_to_write(service):
     assert service.client.post(f"/api/v1/runs/{run['id']}/identify").status_code == 409
 
 
-def test_a_run_that_ended_while_the_service_was_away_is_found(service):
+def test_a_run_that_ended_while_the_service_was_down_is_found(service):
     run = start(service)
     service.end()
     write_complete_log(service.data / run["log"], run["id"])
@@ -202,10 +202,10 @@ def test_a_run_that_ended_while_the_service_was_away_is_found(service):
     service.start()
     found = service.wait_for(f"/runs/{run['id']}", lambda found: found["outcome"])
     assert found["outcome"] == "clean"
-    assert the_job(service, run["id"])["state"] == "queued"
+    assert get_last_job(service, run["id"])["state"] == "queued"
 
 
-def test_a_run_that_nobody_has_announced_is_found(service):
+def test_a_log_from_elsewhere_is_found(service):
     service.end()
     write_complete_log(service.data / "from_elsewhere.mcap", "foreign", first_s=3600.0)
     write_complete_log(service.data / "bought.mcap", "bought.csv", source="import", started=None)
@@ -218,7 +218,7 @@ def test_a_run_that_nobody_has_announced_is_found(service):
     assert service.post("/runs/bought/identify", status=201)["state"] == "queued"
 
 
-def test_a_log_without_its_end_is_flagged_and_can_be_mended(service):
+def test_a_truncated_log_is_flagged_and_can_be_repaired(service):
     run = start(service)
     service.end()
     write_truncated_log(service.data / run["log"], run["id"])
@@ -228,13 +228,13 @@ def test_a_log_without_its_end_is_flagged_and_can_be_mended(service):
     found = service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "truncated")
     assert "salvage" in found["reason"]
     assert service.client.post(f"/api/v1/runs/{run['id']}/identify").status_code == 409
-    mended = service.post(f"/runs/{run['id']}/salvage")
-    assert (mended["state"], mended["outcome"]) == ("ended", "truncated")
+    repaired = service.post(f"/runs/{run['id']}/salvage")
+    assert (repaired["state"], repaired["outcome"]) == ("ended", "truncated")
     assert service.post(f"/runs/{run['id']}/identify", status=201)["state"] == "queued"
     assert service.client.post(f"/api/v1/runs/{run['id']}/salvage").status_code == 409
 
 
-def test_a_run_that_left_no_log_is_not_said_to_go_on(service):
+def test_a_run_without_a_log_counts_as_ended(service):
     run = start(service)
     service.agent.forget()
     service.end()
@@ -248,7 +248,7 @@ def test_a_run_that_left_no_log_is_not_said_to_go_on(service):
 def test_unfinished_jobs_are_submitted_again_under_their_key(service):
     run = start(service)
     finish(service, run)
-    job = the_job(service, run["id"])
+    job = get_last_job(service, run["id"])
     service.report("on_started", job["id"])
     key = service.engine.specs[job["id"]].key
     service.start()
@@ -259,7 +259,7 @@ def test_unfinished_jobs_are_submitted_again_under_their_key(service):
     assert complete_folder == str(service.data / f"{run['log'].removesuffix('.mcap')}.fit-{key[:12]}")
 
 
-def test_a_move_without_a_place_is_refused_and_nothing_is_sent(service):
+def test_a_move_without_a_target_is_refused_and_not_sent(service):
     answer = service.client.post("/api/v1/agent/prepare", json={"step": "move"})
     assert answer.status_code == 422
     assert "move needs position_m" in answer.json()["detail"]

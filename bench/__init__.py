@@ -1,3 +1,3 @@
-"""Runs tests, keeps their records, serves people."""
+"""Test bench: runs, logs, catalogue, jobs, and the service with its web page."""
 
 __all__: list[str] = []

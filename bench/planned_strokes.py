@@ -53,7 +53,7 @@ def compile_argument(argument: str) -> Iterator[str]:
 
 
 def _is_method(argument: str) -> bool:
-    """Whether an argument names a method: a .json file, or a name that is neither a file nor a log."""
+    """Return whether an argument names a method: a .json file, or a name that is neither a file nor a log."""
     path = Path(argument)
     if path.suffix in (".mcap", ".npz"):
         return False

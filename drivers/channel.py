@@ -54,7 +54,7 @@ class Reading(NamedTuple):
     received_ns: int
     """Bench clock when the reply was complete [ns]."""
     device_ns: int | None
-    """Device clock at the conversion [ns]; none if the instrument has no clock."""
+    """Device clock at the conversion [ns]; None if the instrument has no clock."""
     raw: float
     """Number on the wire, in the unit of the wire."""
     quality: Quality
@@ -67,7 +67,7 @@ class SampleBlock(NamedTuple):
     first: int
     """Running number of the first sample since the stream began; a gap between blocks counts lost samples."""
     device_ns: TimeArray | None
-    """Device clock at each conversion [ns]; none if the instrument has no clock."""
+    """Device clock at each conversion [ns]; None if the instrument has no clock."""
     received_ns: int
     """Bench clock when the last byte arrived [ns]."""
     values: Array
@@ -94,5 +94,5 @@ class Frame(NamedTuple):
     received_ns: int
     """Bench clock [ns]."""
     sent: bool
-    """Whether the driver sent the frame; otherwise it received it."""
+    """True if the driver sent the frame; otherwise it received it."""
     data: bytes

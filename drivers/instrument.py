@@ -32,7 +32,7 @@ class Health:
     last_ns: int | None
     """Bench clock at the last good frame [ns]."""
     message: str
-    """Description of what is wrong; empty if nothing is."""
+    """Description of the present problems; empty without a problem."""
 
 
 class Instrument(Protocol):

@@ -12,7 +12,7 @@ class FrozenModel(BaseModel):
 
 
 def describe_first_error(error: ValidationError) -> str:
-    """Return the place of the first error in a document, and what is wrong there, in one line."""
+    """Return position and description of the first error in a document, in one line."""
     faults = error.errors(include_url=False)
     # Where a name or an object is allowed, an error inside the object is more precise than "not a string".
     first = next((fault for fault in faults if fault["type"] != "string_type"), faults[0])

@@ -62,12 +62,12 @@ class SetupExecutor:
 
     @property
     def is_running(self) -> bool:
-        """Whether a step is in progress."""
+        """True if a step is in progress."""
         return self._thread is not None and self._thread.is_alive()
 
     @property
     def is_moving(self) -> bool:
-        """Whether a step that moves the rod is in progress."""
+        """True if a step that moves the rod is in progress."""
         return self.is_running and self._status is not None and self._status.step in MOVING_STEPS
 
     def start(self, step: SetupStep, position: float = 0.0) -> SetupStatus:

@@ -85,7 +85,7 @@ class JobRow(Base):
     started: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     finished: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     activity: Mapped[str] = mapped_column("doing", Text, default="")
-    """What the running job does at present. The column keeps the name `doing` of older versions."""
+    """Present activity of the running job. The column keeps the name `doing` of older versions."""
     error: Mapped[str] = mapped_column(Text, default="")
     """Reason of a failure."""
     result: Mapped[str | None] = mapped_column(Text, default=None)

@@ -96,7 +96,7 @@ class JobManager:
         )
 
     async def on_progress(self, job_id: str, message: str) -> None:
-        """Record what a job does at present."""
+        """Record the present activity of a job."""
         await self._update_job(job_id, activity=message)
 
     async def on_done(self, job_id: str, summary: FitSummary) -> None:

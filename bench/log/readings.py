@@ -23,7 +23,7 @@ class ClockMapProtocol(Protocol):
 
     @property
     def is_known(self) -> bool:
-        """Whether enough clock readings were taken for a mapping."""
+        """True if enough clock readings were taken for a mapping."""
 
     def map_instants(self, device_ns: npt.ArrayLike) -> Instants:
         """Return the bench clock [ns] at instants of the device clock [ns]."""

@@ -199,7 +199,7 @@ class LogWriter(LogContext):
 
     @property
     def is_lossy(self) -> bool:
-        """Whether samples were lost."""
+        """True if samples were lost."""
         return bool(self._lost)
 
     def close(self, outcome: Outcome | None = None, reason: str = "") -> None:

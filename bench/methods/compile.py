@@ -43,7 +43,7 @@ class ProgrammeSegment:
     drive_value: float | None
     """[V or A]; None if the drive varies."""
     checkpoint: bool = False
-    """Whether an interrupted run can be resumed after this segment."""
+    """True if an interrupted run can be resumed after this segment."""
 
 
 @dataclass(frozen=True)

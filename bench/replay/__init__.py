@@ -1,4 +1,4 @@
-"""Plays a log back: its raw frames through the decoders that made it, its samples to a live view."""
+"""Replay of a log: its raw frames through the drivers' decoders, its samples to live views."""
 
 from bench.replay.compare import replay_frames
 from bench.replay.player import parse_speed, play_log

@@ -1,4 +1,4 @@
-"""Plays the bench samples of a log to live views, as the agent publishes those of a run."""
+"""Playback of the bench samples of a log to live views, in the messages that the agent publishes during a run."""
 
 import math
 import time
@@ -12,14 +12,14 @@ from bench.errors import LogError
 from bench.log import SAMPLE_FIELDS, Log, read_log
 
 MESSAGE_PERIOD = 0.1
-"""[s] of recorded time in one message."""
+"""[s] Recorded time in one message."""
 
 
 def parse_speed(text: str) -> float:
-    """How many times as fast as recorded; infinite for ``max``.
+    """Parse a speed as a multiple of real time; infinite for ``max``.
 
     Raises:
-        LogError: it is neither ``max`` nor a number above zero.
+        LogError: the text is neither ``max`` nor a number above zero.
     """
     try:
         speed = math.inf if text == "max" else float(text)
@@ -31,7 +31,7 @@ def parse_speed(text: str) -> float:
 
 
 def make_messages(log: Log) -> Iterator[tuple[float, Samples]]:
-    """When each message is due, in recorded time from the first sample [s], and the message."""
+    """Yield the time at which each message is due [s], from the first sample, and the message."""
     time_s = np.asarray(log.samples["time"], dtype=np.float64)
     edges = np.searchsorted(time_s, np.arange(0.0, time_s[-1] + MESSAGE_PERIOD, MESSAGE_PERIOD))
     names = [name for name in SAMPLE_FIELDS if name in log.samples and name != "segment"]
@@ -54,17 +54,17 @@ def _make_list(column: list[float]) -> list[float | None]:
 
 
 def play_log(path: Path, speed: float, address: str, wait: Callable[[float], None] = time.sleep) -> int:
-    """Publish the samples of a log; returns how many.
+    """Publish the samples of a log and return their number.
 
     Args:
-        path: of the log.
-        speed: times as fast as it was recorded.
-        address: where subscribers connect.
-        wait: for so many seconds.
+        path: file of the log.
+        speed: multiple of real time.
+        address: ZeroMQ address to which subscribers connect.
+        wait: waits for a time [s].
 
     Raises:
         LogError: the log cannot be read.
-        RunError: the address cannot be had.
+        RunError: the address is not available.
     """
     log = read_log(path)
     count = 0

@@ -1,4 +1,4 @@
-"""What a log holds of instruments and wires, message by message."""
+"""Raw content of a log: frames, readings and decoder snapshot of each instrument."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,20 +23,20 @@ from drivers import Frame, SampleBlock
 
 
 class RawRecording(NamedTuple):
-    """One instrument as a log has it."""
+    """Raw content of a log about one instrument."""
 
     frames: list[Frame]
     blocks: list[SampleBlock]
-    """Its recorded readings."""
+    """Recorded readings."""
     description: dict[str, Any] | None
-    """Of its decoder; none where the log has none."""
+    """Snapshot of its decoder; None if the log contains none."""
 
 
 def read_raw_recordings(path: Path) -> dict[str, RawRecording]:
-    """Frames and readings of a log, by instrument; empty for a log that was made without wires.
+    """Read frames and readings of a log by instrument; empty for a log that was recorded without wires.
 
     Raises:
-        LogError: there is no such file, it is no log of ours, is cut off or damaged.
+        LogError: the file does not exist, is not an mrbench log, or is truncated or damaged.
     """
     frames: dict[str, list[Frame]] = {}
     blocks: dict[str, list[SampleBlock]] = {}

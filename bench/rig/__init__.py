@@ -1,4 +1,4 @@
-"""From instruments to bench samples: one thread per wire, one clock, all channels at the same instants."""
+"""Instruments of a bench and their samples: one thread per wire, one clock, all channels at the same instants."""
 
 from bench.rig.acquisition import Acquisition, Batch
 from bench.rig.alignment import AlignedSamples, Aligner

@@ -95,7 +95,7 @@ class ClockMap:
 
     @property
     def is_known(self) -> bool:
-        """Whether the device's clock was read."""
+        """True if the device's clock was read."""
         return self._offset_bounds is not None
 
     def restart(self) -> None:

@@ -1,6 +1,6 @@
 """Interlocks: every sample is checked on arrival, and every command before it is sent.
 
-Time and samples are passed in and limit violations are returned; nothing here knows threads or wires. The fast
+Time and samples are passed in and limit violations are returned; the module uses no threads and no wires. The fast
 limits use the actuator's encoder and the load cell. LVDT samples arrive tens of milliseconds late, so they are
 recorded but not limited.
 """

@@ -56,7 +56,7 @@ class CommandHistory:
 
     @property
     def has_started(self) -> bool:
-        """Whether the programme has begun; the move to its start does not count."""
+        """True if the programme has begun; the move to its start does not count."""
         return any(entry.section is not None for entry in self.entries)
 
     def add(self, entry: CommandEntry) -> None:

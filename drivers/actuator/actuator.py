@@ -112,7 +112,7 @@ class Actuator:
 
     @property
     def clock_reading(self) -> ClockReading | None:
-        """Latest reading of the drive's clock; none before the first."""
+        """Latest reading of the drive's clock; None before the first."""
         return self._decoder.clock_reading
 
     @property
@@ -148,7 +148,7 @@ class Actuator:
         self._bus.close()
 
     def get_health(self) -> Health:
-        """Return the counts of samples, and what is wrong."""
+        """Return the counts of samples, and the present problems."""
         decoder = self._decoder
         # Frames are counted even while no thread takes samples (decision 0011).
         decoder.decode_pending()

@@ -62,7 +62,7 @@ def decode_drive_state(statusword: int) -> DriveState:
 
 
 def find_next_control_word(state: DriveState) -> int | None:
-    """Return the controlword of the next step towards operation; none if only waiting or a reset helps."""
+    """Return the controlword of the next step towards operation; None if only waiting or a reset helps."""
     return _NEXT_CONTROL_WORDS.get(state)
 
 

@@ -98,7 +98,7 @@ class ServoDrive:
         self.switch_off()
 
     def is_referenced(self) -> bool:
-        """Whether the drive has a position reference."""
+        """Return whether the drive has a position reference."""
         return bool(self._node.read_number(0x6041) & cia402.REFERENCED)
 
     def read_state(self) -> DriveState:

@@ -47,7 +47,7 @@ class SetpointSender:
 
     @property
     def is_armed(self) -> bool:
-        """Whether setpoints may be sent."""
+        """True if setpoints may be sent."""
         return self._armed_ns is not None
 
     def start_session(self) -> None:
@@ -122,7 +122,7 @@ class SetpointSender:
             )
 
     def _find_stop_reason(self, armed_ns: int, decoder: ActuatorDecoder) -> str:
-        """Return why the drive no longer follows setpoints; empty if it does."""
+        """Return the reason why the drive no longer follows setpoints; empty if it follows them."""
         if self._node.heartbeat.boot_count != self._boot_count:
             return "it has restarted (connect again)"
         if faults := self._drive.faults:

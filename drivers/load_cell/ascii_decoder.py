@@ -40,7 +40,7 @@ class AsciiReading(NamedTuple):
     force: float
     """[N]"""
     is_net: bool
-    """Whether the indicator has subtracted its tare."""
+    """True if the indicator has subtracted its tare."""
 
 
 class AsciiLoadCellDecoder:
@@ -62,7 +62,7 @@ class AsciiLoadCellDecoder:
         self.last_ns: int | None = None
         """Bench clock at the last accepted line [ns]."""
         self.overload = False
-        """Whether the last line shows an overload."""
+        """True if the last line shows an overload."""
         self._max_step = max_step
         self._buffer = b""
         self._last_feed_ns = 0
@@ -145,7 +145,7 @@ class AsciiLoadCellDecoder:
         return AsciiReading(self._number, display_value, force, zero == _ZERO["net"])
 
     def _is_implausible(self, force: float) -> bool:
-        """Whether a force is out of range, or far from both the last reading and the last accepted one.
+        """Return whether a force is out of range, or far from both the last reading and the last accepted one.
 
         The first reading of all has nothing to agree with and is implausible.
         """

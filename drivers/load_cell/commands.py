@@ -83,7 +83,7 @@ class CommandChannel:
 
     def _make_wrong_reply_error(self, command: str, reply: Reply) -> InvalidReplyError:
         return InvalidReplyError(
-            f"{self._name}: {command} was answered by {reply}; check that this is the load cell"
+            f"{self._name}: {command} received the reply {reply}; check that this is the load cell"
         )
 
     def _send_request(self, command: str, argument: int = 0) -> Reply:
@@ -98,7 +98,7 @@ class CommandChannel:
                 if (reply := self._wait_for_reply(request)) is not None:
                     return reply
         raise NoReplyError(
-            f"{self._name}: {command} was not answered within {_DEADLINES['reply_s']:.3g} s, "
+            f"{self._name}: {command} received no reply within {_DEADLINES['reply_s']:.3g} s, "
             f"sent {_DEADLINES['attempts']} times; check power, cable and baud rate"
         )
 

@@ -85,7 +85,7 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
 
     @property
     def clock_reading(self) -> ClockReading | None:
-        """Latest reading of the load cell's clock; none before the first."""
+        """Latest reading of the load cell's clock; None before the first."""
         return self._clock_reader.clock_reading
 
     def close(self) -> None:
@@ -194,7 +194,7 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
     def _check_rate(self, rate: int) -> int:
         offered: list[int] = _INSTRUMENT["rates_hz"]
         if rate not in offered:
-            raise OutOfRangeError(f"{self.name}: {rate} Hz is none of the rates {offered} Hz; nothing was sent")
+            raise OutOfRangeError(f"{self.name}: {rate} Hz is not one of the rates {offered} Hz; nothing was sent")
         return rate
 
     def _set_rate(self, rate: int) -> None:

@@ -58,7 +58,7 @@ class SerialLoadCell(ABC, Generic[_Decoder]):
             return {"decoder": self.decoder_name, "state": self._decoder.snapshot()}
 
     def get_health(self) -> Health:
-        """Return the counts since the load cell was connected, and what is wrong."""
+        """Return the counts since the load cell was connected, and the present problems."""
         counts = self._decoder.get_statistics().subtract(self._initial_statistics)
         message = "; ".join(self._find_problems()) if self._line.is_open else "not connected"
         return Health(self._line.is_open, *counts, self._decoder.last_ns, message)
@@ -69,7 +69,7 @@ class SerialLoadCell(ABC, Generic[_Decoder]):
 
     @abstractmethod
     def _find_problems(self) -> list[str]:
-        """Return what is wrong with the stream of an open line."""
+        """Return the problems of the stream of an open line."""
 
     def _find_silence(self, timeout: float) -> list[str]:
         """Return a message if nothing good was received for longer than ``timeout`` [s]."""

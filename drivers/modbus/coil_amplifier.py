@@ -64,7 +64,7 @@ class AmplifierStatus(NamedTuple):
 
     @property
     def message(self) -> str:
-        """Description of what is wrong; empty if nothing is."""
+        """Description of the faults; empty without a fault."""
         names = [fault.name or "" for fault in self.fault]
         if unknown := int(self.fault) & ~_KNOWN_FAULTS:
             names.append(f"fault {unknown:02X}h, see the amplifier's manual")
@@ -200,7 +200,7 @@ class CoilAmplifier(ModbusInstrument):
         """
         self._registers.write("reset", 1)
         if message := self.read_status().message:
-            raise RefusedError(f"{self.name}: after a reset still: {message}; find the cause")
+            raise RefusedError(f"{self.name}: the fault remains after a reset: {message}; find the cause")
 
     @property
     def table_capacity(self) -> int:

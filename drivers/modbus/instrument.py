@@ -43,8 +43,8 @@ def check_rate(name: str, address: ModbusAddress, map_: RegisterMap) -> float:
     rate = layout.capacity * compute_line_capacity(address, exchanges, serial["reply_delay"])
     if rate < _CAPACITY_MARGIN * instrument_rate:
         raise OutOfRangeError(
-            f"{name}: {address.baud} baud carry {rate:.0f} samples/s of the {instrument_rate} samples/s that it "
-            f"makes, and {_CAPACITY_MARGIN * instrument_rate:.0f} are needed to catch up after a failure; "
+            f"{name}: {address.baud} baud transfer {rate:.0f} samples/s of the {instrument_rate} samples/s that "
+            f"it takes, and {_CAPACITY_MARGIN * instrument_rate:.0f} are needed to catch up after a failure; "
             "set a higher baud rate or use Modbus TCP"
         )
     return rate
@@ -108,7 +108,7 @@ class ModbusInstrument:
 
     @property
     def clock_reading(self) -> ClockReading | None:
-        """Device clock in the latest block; none before the first."""
+        """Device clock in the latest block; None before the first."""
         return self._reader.clock_reading
 
     def connect(self) -> None:
@@ -138,7 +138,7 @@ class ModbusInstrument:
         return self._reader.acquire(timeout)
 
     def compute_age(self) -> float | None:
-        """Return the time [s] since the latest received sample was taken; none before the first."""
+        """Return the time [s] since the latest received sample was taken; None before the first."""
         return self._reader.compute_age()
 
     def read(self, channel: str) -> Reading:

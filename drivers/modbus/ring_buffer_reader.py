@@ -93,7 +93,7 @@ class RingBufferReader:
         return blocks
 
     def compute_age(self) -> float | None:
-        """Return the largest possible age of the latest sample [s], transfer included; none before the first."""
+        """Return the largest possible age of the latest sample [s], transfer included; None before the first."""
         newest_ns = self.decoder.newest_ns
         if newest_ns is None or self.clock_reading is None:
             return None

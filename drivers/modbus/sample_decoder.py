@@ -79,7 +79,7 @@ class BlockReadout(NamedTuple):
     clock_ns: int
     """Device clock when the instrument assembled the block [ns]."""
     has_more: bool
-    """Whether the instrument has more samples after these."""
+    """True if the instrument has more samples after these."""
 
 
 class ModbusDecoder:

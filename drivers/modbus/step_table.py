@@ -28,7 +28,7 @@ class TableProgress(NamedTuple):
 
     state: TableState
     started_ns: int | None
-    """Device clock at the trigger [ns]; none before it."""
+    """Device clock at the trigger [ns]; None before it."""
 
 
 class StepTable:
@@ -65,11 +65,13 @@ class StepTable:
         for start in range(0, len(words), _MAX_WRITE_WORDS):
             line.write(self._address + start, words[start : start + _MAX_WRITE_WORDS])
         self._registers.write("table_length", len(times))
-        # The table runs without supervision: errors of the transfer must show now.
+        # The table runs without supervision, so errors of the transfer are detected here.
         for start in range(0, len(words), _MAX_READ_WORDS):
             expected = words[start : start + _MAX_READ_WORDS]
             if line.read("holding", self._address + start, len(expected)).words != expected:
-                raise InvalidReplyError(f"{line.name}: its step table does not read as written; upload it again")
+                raise InvalidReplyError(
+                    f"{line.name}: its step table reads back other values than were written; upload it again"
+                )
 
     def send_command(self, command: Literal["abort", "arm"]) -> None:
         """Abort or arm the table; the trigger starts it.

@@ -12,5 +12,5 @@ class ReplayableInstrument(Protocol):
 
 
 def snapshot_decoder(instrument: object) -> dict[str, Any] | None:
-    """Return the state of an instrument's decoder; none if its frames cannot be replayed."""
+    """Return the state of an instrument's decoder; None if its frames cannot be replayed."""
     return instrument.snapshot_decoder() if isinstance(instrument, ReplayableInstrument) else None

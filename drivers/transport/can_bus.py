@@ -95,7 +95,7 @@ class CanBus:
 
     @property
     def is_open(self) -> bool:
-        """Whether frames can pass."""
+        """True if frames can pass."""
         return self._bus is not None and self._failure is None
 
     def open(self) -> None:

@@ -27,7 +27,7 @@ class PdoMapping(NamedTuple):
     size: int
     """[bytes]"""
     on_sync: bool
-    """Whether the frame is sent, or takes effect, at each SYNC."""
+    """True if the frame is sent, or takes effect, at each SYNC."""
     fields: tuple[PdoField, ...]
 
     def pack(self, values: Mapping[int, int]) -> bytes:

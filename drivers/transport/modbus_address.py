@@ -19,7 +19,7 @@ class ModbusAddress:
 
     @property
     def is_rtu(self) -> bool:
-        """Whether the line uses RTU framing, whose replies carry no request number."""
+        """True if the line uses RTU framing, whose replies carry no request number."""
         return not self.url.startswith("tcp://")
 
     @property

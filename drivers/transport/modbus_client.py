@@ -103,7 +103,7 @@ def _make_serial_client(address: ModbusAddress, timeout: float, trace: FrameTrac
 
 
 def is_input_pending(client: Client) -> bool:
-    """Whether bytes, or the end of the connection, wait on the wire before a request."""
+    """Return whether bytes, or the end of the connection, wait on the wire before a request."""
     if client.socket is None:
         return False
     if isinstance(client, ModbusSerialClient):

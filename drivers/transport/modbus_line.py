@@ -35,14 +35,14 @@ _MAX_FRAME_BYTES = 256
 _DIAGNOSTICS_UNKNOWN = bytes([0x88, 0x01])
 """Reply of an instrument that does not know function 8: exception 1."""
 _EXCEPTION_TEXTS = {
-    1: "it does not know this function",
-    2: "there is no such register",
-    3: "it does not take this value",
+    1: "it does not support this function",
+    2: "the register does not exist",
+    3: "it does not accept this value",
     4: "it cannot do this in its present state",
     5: "it needs more time",
     6: "it is busy",
-    10: "the gateway has no path to it",
-    11: "the gateway gets no answer from it",
+    10: "the gateway has no route to it",
+    11: "the gateway receives no reply from it",
 }
 
 
@@ -85,7 +85,7 @@ class ModbusLine:
 
     @property
     def connected(self) -> bool:
-        """Whether the line is open."""
+        """True if the line is open."""
         return self._client is not None
 
     def add_listener(self, listener: FrameListener) -> None:
@@ -194,7 +194,7 @@ class ModbusLine:
         self._trace.flush()
         if reply.function_code & 0x7F != function:
             raise self._make_invalid_reply(
-                action, f"function {reply.function_code} answered, {function} was requested"
+                action, f"function {reply.function_code} is in the reply, {function} was requested"
             )
         # The library returns a refusal like any other reply.
         if reply.isError():
@@ -244,7 +244,7 @@ class ModbusLine:
         return client
 
     def _has_stale_input(self, client: Client) -> bool:
-        """Whether input waits before the request, which cannot be the reply to it."""
+        """Return whether input waits before the request, which cannot be the reply to it."""
         try:
             return is_input_pending(client)
         except OSError:

@@ -53,7 +53,7 @@ class SerialLine:
 
     @property
     def is_open(self) -> bool:
-        """Whether the line has been opened and is not gone."""
+        """True if the line has been opened and is not gone."""
         return self._port is not None
 
     def open(self) -> None:
@@ -85,7 +85,7 @@ class SerialLine:
             port.close()
 
     def read(self, timeout: float) -> Frame | None:
-        """Return all bytes that have arrived, waiting up to ``timeout`` [s] for the first; none if there are none.
+        """Return all bytes that have arrived, waiting up to ``timeout`` [s] for the first; None if there are none.
 
         Raises:
             NotConnectedError: the line was never opened, or is gone.
@@ -153,7 +153,7 @@ def _open_port(address: str, baud: int, write_timeout: float) -> serial.Serial:
 
 
 def _get_descriptor(port: serial.Serial) -> int | None:
-    """Return the port's file descriptor; none if the library reads the port in a thread of its own."""
+    """Return the port's file descriptor; None if the library reads the port in a thread of its own."""
     try:
         return port.fileno()
     except io.UnsupportedOperation:

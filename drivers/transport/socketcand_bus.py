@@ -57,7 +57,7 @@ class SocketcandBus(SocketCanDaemonBus):
         return message, filtered
 
     def _is_peer_closed(self) -> bool:
-        """Whether the connection is closed: readable, but without data."""
+        """Return whether the connection is closed: readable, but without data."""
         connection = self._get_socket()
         return bool(select.select([connection], [], [], 0)[0]) and not connection.recv(1, socket.MSG_PEEK)
 

@@ -86,6 +86,6 @@ class AlternativeForm(NamedTuple):
     exponents: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Powers [1] of a damper gain on alpha, c0 and c1."""
     in_library: bool = True
-    """Whether the library has an effect of this name."""
+    """True if the library has an effect of this name."""
     former_symbols: Mapping[str, str] = MappingProxyType({})
     """Former parameter symbol -> present one, for scenarios and sealed truths of earlier trials."""

@@ -14,7 +14,7 @@ _OVER_RANGE, _NO_VALUE = 1, 2
 class _SensorKind(NamedTuple):
     channel: str
     two_sided: bool
-    """Whether the range has its limit on both sides of zero."""
+    """True if the range has its limit on both sides of zero."""
 
 
 _KINDS = {"lvdt": _SensorKind("displacement", True), "thermometer": _SensorKind("temperature", False)}

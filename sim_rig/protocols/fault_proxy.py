@@ -182,7 +182,7 @@ class _Pipe:
         self.queue: deque[tuple[int, bytes]] = deque()
         """Instant [ns] from which a piece may pass, and its bytes."""
         self.source_closed = False
-        """Whether the source has closed."""
+        """True if the source has closed."""
 
     def receive(self, now_ns: int, faults: list[WireFault]) -> None:
         """Receive a piece from the source."""

@@ -55,7 +55,7 @@ class SamplingModel(NamedTuple):
     dt: float
     """[s] between two true values."""
     held: bool = False
-    """Whether each value is held until the next, as the output of the amplifier is."""
+    """True if each value is held until the next, as the output of the amplifier is."""
     hidden_delay: float = 0.0
     """[s] delay beyond the one that the channel reports."""
     hidden_lag: float = 0.0

@@ -139,7 +139,7 @@ def test_a_rate_is_set_and_kept_over_a_restart(streaming):
 
 def test_a_rate_that_is_not_offered_is_out_of_range(streaming):
     _, _, driver = streaming()
-    with pytest.raises(OutOfRangeError, match=r"333 Hz is none of the rates .* nothing was sent"):
+    with pytest.raises(OutOfRangeError, match=r"333 Hz is not one of the rates .* nothing was sent"):
         driver.set_rate(333)
 
 
@@ -190,7 +190,7 @@ def test_a_forward_jump_of_the_sequence_is_a_loss_and_a_backward_one_a_restart(s
 def test_a_silent_instrument_is_no_reply(rig):
     adapter, _, driver = rig()
     adapter.faults.silent = True
-    with pytest.raises(NoReplyError, match=r"load cell: stop was not answered within 0\.5 s, sent 3 times"):
+    with pytest.raises(NoReplyError, match=r"load cell: stop received no reply within 0\.5 s, sent 3 times"):
         driver.connect()
     assert not driver.get_health().connected
 
@@ -217,7 +217,7 @@ def test_a_late_reply_is_not_taken_for_another(streaming):
     [
         (encode_frame("identity", 1, 6, 1, 7, 400), "counts_per_newton 400, expected 800"),
         (encode_frame("identity", 1, 6, 9, 7, 800), "protocol 9, expected 1"),
-        (encode_frame("acknowledgement", 1, 6, 0, 0), "identify was answered by Acknowledgement"),
+        (encode_frame("acknowledgement", 1, 6, 0, 0), "identify received the reply Acknowledgement"),
     ],
 )
 def test_another_instrument_is_an_invalid_reply(rig, reply, message):
@@ -241,7 +241,7 @@ def test_an_identity_instead_of_an_acknowledgement_is_an_invalid_reply(streaming
     adapter, _, driver = streaming()
     driver.stop()
     adapter.faults.inject(lambda frame: encode_frame("identity", frame[4], 4, 1, 7, 800))
-    with pytest.raises(InvalidReplyError, match="clear_tare was answered by Identity"):
+    with pytest.raises(InvalidReplyError, match="clear_tare received the reply Identity"):
         driver.clear_tare()
 
 

@@ -158,7 +158,7 @@ def test_a_table_that_reads_back_differently_is_an_error(bench):
         return bench.device._table
 
     bench.device._bank.sections[1].read = read_with_error
-    with pytest.raises(InvalidReplyError, match="does not read as written"):
+    with pytest.raises(InvalidReplyError, match="reads back other values than were written"):
         bench.driver.upload_table(np.array([0.0]), np.array([0.1]))
 
 
@@ -182,7 +182,7 @@ def test_a_fault_switches_the_output_to_zero_until_a_reset(bench, name, fault):
     assert bench.driver.get_health().message == message
     with pytest.raises(RefusedError, match=message):
         bench.driver.write("coil_drive", 1.0)
-    with pytest.raises(RefusedError, match=f"after a reset still: {message}"):
+    with pytest.raises(RefusedError, match=f"the fault remains after a reset: {message}"):
         bench.driver.reset()
     bench.device.remove_fault_causes()
     bench.driver.reset()
@@ -284,7 +284,7 @@ def test_channels_have_the_unit_of_the_mode(bench):
 def test_an_unavailable_mode_is_refused_while_connecting():
     with serve(CoilAmplifierDevice(FakeSignals(), drive_unit="A"), "tcp", unit=2) as (_, address):
         driver = amplifier(address, mode="voltage")
-        with pytest.raises(RefusedError, match="does not take this value"):
+        with pytest.raises(RefusedError, match="does not accept this value"):
             driver.connect()
         assert not driver.get_health().connected
 

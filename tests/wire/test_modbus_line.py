@@ -140,7 +140,7 @@ def test_a_long_silence_neither_hangs_nor_closes_the_line(wire):
 
 def test_a_refusal_has_a_reason(wire):
     line, _, _ = wire
-    with pytest.raises(RefusedError, match=r"there is no such register \(2\)"):
+    with pytest.raises(RefusedError, match=r"the register does not exist \(2\)"):
         line.read("input", 65000, 2)
 
 

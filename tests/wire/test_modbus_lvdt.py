@@ -204,7 +204,7 @@ def test_another_instrument_is_not_taken_for_a_conditioner():
 
 
 def test_a_serial_line_that_is_too_slow_is_refused_before_it_is_opened():
-    with pytest.raises(OutOfRangeError, match="38400 baud carry"):
+    with pytest.raises(OutOfRangeError, match="38400 baud transfer"):
         Lvdt("lvdt", ModbusAddress("/dev/ttyUSB0", 38400), time.monotonic_ns)
 
 

@@ -17,7 +17,7 @@ class ValueRange(NamedTuple):
     measure: str = "one"
     """``one`` (SI), ``drive``, ``stroke``, ``duration`` or ``power`` of the case."""
     signed: bool = False
-    """Whether the value may be negative as well."""
+    """True if the value may be negative as well."""
 
 
 RANGES: dict[str, dict[str, ValueRange]] = {

@@ -47,5 +47,5 @@ def test_a_driver_implements_the_instrument_interface(driver):
 
 
 def test_a_rate_that_the_load_cell_does_not_offer_is_refused():
-    with pytest.raises(OutOfRangeError, match="999 Hz is none of the rates"):
+    with pytest.raises(OutOfRangeError, match="999 Hz is not one of the rates"):
         LoadCell("force", "/dev/null", lambda: 0, rate=999)

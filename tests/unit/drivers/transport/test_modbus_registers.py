@@ -92,7 +92,7 @@ def test_the_baud_rate_of_a_wire_file_is_high_enough_for_its_samples(instrument)
 
 
 def test_a_line_too_slow_for_the_samples_is_refused_in_one_line():
-    with pytest.raises(OutOfRangeError, match=r"lvdt: 19200 baud carry \d+ samples/s of the 1000") as caught:
+    with pytest.raises(OutOfRangeError, match=r"lvdt: 19200 baud transfer \d+ samples/s of the 1000") as caught:
         check_rate("lvdt", ModbusAddress("/dev/ttyUSB0", 19200), load_register_map("lvdt"))
     assert "\n" not in str(caught.value)
 

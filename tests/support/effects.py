@@ -10,7 +10,7 @@ from identification.simulate import ActiveEffect, Excitation
 LABORATORY = to_coordinates(find_parameter_set("laboratory").parameters)
 RATE = 1000.0
 
-MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
+_CHOSEN: dict[str, dict[str, tuple[float, ...]]] = {
     "field_saturation": {"tanh": (1.5,), "knee": (1.8, 3.0), "magnetisation": (1.2, 0.4, 0.2)},
     "magnetic_remanence": {"exponential": (0.03, 0.1), "closing": (0.03, 0.1, 0.3), "play_operator": (0.03,)},
     "coil_lag": {
@@ -61,6 +61,14 @@ MEDIUM: dict[str, dict[str, tuple[float, ...]]] = {
     "coil_crosstalk": {"proportional": (20.0,)},
 }
 
+MEDIUM = {
+    effect.name: {
+        form.name: _CHOSEN.get(effect.name, {}).get(form.name, tuple(q.scale for q in form.parameters))
+        for form in effect.forms
+    }
+    for effect in EFFECTS.values()
+}
+"""Values of every form; the scales of its parameters where none are chosen above."""
 FORMS = [(effect.name, form.name) for effect in EFFECTS.values() for form in effect.forms]
 IDS = [f"{name}-{form}" for name, form in FORMS]
 

@@ -11,6 +11,7 @@ from identification.damper.coordinates import COORDINATES, Coordinates, to_coord
 from identification.damper.effects import EFFECTS
 from identification.damper.parameter_sets import find_parameter_set
 from identification.simulate import SENSITIVITY_COLUMNS, ActiveEffect, Excitation, SimulationModel, simulate
+from tests.support.sensitivities import compare_sensitivities
 
 LABORATORY = to_coordinates(find_parameter_set("laboratory").parameters)
 RATE = 1000.0
@@ -67,46 +68,14 @@ def test_force_agrees_with_an_independent_integrator(name, amplitude, frequency,
     assert np.abs(fine - exact).max() < 1e-4 * np.abs(exact).max()
 
 
-def _moved(setting: SimulationModel, name: str, relative: float) -> SimulationModel:
-    if name in Coordinates._fields:
-        value = getattr(setting.coordinates, name)
-        return replace(setting, coordinates=setting.coordinates._replace(**{name: value * (1 + relative)}))
-    if name in SENSITIVITY_COLUMNS:
-        return replace(setting, **{name: getattr(setting, name) + 1e-3 * relative})
-    owner, _, symbol = name.partition(".")
-    effects = []
-    for effect, values, _ in setting.effects:
-        at = [q.symbol for q in effect.find_form().parameters].index(symbol) if effect.name == owner else None
-        moved = tuple(v * (1 + relative) if i == at else v for i, v in enumerate(values))
-        effects.append(ActiveEffect(effect, moved))
-    return replace(setting, effects=tuple(effects))
-
-
-def _size(setting: SimulationModel, name: str) -> float:
-    if name in Coordinates._fields:
-        return getattr(setting.coordinates, name)
-    if name in SENSITIVITY_COLUMNS:
-        return 1e-3
-    owner, _, symbol = name.partition(".")
-    effect, values, _ = next(e for e in setting.effects if e.effect.name == owner)
-    return values[[q.symbol for q in effect.find_form().parameters].index(symbol)]
-
-
 @pytest.mark.parametrize("effects", [(), SOME_EFFECTS[:2], SOME_EFFECTS], ids=["law", "forces", "all"])
-def test_slopes_agree_with_central_differences_within_1e_6(effects):
-    setting = SimulationModel(LABORATORY, y0=1e-4, force_delay=3.3e-4, drive_delay=1e-4, effects=effects)
-    stroke = sine()
-    found = simulate(setting, stroke, sensitivities=True)
-    for k, name in enumerate(found.columns):
-        e = 2e-5
-        ahead = simulate(_moved(setting, name, e), stroke, found.step_counts).force
-        behind = simulate(_moved(setting, name, -e), stroke, found.step_counts).force
-        difference = (ahead - behind) / (2 * e)
-        slope = found.sensitivities[:, k] * _size(setting, name)
-        assert np.sqrt(np.mean((slope - difference) ** 2)) < 1e-6 * np.sqrt(np.mean(slope**2)), name
+def test_sensitivities_agree_with_central_differences_within_1e_6(effects):
+    model = SimulationModel(LABORATORY, y0=1e-4, force_delay=3.3e-4, drive_delay=1e-4, effects=effects)
+    for name, sensitivity, difference in compare_sensitivities(model, sine(), 2e-5):
+        assert np.sqrt(np.mean((sensitivity - difference) ** 2)) < 1e-6 * np.sqrt(np.mean(sensitivity**2)), name
 
 
-def test_slopes_do_not_change_the_force():
+def test_sensitivities_do_not_change_the_force():
     plain, rich = (simulate(SimulationModel(LABORATORY), sine(), sensitivities=s) for s in (False, True))
     np.testing.assert_allclose(plain.force, rich.force, rtol=1e-11, atol=1e-9)
 
@@ -164,9 +133,3 @@ def test_force_delay_shifts_the_force():
     late = simulate(SimulationModel(LABORATORY, force_delay=0.004), sine(drive=0.3)).force
     prompt = simulate(SimulationModel(LABORATORY), sine(drive=0.3)).force
     np.testing.assert_allclose(late[300:], prompt[296:-4], rtol=0, atol=2e-3 * np.abs(prompt).max())
-
-
-def test_force_dissipates():
-    stroke = sine(drive=0.3, seconds=2.0)
-    power = simulate(SimulationModel(LABORATORY), stroke).force * stroke.velocity
-    assert power.sum() > 0

@@ -1,4 +1,4 @@
-"""What a dry run asks of the identification, and what it does where nobody answers."""
+"""Assessment of planned strokes: file for the identification, its document, and its failures."""
 
 import json
 import sys
@@ -18,7 +18,7 @@ def quick():
     return compile_method(load_method("quick"))
 
 
-def test_every_addition_keeps_the_methods_limits_and_is_a_segment_that_can_be_run(quick):
+def test_candidate_strokes_are_valid_segments_within_the_limits_of_the_method(quick):
     found = make_candidate_strokes(quick)
     limits = quick.method.limits
     assert len(found) > 10
@@ -29,20 +29,20 @@ def test_every_addition_keeps_the_methods_limits_and_is_a_segment_that_can_be_ru
         assert compile_method(longer).duration > quick.duration + 9
 
 
-def test_additions_step_the_drive_inside_strokes_as_high_as_the_method_may(quick):
+def test_stepped_candidate_strokes_use_the_whole_range_of_the_drive(quick):
     steps = [alone for segment, alone in make_candidate_strokes(quick) if segment.drive.kind == "steps"]
     assert steps
     assert all(np.ptp(alone.drive) == quick.method.limits.drive for alone in steps)
     assert len(DRIVE_LEVELS) > 10
 
 
-def test_a_method_without_room_for_a_force_gets_no_additions_beyond_it(quick):
+def test_lower_force_limit_leaves_fewer_candidate_strokes(quick):
     tight = quick.method.limits.model_copy(update={"force_n": 650.0})
     programme = compile_method(quick.method.model_copy(update={"limits": tight}))
     assert 0 < len(make_candidate_strokes(programme)) < len(make_candidate_strokes(quick))
 
 
-def test_planned_samples_are_those_of_the_programme(quick, tmp_path):
+def test_planned_samples_equal_those_of_the_programme(quick, tmp_path):
     write_planned_strokes(tmp_path / "planned.npz", quick)
     with np.load(tmp_path / "planned.npz") as file:
         info = json.loads(str(file["info"]))
@@ -53,29 +53,29 @@ def test_planned_samples_are_those_of_the_programme(quick, tmp_path):
     assert info["drive_unit"] == "V"
 
 
-def test_samples_that_cannot_be_written_are_said(quick, tmp_path):
+def test_file_that_cannot_be_written_is_an_error(quick, tmp_path):
     with pytest.raises(RunError, match="cannot be written"):
         write_planned_strokes(tmp_path / "none" / "planned.npz", quick)
 
 
-def says(text, code=0):
-    """A command that prints a text to the right place and ends."""
+def make_command(text, code=0):
+    """Return a command that prints a text and ends; a failure prints to standard error."""
     stream = "stderr" if code else "stdout"
     return (sys.executable, "-c", f"import sys; sys.{stream}.write({text!r}); sys.exit({code})")
 
 
-def test_the_answer_is_the_document_that_was_printed(quick):
-    assert assess_design(quick, command=says('{"words": ["all of it"]}')) == {"words": ["all of it"]}
+def test_printed_document_is_returned(quick):
+    assert assess_design(quick, command=make_command('{"coordinates": ["c0"]}')) == {"coordinates": ["c0"]}
 
 
 @pytest.mark.parametrize(
-    ("command", "why"),
+    ("command", "message"),
     [
-        (says("mrbench: numba is not installed", 1), "is not known: numba is not installed"),
-        (says("no json"), "is no JSON"),
-        (("/no/such/command",), "is not known"),
+        (make_command("mrbench: numba is not installed", 1), "were not assessed: numba is not installed"),
+        (make_command("not a document"), "is not JSON"),
+        (("/no/such/command",), "were not assessed"),
     ],
 )
-def test_where_nobody_answers_it_is_said(quick, command, why):
-    with pytest.raises(RunError, match=why):
+def test_failed_assessment_is_an_error(quick, command, message):
+    with pytest.raises(RunError, match=message):
         assess_design(quick, command=command)

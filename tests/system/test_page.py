@@ -28,8 +28,10 @@ NODE = shutil.which("node")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 needs_browser = [
-    pytest.mark.skipif(NODE is None, reason="Node is not installed; it drives the browser"),
-    pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed; `apt-get install chromium` brings it"),
+    pytest.mark.skipif(NODE is None, reason="Node is not installed; it controls the browser"),
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="chromium is not installed; `apt-get install chromium` installs it"
+    ),
     pytest.mark.skipif(
         not (FOLDER / "node_modules" / "playwright-core").is_dir(),
         reason="playwright-core is not installed; run `npm ci --prefix tests/system/javascript`",
@@ -90,7 +92,7 @@ def test_runs_and_instruments_show_their_errors(seen):
     assert "12 samples of force were lost" in lossy
     assert "refine, start 3 of 8" in identified
     assert "1.31\u00a0N / 1.26\u00a0N" in done
-    assert "1.04 times the floor" in done
+    assert "1.04 times the noise floor" in done
     assert "the log has no end" in truncated
     assert "no reply for 83 s" in seen["instruments"][-1]
     assert "1 min 23 s" in seen["instruments"][-1]
@@ -128,8 +130,8 @@ def test_reset_needs_confirmation(seen, bench):
 
 @browser_test
 def test_setup_steps_are_sent_to_the_agent_and_homing_needs_confirmation(seen, bench):
-    asked = [json.loads(body) for path, body in bench.posted if path == "agent/prepare"]
-    assert asked == [
+    steps = [json.loads(body) for path, body in bench.posted if path == "agent/prepare"]
+    assert steps == [
         {"step": "move", "position_m": pytest.approx(0.0125)},
         {"step": "mount", "position_m": 0},
         {"step": "home", "position_m": 0},
@@ -140,8 +142,8 @@ def test_setup_steps_are_sent_to_the_agent_and_homing_needs_confirmation(seen, b
 
 @browser_test
 def test_a_lost_connection_greys_the_values_and_shows_the_reason(seen):
-    words, stopped = seen["lost"]
-    assert re.fullmatch(r"No data for \d+ s\. Trying again: " + re.escape(SILENCE) + r"\.", words)
+    message, stopped = seen["lost"]
+    assert re.fullmatch(r"No data for \d+ s\. Trying again: " + re.escape(SILENCE) + r"\.", message)
     assert stopped == f"Stop was not confirmed, use the emergency stop of the hardware: {SILENCE}."
     assert seen["greyed"]
 

@@ -1,11 +1,11 @@
-// The service's REST interface: the token, calls that answer JSON, files, and errors in words.
+// Client of the REST interface: token, JSON requests, files, and errors with their messages.
 
 const BASE = new URL("api/v1/", document.baseURI);
-const KEPT_AS = "mrbench.token";
-const PATIENCE_MS = 20_000;
-const FILE_PATIENCE_MS = 600_000;
+const TOKEN_KEY = "mrbench.token";
+const TIMEOUT_MS = 20_000;
+const FILE_TIMEOUT_MS = 600_000;
 
-/** What the service refused or could not do, as it says itself; `message` is a sentence for a person. */
+/** Error of a request, with the detail that the service returned; `message` is a sentence for a person. */
 export class Problem extends Error {
   constructor(status, title, detail) {
     super(detail || title);
@@ -13,17 +13,17 @@ export class Problem extends Error {
     this.title = title;
   }
 
-  /** The whole in a sentence that says first what it prevented. */
-  after(what) {
-    return `${what}: ${this.message.replace(/\.$/, "")}.`;
+  /** Returns a sentence that begins with the consequence. */
+  after(consequence) {
+    return `${consequence}: ${this.message.replace(/\.$/, "")}.`;
   }
 
-  get refused() {
+  get unauthorised() {
     return this.status === 401;
   }
 }
 
-/** Moves a token from the address into this tab's storage, so that no bookmark and no screenshot keeps it. */
+/** Moves a token from the address into this tab's storage, so that no bookmark or screenshot contains it. */
 export function takeToken() {
   const given = new URLSearchParams(location.hash.slice(1)).get("token");
   if (given) {
@@ -33,11 +33,11 @@ export function takeToken() {
   return token();
 }
 
-export const token = () => sessionStorage.getItem(KEPT_AS);
-export const keepToken = (value) => sessionStorage.setItem(KEPT_AS, value);
-export const forgetToken = () => sessionStorage.removeItem(KEPT_AS);
+export const token = () => sessionStorage.getItem(TOKEN_KEY);
+export const keepToken = (value) => sessionStorage.setItem(TOKEN_KEY, value);
+export const forgetToken = () => sessionStorage.removeItem(TOKEN_KEY);
 
-/** Address of the live websocket; a browser cannot send headers there, so the token stands in the query. */
+/** Address of the live websocket. Browsers cannot send headers there, so the token is in the query. */
 export function liveAddress() {
   const address = new URL("live", BASE);
   address.protocol = address.protocol.replace("http", "ws");
@@ -45,44 +45,44 @@ export function liveAddress() {
   return address.href;
 }
 
-export const get = (path, patience) => call("GET", path, undefined, patience);
-export const post = (path, body, patience) => call("POST", path, body, patience);
+export const get = (path, timeout) => call("GET", path, undefined, timeout);
+export const post = (path, body, timeout) => call("POST", path, body, timeout);
 
-/** Fetches a file with the token in its header; a plain link could not carry one. */
+/** Fetches a file with the token in the header, which a plain link cannot send. */
 export async function file(path) {
-  const answer = await send("GET", path, undefined, FILE_PATIENCE_MS);
-  const named = /filename="?([^";]+)"?/.exec(answer.headers.get("content-disposition") ?? "");
-  return { blob: await answer.blob(), name: named?.[1] ?? path.replaceAll("/", "-") };
+  const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
+  const match = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
+  return { blob: await response.blob(), name: match?.[1] ?? path.replaceAll("/", "-") };
 }
 
-async function call(method, path, body, patience) {
-  const answer = await send(method, path, body, patience);
-  return answer.status === 204 ? null : answer.json();
+async function call(method, path, body, timeout) {
+  const response = await send(method, path, body, timeout);
+  return response.status === 204 ? null : response.json();
 }
 
-async function send(method, path, body, patience = PATIENCE_MS) {
+async function send(method, path, body, timeout = TIMEOUT_MS) {
   const headers = { Authorization: `Bearer ${token() ?? ""}` };
   if (body !== undefined) headers["Content-Type"] = "application/json";
-  let answer;
+  let response;
   try {
-    answer = await fetch(new URL(path, BASE), {
-      method, headers, body: body && JSON.stringify(body), signal: AbortSignal.timeout(patience),
+    response = await fetch(new URL(path, BASE), {
+      method, headers, body: body && JSON.stringify(body), signal: AbortSignal.timeout(timeout),
     });
   } catch (error) {
-    throw new Problem(0, "No answer", silence(error, patience));
+    throw new Problem(0, "No answer", describeFailure(error, timeout));
   }
-  if (!answer.ok) throw await problemOf(answer);
-  return answer;
+  if (!response.ok) throw await readProblem(response);
+  return response;
 }
 
-function silence(error, patience) {
+function describeFailure(error, timeout) {
   return error.name === "TimeoutError"
-    ? `The service at ${BASE.host} took longer than ${patience / 1000} s.`
+    ? `The service at ${BASE.host} did not answer within ${timeout / 1000} s.`
     : `The service at ${BASE.host} cannot be reached.`;
 }
 
-async function problemOf(answer) {
-  const said = await answer.json().catch(() => ({}));
-  const title = said.title ?? `${answer.status} ${answer.statusText}`;
-  return new Problem(answer.status, title, typeof said.detail === "string" ? said.detail : "");
+async function readProblem(response) {
+  const { title, detail } = await response.json().catch(() => ({}));
+  const text = typeof detail === "string" ? detail : "";
+  return new Problem(response.status, title ?? `${response.status} ${response.statusText}`, text);
 }

@@ -1,86 +1,86 @@
-// The page's parts put together: what the service sends goes to those who show it.
+// Entry point: creates the parts of the page and distributes the messages of the service to them.
 
 import { forgetToken, get, keepToken, takeToken } from "./api.js";
 import { byId, fixed, write } from "./format.js";
 import { showEvent, showInstruments, showWarnings } from "./instruments.js";
-import { FIELDS, LiveLink, QUANTITIES, Readings, withDriveNamed } from "./live.js";
+import { FIELDS, LiveLink, QUANTITIES, Readings, fillCoilChannel } from "./live.js";
 import { LivePlots, STRIP_SECONDS } from "./plots.js";
-import { Preparation } from "./prepare.js";
+import { SetupPanel } from "./prepare.js";
 import { SampleRing } from "./ring.js";
 import { RunList } from "./runs.js";
 import { StartForm } from "./start.js";
 import { TopBar } from "./topbar.js";
 
-/** [s] of silence after which the plain way is tried; the agent speaks four times a second. */
-const ASK_AFTER = 0.9;
-/** [ms] from one such question to the next: soon while there is hope, seldom once all is silent. */
-const ASK_EVERY = { hopeful: 400, stale: 3_000 };
+/** Silence [s] after which the status is requested by REST; the agent publishes it four times a second. */
+const REQUEST_AFTER = 0.9;
+/** Time [ms] between such requests: short at first, long once the connection counts as lost. */
+const REQUEST_EVERY = { fresh: 400, stale: 3_000 };
 
 const ring = new SampleRing(FIELDS);
 const runs = new RunList({ onSpecimens: (names) => form.suggestSpecimens(names) });
 const form = new StartForm({
   onStarted: (run) => {
-    runs.take(run);
-    byId("stop").focus(); // what was started here can be stopped by the next key
+    runs.update(run);
+    byId("stop").focus(); // the next key can stop a run that was started here
   },
 });
 const bar = new TopBar({ onState: (state) => form.show({ state }) });
-const preparation = new Preparation();
+const setup = new SetupPanel();
 new Readings(ring, byId("readings"), STRIP_SECONDS);
 const plots = new LivePlots(ring, QUANTITIES, { loop: byId("plot-loop"), strips: byId("strips") });
 
-let asking = false;
-let askedAt = -Infinity;
+let requesting = false;
+let requestedAt = -Infinity;
 let driveKind = "";
 let sampledAt = -Infinity;
 
-const TAKE = {
+const HANDLERS = {
   status(status) {
-    bar.take(status);
+    bar.update(status);
     driveKind = status.drive_kind;
     if (status.drive_unit) plots.nameDrive(`Drive [${status.drive_unit}]`);
     showInstruments(status.instruments);
     showWarnings(status.warnings);
-    preparation.take(status);
+    setup.update(status);
   },
   samples(samples) {
     if (!samples.time_ns.length) return;
     sampledAt = performance.now();
-    ring.push(withDriveNamed(samples, driveKind));
+    ring.push(fillCoilChannel(samples, driveKind));
   },
   event: showEvent,
-  run: (run) => runs.take(run),
-  job: (job) => runs.takeJob(job),
+  run: (run) => runs.update(run),
+  job: (job) => runs.updateJob(job),
 };
 
 const link = new LiveLink({
-  onMessage: ({ topic, data }) => TAKE[topic]?.(data),
-  onClosed: ask,
-  onReopened: () => runs.load(), // what changed meanwhile was not heard
+  onMessage: ({ topic, data }) => HANDLERS[topic]?.(data),
+  onClosed: requestStatus,
+  onReopened: () => runs.load(), // changes in the meantime were missed
 });
 
-/** Asks the agent's state the plain way: it says in words what is wrong when nothing comes live. */
-async function ask() {
-  if (asking) return;
-  asking = true;
-  askedAt = performance.now();
+/** Requests the agent's status by REST: its error explains why no live messages arrive. */
+async function requestStatus() {
+  if (requesting) return;
+  requesting = true;
+  requestedAt = performance.now();
   try {
-    TAKE.status(await get("agent"));
+    HANDLERS.status(await get("agent"));
   } catch (problem) {
-    if (problem.refused) askForToken("The service does not take this token.");
-    else bar.miss(problem.after("Trying again"));
+    if (problem.unauthorised) askForToken("The service does not accept this token.");
+    else bar.showFailure(problem.after("Trying again"));
   } finally {
-    asking = false;
+    requesting = false;
   }
 }
 
-/** Live values older than a moment are greyed, and their age is said. */
+/** Greys live values older than a second, and shows their age. */
 function showAge() {
   const age = (performance.now() - sampledAt) / 1000;
   const live = byId("live");
   live.classList.toggle("stale", age > 1);
-  const words = age < 1 ? "" : Number.isFinite(age) ? `no samples for ${fixed(age, 0)} s` : "no samples yet";
-  write(byId("live-age"), words);
+  const text = age < 1 ? "" : Number.isFinite(age) ? `no samples for ${fixed(age, 0)} s` : "no samples yet";
+  write(byId("live-age"), text);
 }
 
 function askForToken(reason) {
@@ -94,7 +94,7 @@ function begin() {
   form.load();
   runs.load();
   link.open();
-  ask();
+  requestStatus();
 }
 
 byId("token-dialog").addEventListener("cancel", (event) => event.preventDefault());
@@ -105,8 +105,8 @@ byId("token-form").addEventListener("submit", () => {
 });
 setInterval(showAge, 250);
 setInterval(() => {
-  const due = performance.now() - askedAt > (bar.stale ? ASK_EVERY.stale : ASK_EVERY.hopeful);
-  if (due && bar.age > ASK_AFTER && !byId("token-dialog").open) ask();
+  const due = performance.now() - requestedAt > (bar.stale ? REQUEST_EVERY.stale : REQUEST_EVERY.fresh);
+  if (due && bar.age > REQUEST_AFTER && !byId("token-dialog").open) requestStatus();
 }, 200);
 addEventListener("hashchange", () => location.hash && takeToken() && begin());
 

@@ -1,13 +1,13 @@
-// Numbers, times and small pieces of the page, each quantity with its unit.
+// Formatting of numbers and times with their units, and creation of elements.
 
-/** A number with fixed digits and a true minus sign; a dash where there is none. */
+/** Formats a number with fixed digits and a true minus sign; a dash for a missing number. */
 export function fixed(value, digits) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   const text = value.toFixed(digits);
   return Number(text) === 0 ? text.replace("-", "") : text.replace("-", "−");
 }
 
-/** A length of time [s] in words: `42 s`, `2 min 14 s`, `1 h 05 min`. */
+/** Formats a duration [s]: `42 s`, `2 min 14 s`, `1 h 05 min`. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";
   const whole = Math.max(0, Math.round(seconds));
@@ -16,7 +16,7 @@ export function duration(seconds) {
   return `${Math.floor(whole / 3600)} h ${pad(Math.floor((whole % 3600) / 60))} min`;
 }
 
-/** A short time [s] in the unit that suits it. */
+/** Formats a short time [s] in a suitable unit. */
 export function shortTime(seconds) {
   if (seconds === null || seconds === undefined) return "–";
   const size = Math.abs(seconds);
@@ -25,7 +25,7 @@ export function shortTime(seconds) {
   return size < 60 ? `${fixed(seconds, 1)} s` : duration(seconds);
 }
 
-/** Local date and time of an ISO 8601 instant. */
+/** Formats an ISO 8601 instant as local date and time. */
 export function instant(text) {
   const date = new Date(text);
   if (!text || Number.isNaN(date.getTime())) return "–";
@@ -42,10 +42,10 @@ const DRIVES = {
   driver_command_v: "driver command",
 };
 
-/** A kind of drive in words. */
-export const driveWords = (kind) => DRIVES[kind] ?? kind ?? "";
+/** Returns the name of a drive kind. */
+export const describeDriveKind = (kind) => DRIVES[kind] ?? kind ?? "";
 
-/** An element with properties and children; text stays text, whatever it holds. */
+/** Creates an element with properties and children; text is never interpreted as HTML. */
 export function element(tag, properties = {}, ...children) {
   const made = document.createElement(tag);
   for (const [name, value] of Object.entries(properties)) {
@@ -56,7 +56,7 @@ export function element(tag, properties = {}, ...children) {
   return made;
 }
 
-/** Writes a text only where it differs, so that a screen reader is not told the same thing again. */
+/** Writes a text only if it differs, so that a screen reader does not repeat it. */
 export function write(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }

@@ -1,11 +1,11 @@
-// The instruments and their wires, the agent's warnings, and what happened.
+// Table of the instruments and their wires, warnings of the agent, and list of events.
 
 import { byId, clock, element, fixed, shortTime, write } from "./format.js";
 
 const EVENTS_KEPT = 12;
 const rows = new Map();
 
-/** Writes the table; rows stay where they are, only what changed is written. */
+/** Updates the table; rows keep their places, and only changed cells are written. */
 export function showInstruments(instruments) {
   const body = byId("instruments");
   const names = new Set(instruments.map((instrument) => instrument.name));
@@ -35,21 +35,21 @@ function fill(row, instrument) {
   const [name, connection, ...numbers] = row.children;
   write(name.firstChild, instrument.name);
   write(name.lastChild, `${instrument.driver}, ${instrument.address}`);
-  const well = instrument.connected && !instrument.message;
-  connection.firstChild.className = `mark ${well ? "good" : instrument.connected ? "fair" : "bad"}`;
+  const isFaultless = instrument.connected && !instrument.message;
+  connection.firstChild.className = `mark ${isFaultless ? "good" : instrument.connected ? "fair" : "bad"}`;
   write(connection.firstChild, instrument.connected ? "connected" : "not connected");
   write(connection.lastChild, instrument.message);
   const { age_s, received, lost, corrupted, resynchronised, clock_error_bound_s: bound } = instrument;
   const clockError = bound === null ? "no clock" : `± ${shortTime(bound)}`;
   const texts = [shortTime(age_s), count(received), count(lost), count(corrupted), count(resynchronised), clockError];
   texts.forEach((text, k) => write(numbers[k], text));
-  [lost, corrupted, resynchronised].forEach((number, k) => numbers[k + 2].classList.toggle("worth-a-look", number > 0));
+  [lost, corrupted, resynchronised].forEach((number, k) => numbers[k + 2].classList.toggle("attention", number > 0));
 }
 
-/** A count with thin spaces between thousands. */
+/** Formats a count with thin spaces between thousands. */
 const count = (number) => fixed(number, 0).replace(/\B(?=(\d{3})+$)/g, "\u202f");
 
-/** Shows the agent's standing warnings. */
+/** Shows the present warnings of the agent. */
 export function showWarnings(warnings) {
   const list = byId("warnings");
   if (list.dataset.shown === JSON.stringify(warnings)) return;
@@ -62,7 +62,7 @@ export function showEvent({ kind, text }) {
   const list = byId("events");
   if (!list.dataset.used) list.replaceChildren();
   list.dataset.used = "yes";
-  list.prepend(element("li", { className: kind === "trip" || kind === "alarm" ? "worth-a-look" : "" },
+  list.prepend(element("li", { className: kind === "trip" || kind === "alarm" ? "attention" : "" },
     element("time", { className: "number" }, clock(new Date())), ` ${kind.replaceAll("_", " ")}: ${text}`));
   while (list.children.length > EVENTS_KEPT) list.lastChild.remove();
 }

@@ -1,20 +1,20 @@
-// What moves: the websocket to the service, and the readings in numbers.
+// Websocket to the service, and the live readings as numbers.
 
 import { liveAddress } from "./api.js";
 import { element, fixed, write } from "./format.js";
 
 const RETRY_MS = [500, 1_000, 2_000, 5_000];
-const SILENT_MS = 6_000;
+const SILENCE_LIMIT_MS = 6_000;
 const FRESH_S = 2.5;
 
-/** A quantity as a person reads it. */
+/** Describes a quantity for display. */
 function quantity(field, label, unit, digits, least, colour, more = {}) {
   return { field, label, unit, digits, least, colour, scale: 1, hole: 0.1, ...more };
 }
 
 /**
- * What is shown: `scale` from SI to the unit, `least` span of an axis in that unit, `hole` [s] without values from
- * which on a trace is broken; temperature comes seldom.
+ * Displayed quantities: `scale` from SI to the unit, `least` span of an axis in that unit, and `hole`, the time [s]
+ * without values after which a trace is interrupted; it is long for the temperature, which is sampled slowly.
  */
 export const QUANTITIES = {
   force: quantity("force", "Force", "N", 1, 20, "--force"),
@@ -28,35 +28,35 @@ export const QUANTITIES = {
 const READ = ["force", "displacement", "velocity", "voltage", "current", "temperature"];
 export const FIELDS = Object.values(QUANTITIES).map((quantity) => quantity.field);
 
-/** Fills in the coil's voltage or current where it is the drive itself, and has no channel of its own. */
-export function withDriveNamed(samples, driveKind) {
+/** Copies the drive to the coil voltage or current that it commands, if that has no separate channel. */
+export function fillCoilChannel(samples, driveKind) {
   const own = { coil_v: "coil_voltage", coil_a: "coil_current" }[driveKind];
   const { coil_drive: drive } = samples.values;
   if (!own || samples.values[own] || !drive) return samples;
   return { ...samples, values: { ...samples.values, [own]: drive } };
 }
 
-/** The websocket, opened again whenever it closes or falls silent. */
+/** Websocket that is opened again whenever it closes or is silent. */
 export class LiveLink {
   constructor({ onMessage, onClosed, onReopened }) {
     Object.assign(this, { onMessage, onClosed, onReopened });
     this.failures = 0;
-    this.heard = 0;
+    this.lastMessageAt = 0;
   }
 
   open() {
     this.close();
     const socket = new WebSocket(liveAddress());
     this.socket = socket;
-    this.heard = performance.now();
+    this.lastMessageAt = performance.now();
     socket.onopen = () => this.failures && this.onReopened();
     socket.onmessage = ({ data }) => {
       this.failures = 0;
-      this.heard = performance.now();
+      this.lastMessageAt = performance.now();
       this.onMessage(JSON.parse(data));
     };
     socket.onclose = () => this.socket === socket && this.closed();
-    this.watch = setInterval(() => performance.now() - this.heard > SILENT_MS && this.closed(), 1_000);
+    this.watch = setInterval(() => performance.now() - this.lastMessageAt > SILENCE_LIMIT_MS && this.closed(), 1_000);
   }
 
   closed() {
@@ -66,7 +66,7 @@ export class LiveLink {
     this.onClosed();
   }
 
-  /** Closes it for good, until `open` is called. */
+  /** Closes the websocket until `open` is called. */
   close() {
     clearInterval(this.watch);
     clearTimeout(this.retry);
@@ -76,7 +76,7 @@ export class LiveLink {
   }
 }
 
-/** The readings as numbers, each with its unit and its extremes; written often enough to read, not to flicker. */
+/** Readings as numbers with unit and extremes; updated five times a second, which is readable without flicker. */
 export class Readings {
   constructor(ring, place, seconds) {
     Object.assign(this, { ring, seconds, written: -1 });

@@ -1,4 +1,4 @@
-// Live plots on uPlot: strips over the last ten seconds, and force against displacement.
+// Live plots with uPlot: traces of the last ten seconds, and force against displacement.
 
 import uPlot from "./vendor/uPlot.esm.js";
 import { element } from "./format.js";
@@ -8,17 +8,17 @@ export const STRIP_SECONDS = 10;
 const LOOP_SECONDS = 2;
 const LOOP_PIECES = 12;
 const SHRINK_AFTER_MS = 2_000;
-const MARGIN = 0.03; // part of an axis that stays free at its ends
+const MARGIN = 0.03; // share of an axis that stays free at each end
 
-/** Bounds of an axis that grow at once and shrink late, so that a plot can be read while it moves. */
-class CalmRange {
+/** Bounds of an axis that grow at once and shrink late, so that a moving plot stays readable. */
+class AxisRange {
   constructor(least) {
     this.least = least;
     this.held = [-least / 2, least / 2];
     this.filledAt = 0;
   }
 
-  /** Bounds for values from `low` to `high`. */
+  /** Returns the bounds for values from `low` to `high`. */
   hold(low, high) {
     if (!Number.isFinite(low) || !Number.isFinite(high)) return this.held;
     const [bottom, top] = this.held;
@@ -41,7 +41,7 @@ class CalmRange {
   }
 }
 
-/** The next of 1, 2, 5 times a power of ten that is not smaller. */
+/** Rounds up to 1, 2 or 5 times a power of ten. */
 function roundStep(size) {
   const power = 10 ** Math.floor(Math.log10(size));
   return power * [1, 2, 5, 10].find((digit) => digit * power >= size * (1 - 1e-9));
@@ -62,7 +62,7 @@ const secondsAgo = (u, splits) => splits.map((s) => (s === -STRIP_SECONDS ? "" :
 const unlabelled = (u, splits) => splits.map(() => "");
 const QUIET = { cursor: { show: false }, legend: { show: false }, select: { show: false } };
 
-/** A uPlot that fills its place and follows it. */
+/** Creates a uPlot that fills its container and follows its size. */
 function fitted(place, options, data, afterwards) {
   const size = () => ({ width: Math.max(120, place.clientWidth), height: Math.max(60, place.clientHeight) });
   const plot = new uPlot({ ...QUIET, ...options, ...size() }, data, place);
@@ -73,12 +73,12 @@ function fitted(place, options, data, afterwards) {
   return plot;
 }
 
-/** One quantity over the last ten seconds. */
+/** Trace of one quantity over the last ten seconds. */
 class Strip {
   constructor(ring, quantity, { place, caption, last, redraw }) {
     Object.assign(this, { ring, quantity, caption });
     this.data = [[], []];
-    const range = new CalmRange(quantity.least);
+    const range = new AxisRange(quantity.least);
     this.plot = fitted(place, {
       padding: [8, 12, last ? 0 : 8, 0],
       scales: { x: { time: false, range: () => [-STRIP_SECONDS, 0] }, y: { range: (u, low, high) => range.hold(low, high) } },
@@ -91,16 +91,16 @@ class Strip {
   }
 
   draw() {
-    const buckets = Math.max(100, Math.round(this.plot.width));
-    this.plot.setData(envelope(this.ring, this.quantity, STRIP_SECONDS, buckets, this.data));
+    const bins = Math.max(100, Math.round(this.plot.width));
+    this.plot.setData(envelope(this.ring, this.quantity, STRIP_SECONDS, bins, this.data));
   }
 }
 
-/** Force against displacement, older pieces fading. uPlot holds the axes; the loop itself is not a function of x. */
+/** Force against displacement, with older parts fading. uPlot draws only the axes: the loop is no function of x. */
 class Loop {
   constructor(ring, across, up, place, redraw) {
     Object.assign(this, { ring, across, up });
-    const ranges = [new CalmRange(across.least), new CalmRange(up.least)];
+    const ranges = [new AxisRange(across.least), new AxisRange(up.least)];
     const scale = (range) => ({ time: false, range: (u, low, high) => range.hold(low, high) });
     this.plot = fitted(place, {
       padding: [10, 14, 0, 0],
@@ -140,7 +140,7 @@ class Loop {
     u.ctx.beginPath();
     for (let n = from; n < to; n++) {
       const [x, y] = this.position(u, n % this.ring.capacity);
-      u.ctx.lineTo(x, y); // a canvas leaves out what is not a number
+      u.ctx.lineTo(x, y); // a canvas ignores points that are NaN
     }
     u.ctx.stroke();
   }
@@ -162,7 +162,7 @@ class Loop {
   }
 }
 
-/** All live plots of the page; they are drawn when the browser draws, and only after new samples. */
+/** All live plots; they are drawn with the frames of the browser, and only after new samples. */
 export class LivePlots {
   constructor(ring, quantities, { loop, strips }) {
     this.ring = ring;
@@ -187,16 +187,16 @@ export class LivePlots {
     for (const plot of this.plots) plot.draw();
   }
 
-  /** The unit of the drive is known only once the agent has said it. */
-  nameDrive(words) {
-    for (const { caption, quantity } of this.plots) if (quantity?.field === "coil_drive") caption.textContent = words;
+  /** Sets the caption of the drive, whose unit is known only from the agent. */
+  nameDrive(text) {
+    for (const { caption, quantity } of this.plots) if (quantity?.field === "coil_drive") caption.textContent = text;
   }
 }
 
 function strip(ring, quantity, strips, last, redraw) {
-  const words = `${quantity.label} [${quantity.unit}]`;
-  const caption = element("figcaption", {}, words);
-  const place = element("div", { className: "plot", role: "img", "aria-label": `${words}, last ${STRIP_SECONDS} seconds` });
+  const label = `${quantity.label} [${quantity.unit}]`;
+  const caption = element("figcaption", {}, label);
+  const place = element("div", { className: "plot", role: "img", "aria-label": `${label}, last ${STRIP_SECONDS} seconds` });
   strips.append(element("figure", { className: last ? "strip last" : "strip" }, caption, place));
   return new Strip(ring, quantity, { place, caption, last, redraw });
 }

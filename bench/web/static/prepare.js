@@ -1,19 +1,19 @@
-// What is done before a run: home, move, clamp, centre, tare. Homing and moving lead the rod; homing asks first.
+// Setup steps before a run: home, move, mount, centre, tare. Home and move move the rod; home asks first.
 
 import { post } from "./api.js";
 import { byId, write } from "./format.js";
 
-export class Preparation {
+export class SetupPanel {
   constructor() {
     for (const button of byId("prepare").querySelectorAll("button")) {
       button.addEventListener("click", () => this.ask(button.dataset.step));
     }
     const dialog = byId("home-dialog");
-    dialog.addEventListener("close", () => dialog.returnValue === "home" && this.carryOut("home"));
+    dialog.addEventListener("close", () => dialog.returnValue === "home" && this.execute("home"));
   }
 
-  /** Takes a status of the agent. */
-  take({ state, reference_state: reference, step }) {
+  /** Shows a status of the agent. */
+  update({ state, reference_state: reference, step }) {
     write(byId("reference-state"), reference.replaceAll("_", " ") || "unknown");
     if (step && JSON.stringify(step) !== this.shown) {
       this.shown = JSON.stringify(step);
@@ -23,19 +23,19 @@ export class Preparation {
   }
 
   ask(step) {
-    // An empty field is no place: taken for zero, it would move the rod to the middle.
+    // An empty field must not count as zero, which would move the rod to the middle.
     if (step === "move" && Number.isNaN(byId("move-to").valueAsNumber)) {
-      return write(byId("prepare-note"), "Nothing was done: say where to move to, in mm.");
+      return write(byId("prepare-note"), "Nothing was done: enter a target position in mm.");
     }
-    if (step !== "home") return this.carryOut(step);
+    if (step !== "home") return this.execute(step);
     byId("home-dialog").returnValue = "";
     byId("home-dialog").showModal();
   }
 
-  async carryOut(step) {
+  async execute(step) {
     try {
-      const place = step === "move" ? byId("move-to").valueAsNumber / 1000 : 0;
-      this.take(await post("agent/prepare", { step, position_m: place }));
+      const position = step === "move" ? byId("move-to").valueAsNumber / 1000 : 0;
+      this.update(await post("agent/prepare", { step, position_m: position }));
     } catch (problem) {
       write(byId("prepare-note"), problem.after("Nothing was done"));
     }

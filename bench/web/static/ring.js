@@ -1,6 +1,6 @@
-// The last samples, in typed arrays of fixed size that are written round and round, and what plots need of them.
+// Ring buffer of the latest samples in typed arrays, with extremes and envelopes for the plots.
 
-/** Ring of bench samples: a time [s] since the first one and a value per field, NaN where there is none. */
+/** Ring buffer of bench samples: time [s] since the first one and a value for each field, NaN if missing. */
 export class SampleRing {
   constructor(fields, capacity = 1 << 14) {
     this.capacity = capacity;
@@ -18,12 +18,12 @@ export class SampleRing {
     return Math.min(this.written, this.capacity);
   }
 
-  /** Time [s] of the newest sample; NaN while there is none. */
+  /** Time [s] of the newest sample; NaN without samples. */
   get newest() {
     return this.written ? this.time[(this.written - 1) % this.capacity] : NaN;
   }
 
-  /** Takes a batch as the agent publishes it. A clock that goes back is another agent's: all starts anew. */
+  /** Adds a batch of the agent. A clock that goes back belongs to a restarted agent: the buffer is cleared. */
   push({ time_ns, values }) {
     if (this.origin !== null && (time_ns[0] - this.origin) / 1e9 < this.newest) this.clear();
     this.origin ??= time_ns[0];
@@ -35,7 +35,7 @@ export class SampleRing {
     }
   }
 
-  /** Number (counted since the start) of the first kept sample not before a time [s]. */
+  /** Returns the number, counted from the start, of the first kept sample not before a time [s]. */
   firstSince(from) {
     let low = this.written - this.count;
     let high = this.written;
@@ -47,7 +47,7 @@ export class SampleRing {
     return low;
   }
 
-  /** Newest value of a field, not older than `fresh` [s], and its extremes over the last seconds. */
+  /** Returns the newest value of a field, not older than `fresh` [s], and its extremes over the last seconds. */
   recent(field, seconds, fresh = seconds) {
     const column = this.values[field];
     let [low, high, last] = [Infinity, -Infinity, NaN];
@@ -63,20 +63,20 @@ export class SampleRing {
 }
 
 /**
- * The last seconds of a field, thinned to the least and the greatest value of each bucket at their own times.
+ * Reduces the last seconds of a field to the lowest and highest value of each bin, at their times.
  *
- * Buckets lie on the clock, not on the window, so that a trace does not shimmer as it moves. A stretch without values
- * longer than `hole` [s] is one null: a gap in the line.
+ * The bins are fixed to the clock, not to the window, so that a moving trace does not flicker. A time without values
+ * longer than `hole` [s] becomes one null, which interrupts the line.
  *
  * Fills `out[0]` with times [s] relative to the newest sample and `out[1]` with values times `scale`.
  */
-export function envelope(ring, { field, scale, hole }, seconds, buckets, out) {
+export function envelope(ring, { field, scale, hole }, seconds, bins, out) {
   const [times, values] = out;
   const column = ring.values[field];
   const newest = ring.newest;
-  const width = seconds / buckets;
+  const width = seconds / bins;
   times.length = values.length = 0;
-  let [bucket, low, high, last] = [NaN, -1, -1, NaN];
+  let [bin, low, high, last] = [NaN, -1, -1, NaN];
 
   const put = (at) => {
     times.push(ring.time[at] - newest);
@@ -94,12 +94,12 @@ export function envelope(ring, { field, scale, hole }, seconds, buckets, out) {
     const at = n % ring.capacity;
     if (Number.isNaN(column[at])) continue;
     const now = Math.floor(ring.time[at] / width);
-    if (now !== bucket) flush();
+    if (now !== bin) flush();
     if (ring.time[at] - last > hole) {
       times.push((last + ring.time[at]) / 2 - newest);
       values.push(null);
     }
-    bucket = now;
+    bin = now;
     last = ring.time[at];
     if (low < 0 || column[at] < column[low]) low = at;
     if (high < 0 || column[at] > column[high]) high = at;

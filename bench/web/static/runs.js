@@ -1,11 +1,11 @@
-// The runs: outcome, fit, files, and the jobs that work on them.
+// List of the runs with outcome, fit, files and jobs.
 
 import { file, get, post } from "./api.js";
 import { byId, duration, element, fixed, instant, write } from "./format.js";
 
 const PAGE = 20;
 const OUTCOMES = { clean: "good", lossy: "fair", truncated: "fair", incomplete: "bad" };
-const GOING_ON = ["queued", "running"];
+const UNFINISHED = ["queued", "running"];
 
 export class RunList {
   constructor({ onSpecimens }) {
@@ -16,13 +16,13 @@ export class RunList {
     byId("older").addEventListener("click", () => this.load(this.next));
   }
 
-  /** Loads the newest page, or the one before a run. */
+  /** Loads the newest page, or the page before a run. */
   async load(before = null) {
     try {
       const query = new URLSearchParams({ limit: PAGE, ...(before && { before }) });
       const { items, next } = await get(`runs?${query}`);
       for (const run of items) this.runs.set(run.id, run);
-      // A reload of the newest page leaves the place in the older ones as it is.
+      // A reload of the newest page keeps the position in the older ones.
       if (before || this.runs.size <= PAGE) this.next = next;
       this.show();
     } catch (problem) {
@@ -30,24 +30,24 @@ export class RunList {
     }
   }
 
-  /** Takes a run that changed. */
-  take(run) {
+  /** Shows a changed run. */
+  update(run) {
     this.runs.set(run.id, run);
     this.show();
   }
 
-  /** Takes a job that changed. */
-  takeJob(job) {
+  /** Shows a changed job. */
+  updateJob(job) {
     const run = this.runs.get(job.run);
     if (!run) return;
     const others = run.jobs.filter(({ id }) => id !== job.id);
-    this.take({ ...run, jobs: [...others, job] });
-    if (!GOING_ON.includes(job.state)) this.refresh(run.id);
+    this.update({ ...run, jobs: [...others, job] });
+    if (!UNFINISHED.includes(job.state)) this.refresh(run.id);
   }
 
   async refresh(id) {
     try {
-      this.take(await get(`runs/${encodeURIComponent(id)}`));
+      this.update(await get(`runs/${encodeURIComponent(id)}`));
     } catch (problem) {
       this.note(id, problem.message);
     }
@@ -82,39 +82,39 @@ export class RunList {
   identification(run) {
     const job = run.jobs.at(-1);
     const id = encodeURIComponent(run.id);
-    let button = this.button(run, "job", "Identify", ended(run), () => this.attempt(run, "Not asked for", `runs/${id}/identify`));
-    if (job && GOING_ON.includes(job.state)) {
+    let button = this.button(run, "job", "Identify", ended(run), () => this.attempt(run, "Not requested", `runs/${id}/identify`));
+    if (job && UNFINISHED.includes(job.state)) {
       const path = `jobs/${encodeURIComponent(job.id)}/cancel`;
       button = this.button(run, "job", "Cancel", true, () => this.attempt(run, "Not cancelled", path));
     } else if (run.state === "truncated") {
       button = this.button(run, "job", "Salvage", true, () => this.attempt(run, "Not salvaged", `runs/${id}/salvage`));
     }
     return element("td", { className: "actions" },
-      button, job ? jobWords(job) : "",
+      button, job ? describeJob(job) : "",
       element("small", { className: "problem", role: "status" }, this.notes.get(run.id) ?? ""));
   }
 
-  button(run, key, word, enabled, act, label = `${word}: run of ${instant(run.started)}`) {
-    const button = element("button", { type: "button", disabled: !enabled, "aria-label": label }, word);
+  button(run, key, text, enabled, act, label = `${text}: run of ${instant(run.started)}`) {
+    const button = element("button", { type: "button", disabled: !enabled, "aria-label": label }, text);
     button.dataset.key = `${run.id}/${key}`;
     button.addEventListener("click", act);
     return button;
   }
 
-  note(id, words) {
-    this.notes.set(id, words);
+  note(id, text) {
+    this.notes.set(id, text);
     this.show();
   }
 
-  /** Opens the report in a tab of its own; logs and fits are saved. */
+  /** Opens the report in a new tab; saves logs and fits. */
   async open(run, name) {
-    // Only a click may open a tab, and the file comes later.
+    // The tab is opened now, because browsers allow it only during a click and the file arrives later.
     const tab = name === "report" ? window.open("", "_blank") : null;
     try {
-      const { blob, name: saved } = await file(`runs/${encodeURIComponent(run.id)}/${name}`);
+      const { blob, name: fileName } = await file(`runs/${encodeURIComponent(run.id)}/${name}`);
       const address = URL.createObjectURL(blob);
       if (tab) tab.location.replace(address);
-      else element("a", { href: address, download: saved }).click();
+      else element("a", { href: address, download: fileName }).click();
       setTimeout(() => URL.revokeObjectURL(address), 60_000);
       this.note(run.id, "");
     } catch (problem) {
@@ -138,23 +138,23 @@ const ended = (run) => Boolean(run.outcome);
 const fitted = (run) => run.jobs.some((job) => job.state === "done");
 
 function outcome(run) {
-  const word = (run.outcome ?? run.state).replaceAll("_", " ");
+  const text = (run.outcome ?? run.state).replaceAll("_", " ");
   const kind = OUTCOMES[run.outcome ?? run.state] ?? "plain";
-  return element("td", {}, element("span", { className: `mark ${kind}` }, word), element("small", {}, run.reason ?? ""));
+  return element("td", {}, element("span", { className: `mark ${kind}` }, text), element("small", {}, run.reason ?? ""));
 }
 
 function fit(run) {
   const { rmse_n: rmse, noise_floor_n: floor } = run;
   if (!fitted(run)) return element("td", {}, "–");
-  const ratio = floor > 0 ? `${fixed(rmse / floor, 2)} times the floor` : "no floor known";
+  const ratio = floor > 0 ? `${fixed(rmse / floor, 2)} times the noise floor` : "noise floor not known";
   return element("td", {}, element("span", { className: "number" }, `${newtons(rmse)} / ${newtons(floor)}`),
     element("small", {}, run.result === "converged" ? ratio : `${ratio}; ${run.result}`));
 }
 
 const newtons = (force) => (force === null ? "–" : `${fixed(force, 2)}\u00a0N`);
-/** A date or a time that is never broken, and a place to break after it. */
+/** A date or time without line break, followed by a space for one. */
 const whole = (text) => element("span", { className: "number whole" }, `${text} `);
 
-function jobWords(job) {
+function describeJob(job) {
   return [job.state, job.state === "running" ? job.activity : "", job.error].filter(Boolean).join(": ");
 }

@@ -1,16 +1,16 @@
-// The form that starts a run: which method, on which specimen, by whom.
+// Form that starts a run: method, specimen and operator.
 
 import { get, post } from "./api.js";
-import { byId, driveWords, duration, element, write } from "./format.js";
+import { byId, describeDriveKind, duration, element, write } from "./format.js";
 
 const OPERATOR = "mrbench.operator";
 
-/** Why nothing can be started in a state of the bench; empty where it can. */
+/** Reason why no run can be started, by state of the bench; empty if one can. */
 const OBSTACLES = {
   idle: "",
   unknown: "The bench does not answer.",
-  preparing: "A run, or a step before one, is being prepared.",
-  running: "A run goes on.",
+  preparing: "A run or a setup step is being prepared.",
+  running: "A run is in progress.",
   stopping: "The run is being stopped.",
   tripped: "The bench has tripped: reset it first.",
 };
@@ -29,7 +29,7 @@ export class StartForm {
     byId("start-form").addEventListener("input", () => this.show({ problem: "" }));
   }
 
-  /** Loads the methods; what was chosen stays chosen. */
+  /** Loads the methods; the selection is kept. */
   async load() {
     try {
       const methods = await get("methods");
@@ -48,9 +48,9 @@ export class StartForm {
     byId("known-specimens").replaceChildren(...names.map((value) => element("option", { value })));
   }
 
-  /** Shows the state of the bench, or a problem of the last attempt, beside the button. */
+  /** Shows the state of the bench, or the error of the last attempt, next to the button. */
   show({ state = this.state, problem = this.problem }) {
-    // What was refused in one state says nothing about the next one.
+    // A refusal in one state does not apply to the next one.
     this.problem = state === this.state ? problem : "";
     this.state = state;
     const obstacle = OBSTACLES[state] ?? "";
@@ -65,7 +65,7 @@ export class StartForm {
     this.busy = true;
     this.show({ problem: "" });
     try {
-      const run = await post("runs", { method, specimen, operator }); // answered once the run has begun
+      const run = await post("runs", { method, specimen, operator }); // returns once the run has started
       localStorage.setItem(OPERATOR, operator);
       this.onStarted(run);
     } catch (problem) {
@@ -78,7 +78,7 @@ export class StartForm {
 }
 
 function choice(method, checked) {
-  const facts = [duration(method.duration_s), driveWords(method.drive_kind)].filter(Boolean).join(", ");
+  const facts = [duration(method.duration_s), describeDriveKind(method.drive_kind)].filter(Boolean).join(", ");
   return element("label", { className: "choice" },
     element("input", { type: "radio", name: "method", value: method.name, checked, required: true }),
     element("span", {}, element("strong", {}, method.title || method.name),

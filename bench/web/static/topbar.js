@@ -1,9 +1,9 @@
-// The bar that is always in sight: the bench's state, what runs, Stop, and Reset after a trip.
+// Bar that is always visible: state of the bench, current run, Stop, and Reset after a trip.
 
 import { get, post } from "./api.js";
 import { byId, clock, duration, fixed, write } from "./format.js";
 
-const WORDS = {
+const STATE_NAMES = {
   unknown: "No connection",
   idle: "Idle",
   preparing: "Preparing",
@@ -13,16 +13,16 @@ const WORDS = {
 };
 const MOVING = ["preparing", "running", "stopping"];
 const STALE_S = 1.5;
-const STOP_PATIENCE_MS = 3_000;
-/** Where Space has a meaning of its own. Stop itself is a button, so that Space on it stops as well. */
-const TAKES_SPACE = "input, select, textarea, button, a[href], summary, [contenteditable]";
+const STOP_TIMEOUT_MS = 3_000;
+/** Elements on which Space has another function. Stop itself is a button, so that Space on it stops as well. */
+const USES_SPACE = "input, select, textarea, button, a[href], summary, [contenteditable]";
 
 export class TopBar {
   constructor({ onState }) {
     this.onState = onState;
     this.status = null;
-    this.silence = "";
-    this.heard = performance.now();
+    this.failure = "";
+    this.updatedAt = performance.now();
     this.state = null;
     byId("stop").addEventListener("click", () => this.stop());
     byId("reset").addEventListener("click", () => this.askForReset());
@@ -31,35 +31,35 @@ export class TopBar {
     setInterval(() => this.show(), 100);
   }
 
-  /** Takes a status of the agent. */
-  take(status) {
+  /** Shows a status of the agent. */
+  update(status) {
     this.status = status;
-    this.silence = "";
-    this.heard = performance.now();
+    this.failure = "";
+    this.updatedAt = performance.now();
     this.show();
   }
 
-  /** Takes what is known of why nothing is heard. */
-  miss(reason) {
-    this.silence = reason;
+  /** Shows the reason why no status arrives. */
+  showFailure(reason) {
+    this.failure = reason;
   }
 
-  /** Age [s] of the last thing that the agent said. */
+  /** Age [s] of the latest status. */
   get age() {
-    return (performance.now() - this.heard) / 1000;
+    return (performance.now() - this.updatedAt) / 1000;
   }
 
   get stale() {
     return this.age > STALE_S;
   }
 
-  /** The run that goes on; none while only a step before a run does. */
+  /** Run in progress; null during a setup step. */
   get run() {
     const run = this.status?.run;
     return run && !run.outcome ? run : null;
   }
 
-  /** True if, as far as is known, something may move. */
+  /** True if something may move according to the latest status. */
   get moving() {
     return MOVING.includes(this.status?.state);
   }
@@ -67,7 +67,7 @@ export class TopBar {
   show() {
     const state = this.stale || !this.status ? "unknown" : this.status.state;
     if (state !== this.state) this.enter(state);
-    const word = this.status || this.stale ? WORDS[state] : "Connecting";
+    const word = this.status || this.stale ? STATE_NAMES[state] : "Connecting";
     write(byId("state-word"), word);
     document.title = `${word} – mrbench`;
     write(byId("bar-line"), this.line(state));
@@ -79,20 +79,20 @@ export class TopBar {
     byId("state").dataset.state = document.body.dataset.state = state;
     byId("state-shape").setAttribute("href", `#shape-${state}`);
     byId("reset").classList.toggle("absent", state !== "tripped");
-    this.say("");
+    this.showDetail("");
     this.onState(state);
   }
 
   line(state) {
     const { run, trip } = this.status ?? {};
-    if (state === "unknown") return this.stale ? `No data for ${fixed(this.age, 0)} s. ${this.silence}` : "";
+    if (state === "unknown") return this.stale ? `No data for ${fixed(this.age, 0)} s. ${this.failure}` : "";
     if (state === "tripped") return trip;
     if (state === "preparing" && !this.run) return this.status.step?.message ?? "";
     if (!run) return this.status?.step?.message ?? "Ready for a run.";
-    const what = `${run.method} on ${run.specimen || "an unnamed specimen"}`;
-    if (state === "idle") return `Last run: ${what}: ${[run.outcome, run.reason].filter(Boolean).join(", ")}.`;
+    const description = `${run.method} on ${run.specimen || "an unnamed specimen"}`;
+    if (state === "idle") return `Last run: ${description}: ${[run.outcome, run.reason].filter(Boolean).join(", ")}.`;
     const by = run.operator ? ` by ${run.operator}` : "";
-    return `${what}, started ${clock(new Date(run.started))}${by}`;
+    return `${description}, started ${clock(new Date(run.started))}${by}`;
   }
 
   showProgress(state) {
@@ -104,33 +104,33 @@ export class TopBar {
     write(byId("time-left"), left ?? "");
   }
 
-  /** One line of words beside the buttons; `problem` if something did not work. */
-  say(words, problem = false) {
-    write(byId("bar-detail"), words);
+  /** Shows one line next to the buttons; `problem` marks an error. */
+  showDetail(text, problem = false) {
+    write(byId("bar-detail"), text);
     byId("bar-detail").classList.toggle("problem", problem);
   }
 
-  /** Escape stops from anywhere, Space wherever it has no other meaning; both only while something may move. */
+  /** Stops on Escape, and on Space where it has no other function; both only while something may move. */
   onKey(event) {
-    const bare = !event.repeat && !event.ctrlKey && !event.altKey && !event.metaKey;
-    if (!bare || !this.moving || document.querySelector("dialog[open]")) return;
-    const stops = event.key === "Escape" || (event.key === " " && !event.target.closest?.(TAKES_SPACE));
+    const isPlain = !event.repeat && !event.ctrlKey && !event.altKey && !event.metaKey;
+    if (!isPlain || !this.moving || document.querySelector("dialog[open]")) return;
+    const stops = event.key === "Escape" || (event.key === " " && !event.target.closest?.(USES_SPACE));
     if (!stops) return;
     event.preventDefault();
     this.stop();
   }
 
   async stop() {
-    this.say("Stop is sent.");
+    this.showDetail("Stop was sent.");
     try {
-      // What was last heard may be old: another page may have started something since.
-      if (this.stale && !this.moving) this.take(await get("agent", STOP_PATIENCE_MS));
-      if (!this.moving) return this.say("Nothing runs that could be stopped.");
-      const what = this.run ? `runs/${encodeURIComponent(this.run.id)}` : "agent";
-      await post(`${what}/stop`, undefined, STOP_PATIENCE_MS);
-      if (this.state === "running") this.say("Stop is taken: the motion fades out.");
+      // The latest status may be old: another page may have started something since.
+      if (this.stale && !this.moving) this.update(await get("agent", STOP_TIMEOUT_MS));
+      if (!this.moving) return this.showDetail("Nothing to stop: no run or setup step is in progress.");
+      const target = this.run ? `runs/${encodeURIComponent(this.run.id)}` : "agent";
+      await post(`${target}/stop`, undefined, STOP_TIMEOUT_MS);
+      if (this.state === "running") this.showDetail("Stop was accepted: the motion fades out.");
     } catch (problem) {
-      this.say(problem.after("Stop was not confirmed, use the emergency stop of the hardware"), true);
+      this.showDetail(problem.after("Stop was not confirmed, use the emergency stop of the hardware"), true);
     }
   }
 
@@ -141,12 +141,12 @@ export class TopBar {
   }
 
   async reset() {
-    this.say("Reset is sent.");
+    this.showDetail("Reset was sent.");
     try {
       await post("agent/reset");
-      this.say("");
+      this.showDetail("");
     } catch (problem) {
-      this.say(problem.after("Not reset"), true);
+      this.showDetail(problem.after("Not reset"), true);
     }
   }
 }

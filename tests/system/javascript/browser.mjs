@@ -1,8 +1,8 @@
-// Opens Debian's chromium, headless, on one page.
+// Headless chromium with one page.
 
 import { chromium } from "playwright-core";
 
-/** A page of the given size and scheme; `close` ends the browser. */
+/** Opens a page with a size and a colour scheme; `close` ends the browser. */
 export async function openPage(executablePath, { width = 1280, height = 800, colorScheme = "light" } = {}) {
   // Tests run as root in containers, where chromium's own sandbox cannot be set up; only our own page is opened.
   const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });

@@ -1,6 +1,6 @@
-// Uses the service's page as a technician would, against the fake service of the tests, and prints what it saw as JSON:
+// Operates the web page like a technician, on the fake service of the tests, and prints the observations as JSON:
 //   node look_at_page.mjs URL TOKEN CHROMIUM
-// Every wait has playwright's deadline, and its error says what was awaited.
+// Every wait has playwright's time limit, and its error names the condition.
 
 import { openPage } from "./browser.mjs";
 
@@ -27,7 +27,7 @@ const posted = (path) => page.waitForRequest((request) => request.method() === "
 
 async function letIn() {
   await page.goto(`${url}/#token=wrong`);
-  await hasText("#token-reason", "does not take");
+  await hasText("#token-reason", "does not accept");
   await page.fill("#token", token);
   await page.keyboard.press("Enter");
   await hasText("#state-word", "Idle");
@@ -35,7 +35,7 @@ async function letIn() {
 }
 
 async function watch() {
-  await hasText("#readings", "−10.00 … 10.00"); // a whole stroke has come, in millimetres
+  await hasText("#readings", "−10.00 … 10.00"); // a complete stroke has arrived, in millimetres
   const before = await canvases();
   await until(
     (old) => [...document.querySelectorAll("canvas")].every((canvas, k) => canvas.toDataURL() !== old[k]), before);
@@ -87,7 +87,7 @@ async function reset() {
 async function prepare() {
   await page.fill("#move-to", "");
   await page.click("#prepare button[data-step=move]");
-  await hasText("#prepare-note", "say where");
+  await hasText("#prepare-note", "enter a target");
   await page.fill("#move-to", "12.5");
   await page.click("#prepare button[data-step=move]");
   await hasText("#prepare-note", "move is done");
@@ -133,7 +133,7 @@ async function measureWidths() {
   }
 }
 
-/** The thinned trace of a known signal with one spike and one hole, beside the signal. */
+/** Returns a known signal with one spike and one hole, and its envelope. */
 async function thin() {
   return page.evaluate(async () => {
     const { SampleRing, envelope } = await import("./ring.js");

@@ -1,6 +1,6 @@
-// A picture of the service's page:
+// Screenshot of the web page:
 //   node screenshot.mjs URL#token=... FILE.png [--width 1280] [--height 800] [--dark] [--full] [--seconds 12] [--chromium PATH]
-// `--seconds` is how long the page is left to fill its plots.
+// `--seconds` is the time that the page has to fill its plots.
 
 import { parseArgs } from "node:util";
 import { openPage } from "./browser.mjs";

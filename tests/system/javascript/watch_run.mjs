@@ -1,6 +1,6 @@
-// Starts a run of `quick` at the page of a bench whose rig is there, watches it to its fit, prints what it saw as JSON:
+// Starts a run of `quick` on the page of a real service, follows it to its fit, and prints the observations as JSON:
 //   node watch_run.mjs URL TOKEN CHROMIUM PICTURE.png
-// Every wait has playwright's deadline; that of the fit is longer.
+// Every wait has playwright's time limit; that of the fit is longer.
 
 import { openPage } from "./browser.mjs";
 

@@ -1,8 +1,8 @@
-"""Documents of two versions of the product, compared number by number.
+"""Comparison of the documents of two versions, number by number.
 
 A refactoring must not change a result. ``make`` records and analyses twelve logs with one installed version:
-five from the simulated plant, two that were recorded over wires before, recordings of two real dampers and three
-withheld ones. ``compare`` holds the documents of two versions against each other.
+five from the simulated plant, two given logs that were recorded over wires, recordings of two real dampers and
+three withheld ones. ``compare`` compares the documents of two versions.
 
     python -m benchmarks.quality.version_comparison make FOLDER --mrbench COMMAND --shared SHARED --wires A,B
     python -m benchmarks.quality.version_comparison compare BEFORE AFTER
@@ -13,6 +13,7 @@ field that was renamed is compared under its new name (``RENAMED``).
 
 import argparse
 import json
+import os
 import re
 import subprocess
 import sys
@@ -21,9 +22,14 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from identification.damper.effects import rename_form, rename_parameters
+
 IGNORED = re.compile(r"(^|\.)(seconds|version|versions|path|sha256|created|history)(\.|\[|$)|provenance\.logs")
 """Fields that hold times, versions and paths."""
-RENAMED: dict[str, str] = {}
+RENAMED: dict[str, str] = {
+    "each_log": "per_log", "how": "basis", "inside": "coverage", "witness": "cross_check", "agrees": "consistent",
+    "said": "message",
+}  # fmt: skip
 """Last part of a field's path, or an identifier: old name to new name."""
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_./-]+")
 _PLANT_RUNS = {
@@ -37,14 +43,14 @@ _BLIND_CASES = ("case03", "case11", "case22")
 
 
 class Case(NamedTuple):
-    """One log with the strokes that are kept out of its fit."""
+    """Log, and the strokes that are held out of its fit."""
 
     name: str
     hold_out: str = ""
 
 
 def main() -> int:
-    """Run one of the two commands; exit status 1 where a number differs."""
+    """Run one of the two commands; return exit status 1 if a number differs."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("make", help="record and analyse the twelve logs")
@@ -93,7 +99,7 @@ def _record(options: argparse.Namespace) -> Iterator[Case]:
 
 
 def _analyse(options: argparse.Namespace, case: Case) -> list[str]:
-    """Identify, predict and diagnose one log; returns what failed."""
+    """Identify, predict and diagnose one log; return the failures."""
     log, fit = options.folder / f"{case.name}.mcap", options.folder / f"{case.name}.fit.json"
     held = ("--hold-out", case.hold_out) if case.hold_out else ()
     steps = (
@@ -112,11 +118,13 @@ def _analyse(options: argparse.Namespace, case: Case) -> list[str]:
 
 def _run_mrbench(options: argparse.Namespace, *words: object) -> None:
     command = [options.mrbench, *map(str, words)]
-    subprocess.run(command, check=True, capture_output=True, text=True)
+    # Former versions summed columns of the network in the order of a set, which the hash seed determines.
+    environment = {**os.environ, "PYTHONHASHSEED": "1"}
+    subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
 
 
 def compare_documents(before: Path, after: Path) -> int:
-    """Print one line for each document and each difference; 1 where a number differs or a document is missing."""
+    """Print one line for each document and difference; return 1 if a number differs or a document is missing."""
     worst = 0
     print("| document | numbers | identifiers | sentences changed | differences |")
     print("| --- | --- | --- | --- | --- |")
@@ -144,18 +152,26 @@ class _Counts:
 
 
 def _iterate_leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Path and value of every leaf, under new names; ignored fields left out."""
+    """Yield path and value of all leaves under present names, without the ignored fields."""
     if IGNORED.search(path):
         return
     if isinstance(value, dict):
+        if {"name", "form", "parameters"} <= value.keys():
+            value = _rename_effect(value)
         for key, inner in value.items():
-            name = RENAMED.get(key, key)
+            name = RENAMED.get(str(key), str(key))
             yield from _iterate_leaves(inner, f"{path}.{name}" if path else name)
     elif isinstance(value, list):
         for number, inner in enumerate(value):
             yield from _iterate_leaves(inner, f"{path}[{number}]")
     else:
         yield path, value
+
+
+def _rename_effect(effect: dict[str, Any]) -> dict[str, Any]:
+    """Return an effect with the present names of its form and parameters."""
+    name, form, parameters = effect["name"], effect["form"], effect["parameters"]
+    return {**effect, "form": form and rename_form(name, form), "parameters": rename_parameters(name, parameters)}
 
 
 def _find_differences(old: dict[str, Any], new: dict[str, Any], counts: _Counts) -> Iterator[str]:

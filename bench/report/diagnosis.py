@@ -127,7 +127,7 @@ def read_diagnosis(path: Path) -> Diagnosis:
 
 
 def format_name(name: str) -> str:
-    """Return a name of the library as words."""
+    """Return the name of an effect, stage or parameter without underscores."""
     return name.replace("_", " ")
 
 

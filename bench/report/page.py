@@ -72,7 +72,7 @@ class Report:
 
     @property
     def is_fitted_log(self) -> bool:
-        """Whether the fit was made from this log."""
+        """True if the fit used this log."""
         return self.fit is not None and self.fit.has_fitted(self.sha256)
 
 

@@ -42,7 +42,7 @@ class Stroke:
 
     @property
     def has_varying_drive(self) -> bool:
-        """Whether the drive varies within a trace."""
+        """True if the drive varies within a trace."""
         return any(trace.drive is None for trace in self.traces)
 
 

@@ -78,7 +78,7 @@ def test_the_page_is_well_formed_and_needs_nothing_from_elsewhere(html):
 
 
 @pytest.mark.parametrize(
-    "said",
+    "text",
     [
         "The law reproduces the recorded force with an error of 2.00 N",
         "The noise floor of the recording is 1.90 N",
@@ -99,8 +99,8 @@ def test_the_page_is_well_formed_and_needs_nothing_from_elsewhere(html):
         "The recording is clean",
     ],
 )
-def test_the_page_shows_numbers_with_their_units(html, said):
-    assert said in Checked(html).text
+def test_the_page_shows_numbers_with_their_units(html, text):
+    assert text in Checked(html).text
 
 
 def test_the_page_names_what_it_was_made_from(html, made):
@@ -130,10 +130,10 @@ def describe(log, fit_changes=None, is_fitted_log=True, **errors):
 
 
 def test_a_fit_from_another_log_is_noted(log):
-    said = " ".join(describe(log, is_fitted_log=False))
-    assert "fitted to another recording (strokes.mcap)" in said
-    assert "predictions for strokes that the fit did not use" in said
-    assert "held-out" not in said
+    text = " ".join(describe(log, is_fitted_log=False))
+    assert "fitted to another recording (strokes.mcap)" in text
+    assert "predictions for strokes that the fit did not use" in text
+    assert "held-out" not in text
 
 
 @pytest.mark.parametrize(
@@ -164,17 +164,17 @@ def test_limits_of_a_fit_are_warnings(log, changes, words):
 
 
 def test_undetermined_parameters_are_named(log):
-    said = " ".join(describe(log))
-    assert "The strokes determine 1 of the 2 parameters that affect the force. Not determined: c0_b." in said
-    assert "A, is a gauge" in said
-    assert "the parameters rely on the calibration" in said
+    text = " ".join(describe(log))
+    assert "The strokes determine 1 of the 2 parameters that affect the force. Not determined: c0_b." in text
+    assert "A, is a gauge" in text
+    assert "the parameters rely on the calibration" in text
 
 
 def test_a_delay_that_clock_errors_do_not_explain_is_noted(log):
     nuisances = fit_document()["nuisances"]
     late = {**nuisances["force_delay"], "value": 2e-3, "ci95": [1.9e-3, 2.1e-3], "outside_prior": True}
-    said = describe(log, {"nuisances": {**nuisances, "force_delay": late}})
-    assert "The delay of the force channel, 2.00 ± 0.10 ms, exceeds what clock errors explain." in said
+    text = describe(log, {"nuisances": {**nuisances, "force_delay": late}})
+    assert "The delay of the force channel, 2.00 ± 0.10 ms, exceeds what clock errors explain." in text
 
 
 def test_a_lossy_recording_is_a_warning(tmp_path):

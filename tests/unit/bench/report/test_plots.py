@@ -112,15 +112,15 @@ def test_a_constant_drive_is_drawn_as_a_line_with_gaps():
 ])  # fmt: skip
 def test_every_axis_has_its_unit(recording, draw, labels):
     axes = draw(recording).axes
-    said = {axis.get_xlabel() for axis in axes} | {axis.get_ylabel() for axis in axes}
-    assert set(labels) <= said
-    assert all("[" in label for label in said if label)
+    texts = {axis.get_xlabel() for axis in axes} | {axis.get_ylabel() for axis in axes}
+    assert set(labels) <= texts
+    assert all("[" in label for label in texts if label)
 
 
 def test_the_residual_is_drawn_with_the_floor_and_the_held_out_part(recording):
     figure = plots.plot_residual(recording, 1.9)
-    said = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert said == ["± twice the noise floor", "held out of the fit"]
+    texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert texts == ["± twice the noise floor", "held out of the fit"]
 
 
 def test_there_is_no_residual_without_a_fit(log):

@@ -122,13 +122,19 @@ def _parse_clock_record(text: str) -> dict[str, Any]:
     return record if isinstance(record, dict) else {}
 
 
-def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> Dataset:
+def assemble(
+    recordings: Sequence[Recording], hold_out: HoldOut = HoldOut(), max_excluded: float = _MAX_EXCLUDED
+) -> Dataset:
     """Smooth the motion of every stretch, and mark the fitted samples.
+
+    Args:
+        recordings: logs that are fitted together.
+        hold_out: samples kept out of the fit.
+        max_excluded: largest share of a stretch that disturbances may exclude [1].
 
     Raises:
         UnusableDataError: the logs have different kinds of drive, or the hold-out selects nothing or leaves too
-        few
-            samples.
+            few samples.
     """
     kinds = {r.drive_kind for r in recordings}
     if len(kinds) > 1:
@@ -142,7 +148,7 @@ def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> 
     pieces, floors, notes = [], [], list[str]()
     for k, (mask, start, log) in enumerate(zip(held_out, starts, logs, strict=True)):
         motion = estimate_motion(stretches[k])
-        stretch = stretches[k] = _exclude_unresolved(stretches[k], motion.unresolved, notes)
+        stretch = stretches[k] = _exclude_unresolved(stretches[k], motion.unresolved, max_excluded, notes)
         floors.append(estimate_floor(replace(stretch, measured=stretch.valid_mask), motion))
         fitted = stretch.valid_mask & ~mask
         fitted[: round(_TRANSIENT_TIME * stretch.rate)] = False
@@ -156,13 +162,13 @@ def assemble(recordings: Sequence[Recording], hold_out: HoldOut = HoldOut()) -> 
     return Dataset(tuple(pieces), tuple(held_out), tuple(stretches), floor, tuple(recordings), tuple(notes))
 
 
-def _exclude_unresolved(stretch: Stretch, unresolved: BoolArray, notes: list[str]) -> Stretch:
+def _exclude_unresolved(stretch: Stretch, unresolved: BoolArray, max_excluded: float, notes: list[str]) -> Stretch:
     """Mark the force of unresolved samples as invalid, unless they are most of the stretch, and add a note."""
     if not unresolved.any():
         return stretch
     note = f"{stretch.name}: disturbances (late setpoints or shocks) in {unresolved.mean():.2%} of the samples"
-    if unresolved.mean() > _MAX_EXCLUDED:
-        notes.append(f"{note}, too many to exclude (limit {_MAX_EXCLUDED:.0%}); record again")
+    if unresolved.mean() > max_excluded:
+        notes.append(f"{note}, too many to exclude (limit {max_excluded:.0%}); record again")
         return stretch
     notes.append(f"{note}; these samples were excluded")
     valid = ~unresolved if stretch.force_valid is None else stretch.force_valid & ~unresolved

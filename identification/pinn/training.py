@@ -28,7 +28,7 @@ from identification.simulate import ActiveEffect
 from identification.threads import use_one_thread
 
 _MAX_BATCH_ACCELERATOR, _MAX_BATCH_CPU = 16, 1
-"""Largest number of dampers in a batch.
+"""Largest number of dampers in a batch, unless the settings have another.
 
 On an accelerator, the Jacobian of a damper and its intermediate arrays take some 0.3 GB. A processor is busy with
 one damper, and the arrays of several would not fit its caches.
@@ -110,7 +110,7 @@ def group_batches(problems: Sequence[Problem], settings: DenseSettings) -> list[
     groups = dict[tuple[int, int], list[int]]()
     for number, problem in enumerate(problems):
         groups.setdefault(compute_batch_size(problem, settings), []).append(number)
-    size = _MAX_BATCH_CPU if settings.device == "cpu" else _MAX_BATCH_ACCELERATOR
+    size = settings.max_dampers or (_MAX_BATCH_CPU if settings.device == "cpu" else _MAX_BATCH_ACCELERATOR)
     return [group[k : k + size] for group in groups.values() for k in range(0, len(group), size)]
 
 

@@ -128,6 +128,11 @@ class ElementSettings(CommonSettings):
         validation_alias=AliasChoices("max_starts", "starts"),
         description="largest number of starts",
     )
+    opening_length: float = Field(
+        default=40.0,
+        gt=0.0,
+        description="length of the data on which starts are compared, all pieces together, in s",
+    )
 
 
 class TorchSettings(CommonSettings):
@@ -155,6 +160,11 @@ class DenseSettings(TorchSettings):
         description="first and last law weight",
     )
     steps: int = Field(default=280, ge=10, description="number of Gauss-Newton steps")
+    max_dampers: int | None = Field(
+        default=None,
+        ge=1,
+        description="largest number of dampers that are trained together; by default 1 on `cpu` and 16 elsewhere",
+    )
 
 
 class PaperSettings(TorchSettings):
@@ -165,7 +175,7 @@ class PaperSettings(TorchSettings):
     layers: int = Field(default=3, ge=1)
     derivative: Literal["total", "partial"] = Field(
         default="total",
-        description="time derivative of the outputs: along the trajectory, or over the input t alone, which is "
+        description="time derivative of the outputs: along the solution, or over the input t alone, which is "
         "a research option",
     )
     phi_data: float = Field(default=1.0, gt=0.0, description="weight of the two force losses")

@@ -1,4 +1,4 @@
-"""Multilayer perceptron with tanh layers that carries the derivative along the trajectory forward with its values.
+"""Multilayer perceptron with tanh layers that propagates the derivative along the solution with its values.
 
 Inputs are functions of time, so the rate of an output is the product of the network's Jacobian with the rates of
 all inputs (a Jacobian-vector product). A partial derivative over an input called t would ignore the rates of the
@@ -18,7 +18,7 @@ class ForwardCache(NamedTuple):
     value: Tensor
     """Activations (N, units)."""
     rate: Tensor
-    """Rates of the activations along the trajectory (N, units) [1/s]."""
+    """Rates of the activations along the solution (N, units) [1/s]."""
     inner_rate: Tensor
     """Rates before the activation function (N, units) [1/s]."""
 

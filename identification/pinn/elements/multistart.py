@@ -38,8 +38,8 @@ Weighted residuals are far smaller; a sharp knee leaves a hundredth at points of
 """
 _SAME_MISFIT = 1e-2
 """Threshold on the relative difference of two misfits [1]: below it, two starts ended in the same minimum."""
-_OPENING_LENGTH, _MIN_PIECE_LENGTH = 40.0, 2.0
-"""Length of the data on which starts are compared [s]: of all pieces together, and of each piece at least."""
+_MIN_PIECE_LENGTH = 2.0
+"""Smallest length of each piece of the data on which starts are compared [s]."""
 _REQUIRED_AGREEMENTS = 1
 """Number of further starts that must end in the best one's minimum before the search stops."""
 
@@ -72,7 +72,7 @@ def train_elements(
         stretches: recordings behind the pieces, to estimate the motion again; None to keep the motion.
     """
     split = problem.exclude_samples(validation)
-    opening = _select_opening(split)
+    opening = _select_opening(split, settings.opening_length)
     best = _find_best_start(opening, settings, monitor)
     blind = _make_outcome(opening, best)
     try:
@@ -84,12 +84,12 @@ def train_elements(
     return final, blind if settings.refit_on_all else final
 
 
-def _select_opening(problem: Problem) -> Problem:
-    """Return the problem with the first part of each piece, if all pieces together are long enough."""
+def _select_opening(problem: Problem, length: float) -> Problem:
+    """Return the problem with the first part of each piece, if all pieces together exceed a length [s]."""
     total = sum(float(p.train.sum()) / p.excitation.rate for p in problem.pieces)
-    if total <= _OPENING_LENGTH:
+    if total <= length:
         return problem
-    return problem.replace_training([_mask_opening(p, _OPENING_LENGTH / total) for p in problem.pieces])
+    return problem.replace_training([_mask_opening(p, length / total) for p in problem.pieces])
 
 
 def _mask_opening(piece: Piece, share: float) -> Array:

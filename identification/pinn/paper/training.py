@@ -5,7 +5,7 @@ N(x, x', v, t) -> [u, y, z], all three learned. Five losses (eqs. 16-20) are wei
 reasons:
 
 - du/dt has the stable sign, and eq. 13's slip is x' - y' as in eqs. 3 and 18 (see ``damper/law.py``).
-- d/dt of the outputs is the derivative along the trajectory, with (x', x'', dv/dt, 1). dv/dt is zero between drive
+- d/dt of the outputs is the derivative along the solution, with (x', x'', dv/dt, 1). dv/dt is zero between drive
   steps. ``derivative: partial`` is the printed form, kept as a research option to show its effect.
 - Inputs, outputs and residuals are of order one, so that the weights are comparable. Positive parameters are
   searched as logarithms.
@@ -51,7 +51,7 @@ class _PaperSamples(NamedTuple):
     inputs: Tensor
     """Inputs of the network (4, N)."""
     rates: Tensor
-    """Rates of the inputs (4, N) along the trajectory, or of t alone [1/s]."""
+    """Rates of the inputs (4, N) along the solution, or of t alone [1/s]."""
     x: Tensor
     v: Tensor
     drive: Tensor

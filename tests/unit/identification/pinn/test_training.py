@@ -10,7 +10,6 @@ from identification.fitting.unknown_layout import COORDINATE_COUNT
 from identification.pinn.common.settings import read_settings
 from identification.pinn.common.training_monitor import TrainingMonitor, TrainingStopped
 from identification.pinn.common.validation_split import make_validation_masks
-from identification.pinn.elements import multistart
 from identification.pinn.training import train
 from tests.support.pinn_problem import TRUTH, make_problem
 
@@ -64,10 +63,9 @@ def test_the_force_of_validation_blocks_is_not_learned():
     assert moved.simulation.validation == pytest.approx(3.0 * problem.noise, rel=0.25)
 
 
-def test_of_a_long_recording_the_first_part_is_learned_first_and_all_of_it_at_the_end(monkeypatch):
-    monkeypatch.setattr(multistart, "_OPENING_LENGTH", 3.0)
+def test_of_a_long_recording_the_first_part_is_learned_first_and_all_of_it_at_the_end():
     problem = make_problem((0.0, 0.3), 3.0)
-    result = train(problem, read_settings("elements"))
+    result = train(problem, read_settings("elements").model_copy(update={"opening_length": 3.0}))
     noise = problem.noise
     assert result.accepted
     assert result.simulation.validation == pytest.approx(noise, rel=0.15)

@@ -13,11 +13,10 @@ from identification.errors import IdentificationError
 from identification.fitting.output_error import OptimiserSettings
 from identification.logs.recording import Recording
 from identification.pinn import training
-from identification.pipeline import batch
-from identification.pipeline import FitRequest, identify
+from identification.pipeline import FitRequest, batch, identify
 from tests.support.short_fit import LABORATORY, NOISE, fitted, recording
 
-SMALL = {"network": "dense", "width": 6, "samples": 500, "steps": 10}
+SMALL = {"network": "dense", "width": 6, "samples": 500, "steps": 10, "max_dampers": 16}
 
 
 def weaker() -> Recording:
@@ -71,7 +70,6 @@ def test_the_dense_network_is_trained_on_all_of_them_at_once(logs, small, monkey
         return once(problems, *rest)
 
     monkeypatch.setattr(pinn, "train_batch", counted)
-    monkeypatch.setattr(training, "_MAX_BATCH_CPU", 16)
     first, third = fits(batch.identify_batch(logs, FitRequest(stages=("pinn", "refine"), preset=small)))
     assert sizes == [2]
     assert [stage.name for stage in first.stages] == ["pinn", "refine"]
@@ -80,8 +78,7 @@ def test_the_dense_network_is_trained_on_all_of_them_at_once(logs, small, monkey
     assert list(third.provenance.logs) == ["b.mcap"]
 
 
-def test_the_budget_of_a_batch_is_that_of_each_log(logs, small, monkeypatch):
-    monkeypatch.setattr(training, "_MAX_BATCH_CPU", 16)
+def test_the_budget_of_a_batch_is_that_of_each_log(logs, small):
     request = FitRequest(settings=OptimiserSettings(budget=1e-3), stages=("pinn", "refine"), preset=small)
     assert fits(batch.identify_batch(logs, request))[0].agreement.startswith(
         "not compared: pinn found nothing, its budget of 0.001 s"

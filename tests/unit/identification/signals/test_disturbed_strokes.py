@@ -99,10 +99,9 @@ def test_unresolved_samples_are_neither_fitted_nor_scored_with_a_note(tmp_path):
     )
 
 
-def test_a_mostly_disturbed_recording_is_kept_with_a_note(tmp_path, monkeypatch):
+def test_a_mostly_disturbed_recording_is_kept_with_a_note(tmp_path):
     _, disturbed = make_disturbed()
-    monkeypatch.setattr("identification.fitting.dataset._MAX_EXCLUDED", 0.01)
     log = Recording(tmp_path / "run.mcap", "0" * 64, "coil_v", "V", (disturbed,), {"run": {"source": "run"}})
-    dataset = assemble([log])
+    dataset = assemble([log], max_excluded=0.01)
     assert dataset.stretches[0].valid_mask.all()
     assert "record again" in dataset.notes[0]

@@ -1,3 +1,3 @@
-"""Benchmarks: ratios against a baseline measured in the same run. They print; they never decide a test."""
+"""Benchmarks of speed and accuracy, printed as ratios to a baseline of the same run; no test depends on them."""
 
 __all__: list[str] = []

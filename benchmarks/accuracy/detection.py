@@ -1,9 +1,9 @@
-"""How small an effect may be and still be found: each effect at parts of its usual size on a short rich method.
+"""Detection limit of effects: each effect at fractions of its usual size, on a short rich method.
 
-Sizes are those of the shipped scenarios, and the forms are the library's own; forms that the library does not have
-are the business of `mrbench trial`. Runs without any effect say how often something is named where nothing is.
-``--keep FOLDER`` keeps every answer and takes up where an earlier call stopped; ``--cases N`` stops after so many
-new ones; ``--page`` writes ``docs/evidence/detection.md`` from what there is.
+Sizes are those of the shipped scenarios, and forms are those of the library; `mrbench trial` tests other forms.
+Runs without any effect measure the rate of false alarms. ``--keep FOLDER`` keeps all results and continues an
+interrupted call. ``--cases N`` stops after N new runs. ``--page`` writes ``docs/evidence/detection.md`` from the
+existing results.
 """
 
 import argparse
@@ -16,7 +16,7 @@ from benchmarks.common import (
     COMMON_EFFECTS,
     NO_EFFECT,
     lengthen_method,
-    load_figures,
+    load_results,
     make_scenario,
     record_effect,
     time_call,
@@ -27,24 +27,24 @@ from identification.logs import load
 
 EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
 SIZES = (1.0, 0.5, 0.2, 0.1)
-"""[1] of the usual size."""
+"""Fractions of the usual size [1]."""
 _RUN_ORDER = (0.2, 0.5, 1.0, 0.1)
-"""The same, as they are run: where a call ends early, the middle of the curve is there."""
+"""Order in which the sizes are run: an interrupted call has the middle of the curve."""
 NULL_RUNS = 50
-_PAGE = """# How small an effect may be and still be found
+"""Number of runs without an effect."""
+_PAGE = """# Detection limit of effects
 
-Each effect in the default rig at a part of its usual size, on the shipped method `quick` ({seconds} s, 1 kHz, 3
-strokes at six drives); one run a cell and seed. A cell says how many of the runs named the effect, how many named
-something else instead, and how far the refitted law stood above the noise floor (1.00 is the floor itself: nothing
-shows). Sizes are those of the shipped scenarios, forms are the library's own: these are the odds under a form that
-is right. Forms that the library does not have are tried by `mrbench trial`.
-Made by
+Each effect in the default rig at a fraction of its usual size, on the shipped method `quick` ({seconds} s, 1 kHz,
+3 strokes at six drives), with one run for each cell and seed. A cell contains the number of runs that named the
+effect, the number that named another one, and the error of the refitted law over the noise floor (1.00: no visible
+gap). Sizes are those of the shipped scenarios. Forms are those of the library, so these rates hold for a form that
+is known. `mrbench trial` tests forms outside the library. Command:
 
 ```
 python -m benchmarks.accuracy.detection --keep FOLDER --page
 ```
 
-Without any effect: something named in **{false} of {nulls}** runs ({rate}).
+Without any effect: an effect was named in **{false} of {nulls}** runs ({rate}).
 
 | effect | usual size | {heads} |
 | --- | --- | {dashes} |
@@ -55,7 +55,7 @@ Without any effect: something named in **{false} of {nulls}** runs ({rate}).
 
 
 class Case(NamedTuple):
-    """One run."""
+    """Run with one effect at one size."""
 
     effect: str
     size: float
@@ -63,12 +63,12 @@ class Case(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Of its files."""
+        """Base name of the files of this run."""
         return f"{self.effect}-{self.size:g}-{self.seed}"
 
 
 def list_cases(seeds: int) -> Iterator[Case]:
-    """Every run, the nulls between the others, so that a part is a fair sample."""
+    """List all runs; those without effect are spread between the others, so that each part is a fair sample."""
     nulls = iter(range(NULL_RUNS))
     for seed in range(seeds):
         for size in _RUN_ORDER:
@@ -78,11 +78,11 @@ def list_cases(seeds: int) -> Iterator[Case]:
                     yield Case(NO_EFFECT, 0.0, null)
 
 
-def ensure_answer(case: Case, folder: Path) -> bool:
-    """Record and diagnose a run, once; whether it was new."""
+def ensure_result(case: Case, folder: Path) -> bool:
+    """Record and diagnose a run unless its result exists; return whether it was new."""
     out = folder / f"{case.name}.json"
     new = not out.exists()
-    load_figures(out, lambda: _diagnose_case(case, folder))
+    load_results(out, lambda: _diagnose_case(case, folder))
     return new
 
 
@@ -91,7 +91,7 @@ def _diagnose_case(case: Case, folder: Path) -> dict[str, Any]:
     record_effect(lengthen_method("quick", 1), case.effect, case.size, 1000 + case.seed, log)
     recording = load(log)
     found, seconds = time_call(lambda: diagnose([recording]).diagnosis)
-    answer = {
+    result = {
         **case._asdict(),
         "verdict": found.verdict,
         "named": {e.name: e.probability for e in found.effects},
@@ -100,29 +100,29 @@ def _diagnose_case(case: Case, folder: Path) -> dict[str, Any]:
         "recorded": sum(len(s.time) / s.rate for s in recording.stretches),
     }
     log.unlink()
-    print(f"{case.name}: {found.verdict} {answer['named']} {answer['ratio']:.3f}", flush=True)
-    return answer
+    print(f"{case.name}: {found.verdict} {result['named']} {result['ratio']:.3f}", flush=True)
+    return result
 
 
-def render_page(answers: list[dict[str, Any]]) -> str:
-    """The page of what has been answered."""
-    nulls = [a for a in answers if a["effect"] == NO_EFFECT]
+def render_page(results: list[dict[str, Any]]) -> str:
+    """Return the page of the existing results."""
+    nulls = [a for a in results if a["effect"] == NO_EFFECT]
     false = sum(bool(a["named"]) for a in nulls)
     return _PAGE.format(
-        seconds=f"{answers[0]['recorded']:.0f}",
+        seconds=f"{results[0]['recorded']:.0f}",
         false=false,
         nulls=len(nulls),
         rate=f"{false / max(len(nulls), 1):.0%}",
-        heads=" | ".join(f"{size:g} of it" for size in SIZES),
+        heads=" | ".join(f"{size:g} times" for size in SIZES),
         dashes=" | ".join("---" for _ in SIZES),
-        rows="\n".join(_render_row(effect, answers) for effect in COMMON_EFFECTS),
-        total=len(answers),
-        minutes=sum(a["seconds"] for a in answers) / 60.0,
+        rows="\n".join(_render_row(effect, results) for effect in COMMON_EFFECTS),
+        total=len(results),
+        minutes=sum(a["seconds"] for a in results) / 60.0,
     )
 
 
-def _render_row(effect: str, answers: list[dict[str, Any]]) -> str:
-    mine = [[a for a in answers if a["effect"] == effect and a["size"] == size] for size in SIZES]
+def _render_row(effect: str, results: list[dict[str, Any]]) -> str:
+    mine = [[a for a in results if a["effect"] == effect and a["size"] == size] for size in SIZES]
     return f"| {effect} | {_describe_size(effect)} | {' | '.join(map(_render_cell, mine))} |"
 
 
@@ -144,11 +144,11 @@ def _render_cell(runs: list[dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    """Run what is missing, and write the page if asked."""
+    """Run the missing cases, and write the page on request."""
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--keep", type=Path, required=True, help="folder of the answers")
-    options.add_argument("--seeds", type=int, default=1, help="runs a cell")
-    options.add_argument("--cases", type=int, default=10**6, help="most new runs in this call")
+    options.add_argument("--keep", type=Path, required=True, help="folder of the results")
+    options.add_argument("--seeds", type=int, default=1, help="runs for each cell")
+    options.add_argument("--cases", type=int, default=10**6, help="largest number of new runs in this call")
     options.add_argument("--page", action="store_true", help="write the page")
     asked = options.parse_args()
     asked.keep.mkdir(parents=True, exist_ok=True)
@@ -156,10 +156,10 @@ def main() -> None:
     for case in list_cases(asked.seeds):
         if new >= asked.cases:
             break
-        new += ensure_answer(case, asked.keep)
+        new += ensure_result(case, asked.keep)
     if asked.page:
-        answers = [json.loads(p.read_text("utf-8")) for p in asked.keep.glob("*.json") if "scenario" not in p.name]
-        (EVIDENCE / "detection.md").write_text(render_page(answers), encoding="utf-8")
+        results = [json.loads(p.read_text("utf-8")) for p in asked.keep.glob("*.json") if "scenario" not in p.name]
+        (EVIDENCE / "detection.md").write_text(render_page(results), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,16 @@
-"""Coverage of the intervals over many replicas: one damper, one method, the sensors' noise drawn anew each time.
+"""Coverage of the intervals over many replicas of one damper and one method, each with fresh sensor noise.
 
-The rig plays the method without noise a few times (its own integrator, filters, delays; clock errors and zero
-shifts drawn anew). Each replica adds fresh noise and the converters' steps to displacement, force and drive, and
-is fitted without a guess. Results are kept a line each, so that an interrupted run goes on where it stopped:
+The simulated rig records the method a few times without noise, each time with new clock errors and zero shifts, by
+its own integrator, filters and delays. Each replica adds fresh noise and the resolution of the converters to
+displacement, force and drive, and is fitted without an initial guess. The results file has one line for each
+replica, so that an interrupted run can be continued:
 
     python -m benchmarks.accuracy.monte_carlo run METHOD FIRST LAST FILE
     python -m benchmarks.accuracy.monte_carlo random FIRST LAST FILE
     python -m benchmarks.accuracy.monte_carlo table FILE
 
-`random` takes a displacement that never repeats, with 5 µm of noise and steps of 3 µm, thirty seconds of it, and
-also compares the fit with the true damper on twenty unseen seconds.
+`random` uses thirty seconds of random displacement with 5 µm of noise and a resolution of 3 µm. It also compares
+the fit with the true damper on twenty seconds that the fit has not read.
 """
 
 import json
@@ -36,12 +37,12 @@ REPLICAS_PER_RECORDING = 20
 """Replicas that share one noise-free recording."""
 QUANTILES = {95: 1.959964, 99: 2.575829}
 NOISY_CHANNELS = ("displacement", "force", "coil_drive")
-COARSE_STEP = 3e-6
-"""[m] step of the displacement of a random stroke."""
+COARSE_RESOLUTION = 3e-6
+"""Resolution of the displacement of a random stroke [m]."""
 
 
 def write_noiseless_scenario(folder: Path) -> Path:
-    """The default scenario with sensors that have filters, delays and zero shifts, but no noise and no steps."""
+    """Write the default scenario without noise and resolution of the sensors; filters and delays are kept."""
     sensors = {
         name: sensor.model_copy(update={"noise": 0.0, "resolution": 0.0, "jitter": 0.0}).model_dump()
         for name, sensor in Sensors()
@@ -59,7 +60,7 @@ def write_noiseless_scenario(folder: Path) -> Path:
 
 
 def add_noise(recording: Recording, seed: int) -> Recording:
-    """The recording with fresh noise and steps of the converters, as large as the default scenario's."""
+    """Return the recording with fresh noise and resolution as in the default scenario."""
     random = np.random.default_rng([7, seed])
     return replace(
         recording,
@@ -74,7 +75,8 @@ def _add_stretch_noise(stretch: Stretch, random: np.random.Generator) -> Stretch
     def channel(name: str, values: np.ndarray) -> np.ndarray:
         sensor = getattr(sensors, name)
         step = sensor.resolution or 1.0
-        return np.round((values + sensor.noise * random.standard_normal(len(values))) / step) * step
+        noisy = values + sensor.noise * random.standard_normal(len(values))
+        return np.asarray(np.round(noisy / step) * step)
 
     return replace(
         stretch,
@@ -87,7 +89,7 @@ def _add_stretch_noise(stretch: Stretch, random: np.random.Generator) -> Stretch
 def run(method: str, first: int, last: int, results: Path) -> None:
     """Fit the replicas from ``first`` up to, not including, ``last`` that are not in the file yet."""
     known = {row["seed"] for row in cache.read_rows(results)}
-    # Some replicas share a recording, and so its clock errors and zero shifts.
+    # Replicas of one recording share its clock errors and zero shifts.
     for base in sorted({seed // REPLICAS_PER_RECORDING for seed in range(first, last) if seed not in known}):
         with TemporaryDirectory() as folder:
             recording, true, _ = record_run(
@@ -122,7 +124,7 @@ def _fit_replica(recording: Recording, seed: int, true: Coordinates) -> dict[str
 
 
 def run_random(first: int, last: int, results: Path) -> None:
-    """Fit random strokes with a noisy, coarse displacement."""
+    """Fit random strokes with a noisy displacement of coarse resolution."""
     for seed in range(first, last):
         row = _fit_replica(_quantise(make_random_recording(seed, 30.0)), seed, LABORATORY)
         point = Coordinates(**{name: c["value"] for name, c in row["coordinates"].items()})
@@ -138,32 +140,33 @@ def _quantise(recording: Recording) -> Recording:
     return replace(
         recording,
         stretches=tuple(
-            replace(s, displacement=np.round(s.displacement / COARSE_STEP) * COARSE_STEP)
+            replace(s, displacement=np.round(s.displacement / COARSE_RESOLUTION) * COARSE_RESOLUTION)
             for s in recording.stretches
         ),
     )
 
 
 def print_table(results: Path) -> None:
-    """Print the coverage, pooled and of each coordinate, with bias and spread in the fit's own deviations."""
+    """Print the coverage, pooled and by coordinate, and mean and deviation of the errors in fit deviations."""
     found = cache.read_rows(results)
     names = list(found[0]["coordinates"])
     inside = {level: [_find_covered(found, name, f"ci{level}") for name in names] for level in QUANTILES}
-    print(f"{len(found)} replicas, {sum(r['result'] == 'converged' for r in found)} end in `converged` alone")
+    print(f"{len(found)} replicas, {sum(r['result'] == 'converged' for r in found)} with the result `converged`")
     print(f"processor time of a fit, median {np.median([r['seconds'] for r in found]):.1f} s")
-    if unseen := [r["unseen"] for r in found if "unseen" in r]:
+    if validation := [r["unseen"] for r in found if "unseen" in r]:
         print(
-            f"unseen force error over the true damper's: worst {max(unseen):.4f}, median {np.median(unseen):.4f}"
+            f"validation force error over the true damper's: largest {max(validation):.4f}, "
+            f"median {np.median(validation):.4f}"
         )
     for level, hits in inside.items():
         every = np.concatenate(hits)
-        # Coordinates of one fit miss together: what varies freely is the share inside from replica to replica.
+        # Errors of the coordinates of one fit are correlated; the shares of different replicas are independent.
         error = 100 * np.std([np.mean([h[k] for h in hits if len(h) == len(found)]) for k in range(len(found))])
         print(
             f"pooled {level} %: {100 * every.mean():.1f} % of {len(every)} "
             f"(± {error / np.sqrt(len(found)):.1f}, over replicas)"
         )
-    print("| coordinate | 95 % | 99 % | bias | spread |\n| --- | ---: | ---: | ---: | ---: |")
+    print("| coordinate | 95 % | 99 % | bias | deviation |\n| --- | ---: | ---: | ---: | ---: |")
     for k, name in enumerate(names):
         z = _compute_deviations(found, name)
         shares = [f"{100 * inside[level][k].mean():.1f} %" for level in QUANTILES]
@@ -176,7 +179,7 @@ def _find_covered(found: Sequence[dict[str, Any]], name: str, interval: str) -> 
 
 
 def _compute_deviations(found: Sequence[dict[str, Any]], name: str) -> np.ndarray:
-    """Found minus true, in the fit's own standard deviations, by its 95 % interval."""
+    """Compute estimated minus true values in the standard deviations of the fit, from its 95 % intervals."""
     known = [r["coordinates"][name] for r in found if r["coordinates"][name]["ci95"] is not None]
     return np.array([QUANTILES[95] * 2 * (c["value"] - c["true"]) / (c["ci95"][1] - c["ci95"][0]) for c in known])
 

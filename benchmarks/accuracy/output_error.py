@@ -1,8 +1,8 @@
-"""Output-error refinement: a hundred random dampers, errors against the Cramér-Rao bound, and scipy as baseline.
+"""Output-error fit: errors of a hundred random dampers against the Cramér-Rao bound, and scipy as baseline.
 
-The baseline is what a careful person would write first: `scipy.optimize.least_squares` with differences for
-slopes, the law in Python under `solve_ivp`, method LSODA. It gets the same start, the same search numbers and the
-same data, and is timed to the same final cost.
+The baseline is the straightforward solution: `scipy.optimize.least_squares` with finite differences, and the law
+in Python under `solve_ivp`, method LSODA. It has the same start, search coordinates and data, and is timed until
+it reaches the same final cost.
 
     python -m benchmarks.accuracy.output_error dampers [FIRST LAST FILE]
     python -m benchmarks.accuracy.output_error baseline
@@ -43,12 +43,14 @@ from identification.uncertainty import compute_coordinate_covariance, estimate_c
 
 DAMPERS = 100
 EQUAL_COST = 1.001
-"""[1] ratio of two costs that count as equal."""
+"""Ratio of two costs up to which they count as equal [1]."""
 START_SHARES = (0.3, 0.5, 0.7)
-"""[1] of the way from the minimum to the regression's start, in search numbers, where both begin: from that start
-scipy's own way does not arrive within minutes."""
+"""Starts of both: fractions [1] of the distance in search coordinates from the minimum to the start by regression.
+
+From the start by regression itself, scipy does not converge within minutes.
+"""
 BASELINE_LEVELS = (0.0, 0.5, 0.2)
-"""[V] drives of the baseline's recording, two seconds each: its slowness asks for a short one."""
+"""Drives of the recording of the baseline [V], two seconds each; it is short because the baseline is slow."""
 
 
 def make_case_problem(
@@ -57,7 +59,7 @@ def make_case_problem(
     training: tuple[tuple[float, float], ...] = TRAINING_STROKES,
     levels: tuple[float, ...] = SHUFFLED_LEVELS,
 ) -> Problem:
-    """Strokes of a damper with noise of one per cent of the force."""
+    """Make a fit problem from strokes of a damper, with noise of 1 % of the force."""
     strokes = [make_excitation(a, f, levels) for a, f in training]
     forces, noise = record_forces(c, strokes, seed)
     pieces = tuple(
@@ -67,7 +69,7 @@ def make_case_problem(
 
 
 def fit_seed(c: Coordinates, seed: int) -> dict[str, Any]:
-    """Time [s], unseen error over the true damper's, and errors in Cramér-Rao deviations of one fit."""
+    """Fit one damper; return time [s], validation error ratio, and errors in Cramér-Rao deviations."""
     problem = make_case_problem(c, seed)
     began = time.process_time()
     minimum = fit_output_error(problem)
@@ -78,7 +80,7 @@ def fit_seed(c: Coordinates, seed: int) -> dict[str, Any]:
     )
     strokes = [make_excitation(a, f, RISING_LEVELS) for a, f in VALIDATION_STROKES]
     forces, _ = record_forces(c, strokes, seed + 500)
-    pieces = tuple(Piece("unseen", s, f, np.ones(len(f))) for s, f in zip(strokes, forces, strict=True))
+    pieces = tuple(Piece("validation", s, f, np.ones(len(f))) for s, f in zip(strokes, forces, strict=True))
     errors = [np.concatenate([predict_piece(p, d).force - p.force for p in pieces]) for d in (found, c)]
     return {
         "seed": seed,
@@ -91,9 +93,9 @@ def fit_seed(c: Coordinates, seed: int) -> dict[str, Any]:
 
 
 def fit_dampers(first: int = 0, last: int = DAMPERS, results: Path | None = None) -> None:
-    """Fit random dampers; with a file, results are kept a line each and the table is of all in it."""
+    """Fit random dampers; a results file keeps one line for each, and the table shows all of them."""
     done = cache.read_rows(results)
-    # Once unmeasured: the first call compiles.
+    # The first call compiles and is not measured.
     fit_seed(to_coordinates(find_parameter_set("laboratory").parameters), 0)
     for seed in sorted(set(range(first, last)) - {row["seed"] for row in done}):
         done.append(fit_seed(draw_damper(seed), seed))
@@ -102,13 +104,14 @@ def fit_dampers(first: int = 0, last: int = DAMPERS, results: Path | None = None
 
 
 def _print_table(done: list[dict[str, Any]]) -> None:
-    unseen, seconds = (np.array([row[key] for row in done]) for key in ("unseen", "seconds"))
+    validation, seconds = (np.array([row[key] for row in done]) for key in ("unseen", "seconds"))
     errors = np.array([row["errors"] for row in done])
-    print(
-        f"refine: {len(done)} random dampers, 56 000 samples each, no guess; reference {measure_reference_time():.4f} s"
+    print(f"output-error fit: {len(done)} random dampers, 56 000 samples each, no initial guess;", end=" ")
+    print(f"reference {measure_reference_time():.4f} s")
+    print_line(
+        "validation force error at most 1.01 of the true damper's", float((validation <= 1.01).sum()), "", "all"
     )
-    print_line("unseen force error at most 1.01 of the true damper's", float((unseen <= 1.01).sum()), "", "all")
-    print_line("the worst of them", unseen.max(), "x", "at most 1.01")
+    print_line("largest validation force error over the true damper's", validation.max(), "x", "at most 1.01")
     print_line("median time", float(np.median(seconds)), "s", "at most 0.3 s")
     print_line("longest time", seconds.max(), "s", "")
     pooled = float(np.sqrt(np.mean(errors**2)))
@@ -118,7 +121,7 @@ def _print_table(done: list[dict[str, Any]]) -> None:
 
 
 def simulate_with_scipy(c: Coordinates, y0: float, piece: Piece, amplitude: float, frequency: float) -> np.ndarray:
-    """Force [N] (N,) by solve_ivp, LSODA, the law in Python; states y, zeta and the field."""
+    """Simulate the force [N], (N,), by solve_ivp (LSODA) with the law in Python; states y, zeta and the field."""
     w, levels, duration = 2 * np.pi * frequency, BASELINE_LEVELS, 2.0
     shape = (1 / c.D_y, c.rho / c.D_y, (1 - c.rho) / c.D_y, c.n)
 
@@ -144,57 +147,70 @@ def simulate_with_scipy(c: Coordinates, y0: float, piece: Piece, amplitude: floa
 
 
 def compare_baseline() -> None:
-    """Time scipy's own way to the cost that ours ends at, on one stroke of 6 000 samples, from the same starts."""
+    """Compare the time of scipy with that of this fit, to equal cost, on one stroke of 6 000 samples."""
     print(f"baseline: 6 000 samples, the same start; reference {measure_reference_time():.4f} s")
     for share in START_SHARES:
         _compare_with_scipy(share)
 
 
 def _compare_with_scipy(share: float) -> None:
-    """Both from one start, a share [1] of the way off."""
+    """Run both from one start, at a fraction [1] of the distance to the start by regression."""
     amplitude, frequency = TRAINING_STROKES[1]
     default = to_coordinates(find_parameter_set("laboratory").parameters)
     problem = make_case_problem(default, 0, ((amplitude, frequency),), BASELINE_LEVELS)
-    piece, ours = problem.pieces[0], fit_output_error(problem)
-    start = ours.unknowns + share * (make_starting_points(problem)[0] - ours.unknowns)
-    # scipy's way has no delays to find: the easier search.
+    piece, minimum = problem.pieces[0], fit_output_error(problem)
+    start = minimum.unknowns + share * (make_starting_points(problem)[0] - minimum.unknowns)
+    # scipy does not estimate the delays, which makes its task easier.
     moving = np.flatnonzero(problem.free_mask & ~problem.delay_mask)
     low, high = (bound[moving] for bound in problem.get_bounds())
     start[moving] = np.clip(start[moving], low + 1e-6, high - 1e-6)
-    goal = EQUAL_COST * ours.evaluation.cost
+    goal = EQUAL_COST * minimum.evaluation.cost
 
     def residuals(values: np.ndarray) -> np.ndarray:
         unknowns = start.copy()
         unknowns[moving] = values
         setting = problem.make_model(unknowns, 0)
         force = simulate_with_scipy(setting.coordinates, setting.y0, piece, amplitude, frequency)
-        # At an unstable point a large misfit turns the search round instead of ending it.
+        # At an unstable point a large residual makes the optimiser step back instead of failing.
         return np.nan_to_num((force - piece.force) / problem.noise, nan=1e3)
 
-    def arrived(intermediate_result: OptimizeResult) -> None:
-        # least_squares counts half the squares.
+    def stop_at_goal(intermediate_result: OptimizeResult) -> None:
+        # The cost of least_squares is half the sum of squares.
         if 2.0 * intermediate_result.cost <= goal:
             raise StopIteration
 
     spent = measure_cpu_time(lambda: fit_output_error(problem, start=start), 5)
     reached = fit_output_error(problem, start=start).evaluation.cost
     began = time.process_time()
-    theirs = least_squares(
-        residuals, start[moving], bounds=(low, high), diff_step=1e-4, x_scale="jac", max_nfev=300, callback=arrived
+    baseline = least_squares(
+        residuals,
+        start[moving],
+        bounds=(low, high),
+        diff_step=np.full(len(moving), 1e-4),
+        x_scale="jac",
+        max_nfev=300,
+        callback=stop_at_goal,
     )
     needed = time.process_time() - began
     print_line(
-        f"cost of the start over the least, {share} of the way off",
-        problem.evaluate(start).cost / ours.evaluation.cost,
+        f"cost of the start over the minimum, at {share} of the distance",
+        problem.evaluate(start).cost / minimum.evaluation.cost,
         "x",
         "",
     )
-    print_line("ours, least of five", spent, "s", f"cost {reached / ours.evaluation.cost:.6f} of the least")
-    print_line("scipy: least_squares with solve_ivp LSODA", needed, "s", f"{theirs.nfev} steps, {theirs.message}")
     print_line(
-        "its final cost over ours", 2.0 * theirs.cost / ours.evaluation.cost, "x", f"equal up to {EQUAL_COST}"
+        "this fit, least time of five", spent, "s", f"cost {reached / minimum.evaluation.cost:.6f} of the minimum"
     )
-    print_line("time over ours", needed / spent, "x", "at least 200")
+    print_line(
+        "scipy: least_squares with solve_ivp LSODA", needed, "s", f"{baseline.nfev} steps, {baseline.message}"
+    )
+    print_line(
+        "final cost of scipy over that of this fit",
+        2.0 * baseline.cost / minimum.evaluation.cost,
+        "x",
+        f"equal up to {EQUAL_COST}",
+    )
+    print_line("time of scipy over that of this fit", needed / spent, "x", "at least 200")
 
 
 if __name__ == "__main__":

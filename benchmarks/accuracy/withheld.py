@@ -1,8 +1,8 @@
-"""Recordings whose effect is withheld: `mrbench import`, then what `mrbench diagnose` does, in one process.
+"""Diagnoses of recordings whose effects are withheld, imported by `mrbench import` and diagnosed in one process.
 
-`MRBENCH_SHARED` names the folder that holds `blind/caseNN.csv.gz`. Writes `docs/evidence/blind-predictions.json`
-(case -> diagnosis) and `docs/evidence/blind.md`. `--only case00,case01` takes some, `--keep FOLDER` keeps logs,
-diagnoses and twins there and takes up where an earlier call stopped.
+`MRBENCH_SHARED` names the folder with `blind/caseNN.csv.gz`. The results are
+`docs/evidence/blind-predictions.json` (case -> diagnosis) and `docs/evidence/blind.md`. `--only case00,case01`
+selects cases. `--keep FOLDER` keeps logs, diagnoses and twins, and continues an interrupted call.
 """
 
 import json
@@ -18,12 +18,11 @@ from identification.gap.outcome import summarise_diagnosis
 from identification.logs import load
 
 EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
-_HEAD = """# Recordings whose effect is withheld
+_HEAD = """# Recordings with withheld effects
 
-{count} recordings, one or two effects in each, or none, or something that no library knows. Nobody of this project
-has seen the answers; the diagnoses stand in `blind-predictions.json`. Errors are on strokes kept out of every fit;
-"after" and shrinkage are what another run is expected to show.
-Made by
+{count} recordings, each with one effect, two effects, none, or a cause outside the library. The true effects were
+unknown when the diagnoses in `blind-predictions.json` were made. Errors are on held-out strokes; "after" and
+shrinkage are the values expected of another run. Command:
 
 ```
 {command}
@@ -35,7 +34,7 @@ Made by
 
 
 def diagnose_recording(source: Path, kept: Path) -> dict[str, Any]:
-    """The diagnosis of one recording, made once."""
+    """Return the diagnosis of one recording; diagnose it if no result is stored."""
     name = source.name.removesuffix(".csv.gz")
     out = kept / f"{name}.json"
     if not out.exists():
@@ -52,7 +51,7 @@ def diagnose_recording(source: Path, kept: Path) -> dict[str, Any]:
 
 
 def render_row(name: str, diagnosis: dict[str, Any], seconds: str) -> str:
-    """One line of the table."""
+    """Return one line of the table."""
     gap = diagnosis["gap"]
     effects = ", ".join(f"{e['name']} ({e['probability']:.2f})" for e in diagnosis["effects"]) or "–"
     shrinkage = "–" if gap["shrinkage"] is None else f"{gap['shrinkage']:.3f}"
@@ -67,7 +66,7 @@ def main() -> None:
     shared = Path(os.environ.get("MRBENCH_SHARED", "."))
     sources = {s.name.removesuffix(".csv.gz"): s for s in sorted(shared.glob("blind/case*.csv.gz"))}
     if not sources:
-        sys.exit("MRBENCH_SHARED: names no folder with blind/caseNN.csv.gz; point it at the recordings")
+        sys.exit("MRBENCH_SHARED: not a folder with blind/caseNN.csv.gz; set it to the folder of the recordings")
     with open_folder(asked.keep) as kept:
         found = {name: diagnose_recording(sources[name], kept) for name in select_names(asked.only, list(sources))}
         seconds = {name: (kept / f"{name}.seconds").read_text(encoding="utf-8") for name in found}

@@ -1,4 +1,4 @@
-"""Logs of the default rig with one effect of a chosen size, for benchmarks of the diagnosis."""
+"""Logs of the default simulated rig with one effect of a given size, for benchmarks of the diagnosis."""
 
 import json
 from datetime import UTC, datetime
@@ -16,10 +16,10 @@ NO_EFFECT = "nothing"
 
 
 def make_scenario(effect: str, size: float) -> dict[str, Any]:
-    """The shipped scenario of an effect, with its sizes (not its lengths, speeds and times) times a factor.
+    """Return the shipped scenario of an effect with scaled sizes; lengths, speeds and times are kept.
 
     Args:
-        effect: its name, or ``NOTHING``.
+        effect: name of the effect, or ``NO_EFFECT``.
         size: factor on the shipped size [1].
     """
     if effect == NO_EFFECT:
@@ -28,14 +28,14 @@ def make_scenario(effect: str, size: float) -> dict[str, Any]:
         files("sim_rig.scenario").joinpath(f"library/{effect}.json").read_text("utf-8")
     )
     (entry,) = document["effects"]
-    # What may be zero is a size; a length, a speed or a time may not.
+    # Only a size may be zero; a length, speed or time may not.
     sizes = {q.symbol for q in EFFECTS[effect].find_form(entry.get("form")).parameters if q.low <= 0.0}
     entry["parameters"] = {k: v * size if k in sizes else v for k, v in entry["parameters"].items()}
     return document
 
 
 def lengthen_method(name: str, times: int) -> Method:
-    """A shipped method with so many times the cycles of each segment."""
+    """Return a shipped method with a multiple of the cycles of each segment."""
     method = load_method(name)
     segments = tuple(
         s if s.cycles is None else s.model_copy(update={"cycles": times * s.cycles}) for s in method.segments
@@ -44,13 +44,13 @@ def lengthen_method(name: str, times: int) -> Method:
 
 
 def record_effect(method: Method, effect: str, size: float, seed: int, log: Path) -> None:
-    """Record a method on the rig with an effect, unless that log is there already."""
+    """Record a method on the simulated rig with an effect, unless the log exists."""
     if log.exists():
         return
-    played = log.with_suffix(".scenario.json")
-    played.write_text(json.dumps(make_scenario(effect, size)), encoding="utf-8")
+    scenario = log.with_suffix(".scenario.json")
+    scenario.write_text(json.dumps(make_scenario(effect, size)), encoding="utf-8")
     identity = Identity("", "", datetime.fromtimestamp(0, UTC))
-    run_from_plant(method, str(played), log, identity, seed=seed)
+    run_from_plant(method, str(scenario), log, identity, seed=seed)
 
 
-__all__ = ["NO_EFFECT", "COMMON_EFFECTS", "record_effect", "make_scenario", "lengthen_method"]
+__all__ = ["COMMON_EFFECTS", "NO_EFFECT", "lengthen_method", "make_scenario", "record_effect"]

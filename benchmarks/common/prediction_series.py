@@ -1,4 +1,4 @@
-"""What `mrbench predict --series` writes, read back."""
+"""Force series that ``mrbench predict --series`` writes."""
 
 import json
 from collections.abc import Sequence
@@ -13,41 +13,42 @@ class PredictionSeries:
     """Recorded and simulated force of every stretch of a log, (N,) each."""
 
     time: np.ndarray
-    """[s]"""
+    """Time [s]."""
     displacement: np.ndarray
-    """[m]"""
+    """Displacement [m]."""
     velocity: np.ndarray
-    """[m/s]"""
+    """Velocity [m/s]."""
     drive: np.ndarray
-    """[V or A]"""
+    """Drive [V or A]."""
     force: np.ndarray
-    """[N] recorded."""
+    """Recorded force [N]."""
     simulated: np.ndarray
-    """[N]"""
+    """Simulated force [N]."""
     stretch: np.ndarray
     """Number of the stretch in ``names``."""
     held_out: np.ndarray
-    """True where the fit did not see the sample."""
+    """True for held-out samples."""
     names: Sequence[str]
+    """Names of the stretches."""
 
     @property
     def residual(self) -> np.ndarray:
         """Recorded minus simulated force [N]."""
-        return self.force - self.simulated
+        return np.asarray(self.force - self.simulated)
 
     def select_rows(self, name: str) -> np.ndarray:
-        """(N,) True in one stretch."""
+        """Return a mask (N,) of the samples of one stretch."""
         return np.asarray(self.stretch == self.names.index(name))
 
     def compute_error(self, rows: np.ndarray) -> tuple[float, float]:
-        """RMSE [N] and NRMSE [1] of the samples chosen."""
+        """Compute RMSE [N] and NRMSE [1] of the selected samples."""
         rmse = float(np.sqrt(np.mean(self.residual[rows] ** 2)))
         return rmse, rmse / float(self.force[rows].std())
 
 
 def read_series(path: Path) -> PredictionSeries:
-    """A series from its .npz file."""
+    """Read a series from its .npz file."""
     columns = ("time", "displacement", "velocity", "drive", "force", "simulated", "stretch", "held_out")
     with np.load(path) as file:
         names = json.loads(str(file["info"]))["stretches"]
-        return PredictionSeries(*(file[name] for name in columns), names=names)
+        return PredictionSeries(**{name: file[name] for name in columns}, names=names)

@@ -1,7 +1,7 @@
-"""What each ingredient of the networks brings: leave it out, or give more of it, and look at the truth again.
+"""Ablation study of the networks: error against the truth with one part of the method changed or left out.
 
-python -m benchmarks.pinn.ablation                  all rows; takes an hour
-python -m benchmarks.pinn.ablation weight rank      some of them
+python -m benchmarks.pinn.ablation               all rows; takes an hour
+python -m benchmarks.pinn.ablation weight rank   some groups of rows
 """
 
 import sys
@@ -16,24 +16,25 @@ from identification.pinn.common import ElementSettings, LayerSize, ScheduleStage
 SEEDS = (1, 3, 5)
 _ELEMENTS = read_settings("elements")
 assert isinstance(_ELEMENTS, ElementSettings)
+_LAYERS = _ELEMENTS.layers
 _FIRST_STAGE, _LAST_STAGE = _ELEMENTS.schedule
 
 
 class Row(NamedTuple):
-    """One thing done otherwise."""
+    """Variant of a preset with one change."""
 
     group: str
     description: str
     changes: dict[str, object]
     preset: str = "elements"
     motion: str = ""
-    """How the motion of a displacement with noise is had; without one it is known."""
+    """Source of the motion if the displacement has noise; empty if the motion is known."""
 
 
 def _list_rows() -> Iterator[Row]:
-    yield Row("slip", "as shipped: elements by the slip", {})
-    yield Row("slip", "elements by the turns of the stroke", {"element_input": "stroke"})
-    yield Row("slip", "elements by the slip, plain time in them", {"element_input": "time"})
+    yield Row("slip", "preset: elements between reversals of the slip", {})
+    yield Row("slip", "elements between reversals of the stroke", {"element_input": "stroke"})
+    yield Row("slip", "elements of the slip with plain time", {"element_input": "time"})
     for activation in ("tanh", "sine", "gaussian"):
         yield Row("activation", activation, {"activation": activation})
     yield Row("network", "one network, all layers trained (dense)", {}, preset="dense")
@@ -42,7 +43,7 @@ def _list_rows() -> Iterator[Row]:
             _FIRST_STAGE.model_copy(update={"meshes": min(meshes, 3)}),
             _change_last_stage(meshes=meshes, reversal_tolerance=0.0),
         )
-        yield Row("meshes", f"{meshes} meshes at most in the last stage", {"schedule": schedule})
+        yield Row("meshes", f"at most {meshes} meshes in the last stage", {"schedule": schedule})
     for rank in (16, 24, 36, 40, 48):
         size = LayerSize(units=max(120, 4 * rank), rank=rank, points=max(72, 2 * rank))
         yield Row("rank", f"rank {rank}", {"layers": (size,)})
@@ -52,15 +53,15 @@ def _list_rows() -> Iterator[Row]:
         yield Row("weight", f"law weight {weight:g}, no multipliers", _set_law_weight(weight, 0))
     for weight in (5.0, 30.0, 100.0):
         for multipliers in (3, 6):
-            words = f"law weight {weight:g}, {multipliers} multiplier steps"
-            yield Row("multipliers", words, _set_law_weight(weight, multipliers))
+            description = f"law weight {weight:g}, {multipliers} multiplier steps"
+            yield Row("multipliers", description, _set_law_weight(weight, multipliers))
     for motion in ("", "estimated", "by differences"):
         for weighting in ("collocation", "galerkin", "weak_form"):
-            words = f"5 µm, motion {motion}" if motion else "known motion"
-            yield Row("residual", f"{words}: {weighting}", {"residual_weighting": weighting}, motion=motion)
-    yield Row("taking back", "blocks set aside stay aside", {"refit_on_all": False})
+            description = f"5 µm, motion {motion}: {weighting}" if motion else f"known motion: {weighting}"
+            yield Row("residual", description, {"residual_weighting": weighting}, motion=motion)
+    yield Row("refit", "no final fit on the validation blocks", {"refit_on_all": False})
     yield Row("paper", "derivative along the trajectory", {"derivative": "total"}, preset="paper")
-    yield Row("paper", "derivative over the input t alone", {"derivative": "partial"}, preset="paper")
+    yield Row("paper", "partial derivative over the input t", {"derivative": "partial"}, preset="paper")
 
 
 def _change_last_stage(**changes: object) -> ScheduleStage:
@@ -71,29 +72,29 @@ def _set_law_weight(weight: float, multiplier_steps: int) -> dict[str, object]:
     return {
         "schedule": (_FIRST_STAGE, _change_last_stage(law_weight=weight)),
         "multiplier_steps": multiplier_steps,
-        "layers": _ELEMENTS.layers[:1],
+        "layers": _LAYERS[:1],
     }
 
 
 def _score_row(row: Row, seed: int) -> Score:
-    given = make_noisy_problem(seed, row.motion) if row.motion else None
-    return train_preset(row.preset, LABORATORY, seed, given=given, **row.changes)
+    problem = make_noisy_problem(seed, row.motion) if row.motion else None
+    return train_preset(row.preset, LABORATORY, seed, problem=problem, changes=row.changes)
 
 
 def run(groups: tuple[str, ...] = ()) -> None:
-    """Print a row for each."""
-    print(f"  seeds {SEEDS}, six voltages: pooled error in Cramér-Rao deviations; unseen error over the truth's;")
-    print("  validation error of the network's own force over the noise; median processor time")
+    """Print one row for each variant, or for those of the given groups."""
+    print(f"  seeds {SEEDS}, six voltages: pooled error in Cramér-Rao deviations; validation error over that of")
+    print("  the true damper; error of the network's own force over the noise; median processor time")
     for row in _list_rows():
         if groups and row.group not in groups:
             continue
         scores = [_score_row(row, seed) for seed in SEEDS]
         pooled = "/".join(f"{s.pooled_error:.2g}" for s in scores)
-        unseen = "/".join(f"{s.ratio:.4g}" for s in scores)
-        own = "/".join(f"{s.reconstruction:.3g}" for s in scores)
+        ratios = "/".join(f"{s.ratio:.4g}" for s in scores)
+        own_errors = "/".join(f"{s.reconstruction:.3g}" for s in scores)
         seconds = float(np.median([s.seconds for s in scores]))
         print(
-            f"  {row.group:<12} {row.description:<45} {pooled:<18} {unseen:<26} {own:<18} {seconds:5.1f} s",
+            f"  {row.group:<12} {row.description:<45} {pooled:<18} {ratios:<26} {own_errors:<18} {seconds:5.1f} s",
             flush=True,
         )
 

@@ -1,5 +1,6 @@
-"""What the networks are tried on: dampers with known truth, and how far from it they end."""
+"""Test cases of the networks: dampers with known truth, and scores of a training against it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -31,34 +32,35 @@ from identification.simulate import Excitation, SimulationModel, simulate
 
 LABORATORY = to_coordinates(find_parameter_set("laboratory").parameters)
 SIX_VOLTAGES = ((0.010, 1.0),)
-"""One sine of 10 mm and 1 Hz through six voltages, 12 s: the paper's."""
+"""Amplitude [m] and frequency [Hz] of the paper's stroke, 12 s at six voltages."""
 UNIDENTIFIABLE = ("c1_b",)
-"""Coordinates that 0 to 0.5 V do not fix; left out of pooled errors, as in the reference study."""
+"""Coordinates that strokes at 0 to 0.5 V do not determine; excluded from pooled errors."""
 DISPLACEMENT_NOISE = 5e-6
-"""[m] standard deviation."""
+"""Standard deviation of the displacement noise [m]."""
 _SETTLING_SAMPLES = 20
-"""Samples at the start that are not fitted, as in a recording."""
+"""Number of samples at the start that are not fitted, as in a recording."""
 
 
 @dataclass(frozen=True)
 class Score:
-    """How a training ended."""
+    """Errors of a training result against the truth."""
 
     ratio: float
-    """[1] unseen force error of the identified law over that of the true damper, on the same samples."""
+    """Validation force error of the identified law over that of the true damper, on the same samples [1]."""
     pooled_error: float
-    """[1] root mean square of the coordinates' errors in Cramér-Rao deviations."""
+    """Root mean square error of the coordinates in Cramér-Rao deviations [1]."""
     seconds: float
-    """[s] of processor time."""
+    """Processor time [s]."""
     accepted: bool
+    """True if the network accepts its own result."""
     reconstruction: float
-    """[1] validation error of the network's own force, over the noise."""
+    """Error of the network's own force on validation blocks, over the noise [1]."""
     simulation: float
-    """[1] validation error of the law simulated, over the noise."""
+    """Error of the simulated law on validation blocks, over the noise [1]."""
 
 
 def make_case_problem(c: Coordinates, seed: int, *, pairs: bool = False) -> Problem:
-    """A recording of a damper: six voltages, or four pairs of amplitude and frequency; noise of one per cent."""
+    """Make a fit problem of six voltages or four pairs of amplitude and frequency, with noise of 1 %."""
     strokes = [
         make_excitation(a, f, SHUFFLED_LEVELS if pairs else RISING_LEVELS)
         for a, f in (TRAINING_STROKES if pairs else SIX_VOLTAGES)
@@ -67,23 +69,23 @@ def make_case_problem(c: Coordinates, seed: int, *, pairs: bool = False) -> Prob
     fitted = np.ones(len(forces[0]))
     fitted[:_SETTLING_SAMPLES] = 0.0
     pieces = [Piece(str(i), s, f, fitted[: len(f)]) for i, (s, f) in enumerate(zip(strokes, forces, strict=True))]
-    # Made up, so no channel is late: the prior holds the delays at nothing.
+    # Synthetic channels have no delays, so a narrow prior keeps the delays at zero.
     return Problem(tuple(pieces), SearchSpace(0.0, 0.5), noise, 1e-9)
 
 
 def train_preset(
-    preset: str | Path, c: Coordinates, seed: int, *, pairs: bool = False, given: Problem | None = None,
-    **changes: object,
+    preset: str | Path, c: Coordinates, seed: int, *, pairs: bool = False, problem: Problem | None = None,
+    changes: Mapping[str, object] | None = None,
 ) -> Score:  # fmt: skip
-    """Train a preset on a damper, or on a given recording of it, and judge it by the bound of known motion."""
+    """Train a preset on a damper, or on a given problem of it; score it with the bound of known motion."""
     known = make_case_problem(c, seed, pairs=pairs)
-    problem = given or known
-    settings = read_settings(preset).model_copy(update={"seed": seed, **changes})
+    problem = problem or known
+    settings = read_settings(preset).model_copy(update={"seed": seed, **(changes or {})})
     return score_training(train(problem, settings, TrainingMonitor()), c, problem, known, seed)
 
 
 def score_training(found: PinnResult, c: Coordinates, problem: Problem, known: Problem, seed: int) -> Score:
-    """How a training on a problem ended, by the truth and by the bound of a problem whose motion is known."""
+    """Score a training on a problem by the truth and by the bound of a problem with known motion."""
     return Score(
         compute_validation_ratio(found.coordinates, c, seed),
         compute_pooled_error(known, found.coordinates, c),
@@ -95,18 +97,18 @@ def score_training(found: PinnResult, c: Coordinates, problem: Problem, known: P
 
 
 def compute_validation_ratio(found: Coordinates, true: Coordinates, seed: int) -> float:
-    """Force error on two unseen strokes over that of the true damper."""
+    """Return the force error on two validation strokes over that of the true damper [1]."""
     strokes = [make_excitation(a, f, RISING_LEVELS) for a, f in VALIDATION_STROKES]
     forces, _ = record_forces(true, strokes, seed + 500)
-    pieces = [Piece("unseen", s, f, np.ones(len(f))) for s, f in zip(strokes, forces, strict=True)]
+    pieces = [Piece("validation", s, f, np.ones(len(f))) for s, f in zip(strokes, forces, strict=True)]
     errors = [np.concatenate([predict_piece(p, c).force - p.force for p in pieces]) for c in (found, true)]
     return compute_rmse(errors[0]) / compute_rmse(errors[1])
 
 
 def compute_pooled_error(problem: Problem, found: Coordinates, true: Coordinates) -> float:
-    """Root mean square error of the coordinates in Cramér-Rao deviations of this recording."""
+    """Compute the root mean square error of the coordinates in Cramér-Rao deviations of a problem [1]."""
     information = problem.evaluate(problem.make_start(true)).hessian
-    # Nothing is late here: with delays among the unknowns the bound would be wider and the errors look smaller.
+    # There are no delays here; as unknowns they would widen the bound and make the errors seem smaller.
     kept = ~problem.delay_mask
     bound = np.linalg.inv(information[np.ix_(kept, kept)])[:COORDINATE_COUNT, :COORDINATE_COUNT]
     D = problem.space.differentiate(problem.space.to_search(true))
@@ -116,7 +118,7 @@ def compute_pooled_error(problem: Problem, found: Coordinates, true: Coordinates
 
 
 def make_random_recording(seed: int, seconds: float = 20.0, highest: float = 4.0) -> Recording:
-    """A random displacement of 6 mm rms under a drive that jumps, with 5 µm of noise on the displacement."""
+    """Make a recording of a random displacement of 6 mm rms with 5 µm of noise, and a drive with random steps."""
     rate = 1000.0
     count = round(seconds * rate)
     random = np.random.default_rng(seed)
@@ -129,26 +131,26 @@ def make_random_recording(seed: int, seconds: float = 20.0, highest: float = 4.0
 
 
 def _make_recording(stroke: Excitation, random: np.random.Generator, seed: int) -> Recording:
-    """The laboratory damper on a stroke: 5 µm of noise on the displacement, one per cent on the force."""
+    """Simulate the laboratory damper on a stroke, with 5 µm of noise on the displacement and 1 % on the force."""
     force = simulate(SimulationModel(LABORATORY), stroke, max_travel=0.005).force
     count = len(force)
     made = Stretch(
-        name="made up", time=np.arange(count) / stroke.rate, rate=stroke.rate,
+        name="synthetic", time=np.arange(count) / stroke.rate, rate=stroke.rate,
         displacement=stroke.displacement + DISPLACEMENT_NOISE * random.standard_normal(count),
         force=force + 0.01 * float(force.std()) * random.standard_normal(count), drive=stroke.drive,
         velocity=None, segments=(), force_filter=None, displacement_filter=None, force_delay=0.0,
         displacement_delay=0.0, drive_delay=0.0, measured=np.ones(count, bool),
     )  # fmt: skip
-    metadata = {"run": {"specimen": "made up", "source": "run"}}
-    return replace(Recording(Path("made up.mcap"), str(seed) * 64, "coil_v", "V", (made,), metadata))
+    metadata = {"run": {"specimen": "synthetic", "source": "run"}}
+    return replace(Recording(Path("synthetic.mcap"), str(seed) * 64, "coil_v", "V", (made,), metadata))
 
 
 def make_noisy_problem(seed: int, motion: str) -> Problem:
-    """Six voltages with noise on displacement and force.
+    """Make a problem of six voltages with noise on displacement and force.
 
     Args:
-        seed: of the noise.
-        motion: ``estimated`` as the product does it, or ``by differences`` of the samples as they are.
+        seed: seed of the noise.
+        motion: ``estimated`` as in a fit, or ``by differences`` of the recorded samples.
     """
     ((amplitude, frequency),) = SIX_VOLTAGES
     assembled = assemble(
@@ -163,7 +165,7 @@ def make_noisy_problem(seed: int, motion: str) -> Problem:
 
 
 def _use_plain_differences(piece: Piece, stretch: Stretch) -> Piece:
-    """A piece with its displacement as recorded, velocity and acceleration by central differences."""
+    """Return the piece with its recorded displacement, and velocity and acceleration by central differences."""
     x = stretch.displacement
     v = np.gradient(x, 1.0 / stretch.rate)
     made = replace(piece.excitation, displacement=x, velocity=v, acceleration=np.gradient(v, 1.0 / stretch.rate))

@@ -1,11 +1,11 @@
-"""The paper's network in DeepXDE beside ours: time of a step of Adam, and what the same time brings.
+"""Network of the paper compared with DeepXDE: time of an Adam step, and error after equal time.
 
-    python -m benchmarks.pinn.deepxde                 the step, then what the time of `local` and of `paper` brings
-    python -m benchmarks.pinn.deepxde step local      some of them
+    python -m benchmarks.pinn.deepxde                 step time, and errors after the time of each preset
+    python -m benchmarks.pinn.deepxde step elements   some of them
 
-The same layers, samples, losses, start and rate of learning; every sample carries what the residuals ask for, so
-that DeepXDE passes each of them through its network once. DeepXDE (its PyTorch backend) is no dependency of this
-project: `pip install deepxde`, best into an environment of its own.
+Layers, samples, losses, start and learning rate are the same. All data of the residuals are passed with each
+sample, so that DeepXDE evaluates its network once for each sample. DeepXDE, with its PyTorch backend, is not a
+dependency of this project: run `pip install deepxde`, preferably in a separate environment.
 """
 
 import importlib
@@ -34,14 +34,15 @@ from identification.pinn.common import PaperSettings, TrainingMonitor, make_vali
 from identification.pinn.paper import PaperTraining, decode_parameters
 
 STEPS, REPEATS = 100, 10
-"""Steps in one timing, and timings; the least counts."""
+"""Number of steps in one timing, and number of timings, of which the least is used."""
 SEED = 0
 _REPORT_INTERVAL = 10**9
-"""Steps between two of DeepXDE's own reports."""
+"""Number of steps between two reports of DeepXDE; so large that there are none."""
+PARTS = ("step", "elements", "paper")
 
 
 def make_training() -> PaperTraining:
-    """Ours, as it begins: its samples, scales and start are DeepXDE's too."""
+    """Prepare the training of this project; DeepXDE uses its samples, scales and start."""
     settings = read_settings("paper")
     assert isinstance(settings, PaperSettings)
     settings = settings.model_copy(
@@ -53,45 +54,45 @@ def make_training() -> PaperTraining:
 
 
 class DeepXdeTraining:
-    """The same training, as a user of DeepXDE writes it."""
+    """Same training as a DeepXDE model."""
 
-    def __init__(self, dde: ModuleType, ours: PaperTraining) -> None:
-        self.dde, self.ours = dde, ours
+    def __init__(self, dde: ModuleType, reference: PaperTraining) -> None:
+        self.dde, self.reference = dde, reference
         random = np.random.default_rng(SEED)
-        at = random.choice(len(ours.data.x), ours.settings.samples, replace=False)
-        d = ours.data
-        points = d.inputs.T[at].numpy()
-        told = torch.column_stack([d.rates.T, d.x, d.v, d.drive, d.force, d.fitted])[at].numpy()
+        rows = random.choice(len(reference.data.x), reference.settings.samples, replace=False)
+        d = reference.data
+        points = d.inputs.T[rows].numpy()
+        known = torch.column_stack([d.rates.T, d.x, d.v, d.drive, d.force, d.fitted])[rows].numpy()
         self.raw = dde.Variable([0.0] * len(Parameters._fields))
         data = dde.data.PDE(
             dde.geometry.PointCloud(points), self._compute_residuals, [], num_domain=0, anchors=points,
-            auxiliary_var_function=lambda _: told,
+            auxiliary_var_function=lambda _: known,
         )  # fmt: skip
-        width, layers = ours.settings.width, ours.settings.layers
+        width, layers = reference.settings.width, reference.settings.layers
         network = dde.nn.FNN([4, *[width] * layers, 3], "tanh", "Glorot normal")
         self.model = dde.Model(data, network)
         self.model.compile(
-            "adam", lr=ours.settings.learning_rate, external_trainable_variables=self.raw, verbose=0
+            "adam", lr=reference.settings.learning_rate, external_trainable_variables=self.raw, verbose=0
         )
 
     def run(self, steps: int) -> None:
-        """So many steps of Adam."""
+        """Run a number of Adam steps."""
         self.model.train(iterations=steps, display_every=_REPORT_INTERVAL, verbose=0)
 
     def read_coordinates(self) -> Coordinates:
-        """What it has found."""
-        return to_coordinates(Parameters(*decode_parameters(self.ours.start_parameters, self.raw).tolist()))
+        """Return the coordinates that the training has reached."""
+        return to_coordinates(Parameters(*decode_parameters(self.reference.start_parameters, self.raw).tolist()))
 
-    def _compute_residuals(self, inputs: Tensor, outputs: Tensor, told: Tensor) -> list[Tensor]:
-        """Two misfits of the force and three of the law; the derivative is that along the trajectory."""
+    def _compute_residuals(self, inputs: Tensor, outputs: Tensor, known: Tensor) -> list[Tensor]:
+        """Compute two residuals of the force and three of the law, with derivatives along the trajectory."""
         s, p = (
-            self.ours.scales,
-            Parameters(*cast(list[float], decode_parameters(self.ours.start_parameters, self.raw).unbind())),
+            self.reference.scales,
+            Parameters(*cast(list[float], decode_parameters(self.reference.start_parameters, self.raw).unbind())),
         )
-        x, v, drive, force, fitted = told[:, 4:].T
+        x, v, drive, force, fitted = known[:, 4:].T
         u, y, z = outputs.T * torch.tensor([[s.u], [s.y], [s.z]])
         rates = [
-            sum(self.dde.grad.jacobian(outputs, inputs, i, j)[:, 0] * told[:, j] for j in range(4))
+            sum(self.dde.grad.jacobian(outputs, inputs, i, j)[:, 0] * known[:, j] for j in range(4))
             for i in range(3)
         ]
         u_rate, y_rate, z_rate = rates[0] * s.u, rates[1] * s.y, rates[2] * s.z
@@ -106,25 +107,28 @@ class DeepXdeTraining:
             (force - second) / s.force * fitted,
             (u_rate - law.compute_field_rate(u, drive, p.eta)) / (s.rate * s.u),
             (y_rate - inner) / s.velocity,
-            (z_rate - hysteresis) / (self.ours.start_parameters.A * s.velocity),
+            (z_rate - hysteresis) / (self.reference.start_parameters.A * s.velocity),
         ]
 
 
-def measure_steps(hundreds: Sequence[Callable[[], None]]) -> list[float]:
-    """[s] of processor time of one step of each: the least of some repeats of ``STEPS`` steps, by turns, warm."""
-    for hundred in hundreds:
-        hundred()
-    spent = [[time_call(hundred)[1] for hundred in hundreds] for _ in range(REPEATS)]
+def measure_steps(trainings: Sequence[Callable[[], None]]) -> list[float]:
+    """Measure the processor time [s] of one step of each training.
+
+    The trainings alternate, each with ``STEPS`` steps in a repeat; the least time of the repeats is returned.
+    """
+    for run_steps in trainings:
+        run_steps()
+    spent = [[time_call(run_steps)[1] for run_steps in trainings] for _ in range(REPEATS)]
     return [min(times) / STEPS for times in zip(*spent, strict=True)]
 
 
-def train_for(theirs: DeepXdeTraining, seconds: float) -> tuple[float, float, int]:
-    """Unseen error over the true damper's, pooled error and steps after some processor time [s] from the start."""
+def train_for(training: DeepXdeTraining, seconds: float) -> tuple[float, float, int]:
+    """Train for a processor time [s]; return validation error over the true damper's, pooled error and steps."""
     steps, began = 0, time.process_time()
     while time.process_time() - began < seconds:
-        theirs.run(STEPS)
+        training.run(STEPS)
         steps += STEPS
-    found = theirs.read_coordinates()
+    found = training.read_coordinates()
     problem = make_case_problem(LABORATORY, SEED)
     return (
         compute_validation_ratio(found, LABORATORY, SEED),
@@ -134,27 +138,27 @@ def train_for(theirs: DeepXdeTraining, seconds: float) -> tuple[float, float, in
 
 
 def compare_step(dde: ModuleType) -> None:
-    """Time of a step of Adam."""
-    ours, theirs = make_training(), DeepXdeTraining(dde, make_training())
-    steps = measure_steps((ours.run, lambda: theirs.run(STEPS)))
-    print_line("a step of Adam, 2048 samples: ours", 1e3 * steps[0], "ms", "")
-    print_line("the same in DeepXDE", 1e3 * steps[1], "ms", "")
-    print_line("ours over DeepXDE's", steps[0] / steps[1], "x", "at most 1/3")
+    """Print the time of an Adam step of both."""
+    reference, training = make_training(), DeepXdeTraining(dde, make_training())
+    steps = measure_steps((reference.run, lambda: training.run(STEPS)))
+    print_line("Adam step, 2048 samples: this project", 1e3 * steps[0], "ms", "")
+    print_line("Adam step, 2048 samples: DeepXDE", 1e3 * steps[1], "ms", "")
+    print_line("this project over DeepXDE", steps[0] / steps[1], "x", "at most 1/3")
 
 
 def compare_preset(dde: ModuleType, preset: str) -> None:
-    """What DeepXDE finds in the time that a preset takes."""
+    """Print the errors of DeepXDE after the time that a preset takes."""
     score = train_preset(preset, LABORATORY, SEED)
-    print(f"in the {score.seconds:.1f} s of preset {preset}, unseen error over the true damper's, and pooled:")
+    print(f"after {score.seconds:.1f} s (preset {preset}): validation error over the true damper's, pooled error")
     print_line(f"  {preset}", score.ratio, "x", f"{score.pooled_error:.3g}")
-    unseen, pooled, count = train_for(DeepXdeTraining(dde, make_training()), score.seconds)
-    print_line(f"  DeepXDE, {count} steps", unseen, "x", f"{pooled:.3g}")
+    ratio, pooled, count = train_for(DeepXdeTraining(dde, make_training()), score.seconds)
+    print_line(f"  DeepXDE, {count} steps", ratio, "x", f"{pooled:.3g}")
 
 
-def run(parts: Sequence[str] = ("step", "local", "paper")) -> None:
-    """Print the parts asked for: the step, and presets beside DeepXDE."""
+def run(parts: Sequence[str] = PARTS) -> None:
+    """Print the requested parts: ``step``, and presets compared with DeepXDE."""
     if find_spec("deepxde") is None:
-        print("deepxde: left out; it is no dependency of this project, `pip install deepxde` brings it")
+        print("deepxde: skipped, the package is not installed; run `pip install deepxde`")
         return
     os.environ["DDE_BACKEND"] = "pytorch"
     torch.set_num_threads(1)
@@ -170,4 +174,4 @@ def run(parts: Sequence[str] = ("step", "local", "paper")) -> None:
 
 
 if __name__ == "__main__":
-    run(sys.argv[1:] or ("step", "local", "paper"))
+    run(sys.argv[1:] or PARTS)

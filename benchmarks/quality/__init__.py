@@ -1,3 +1,3 @@
-"""Quality of the tests, and documents of two versions compared."""
+"""Measures of test quality, and comparison of the documents of two versions."""
 
 __all__: list[str] = []

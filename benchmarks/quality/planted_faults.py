@@ -1,4 +1,4 @@
-"""Plants faults in the code and counts those that make a test fail.
+"""Test quality: share of faults planted in the code that make a test fail.
 
     python -m benchmarks.quality.planted_faults [--count 100] [--seed 1] [--jobs 2] [--out PAGE.md]
 
@@ -16,7 +16,7 @@ import sqlite3
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import accumulate
 from pathlib import Path
@@ -28,8 +28,8 @@ from benchmarks.quality.branch_coverage import DATA, PACKAGES, ROOT
 COPIES = ROOT / "build" / "faults"
 TIMEOUT = 900.0
 """Time [s] after which the tests of one fault are stopped; a fault that hangs them is detected."""
-MOST_TESTS = 400
-"""Tests that are run for one fault at most, drawn where more execute its line."""
+MAX_TESTS = 400
+"""Largest number of tests for one fault; a sample is drawn if more tests execute its line."""
 _COMPARISONS = {
     ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "==", ast.In: "not in",
     ast.NotIn: "in", ast.Is: "is not", ast.IsNot: "is",
@@ -40,7 +40,7 @@ _FUNCTIONS = {"min": "max", "max": "min", "any": "all", "all": "any"}
 
 
 class Fault(NamedTuple):
-    """One changed place of one file."""
+    """Change of one place in one file."""
 
     path: str
     line: int
@@ -51,15 +51,15 @@ class Fault(NamedTuple):
     start: int
     """First byte in the file."""
     stop: int
-    """One beyond the last byte."""
+    """Position after the last byte."""
 
     def __str__(self) -> str:
-        """Place, kind and change on one line."""
+        """Return place, kind and change on one line."""
         return f"{self.path}:{self.line}: {self.kind}: `{self.before}` -> `{self.after}`"
 
 
 def main() -> int:
-    """Plant the faults and print the table; exit status 1 below 80 % detected."""
+    """Plant the faults and print the table; return exit status 1 if less than 80 % are detected."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=1)
@@ -83,7 +83,7 @@ def main() -> int:
 
 
 def draw_faults(count: int, seed: int) -> list[Fault]:
-    """Faults by seed: each package in proportion to its possible places, each kind alike."""
+    """Draw faults: packages in proportion to their possible places, kinds with equal probability."""
     chance = random.Random(seed)
     listed = subprocess.run(["git", "ls-files", *PACKAGES], cwd=ROOT, capture_output=True, text=True, check=True)
     places = [
@@ -104,7 +104,7 @@ def draw_faults(count: int, seed: int) -> list[Fault]:
 
 
 def find_places(path: str, source: str) -> Iterator[Fault]:
-    """Every fault that can be planted in one file."""
+    """Find all faults that can be planted in one file."""
     text = SourceText(path, source)
     tree = ast.parse(source)
     for node in ast.walk(tree):
@@ -120,16 +120,16 @@ def find_places(path: str, source: str) -> Iterator[Fault]:
                     left, right, "or" if isinstance(op, ast.And) else "and", "decision"
                 )
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                yield text.fault(node, "sign", text.of(operand))
+                yield text.replace_node(node, "sign", text.get_text(operand))
             case ast.Call(func=ast.Name(id=name) as function, args=arguments) if name in _FUNCTIONS:
-                yield text.fault(function, "decision", _FUNCTIONS[name])
+                yield text.replace_node(function, "decision", _FUNCTIONS[name])
                 yield from text.change_bounds(arguments)
             case ast.Constant(value=float() | int() as value) if value in _UNITS:
-                yield text.fault(node, "unit", "1.0")
+                yield text.replace_node(node, "unit", "1.0")
 
 
 class SourceText:
-    """Bytes of one file, addressed by the places of its syntax tree."""
+    """Bytes of one file, addressed by nodes of its syntax tree."""
 
     def __init__(self, path: str, source: str) -> None:
         self.path = path
@@ -137,37 +137,39 @@ class SourceText:
         lengths = (len(line.encode()) for line in source.splitlines(keepends=True))
         self._starts = [0, *accumulate(lengths)]
 
-    def span(self, node: ast.expr) -> tuple[int, int]:
-        """First byte of an expression, and one beyond its last."""
+    def find_span(self, node: ast.expr) -> tuple[int, int]:
+        """Return the first byte of an expression and the position after its last byte."""
         last = node.end_lineno or node.lineno
         return (
             self._starts[node.lineno - 1] + node.col_offset,
             self._starts[last - 1] + (node.end_col_offset or 0),
         )
 
-    def of(self, node: ast.expr) -> str:
-        """Text of an expression."""
-        start, stop = self.span(node)
+    def get_text(self, node: ast.expr) -> str:
+        """Return the text of an expression."""
+        start, stop = self.find_span(node)
         return self.whole[start:stop].decode()
 
-    def fault(self, node: ast.expr, kind: str, after: str) -> Fault:
-        """Replacement of a whole expression."""
-        return Fault(self.path, node.lineno, kind, self.of(node), after, *self.span(node))
+    def replace_node(self, node: ast.expr, kind: str, after: str) -> Fault:
+        """Return the fault that replaces a whole expression."""
+        return Fault(self.path, node.lineno, kind, self.get_text(node), after, *self.find_span(node))
 
     def change_operator(self, left: ast.expr, right: ast.expr, after: str, kind: str) -> Iterator[Fault]:
-        """Replacement of the operator between two expressions, if nothing else stands there."""
-        start, stop = self.span(left)[1], self.span(right)[0]
+        """Replace the operator between two expressions, if nothing else is between them."""
+        start, stop = self.find_span(left)[1], self.find_span(right)[0]
         before = self.whole[start:stop].decode()
         if not set(before) & set("()#\n"):
             yield Fault(self.path, left.end_lineno or left.lineno, kind, before.strip(), f" {after} ", start, stop)
 
     def change_bounds(self, arguments: Sequence[ast.expr]) -> Iterator[Fault]:
-        """Limits that are numbers: an integer by one, any other by a factor of ten."""
+        """Change numeric limits: an integer by one, any other number by a factor of ten."""
         for node in arguments:
             if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
                 whole = isinstance(node.value, int)
                 if not isinstance(node.value, bool):
-                    yield self.fault(node, "bound", repr(node.value + 1 if whole else (node.value or 0.1) * 10.0))
+                    yield self.replace_node(
+                        node, "bound", repr(node.value + 1 if whole else (node.value or 0.1) * 10.0)
+                    )
 
 
 def _is_text(node: ast.BinOp) -> bool:
@@ -179,7 +181,7 @@ def _is_text(node: ast.BinOp) -> bool:
 
 
 def make_copy(number: int) -> Path:
-    """A copy of the committed sources, as a work tree of its own."""
+    """Copy the committed sources into a separate git work tree."""
     folder = COPIES / f"tree{number}"
     if folder.exists():
         subprocess.run(["git", "worktree", "remove", "--force", str(folder)], cwd=ROOT, check=True)
@@ -188,40 +190,40 @@ def make_copy(number: int) -> Path:
 
 
 def try_fault(fault: Fault, copies: "Queue[Path]") -> bool:
-    """Plant one fault, run the tests that execute it, take it out again; whether a test failed."""
+    """Plant one fault, run the tests that execute it, remove it; return whether a test failed."""
     folder = copies.get()
     path = folder / fault.path
-    sound = path.read_bytes()
+    original = path.read_bytes()
     try:
-        path.write_bytes(sound[: fault.start] + fault.after.encode() + sound[fault.stop :])
-        return any(not passes(folder, some) for some in choose_tests(fault))
+        path.write_bytes(original[: fault.start] + fault.after.encode() + original[fault.stop :])
+        return any(not run_tests(folder, some) for some in choose_tests(fault))
     finally:
-        path.write_bytes(sound)
+        path.write_bytes(original)
         copies.put(folder)
 
 
 def choose_tests(fault: Fault) -> list[list[str]]:
-    """Tests to run, those of the same package first; at most ``MOST_TESTS`` that execute the line."""
-    mirrored = mirrored_tests(fault.path)
-    executing = sorted(tests_of_line(fault.path, fault.line))
+    """Choose at most ``MAX_TESTS`` tests that execute the line, those of the same package first."""
+    mirrored = find_mirrored_folder(fault.path)
+    executing = sorted(find_tests_of_line(fault.path, fault.line))
     near = [test for test in executing if test.startswith(mirrored)]
     far = [test for test in executing if not test.startswith(mirrored)]
     chance = random.Random(fault.start)
-    far = sorted(chance.sample(far, min(len(far), MOST_TESTS)))
+    far = sorted(chance.sample(far, min(len(far), MAX_TESTS)))
     groups = [near, far] if executing else [[mirrored]]
     return [group for group in groups if group]
 
 
-def mirrored_tests(path: str) -> str:
-    """The nearest folder of unit tests that mirrors a file."""
+def find_mirrored_folder(path: str) -> str:
+    """Return the nearest folder of unit tests that mirrors a file."""
     folder = ROOT / "tests" / "unit" / Path(path).parent
     while not folder.is_dir():
         folder = folder.parent
     return folder.relative_to(ROOT).as_posix()
 
 
-def tests_of_line(path: str, line: int) -> set[str]:
-    """Tests that executed a line, from the data of ``make coverage``."""
+def find_tests_of_line(path: str, line: int) -> set[str]:
+    """Return the tests that executed a line, from the data of ``make coverage``."""
     with sqlite3.connect(f"file:{DATA}?mode=ro", uri=True) as data:
         rows = data.execute(
             "SELECT DISTINCT context.context FROM arc JOIN file ON file.id = arc.file_id "
@@ -232,8 +234,8 @@ def tests_of_line(path: str, line: int) -> set[str]:
     return {context.partition("|")[0] for context in contexts if "::" in context}
 
 
-def passes(folder: Path, tests: list[str]) -> bool:
-    """Whether some tests pass in a copy of the sources; a time-out is a failure."""
+def run_tests(folder: Path, tests: list[str]) -> bool:
+    """Run tests in a copy of the sources; return whether they pass. A time-out is a failure."""
     listing = folder / "selected_tests.txt"
     listing.write_text("\n".join(tests), encoding="utf-8")
     command = [
@@ -259,7 +261,7 @@ def passes(folder: Path, tests: list[str]) -> bool:
 
 
 def format_page(results: list[tuple[Fault, bool]], seed: int) -> str:
-    """Counts by package and by kind, and the survivors."""
+    """Return counts by package and by kind, and the survivors, as a Markdown page."""
     lines = [
         f"{sum(detected for _, detected in results)} of {len(results)} planted faults made a test fail "
         f"(seed {seed}; `python -m benchmarks.quality.planted_faults --count {len(results)} --seed {seed}`).",
@@ -267,8 +269,12 @@ def format_page(results: list[tuple[Fault, bool]], seed: int) -> str:
         "| drawn over | faults | detected |",
         "| --- | --- | --- |",
     ]
-    for name, key in (("package", lambda f: f.path.partition("/")[0]), ("kind", lambda f: f.kind)):
-        total: Counter[str] = Counter(key(fault) for fault, _ in results)
+    keys: tuple[tuple[str, Callable[[Fault], str]], ...] = (
+        ("package", lambda f: f.path.partition("/")[0]),
+        ("kind", lambda f: f.kind),
+    )
+    for name, key in keys:
+        total = Counter(key(fault) for fault, _ in results)
         found = Counter(key(fault) for fault, detected in results if detected)
         lines += [f"| {name} {each} | {total[each]} | {found[each]} |" for each in sorted(total)]
     survivors = [f"- {fault}" for fault, detected in results if not detected]

@@ -1,10 +1,10 @@
-"""The evaluation of the paper that the product sets out from, as a page: its tables and figures on a known damper.
+"""Evidence page with the tables and figures of the paper, for a damper with known parameters.
 
     python -m benchmarks.real.paper [FOLDER]
 
-It records the paper's six voltages on the simulated rig, identifies a short recording of them, predicts another
-one of 100 s at each, and writes docs/evidence/paper.md with its figures. FOLDER keeps the logs; what is there is
-used again.
+The paper's six voltages are recorded on the simulated rig. A short recording is identified, and another one with
+100 s at each voltage is predicted. The output is docs/evidence/paper.md with its figures. FOLDER keeps the logs,
+which later calls use again.
 """
 
 import sys
@@ -31,7 +31,7 @@ from identification.damper import (
 PAGE = Path(__file__).parents[2] / "docs" / "evidence" / "paper.md"
 TEMPLATE = Path(__file__).with_name("paper.md.j2")
 TABLE_2 = {0.0: 18.7936, 0.1: 17.7621, 0.2: 13.8159, 0.3: 11.8298, 0.4: 16.8806, 0.5: 10.0988}
-"""[N] the paper's force error by voltage."""
+"""Force error in the paper [N] by voltage [V]."""
 TABLE_1, TRUE = (PARAMETER_SETS[name].parameters for name in ("paper_table_1", "laboratory"))
 AMPLITUDE, FREQUENCY, SECONDS, STEP = 0.010, 1.0, 3.0, 1e-4
 COMMANDS = (
@@ -46,9 +46,14 @@ COMMANDS = (
 
 
 def integrate_force(p: Parameters, drive: float, *, printed: bool = False) -> np.ndarray:
-    """Force [N] on the paper's sine at a constant drive, the last cycle; ``printed`` takes x' + y' as eq. 13 does.
+    """Integrate the force [N] in the last cycle of the paper's sine at a constant drive.
 
-    Runge-Kutta of order four with steps of 0.1 ms: slow, and independent of the product's integrator.
+    The method is Runge-Kutta of order four with steps of 0.1 ms. It is slow and independent of `simulate`.
+
+    Args:
+        p: parameters of the damper.
+        drive: drive [V].
+        printed: use x' + y' as printed in eq. 13 instead of x' - y'.
     """
     w = 2 * np.pi * FREQUENCY
     alpha, c0, c1 = (
@@ -63,8 +68,8 @@ def integrate_force(p: Parameters, drive: float, *, printed: bool = False) -> np
         if not printed:
             return y_rate, compute_hysteresis_rate(v - y_rate, z, p.A, p.beta, p.gamma, p.n)
         size, summed = abs(z), v + y_rate
-        turned = p.gamma * abs(summed) * z * size ** (p.n - 1) + p.beta * summed * size**p.n
-        return y_rate, p.A * (v - y_rate) - turned
+        reduction = p.gamma * abs(summed) * z * size ** (p.n - 1) + p.beta * summed * size**p.n
+        return y_rate, p.A * (v - y_rate) - reduction
 
     y, z, forces = 0.0, 0.0, []
     for k in range(round(SECONDS / STEP)):
@@ -88,9 +93,9 @@ def _advance(
 
 
 def render_table_1(fit: dict[str, Any]) -> str:
-    """The fourteen parameters in the paper's order, with what it has not: intervals and the truth."""
+    """Return the table of the fourteen parameters in the paper's order, with intervals and true values."""
     head = (
-        "| parameter | found | 95 % interval | unit | true | the paper's damper |\n"
+        "| parameter | estimate | 95 % interval | unit | true | the paper's damper |\n"
         "| --- | ---: | --- | --- | ---: | ---: |\n"
     )
     rows = []
@@ -98,7 +103,7 @@ def render_table_1(fit: dict[str, Any]) -> str:
         e = fit["parameters"][q.symbol]
         ci = e["ci95"]
         interval = (
-            "fixed: a gauge" if q.symbol == "A" else f"{ci[0]:.4g} to {ci[1]:.4g}" if ci else "cannot be seen"
+            "fixed: a gauge" if q.symbol == "A" else f"{ci[0]:.4g} to {ci[1]:.4g}" if ci else "not observable"
         )
         inside = "" if ci is None or ci[0] <= TRUE[i] <= ci[1] else " (outside)"
         rows.append(
@@ -109,7 +114,7 @@ def render_table_1(fit: dict[str, Any]) -> str:
 
 
 def render_table_2(prediction: dict[str, Any]) -> str:
-    """Force error by voltage, beside the paper's."""
+    """Return the table of force errors by voltage, next to those of the paper."""
     head = "| voltage V | RMSE N | NRMSE | samples | the paper's RMSE N |\n| ---: | ---: | ---: | ---: | ---: |\n"
     rows = [
         f"| {abs(e['drive']):.1f} | {e['rmse_n']:.3f} | {100 * e['nrmse']:.2f} % | {e['samples']} | "
@@ -120,7 +125,7 @@ def render_table_2(prediction: dict[str, Any]) -> str:
 
 
 def render_table_1_forces() -> str:
-    """What Table 1 makes of the paper's own stroke, and its Table 2 in shares of that."""
+    """Return the forces of the paper's Table 1 on its own stroke, and its Table 2 relative to them."""
     head = (
         "| voltage V | c0 N s/m | c1 N s/m | peak force N | deviation N | Table 2's error over that |\n"
         "| ---: | ---: | ---: | ---: | ---: | ---: |\n"
@@ -140,7 +145,7 @@ def render_table_1_forces() -> str:
 
 
 def render_sign_table() -> str:
-    """How much x' + y' in place of x' - y' changes the force of a damper."""
+    """Return the change of the force if x' + y' replaces x' - y'."""
     head = "| voltage V | laboratory damper | Spencer's damper |\n| ---: | ---: | ---: |\n"
     dampers = (TRUE, PARAMETER_SETS["spencer_1997"].parameters)
     rows = []
@@ -153,8 +158,8 @@ def render_sign_table() -> str:
     return head + "\n".join(rows)
 
 
-def render_page(fit: dict[str, Any], prediction: dict[str, Any], typed: list[str]) -> str:
-    """The page, from the documents of this run."""
+def render_page(fit: dict[str, Any], prediction: dict[str, Any], commands: list[str]) -> str:
+    """Return the page made from the documents of this run."""
     p = TABLE_1
     zero = -p.c0_a / p.c0_b
     unstable = -(p.c0_a + p.c1_a) / (p.c0_b + p.c1_b)
@@ -168,7 +173,7 @@ def render_page(fit: dict[str, Any], prediction: dict[str, Any], typed: list[str
     environment = Environment(undefined=StrictUndefined, keep_trailing_newline=True)
     return environment.from_string(TEMPLATE.read_text()).render(
         version=version("mrbench"),
-        commands="\n".join(typed),
+        commands="\n".join(commands),
         table_1=render_table_1(fit),
         table_2=render_table_2(prediction),
         table_of_table_1=render_table_1_forces(),
@@ -177,7 +182,7 @@ def render_page(fit: dict[str, Any], prediction: dict[str, Any], typed: list[str
         known=len(known),
         rmse=f"{prediction['rmse_n']:.3f}",
         floor=f"{prediction['noise_floor_n']:.3f}",
-        band=f"{100 * band['inside']:.1f} % of its {prediction['samples']} samples lie inside the band of "
+        band=f"{100 * band['coverage']:.1f} % of its {prediction['samples']} samples lie inside the band of "
         f"± {band['half_width_n']:.2f} N",
         growth=f"{np.exp(p.eta * 0.1):.0f}",
         negative=f"{evaluate_coefficient(p.c0_a, p.c0_b, 0.5):.0f}",
@@ -188,15 +193,17 @@ def render_page(fit: dict[str, Any], prediction: dict[str, Any], typed: list[str
 
 
 def run(folder: Path) -> None:
-    """Make the page."""
-    desk = Workspace(folder)
-    for made, command in COMMANDS:
-        if not (folder / made).exists():
-            desk.run(command)
+    """Write the page."""
+    workspace = Workspace(folder)
+    for output, command in COMMANDS:
+        if not (folder / output).exists():
+            workspace.run(command)
     found: PredictionSeries = read_series(folder / "unseen.npz")
     draw(found, PAGE.parent / "paper")
     PAGE.write_text(
-        render_page(desk.read_document("fit"), desk.read_document("unseen"), [words for _, words in COMMANDS])
+        render_page(
+            workspace.read_document("fit"), workspace.read_document("unseen"), [command for _, command in COMMANDS]
+        )
     )
 
 
@@ -204,5 +211,5 @@ if __name__ == "__main__":
     if len(sys.argv) > 1:
         run(Path(sys.argv[1]))
     else:
-        with TemporaryDirectory() as place:
-            run(Path(place))
+        with TemporaryDirectory() as temporary:
+            run(Path(temporary))

@@ -1,5 +1,6 @@
 """Figures 3 to 5 of the paper: force over time, displacement and velocity at six voltages."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib
@@ -12,24 +13,24 @@ from benchmarks.common import PredictionSeries
 matplotlib.use("Agg")
 
 _CYCLE_TIME = 1.0
-"""[s] shown of each voltage."""
+"""Time shown at each voltage [s]."""
 _END_MARGIN = 5.0
-"""[s] before the end of a voltage at which the cycle shown ends."""
+"""Time between the end of the shown cycle and the end of its voltage [s]."""
 _DOT_SPACING = 12
-"""[samples] between two dots of the recorded force."""
+"""Distance between two dots of the recorded force [samples]."""
 
 
 def draw(series: PredictionSeries, folder: Path) -> None:
     """Write the three figures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    across = {
+    axes_by_name: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {
         "force_time": ("time in the cycle [s]", lambda rows: series.time[rows] - series.time[rows[0]]),
         "force_displacement": ("displacement [mm]", lambda rows: 1e3 * series.displacement[rows]),
         "force_velocity": ("velocity [m/s]", lambda rows: series.velocity[rows]),
     }
     cycles = _find_cycles(series)
     colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, len(cycles)))
-    for name, (label, values) in across.items():
+    for name, (label, values) in axes_by_name.items():
         figure = Figure(figsize=(6.4, 4.2), layout="constrained")
         axes = figure.subplots()
         for (drive, rows), colour in zip(cycles.items(), colours, strict=True):
@@ -41,7 +42,7 @@ def draw(series: PredictionSeries, folder: Path) -> None:
 
 
 def _find_cycles(series: PredictionSeries) -> dict[float, np.ndarray]:
-    """Rows of one late cycle at each voltage."""
+    """Return the indices of one late cycle at each voltage."""
     rate = 1.0 / float(np.median(np.diff(series.time[:1000])))
     levels = np.round(series.drive, 1)
     found = {}

@@ -1,4 +1,4 @@
-"""Pictures of the real dampers: recorded over simulated, and what is left."""
+"""Plots of the real dampers: recorded force, simulated force and residual."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,11 +15,11 @@ matplotlib.use("Agg")
 _CURRENTS = ("0", "0.25", "0.5", "0.75", "1")
 _COLOURS = dict(zip(_CURRENTS, matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, 5)), strict=True))
 _EXCERPT = (18.0, 18.8)
-"""[s] of the random stroke that is shown over time."""
+"""Interval of the random stroke that is plotted over time [s]."""
 
 
 def draw_all(utfsm: PredictionSeries, nees: PredictionSeries, folder: Path) -> None:
-    """Write every picture into a folder."""
+    """Write all plots into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     figures = {
         "loops-5mm-4hz": plot_loops(utfsm, "5mm_4Hz"),
@@ -33,7 +33,7 @@ def draw_all(utfsm: PredictionSeries, nees: PredictionSeries, folder: Path) -> N
 
 
 def plot_loops(series: PredictionSeries, stroke: str) -> Figure:
-    """Force against displacement and velocity, mean of the steady cycles, all currents."""
+    """Plot the force over displacement and velocity, as mean of the steady cycles, for all currents."""
     figure = Figure(figsize=(9.0, 4.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     for current in _CURRENTS:
@@ -47,7 +47,7 @@ def plot_loops(series: PredictionSeries, stroke: str) -> Figure:
 
 
 def plot_residuals(series: PredictionSeries, strokes: Iterable[str]) -> Figure:
-    """Recorded minus simulated force over the phase of the stroke, mean of the steady cycles."""
+    """Plot recorded minus simulated force over the phase of the stroke, as mean of the steady cycles."""
     figure = Figure(figsize=(9.0, 3.8), layout="constrained")
     degree = 360.0 * np.arange(POINTS) / POINTS
     for axes, stroke in zip(figure.subplots(1, 2, sharey=True), strokes, strict=True):
@@ -63,7 +63,7 @@ def plot_residuals(series: PredictionSeries, strokes: Iterable[str]) -> Figure:
 
 
 def plot_notch(series: PredictionSeries, names: Iterable[str]) -> Figure:
-    """The force against time around the lower reversal at the highest current."""
+    """Plot the force of all steady cycles around the lower reversal at the highest current."""
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     degree = 360.0 * np.arange(POINTS) / POINTS
     near = (degree > 240) & (degree < 340)
@@ -79,19 +79,19 @@ def plot_notch(series: PredictionSeries, names: Iterable[str]) -> Figure:
 
 
 def plot_time_series(series: PredictionSeries) -> Figure:
-    """Held-out part of the random stroke: force, its residual, displacement and voltage."""
+    """Plot force, residual, displacement and voltage of the held-out part of the random stroke."""
     figure = Figure(figsize=(9.0, 6.0), layout="constrained")
-    force, left, motion, drive = figure.subplots(4, 1, sharex=True, height_ratios=(3, 1.6, 1, 1))
+    force, residual, motion, drive = figure.subplots(4, 1, sharex=True, height_ratios=(3, 1.6, 1, 1))
     rows = (series.time >= _EXCERPT[0]) & (series.time < _EXCERPT[1]) & series.held_out
     time = series.time[rows]
     force.plot(time, series.force[rows], color="tab:blue", lw=1.0, label="recorded")
     force.plot(time, series.simulated[rows], color="0.2", lw=0.9, ls="--", label="simulated")
     force.legend(frameon=False, fontsize=8, ncols=2)
-    left.plot(time, series.residual[rows], color="tab:red", lw=0.8)
+    residual.plot(time, series.residual[rows], color="tab:red", lw=0.8)
     motion.plot(time, 1e3 * series.displacement[rows], color="0.3", lw=0.9)
     drive.plot(time, series.drive[rows], color="0.3", lw=0.9)
     _format_axes(force, "", "force [N]", "random stroke, held-out part")
-    _format_axes(left, "", "recorded -\nsimulated [N]", "")
+    _format_axes(residual, "", "recorded -\nsimulated [N]", "")
     _format_axes(motion, "", "displacement\n[mm]", "")
     _format_axes(drive, "time [s]", "voltage [V]", "")
     return figure

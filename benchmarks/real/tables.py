@@ -1,4 +1,4 @@
-"""Tables of the real dampers: where the held-out error sits."""
+"""Tables of the held-out errors of the real dampers, by conditions."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -20,33 +20,33 @@ SLOW_STROKES = ("2mm_5Hz", "25mm_0.5Hz", "25mm_0.25Hz")
 STROKES = (*FAST_STROKES, *SLOW_STROKES)
 CURRENTS = ("0", "0.25", "0.5", "0.75", "1")
 REFERENCE_NRMSE = {"utfsm": 0.099, "nees": 0.181}
-"""[1] held-out NRMSE that a quick least-squares fit of the same law reached."""
+"""Held-out NRMSE of a quick least-squares fit of the same law [1]."""
 REFERENCE_BY_CURRENT = dict(zip(CURRENTS, (0.253, 0.159, 0.093, 0.080, 0.097), strict=True))
-"""[1] the same by current."""
+"""Held-out NRMSE of that fit by current, utfsm [1]."""
 
 
 def make_stretch_names(strokes: Sequence[str], currents: Sequence[str]) -> list[str]:
-    """Stretches of these strokes at these currents."""
+    """Return the names of the stretches of these strokes at these currents."""
     return [f"{stroke}_{current}A" for stroke in strokes for current in currents]
 
 
 def compute_stretch_error(series: PredictionSeries, names: Sequence[str]) -> tuple[float, float]:
-    """RMSE [N] and NRMSE [1] over several stretches."""
+    """Compute RMSE [N] and NRMSE [1] over several stretches."""
     return series.compute_error(np.any([series.select_rows(name) for name in names], axis=0))
 
 
 def summarise_fit(log: str, label: str, found: SimulatedFit) -> dict[str, Any]:
-    """One row of the table of results."""
+    """Return one row of the table of results."""
     d = found.document
-    held, bar = d["nrmse"]["held_out"], REFERENCE_NRMSE[log]
+    held, reference = d["nrmse"]["held_out"], REFERENCE_NRMSE[log]
     return {
         "log": log,
         "label": label,
         "train": d["nrmse"]["train"],
         "held": held,
         "held_n": d["rmse_n"]["held_out"],
-        "bar": bar,
-        "below": 100 * (1 - held / bar),
+        "reference": reference,
+        "below": 100 * (1 - held / reference),
         "floors": d["rmse_n"]["held_out"] / d["noise_floor_n"],
         "seconds": d["stages"][-1]["seconds"],
         "result": d["result"],
@@ -54,7 +54,7 @@ def summarise_fit(log: str, label: str, found: SimulatedFit) -> dict[str, Any]:
 
 
 def compare_network(row: dict[str, Any], found: SimulatedFit) -> dict[str, Any]:
-    """What the network says of a recording, beside the refinement's row in the table of results."""
+    """Return a row of the table of results, with the result of the network for comparison."""
     network, refined = found.document["stages"]
     assert (network["name"], refined["name"]) == ("pinn", "refine")
     names = ("D_y", "rho", "n", "F_a", "c0_a", "c1_a", "k0", "k1")
@@ -69,7 +69,7 @@ def compare_network(row: dict[str, Any], found: SimulatedFit) -> dict[str, Any]:
 
 
 def tabulate_by_current(fits: dict[str, SimulatedFit], alone: dict[str, SimulatedFit]) -> list[dict[str, Any]]:
-    """Errors of the common fits and of a fit of each current alone, on the strokes held out."""
+    """Return held-out errors of the common fits and of a separate fit of each current, by current."""
     rows = []
     for current in CURRENTS:
         held, rest = (
@@ -96,7 +96,7 @@ def tabulate_by_current(fits: dict[str, SimulatedFit], alone: dict[str, Simulate
 
 
 def compute_pooled_nrmse(alone: dict[str, SimulatedFit]) -> float:
-    """[1] held-out NRMSE where every current has a law of its own."""
+    """Compute the held-out NRMSE [1] of separate fits for all currents."""
     pairs = []
     for current, found in alone.items():
         rows = np.any(
@@ -108,7 +108,7 @@ def compute_pooled_nrmse(alone: dict[str, SimulatedFit]) -> float:
 
 
 def decompose_residual(cycles: Sequence[Cycles]) -> dict[str, float]:
-    """What the residual of some files holds in common over their cycles, and where."""
+    """Divide the residual of some files into repeating part [N], scatter [N] and fraction at reversals [1]."""
     squares = np.array([c.repeating_rms**2 for c in cycles])
     return {
         "repeating": float(np.sqrt(squares.mean())),
@@ -118,7 +118,7 @@ def decompose_residual(cycles: Sequence[Cycles]) -> dict[str, float]:
 
 
 def tabulate_by_file(found: SimulatedFit) -> list[dict[str, Any]]:
-    """Errors and residual of every file held out."""
+    """Return errors and parts of the residual of all held-out files."""
     rows = []
     for name in make_stretch_names(TEST_STROKES, CURRENTS):
         inside = found.series.select_rows(name)
@@ -130,10 +130,10 @@ def tabulate_by_file(found: SimulatedFit) -> list[dict[str, Any]]:
     return rows
 
 
-def compute_rest_start_nrmse(desk: Workspace, log: str, hold_out: Sequence[str]) -> float:
-    """[1] held-out NRMSE where y(0) of the held-out files is not fitted to them but taken as 0."""
-    fit = read_fit(desk.folder / f"{log}.json")
-    assembled = assemble([load(desk.folder / f"{log}.mcap")], HoldOut(tuple(f"{s}*" for s in hold_out)))
+def compute_rest_start_nrmse(workspace: Workspace, log: str, hold_out: Sequence[str]) -> float:
+    """Compute the held-out NRMSE [1] with y(0) = 0 instead of its estimate in the held-out files."""
+    fit = read_fit(workspace.folder / f"{log}.json")
+    assembled = assemble([load(workspace.folder / f"{log}.mcap")], HoldOut(tuple(f"{s}*" for s in hold_out)))
     delay = fit.nuisances.force_delay.value
     held = [p for p, out in zip(assembled.pieces, assembled.held_out, strict=True) if out.any()]
     errors = [
@@ -144,7 +144,7 @@ def compute_rest_start_nrmse(desk: Workspace, log: str, hold_out: Sequence[str])
 
 
 def tabulate_by_voltage(fits: dict[str, SimulatedFit]) -> list[dict[str, Any]]:
-    """Errors at the two voltages between which the drive switches."""
+    """Return the errors at the two voltages between which the drive switches."""
     levels = [row["drive"] for row in fits[""].document["per_drive"]]
     held = fits[""].series.held_out
     rows = []
@@ -161,7 +161,7 @@ def tabulate_by_voltage(fits: dict[str, SimulatedFit]) -> list[dict[str, Any]]:
 
 
 def tabulate_by_speed(series: PredictionSeries, driven: np.ndarray) -> list[dict[str, Any]]:
-    """Where the residual of the held-out part sits, by speed of the stroke."""
+    """Return the residual of the held-out part by speed of the stroke."""
     speed, rows = np.abs(series.velocity), []
     edges = (0.0, 0.03, 0.06, 0.1, 0.2, np.inf)
     for low, high in pairwise(edges):
@@ -173,7 +173,7 @@ def tabulate_by_speed(series: PredictionSeries, driven: np.ndarray) -> list[dict
 
 
 def compute_high_frequency_share(series: PredictionSeries, rows: np.ndarray, above: float = 40.0) -> float:
-    """[1] part of the squared residual of consecutive samples above a frequency [Hz]."""
+    """Compute the fraction [1] of the squared residual of consecutive samples above a frequency [Hz]."""
     residual = series.residual[rows]
     power = np.abs(np.fft.rfft(residual * np.hanning(len(residual)))) ** 2
     frequency = np.fft.rfftfreq(len(residual), float(np.median(np.diff(series.time[rows]))))
@@ -181,7 +181,7 @@ def compute_high_frequency_share(series: PredictionSeries, rows: np.ndarray, abo
 
 
 def estimate_inertia(series: PredictionSeries, rows: np.ndarray) -> tuple[float, float]:
-    """Mass [kg] that would best repeat the residual, and the NRMSE [1] it would leave."""
+    """Estimate the mass [kg] whose inertia best fits the residual, and the NRMSE [1] that remains."""
     acceleration = np.gradient(series.velocity, series.time)[rows]
     residual = series.residual[rows]
     mass = float(acceleration @ residual / (acceleration @ acceleration))

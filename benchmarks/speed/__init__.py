@@ -16,6 +16,6 @@ __all__ = [
     "TRAINING_STROKES",
     "VALIDATION_STROKES",
     "draw_damper",
-    "record_forces",
     "make_excitation",
+    "record_forces",
 ]

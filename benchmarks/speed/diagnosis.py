@@ -1,8 +1,8 @@
-"""How long a diagnosis takes: a two-minute log at 1 kHz with each effect, and with none.
+"""Speed of a diagnosis: processor time for a two-minute log at 1 kHz, with each effect and without effects.
 
-Processor time of one process, machine code warm, and its ratio to one fit of the plain law to the same log.
-``--keep FOLDER`` keeps logs and figures and takes up where an earlier call stopped; ``--only gas_spring,nothing``
-takes some.
+The time is that of one process with compiled code, and its ratio to one fit of the law to the same log.
+``--keep FOLDER`` keeps logs and results and continues an interrupted call; ``--only gas_spring,nothing`` selects
+cases.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from benchmarks.common import (
     COMMON_EFFECTS,
     NO_EFFECT,
     lengthen_method,
-    load_figures,
+    load_results,
     make_parser,
     open_folder,
     record_effect,
@@ -27,30 +27,31 @@ from identification.pipeline import FitRequest, identify
 
 EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
 _LENGTHENING = 6
-"""[1] by which the strokes of `quick` are longer here: some two minutes with its rests."""
+"""Factor on the cycles of `quick` [1], which give about two minutes with its rests."""
 _TIME_LIMITS = {NO_EFFECT: 3.0}
+"""Time limit of a diagnosis for cases that differ from `_TIME_LIMIT` [s]."""
 _TIME_LIMIT = 30.0
-"""[s] of one core that a diagnosis may take: of nothing, and of an effect."""
-_PAGE = """# How long a diagnosis takes
+"""Time limit of a diagnosis with an effect [s]."""
+_PAGE = """# Speed of a diagnosis
 
-Two minutes at 1 kHz (`quick`, six times as long), processor seconds of one process on a machine that others used,
-machine code warm; asked for are {bar:g} s, and {none:g} s where there is nothing. Made by
+Two minutes at 1 kHz (`quick`, six times as long). Times are processor seconds of one process on a shared machine,
+with compiled code. The requirement is {limit:g} s, and {none:g} s without an effect. Command:
 
 ```
 python -m benchmarks.speed.diagnosis --keep FOLDER --page
 ```
 
-| effect | diagnosis, CPU s | one fit, CPU s | ratio | within the bar | verdict | named |
+| effect | diagnosis, CPU s | one fit, CPU s | ratio | within limit | verdict | named effects |
 | --- | ---: | ---: | ---: | --- | --- | --- |
 {rows}
 
-{within} of {count} within the bar{missing}.
+{within} of {count} within the limit{missing}.
 """
 
 
 def load_measurement(effect: str, kept: Path) -> dict[str, Any]:
-    """The figures of one effect, measured once."""
-    found: dict[str, Any] = load_figures(kept / f"{effect}.json", lambda: _measure_effect(effect, kept))
+    """Return the measurement of one effect; measure it if it is not stored."""
+    found: dict[str, Any] = load_results(kept / f"{effect}.json", lambda: _measure_effect(effect, kept))
     return found
 
 
@@ -58,9 +59,9 @@ def _measure_effect(effect: str, kept: Path) -> dict[str, Any]:
     log = kept / f"{effect}.mcap"
     record_effect(lengthen_method("quick", _LENGTHENING), effect, 1.0, 1, log)
     recording = load(log)
-    answer, seconds = time_call(lambda: diagnose([recording]).diagnosis)
-    named = [e.name for e in answer.effects]
-    return {"seconds": seconds, "fit": _time_fit(recording), "verdict": answer.verdict, "named": named}
+    diagnosis, seconds = time_call(lambda: diagnose([recording]).diagnosis)
+    named = [e.name for e in diagnosis.effects]
+    return {"seconds": seconds, "fit": _time_fit(recording), "verdict": diagnosis.verdict, "named": named}
 
 
 def _time_fit(recording: Recording) -> float:
@@ -78,10 +79,10 @@ def _render_row(effect: str, found: dict[str, Any]) -> str:
 
 
 def render_page(found: dict[str, dict[str, Any]]) -> str:
-    """The page of what has been measured."""
+    """Return the page of all measurements."""
     missing = [name for name in (NO_EFFECT, *COMMON_EFFECTS) if name not in found]
     return _PAGE.format(
-        bar=_TIME_LIMIT,
+        limit=_TIME_LIMIT,
         none=_TIME_LIMITS[NO_EFFECT],
         rows="\n".join(_render_row(effect, one) for effect, one in found.items()),
         within=sum(_is_within_limit(effect, one) for effect, one in found.items()),
@@ -91,7 +92,7 @@ def render_page(found: dict[str, dict[str, Any]]) -> str:
 
 
 def main() -> None:
-    """Measure, print the table, and write the page if asked."""
+    """Measure, print the table, and write the page on request."""
     asked = _make_parser().parse_args()
     found = {}
     with open_folder(asked.keep) as kept:
@@ -104,13 +105,13 @@ def main() -> None:
 
 
 def _make_parser() -> argparse.ArgumentParser:
-    made = make_parser(__doc__, "logs and figures")
-    made.add_argument("--page", action="store_true", help="write the page")
-    return made
+    parser = make_parser(__doc__, "logs and results")
+    parser.add_argument("--page", action="store_true", help="write the page")
+    return parser
 
 
 def _warm_up(kept: Path) -> None:
-    """Compile everything on a short log with a play, which needs the most."""
+    """Compile all functions on a short log with a compliant mount, which uses most of them."""
     log = kept / "warm.mcap"
     record_effect(lengthen_method("quick", 1), "fixture_compliance", 1.0, 2, log)
     diagnose([load(log)])

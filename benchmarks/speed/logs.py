@@ -1,4 +1,4 @@
-"""Log into arrays: the first read parses every message, later ones take the cache."""
+"""Speed of writing a log and of reading it into arrays, at first from its messages and later from the cache."""
 
 import os
 import time
@@ -15,7 +15,7 @@ SAMPLE_COUNT = 400_000
 
 
 def run() -> None:
-    """Print samples a second, written and read."""
+    """Print the written and read samples per second."""
     random = np.random.default_rng(1)
     t = np.arange(SAMPLE_COUNT) / 1000
     columns = {
@@ -26,7 +26,7 @@ def run() -> None:
         "coil_voltage": 0.3 + 1e-3 * random.standard_normal(SAMPLE_COUNT),
     }
     with TemporaryDirectory() as folder:
-        # An empty cache, or the first reading would be a later one.
+        # With a filled cache the first reading would not parse the messages.
         os.environ["MRBENCH_CACHE"] = str(Path(folder) / "cache")
         log = Path(folder) / "run.mcap"
         began = time.process_time()
@@ -38,11 +38,11 @@ def run() -> None:
     print(f"log: {SAMPLE_COUNT} samples of five channels, one JSON message each")
     print_line("written", SAMPLE_COUNT / written, "1/s", "")
     print_line("read into arrays for the first time", SAMPLE_COUNT / first, "1/s", "at least 80 000")
-    print_line("read into arrays from the second time on", SAMPLE_COUNT / later, "1/s", "at least 1 000 000")
+    print_line("read into arrays from the cache", SAMPLE_COUNT / later, "1/s", "at least 1 000 000")
 
 
 def make_header() -> RunHeader:
-    """A header with the least that a log needs."""
+    """Return a header with the required fields of a log."""
     return RunHeader(
         id="benchmark", specimen="none", method="none", drive_kind="coil_v", drive_unit="V", source="run",
         versions={}, utc_offset="", velocity_from="smoothed displacement",

@@ -1,7 +1,7 @@
-"""Ten minutes of stroking over the wires beside a busy core: what is lost, and what the agent costs.
+"""Soak test: ten minutes of strokes over the wires with one busy core; lost samples and load of the agent.
 
-python -m benchmarks soak              the paper's six voltages, 100 s each
-python -m benchmarks.speed.soak quick        another method
+python -m benchmarks soak               the paper's six voltages, 100 s each
+python -m benchmarks.speed.soak quick   another method
 """
 
 import json
@@ -22,7 +22,7 @@ _CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def run(method: str = METHOD) -> None:
-    """Record a method over the wires of a simulated rig beside a process that keeps one core busy."""
+    """Record a method over the wires of a simulated rig while another process keeps one core busy."""
     with TemporaryDirectory() as folder:
         bench, log = Path(folder) / "bench.toml", Path(folder) / "soak.mcap"
         rig = _start_mrbench("sim", "--out", str(bench))
@@ -35,7 +35,7 @@ def run(method: str = METHOD) -> None:
             for process in (busy, rig):
                 process.terminate()
                 process.wait()
-        _report(log, shares)
+        _print_report(log, shares)
 
 
 def _start_mrbench(*words: str) -> "subprocess.Popen[bytes]":
@@ -48,18 +48,18 @@ def _wait_for_file(file: Path, process: "subprocess.Popen[bytes]") -> None:
     deadline = time.monotonic() + _STARTUP_TIMEOUT
     while not file.is_file():
         if process.poll() is not None or time.monotonic() > deadline:
-            sys.exit("the simulated rig did not come up")
+            sys.exit(f"the simulated rig did not start within {_STARTUP_TIMEOUT:g} s; run `mrbench sim` alone")
         time.sleep(0.1)
 
 
 def _measure_shares(
     processes: dict[str, "subprocess.Popen[bytes]"], until: "subprocess.Popen[bytes]"
 ) -> dict[str, float]:
-    """Share of a core [1] that each process takes from the tenth second on until one of them ends."""
-    # Imports and connecting are over by then; what is measured is the stroking.
+    """Measure the core load [1] of each process from the tenth second until one of them ends."""
+    # Imports and connections are complete by then, so that only the strokes are measured.
     time.sleep(10.0)
     begin, began = time.monotonic(), {name: _read_cpu_time(process) for name, process in processes.items()}
-    # A process that has ended has no times left to read: the last ones before that count.
+    # The times of an ended process cannot be read; the last reading before its end is used.
     latest, end = dict(began), begin
     while until.poll() is None:
         time.sleep(0.5)
@@ -71,18 +71,18 @@ def _measure_shares(
 
 
 def _read_cpu_time(process: "subprocess.Popen[bytes]") -> float:
-    """Processor time [s] of a process so far."""
-    # Fields behind the name, which may itself hold spaces and brackets: utime and stime are the 14th and 15th.
+    """Return the processor time [s] of a process so far."""
+    # The name may contain spaces and brackets, so fields are counted after it. utime and stime: 14th and 15th.
     words = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(words[11]) + int(words[12])) / _CLOCK_TICKS
 
 
-def _report(log: Path, shares: dict[str, float]) -> None:
+def _print_report(log: Path, shares: dict[str, float]) -> None:
     recorded = read_log(log)
     lost = json.loads(recorded.metadata["outcome"]["lost"])
     seconds = float(recorded.samples["time"][-1] - recorded.samples["time"][0])
     print(f"soak: {seconds:.0f} s recorded, outcome {recorded.outcome}, lost: {lost or 'nothing'}")
-    print_line("samples at the load cell's conversions", len(recorded.samples["time"]), "", "")
+    print_line("recorded samples", len(recorded.samples["time"]), "", "")
     for name, share in shares.items():
         print_line(f"processor time of the {name}", 100 * share, "% core", "at most 30" if name == "agent" else "")
 

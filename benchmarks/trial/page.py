@@ -1,7 +1,10 @@
-"""The evidence page of a blind trial: `python -m benchmarks.trial.page trial.json`, after `mrbench trial`.
+"""Evidence page of a blind trial.
 
-A trial that was stopped counts as far as it went: cases that have not been diagnosed are left out, and the page
-says how many there were to be. Strokes made by `benchmarks.trial.next_stroke` have their line once they are there.
+    python -m benchmarks.trial.page trial.json
+
+The page is written after `mrbench trial`, also after an interrupted one. Cases without a diagnosis are excluded,
+and the page states the number of drawn cases. It includes the results of `benchmarks.trial.next_stroke` and
+`benchmarks.trial.same_kind` if they exist.
 """
 
 import argparse
@@ -12,7 +15,7 @@ from typing import Any, NamedTuple
 
 import orjson
 
-from benchmarks.trial.next_stroke import find_open_cases, read_seal, read_second_answer
+from benchmarks.trial.next_stroke import find_open_cases, read_seal, read_second_diagnosis
 from benchmarks.trial.same_kind import find_claimed_cases, read_same_kind_shrinkage
 from sim_rig.trial.cases import TrialFolder
 from sim_rig.trial.execution import DIAGNOSE, WIRES_SUFFIX, TrialOptions
@@ -29,16 +32,16 @@ from sim_rig.trial.scoring import (
 
 EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
 _CLEAR_GAP = 1.2
-"""[1] refitted law over the floor from which on a shrinkage is asked for."""
+"""Threshold on the refitted law's error over the noise floor [1]: above it, a claimed shrinkage is scored."""
 _TOLERANCE = 0.05
-"""[1] by which a claimed shrinkage may be off."""
+"""Largest permitted error of a claimed shrinkage [1]."""
 _CORRELATION_SUM = 2.63
-"""[1] sum of the squared correlations of neighbouring fourth differences of white noise."""
-_PAGE = """# The diagnosis on sealed scenarios
+"""Sum of the squared correlations of neighbouring fourth differences of white noise [1]."""
+_PAGE = """# Blind trial of the diagnosis
 
-{run} of {drawn} cases. Truth drawn and sealed before anything was recorded, in forms of their own; each case
-diagnosed from its log alone, then unsealed. [How it works](../explanation/blind-trial.md). Sealed truth: SHA-256
-`{seal}`. Made by
+{run} of {drawn} cases. The truth was drawn and sealed before any recording, with functional forms outside the
+library. Each case was diagnosed from its log alone and then unsealed ([method](../explanation/blind-trial.md)).
+SHA-256 of the sealed truth: `{seal}`. Commands:
 
 ```
 {command}
@@ -47,153 +50,164 @@ python -m benchmarks.trial.same_kind trial.json
 python -m benchmarks.trial.page trial.json{since}
 ```
 
-| asked | wanted | found |
+| quantity | requirement | result |
 | --- | --- | --- |
-{bars}
+{requirements}
 
-Sizes are first-order figures; what the refitted law really left stands in the last table ("before", over the floor
-on strokes that no fit saw), and so does what was left with the named effects ("after").
+Sizes are first-order estimates. The last table contains the actual error of the refitted law on validation strokes
+over the noise floor ("before"), and the error with the named effects ("after").
 
 ```
 {table}```
 
-## Read with care
+## Limitations
 
-{care}
+{limitations}
 
-## Seeds before
+## Earlier seeds
 
-By the code of their day, which has been mended since with what they showed; they are no sealed seeds any more.
+The results are those of the code at that time. The code was improved with them since, so these seeds are no longer
+blind.
 
 {before}
 
-## Case by case
+## All cases
 
-The named set is in bold where it is the true one. "Shrinkage" is claimed / that on the run never seen.
+A named set in bold is the true one. "p(truth)" is the probability of the true set.
+"Shrinkage" is the claimed one / that on the validation run.
 
-| case | kind | strokes | noise | truth (ratio) | verdict | named | truth had | before | after | shrinkage | s |
+| case | kind | strokes | noise | truth (ratio) | verdict | named | p(truth) | before | after | shrinkage | s |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 {rows}
 """
 
 _EARLIER_SEEDS = Path(__file__).with_name("before.md")
-"""What earlier seeds came to, each with the code of its day."""
+"""Results of earlier seeds, each with the code at that time."""
 
 
 class PageNotes(NamedTuple):
-    """What a page tells beside the answer of a trial."""
+    """Content of the page beyond the document of the trial."""
 
     next_strokes: Proportion
-    """Proposed strokes that brought the truth to the top."""
+    """Proposed strokes after which the true set was named."""
     chance: Mapping[str, float]
-    """[1] by which noise alone moves claimed from true shrinkage, one deviation, case by case."""
+    """Standard deviation of claimed less true shrinkage that noise alone causes [1], by case."""
     notes: Sequence[str] = ()
+    """Further limitations."""
     same_kind: Proportion | None = None
-    """Claims of poor methods that came true on another run of their kind."""
+    """Claims of poor methods that hold on another run of the same kind."""
     current_from: str = ""
-    """The first case whose shrinkage was claimed as it is now; claims before were learnt from, and stand apart."""
+    """First case with the present way of claiming a shrinkage; earlier claims were used for development."""
 
 
-def render_page(whole: TrialReport, drawn: int, beside: PageNotes) -> str:
-    """The page of the cases that have been diagnosed, of so many that were sealed."""
-    honest = [case for case in whole.cases if case.verdict or "not been diagnosed" not in (case.failure or "")]
-    told = whole.model_copy(update={"cases": tuple(honest), "scores": compute_scores(honest)})
-    grid = " --grid" if whole.kind == "grid" else ""
+def render_page(report: TrialReport, drawn: int, notes: PageNotes) -> str:
+    """Return the page of the diagnosed cases, out of the number of drawn cases."""
+    diagnosed = [case for case in report.cases if case.verdict or "not been diagnosed" not in (case.failure or "")]
+    shown = report.model_copy(update={"cases": tuple(diagnosed), "scores": compute_scores(diagnosed)})
+    grid = " --grid" if report.kind == "grid" else ""
     return _PAGE.format(
-        run=len([case for case in honest if not case.wired]),
+        run=len([case for case in diagnosed if not case.wired]),
         drawn=drawn,
-        seal=whole.sealed_sha256,
-        command=f"mrbench trial --cases {drawn} --seed {whole.seed}{grid} --wired 10 --out trial.json",
-        bars="\n".join(f"| {' | '.join(line)} |" for line in _list_requirements(told.scores, honest, beside)),
-        since=beside.current_from and f" --from {beside.current_from}",
-        table=render_table(told),
-        care="\n".join(f"- {line}" for line in (*_list_caveats(honest, drawn), *beside.notes)),
+        seal=report.sealed_sha256,
+        command=f"mrbench trial --cases {drawn} --seed {report.seed}{grid} --wired 10 --out trial.json",
+        requirements="\n".join(
+            f"| {' | '.join(line)} |" for line in _list_requirements(shown.scores, diagnosed, notes)
+        ),
+        since=notes.current_from and f" --from {notes.current_from}",
+        table=render_table(shown),
+        limitations="\n".join(f"- {line}" for line in (*_list_limitations(diagnosed, drawn), *notes.notes)),
         before=_EARLIER_SEEDS.read_text(encoding="utf-8").strip(),
-        rows="\n".join(map(_render_row, honest)),
+        rows="\n".join(map(_render_row, diagnosed)),
     )
 
 
 def _list_requirements(
-    found: Scores, cases: Sequence[CaseResult], beside: PageNotes
+    scores: Scores, cases: Sequence[CaseResult], notes: PageNotes
 ) -> Iterable[tuple[str, str, str]]:
-    """What is asked of the diagnosis, what is wanted, and what was found."""
+    """List quantity, requirement and result, one line each."""
     known = [case for case in cases if case.kind not in ("nothing", "unknown") and not case.wired]
     later = (
-        compute_scores([case for case in cases if case.id >= beside.current_from]) if beside.current_from else None
+        compute_scores([case for case in cases if case.id >= notes.current_from]) if notes.current_from else None
     )
-    for size, wanted in (("large", "97 %"), ("small", "85 %")):
+    for size, required in (("large", "97 %"), ("small", "85 %")):
         yield (
-            f"right set named first, {size}, rich methods",
-            wanted,
-            _format_share(found.correct[f"{size} rich"]),
+            f"true set named, {size}, rich methods",
+            required,
+            _format_proportion(scores.correct[f"{size} rich"]),
         )
         if later:
-            line = f"of these from {beside.current_from} on, {size}, rich methods"
-            yield line, wanted, _format_share(later.correct[f"{size} rich"])
+            line = f"of these from {notes.current_from} on, {size}, rich methods"
+            yield line, required, _format_proportion(later.correct[f"{size} rich"])
     rich = compute_proportion(case.correct_or_alternative for case in known if case.method == "rich")
-    yield "truth among the named and three alternatives, rich methods", "98 %", _format_share(rich)
+    yield "truth is the named set or one of three alternatives, rich methods", "98 %", _format_proportion(rich)
     yield (
-        "truth among the named and three alternatives, all methods",
+        "truth is the named set or one of three alternatives, all methods",
         "98 %",
-        _format_share(found.correct_or_alternative["all"]),
+        _format_proportion(scores.correct_or_alternative["all"]),
     )
-    yield "effects named where nothing is", "at most 2 in 100", _format_share(found.false_alarms)
-    yield "unknown effects blamed on no known one", "27 of 30", _format_share(found.unknown_correct)
-    yield from _list_claims(cases, beside)
-    if beside.same_kind and beside.same_kind.total:
+    yield "effects named without any effect", "at most 2 in 100", _format_proportion(scores.false_alarms)
+    yield (
+        "unknown effects not attributed to a library effect",
+        "27 of 30",
+        _format_proportion(scores.unknown_correct),
+    )
+    yield from _list_claims(cases, notes)
+    if notes.same_kind and notes.same_kind.total:
         yield (
-            "claimed shrinkage within 5 points on another run of its kind, poor",
+            "claimed shrinkage within 5 points on another run of the same kind, poor",
             "–",
-            _format_share(beside.same_kind),
+            _format_proportion(notes.same_kind),
         )
     yield (
-        "truth named after the proposed stroke was made, poor methods",
+        "truth named after the proposed stroke, poor methods",
         "90 %",
-        _format_share(beside.next_strokes),
+        _format_proportion(notes.next_strokes),
     )
-    yield "same answer over the wires", "10 of 10", _format_share(_count_same_over_wires(cases))
+    yield "same diagnosis over the wires", "10 of 10", _format_proportion(_count_same_over_wires(cases))
 
 
-def _list_claims(cases: Sequence[CaseResult], beside: PageNotes) -> Iterable[tuple[str, str, str]]:
-    """How near the claimed shrinkages came, those of now apart from those that were learnt from."""
+def _list_claims(cases: Sequence[CaseResult], notes: PageNotes) -> Iterable[tuple[str, str, str]]:
+    """List the accuracy of claimed shrinkages; claims used for development have separate lines."""
     claimed, since = (
         f"claimed shrinkage within {100 * _TOLERANCE:.0f} points",
-        beside.current_from and f", from {beside.current_from} on",
+        notes.current_from and f", from {notes.current_from} on",
     )
-    now = [case for case in cases if case.id >= beside.current_from]
+    current = [case for case in cases if case.id >= notes.current_from]
     for method in ("rich", "poor"):
-        yield f"{claimed}, {method}{since}", "95 %", _format_share(_count_accurate_claims(now, method))
+        yield f"{claimed}, {method}{since}", "95 %", _format_proportion(_count_accurate_claims(current, method))
     for method in ("rich", "poor"):
-        near = _count_accurate_claims(now, method, beside.chance)
+        near = _count_accurate_claims(current, method, notes.chance)
         yield (
-            f"{claimed} or what noise alone does to it (two deviations), {method}{since}",
+            f"{claimed} or two standard deviations of noise, {method}{since}",
             "–",
-            _format_share(near),
+            _format_proportion(near),
         )
-    for method in ("rich", "poor") if beside.current_from else ():
-        learnt = _count_accurate_claims([case for case in cases if case.id < beside.current_from], method)
-        yield f"{claimed}, {method}, before that: learnt from", "–", _format_share(learnt)
+    for method in ("rich", "poor") if notes.current_from else ():
+        earlier = _count_accurate_claims([case for case in cases if case.id < notes.current_from], method)
+        yield f"{claimed}, {method}, earlier: used for development", "–", _format_proportion(earlier)
 
 
-def _list_caveats(cases: Sequence[CaseResult], drawn: int) -> Iterable[str]:
-    """What is behind the figures: how many there are, and every case that went wrong."""
+def _list_limitations(cases: Sequence[CaseResult], drawn: int) -> Iterable[str]:
+    """List the number of cases that ran, wrong diagnoses, and wrong claims of shrinkage."""
     once = [case for case in cases if not case.wired]
     if len(once) < drawn:
         yield (
-            f"**How much ran.** {len(once)} of the {drawn} sealed cases; kinds, sizes and methods come in turn, "
-            "so that the beginning is a fair sample. Shares stand with Wilson's 95 % interval."
+            f"**Number of cases.** {len(once)} of the {drawn} sealed cases ran. Kinds, sizes and methods "
+            "alternate, so that the first cases are a fair sample. Proportions have Wilson's 95 % interval."
         )
     for case in cases:
         if not case.correct:
-            yield f"**{case.id}** ({case.method}, {_join_names(case.truth)} at work): {_describe_wrong_answer(case)}."
-    far = [
+            truth = _join_names(case.truth)
+            yield f"**{case.id}** ({case.method}, truth {truth}): {_describe_wrong_diagnosis(case)}."
+    inaccurate = [
         case
         for case in once
         if case.named_set and case.named_set.effects and _compute_shrinkage_error(case) > _TOLERANCE
     ]
-    if far:
-        yield f"**Shrinkage more than {100 * _TOLERANCE:.0f} points off**, claimed and true: " + "; ".join(
-            f"{case.id} ({case.method}) {case.claimed_shrinkage:.2f} and {case.true_shrinkage:.2f}" for case in far
+    if inaccurate:
+        yield f"**Errors of the shrinkage above {100 * _TOLERANCE:.0f} points**, claimed and true: " + "; ".join(
+            f"{case.id} ({case.method}) {case.claimed_shrinkage:.2f} and {case.true_shrinkage:.2f}"
+            for case in inaccurate
         )
 
 
@@ -201,22 +215,24 @@ def _join_names(names: Sequence[str]) -> str:
     return " and ".join(names) or "nothing"
 
 
-def _describe_wrong_answer(case: CaseResult) -> str:
-    """What was said instead of the truth."""
+def _describe_wrong_diagnosis(case: CaseResult) -> str:
+    """Return the diagnosis that differs from the truth, as text."""
     if case.failure is not None or case.named_set is None:
         return f"no diagnosis, {case.failure}"
-    said = f"{case.verdict}, {_join_names(case.named_set.effects)} named with {case.named_set.probability:.2f}"
+    diagnosis = (
+        f"{case.verdict}, {_join_names(case.named_set.effects)} named with {case.named_set.probability:.2f}"
+    )
     unknown, truth = case.unknown_probability, case.truth_probability
-    return f"{said}, {unknown:.2f} for something unknown; the truth had {truth:.2f}"
+    return f"{diagnosis}, {unknown:.2f} for an unknown effect; {truth:.2f} for the truth"
 
 
 def _compute_shrinkage_error(case: CaseResult) -> float:
-    """[1] by which the claimed shrinkage was off; 0 where there is none."""
+    """Return the error of the claimed shrinkage [1]; 0 if there is no claim or no true value."""
     claimed, true = case.claimed_shrinkage, case.true_shrinkage
     return 0.0 if claimed is None or true is None else abs(claimed - true)
 
 
-def _format_share(found: Proportion) -> str:
+def _format_proportion(found: Proportion) -> str:
     if found.fraction is None or found.ci95 is None:
         return "not measured"
     low, high = found.ci95
@@ -226,7 +242,7 @@ def _format_share(found: Proportion) -> str:
 def _count_accurate_claims(
     cases: Sequence[CaseResult], method: str, chance: Mapping[str, float] | None = None
 ) -> Proportion:
-    """Claimed shrinkages that came true on the run never seen, of cases with a clear gap and named effects."""
+    """Count claimed shrinkages that hold on the validation run, of cases with a clear gap and named effects."""
     clear = [
         case
         for case in cases
@@ -235,24 +251,27 @@ def _count_accurate_claims(
         and case.named_set.effects
         and case.method == method
     ]
-    there = [case for case in clear if None not in (case.claimed_shrinkage, case.true_shrinkage)]
+    scored = [case for case in clear if None not in (case.claimed_shrinkage, case.true_shrinkage)]
     return compute_proportion(
-        _compute_shrinkage_error(case) <= max(_TOLERANCE, 2.0 * (chance or {}).get(case.id, 0.0)) for case in there
+        _compute_shrinkage_error(case) <= max(_TOLERANCE, 2.0 * (chance or {}).get(case.id, 0.0))
+        for case in scored
     )
 
 
 def _count_same_kind(folder: TrialFolder, cases: Iterable[CaseResult]) -> Proportion:
-    """Claims of poor methods that came true on another run of their kind, of cases with a clear gap."""
-    there = {case.id: read_same_kind_shrinkage(folder, case) for case in find_claimed_cases(folder)}
-    found = [case.model_copy(update={"true_shrinkage": there[case.id]}) for case in cases if case.id in there]
+    """Count claims of poor methods that hold on another run of the same kind, of cases with a clear gap."""
+    shrinkages = {case.id: read_same_kind_shrinkage(folder, case) for case in find_claimed_cases(folder)}
+    found = [
+        case.model_copy(update={"true_shrinkage": shrinkages[case.id]}) for case in cases if case.id in shrinkages
+    ]
     return _count_accurate_claims(found, "poor")
 
 
 def _estimate_chance(folder: TrialFolder, cases: Iterable[CaseResult]) -> dict[str, float]:
-    """[1] deviation that white noise gives to claimed less true shrinkage, by the name of the case.
+    """Estimate the standard deviation of claimed less true shrinkage that white noise causes [1], by case.
 
-    The mean square of N samples of noise varies by the root of 2 / N of itself. The floor comes from fourth
-    differences, neighbours of which are alike. Coloured noise comes on top.
+    The mean square of N samples of noise has a relative standard deviation of sqrt(2 / N). The noise floor is
+    estimated from fourth differences, and neighbouring ones are correlated. Coloured noise is not included.
     """
     found = {}
     for case in cases:
@@ -274,22 +293,22 @@ def _read_document(path: Path) -> dict[str, Any] | None:
 
 
 def _count_same_over_wires(cases: Sequence[CaseResult]) -> Proportion:
-    """Cases whose diagnosis over the wires named what that in accelerated time did."""
+    """Count cases with the same diagnosis over the wires as in accelerated time."""
     by_name = {case.id: case for case in cases}
-    twice = [(case, by_name[case.id.removesuffix(WIRES_SUFFIX)]) for case in cases if case.wired]
-    return compute_proportion(_extract_answer(one) == _extract_answer(other) for one, other in twice)
+    pairs = [(case, by_name[case.id.removesuffix(WIRES_SUFFIX)]) for case in cases if case.wired]
+    return compute_proportion(_extract_diagnosis(one) == _extract_diagnosis(other) for one, other in pairs)
 
 
-def _extract_answer(case: CaseResult) -> tuple[str | None, tuple[str, ...]]:
+def _extract_diagnosis(case: CaseResult) -> tuple[str | None, tuple[str, ...]]:
     return case.verdict, case.named_set.effects if case.named_set else ()
 
 
 def _count_successful_proposals(folder: TrialFolder) -> Proportion:
-    """Cases with open sets in which the proposed stroke brought the truth to the top."""
-    answers = [(case, read_second_answer(folder, case)) for case, _ in find_open_cases(folder)]
+    """Count the cases in which the true set was named after the proposed stroke."""
+    diagnoses = [(case, read_second_diagnosis(folder, case)) for case, _ in find_open_cases(folder)]
     return compute_proportion(
         found == tuple(sorted(effect.name for effect in case.effects))
-        for case, found in answers
+        for case, found in diagnoses
         if found is not None
     )
 
@@ -309,28 +328,28 @@ def _render_row(case: CaseResult) -> str:
 
 def main() -> None:
     """Write the page."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("trial", type=Path, help="the answer of `mrbench trial`; its folder stands beside it")
-    options.add_argument("--page", type=Path, default=EVIDENCE / "trial.md")
-    options.add_argument("--note", action="append", default=[], help="what else is to be read with care")
-    options.add_argument(
-        "--from", dest="current_from", default="", help="first case whose shrinkage is claimed as now"
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("trial", type=Path, help="document of `mrbench trial`; its folder is in the same place")
+    parser.add_argument("--page", type=Path, default=EVIDENCE / "trial.md", help="page to write")
+    parser.add_argument("--note", action="append", default=[], help="further limitation, as text")
+    parser.add_argument(
+        "--from", dest="current_from", default="", help="first case with the present way of claiming a shrinkage"
     )
-    asked = options.parse_args()
-    folder = TrialFolder(asked.trial)
+    options = parser.parse_args()
+    folder = TrialFolder(options.trial)
     seal = read_seal(folder)
-    twice = [path.name for path in (folder.root / "diagnoses").glob(f"*{WIRES_SUFFIX}.outcome.json")]
-    wires = max((int(name.split("_")[1]) + 1 for name in twice), default=0)
-    plan = TrialOptions(seal.cases, seal.seed, seal.kind, 1, wires, DIAGNOSE)
-    whole = score_trial(folder, plan)
-    beside = PageNotes(
+    wired = [path.name for path in (folder.root / "diagnoses").glob(f"*{WIRES_SUFFIX}.outcome.json")]
+    wires = max((int(name.split("_")[1]) + 1 for name in wired), default=0)
+    trial_options = TrialOptions(seal.cases, seal.seed, seal.kind, 1, wires, DIAGNOSE)
+    report = score_trial(folder, trial_options)
+    notes = PageNotes(
         _count_successful_proposals(folder),
-        _estimate_chance(folder, whole.cases),
-        asked.note,
-        _count_same_kind(folder, whole.cases),
-        asked.current_from,
+        _estimate_chance(folder, report.cases),
+        options.note,
+        _count_same_kind(folder, report.cases),
+        options.current_from,
     )
-    asked.page.write_text(render_page(whole, seal.cases, beside), encoding="utf-8")
+    options.page.write_text(render_page(report, seal.cases, notes), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,10 +1,10 @@
-"""Checks claims from one stroke on another run of the same kind.
+"""Check of claimed shrinkages from one stroke on another run of the same kind.
 
-`python -m benchmarks.trial.same_kind trial.json`
+    python -m benchmarks.trial.same_kind trial.json
 
-The trial holds claims of poor methods against strokes at other amplitudes than were recorded. Here the twins
-predict one more run of the kind that was recorded: one stroke, its amplitude, frequency and order of the drives
-drawn anew. A run that was stopped goes on; the page of `benchmarks.trial.page` has the figures.
+The trial checks claims of poor methods on strokes at other amplitudes than the recorded ones. Here the twins
+predict one more run of the recorded kind: one stroke with newly drawn amplitude, frequency and order of the
+drives. An interrupted call can be continued. The results are on the page of `benchmarks.trial.page`.
 """
 
 import argparse
@@ -19,11 +19,11 @@ from sim_rig.trial.execution import MRBENCH, CommandFailedError, run_command
 from sim_rig.trial.scoring import compute_force_noise, compute_true_shrinkage, unseal_case
 
 SEED = 15_485_863
-"""Added to the seeds of the trial's strokes and of a case's run."""
+"""Offset of the seeds of the strokes and of a case's run."""
 
 
 def find_claimed_cases(folder: TrialFolder) -> Iterator[TrueCase]:
-    """Cases with effects under a poor method for which a diagnosis claims a shrinkage."""
+    """Find cases with effects and a poor method for which a diagnosis claims a shrinkage."""
     for case in read_sealed_truth(folder.truth, read_seal(folder).sha256).cases:
         if case.method == "poor" and case.effects and folder.get_case_files(case.id).twin.exists():
             found = unseal_case(folder, case, case.id)
@@ -32,12 +32,12 @@ def find_claimed_cases(folder: TrialFolder) -> Iterator[TrueCase]:
 
 
 def find_prediction_path(folder: TrialFolder, case: str) -> Path:
-    """What the twin leaves on that run, `mrbench.prediction/1`."""
+    """Return the path of the twin's prediction of that run, `mrbench.prediction/1`."""
     return folder.root / "alike" / f"{case}.json"
 
 
 def read_same_kind_shrinkage(folder: TrialFolder, case: TrueCase) -> float | None:
-    """Shrinkage [1] on that run; None where it has not been made, or there is nothing to shrink."""
+    """Return the shrinkage [1] on that run; None if it was not recorded or has no gap."""
     path = find_prediction_path(folder, case.id)
     return (
         compute_true_shrinkage(orjson.loads(path.read_bytes()), compute_force_noise(case))
@@ -47,25 +47,25 @@ def read_same_kind_shrinkage(folder: TrialFolder, case: TrueCase) -> float | Non
 
 
 def record_same_kind(folder: TrialFolder, case: TrueCase, seed: int) -> None:
-    """Record one more run of a case's kind, and let the twin predict it."""
-    answer, files = find_prediction_path(folder, case.id), folder.get_case_files(case.id)
-    if answer.exists():
+    """Record one more run of a case's kind, and predict it with the twin."""
+    prediction, files = find_prediction_path(folder, case.id), folder.get_case_files(case.id)
+    if prediction.exists():
         return
-    answer.parent.mkdir(exist_ok=True)
-    method, log = answer.with_suffix(".method.json"), answer.with_suffix(".mcap")
+    prediction.parent.mkdir(exist_ok=True)
+    method, log = prediction.with_suffix(".method.json"), prediction.with_suffix(".mcap")
     planned = make_strokes("poor", case.damper, seed + SEED, case.variant)
     folder.write_file(method, orjson.dumps(make_method_document("alike", case.damper, planned)).decode())
     log.unlink(missing_ok=True)
-    seeded = str(case.seed + SEED)
-    run_command([*MRBENCH, "run", method, "--scenario", files.scenario, "--seed", seeded, "--out", log])
-    run_command([*MRBENCH, "predict", files.twin, log, "--free", "offset", "--out", answer])
+    run_seed = str(case.seed + SEED)
+    run_command([*MRBENCH, "run", method, "--scenario", files.scenario, "--seed", run_seed, "--out", log])
+    run_command([*MRBENCH, "predict", files.twin, log, "--free", "offset", "--out", prediction])
 
 
 def main() -> None:
-    """Make these runs for all cases of a trial."""
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("trial", type=Path, help="the answer of `mrbench trial`; its folder stands beside it")
-    folder = TrialFolder(options.parse_args().trial)
+    """Record and predict these runs for all cases of a trial."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("trial", type=Path, help="document of `mrbench trial`; its folder is in the same place")
+    folder = TrialFolder(parser.parse_args().trial)
     seed = read_seal(folder).seed
     for case in find_claimed_cases(folder):
         try:

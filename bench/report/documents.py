@@ -1,7 +1,7 @@
 """Fit and prediction in a report: the parts of their JSON documents that a report shows.
 
-Bench and identification exchange these documents as files, so these types are a hand-kept mirror and ignore all other
-keys. A contract test compares them with the JSON Schemas in `docs/reference/schemas`.
+Bench and identification exchange these documents as files, so these types are a hand-kept mirror and ignore all
+other keys. A contract test compares them with the JSON Schemas in `docs/reference/schemas`.
 """
 
 from pathlib import Path

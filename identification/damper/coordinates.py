@@ -18,31 +18,31 @@ class Coordinates(NamedTuple):
     """Point in the space that the fit searches, in SI units."""
 
     F_a: float
-    """[N] yield force at zero drive."""
+    """Yield force at zero drive [N]."""
     F_b: float
-    """[N/drive] growth of the yield force with drive."""
+    """Growth of the yield force with drive [N/drive]."""
     D_y: float
-    """[m] yield displacement: slip over which the loop turns at a reversal."""
+    """Yield displacement [m]: slip over which the loop turns at a reversal."""
     rho: float
-    """[1] shape of the loop, beta / (beta + gamma)."""
+    """Shape of the loop, beta / (beta + gamma) [1]."""
     n: float
-    """[1] sharpness of the yield."""
+    """Sharpness of the yield [1]."""
     eta: float
-    """[1/s] rate constant of the field behind the drive."""
+    """Rate constant of the field behind the drive [1/s]."""
     c0_a: float
-    """[N s/m] viscous damping at large velocity, zero drive."""
+    """Viscous damping at large velocity and zero drive [N s/m]."""
     c0_b: float
-    """[N s/(m drive)] growth of c0 with drive."""
+    """Growth of c0 with drive [N s/(m drive)]."""
     c1_a: float
-    """[N s/m] roll-off dashpot, zero drive."""
+    """Roll-off dashpot at zero drive [N s/m]."""
     c1_b: float
-    """[N s/(m drive)] growth of c1 with drive."""
+    """Growth of c1 with drive [N s/(m drive)]."""
     k0: float
-    """[N/m] stiffness at large velocity."""
+    """Stiffness at large velocity [N/m]."""
     k1: float
-    """[N/m] accumulator stiffness."""
+    """Accumulator stiffness [N/m]."""
     f0: float
-    """[N] accumulator preload, k1 x0."""
+    """Accumulator preload k1 x0 [N]."""
 
 
 COORDINATES: tuple[Quantity, ...] = (

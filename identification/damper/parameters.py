@@ -31,33 +31,33 @@ class Parameters(NamedTuple):
     """Set of the paper's fourteen parameters, in SI units."""
 
     alpha_a: float
-    """[N/m] hysteretic stiffness at zero drive."""
+    """Hysteretic stiffness at zero drive [N/m]."""
     alpha_b: float
-    """[N/(m drive)] growth of alpha with drive."""
+    """Growth of alpha with drive [N/(m drive)]."""
     beta: float
-    """[1/m^n] shape of the loop, loading."""
+    """Shape of the loop in loading [1/m^n]."""
     gamma: float
-    """[1/m^n] shape of the loop, unloading."""
+    """Shape of the loop in unloading [1/m^n]."""
     eta: float
-    """[1/s] rate constant of the field behind the drive."""
+    """Rate constant of the field behind the drive [1/s]."""
     A: float
-    """[1] gauge: any positive value gives the same force with alpha, beta and gamma rescaled."""
+    """Gauge [1]: any positive value gives the same force with alpha, beta and gamma rescaled."""
     c0_a: float
-    """[N s/m] viscous damping at large velocity, zero drive."""
+    """Viscous damping at large velocity and zero drive [N s/m]."""
     c0_b: float
-    """[N s/(m drive)] growth of c0 with drive."""
+    """Growth of c0 with drive [N s/(m drive)]."""
     c1_a: float
-    """[N s/m] roll-off dashpot at low velocity, zero drive."""
+    """Roll-off dashpot at low velocity and zero drive [N s/m]."""
     c1_b: float
-    """[N s/(m drive)] growth of c1 with drive."""
+    """Growth of c1 with drive [N s/(m drive)]."""
     k0: float
-    """[N/m] stiffness at large velocity."""
+    """Stiffness at large velocity [N/m]."""
     k1: float
-    """[N/m] accumulator stiffness."""
+    """Accumulator stiffness [N/m]."""
     n: float
-    """[1] sharpness of the yield."""
+    """Sharpness of the yield [1]."""
     x0: float
-    """[m] rest position of the accumulator spring."""
+    """Rest position of the accumulator spring [m]."""
 
 
 GAUGE = 301.0

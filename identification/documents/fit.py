@@ -1,7 +1,7 @@
 """Documents of a fit and of its use: mrbench.fit/1, mrbench.prediction/1, mrbench.forecast/1.
 
-Keys carry the unit where no description can (``rmse_n`` is in newton). Every other number has its unit in a field
-of its own. The JSON Schemas in docs/reference/schemas are generated from these types.
+Keys contain the unit where no description can (``rmse_n`` is in newton). Every other number has a separate field
+for its unit. The JSON Schemas in docs/reference/schemas are generated from these types.
 """
 
 from pathlib import Path

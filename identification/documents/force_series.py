@@ -16,17 +16,17 @@ class ForceSeries:
     """All samples of a prediction, stretch by stretch; arrays (N,)."""
 
     time: Array
-    """[s] on the log's clock."""
+    """Time on the log's clock [s]."""
     displacement: Array
-    """[m] smoothed for the simulation."""
+    """Displacement, smoothed for the simulation [m]."""
     velocity: Array
-    """[m/s]"""
+    """Velocity [m/s]."""
     drive: Array
-    """[V or A]"""
+    """Drive [V or A]."""
     force: Array
-    """[N] recorded."""
+    """Recorded force [N]."""
     simulated: Array
-    """[N]"""
+    """Simulated force [N]."""
     stretch: npt.NDArray[np.int64]
     """Index of the stretch in ``names``."""
     held_out: BoolArray
@@ -34,7 +34,7 @@ class ForceSeries:
     names: tuple[str, ...]
     drive_unit: str
     band: tuple[Array, Array] | None = None
-    """[N] lower and upper end of the 95 % band of the recorded force, if known."""
+    """Lower and upper end of the 95 % band of the recorded force [N]; None if unknown."""
 
 
 _COLUMNS = {

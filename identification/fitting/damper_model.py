@@ -28,7 +28,7 @@ class DamperModel:
     coordinates: Coordinates
     effects: tuple[ActiveEffect, ...] = ()
     delays: tuple[float, float] = (0.0, 0.0)
-    """[s] residual delays of force and drive channel in the fit or twin."""
+    """Residual delays of force and drive channel in the fit or twin [s]."""
     baseline: Fit | None = None
     """Fit without effects of a twin."""
 

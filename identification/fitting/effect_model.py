@@ -1,7 +1,7 @@
 """Effect in a fit: its form and its search coordinates.
 
-The search coordinate of a parameter that cannot be zero (length, velocity, time constant) is its logarithm, that
-of any other parameter its value over its usual size. Both are of order one.
+The search coordinate of a parameter that cannot be zero (length, velocity, time constant) is its logarithm. That
+of any other parameter is its value over its usual size. Both are of order one.
 """
 
 from dataclasses import dataclass

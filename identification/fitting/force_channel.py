@@ -25,7 +25,7 @@ class LowPass:
     channel_filter: ChannelFilter
     """The filter as the device reports it."""
     rate: float
-    """[Hz] rate of the recording."""
+    """Rate of the recording [Hz]."""
     oversampling: int = 1
 
     def apply(self, values: Array) -> Array:

@@ -26,7 +26,7 @@ class LogCorrection:
     """Difference between one log's damper and that of the first log."""
 
     offset: float = 0.0
-    """[N] added to the preload f0."""
+    """Force added to the preload f0 [N]."""
     viscosity: float = 1.0
     """Factor on c0 and c1 (dimensionless)."""
 

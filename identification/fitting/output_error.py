@@ -43,7 +43,7 @@ class Minimum:
     """End of a minimisation."""
 
     unknowns: Array
-    """(U,)"""
+    """(U,) unknowns at the minimum."""
     evaluation: Evaluation
     iterations: int
     converged: bool

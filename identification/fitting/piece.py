@@ -23,9 +23,9 @@ class Piece:
     train: Array
     """(N,) 1.0 where the sample is fitted, 0.0 where it is held out or invalid."""
     force_delay: float = 0.0
-    """[s] known lag of the force channel behind the displacement channel."""
+    """Known delay of the force channel after the displacement channel [s]."""
     drive_delay: float = 0.0
-    """[s] known additional lag of the force channel behind the drive channel."""
+    """Known additional delay of the force channel after the drive channel [s]."""
     low_pass: LowPass | None = None
     """Filter of the force channel."""
     backlash_oversampling: int = 4

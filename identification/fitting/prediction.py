@@ -26,11 +26,11 @@ class PiecePrediction:
     """Simulated force of one piece."""
 
     force: Array
-    """(N,) [N], offset included."""
+    """(N,) simulated force, offset included [N]."""
     y0: float
-    """[m]"""
+    """Inner displacement at the first sample [m]."""
     offset: float
-    """[N] added to the simulated force; 0 unless it was fitted."""
+    """Offset added to the simulated force [N]; 0 unless it was fitted."""
 
 
 def predict_piece(

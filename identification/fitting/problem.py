@@ -51,9 +51,9 @@ class Problem:
     pieces: tuple[Piece, ...]
     space: SearchSpace
     noise: float
-    """[N] standard deviation of the force noise."""
+    """Standard deviation of the force noise [N]."""
     delay_prior: float
-    """[s] standard deviation of each residual delay."""
+    """Standard deviation of each residual delay [s]."""
     effects: tuple[EffectModel, ...] = ()
     """Effects fitted together with the law."""
     per_log: tuple[str, ...] = ()

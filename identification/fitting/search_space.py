@@ -26,15 +26,15 @@ class SearchSpace:
     """Map between search coordinates q and regular coordinates, for one range of drives."""
 
     lowest_drive: float
-    """[V or A]"""
+    """Lowest drive [V or A]."""
     highest_drive: float
-    """[V or A]"""
+    """Highest drive [V or A]."""
     lowest_k0: float = _BOUNDS["k0"][0]
-    """[N/m] lower bound on k0: below it, the inner displacement would diverge within these strokes."""
+    """Lower bound on k0 [N/m]: below it, the inner displacement would diverge within these strokes."""
 
     @property
     def has_one_drive(self) -> bool:
-        """Whether the drive never changes, so that slopes over it are not observable."""
+        """True if the drive is constant, so that slopes over it are not observable."""
         return self.highest_drive - self.lowest_drive < 1e-9
 
     @property

@@ -1,7 +1,7 @@
 """Trend over the runs of one specimen.
 
 Each run is diagnosed alone. The effects that any run names are then fitted together with the law in all runs,
-in one form each, so that an effect has a size also where it was too small to be named. A quantity has changed
+in one form each. An effect thus has a size even in runs where it was too small to be named. A quantity has changed
 if a line with a change point, constant before it and linear after it, differs significantly from a constant.
 """
 

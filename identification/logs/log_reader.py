@@ -38,7 +38,7 @@ Columns = dict[str, Array]
 class _Message(NamedTuple):
     channel: int
     time: int
-    """[ns] bench clock."""
+    """Time on the bench clock [ns]."""
     body: bytes
 
 

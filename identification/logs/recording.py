@@ -43,7 +43,7 @@ class ChannelFilter:
     """Kind of filter, such as butterworth."""
     order: int
     cutoff: float
-    """[Hz]"""
+    """Cutoff frequency [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,11 @@ class Segment:
     motion: str
     """Kind of motion: hold, ramp, sine, triangle, sweep, multisine, random or table."""
     amplitude: float | None
-    """[m]"""
+    """Amplitude [m]."""
     frequency: float | None
-    """[Hz]"""
+    """Frequency [Hz]."""
     drive_value: float | None
-    """[V or A] if the drive is constant."""
+    """Drive if it is constant [V or A]; None if it changes."""
 
 
 @dataclass(frozen=True)
@@ -73,32 +73,32 @@ class Stretch:
 
     name: str
     time: Array
-    """[s] on the log's clock, uniform."""
+    """Uniform time on the log's clock [s]."""
     rate: float
-    """[Hz]"""
+    """Sampling rate [Hz]."""
     displacement: Array
-    """[m]"""
+    """Displacement [m]."""
     force: Array
-    """[N]"""
+    """Recorded force [N]."""
     drive: Array
     """Measured coil drive [V or A]."""
     velocity: Array | None
-    """[m/s] if it was measured and not derived from the displacement."""
+    """Measured velocity [m/s]; None if it was derived from the displacement."""
     segments: tuple[Segment, ...]
     force_filter: ChannelFilter | None
     displacement_filter: ChannelFilter | None
     force_delay: float
-    """[s] delay of the recorded force, as the device reports it."""
+    """Delay of the recorded force, as the device reports it [s]."""
     displacement_delay: float
-    """[s]"""
+    """Delay of the recorded displacement, as the device reports it [s]."""
     drive_delay: float
-    """[s]"""
+    """Delay of the recorded drive, as the device reports it [s]."""
     measured: BoolArray
     """False where a lost sample was interpolated."""
     force_valid: BoolArray | None = None
     """False where only the force is invalid; None if all of it is valid."""
     interpolated: bool = False
-    """Whether the displacement was resampled from other instants, which removes its fastest noise."""
+    """True if the displacement was resampled from other instants, which removes its fastest noise."""
 
     @property
     def valid_mask(self) -> BoolArray:

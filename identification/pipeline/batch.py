@@ -1,4 +1,4 @@
-"""Fits of many logs, each of its own specimen; networks are trained together where that is possible."""
+"""Fits of many logs, each of another specimen; networks are trained together where that is possible."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -52,8 +52,8 @@ def identify_batch(
         progress: receives the present activity and the force error so far [N].
 
     Yields:
-        The entry of a log as soon as it is complete, so that a batch that is ended early keeps what it has: first
-        the logs that cannot be fitted, then the others, in groups that are trained together.
+        The entry of each log as soon as it is complete, so that a batch that is ended early keeps its results.
+        Logs that cannot be fitted come first. The others follow in the groups that are trained together.
     """
     prepared = {log: _try_prepare(log, request) for log in logs}
     yield from (

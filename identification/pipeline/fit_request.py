@@ -20,7 +20,7 @@ class FitRequest:
     per_log: tuple[str, ...] = ()
     """Per-log parameters of each further log: ``offset``, ``viscosity``."""
     profile: bool = False
-    """Whether to compute intervals by profile likelihood, too."""
+    """True to compute intervals by profile likelihood as well."""
 
     @property
     def network_budget(self) -> float | None:

@@ -113,7 +113,7 @@ def _describe_outliers(dataset: Dataset, fit: Fit) -> list[str]:
 def _fit_output_error(
     dataset: Dataset, problem: Problem, stretches: Sequence[Stretch], request: FitRequest, progress: Progress
 ) -> FitResult:
-    """Fit the output error from starts of its own; no result of the network enters."""
+    """Fit the output error from separate starts, without any result of the network."""
     start_time = time.process_time()
     settings = replace(request.settings, budget=request.output_error_budget)
     minimum = fit_output_error(problem.make_fast(), settings, progress)

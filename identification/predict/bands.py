@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from identification.fitting import DamperModel
 
 CONFIDENCE_LEVEL = 0.95
+"""Probability of the band [1]."""
 _DELAYS = [SENSITIVITY_COLUMNS.index("force_delay"), SENSITIVITY_COLUMNS.index("drive_delay")]
 _TEST_CHANGE = 0.1
 """Change of an unobservable coordinate, over its usual scale, that tests its influence on the force [1]."""
@@ -36,13 +37,13 @@ class ForceUncertainty:
     """Standard deviations of the predicted force of one stretch [N]."""
 
     parameters: Array
-    """(N,) part of the uncertain coordinates and delays."""
+    """(N,) part that uncertain coordinates and delays cause."""
     noise: float
     """Noise of the recorded force, misfit included."""
 
     @property
     def total(self) -> Array:
-        """(N,) both parts together."""
+        """(N,) both parts combined."""
         return np.asarray(np.hypot(self.parameters, self.noise))
 
 
@@ -50,7 +51,7 @@ def estimate_record_noise(fit: Fit, floor: float | None) -> float:
     """Return the expected noise of a recorded force [N]: a noise floor and the fit's misfit beyond its own floor.
 
     Args:
-        fit: behind the prediction.
+        fit: fit from which the force is predicted.
         floor: noise floor of the record [N]; None takes that of the fit.
     """
     misfit = max(fit.rmse_n.train**2 - fit.noise_floor_n**2, 0.0)
@@ -63,11 +64,11 @@ def estimate_force_uncertainty(
     """Estimate the uncertainty of the predicted force of one stretch.
 
     Args:
-        fit: with the covariance of its coordinates; without one, only the noise counts.
+        fit: fit with the covariance of its coordinates; without one, only the noise counts.
         model: the fit as it was simulated.
         piece: the stretch.
         prediction: its simulated force, with y(0).
-        noise: of the recorded force [N].
+        noise: noise of the recorded force [N].
     """
     sensitivities = _compute_sensitivities(model, piece, prediction)
     count = len(COORDINATES)
@@ -95,10 +96,10 @@ def make_band(
     """Summarise the band of a prediction.
 
     Args:
-        fit: behind the prediction.
-        uncertainties: of each stretch.
+        fit: fit from which the force is predicted.
+        uncertainties: uncertainty of each stretch.
         errors: force error (N,) [N] of each stretch at its samples; None where nothing was recorded.
-        drives: (N,) [V or A] of each stretch.
+        drives: drive (N,) of each stretch [V or A].
         unobserved: coordinates that the fit did not observe and on which these strokes depend.
     """
     total = np.concatenate([u.total for u in uncertainties])

@@ -63,13 +63,13 @@ def predict_log(
     Args:
         fit: fit with the delays of its bench, or a damper model.
         recording: the log; where the fit has read it, the samples that were held out then are held out here.
-        free_offset: whether to estimate a constant force of each stretch, too.
+        free_offset: True to estimate a constant force of each stretch as well.
 
     Returns:
         Errors, and recorded and simulated force.
     """
     model = make_damper_model(fit) if isinstance(fit, Fit) else fit
-    # By content: a log that was copied or renamed is still one that the fit has read.
+    # Logs are compared by content, so a copied or renamed log is recognised.
     seen = isinstance(fit, Fit) and recording.sha256 in fit.provenance.logs.values()
     dataset = assemble([recording], _read_hold_out(fit) if seen and isinstance(fit, Fit) else HoldOut())
     log = _LogPrediction(dataset, [model.predict(p, free_offset=free_offset) for p in dataset.pieces])

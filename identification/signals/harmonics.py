@@ -4,8 +4,8 @@ A servo under load does not follow a pure sine: its motion contains harmonics of
 refined by Gauss-Newton, they are a linear regression, which averages the displacement noise over the segment.
 
 Only harmonics above the noise are used, and only steady cycles are fitted. The smoother handles a soft start
-inside the segment. It also handles disturbances, in which the rod leaves its wave for some hundredths of a second:
-in a regression they would leave an echo in every other cycle.
+inside the segment. It also handles disturbances, in which the rod leaves its wave for some hundredths of a second.
+In a regression, a disturbance would change every other cycle as well.
 """
 
 from typing import NamedTuple

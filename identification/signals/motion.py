@@ -40,11 +40,11 @@ class Motion(NamedTuple):
     """Motion of a stretch, (N,) each; velocity and acceleration are derivatives of the displacement."""
 
     displacement: Array
-    """[m]"""
+    """Displacement [m]."""
     velocity: Array
-    """[m/s]"""
+    """Velocity [m/s]."""
     acceleration: Array
-    """[m/s²]"""
+    """Acceleration [m/s²]."""
     noise: float
     """Standard deviation of the recorded displacement's noise [m]."""
     cutoff: Array

@@ -1,8 +1,8 @@
 """Noise floor of the recorded force: the part that no model of the damper can explain.
 
 Two estimates need no model. **Cycle to cycle**: where motion and drive repeat, the difference of the forces of two
-successive cycles has twice the variance of the noise. **High frequency**: fourth differences contain only what is
-too fast for a damper, and their median ignores the corners of a hysteresis loop.
+successive cycles has twice the variance of the noise. **High frequency**: fourth differences contain only the part
+that is too fast for a damper. Their median ignores the corners of a hysteresis loop.
 
 On white noise the two agree. A larger cycle-to-cycle estimate points to drift, stick-slip, heating or coloured
 noise. A smaller one points to hum locked to the stroke, or to sampling that is too slow.
@@ -44,13 +44,13 @@ class NoiseFloorEstimate:
     """Noise of a recorded force."""
 
     noise: float
-    """[N] standard deviation to use."""
+    """Noise floor [N]."""
     cycle_to_cycle: float | None
-    """[N] from repeated cycles; None if no cycles repeat."""
+    """Estimate from repeated cycles [N]; None if no cycles repeat."""
     high_frequency: float
-    """[N] from fourth differences."""
+    """Estimate from fourth differences [N]."""
     basis: str
-    """Which of the two ``noise`` rests on, and why, as text for a person."""
+    """Estimate on which ``noise`` rests, and the reason, as text for a person."""
 
 
 class _CyclePairs(NamedTuple):
@@ -74,7 +74,7 @@ class _RepeatStatistics(NamedTuple):
     """Noise in repeated cycles."""
 
     squares: float
-    """[N²] sum of squared noise."""
+    """Sum of squared noise [N²]."""
     degrees_of_freedom: float
     """Number of independent samples."""
     cycles: int

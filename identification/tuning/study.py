@@ -5,8 +5,8 @@ The objective is the mean over the recordings of
     error + (sqrt(1 + offset²) - 1) + time_weight * seconds
 
 The error is that of the *simulated* law on blocks that the training did not use, over the noise floor. The offset
-is the distance of the parameters from the best simulated fit in standard deviations; its term is the factor by
-which it widens the error of an estimate with a standard deviation of one. Seconds are processor time. A trial that
+is the distance of the parameters from the best simulated fit, in standard deviations. Its term is the relative
+growth of the error of an estimate with a standard deviation of one. Seconds are processor time. A trial that
 is worse than the median of the others at the same time is pruned. An interrupted study is continued from its file.
 """
 

@@ -30,7 +30,7 @@ class Agreement:
 
     @property
     def is_consistent(self) -> bool:
-        """Whether the largest difference is within the limit that chance explains."""
+        """True if the largest difference is within the limit that chance explains."""
         return all(value <= MAX_DEVIATION for value in self.deviations.values())
 
     def describe(self) -> str:

@@ -1,8 +1,8 @@
 """Clock drift: a slow change of the force channel's delay within a run, and its effect on a fit.
 
-The difference between the clocks of two devices changes over seconds. A force that is late by some ten
-microseconds resembles a slightly stiffer one, and puts k0 and k1 of a clean fit several of their deviations off.
-So the delay may drift at the end of a fit, linearly between knots. The size of the drift is the one with the
+The difference between the clocks of two devices changes over seconds. A force delay of about ten microseconds
+resembles a slightly stiffer damper, and moves k0 and k1 of a clean fit by several of their deviations. The delay
+may therefore drift at the end of a fit, linearly between knots. The size of the drift is the one with the
 largest likelihood of the residuals, with the knots integrated out (empirical Bayes; Robbins 1956). The unknowns
 follow by one Gauss-Newton step from which the knots are eliminated, and their intervals widen accordingly.
 """

@@ -1,13 +1,13 @@
 """Effect of input noise, the noise of displacement and drive, on the fit.
 
 The motion that drives the simulation is estimated from a noisy displacement. Its error changes the yield
-displacement and the shape as much as the force noise does. The drive is measured, too: the mean of a level that
+displacement and the shape as much as the force noise does. The drive is measured as well. The mean of a level that
 lasts two seconds has a thirtieth of the drive's noise, and changes the yield force as much as a hundredth of a
-newton. So the noise is resampled. The fitted motion and the drive get fresh noise and are estimated again in the
-same way. The change of the simulated force is propagated to the unknowns by one Gauss-Newton step (linearised
-parametric bootstrap).
+newton. The noise is therefore resampled. The fitted motion and the drive get fresh noise and are estimated again
+in the same way. The change of the simulated force is propagated to the unknowns by one Gauss-Newton step
+(linearised parametric bootstrap).
 
-The sensitivities are computed along the erroneous motion, too. That correlation biases the fit, as noise on the
+The sensitivities are computed along the erroneous motion as well. This correlation biases the fit, as noise on the
 abscissa flattens a straight line (errors in variables; Carroll et al. 2006). The same replicas show the bias: a
 step with the sensitivities of the replica's motion less one with those of the fitted motion. It is subtracted.
 """
@@ -34,7 +34,7 @@ REPLICAS = 12
 _STUDENT_FACTOR = (float(stdtrit(REPLICAS, 0.975)) / Z95) ** 2
 """Factor on the variance [1] that gives 95 % intervals Student's width.
 
-The standard deviation of so few replicas is itself known to a fifth only.
+The standard deviation of so few replicas is itself only known to a fifth.
 """
 
 

@@ -1,9 +1,9 @@
 """Profile-likelihood intervals, in addition to those of the covariance.
 
 The covariance approximates the cost by a parabola. Here one coordinate is held away from its best value while all
-other unknowns are fitted again, until the cost has risen by the amount that the interval allows (Venzon and
-Moolgavkar 1988). Where the cost is a parabola, both intervals agree. Where it is not, the profile is correct, and
-often asymmetric. The allowed rise is that of the covariance's interval, so coloured misfit and input noise widen
+other unknowns are fitted again. The interval ends where the cost has risen by the allowed amount (Venzon and
+Moolgavkar 1988). If the cost is a parabola, both intervals agree. If not, the profile is correct, and often
+asymmetric. The allowed rise is that of the covariance's interval, so coloured misfit and input noise widen
 both alike.
 """
 

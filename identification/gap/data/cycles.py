@@ -39,11 +39,11 @@ class StrokeCondition:
     """Drive, amplitude and frequency of one segment."""
 
     drive: float
-    """[V or A]"""
+    """Drive [V or A]."""
     amplitude: float
-    """[m]"""
+    """Amplitude [m]."""
     frequency: float
-    """[Hz]; 0 where the motion is not periodic."""
+    """Frequency [Hz]; 0 where the motion is not periodic."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Cycles:
     segment: Indices
     """(cycles,) number of each cycle's segment."""
     conditions: tuple[StrokeCondition, ...]
-    """(segments,)"""
+    """(segments,) condition of each segment."""
 
     @property
     def count(self) -> int:

@@ -1,9 +1,9 @@
 """Coloured noise: the part of a residual that is stationary and does not repeat with the stroke.
 
-Slow noise of a load cell lies above the high-frequency noise floor, and cycles do not repeat it. A residual
-counts as noise only if it is stationary: its power is the same at all times (bursts and sticking are not), and
-it has no line (beats and mains interference have) and no drift. The variation of its power is compared with
-that of surrogates of the same spectrum with random phases (Theiler et al. 1992).
+Slow noise of a load cell lies above the high-frequency noise floor, and cycles do not repeat it. A residual counts
+as noise only if it is stationary. Its power must be the same at all times, which excludes bursts and sticking. It
+must have no line, which excludes beats and mains interference, and no drift. The variation of its power is
+compared with that of surrogates of the same spectrum with random phases (Theiler et al. 1992).
 """
 
 import numpy as np

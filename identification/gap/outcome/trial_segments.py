@@ -35,15 +35,15 @@ class StrokeLimits:
     """Limits of a trial segment, which are those of the recording."""
 
     amplitude: float
-    """[m]"""
+    """Amplitude [m]."""
     centre: float
-    """[m]"""
+    """Centre of the motion [m]."""
     velocity: float
-    """[m/s]"""
+    """Velocity [m/s]."""
     frequency: float
-    """[Hz]"""
+    """Frequency [Hz]."""
     drives: tuple[float, float]
-    """[V or A]"""
+    """Lowest and highest drive [V or A]."""
 
 
 def generate_trial_segments(limits: StrokeLimits) -> Iterator[tuple[dict[str, Any], Excitation]]:

@@ -1,11 +1,11 @@
 """Posterior of the sets of effects, from the part of the gap that each leaves.
 
-The likelihood of white noise would be far too certain: with a hundred thousand samples, one per cent of misfit
-decides everything, while the form error of every library is larger. So the odds follow the *ratio* of the
-excesses of two sets, to a fixed power, down to a resolution: the noise of the floor itself, and a small part of
-the gap that even the correct effect leaves because its form is not exact. Smaller sets are more probable
-beforehand. An unknown cause is one of the alternatives: known effects are expected to leave a part of its gap
-that the correct effects hardly ever leave.
+The likelihood of white noise would be far too certain. With a hundred thousand samples, one per cent of misfit
+would decide everything, but the form error of every library is larger. The odds therefore follow the *ratio* of
+the excesses of two sets, to a fixed power, down to a resolution. The resolution is the noise of the floor itself,
+and the small part of the gap that even the correct effect leaves because its form is not exact. Smaller sets are
+more probable beforehand. An unknown cause is one of the alternatives: known effects are expected to leave a part
+of its gap that the correct effects hardly ever leave.
 """
 
 import math

@@ -110,7 +110,7 @@ class _Linearisation:
 
     problem: Problem
     unknowns: Array
-    """(U,)"""
+    """(U,) unknowns at which the baseline is linearised."""
     evaluation: Evaluation
     residuals: tuple[Array, ...]
     """(N,) for each piece, relative to the noise."""

@@ -1,7 +1,7 @@
 """Cache of screenings.
 
-The gains of further effects are needed several times for the same set: when it grows, when its effects are
-exchanged, and when it is extended in the end. A screening holds while the excess of the set stays nearly the
+The gains of further effects are needed several times for the same set: when it grows, in exchanges, and in
+extensions at the end. A screening is valid while the excess of the set stays nearly the
 same.
 """
 

@@ -46,9 +46,9 @@ class TrainingOutcome:
     forces: tuple[Array, ...]
     """The network's own force [N] (N,) of each piece, as the channel records it; NaN outside the learned span."""
     accepted: bool
-    """Whether the force reaches the noise and the law is satisfied."""
+    """True if the force reaches the noise and the law is satisfied."""
     note: str
-    """How the training ended, as text for a person."""
+    """End of the training, as text for a person."""
     steps: int
     history: tuple[TrainingRecord, ...]
 

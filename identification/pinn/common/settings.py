@@ -21,7 +21,7 @@ FORMER_NETWORKS = {"local": "elements", "global": "dense"}
 _FORMER_WEIGHTINGS = {"points": "collocation", "means": "galerkin", "weak": "weak_form"}
 
 ResidualWeighting = Literal["collocation", "galerkin", "weak_form"]
-"""How law residuals enter the loss.
+"""Form in which law residuals enter the loss.
 
 ``collocation``: at each Gauss point. ``galerkin``: weighted with test functions. ``weak_form``: as ``galerkin``,
 with the stroke's velocity integrated by parts. All but ``galerkin`` are research options, used by benchmarks only.

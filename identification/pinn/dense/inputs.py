@@ -1,8 +1,8 @@
 """Inputs of the dense network: motion, lagged drive, time, and the position in the hysteresis loop.
 
 All inputs are continuous in time, and each comes with its rate. The memory inputs use the time map of the network
-of elements, centred at the breakthrough. Inputs that are odd in the slip's direction carry its sign, so that the
-value at the end of one half stroke is that at the beginning of the next.
+of elements, centred at the breakthrough. Inputs that are odd in the slip's direction have its sign. Their value at
+the end of one half stroke is therefore that at the beginning of the next.
 """
 
 from collections.abc import Callable, Sequence

@@ -4,8 +4,8 @@ Levenberg-Marquardt moves weights and coordinates together. The law weight incre
 network's own slip are computed again in intervals, until three fifths of the steps are done. Filters of the force
 channel count as a delay, and the residual delays are zero.
 
-Several dampers take the same steps together, each with its own network, coordinates, samples and damping: the
-matrix products of one damper are too small for an accelerator. A damper alone is a batch of one.
+Several dampers take the same steps together, because the matrix products of one damper are too small for an
+accelerator. Each has its own network, coordinates, samples and damping. A damper alone is a batch of one.
 """
 
 from collections.abc import Sequence

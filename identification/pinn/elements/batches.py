@@ -3,8 +3,8 @@
 Elements with similar numbers of samples are processed together, in few operations on large arrays.
 
 In a force channel with a filter, y' passes through the filter's impulse response, on the filter's own fine grid
-and once for each mesh. Field and displacement are slow beside the filter, so they are only shifted by its lag. The
-filter also remembers earlier elements: their contribution is taken from the present network.
+and once for each mesh. Field and displacement are slow compared with the filter, so they are only shifted by its
+lag. Earlier elements contribute through the filter's memory; their part is taken from the present network.
 """
 
 from collections.abc import Iterator, Sequence

@@ -38,9 +38,9 @@ class Factorisation:
     triangle: Array
     """Triangular rows (R, C + 1) over the C shared unknowns, right-hand side last."""
     inner: list[Array]
-    """Of each batch: triangular rows (K, I, I + 4 + C + 1) of its I inner weights."""
+    """Triangular rows (K, I, I + 4 + C + 1) of the I inner weights, for each batch."""
     nodes: list[list[Array]]
-    """Of each piece: rows (2, 2 + 2 + C + 1) of each node over itself, the next node and the shared unknowns."""
+    """Rows (2, 2 + 2 + C + 1) of each node over itself, the next node and the shared unknowns, for each piece."""
 
     def compute_information(self) -> Array:
         """Return the information matrix (C, C) of the shared unknowns, output weights marginalised."""

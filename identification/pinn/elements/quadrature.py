@@ -1,10 +1,10 @@
 """Quadrature in an element: Gauss points, and the derivative table of the weak form (a research option).
 
-The law contains the velocity of the stroke. Weighted with a smooth function g, it needs no derivative of the
-displacement: the integral of g x' over an element is g x at its ends, less the integral of g' x (integration by
-parts). Let g be the polynomial through its values at M points. The integral is then a sum over these values, and
-its coefficients over the quadrature weights take the place of x'. So the weak form is the Galerkin form with
-another velocity: x' without the part that no polynomial through the points can follow.
+The law contains the velocity of the stroke. If it is weighted with a smooth function g, no derivative of the
+displacement is needed. The integral of g x' over an element is g x at its ends, less the integral of g' x
+(integration by parts). Let g be the polynomial through its values at M points. The integral is then a sum over
+these values, and its coefficients over the quadrature weights take the place of x'. So the weak form is the
+Galerkin form with another velocity: x' without the part that no polynomial through the points can follow.
 """
 
 from functools import cache

@@ -95,7 +95,8 @@ def test_the_first_log_has_no_per_log_parameters():
 
 
 @pytest.mark.parametrize(
-    ("free", "reason"), [("A", r"leaves every force unchanged"), ("D_y", "every parameter of the damper is free already")]
+    ("free", "reason"),
+    [("A", r"leaves every force unchanged"), ("D_y", "every parameter of the damper is free already")],
 )
 def test_unobservable_and_shared_parameters_cannot_be_freed_per_log(free, reason, tmp_path):
     from bench.cli import _make_application, entry_points

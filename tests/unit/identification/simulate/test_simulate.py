@@ -81,7 +81,7 @@ def test_sensitivities_do_not_change_the_force():
 
 
 def test_every_corner_of_the_search_bounds_gives_a_finite_force():
-    """Where the law itself is stable: k0 < 0 makes y run away, whoever integrates it."""
+    """Only k0 >= 0 is tested, because the law itself is unstable for k0 < 0."""
     random = np.random.default_rng(7)
     stroke = sine(seconds=1.0)
     for _ in range(200):

@@ -24,7 +24,7 @@ def linearise(priors, pieces=1):
 
 
 def assemble_system(residuals, batches, network, priors):
-    """Return all residuals over all weights and shared unknowns, with the ridge and the priors of the elimination."""
+    """Return all residuals over weights and shared unknowns, with ridge and priors of the elimination."""
     mesh, count = network.mesh, network.output_weights.inner_z.shape[1]
     nodes, total = 2 * mesh.node_count, 2 * mesh.node_count + 2 * count * len(mesh.elements)
     tables, rights = [], []

@@ -26,7 +26,7 @@ def compute_law_residuals(problem, weighting, **sizes):
 
 
 def roughen(problem, size):
-    """Return the problem with noise of ``size`` [m/s] on the velocity and unchanged displacements at the samples."""
+    """Return the problem with noise of ``size`` [m/s] on the velocity, and unchanged displacements."""
     (piece,) = problem.pieces
     noise = size * default_rng(6).standard_normal(len(piece.force))
     excitation = replace(piece.excitation, velocity=piece.excitation.velocity + noise)

@@ -95,7 +95,7 @@ def _advance(
 def render_table_1(fit: dict[str, Any]) -> str:
     """Return the table of the fourteen parameters in the paper's order, with intervals and true values."""
     head = (
-        "| parameter | estimate | 95 % interval | unit | true | the paper's damper |\n"
+        "| parameter | found | 95 % interval | unit | true | the paper's damper |\n"
         "| --- | ---: | --- | --- | ---: | ---: |\n"
     )
     rows = []

@@ -15,13 +15,13 @@ TCP = "127.0.0.1:0"
 
 
 def steps(ticks):
-    """[N] Another whole multiple of 9.80665 N every 20 ms."""
+    """Return a force [N] that is another whole multiple of 9.80665 N every 20 ms."""
     return 9.80665 * (ticks // 20 % 100)
 
 
 @pytest.fixture
 def rig():
-    """Starts indicators, each with a driver that is not connected; stops all at the end."""
+    """Return a function that starts an indicator with a driver that is not connected; stop all at the end."""
     running, drivers = [], []
 
     def start(force=steps, address="pty", **options):
@@ -40,7 +40,7 @@ def rig():
 
 @pytest.fixture
 def streaming(rig):
-    """Starts indicators with connected drivers."""
+    """Return a function that starts an indicator with a connected driver."""
 
     def start(*arguments, **options):
         adapter, device, driver = rig(*arguments, **options)
@@ -51,7 +51,7 @@ def streaming(rig):
 
 
 def is_right(blocks):
-    """Whether every value is one that the indicator has shown."""
+    """Return whether every value is one that the indicator has shown."""
     kilograms = join(blocks, "values") / 9.80665
     return np.allclose(kilograms, np.rint(kilograms), atol=1e-9) and kilograms.max() < 100
 

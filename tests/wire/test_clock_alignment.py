@@ -67,7 +67,7 @@ def connected(instruments):
 
 
 def serve(pipe):
-    """Run the rig in a process of its own, as `mrbench sim` does; sends its wires and its clocks."""
+    """Run the rig in this process, as `mrbench sim` does, and send its wires and clocks to the test."""
     sys.setswitchinterval(5e-4)
     clock = RunningClock()
     start_ns = time.monotonic_ns() - clock.now_ns()
@@ -81,20 +81,20 @@ def serve(pipe):
 @contextmanager
 def rig():
     context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    process = context.Process(target=serve, args=(theirs,), daemon=True)
+    here, there = context.Pipe()
+    process = context.Process(target=serve, args=(there,), daemon=True)
     process.start()
     try:
-        assert ours.poll(60)
-        yield ours.recv()
+        assert here.poll(60)
+        yield here.recv()
     finally:
-        ours.send("end")
+        here.send("end")
         process.join(10)
         process.kill()
 
 
 def record(seconds):
-    """Acquire for some seconds; returns clock errors [ns], bench samples, losses, skews and driver errors."""
+    """Acquire for some seconds; return clock errors [ns], bench samples, losses, skews and driver errors."""
     batches: list[Batch] = []
     errors: list[tuple[str, DriverError]] = []
     with rig() as (wires, clocks, start_ns), connected(build_drivers(wires)) as instruments:
@@ -172,7 +172,7 @@ def run_busy_loop():
 
 
 @pytest.mark.slow
-def test_they_are_so_with_two_busy_processes():
+def test_channels_are_as_close_with_two_busy_processes():
     load = [multiprocessing.get_context("spawn").Process(target=run_busy_loop, daemon=True) for _ in range(2)]
     for process in load:
         process.start()

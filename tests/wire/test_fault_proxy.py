@@ -14,7 +14,7 @@ SECOND = 1_000_000_000
 
 
 class Echo:
-    """A device that returns all bytes to any number of hosts."""
+    """Device that returns all bytes to any number of hosts."""
 
     def __init__(self) -> None:
         self.listener = socket.create_server(("127.0.0.1", 0))
@@ -45,7 +45,7 @@ def echo():
 
 @pytest.fixture
 def bench(echo):
-    """A clock, a proxy in front of the device, and a function that connects to it."""
+    """Return a clock, a proxy in front of the device, and a function that connects to it."""
     clock, hosts = SteppedClock(), []
     with FaultProxy(echo.listener.getsockname(), clock) as proxy:
 

@@ -40,7 +40,7 @@ TCP = "127.0.0.1:0"
 
 @pytest.fixture
 def rig():
-    """Starts load cells, each with a driver that is not connected; stops all at the end."""
+    """Return a function that starts a load cell with a driver that is not connected; stop all at the end."""
     running, drivers = [], []
 
     def start(force=saw, address="pty", **options):
@@ -59,7 +59,7 @@ def rig():
 
 @pytest.fixture
 def streaming(rig):
-    """Starts load cells with connected drivers."""
+    """Return a function that starts a load cell with a connected driver."""
 
     def start(*arguments, **options):
         adapter, device, driver = rig(*arguments, **options)
@@ -70,7 +70,7 @@ def streaming(rig):
 
 
 def is_right(blocks):
-    """Whether every value is the force at its own time."""
+    """Return whether every value is the force at the time of its sample."""
     ticks = join(blocks, "device_ns") // 1_000_000
     return np.array_equal(join(blocks, "values"), saw(ticks))
 

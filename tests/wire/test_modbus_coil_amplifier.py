@@ -27,13 +27,13 @@ RAMP = 10.0
 
 
 class Bench:
-    """An amplifier on its wire, and its connected driver."""
+    """Amplifier on its wire, and its connected driver."""
 
     def __init__(self, signals, device, server, driver):
         self.signals, self.device, self.server, self.driver = signals, device, server, driver
 
     def step(self, milliseconds):
-        """Let the rig's time pass with a request every 10 ms, like an agent."""
+        """Advance the rig's clock with a request every 10 ms, as an agent sends them."""
         for _ in range(int(milliseconds // 10)):
             self.signals.step(10)
             self.device.advance()
@@ -221,7 +221,7 @@ def test_the_watchdog_stops_a_running_table(bench):
     assert bench.driver.read_table_progress().state is TableState.IDLE
 
 
-def test_reading_samples_alone_feeds_the_watchdog(bench):
+def test_reading_samples_alone_restarts_the_watchdog(bench):
     bench.driver.write("coil_drive", 1.0)
     for _ in range(10):
         bench.signals.step(200)

@@ -1,4 +1,4 @@
-"""The line alone: every failure is a typed error in time, and never another request's reply."""
+"""Modbus line: every failure is a typed error in time, and no request gets another one's reply."""
 
 import random
 import threading
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.timeout(60)
 
 
 class Echo:
-    """Every register contains its own address, so that a reply shows its request."""
+    """Device whose registers contain their own addresses, so that a reply shows its request."""
 
     def __init__(self):
         self.written = []
@@ -39,7 +39,7 @@ class Echo:
 
 @pytest.fixture(params=WIRES)
 def wire(request):
-    """An open line, its server and its device."""
+    """Return an open line, its server and its device."""
     device = Echo()
     with serve(device, request.param) as (server, address):
         line = ModbusLine("echo", address, 1, time.monotonic_ns, TIMEOUT)
@@ -114,7 +114,7 @@ def test_no_request_gets_the_reply_to_another(wire):
 
 
 def test_a_plain_client_takes_a_late_reply_for_the_next_one():
-    """The hazard exists, and the simulated instrument reproduces it."""
+    """A line without synchronisation has this hazard, and the simulated instrument reproduces it."""
     with serve(Echo(), "rtu over socket") as (server, _):
         port = int(server.address.rpartition(":")[2])
         client = ModbusTcpClient("127.0.0.1", port=port, framer=FramerType.RTU, timeout=TIMEOUT, retries=0)

@@ -18,7 +18,7 @@ CLOCK = DeviceClock(offset_ns=77_000_000_000, ppm=-38.0)
 
 
 class Bench:
-    """A conditioner on its wire, and its connected driver."""
+    """Conditioner on its wire, and its connected driver."""
 
     def __init__(self, signals, device, server, driver):
         self.signals, self.device, self.server, self.driver = signals, device, server, driver
@@ -218,7 +218,7 @@ def test_it_has_one_channel_which_cannot_be_set(bench):
 
 
 def test_at_its_stated_baud_rate_the_line_keeps_up():
-    """In real time: 1000 samples per second, and each reply takes the transfer time of its bytes."""
+    """Runs in real time: 1000 samples per second, and each reply takes the transfer time of its bytes."""
     signals = FakeSignals(0)
     start_ns = time.monotonic_ns()
     signals.now_ns = lambda: time.monotonic_ns() - start_ns + 5_000 * MS

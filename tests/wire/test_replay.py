@@ -33,7 +33,7 @@ SECONDS = 5.0
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """Log of some seconds of the complete simulated rig."""
+    """Return a log of some seconds of the complete simulated rig."""
     path = tmp_path_factory.mktemp("wires") / "run.mcap"
     with rig() as (wires, _, _), connected(build_drivers(wires)) as instruments:
         logs = []
@@ -93,7 +93,7 @@ def test_messages_match_their_schemas(log):
                 jsonschema.validate(json.loads(message.data), make_message_schema(channel.topic))
 
 
-def test_the_log_reads_as_any_other(log):
+def test_the_log_is_read_as_any_other(log):
     content = read_log(log)
     assert content.outcome == "clean"
     assert {"force_raw", "actuator_position", "temperature"} <= set(content.samples)
@@ -133,7 +133,7 @@ def change_data(data):
 
 
 @pytest.mark.parametrize("name", ["load_cell", "lvdt", "coil_amplifier"])
-def test_a_single_changed_byte_is_noticed(log, tmp_path, name):
+def test_a_single_changed_byte_is_detected(log, tmp_path, name):
     other = tmp_path / "flipped.mcap"
     flip_character(log, other, f"/wire/{name}")
     results = {result.instrument: result for result in replay_frames(other)}

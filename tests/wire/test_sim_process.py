@@ -34,7 +34,7 @@ def start_rig(*arguments):
 
 @contextmanager
 def running(folder, *arguments):
-    """Run the rig as a process; yields its wires, its output and the process, and stops it at the end."""
+    """Run the rig as a process; yield its wires, its output and the process, and stop it at the end."""
     process = start_rig("--out", folder / "bench.toml", *arguments)
     try:
         output = []
@@ -125,7 +125,7 @@ def make_frame(kind, payload):
 
 
 def find_frames(data):
-    """Type and payload of the good frames among bytes."""
+    """Return type and payload of the good frames among bytes."""
     start, good = 0, []
     while (start := data.find(b"\xa5\x5a", start)) >= 0 and start + 6 <= len(data):
         end = start + 4 + data[start + 2]

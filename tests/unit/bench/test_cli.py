@@ -1,4 +1,4 @@
-"""The dispatcher: exit codes and what a person reads."""
+"""Dispatcher: exit codes and messages on the command line."""
 
 from importlib.metadata import EntryPoint, EntryPoints
 
@@ -21,7 +21,7 @@ def lack() -> None:
 
 def break_down() -> None:
     """Break down."""
-    raise ZeroDivisionError("a defect")
+    raise ZeroDivisionError("internal error")
 
 
 @pytest.fixture(autouse=True)
@@ -39,7 +39,7 @@ def ending(*words: str) -> int | str | None:
     return ended.value.code
 
 
-def test_an_error_for_a_person_is_one_line_and_exit_1(capsys):
+def test_an_expected_error_is_one_line_and_exit_1(capsys):
     assert ending("refuse") == 1
     assert capsys.readouterr().err == "mrbench: load cell: 31.2 kN exceeds 25 kN; lower the stroke\n"
 
@@ -49,7 +49,7 @@ def test_a_missing_extra_is_named(capsys):
     assert "pip install 'mrbench[identification]'" in capsys.readouterr().err
 
 
-def test_a_defect_keeps_its_traceback():
+def test_an_internal_error_keeps_its_traceback():
     with pytest.raises(ZeroDivisionError):
         main(["break"])
 

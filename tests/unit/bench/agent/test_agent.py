@@ -27,7 +27,7 @@ def messages():
 
 @pytest.fixture
 def agent(messages, monkeypatch):
-    """An agent whose moves continue until they are stopped."""
+    """Return an agent whose moves continue until they are stopped."""
     agent = Agent(BENCH, publish=messages.append, timing=NO_WAITING)
     actuator = agent._rig.actuator
     monkeypatch.setattr(actuator, "read", lambda channel: SimpleNamespace(value=0.0))

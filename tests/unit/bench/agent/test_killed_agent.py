@@ -41,13 +41,13 @@ def scan(folder):
 
 @pytest.fixture(scope="module")
 def killed(tmp_path_factory):
-    """Log of an agent that was killed in the middle of a chunk."""
+    """Return the log of an agent that was killed in the middle of a chunk."""
     return kill_during_run(tmp_path_factory.mktemp("killed"))
 
 
 @pytest.fixture
 def truncated(killed, tmp_path):
-    """Copy of that log, which a test may repair."""
+    """Return a copy of that log, which a test may repair."""
     path = tmp_path / "run.mcap"
     path.write_bytes(killed.read_bytes())
     return path

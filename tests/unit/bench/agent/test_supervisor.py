@@ -51,7 +51,7 @@ def make_supervisor(interlocks, events, stops=None):
 
 
 def late_batch(device_ms):
-    """Two samples of a rod exactly at its setpoint, read 50 ms after the second was taken."""
+    """Return two samples of a rod exactly at its setpoint, read 50 ms after the second was taken."""
     device_ns = None if device_ms is None else np.array(device_ms) * MS
     values = np.array([0.100, 0.104])
     return Batch("actuator", (SampleBlock("actuator_position", 0, device_ns, 154 * MS, values, values, "good"),))

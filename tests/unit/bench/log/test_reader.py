@@ -14,7 +14,7 @@ from tests.support.logs import header, times, values, write_log
 
 @pytest.fixture(scope="module", params=["clean", "truncated"])
 def logged(request, tmp_path_factory):
-    """Path, written values and content of a log; closed, or salvaged after a kill before its index."""
+    """Return path, written values and content of a log; closed, or salvaged after a kill before its index."""
     path = tmp_path_factory.mktemp("log") / "run.mcap"
     written = write_log(path)
     if request.param == "truncated":

@@ -33,7 +33,7 @@ def truncate(complete, folder, size):
 
 @pytest.fixture
 def killed(complete, tmp_path):
-    """A log whose file ends in the middle of its eighth chunk, after seven complete ones."""
+    """Return a log whose file ends in the middle of its eighth chunk, after seven complete ones."""
     eighth = chunk(complete, 7)
     return truncate(complete, tmp_path, eighth.chunk_start_offset + eighth.chunk_length // 2)
 

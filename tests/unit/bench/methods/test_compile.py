@@ -45,7 +45,7 @@ DRIVES = {
 
 
 def method(*segments: dict[str, object], **changes: object) -> Method:
-    """A method of segments with names and drives filled in."""
+    """Return a method of segments, with names and drives filled in."""
     return Method.model_validate(
         {
             "schema": "mrbench.method/1",

@@ -1,4 +1,4 @@
-"""The method document: what it takes, what it refuses, and in which words."""
+"""Method document: valid documents, and the messages on invalid ones."""
 
 import json
 from pathlib import Path

@@ -10,7 +10,7 @@ MS = 1_000_000
 
 
 def follow_clock(wire, seconds=40, every=0.05):
-    """Errors and bounds [ns] of samples taken every millisecond and converted 20 ms later."""
+    """Return errors and bounds [ns] of samples taken every millisecond and converted 20 ms later."""
     clock, errors, bounds, mapped = ClockMap(), [], [], []
     last = wire.find_device_time(BENCH)
     for k in range(int(seconds / every)):
@@ -137,7 +137,7 @@ def test_sample_received_before_it_was_taken_is_ignored():
 
 
 def test_one_instant_is_converted_as_many_are():
-    """Also during corrections, whose knots are in the future."""
+    """This includes corrections, whose knots are in the future."""
     wire, clock = CASES["outliers"], ClockMap()
     for k in range(200):
         reading = wire.read_clock(BENCH + k * 50 * MS)

@@ -18,7 +18,7 @@ def find_offset(device_ns, rate=0.0):
 
 
 def make_bounds(delays, rate=0.0, interval=SECOND // 10):
-    """Bounds from readings at equal intervals; delays [ns] of request and reply."""
+    """Return bounds from readings at equal intervals; delays [ns] of request and reply."""
     instants = [index * interval for index in range(len(delays))]
     offsets = [round(find_offset(instant, rate)) for instant in instants]
     requests, replies = zip(*delays, strict=True)

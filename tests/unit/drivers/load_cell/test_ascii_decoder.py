@@ -17,7 +17,7 @@ def decode(decoder, *pieces):
 
 
 def make_decoder(newtons=10.0, **options):
-    """A decoder with two readings to agree with."""
+    """Return a decoder that has accepted two readings."""
     decoder = AsciiLoadCellDecoder(**options)
     decode(decoder, text(newtons), text(newtons))
     return decoder

@@ -30,7 +30,7 @@ frames = st.one_of(samples, st.builds(Acknowledgement, *[st.integers(0, 255)] * 
 
 @st.composite
 def broken_frames(draw):
-    """A frame that lost its end, its beginning, or one bit."""
+    """Draw a frame without its end or its beginning, or with one flipped bit."""
     frame = encode_frame(draw(samples))
     cut = draw(st.integers(1, len(frame) - 1))
     flipped = bytes([frame[cut] ^ (1 << draw(st.integers(0, 7)))])
@@ -38,9 +38,9 @@ def broken_frames(draw):
 
 
 def contains_a_frame(noise):
-    """Whether pieces of noise make a valid sample, if necessary with the sync word after them.
+    """Return whether noise contains a valid sample, if necessary with the sync word after it.
 
-    A frame whose lost end equals the beginning of the next one is whole again, and right; the next one is lost.
+    A frame whose missing end equals the beginning of the next frame is valid; the next frame is then lost.
     """
     noise += b"\xa5\x5a"
     parts = [noise[start : start + 21] for start in range(len(noise) - 20)]
@@ -56,7 +56,7 @@ garbage = st.one_of(
 
 
 def split(stream, cuts):
-    """The stream, split at these positions."""
+    """Split a stream at these positions."""
     positions = [0, *sorted(cut % (len(stream) + 1) for cut in cuts), len(stream)]
     return [stream[a:b] for a, b in pairwise(positions)]
 
@@ -116,7 +116,7 @@ def test_the_line_is_fast_enough_for_every_rate():
 
 
 def make_frames(ticks, first_time=0):
-    """Frames of the samples at these milliseconds, each with its tick as counts."""
+    """Return the frames of the samples at these milliseconds, each with its tick as counts."""
     return [encode_frame(Sample(k % 65536, (first_time + 1000 * k) % 2**32, k, 0, 0)) for k in ticks]
 
 

@@ -1,4 +1,4 @@
-"""The simulated drive and a plain canopen node, which shares no code with the driver."""
+"""Simulated drive, tested by a plain canopen node that shares no code with the driver."""
 
 import math
 import time
@@ -55,7 +55,7 @@ def operational(node):
     return node
 
 
-def test_objects_are_read_as_the_data_sheet_says(node):
+def test_objects_are_read_as_in_the_data_sheet(node):
     assert node.sdo[0x1000].raw == 0x20192
     assert node.sdo[0x1018][2].raw == 0x4D524231
     assert node.sdo[0x1008].raw == "MR bench servo actuator, 0.1 um"

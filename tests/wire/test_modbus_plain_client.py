@@ -1,4 +1,4 @@
-"""The simulated instruments with a plain pymodbus client and a plain socket, independent of the drivers."""
+"""Simulated instruments, tested by a plain pymodbus client and a plain socket, without the code of the drivers."""
 
 import socket
 import struct

@@ -32,7 +32,7 @@ class ChannelSection(FrozenModel):
     delay: NonNegativeFloat = Field(
         default=0.0, description="[s] delay of conversion and transfer, apart from the filter's"
     )
-    calibration: str = Field(default="", description="who calibrated it, when, and with which uncertainty")
+    calibration: str = Field(default="", description="calibration: laboratory, date and uncertainty")
     certificate: str = Field(default="", description="file of the certificate, which is attached to every log")
 
 

@@ -45,7 +45,7 @@ class Scenario(FrozenModel):
         default="laboratory", description="a shipped parameter set by name, or the paper's fourteen parameters"
     )
     drive_kind: Literal["driver_command_v", "coil_v", "coil_a"] = Field(
-        default="coil_v", description="what commands the damper"
+        default="coil_v", description="quantity that commands the damper"
     )
     drive_unit: Literal["V", "A"] = Field(default="V", description="unit of the drive")
     specimen: Specimen = Field(default=Specimen(), description="name plate")

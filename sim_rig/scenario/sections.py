@@ -1,7 +1,7 @@
 """Sections of a scenario: actuator, amplifier, sensors, clocks, effects, faults, damper.
 
 SI units throughout. The defaults describe a decent laboratory with realistic sensor errors, so a scenario names
-only what differs. A sensor that is named replaces the default one completely. What it leaves out is ideal.
+only what differs. A sensor that is named replaces the default one completely. Its omitted fields are ideal.
 """
 
 from typing import Annotated, Any, Literal

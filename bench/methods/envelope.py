@@ -54,7 +54,7 @@ class Envelope(FrozenModel):
     )
     design: dict[str, Any] | None = Field(
         default=None,
-        description="Precision to which these strokes determine a damper, as mrbench.foresight/1; null if unknown.",
+        description="Precision at which these strokes determine a damper (mrbench.foresight/1); null if unknown.",
     )
 
 

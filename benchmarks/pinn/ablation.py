@@ -32,8 +32,8 @@ class Row(NamedTuple):
 
 
 def _list_rows() -> Iterator[Row]:
-    yield Row("slip", "preset: elements between reversals of the slip", {})
-    yield Row("slip", "elements between reversals of the stroke", {"element_input": "stroke"})
+    yield Row("slip", "preset: elements between slip reversals", {})
+    yield Row("slip", "elements between stroke reversals", {"element_input": "stroke"})
     yield Row("slip", "elements of the slip with plain time", {"element_input": "time"})
     for activation in ("tanh", "sine", "gaussian"):
         yield Row("activation", activation, {"activation": activation})

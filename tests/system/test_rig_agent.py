@@ -1,4 +1,4 @@
-"""The rig agent on the wires of the simulated rig: it runs, stops, trips, and dies."""
+"""Rig agent on the wires of the simulated rig: runs, stops, trips, and the kill of its process."""
 
 import json
 import signal
@@ -34,19 +34,19 @@ def bench(tmp_path):
 
 
 def finished(process):
-    """What a run said, its exit status first."""
-    _, said = process.communicate(timeout=DEADLINE)
-    return process.returncode, said
+    """Return exit status and error output of a run."""
+    _, output = process.communicate(timeout=DEADLINE)
+    return process.returncode, output
 
 
-def kinds(log, kind):
+def list_event_texts(log, kind):
     return [event["text"] for event in log.events if event["kind"] == kind]
 
 
-def test_a_run_is_recorded_as_it_was_commanded(bench):
+def test_run_is_recorded_as_commanded(bench):
     with ended(bench.run("--specimen", "D1")) as process:
-        code, said = finished(process)
-    assert code == 0, said
+        code, output = finished(process)
+    assert code == 0, output
     log = read_log(bench.log)
     samples = log.samples
     assert log.outcome == "clean", log.metadata["outcome"]
@@ -55,12 +55,12 @@ def test_a_run_is_recorded_as_it_was_commanded(bench):
     assert [(segment.stop - segment.start) / 1000 for segment in log.segments] == pytest.approx(
         [1.5, 2.0], abs=0.01
     )
-    assert kinds(log, "checkpoint") == ["after segment a"]
+    assert list_event_texts(log, "checkpoint") == ["after segment a"]
     for name in ("displacement", "force", "coil_drive", "actuator_position", "coil_current", "temperature"):
         assert np.isfinite(samples[name]).mean() > 0.99, name
     segment, command = log.segments[1], samples["displacement_command"]
     inside = slice(segment.start, segment.stop)
-    # The servo is some 12 ms behind at 0.1 m/s.
+    # The servo follows about 12 ms late; at 0.1 m/s this is 1.2 mm.
     assert np.max(np.abs(samples["displacement"][inside] - command[inside])) < 3e-3
     assert np.ptp(samples["displacement"][inside]) == pytest.approx(0.016, rel=0.1)
     assert np.median(samples["coil_drive"][inside]) == pytest.approx(0.4, abs=2e-3)
@@ -70,30 +70,30 @@ def test_a_run_is_recorded_as_it_was_commanded(bench):
     until(bench.rests)
 
 
-def test_drive_and_motion_begin_together_and_marks_stand_where_they_belong(bench):
+def test_drive_and_motion_begin_together_at_the_segment_mark(bench):
     with ended(bench.run()) as process:
-        code, said = finished(process)
-    assert code == 0, said
+        code, output = finished(process)
+    assert code == 0, output
     samples = read_log(bench.log).samples
-    asked = np.flatnonzero(np.diff(samples["coil_drive_command"]) > 0.1)
+    commanded = np.flatnonzero(np.diff(samples["coil_drive_command"]) > 0.1)
     measured = np.flatnonzero((samples["coil_drive"][1:] > 0.1) & (samples["coil_drive"][:-1] < 0.1))
-    assert len(asked) >= 1
-    assert abs(int(asked[0]) - int(measured[0])) < 20
+    assert len(commanded) >= 1
+    assert abs(int(commanded[0]) - int(measured[0])) < 20
     segment = samples["segment"]
     at_a = np.flatnonzero(segment == 0)
     assert samples["displacement_command"][at_a[0]] == pytest.approx(0.0, abs=2e-4)
 
 
-def test_a_limit_trips_and_stays(tmp_path):
-    """The force of the damper passes a fixture limit in the middle of a stroke."""
+def test_trip_is_latched_until_a_reset(tmp_path):
+    """The damper force exceeds a limit of the fixture in the middle of a stroke."""
     with (
         live_bench(tmp_path, limits="force = { trip = 150.0 }") as bench,
         Agent(load_config(bench.toml), bench.toml) as agent,
     ):
-        answer = agent.run(RunCommand(method=method(), log=str(bench.log)))
-        assert answer.ok, answer.error
+        reply = agent.run(RunCommand(method=method(), log=str(bench.log)))
+        assert reply.ok, reply.error
         until(lambda: agent.wait(0.05))
-        status = agent.status()
+        status = agent.get_status()
         assert status.state == "tripped"
         assert "exceeds the limit of 150 N" in status.trip
         assert (status.run.outcome, status.run.reason) == ("incomplete", status.trip)
@@ -102,20 +102,20 @@ def test_a_limit_trips_and_stays(tmp_path):
         assert not refused.ok
         assert "then reset" in refused.error
         assert agent.reset().ok
-        assert agent.status().state == "idle"
+        assert agent.get_status().state == "idle"
     log = read_log(bench.log)
     assert log.outcome == "incomplete"
-    assert len(kinds(log, "trip")) == 1
+    assert len(list_event_texts(log, "trip")) == 1
     assert np.max(np.abs(log.samples["force"])) > 150.0
 
 
-def test_a_stop_ends_in_good_order_and_the_run_goes_on_after_its_checkpoint(bench):
+def test_stopped_run_can_be_resumed_after_its_checkpoint(bench):
     with Agent(load_config(bench.toml), bench.toml) as agent:
         assert agent.run(RunCommand(method=method(), log=str(bench.log))).ok
-        until(lambda: (run := agent.status().run) is not None and run.segment == "b")
+        until(lambda: (run := agent.get_status().run) is not None and run.segment == "b")
         agent.stop()
         until(lambda: agent.wait(0.05))
-        status = agent.status()
+        status = agent.get_status()
         assert (status.state, status.run.outcome, status.run.reason) == (
             "idle",
             "incomplete",
@@ -123,60 +123,60 @@ def test_a_stop_ends_in_good_order_and_the_run_goes_on_after_its_checkpoint(benc
         )
         until(bench.rests)
         stopped = read_log(bench.log)
-        assert kinds(stopped, "checkpoint") == ["after segment a"]
-        assert not kinds(stopped, "trip")
+        assert list_event_texts(stopped, "checkpoint") == ["after segment a"]
+        assert not list_event_texts(stopped, "trip")
         samples = stopped.samples
         assert np.nanmax(np.abs(np.diff(samples["displacement_command"], 2))) * 1e6 <= 9.0
         again = RunCommand(method=method(), log=str(bench.log), resume_after="a")
         assert agent.run(again).ok
         until(lambda: agent.wait(0.05))
-        assert agent.status().run.outcome == "clean", agent.status().run
-        assert len(agent.status().finished) == 2
+        assert agent.get_status().run.outcome == "clean", agent.get_status().run
+        assert len(agent.get_status().finished) == 2
     assert [segment.name for segment in read_log(bench.log).segments] == ["b"]
 
 
-def test_ctrl_c_ends_a_run_in_good_order(bench):
+def test_ctrl_c_stops_a_run_softly(bench):
     with ended(bench.run()) as process:
         until(bench.strokes)
         process.send_signal(signal.SIGINT)
-        code, said = finished(process)
+        code, output = finished(process)
     assert code == 1
-    assert len(said.strip().splitlines()) == 1
-    assert "stopped on request" in said
+    assert len(output.strip().splitlines()) == 1
+    assert "stopped on request" in output
     assert read_log(bench.log).outcome == "incomplete"
     assert bench.rests()
 
 
-def test_a_killed_agent_leaves_all_at_rest_and_its_log_can_be_mended(bench):
+def test_killed_agent_leaves_all_at_rest_and_its_log_can_be_salvaged(bench):
     with ended(bench.run()) as process:
         until(bench.strokes)
         process.kill()
         killed = datetime.now(UTC)
         process.communicate(timeout=DEADLINE)
     until(bench.rests, 10.0)
-    mended = subprocess.run([COMMAND, "salvage", bench.log], capture_output=True, text=True, timeout=DEADLINE)
-    assert mended.returncode == 0, mended.stderr
+    salvaged = subprocess.run([COMMAND, "salvage", bench.log], capture_output=True, text=True, timeout=DEADLINE)
+    assert salvaged.returncode == 0, salvaged.stderr
     log = read_log(bench.log)
     zero = datetime.fromisoformat(log.metadata["run"]["utc_offset"])
     kept = (killed - zero).total_seconds() - log.samples["time_ns"][-1] * 1e-9
     assert kept <= 0.5
 
 
-def test_a_load_cell_that_falls_silent_trips_and_the_log_is_closed(tmp_path):
+def test_silent_load_cell_trips_and_the_log_is_closed(tmp_path):
     cut = WireFault(kind="stuck", start=8.0, duration=100.0)
     with live_bench(tmp_path, faults={"load_cell": (cut,)}) as bench:
         cycles = [{**segment, "cycles": 40} for segment in method()["segments"]]
         with ended(bench.run(segments=cycles)) as process:
-            code, said = finished(process)
+            code, output = finished(process)
         until(bench.rests)
     assert code == 1
-    assert "force age" in said
+    assert "force age" in output
     log = read_log(bench.log)
     assert log.outcome == "incomplete"
     assert "force age" in log.metadata["outcome"]["reason"]
 
 
-def test_the_agent_as_a_process_is_led_over_its_sockets(bench):
+def test_agent_process_is_controlled_over_its_sockets(bench):
     words = ("rig", "--config", bench.toml, "--commands", "tcp://127.0.0.1:*", "--samples", "tcp://127.0.0.1:*")
     process = subprocess.Popen([COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     with ended(process):
@@ -201,9 +201,9 @@ def test_the_agent_as_a_process_is_led_over_its_sockets(bench):
     assert bench.rests()
 
 
-def test_what_this_bench_cannot_run_is_refused_in_one_line(bench):
+def test_method_with_another_drive_is_refused_in_one_line(bench):
     with ended(bench.run(drive_kind="coil_a")) as process:
-        code, said = finished(process)
-    assert (code, len(said.strip().splitlines())) == (1, 1)
-    assert "drives by coil_a, this bench by coil_v" in said
+        code, output = finished(process)
+    assert (code, len(output.strip().splitlines())) == (1, 1)
+    assert "drives by coil_a, this bench by coil_v" in output
     assert not bench.log.exists()

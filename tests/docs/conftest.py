@@ -1,4 +1,4 @@
-"""What the pages take for granted: the command on the path, and a folder with recordings made elsewhere."""
+"""Conditions of the pages: the command on the path, and a folder with recordings made elsewhere."""
 
 import os
 import sys
@@ -9,7 +9,7 @@ import pytest
 from tests.support import blocks
 
 STROKES = {"10mm_1Hz.csv": (0, 7500), "5mm_2.5Hz.csv": (7500, 15704)}
-"""Which samples of `quick` each file holds."""
+"""First and last sample of `quick` in each file."""
 
 
 @pytest.fixture(scope="session")
@@ -21,7 +21,7 @@ def environment():
 
 @pytest.fixture(scope="session")
 def recordings(tmp_path_factory, environment):
-    """Two strokes as files of five columns, and the first once more under a vendor's headers."""
+    """Make files of two strokes, and one of the first stroke with the headers of a vendor."""
     folder = tmp_path_factory.mktemp("elsewhere")
     blocks.run("mrbench run quick --scenario default --out a.mcap", folder, environment)
     blocks.run("mrbench export a.mcap --format csv --out a.csv", folder, environment)
@@ -40,7 +40,7 @@ def recordings(tmp_path_factory, environment):
 
 @pytest.fixture
 def folder(tmp_path, recordings):
-    """Where a reader stands."""
+    """Return the working folder of a reader."""
     (tmp_path / "recordings").mkdir()
     for name, lines in recordings.items():
         (tmp_path / name).write_text("\n".join(lines) + "\n")

@@ -1,8 +1,9 @@
-"""What pages refer to is there, and what they repeat of the code is what the code says."""
+"""Links, paths and commands in the documentation exist, and generated parts are up to date."""
 
 import re
 import tomllib
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 
 import pytest
 
@@ -16,7 +17,14 @@ ALL_PAGES = [p for p in sorted(blocks.ROOT.rglob("*.md")) if not HIDDEN & set(p.
 GENERATED = [
     p for p in sorted(blocks.ROOT.glob("docs/reference/*.md")) if "<!-- generated: " in p.read_text("utf-8")
 ]
+PATH = re.compile(r"`((?:bench|benchmarks|docs|drivers|identification|sim_rig|tests)/[\w./*-]*\w)/?`")
+CALL = re.compile(r"(?:^|`|\$ |&& )mrbench ([a-z]+)([^`|&;#]*?)(?=`|\||&|;|#|$)", re.MULTILINE)
+"""Command and arguments of a call in a block or in the text."""
 COMMAND_LINE = blocks.ROOT / "docs" / "reference" / "command-line.md"
+COMMANDS = dict(
+    re.findall(r"^```text\nmrbench (\w+) (.*?)```", COMMAND_LINE.read_text(), re.MULTILINE | re.DOTALL)
+)
+"""Usage of each command."""
 
 
 def name(page):
@@ -38,6 +46,28 @@ def test_every_link_leads_somewhere(page):
         target = (page.parent / path).resolve() if path else page
         assert target.exists(), f"{name(page)} links to {link}"
         assert not anchor or anchor in anchors(target), f"{name(page)} links to {link}"
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=name)
+def test_every_path_named_in_a_page_exists(page):
+    for path in PATH.findall(page.read_text()):
+        folders = (blocks.ROOT, page.parent)
+        assert any(any(folder.glob(path)) for folder in folders), f"{name(page)} names {path}"
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=name)
+def test_every_module_run_by_a_page_exists(page):
+    for module in re.findall(r"python -m ([a-z_.]+\w)", page.read_text()):
+        assert find_spec(module), f"{name(page)} runs {module}"
+
+
+@pytest.mark.parametrize("page", ALL_PAGES, ids=name)
+def test_every_command_and_option_in_a_page_exists(page):
+    for command, arguments in CALL.findall(page.read_text()):
+        assert command in COMMANDS, f"{name(page)} calls mrbench {command}"
+        for option in re.findall(r"(?<!\S)--[a-z][a-z-]*", arguments):
+            known = f"{option} " in f"{COMMANDS[command]} --help " or f"[{option}]" in COMMANDS[command]
+            assert known, f"{name(page)} calls mrbench {command} {option}"
 
 
 @pytest.mark.parametrize("page", [p for p in ALL_PAGES if "docs" in p.parts], ids=name)

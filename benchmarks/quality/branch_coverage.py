@@ -78,7 +78,7 @@ def measure() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
     for old in FOLDER.glob("coverage*"):
         old.unlink()
-    config = FOLDER / "coverage.ini"
+    config = FOLDER / "settings.ini"
     config.write_text(CONFIG, encoding="utf-8")
     cov = ("--cov", f"--cov-config={config}", "--cov-context=test", "--cov-report=", "-p", "no:cacheprovider")
     _run("pytest", "-n", "2", "-q", *cov)
@@ -97,7 +97,7 @@ def _run(*words: str, **environment: str) -> None:
 def read_package(package: str) -> Coverage:
     """Read the coverage of one top-level package from the combined data."""
     out = FOLDER / f"{package}.json"
-    _run("coverage", "json", "-q", f"--rcfile={FOLDER / 'coverage.ini'}", f"--include={package}/*", "-o", str(out))
+    _run("coverage", "json", "-q", f"--rcfile={FOLDER / 'settings.ini'}", f"--include={package}/*", "-o", str(out))
     totals = json.loads(out.read_text("utf-8"))["totals"]
     return Coverage(
         package,

@@ -62,7 +62,7 @@ def njit_inline(function: Function) -> Function:
 
 
 def njit_uncached(function: Function) -> Function:
-    """Compile a function that takes another function, anew in every process.
+    """Compile a function that takes another function, separately in every process.
 
     The compiler cannot cache such a function on disk: after two different arguments it fails on one that no longer
     exists.

@@ -31,7 +31,7 @@ def load_assumed_damper(model: Path | None, drive_unit: str, noise: float | None
     Args:
         model: file of a fit, twin or scenario; None for the usual damper of the drive's unit.
         drive_unit: V or A.
-        noise: of the recorded force [N]; None takes the fit's noise floor, or that of a usual load cell.
+        noise: noise of the recorded force [N]; None takes the fit's noise floor, or that of a usual load cell.
 
     Raises:
         IdentificationError: the model cannot be read, or is driven in another unit.

@@ -24,7 +24,7 @@ def explain_unidentifiable(
 
     Args:
         quantity: the coordinate.
-        limitations: of the planned strokes.
+        limitations: limitations of the planned strokes.
         most_correlated: the other coordinate with the largest correlation to this one, and that correlation [1].
     """
     name = f"{quantity.symbol} ({quantity.meaning})"

@@ -47,8 +47,8 @@ def identify_batch(
     A log that cannot be fitted does not stop the others.
 
     Args:
-        logs: each of another specimen.
-        request: for every fit; its budget is that of one log.
+        logs: logs, each of another specimen.
+        request: request for every fit; its budget is that of one log.
         progress: receives the present activity and the force error so far [N].
 
     Yields:

@@ -30,7 +30,7 @@ class FitRequest:
 
     @property
     def output_error_budget(self) -> float | None:
-        """Processor time for the output-error fit [s]: half of the budget if a network is trained, too."""
+        """Processor time for the output-error fit [s]: half of the budget if a network is trained as well."""
         budget = self.settings.budget
         share = 0.5 if "pinn" in self.stages else 1.0
         return None if budget is None else share * budget

@@ -54,7 +54,7 @@ def train_network(
         problem: the problem to fit.
         stretches: recordings of its pieces.
         preset: name of a preset, or path of a settings file.
-        seed: of all random numbers.
+        seed: seed of all random numbers.
         budget: processor time [s]; None for no limit.
         progress: receives every step.
 
@@ -81,7 +81,7 @@ def train_networks(
     Args:
         problems: problems to fit, one per damper.
         preset: name of a preset, or path of a settings file.
-        seed: of all random numbers.
+        seed: seed of all random numbers.
         budget: processor time per damper [s]; None for no limit.
         progress: receives every step.
 

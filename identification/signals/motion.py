@@ -59,7 +59,7 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
     """Estimate the motion behind the recorded displacement of a stretch.
 
     Args:
-        stretch: with the segments of its method, as far as they are known.
+        stretch: stretch with the segments of its method, as far as they are known.
         cutoff: (N,) cutoff of the smoother [Hz]; chosen if None.
 
     Returns:

@@ -110,7 +110,7 @@ def compute_step_covariance(cutoff: float, rate: float, *, twicing: bool = False
     """Return how far the first differences of a smooth follow those of white noise: trace of D S D^T per sample.
 
     Args:
-        cutoff: of the smoother [Hz].
+        cutoff: cutoff frequency of the smoother [Hz].
         rate: [Hz].
         twicing: whether it smooths its remainder again.
 

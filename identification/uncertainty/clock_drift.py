@@ -71,7 +71,7 @@ def compute_drift_correction(
     """Return the change of the residuals where the delay drifts and the unknowns follow, and the drift.
 
     Args:
-        problem: with all samples in question marked for the fit.
+        problem: problem in which all samples in question are marked for the fit.
         unknowns: (U,) of a fit.
         clock_deviation: standard deviation of the clocks [s], which limits the drift.
 

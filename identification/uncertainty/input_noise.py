@@ -58,7 +58,7 @@ def reestimate_motion(problem: Problem, stretches: Sequence[Stretch], forces: Se
     The recorded force would add its noise to the motion, and noise that both have in common biases a fit.
 
     Args:
-        problem: with one piece for each stretch, in their order.
+        problem: problem with one piece for each stretch, in the same order.
         stretches: recordings of the pieces.
         forces: simulated force (N,) [N] of each piece.
     """
@@ -85,10 +85,10 @@ def resample_input_noise(
     """Estimate the errors that input noise causes, from replicas with fresh noise.
 
     Args:
-        problem: with one piece for each stretch, in their order.
+        problem: problem with one piece for each stretch, in the same order.
         stretches: recordings of the pieces.
         minimum: minimum of the problem.
-        seed: of the noise.
+        seed: seed of the noise.
     """
     fitted = _replace_recorded_force(problem.make_fast(), minimum.unknowns)
     interior = fitted.find_interior(minimum.unknowns)

@@ -72,7 +72,7 @@ def compute_profile_intervals(
     Args:
         problem: minimised problem.
         minimum: its minimum.
-        covariance: of the minimum; coordinates without a deviation there are left out.
+        covariance: covariance of the minimum; coordinates without a deviation there are left out.
         progress: receives the name of the coordinate and the force error [N].
 
     Returns:

@@ -18,7 +18,7 @@ def compute_transmitted_force(
 
     Args:
         elongation: displacement of the actuator less that of the damper [m].
-        compliance: of the spring at small elongation [m/N].
+        compliance: compliance of the spring at small elongation [m/N].
         gap: free travel from side to side [m].
         hardening: growth of the secant stiffness over the squared elongation [1/m²].
         in_gap_ratio: stiffness in the gap over that outside, in addition to the least one [1].

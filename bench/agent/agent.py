@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from bench.agent.bench_clock import BenchClock
-from bench.agent.instrument_status import make_instrument_status
 from bench.agent.run_executor import RunExecutor
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
+from bench.agent.state_machine import StateMachine
+from bench.agent.status import collect_warnings, make_instrument_status
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import (
@@ -106,13 +107,12 @@ class Agent:
             config, source, self._rig, self._interlocks, self._supervisor, self._acquisition,
             self._recording_thread, self._clock, self._report_event, timing,
         )  # fmt: skip
-        self._lock = threading.RLock()
-        self._state: AgentState = "idle"
+        self._states = StateMachine(self._rig, self._interlocks, self._acquisition, self._report_event)
         self._setup = SetupExecutor(
             self._rig, self._interlocks, self._clock, self._move, self._report_event, self._on_setup_ended, timing
         )
-        self._run_slot = RunSlot(self._lock, self._executor.execute, self._on_run_ended)
-        self._published_state: tuple[AgentState, str] | None = None
+        self._run_slot = RunSlot(self._states.lock, self._executor.execute, self._on_run_ended)
+        self._published_content: tuple[AgentState, str] | None = None
         self._published_at = 0.0
         self._open_resources = contextlib.ExitStack()
         for one in self._rig.instruments:
@@ -151,8 +151,8 @@ class Agent:
 
     def get_status(self) -> AgentStatus:
         """Return the state of the agent, its instruments and its runs."""
-        with self._lock:
-            state, finished = self._state, self._run_slot.finished
+        with self._states.lock:
+            state, finished = self._states.current, self._run_slot.finished
         return AgentStatus(
             state=state,
             trip=self._interlocks.trip_reason,
@@ -163,7 +163,9 @@ class Agent:
             instruments=tuple(
                 make_instrument_status(one, self._acquisition, self._clock) for one in self._rig.instruments
             ),
-            warnings=self._collect_warnings(),
+            warnings=collect_warnings(
+                self._acquisition, self._priority_warning, self._rig.actuator.settings.setpoint_timeout
+            ),
             drive_kind=self._rig.drive_kind,
             drive_unit=self._rig.drive_unit,
         )
@@ -174,15 +176,13 @@ class Agent:
 
     def run(self, command: RunCommand) -> Reply:
         """Start a run; reply as soon as it is accepted."""
-        with self._lock:
-            if obstacle := self._find_start_obstacle():
-                return Reply(ok=False, error=obstacle, status=self.get_status())
-            self._set_state("preparing")
-        # Without the lock, because compiling takes time; the state excludes other commands.
+        if obstacle := self._states.begin_preparing():
+            return Reply(ok=False, error=obstacle, status=self.get_status())
+        # Without a lock, because compiling takes time; the state excludes other commands.
         try:
             self._run_slot.start(self._executor.prepare(command))
         except Exception as error:
-            self._set_state("idle", expected=("preparing",))
+            self._states.change("idle", expected=("preparing",))
             if not isinstance(error, BenchError | DriverError):
                 raise
             return Reply(ok=False, error=str(error), status=self.get_status())
@@ -190,10 +190,8 @@ class Agent:
 
     def prepare(self, command: PrepareCommand) -> Reply:
         """Start a setup step; reply when it is done, or after a moment while it continues."""
-        with self._lock:
-            if obstacle := self._find_start_obstacle():
-                return Reply(ok=False, error=obstacle, status=self.get_status())
-            self._set_state("preparing")
+        if obstacle := self._states.begin_preparing():
+            return Reply(ok=False, error=obstacle, status=self.get_status())
         status = self._setup.start(command.step, command.position_m or 0.0)
         failed = status.outcome == "failed"
         return Reply(ok=not failed, error=status.message if failed else "", status=self.get_status())
@@ -207,7 +205,8 @@ class Agent:
     def reset(self) -> Reply:
         """Reset a trip whose cause is removed; nothing moves."""
         self._report_event("command", "reset")
-        error = self._find_reset_obstacle() or self._reset_trip()
+        is_busy = self._run_slot.current is not None or self._setup.is_running
+        error = self._states.find_reset_obstacle(is_busy) or self._states.reset_trip()
         return Reply(ok=not error, error=error, status=self.get_status())
 
     def shut_down(self) -> None:
@@ -220,53 +219,7 @@ class Agent:
         """Wait for the run to end, up to a timeout [s]; return whether there is none in progress."""
         return self._run_slot.wait(timeout)
 
-    # States
-
-    def _set_state(self, state: AgentState, expected: tuple[AgentState, ...] | None = None) -> None:
-        """Change the state; only from one of the expected states, if they are given."""
-        with self._lock:
-            if state == self._state or (expected is not None and self._state not in expected):
-                return
-            self._state = state
-        self._report_event("state", f"agent {state}")
-
-    def _find_start_obstacle(self) -> str:
-        """Return the reason why nothing can be started; empty if it can."""
-        if self._state == "tripped":
-            reason = self._interlocks.trip_reason
-            return f"the agent is tripped ({reason}); nothing was started; remove the cause, then reset"
-        if self._state != "idle":
-            return f"the agent is {self._state}; nothing was started; wait for its end, or stop it"
-        return self._describe_failed_instruments("nothing was started; check its wire")
-
-    def _find_reset_obstacle(self) -> str:
-        """Return the reason why a trip cannot be reset; empty if it can."""
-        if self._state not in ("tripped", "idle"):
-            return f"the agent is {self._state}; stop it first"
-        if self._run_slot.current is not None or self._setup.is_running:
-            return "the tripped run or step has not ended yet; try again in a moment"
-        return self._describe_failed_instruments("check its wire, then reset") if self._state == "tripped" else ""
-
-    def _describe_failed_instruments(self, consequence: str) -> str:
-        failed = ", ".join(self._acquisition.failed_instruments)
-        return f"{failed} does not reply; {consequence}" if failed else ""
-
-    def _reset_trip(self) -> str:
-        """Reset a trip; return the error of an instrument that refuses, else an empty text.
-
-        The lock is not held meanwhile, because the replies of instruments take time. No other command leaves the
-        state after a trip.
-        """
-        if self._state == "idle":
-            return ""
-        try:
-            self._rig.amplifier.reset()
-            self._rig.actuator.reset()
-        except DriverError as error:
-            return str(error)
-        self._interlocks.reset()
-        self._set_state("idle")
-        return ""
+    # Motion
 
     def _stop_moving(self, reason: str, hold: bool) -> None:
         """Stop a run or setup step softly; from any thread, harmless if nothing is in progress."""
@@ -274,9 +227,9 @@ class Agent:
         if run is not None:
             run.sequencer.stop(reason, hold)
         if self._interlocks.trip_reason:
-            self._set_state("tripped")
+            self._states.change("tripped")
         elif run is not None:
-            self._set_state("stopping", expected=("preparing", "running"))
+            self._states.change("stopping", expected=("preparing", "running"))
         else:
             self._setup.stop(reason)
 
@@ -292,10 +245,10 @@ class Agent:
         )
 
     def _on_setup_ended(self) -> None:
-        self._set_state("idle", expected=("preparing",))
+        self._states.change("idle", expected=("preparing",))
 
     def _on_run_ended(self, status: RunStatus) -> None:
-        self._set_state("tripped" if self._interlocks.trip_reason else "idle")
+        self._states.change("tripped" if self._interlocks.trip_reason else "idle")
         self._report_event("run_finished", f"{status.id}: {status.outcome} {status.reason}".strip())
 
     # On the threads of wires
@@ -330,9 +283,10 @@ class Agent:
             _, index = run.history.find_progress(self._clock())
             segment = "" if index == NO_SEGMENT else run.request.programme.segments[index].name
             if run.history.has_started:
-                self._set_state("running", expected=("preparing",))
-        if (self._state, segment) != self._published_state or now - self._published_at >= _STATUS_PERIOD:
-            self._published_state, self._published_at = (self._state, segment), now
+                self._states.change("running", expected=("preparing",))
+        content = self._states.current, segment
+        if content != self._published_content or now - self._published_at >= _STATUS_PERIOD:
+            self._published_content, self._published_at = content, now
             self._publish(self.get_status())
 
     # Reports
@@ -343,13 +297,3 @@ class Agent:
         if (log := self._run_slot.log) is not None:
             log.write_event(event_ns, kind, text, **details)
         self._publish(AgentEvent(time_ns=event_ns, kind=kind, text=text))
-
-    def _collect_warnings(self) -> tuple[str, ...]:
-        # Every thread reports the same missing priority, so it is listed once, with its consequence.
-        warnings = [warning for warning in self._acquisition.warnings if warning != self._priority_warning]
-        if self._priority_warning:
-            timeout = self._rig.actuator.settings.setpoint_timeout
-            warnings.append(
-                f"{self._priority_warning}; the drive stops by itself {timeout:g} s after the last setpoint"
-            )
-        return tuple(warnings)

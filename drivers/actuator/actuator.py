@@ -6,26 +6,26 @@ when setpoints are stale (event timer of its RPDO) or the heartbeat is lost (101
 the bench. Positions are in metres from the specimen's centre once a specimen is centred, and from home before.
 """
 
-import contextlib
-import time
 from pathlib import Path
 from typing import Any
 
+from drivers.actuator.channels import OBJECTS, make_channels
 from drivers.actuator.cia402 import Fault
-from drivers.actuator.reference_state import ReferenceState, apply_transition, find_initial_state
-from drivers.actuator.sample_decoder import TIME_STAMP, ActuatorDecoder, CountScale
+from drivers.actuator.reference_state import (
+    ReferenceState,
+    apply_transition,
+    check_referenced,
+    find_initial_state,
+)
+from drivers.actuator.sample_reader import SampleReader
 from drivers.actuator.servo_drive import METRES_PER_COUNT, ActuatorSettings, ServoDrive
 from drivers.actuator.setpoints import SetpointSender
 from drivers.channel import Channel, ClockReading, Reading, SampleBlock
-from drivers.errors import DriverError, InvalidReplyError, NoReplyError, OutOfRangeError, RefusedError
+from drivers.errors import DriverError, OutOfRangeError, RefusedError
 from drivers.instrument import Clock, FrameListener, Health
-from drivers.polling import ACTUATOR_SCHEDULE
 from drivers.transport import CanAddress, CanBus, CanopenNode
 from drivers.wire_files import ACTUATOR_EDS
 
-_OBJECTS = {"actuator_position": 0x6064, "actuator_velocity": 0x606C, "actuator_torque": 0x6077}
-_CLOCK_PERIOD_NS = 100_000_000
-"""Time between two readings of the drive's clock [ns]."""
 _DEFAULT_SETTINGS = ActuatorSettings()
 
 
@@ -67,12 +67,9 @@ class Actuator:
         self._reference_state = find_initial_state(clamped, referenced=False)
         self._clamped = clamped
         self._origin = 0.0
-        self._channels = self._make_channels()
-        self._decoder = self.make_decoder(0.0, 1.0)
-        # A lambda, since `connect` makes a new decoder and the bus cannot remove a listener.
-        self._bus.add_listener(lambda frame: self._decoder.add_frame(frame))
+        self._channels = make_channels(self.settings, self._origin, self._drive.rated_torque)
+        self._samples = SampleReader(self._bus, self._node, clock, settings.cycle)
         self._setpoints = SetpointSender(name, self._node, self._drive, clock, settings, master_id)
-        self._clock_request_ns = 0
         self._message = ""
 
     @property
@@ -84,16 +81,6 @@ class Actuator:
     def channels(self) -> tuple[Channel, ...]:
         """Position, velocity and torque."""
         return self._channels
-
-    def _make_channels(self) -> tuple[Channel, ...]:
-        """Make the channels, with ranges from travel, origin and rated torque."""
-        low, high = (limit - self._origin for limit in self.settings.travel)
-        speed, torque = 4 * self.settings.max_speed, 4 * self._drive.rated_torque
-        return (
-            Channel("actuator_position", "m", low, high, "read_write", "rod position by the drive's encoder"),
-            Channel("actuator_velocity", "m/s", -speed, speed, "read", "rod velocity by the drive"),
-            Channel("actuator_torque", "N m", -torque, torque, "read", "torque of the motor"),
-        )
 
     @property
     def reference_state(self) -> ReferenceState:
@@ -113,7 +100,7 @@ class Actuator:
     @property
     def clock_reading(self) -> ClockReading | None:
         """Latest reading of the drive's clock; None before the first."""
-        return self._decoder.clock_reading
+        return self._samples.decoder.clock_reading
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -138,8 +125,8 @@ class Actuator:
         # After a broken connection the specimen is still clamped, and its centre valid if the drive is referenced.
         if not is_referenced or self._reference_state not in (ReferenceState.MOUNTED, ReferenceState.CENTRED):
             self._reference_state, self._origin = find_initial_state(self._clamped, is_referenced), 0.0
-        self._channels = self._make_channels()
-        self._decoder = self.make_decoder(self._origin, self._drive.rated_torque)
+        self._channels = make_channels(self.settings, self._origin, self._drive.rated_torque)
+        self._samples.start(self._origin, self._drive.rated_torque)
 
     def close(self) -> None:
         """Bring the rod to rest and close the bus."""
@@ -149,7 +136,7 @@ class Actuator:
 
     def get_health(self) -> Health:
         """Return the counts of samples, and the present problems."""
-        decoder = self._decoder
+        decoder = self._samples.decoder
         # Frames are counted even while no thread takes samples (decision 0011).
         decoder.decode_pending()
         corrupted = decoder.corrupted + self._bus.corrupted
@@ -167,41 +154,11 @@ class Actuator:
             NotConnectedError: the bus is gone.
             NoReplyError: the drive's heartbeat is lost.
         """
-        if self._clock() - self._clock_request_ns >= _CLOCK_PERIOD_NS:
-            self._clock_request_ns = self._clock()
-            # A clock that was not read is requested again; the heartbeat shows whether the drive is there.
-            with contextlib.suppress(NoReplyError, InvalidReplyError, RefusedError):
-                # The decoder takes the reply from the frames, as in a replay.
-                self._node.read_number(TIME_STAMP)
-        deadline = time.monotonic() + timeout
-        while True:
-            time.sleep(ACTUATOR_SCHEDULE.compute_wait(self._clock()))
-            self._bus.drain()
-            if blocks := self._decoder.pop_blocks():
-                return blocks
-            if time.monotonic() >= deadline:
-                self._node.heartbeat.check_alive()
-                return []
+        return self._samples.acquire(timeout)
 
     def snapshot_decoder(self) -> dict[str, Any]:
         """Return the decoder's state, from which a replay decodes the frames to come, see `drivers.replay`."""
-        return {
-            "decoder": "actuator",
-            "layouts": [
-                {**mapping._asdict(), "fields": [list(field) for field in mapping.fields]}
-                for mapping in self._node.mappings
-            ],
-            "node_id": self._node.node_id,
-            "rated_torque": self._drive.rated_torque,
-            "origin": self._origin,
-            "cycle": self.settings.cycle,
-            "state": self._decoder.snapshot(),
-        }
-
-    def make_decoder(self, origin: float, rated_torque: float) -> ActuatorDecoder:
-        """Make a decoder of the drive's frames; origin [m from home], rated torque [N m]."""
-        scale = CountScale(METRES_PER_COUNT, METRES_PER_COUNT, rated_torque / 1000)
-        return ActuatorDecoder(self._node.mappings, self._node.node_id, scale, origin, self.settings.cycle)
+        return self._samples.snapshot(self._origin, self._drive.rated_torque)
 
     def read(self, channel: str) -> Reading:
         """Request one value from the drive.
@@ -210,9 +167,9 @@ class Actuator:
             OutOfRangeError: there is no such channel.
             NoReplyError, InvalidReplyError, RefusedError, NotConnectedError: the value was not read.
         """
-        if channel not in _OBJECTS:
-            raise OutOfRangeError(f"{self._name}: no channel {channel}; there are {', '.join(_OBJECTS)}")
-        raw = self._node.read_number(_OBJECTS[channel])
+        if channel not in OBJECTS:
+            raise OutOfRangeError(f"{self._name}: no channel {channel}; there are {', '.join(OBJECTS)}")
+        raw = self._node.read_number(OBJECTS[channel])
         value = raw * (self._drive.rated_torque / 1000 if channel == "actuator_torque" else METRES_PER_COUNT)
         zero = self._origin if channel == "actuator_position" else 0.0
         return Reading(value - zero, self._clock(), None, raw, "good")
@@ -234,13 +191,7 @@ class Actuator:
         Raises:
             RefusedError: there is a fault or no reference, or the drive does not switch on.
         """
-        if self._reference_state in (ReferenceState.UNREFERENCED, ReferenceState.REFERENCE_LOST):
-            action = (
-                "home it"
-                if self._reference_state is ReferenceState.UNREFERENCED
-                else "unclamp the specimen, unmount and home"
-            )
-            raise RefusedError(f"{self._name}: the rod's position is not referenced; {action} first")
+        check_referenced(self._reference_state, self._name)
         self._drive.check_no_fault()
         self._drive.enable_operation(self._master_id, self.settings)
         # Read once the drive holds the rod: without voltage the load could still move it.
@@ -260,7 +211,7 @@ class Actuator:
             RefusedError: not armed, or the drive has stopped by itself, with its reason.
             NoReplyError, NotConnectedError: the drive or the bus is gone.
         """
-        self._setpoints.send(position, self._origin, self.channels[0], self._decoder, due_ns)
+        self._setpoints.send(position, self._origin, self.channels[0], self._samples.decoder, due_ns)
 
     def send_sync(self) -> None:
         """Request one sample without a setpoint, by a SYNC alone."""
@@ -338,8 +289,8 @@ class Actuator:
         self._set_origin(0.0)
 
     def _set_origin(self, origin: float) -> None:
-        self._origin = self._decoder.origin = origin
-        self._channels = self._make_channels()
+        self._origin = self._samples.decoder.origin = origin
+        self._channels = make_channels(self.settings, self._origin, self._drive.rated_torque)
 
     def _check_disarmed(self, step: str) -> None:
         if self._setpoints.is_armed:

@@ -77,3 +77,14 @@ def find_initial_state(clamped: bool, referenced: bool) -> ReferenceState:
     if clamped:
         return ReferenceState.MOUNTED if referenced else ReferenceState.REFERENCE_LOST
     return ReferenceState.HOMED if referenced else ReferenceState.UNREFERENCED
+
+
+def check_referenced(state: ReferenceState, name: str) -> None:
+    """Check that positions are referenced, before the actuator ``name`` moves.
+
+    Raises:
+        RefusedError: they are not; with the steps that lead to a reference.
+    """
+    if state in (ReferenceState.UNREFERENCED, ReferenceState.REFERENCE_LOST):
+        action = "home it" if state is ReferenceState.UNREFERENCED else "unclamp the specimen, unmount and home"
+        raise RefusedError(f"{name}: the rod's position is not referenced; {action} first")

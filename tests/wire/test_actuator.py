@@ -208,7 +208,7 @@ def test_replay_of_the_recorded_frames_gives_the_same_samples(rig):
         actuator.add_listener(frames.append)
         with SetpointThread(actuator, sine):
             live = np.concatenate([b.values for b in collect_positions(actuator, 100)])
-        decoder = actuator.make_decoder(actuator.origin, actuator.rated_torque)
+        decoder = actuator._samples.make_decoder(actuator.origin, actuator.rated_torque)
     for frame in frames:
         decoder.add_frame(frame)
     replayed = np.concatenate([b.values for b in decoder.pop_blocks() if b.channel == "actuator_position"])

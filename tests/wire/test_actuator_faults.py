@@ -62,7 +62,7 @@ def test_lost_process_data_is_counted_and_skipped_in_the_numbers(rig):
         wait_until(lambda: actuator.get_health().lost >= 4)
         blocks = collect_positions(actuator, 100)
         assert actuator.get_health().lost == 4
-        decoder = actuator._decoder
+        decoder = actuator._samples.decoder
         assert decoder._number == decoder.received + decoder.lost
         assert blocks
 

@@ -1,4 +1,4 @@
-"""Status message of one instrument and its wire."""
+"""Parts of the agent's status: instruments with their wires, and warnings."""
 
 from bench.agent_protocol import InstrumentStatus
 from bench.rig import Acquisition, RegisteredInstrument
@@ -30,3 +30,20 @@ def make_instrument_status(
         clock_error_bound_s=clock_map.compute_error_bound() if clock_map.is_known else None,
         message=health.message or ("does not reply" if has_failed else ""),
     )
+
+
+def collect_warnings(acquisition: Acquisition, priority_warning: str, setpoint_timeout: float) -> tuple[str, ...]:
+    """Return the warnings of the agent and of the threads that read the instruments.
+
+    Args:
+        acquisition: reads the instruments.
+        priority_warning: warning that real-time priority is not permitted; empty if it is.
+        setpoint_timeout: time without a setpoint after which the drive stops by itself [s].
+    """
+    # Every thread reports the same missing priority, so it is listed once, with its consequence.
+    warnings = [warning for warning in acquisition.warnings if warning != priority_warning]
+    if priority_warning:
+        warnings.append(
+            f"{priority_warning}; the drive stops by itself {setpoint_timeout:g} s after the last setpoint"
+        )
+    return tuple(warnings)

@@ -99,7 +99,7 @@ def describe_commands() -> str:
 
 def _describe_command(name: str, command: Any) -> str:
     arguments = [p for p in command.params if p.param_type_name == "argument"]
-    options = [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
+    options = [p for p in command.params if p.param_type_name == "option" and p.name != "help" and not p.hidden]
     usage = [_format_argument(p) for p in arguments]
     usage += [f"{p.opts[0]}{_format_value(p)}" for p in options if p.required]
     usage += [f"[{p.opts[0]}{_format_value(p)}]" for p in options if not p.required]

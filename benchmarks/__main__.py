@@ -9,7 +9,7 @@ MODULES = {
     "simulation": "speed.simulation",
     "fitting": "speed.fitting",
     "logs": "speed.logs",
-    "coverage": "accuracy.coverage",
+    "interval_coverage": "accuracy.interval_coverage",
     "soak": "speed.soak",
     "choices": "accuracy.design_choices",
     "reduced_models": "accuracy.reduced_models",

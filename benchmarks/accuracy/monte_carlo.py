@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.accuracy.coverage import record_run
+from benchmarks.accuracy.interval_coverage import record_run
 from benchmarks.common import cache
 from benchmarks.pinn import LABORATORY, make_random_recording
 from identification.damper import Coordinates

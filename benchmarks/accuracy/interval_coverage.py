@@ -4,7 +4,7 @@ Each seed draws its own noise, zero shift and clock errors. It records the metho
 fitted, and `validation`, which no fit reads, from the default scenario. Only this benchmark reads the files with
 the truth.
 
-    python -m benchmarks.accuracy.coverage [SEEDS [FILE]]
+    python -m benchmarks.accuracy.interval_coverage [SEEDS [FILE]]
 """
 
 import json

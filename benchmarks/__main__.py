@@ -18,7 +18,7 @@ MODULES = {
     "deepxde": "pinn.deepxde",
 }
 """Module of each benchmark that runs without arguments."""
-DEFAULTS = ("simulation", "fitting", "logs", "coverage", "soak")
+DEFAULTS = ("simulation", "fitting", "logs", "interval_coverage", "soak")
 
 
 def main() -> None:

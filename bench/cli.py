@@ -29,6 +29,14 @@ def _show_version(requested: bool) -> None:
         raise typer.Exit
 
 
+def _mrbench(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+    ] = False,
+) -> None:
+    """Test bench for magnetorheological dampers: records, identifies, diagnoses."""
+
+
 def _make_application(commands: EntryPoints) -> typer.Typer:
     """Return the command line with these commands; each is a plain function that typer reads."""
     app = typer.Typer(
@@ -39,15 +47,7 @@ def _make_application(commands: EntryPoints) -> typer.Typer:
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["--help", "-h"]},
     )
-
-    @app.callback()
-    def _mrbench(
-        version: Annotated[
-            bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
-        ] = False,
-    ) -> None:
-        """Test bench for magnetorheological dampers: records, identifies, diagnoses."""
-
+    app.callback()(_mrbench)
     for command in sorted(commands, key=lambda entry: entry.name):
         app.command(command.name)(accept_methods(command.name, command.load()))
     return app

@@ -19,7 +19,7 @@ from bench.agent.run_executor import RunExecutor
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
 from bench.agent.state_machine import StateMachine
-from bench.agent.status import collect_warnings, make_instrument_status
+from bench.agent.status import collect_warnings, make_instrument_statuses
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import (
@@ -160,9 +160,7 @@ class Agent:
             step=self._setup.status,
             run=self._run_slot.get_status(),
             finished=finished,
-            instruments=tuple(
-                make_instrument_status(one, self._acquisition, self._clock) for one in self._rig.instruments
-            ),
+            instruments=make_instrument_statuses(self._rig.instruments, self._acquisition, self._clock),
             warnings=collect_warnings(
                 self._acquisition, self._priority_warning, self._rig.actuator.settings.setpoint_timeout
             ),

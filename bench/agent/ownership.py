@@ -4,6 +4,7 @@ import contextlib
 import fcntl
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 from bench.errors import RunError
 
@@ -22,13 +23,17 @@ def acquire_agent_lock(config: Path) -> Iterator[None]:
         RunError: another process holds the lock.
     """
     with config.open("rb") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise RunError(
-                f"{config}: another rig agent has this bench; end it, or let it do the work (mrbench prepare, the "
-                "page, or REST)"
-            ) from None
-        except OSError:  # a file system without locks, such as some network file systems: no protection there
-            pass
+        _lock_file(file)
         yield
+
+
+def _lock_file(file: IO[bytes]) -> None:
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise RunError(
+            f"{file.name}: another rig agent has this bench; end it, or let it do the work (mrbench prepare, the "
+            "page, or REST)"
+        ) from None
+    except OSError:  # a file system without locks, such as some network file systems: no protection there
+        pass

@@ -65,13 +65,7 @@ def serve_agent(
 
 
 def handle_command(agent: Agent, command: Command, stopping: threading.Event) -> Reply:
-    """Execute a command and return its reply.
-
-    Args:
-        agent: the running agent.
-        command: as received.
-        stopping: event that ends the agent.
-    """
+    """Execute a received command and return its reply; ``stopping`` is the event that ends the agent."""
     match command:
         case StatusCommand():
             return Reply(ok=True, status=agent.get_status())

@@ -1,20 +1,26 @@
 """Parts of the agent's status: instruments with their wires, and warnings."""
 
+from collections.abc import Iterable
+
 from bench.agent_protocol import InstrumentStatus
 from bench.rig import Acquisition, RegisteredInstrument
 from drivers import Clock
 
 
-def make_instrument_status(
-    registered: RegisteredInstrument, acquisition: Acquisition, clock: Clock
-) -> InstrumentStatus:
-    """Describe the health of an instrument and the accuracy of its clock map.
+def make_instrument_statuses(
+    instruments: Iterable[RegisteredInstrument], acquisition: Acquisition, clock: Clock
+) -> tuple[InstrumentStatus, ...]:
+    """Describe the health of instruments and the accuracy of their clock maps.
 
     Args:
-        registered: the instrument.
-        acquisition: reads the instrument.
+        instruments: the instruments.
+        acquisition: reads the instruments.
         clock: bench clock [ns].
     """
+    return tuple(_make_status(one, acquisition, clock) for one in instruments)
+
+
+def _make_status(registered: RegisteredInstrument, acquisition: Acquisition, clock: Clock) -> InstrumentStatus:
     health, clock_map = registered.instrument.get_health(), acquisition.maps[registered.name]
     has_failed = registered.name in acquisition.failed_instruments
     return InstrumentStatus(

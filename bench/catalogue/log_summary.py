@@ -115,10 +115,9 @@ def _make_summary(
     if run is None:
         raise LogError(f"{path}: the log has no metadata record `run`, so it cannot be catalogued")
     outcome = end.get("outcome")
-    imported = run.get("source") == "import"
     return LogSummary(
         # An import is named after its CSV files, which can be imported twice; the log's file name is unique.
-        id=path.stem if imported else run["id"],
+        id=path.stem if run.get("source") == "import" else run["id"],
         method=run.get("method", ""),
         specimen=run.get("specimen", ""),
         operator=run.get("operator", ""),

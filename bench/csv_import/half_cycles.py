@@ -178,14 +178,15 @@ def fit_sine(displacement: Array, half_period: float, fitted: slice, evaluated: 
         fitted: samples to which the sine is fitted.
         evaluated: samples at which it is evaluated.
     """
-
-    def compute_basis(samples: slice) -> Array:
-        phase = np.pi * np.arange(samples.start, samples.stop) / half_period
-        return np.column_stack([np.cos(phase), np.sin(phase), np.ones(len(phase))])
-
-    basis = compute_basis(fitted)
+    basis = _compute_sine_basis(fitted, half_period)
     weights = np.linalg.lstsq(basis, displacement[fitted], rcond=None)[0]
     amplitude = float(np.hypot(weights[0], weights[1]))
     residual = displacement[fitted] - basis @ weights
     misfit = float(np.sqrt(np.mean(residual**2))) / max(amplitude, 1e-12)
-    return SineFit(amplitude, misfit, compute_basis(evaluated) @ weights)
+    return SineFit(amplitude, misfit, _compute_sine_basis(evaluated, half_period) @ weights)
+
+
+def _compute_sine_basis(samples: slice, half_period: float) -> Array:
+    """Return cosine, sine and constant at some samples, shape (samples, 3)."""
+    phase = np.pi * np.arange(samples.start, samples.stop) / half_period
+    return np.column_stack([np.cos(phase), np.sin(phase), np.ones(len(phase))])

@@ -4,6 +4,7 @@ The medians of windows of about ten milliseconds are hardly affected by noise an
 equal medians form a plateau.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,15 +52,21 @@ def find_plateaus(drive: Array, rate: float) -> tuple[list[Plateau], float]:
     stops = np.append(starts[1:], len(drive))
     medians = [float(np.median(drive[start:stop])) for start, stop in zip(starts, stops, strict=True)]
     tolerance = _estimate_tolerance(np.array(medians))
+    plateaus = _join_windows(zip(starts.tolist(), stops.tolist(), medians, strict=True), tolerance)
+    return [Plateau(p.start, p.stop, float(np.median(drive[p.start : p.stop]))) for p in plateaus], tolerance
+
+
+def _join_windows(windows: Iterable[tuple[int, int, float]], tolerance: float) -> list[Plateau]:
+    """Join successive windows (first sample, end, median) whose medians are equal within a tolerance."""
     plateaus: list[Plateau] = []
-    for start, stop, median in zip(starts.tolist(), stops.tolist(), medians, strict=True):
+    for start, stop, median in windows:
         if plateaus and abs(median - plateaus[-1].level) <= tolerance:
             last = plateaus.pop()
             share = (stop - start) / (stop - last.start)  # weight of the window in the mean of the plateau
             plateaus.append(Plateau(last.start, stop, last.level + share * (median - last.level)))
         else:
             plateaus.append(Plateau(start, stop, median))
-    return [Plateau(p.start, p.stop, float(np.median(drive[p.start : p.stop]))) for p in plateaus], tolerance
+    return plateaus
 
 
 def _estimate_tolerance(medians: Array) -> float:

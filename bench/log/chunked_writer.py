@@ -8,8 +8,10 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import IO
 
 import orjson
+from mcap.writer import Writer
 
 from bench.log.mcap_file import finish, flush, start_writer
 from bench.log.messages import NS_PER_SECOND, make_message_schema, make_schema_name
@@ -38,12 +40,7 @@ class ChunkedMcapWriter:
         self._chunk_opened_at = self._synced_at = clock()
         self._schemas: dict[str, int] = {}
         self._topics: dict[str, int] = {}
-        self._file = path.open("wb")
-        try:
-            self._mcap = start_writer(self._file)
-        except BaseException:
-            self._file.close()
-            raise
+        self._file, self._mcap = _open_writer(path)
 
     @property
     def topics(self) -> tuple[str, ...]:
@@ -105,3 +102,12 @@ class ChunkedMcapWriter:
         self._chunk_start = None
         if self._clock() - self._synced_at >= SYNC_PERIOD:
             self.sync()
+
+
+def _open_writer(path: Path) -> tuple[IO[bytes], Writer]:
+    file = path.open("wb")
+    try:
+        return file, start_writer(file)
+    except BaseException:
+        file.close()
+        raise

@@ -72,10 +72,7 @@ def _is_contiguous(first: SampleBlock, second: SampleBlock) -> bool:
 
 def _make_readings_message(blocks: Sequence[SampleBlock], clock: ClockMapProtocol | None) -> tuple[int, bytes]:
     values = np.concatenate([block.values for block in blocks])
-    received = np.repeat([block.received_ns for block in blocks], [len(block.values) for block in blocks])
-    device_times = [block.device_ns for block in blocks if block.device_ns is not None]
-    device = np.concatenate(device_times) if device_times else np.empty(0, np.int64)
-    mapped = clock.map_instants(device) if clock is not None and clock.is_known and len(device) else received
+    received, device, mapped = _collect_times(blocks, clock)
     begin = max(int(mapped[0]), 0)
     known = np.isfinite(values)
     content = {
@@ -91,6 +88,18 @@ def _make_readings_message(blocks: Sequence[SampleBlock], clock: ClockMapProtoco
         "missing": np.flatnonzero(~known),
     }
     return begin, orjson.dumps(content, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _collect_times(
+    blocks: Sequence[SampleBlock], clock: ClockMapProtocol | None
+) -> tuple[Instants, Instants, Instants]:
+    """Return times of receipt, device times (empty if there are none) and bench times of all samples [ns]."""
+    received = np.repeat([block.received_ns for block in blocks], [len(block.values) for block in blocks])
+    device_times = [block.device_ns for block in blocks if block.device_ns is not None]
+    device = np.concatenate(device_times) if device_times else np.empty(0, np.int64)
+    # Without a known clock map, the time of receipt is the best estimate on the bench clock.
+    mapped = clock.map_instants(device) if clock is not None and clock.is_known and len(device) else received
+    return received, device, mapped
 
 
 def parse_blocks(message: dict[str, Any]) -> list[SampleBlock]:

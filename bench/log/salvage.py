@@ -146,17 +146,22 @@ def _read_intact_records(path: Path, file: IO[bytes], state: _SalvageState) -> I
             if isinstance(record, Header):
                 check_profile(path, record.profile)
             elif isinstance(record, Chunk):
-                state.known_until_ns = max(state.known_until_ns, record.message_end_time)
-                try:
-                    yield from breakup_chunk(record, validate_crc=True)
-                    yield None
-                except DAMAGE_ERRORS:
-                    state.damaged_bytes += state.intact_end - start
+                yield from _read_chunk(record, state.intact_end - start, state)
             else:
                 yield record
         state.intact_end = file.tell()
     except DAMAGE_ERRORS:  # the file is truncated here
         return
+
+
+def _read_chunk(chunk: Chunk, size: int, state: _SalvageState) -> Iterator[McapRecord | None]:
+    """Yield the records of a chunk, and None at its end; a damaged chunk counts with its size [bytes]."""
+    state.known_until_ns = max(state.known_until_ns, chunk.message_end_time)
+    try:
+        yield from breakup_chunk(chunk, validate_crc=True)
+        yield None
+    except DAMAGE_ERRORS:
+        state.damaged_bytes += size
 
 
 def _copy_record(

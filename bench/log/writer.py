@@ -4,9 +4,10 @@
 killed writer.
 """
 
+import contextlib
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NotRequired, TypedDict, Unpack
 
@@ -102,11 +103,8 @@ class LogWriter(LogContext):
         self._closed = False
         with convert_file_errors(self.path):
             self._file = ChunkedMcapWriter(self.path, clock)
-            try:
+            with self._abandon_on_error():
                 self._write_header(header)
-            except BaseException:
-                self._file.abandon()
-                raise
 
     def _write_header(self, header: RunHeader) -> None:
         """Write the records before the first sample, so that also a truncated log describes its run."""
@@ -217,12 +215,18 @@ class LogWriter(LogContext):
         self._closed = True
         final = outcome or ("lossy" if self._lost else "clean")
         with convert_file_errors(self.path):
-            try:
+            with self._abandon_on_error():
                 self._file.write_metadata("outcome", self._make_outcome(final, reason))
-            except BaseException:
-                self._file.abandon()
-                raise
             self._file.close()
+
+    @contextlib.contextmanager
+    def _abandon_on_error(self) -> Iterator[None]:
+        """Close the file without an index if a block fails, so that it can be repaired."""
+        try:
+            yield
+        except BaseException:
+            self._file.abandon()
+            raise
 
     def _make_outcome(self, outcome: Outcome, reason: str) -> dict[str, str]:
         counts = {topic: self._file.message_counts[topic] for topic in self._file.topics}

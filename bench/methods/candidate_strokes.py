@@ -12,7 +12,7 @@ from pydantic import TypeAdapter
 
 from bench.errors import MethodError
 from bench.methods.compile import Programme, compile_method
-from bench.methods.document import Conditioning, Method, MethodSegment
+from bench.methods.document import Conditioning, Method, MethodLimits, MethodSegment
 from bench.methods.envelope import compute_envelope
 
 CANDIDATE_DURATION = 10.0
@@ -60,14 +60,19 @@ def _make_documents(programme: Programme) -> Iterator[dict[str, Any]]:
             }
 
 
+def _compute_max_frequency(limits: MethodLimits, amplitude: float) -> float:
+    """Return the highest frequency [Hz] of a sine of an amplitude [m] within the limits."""
+    return LIMIT_SHARE * min(
+        limits.velocity_mps / (2 * math.pi * amplitude),
+        math.sqrt(limits.acceleration_mps2 / amplitude) / (2 * math.pi),
+    )
+
+
 def _make_motions(programme: Programme) -> Iterator[dict[str, Any]]:
     limits, largest = programme.method.limits, float(abs(programme.displacement).max())
     for share in AMPLITUDE_SHARES:
         amplitude = _round_down(share * (largest or 0.5 * limits.stroke_m))
-        highest = LIMIT_SHARE * min(
-            limits.velocity_mps / (2 * math.pi * amplitude),
-            math.sqrt(limits.acceleration_mps2 / amplitude) / (2 * math.pi),
-        )
+        highest = _compute_max_frequency(limits, amplitude)
         for frequency_share in FREQUENCY_SHARES:
             frequency = _round_down(frequency_share * highest)
             yield {"kind": "sine", "amplitude_m": amplitude, "frequency_hz": frequency}

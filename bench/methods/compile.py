@@ -136,20 +136,21 @@ def _make_segments(parts: list[ProgrammePart], starts: Array, rate: float) -> tu
         for part, start in zip(parts, starts, strict=False)
         for segment in part.segments
     ]
-    return tuple(
-        ProgrammeSegment(
-            index,
-            segment.name,
-            _find_sample(begin + segment.begin, rate),
-            _find_sample(begin + segment.end, rate),
-            segment.motion,
-            segment.drive,
-            segment.amplitude,
-            segment.frequency,
-            segment.drive_value,
-            segment.checkpoint,
-        )
-        for index, (begin, segment) in enumerate(segments)
+    return tuple(_make_segment(index, *one, rate) for index, one in enumerate(segments))
+
+
+def _make_segment(index: int, begin: float, segment: PlannedSegment, rate: float) -> ProgrammeSegment:
+    return ProgrammeSegment(
+        index,
+        segment.name,
+        _find_sample(begin + segment.begin, rate),
+        _find_sample(begin + segment.end, rate),
+        segment.motion,
+        segment.drive,
+        segment.amplitude,
+        segment.frequency,
+        segment.drive_value,
+        segment.checkpoint,
     )
 
 

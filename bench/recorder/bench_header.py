@@ -117,12 +117,13 @@ def make_attachments(method: Method, config: BenchConfig, rig: Rig, source: Path
         attachments.append(Attachment("bench.toml", "application/toml", _read_bytes(source)))
     instruments = orjson.dumps(_describe_instruments(rig), option=orjson.OPT_INDENT_2)
     attachments.append(Attachment("instruments.json", "application/json", instruments))
-    folder = Path() if source is None else source.parent
-    certificates = sorted({section.certificate for section in config.channels.values() if section.certificate})
-    attachments += [
-        Attachment(Path(one).name, "application/octet-stream", _read_bytes(folder / one)) for one in certificates
-    ]
-    return attachments
+    return attachments + _read_certificates(config, Path() if source is None else source.parent)
+
+
+def _read_certificates(config: BenchConfig, folder: Path) -> list[Attachment]:
+    # As a set, because several channels may name the same certificate.
+    names = sorted({section.certificate for section in config.channels.values() if section.certificate})
+    return [Attachment(Path(one).name, "application/octet-stream", _read_bytes(folder / one)) for one in names]
 
 
 def describe_decoders(rig: Rig) -> Attachment:

@@ -38,14 +38,8 @@ def read_raw_recordings(path: Path) -> dict[str, RawRecording]:
     Raises:
         LogError: the file does not exist, is not an mrbench log, or is truncated or damaged.
     """
-    frames: dict[str, list[Frame]] = {}
-    blocks: dict[str, list[SampleBlock]] = {}
     try:
-        for topic, content in _read_messages(path):
-            if topic.startswith(WIRE):
-                frames.setdefault(topic.removeprefix(WIRE), []).extend(parse_frames(content))
-            elif topic.startswith(INSTRUMENT):
-                blocks.setdefault(topic.removeprefix(INSTRUMENT), []).extend(parse_blocks(content))
+        frames, blocks = _read_frames_and_blocks(path)
         descriptions = _read_descriptions(path)
     except (*DAMAGE_ERRORS, orjson.JSONDecodeError, KeyError, ValueError) as error:
         raise LogError(f"{path}: the log is damaged ({error!r}); run `mrbench salvage {path}`") from error
@@ -63,6 +57,17 @@ def _read_messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
         for _, channel, message in reader.iter_messages(log_time_order=False):
             if channel.topic.startswith((WIRE, INSTRUMENT)):
                 yield channel.topic, orjson.loads(message.data)
+
+
+def _read_frames_and_blocks(path: Path) -> tuple[dict[str, list[Frame]], dict[str, list[SampleBlock]]]:
+    frames: dict[str, list[Frame]] = {}
+    blocks: dict[str, list[SampleBlock]] = {}
+    for topic, content in _read_messages(path):
+        if topic.startswith(WIRE):
+            frames.setdefault(topic.removeprefix(WIRE), []).extend(parse_frames(content))
+        elif topic.startswith(INSTRUMENT):
+            blocks.setdefault(topic.removeprefix(INSTRUMENT), []).extend(parse_blocks(content))
+    return frames, blocks
 
 
 def _read_descriptions(path: Path) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from bench.report.diagnosis import Diagnosis, MapPoint, format_name, join_names
 from bench.report.drawing import INK_COLOUR, draw_bars, draw_colour_bar, make_figure, style_axes
@@ -46,17 +47,23 @@ def plot_gap_map(diagnosis: Diagnosis, drive_unit: str) -> Figure | None:
         return None
     figure = make_figure(9.0, 1.3 + 0.24 * len(rows))
     axes = figure.subplots()
+    image = _draw_gap_map(axes, rows, grid)
+    draw_colour_bar(figure, [axes], image, "gap beyond the noise [N]")
+    return figure
+
+
+def _draw_gap_map(axes: Axes, rows: Sequence[str], grid: Numbers) -> AxesImage:
     image = axes.imshow(grid, aspect="auto", cmap="OrRd", vmin=0.0, interpolation="nearest")
     axes.set_yticks(range(len(rows)), rows)
     phases = ["extension, fastest", "end", "compression, fastest", "end", "extension"]
     axes.set_xticks(np.arange(0, _PHASE_BINS + 1, 2) - 0.5, phases)
     style_axes(axes, "phase of the stroke", "")
     axes.grid(visible=False)
-    draw_colour_bar(figure, [axes], image, "gap beyond the noise [N]")
-    return figure
+    return image
 
 
-def _draw_errors(axes: Axes, diagnosis: Diagnosis) -> None:
+def _list_errors(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
+    """Return label, size [N] and colour of each error, in the order of the bars."""
     gap = diagnosis.gap
     law_colour = _REMAINDER_COLOUR if diagnosis.verdict == "no_gap" else _GAP_COLOUR
     errors = [("refitted law", gap.before_n, law_colour)]
@@ -65,6 +72,11 @@ def _draw_errors(axes: Axes, diagnosis: Diagnosis) -> None:
     if diagnosis.effects:
         named = join_names([effect.name for effect in diagnosis.effects]).replace(" and ", "\nand ")
         errors.append((f"with {named}", gap.after_n, _REMAINDER_COLOUR))
+    return errors
+
+
+def _draw_errors(axes: Axes, diagnosis: Diagnosis) -> None:
+    errors = _list_errors(diagnosis)
     draw_bars(axes, errors, "force error on held-out strokes, RMSE [N]; dashed: noise floor")
     for row, (_, size, _) in enumerate(errors):
         axes.annotate(
@@ -77,7 +89,7 @@ def _draw_errors(axes: Axes, diagnosis: Diagnosis) -> None:
             color=INK_COLOUR,
             bbox=_LABEL_BOX,
         )
-    axes.axvline(gap.noise_floor_n, color=INK_COLOUR, linewidth=1.2, linestyle=(0, (4, 3)))
+    axes.axvline(diagnosis.gap.noise_floor_n, color=INK_COLOUR, linewidth=1.2, linestyle=(0, (4, 3)))
     axes.set_ylim(max(len(errors), 2) - 0.5, -0.5)  # a single bar has the width of one of two
     axes.set_xlim(0, 1.25 * max(size for _, size, _ in errors))
 

@@ -135,17 +135,22 @@ def draw_legend(
         drives: constant drives with their labels.
         has_simulation: whether a simulated force is drawn.
     """
+    if handles := _make_legend_handles(colours, drives, has_simulation):
+        figure.legend(
+            handles=handles, loc="outside upper center", ncols=min(len(handles), 8), frameon=False, fontsize=8.5
+        )
+
+
+def _make_legend_handles(
+    colours: DriveColours, drives: Sequence[tuple[float, str]], has_simulation: bool
+) -> list[Line2D]:
     handles: list[Line2D] = []
     if has_simulation:
         handles.append(Line2D([], [], color="#b9bec4", linewidth=0.8, label="recorded"))
         handles.append(Line2D([], [], color="#5b636b", linewidth=2.4, label="simulated"))
-    handles += [
+    return handles + [
         Line2D([], [], color=colours.get_colour(drive), linewidth=2.4, label=label) for drive, label in drives
     ]
-    if handles:
-        figure.legend(
-            handles=handles, loc="outside upper center", ncols=min(len(handles), 8), frameon=False, fontsize=8.5
-        )
 
 
 def draw_colour_bar(figure: Figure, axes: Sequence[Axes], scale: ScalarMappable, label: str) -> None:

@@ -148,18 +148,22 @@ def _make_title(log: Log) -> str:
     return log.path.stem if specimen in ("", "unknown") else specimen
 
 
+def _make_fit_figures(prediction: Prediction, is_fitted_log: bool) -> list[tuple[str, str]]:
+    return [
+        (format_force(prediction.rmse_n), "force error (RMSE)"),
+        (format_force(prediction.noise_floor_n), "noise floor of the force"),
+        (format_percent(prediction.nrmse), "of the force's standard deviation (NRMSE)"),
+        ("fitted" if is_fitted_log else "not used", "use of this recording in the fit"),
+    ]
+
+
 def _make_fit_context(report: Report) -> dict[str, object]:
     """Return the values of a fit for the page's template."""
     fit, prediction = report.fit, report.prediction
     if fit is None or prediction is None:
         raise ReportError("a report on a fit needs its prediction on the log; give both")
     return {
-        "key_figures": [
-            (format_force(prediction.rmse_n), "force error (RMSE)"),
-            (format_force(prediction.noise_floor_n), "noise floor of the force"),
-            (format_percent(prediction.nrmse), "of the force's standard deviation (NRMSE)"),
-            ("fitted" if report.is_fitted_log else "not used", "use of this recording in the fit"),
-        ],
+        "key_figures": _make_fit_figures(prediction, report.is_fitted_log),
         "drives": content.make_drive_rows(prediction.per_drive, prediction.noise_floor_n),
         "samples": prediction.samples,
         "bias": f"{format_rounded(prediction.bias_n, prediction.rmse_n / math.sqrt(prediction.samples))} N",

@@ -86,8 +86,7 @@ class Aligner:
     def align(self, *, final: bool = False) -> AlignedSamples | None:
         """Return the bench samples that all channels have passed since the last call, or None.
 
-        Args:
-            final: whether no more batches will come, so that no channel is waited for.
+        With ``final``, no more batches will come, so that no channel is waited for.
         """
         self._drain_queue()
         force = self._buffers.get("force")

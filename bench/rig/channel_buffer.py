@@ -86,13 +86,18 @@ class ChannelBuffer:
         is_inside = (instants >= self.time_ns[0]) & (instants <= self.time_ns[-1])
         is_exact = (self.time_ns[right] == instants) | (self.time_ns[right - 1] == instants)
         is_known = is_inside & (is_exact | (self.time_ns[right] - self.time_ns[right - 1] <= gap_ns))
+        return np.where(is_known, self._interpolate_everywhere(instants, right, cubic), np.nan)
+
+    def _interpolate_everywhere(self, instants: Instants, right: npt.NDArray[np.int64], cubic: bool) -> Numbers:
+        """Interpolate regardless of gaps; ``right`` are the indices of the samples after the instants."""
+        # Relative to the first sample, so that the times as floats keep all digits.
         origin = self.time_ns[0]
         times, targets = (self.time_ns - origin).astype(np.float64), (instants - origin).astype(np.float64)
         if cubic and self.size >= 4:
             values = _interpolate_cubic(times, self.values, targets, right)
         else:
             values = np.interp(targets, times, self.values)
-        return np.where(is_known, values, np.nan)
+        return values
 
     def hold_last(self, instants: Instants, gap_ns: int) -> Numbers:
         """Return the last value before each instant (N,) [ns]; NaN if it is older than ``gap_ns``."""

@@ -197,10 +197,13 @@ class ClockMap:
             return False
         if distance > CLOCK_STEP_NS:
             self._restart()
+        self._discard_readings()
+        return True
+
+    def _discard_readings(self) -> None:
         self._lows.clear()
         self._highs.clear()
         self._first_device_ns, self._contradictions = None, 0
-        return True
 
     def _add_bounds(self, low: OffsetBound, high: OffsetBound) -> None:
         device_ns = low.device_ns
@@ -243,11 +246,15 @@ class ClockMap:
         last = self._knots[-1]
         bench_ns = last.bench_ns + (device_ns - last.device_ns) * last.slope
         missing = device_ns + bounds.estimate_offset(device_ns) - bench_ns
-        factor = START_SLEW_FACTOR if self._is_start_phase(device_ns) else 1
-        slew = min(max(factor * missing / CORRECTION_TIME_NS, -factor * MAX_SLEW), factor * MAX_SLEW)
+        slew = self._choose_slew(missing, device_ns)
         duration = round(missing / slew) if slew else 0
         self._knots.append(_Knot(device_ns, bench_ns, rate + slew))
         self._knots.append(_Knot(device_ns + duration, bench_ns + duration * (rate + slew), rate))
+
+    def _choose_slew(self, missing: float, device_ns: int) -> float:
+        """Return the additional rate (dimensionless) by which the map corrects a missing offset [ns]."""
+        factor = START_SLEW_FACTOR if self._is_start_phase(device_ns) else 1
+        return min(max(factor * missing / CORRECTION_TIME_NS, -factor * MAX_SLEW), factor * MAX_SLEW)
 
     def _map_array(self, instants: Instants) -> Instants:
         """Convert relative to a knot, because a double cannot resolve nanoseconds over months."""

@@ -145,28 +145,22 @@ def _build_instrument(name: str, section: InstrumentSection, clock: Clock, realt
         case ThermometerSection():
             return Thermometer(name, _make_modbus_address(section), clock, unit=section.unit)
         case CoilAmplifierSection():
-            return CoilAmplifier(
-                name,
-                _make_modbus_address(section),
-                clock,
-                mode=section.mode,
-                ramp=section.ramp,
-                watchdog=section.watchdog,
-                unit=section.unit,
-            )
+            return _build_amplifier(name, section, clock)
+
+
+def _build_amplifier(name: str, section: CoilAmplifierSection, clock: Clock) -> CoilAmplifier:
+    return CoilAmplifier(
+        name,
+        _make_modbus_address(section),
+        clock,
+        mode=section.mode,
+        ramp=section.ramp,
+        watchdog=section.watchdog,
+        unit=section.unit,
+    )
 
 
 def _build_actuator(name: str, section: ActuatorSection, clock: Clock, realtime: bool) -> Actuator:
-    default = SETPOINT_TIMEOUT if realtime else SETPOINT_TIMEOUT_WITHOUT_PRIORITY
-    timeout = section.setpoint_timeout or default
-    settings = ActuatorSettings(
-        setpoint_timeout=timeout,
-        master_heartbeat_timeout=2 * timeout,
-        travel=section.travel,
-        max_speed=section.max_speed,
-        torque_limit=section.torque_limit,
-        following_error_window=section.following_error_window,
-    )
     address = CanAddress(section.interface, section.channel, section.host, section.port)
     return Actuator(
         name,
@@ -174,8 +168,22 @@ def _build_actuator(name: str, section: ActuatorSection, clock: Clock, realtime:
         clock,
         node_id=section.node,
         master_id=section.master,
-        settings=settings,
+        settings=_make_actuator_settings(section, realtime),
         clamped=section.clamped,
+    )
+
+
+def _make_actuator_settings(section: ActuatorSection, realtime: bool) -> ActuatorSettings:
+    default = SETPOINT_TIMEOUT if realtime else SETPOINT_TIMEOUT_WITHOUT_PRIORITY
+    timeout = section.setpoint_timeout or default
+    return ActuatorSettings(
+        setpoint_timeout=timeout,
+        # Heartbeats accompany punctual setpoints only, so they may be absent for longer than setpoints.
+        master_heartbeat_timeout=2 * timeout,
+        travel=section.travel,
+        max_speed=section.max_speed,
+        torque_limit=section.torque_limit,
+        following_error_window=section.following_error_window,
     )
 
 

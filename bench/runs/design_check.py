@@ -40,7 +40,10 @@ def assess_design(
         planned = Path(folder) / "planned.npz"
         write_planned_strokes(planned, programme)
         options = ["--model", str(model)] if model is not None else []
-        output = _run_command([*command, str(planned), "--out", "-", *options])
+        return _parse_document(_run_command([*command, str(planned), "--out", "-", *options]))
+
+
+def _parse_document(output: str) -> dict[str, Any]:
     try:
         document: dict[str, Any] = json.loads(output)
     except ValueError:
@@ -54,6 +57,16 @@ def write_planned_strokes(path: Path, programme: Programme) -> None:
     Raises:
         RunError: the file cannot be written.
     """
+    arrays = _make_arrays(programme)
+    try:
+        # An open file, because numpy adds .npz to a name without it.
+        with path.open("wb") as file:
+            np.savez(file, **arrays)
+    except OSError as error:
+        raise RunError(f"{path} cannot be written: {error.strerror}") from None
+
+
+def _make_arrays(programme: Programme) -> dict[str, Any]:
     candidates = make_candidate_strokes(programme)
     info = {
         "method": programme.method.name,
@@ -62,13 +75,7 @@ def write_planned_strokes(path: Path, programme: Programme) -> None:
         "additions": [json.loads(s.model_dump_json(exclude_defaults=True)) for s, _ in candidates],
     }
     samples = {f"addition_{k}": _stack_channels(stroke) for k, (_, stroke) in enumerate(candidates)}
-    arrays: dict[str, Any] = {"plan": _stack_channels(programme), **samples, "info": np.array(json.dumps(info))}
-    try:
-        # An open file, because numpy adds .npz to a name without it.
-        with path.open("wb") as file:
-            np.savez(file, **arrays)
-    except OSError as error:
-        raise RunError(f"{path} cannot be written: {error.strerror}") from None
+    return {"plan": _stack_channels(programme), **samples, "info": np.array(json.dumps(info))}
 
 
 def _stack_channels(programme: Programme) -> Array:

@@ -96,11 +96,12 @@ def _make_header(method: Method, rig_channels: RigChannels, identity: Identity, 
         resampled=RESAMPLING_NOTE,
         calibration=dict.fromkeys(info["channels"], CALIBRATION_NOTE),
         clocks=serialise_values(info["clocks"]),
-        channels={
-            name: ChannelInfo(**{key: value for key, value in channel.items() if key in ChannelInfo.model_fields})
-            for name, channel in info["channels"].items()
-        },
+        channels={name: _make_channel_info(channel) for name, channel in info["channels"].items()},
     )
+
+
+def _make_channel_info(channel: Mapping[str, Any]) -> ChannelInfo:
+    return ChannelInfo(**{key: value for key, value in channel.items() if key in ChannelInfo.model_fields})
 
 
 def _format_specimen(specimen: dict[str, Any]) -> str:
@@ -111,8 +112,7 @@ def _write_log(
     log: LogWriter, programme: Programme, rig_channels: RigChannels, values: dict[str, Column], scenario: str
 ) -> None:
     """Write attachments and samples, with segment marks and events at their places among them."""
-    method = programme.method
-    log.attach("method.json", "application/json", method.to_json().encode())
+    log.attach("method.json", "application/json", programme.method.to_json().encode())
     log.attach("scenario.txt", "text/plain", f"{scenario}\n".encode())
     time_ns = np.round(rig_channels.channels["time"] * 1e9).astype(np.int64)
     complete = np.all([np.isfinite(values[name]) for name in REQUIRED_CHANNELS], axis=0)
@@ -127,6 +127,10 @@ def _write_log(
         action(log)
         written = stop
     _write_samples(log, kept_ns, kept, slice(written, None))
+    _count_lost(log, values)
+
+
+def _count_lost(log: LogWriter, values: Mapping[str, Column]) -> None:
     for name in (*REQUIRED_CHANNELS, *OPTIONAL_CHANNELS):
         if missing := int(np.count_nonzero(np.isnan(values.get(name, np.zeros(1))))):
             log.count_lost(name, missing)
@@ -163,12 +167,7 @@ def _make_actions(
     method = programme.method
     yield 0, _make_event_action(time_ns[0], "state", f"run of method {method.name} started", scenario=scenario)
     for segment in programme.segments:
-        first, last = int(time_ns[segment.start]), int(time_ns[segment.stop - 1])
-        yield segment.start, _make_segment_action(first, "start", segment, method.name)
-        yield segment.start, _make_event_action(first, "state", f"segment {segment.name} started")
-        yield segment.stop, _make_segment_action(last, "end", segment, method.name)
-        if segment.checkpoint:
-            yield segment.stop, _make_event_action(last, "checkpoint", f"after segment {segment.name}")
+        yield from _make_segment_actions(segment, time_ns, method.name)
     force = np.abs(rig_channels.channels["force"])
     if np.any(above := force > method.limits.force_n):
         first = int(np.argmax(above))
@@ -176,6 +175,17 @@ def _make_actions(
         details = {"quantity": "force", "value": float(force[first]), "limit": method.limits.force_n}
         yield first, _make_event_action(time_ns[first], "alarm", text, **details)
     yield len(time_ns), _make_event_action(time_ns[-1], "state", "run finished")
+
+
+def _make_segment_actions(
+    segment: ProgrammeSegment, time_ns: Integers, method: str
+) -> Iterator[tuple[int, LogAction]]:
+    first, last = int(time_ns[segment.start]), int(time_ns[segment.stop - 1])
+    yield segment.start, _make_segment_action(first, "start", segment, method)
+    yield segment.start, _make_event_action(first, "state", f"segment {segment.name} started")
+    yield segment.stop, _make_segment_action(last, "end", segment, method)
+    if segment.checkpoint:
+        yield segment.stop, _make_event_action(last, "checkpoint", f"after segment {segment.name}")
 
 
 def _make_event_action(time_ns: np.int64 | int, kind: str, text: str, **details: Any) -> LogAction:

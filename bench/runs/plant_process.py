@@ -66,15 +66,18 @@ def play_scenario(
         return _read_channels(measured, len(commands["time"]))
 
 
-def _run_rig(command: list[str], progress: Progress, silence_timeout: float) -> None:
-    """Run the process to its end and pass on its progress; its last other line is its error message."""
+def _start_rig(command: list[str]) -> "subprocess.Popen[str]":
     try:
-        process = subprocess.Popen(
+        return subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
     except OSError as error:
         raise RunError(f"the simulated rig cannot be started: {error}") from None
-    with process:
+
+
+def _run_rig(command: list[str], progress: Progress, silence_timeout: float) -> None:
+    """Run the process to its end and pass on its progress; its last other line is its error message."""
+    with _start_rig(command) as process:
         lines, reader = start_line_reader(process)
         try:
             message = _follow_progress(lines, progress, silence_timeout)

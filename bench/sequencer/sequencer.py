@@ -189,18 +189,22 @@ class Sequencer:
         # The table runs by the amplifier's clock, the motion by the bench clock.
         self._amplifier.upload_table(times * (1 + self._get_amplifier_rate()), levels)
 
+    def _arm_table(self, position: float) -> None:
+        """Arm the drive table during a suspension; after an error, setpoints hold the rod at a position [m]."""
+        try:
+            self._guard.permit()
+            self._amplifier.arm_table()
+        except Exception:
+            # Setpoints have to continue for a soft stop; during a suspension the drive would stop by itself.
+            self._generator.hold_at(position)
+            raise
+
     def _start_section(self, section: PlaybackSection) -> None:
         """Start motion and table with the same SYNC."""
         for _ in range(_MAX_ATTEMPTS):
             # The next SYNC starts the armed table, so it has to be the SYNC of the section's first setpoint.
             self._generator.suspend(self._clock())
-            try:
-                self._guard.permit()
-                self._amplifier.arm_table()
-            except Exception:
-                # Setpoints have to continue for a soft stop; during a suspension the drive would stop by itself.
-                self._generator.hold_at(float(section.programme.displacement[section.start]))
-                raise
+            self._arm_table(float(section.programme.displacement[section.start]))
             has_started = self._generator.start(section.trajectory, section)
             if self._stop_requested.is_set():
                 return

@@ -113,10 +113,7 @@ class SetpointGenerator:
         with self._lock:
             if self._is_suspended(now_ns):
                 return False
-            if self._next is not None:
-                trajectory, section = self._next
-                self._next = None
-                self._set_entry(CommandEntry(ScheduledTrajectory(trajectory, now_ns), section))
+            self._begin_next(now_ns)
             if self._entry is None:
                 return False
             position = self._entry.schedule.find_position(now_ns + self.cycle_ns)
@@ -129,6 +126,13 @@ class SetpointGenerator:
         if self._suspended_ns is not None and now_ns - self._suspended_ns > self._max_suspension_ns:
             self._suspended_ns, self._has_expired = None, True
         return self._suspended_ns is not None
+
+    def _begin_next(self, now_ns: int) -> None:
+        """Begin the trajectory that waits, if any, at the instant of a setpoint [ns]."""
+        if self._next is not None:
+            trajectory, section = self._next
+            self._next = None
+            self._set_entry(CommandEntry(ScheduledTrajectory(trajectory, now_ns), section))
 
     def _set_entry(self, entry: CommandEntry) -> None:
         self._entry = entry
@@ -172,8 +176,7 @@ class SetpointThread:
     def _run(self) -> None:
         self.warning = raise_priority(PRIORITY_STEP)
         cycle = self._generator.cycle_ns
-        # Whole cycles of the bench clock, because the threads that read the drive's replies wake by the same
-        # clock.
+        # Whole cycles of the bench clock, by which the threads that read the drive's replies wake, too.
         due = self._clock() // cycle * cycle
         try:
             while not self._stopping.is_set():
@@ -188,11 +191,14 @@ class SetpointThread:
                 # A drive that is locked to SYNC counts the setpoints, so every place of the grid gets its own.
                 self._generator.step(due)
         except Exception as error:  # if the thread ended silently, the rod would be without setpoints unnoticed
-            is_expected = isinstance(error, DriverError | RunError)
-            self.failure = (
-                error if is_expected else RunError(f"setpoints ended: {error!r}; internal error, please report")
-            )
-            self._on_failed(self.failure)
+            self._report_failure(error)
+
+    def _report_failure(self, error: Exception) -> None:
+        is_expected = isinstance(error, DriverError | RunError)
+        self.failure = (
+            error if is_expected else RunError(f"setpoints ended: {error!r}; internal error, please report")
+        )
+        self._on_failed(self.failure)
 
     def _count_late_cycles(self, now_ns: int, delay: float) -> None:
         missed = int(delay * 1e9) // self._generator.cycle_ns

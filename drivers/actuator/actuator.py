@@ -260,13 +260,16 @@ class Actuator:
         self._drive.check_no_fault()
         # A drive drops its reference when it starts to seek, and has none if the search ends early.
         self._reference_state = ReferenceState.UNREFERENCED
+        self._seek_home(method, timeout)
+        self._set_origin(0.0)
+        self._reference_state = after
+
+    def _seek_home(self, method: int, timeout: float) -> None:
         try:
             self._drive.home(method, timeout)
         except DriverError:
             self.make_safe()
             raise
-        self._set_origin(0.0)
-        self._reference_state = after
 
     def mount(self) -> None:
         """Record that a specimen has been clamped."""

@@ -182,12 +182,16 @@ class ServoDrive:
                     f"{self._name}: unit object {index:04X}h reads {unit:08X}h, not {expected:08X}h; "
                     "set its unit to 0.1 µm"
                 )
+        self.rated_torque = self._read_rated_torque()
+
+    def _read_rated_torque(self) -> float:
         rated = self._node.read_number(0x6076)
+        # Torques on the wire are per mille of it, so without a value they cannot be converted.
         if rated <= 0:
             raise InvalidReplyError(
                 f"{self._name}: rated torque (6076h) reads {rated} mN m; enter the motor's in the drive"
             )
-        self.rated_torque = rated * 1e-3
+        return rated * 1e-3
 
     def _write_limits(self, settings: ActuatorSettings) -> None:
         cycle = round(settings.cycle * 1e3)

@@ -87,20 +87,24 @@ class AsciiLoadCell(SerialLoadCell[AsciiLoadCellDecoder]):
             OutOfRangeError: there is no such channel.
         """
         self._check_channel(channel)
-        with self._read_lock:
-            # Set aside: only a reading from now on counts, and `acquire` needs all of them in their order.
-            earlier = self._pop_pending()
-            try:
-                self._wait_for_readings(_LIMITS["silence_s"])
-                block = next((block for block in self._pending if block.channel == channel), None)
-            finally:
-                self._pending = earlier + self._pending
+        block = self._wait_for_block(channel)
         if block is None:
             raise NoReplyError(
                 f"{self.name}: no reading of {channel} within {_LIMITS['silence_s']:.3g} s; check that the "
                 "indicator sends, and shows gross if the untared force is requested"
             )
         return Reading(float(block.values[-1]), block.received_ns, None, float(block.raw[-1]), block.quality)
+
+    def _wait_for_block(self, channel: str) -> SampleBlock | None:
+        """Return the first new reading of a channel; None if it does not arrive in time."""
+        with self._read_lock:
+            # Set aside: only a reading from now on counts, and `acquire` needs all of them in their order.
+            earlier = self._pop_pending()
+            try:
+                self._wait_for_readings(_LIMITS["silence_s"])
+                return next((block for block in self._pending if block.channel == channel), None)
+            finally:
+                self._pending = earlier + self._pending
 
     def _find_problems(self) -> list[str]:
         return ["overload"] if self._decoder.overload else self._find_silence(_LIMITS["silence_s"])

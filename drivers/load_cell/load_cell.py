@@ -126,6 +126,11 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
             OutOfRangeError: there is no such channel.
         """
         self._check_channel(channel)
+        block = self._wait_for_block(channel)
+        device_ns = None if block.device_ns is None else int(block.device_ns[-1])
+        return Reading(float(block.values[-1]), block.received_ns, device_ns, float(block.raw[-1]), block.quality)
+
+    def _wait_for_block(self, channel: str) -> SampleBlock:
         previous = self._latest_blocks.get(channel)
         deadline = time.monotonic() + _DEADLINES["reply_s"] + 1 / self._rate
         # Compare blocks, not values: forces may repeat.
@@ -136,8 +141,7 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
                     "check that the stream has been started and the instrument has power"
                 )
             self._read_once(WAIT_SLICE)
-        device_ns = None if block.device_ns is None else int(block.device_ns[-1])
-        return Reading(float(block.values[-1]), block.received_ns, device_ns, float(block.raw[-1]), block.quality)
+        return block
 
     def start(self) -> None:
         """Start the stream.

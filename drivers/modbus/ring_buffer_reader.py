@@ -53,21 +53,27 @@ class RingBufferReader:
             NotConnectedError, NoReplyError, InvalidReplyError, RefusedError: the expected instrument does not
                 reply.
         """
-        name, map_ = self._registers.line.name, self._registers.map
         values, reply = self._registers.read_group("identity", "boot", "interval", "newest", "clock")
-        if values["identity"].raw != map_.identity:
-            raise InvalidReplyError(
-                f"{name}: its identity is {values['identity'].raw:#06x}, that of a {map_.instrument} is "
-                f"{map_.identity:#06x}; check address and unit"
-            )
-        if values["interval"].raw * 1000 != self.layout.interval_ns:
-            raise InvalidReplyError(
-                f"{name}: it samples every {values['interval'].raw} us, expected are "
-                f"{self.layout.interval_ns // 1000} us; set the instrument's rate"
-            )
+        self._check_identity(values["identity"].raw)
+        self._check_interval(values["interval"].raw)
         self.decoder.begin(values["boot"].raw, values["newest"].raw, values["clock"].raw)
         self.clock_reading = ClockReading(values["clock"].raw * 1000, reply.sent_ns, reply.received_ns)
         self._next_poll, self._failure_start, self._message = 0.0, None, ""
+
+    def _check_identity(self, identity: int) -> None:
+        name, map_ = self._registers.line.name, self._registers.map
+        if identity != map_.identity:
+            raise InvalidReplyError(
+                f"{name}: its identity is {identity:#06x}, that of a {map_.instrument} is "
+                f"{map_.identity:#06x}; check address and unit"
+            )
+
+    def _check_interval(self, interval_us: int) -> None:
+        if interval_us * 1000 != self.layout.interval_ns:
+            raise InvalidReplyError(
+                f"{self._registers.line.name}: it samples every {interval_us} us, expected are "
+                f"{self.layout.interval_ns // 1000} us; set the instrument's rate"
+            )
 
     def acquire(self, timeout: float) -> list[SampleBlock]:
         """Return all samples since the last call, waiting up to ``timeout`` [s] for the first.
@@ -81,13 +87,7 @@ class RingBufferReader:
         deadline = time.monotonic() + timeout
         blocks: list[SampleBlock] = []
         while self._wait_until_due(deadline):
-            try:
-                has_more = self._read_block(blocks)
-            except NotConnectedError:
-                raise
-            except DriverError as error:
-                self._record_failure(error)
-                has_more = False
+            has_more = self._try_read_block(blocks)
             if blocks and (not has_more or time.monotonic() > deadline):
                 break
         return blocks
@@ -134,6 +134,16 @@ class RingBufferReader:
             return False
         time.sleep(max(0.0, self._next_poll - now))
         return True
+
+    def _try_read_block(self, blocks: list[SampleBlock]) -> bool:
+        """Read the next block as `_read_block` does; record a failure, after which it is read again."""
+        try:
+            return self._read_block(blocks)
+        except NotConnectedError:
+            raise
+        except DriverError as error:
+            self._record_failure(error)
+            return False
 
     def _read_block(self, blocks: list[SampleBlock]) -> bool:
         """Read the next block, and return whether the instrument has more samples."""

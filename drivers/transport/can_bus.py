@@ -10,7 +10,7 @@ import logging
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -149,12 +149,8 @@ class CanBus:
         self.check_open()
         messages = [can.Message(arbitration_id=id_, data=data, is_extended_id=False) for id_, data in frames]
         with self._send_lock:
-            # The time is taken before the frame leaves: no reply may have an earlier time than its request. It has
-            # a lock of its own, since a blocked send must not stop the receiving thread.
-            with self._stamp_lock:
-                now = self._clock()
-                for identifier, data in frames:
-                    self._notify_listeners(now, True, identifier, data)
+            # The time is taken before the frame leaves: no reply may have an earlier time than its request.
+            self._record_sent(frames)
             try:
                 self._transmit(messages)
             except (can.CanError, OSError) as error:
@@ -266,6 +262,13 @@ class CanBus:
             # A frame that one handler cannot decode still goes to the others.
             except (DriverError, ValueError, IndexError, struct.error):
                 self.corrupted += 1
+
+    def _record_sent(self, frames: Iterable[tuple[int, bytes]]) -> None:
+        # Under a lock of its own, since a blocked send must not stop the receiving thread.
+        with self._stamp_lock:
+            now = self._clock()
+            for identifier, data in frames:
+                self._notify_listeners(now, True, identifier, data)
 
     def _notify_listeners(self, now_ns: int, sent: bool, identifier: int, data: bytes) -> None:
         frame = Frame(now_ns, sent, pack_frame(identifier, data))

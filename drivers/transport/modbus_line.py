@@ -192,6 +192,11 @@ class ModbusLine:
             raise self._translate_error(error, action) from error
         # Before the checks: the log keeps refused replies, too.
         self._trace.flush()
+        self._check_reply(reply, function, action)
+        return reply
+
+    def _check_reply(self, reply: ModbusPDU, function: int, action: str) -> None:
+        """Check that a reply is for the requested function, and not a refusal."""
         if reply.function_code & 0x7F != function:
             raise self._make_invalid_reply(
                 action, f"function {reply.function_code} is in the reply, {function} was requested"
@@ -202,7 +207,6 @@ class ModbusLine:
             raise RefusedError(
                 f"{self.name}: {action} was refused: {_EXCEPTION_TEXTS.get(code, 'reason unknown')} ({code})"
             )
-        return reply
 
     def _translate_error(self, error: Exception, action: str) -> DriverError:
         received = self._trace.flush()

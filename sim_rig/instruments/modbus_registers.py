@@ -218,7 +218,18 @@ class SampleRingBuffer:
         edges = (np.arange(first, first + count) + self._origin) * self._interval + self._interval // 2
         indices = [np.searchsorted(times, edges) - 1 for times, _ in samples]
         start_ns = int(samples[0][0][indices[0][0]]) if count else now
-        header = {
+        low_first = self._document["word_order"] == "low_first"
+        header = self._make_header(first, count, newest, start_ns, now)
+        words = [
+            w for e in self._ring["header"] for w in encode_words(header[e["name"]], e["type"], 1.0, low_first)
+        ]
+        for i in range(count):
+            for column, (_, values), index in zip(self._ring["columns"], samples, indices, strict=True):
+                words += encode_words(float(values[index[i]]), column["type"], column["scale"], low_first)
+        return words + [0] * (self._ring["length"] - len(words))
+
+    def _make_header(self, first: int, count: int, newest: int, start_ns: int, now: int) -> dict[str, int]:
+        return {
             "boot": self.boot,
             "first": first,
             "time": self.read_clock_us(start_ns),
@@ -227,11 +238,3 @@ class SampleRingBuffer:
             "count": count,
             "status": self._status(),
         }
-        low_first = self._document["word_order"] == "low_first"
-        words = [
-            w for e in self._ring["header"] for w in encode_words(header[e["name"]], e["type"], 1.0, low_first)
-        ]
-        for i in range(count):
-            for column, (_, values), index in zip(self._ring["columns"], samples, indices, strict=True):
-                words += encode_words(float(values[index[i]]), column["type"], column["scale"], low_first)
-        return words + [0] * (self._ring["length"] - len(words))

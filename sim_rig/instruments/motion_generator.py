@@ -10,6 +10,7 @@ the module uses no bus.
 """
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
@@ -135,10 +136,8 @@ class MotionGenerator:
         """Return the second to last move as a cubic through its neighbours (Catmull-Rom), unless it began."""
         if len(self._recent_setpoints) < 4 or self._recent_setpoints[1][0] < self._now_ns:
             return []
-        times, (a, b, c, d) = (
-            [at for at, _ in self._recent_setpoints],
-            [position for _, position in self._recent_setpoints],
-        )
+        times = [at for at, _ in self._recent_setpoints]
+        positions = [position for _, position in self._recent_setpoints]
         begin, length = times[1], times[2] - times[1]
         # The formula requires moves of equal duration.
         if max(abs(times[1] - times[0] - length), abs(times[3] - times[2] - length)) > _LENGTH_TOLERANCE * length:
@@ -146,11 +145,8 @@ class MotionGenerator:
         moves, last = [], begin
         for part in range(1, _CURVE_PARTS + 1):
             u = part / _CURVE_PARTS
-            position = b + u * (
-                (c - a) / 2 + u * (a - 2.5 * b + 2 * c - d / 2 + u * (1.5 * (b - c) + (d - a) / 2))
-            )
             end = begin + round(u * length)
-            moves.append(LinearMove(last, end, position))
+            moves.append(LinearMove(last, end, _evaluate_catmull_rom(positions, u)))
             last = end
         return moves
 
@@ -216,3 +212,9 @@ class MotionGenerator:
         self.velocity += change
         if stopping < dt:
             self.hold_at(self.position)
+
+
+def _evaluate_catmull_rom(points: Sequence[float], u: float) -> float:
+    """Return the cubic between the second and third of four points, ``u`` from 0 to 1."""
+    a, b, c, d = points
+    return b + u * ((c - a) / 2 + u * (a - 2.5 * b + 2 * c - d / 2 + u * (1.5 * (b - c) + (d - a) / 2)))

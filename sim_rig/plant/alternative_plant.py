@@ -40,6 +40,10 @@ class AlternativePlant(Plant):
         self._command, self._samples = displacement, 0
         self._inputs, self._time = np.zeros(INPUT_COUNT), -_SETTLING_TIME
         self._states = _make_rest_states(self._law, self._constants, displacement, drive)
+        self._settle(displacement, drive)
+
+    def _settle(self, displacement: float, drive: float) -> None:
+        """Let the forms' filters settle at standstill."""
         dt = 1e-3
         count = round(_SETTLING_TIME / dt)
         self.simulate(dt, np.full(count + 1, displacement), np.full(count, drive))

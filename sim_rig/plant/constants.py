@@ -29,11 +29,8 @@ def make_rig_constants(scenario: Scenario, law: Array) -> Array:
     k[states.SERVO_DAMPING] = actuator.damping
     k[states.ACTUATOR_COMPLIANCE] = 1 / actuator.stiffness
     k[states.AMPLIFIER_RATE] = 2 * math.pi * amplifier.bandwidth
-    k[states.HEAT_CAPACITY], k[states.HEAT_LOSS], k[states.AMBIENT] = (
-        thermal.capacity,
-        thermal.loss,
-        thermal.ambient,
-    )
+    k[[states.HEAT_CAPACITY, states.HEAT_LOSS]] = thermal.capacity, thermal.loss
+    k[states.AMBIENT] = thermal.ambient
     k[states.COIL_HEAT] = amplifier.resistance if scenario.drive_unit == "A" else 1 / amplifier.resistance
     k[states.Z_SATURATION] = (law[5] / (law[2] + law[3])) ** (1 / law[12])
     return k

@@ -62,20 +62,16 @@ class Plant:
         """
         effects = EffectFunctions(scenario)
         self._law = np.array(scenario.parameters)
-        self._parallel_force, self._follower, self._scale_factors = (
-            effects.make_parallel_force(),
-            effects.make_follower(),
-            effects.make_scale_factors(),
-        )
+        self._parallel_force, self._follower = effects.make_parallel_force(), effects.make_follower()
+        self._scale_factors = effects.make_scale_factors()
         self._field_map, self._field_memory = effects.make_field_map(), effects.make_field_memory()
         self._constants = make_plant_constants(scenario, self._law, effects)
         self._command = displacement
         self._states, self._damper_position = self._find_equilibrium(displacement, drive)
-        self._remanence, self._substeps = 0.0, 0
+        self._remanence, self._substeps, self._samples = 0.0, 0, 0
         # The substep is not known yet, so the memory is long enough for the finest.
         dead_substeps = self._constants[states.DEAD_TIME] / _MIN_SUBSTEP
         self._output_history = np.full(math.ceil(dead_substeps) + 3, float(drive))
-        self._samples = 0
 
     def advance(self, dt: float, displacement: float, drive: float) -> TrueSignals:
         """Advance by dt [s]: the command goes linearly to ``displacement`` [m], the drive [V or A] is held.

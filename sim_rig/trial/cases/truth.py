@@ -72,15 +72,19 @@ def read_sealed_truth(path: Path, sha256: str) -> SealedTruth:
         raise TrialError(
             f"{path}: the sealed truth cannot be read ({error.strerror}); start a new trial"
         ) from error
-    digest = hashlib.sha256(content).hexdigest()
-    if digest != sha256:
-        raise TrialError(
-            f"{path}: the seal is broken: its SHA-256 is {digest[:12]}..., published was {sha256[:12]}...; "
-            "start a new trial"
-        )
+    _check_seal(path, content, sha256)
     try:
         return SealedTruth.model_validate_json(content)
     except ValidationError as error:
         raise TrialError(
             f"{path}: sealed by an incompatible version ({error.error_count()} errors); start a new trial"
         ) from error
+
+
+def _check_seal(path: Path, content: bytes, sha256: str) -> None:
+    digest = hashlib.sha256(content).hexdigest()
+    if digest != sha256:
+        raise TrialError(
+            f"{path}: the seal is broken: its SHA-256 is {digest[:12]}..., published was {sha256[:12]}...; "
+            "start a new trial"
+        )

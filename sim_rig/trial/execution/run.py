@@ -63,20 +63,26 @@ def prepare_truth(folder: TrialFolder, options: TrialOptions, progress: Progress
     """
     seal = folder.read_seal()
     if seal is None:
-        folder.prepare()
-        sampled = (draw_cases if options.kind == "blind" else draw_grid)(options.cases, options.seed)
-        truth = SealedTruth(cases=tuple(_size_cases(folder, sampled, options, progress)))
-        digest = write_sealed_truth(folder.truth, truth)
-        seal = Seal(
-            cases=options.cases, seed=options.seed, kind=options.kind, version=version("mrbench"), sha256=digest
-        )
-        folder.publish_seal(seal)
+        seal = _seal_new_truth(folder, options, progress)
     if (seal.cases, seal.seed, seal.kind) != (options.cases, options.seed, options.kind):
         raise TrialError(
             f"{folder.root} contains a trial of {seal.cases} cases with seed {seal.seed} ({seal.kind}); "
             "use the same options, or another --out"
         )
     return seal, read_sealed_truth(folder.truth, seal.sha256)
+
+
+def _seal_new_truth(folder: TrialFolder, options: TrialOptions, progress: Progress) -> Seal:
+    folder.prepare()
+    sampled = (draw_cases if options.kind == "blind" else draw_grid)(options.cases, options.seed)
+    truth = SealedTruth(cases=tuple(_size_cases(folder, sampled, options, progress)))
+    digest = write_sealed_truth(folder.truth, truth)
+    seal = Seal(
+        cases=options.cases, seed=options.seed, kind=options.kind, version=version("mrbench"), sha256=digest
+    )
+    # Published before anything is recorded, so that the truth cannot be changed after the diagnoses are known.
+    folder.publish_seal(seal)
+    return seal
 
 
 def run_cases(folder: TrialFolder, truth: SealedTruth, options: TrialOptions, progress: Progress) -> None:

@@ -32,12 +32,16 @@ def record_over_wires(method: Path, scenario: Path, log: Path) -> None:
             _wait_for(config, rig, messages)
             run_command([*MRBENCH, "run", method, "--config", config, "--out", log], real_time=True)
         finally:
-            rig.terminate()
-            try:
-                rig.wait(_STOP_TIMEOUT)
-            except subprocess.TimeoutExpired:
-                rig.kill()
-                rig.wait()
+            _stop(rig)
+
+
+def _stop(rig: "subprocess.Popen[bytes]") -> None:
+    rig.terminate()
+    try:
+        rig.wait(_STOP_TIMEOUT)
+    except subprocess.TimeoutExpired:
+        rig.kill()
+        rig.wait()
 
 
 def _wait_for(config: Path, rig: "subprocess.Popen[bytes]", messages: Path) -> None:

@@ -35,8 +35,7 @@ def assess_design(planned: PlannedStrokes, assumed: AssumedDamper) -> DesignRepo
         assumed: damper and noise.
     """
     information = compute_information(assumed.coordinates, planned.excitation, assumed.noise)
-    covariance = compute_relative_covariance(information)
-    coordinates = _assess_coordinates(planned, assumed, covariance, find_observable(information))
+    coordinates = _assess_coordinates(planned, assumed, information)
     proposal = _propose_stroke(planned, assumed, information)
     return DesignReport(
         method=planned.method,
@@ -50,8 +49,9 @@ def assess_design(planned: PlannedStrokes, assumed: AssumedDamper) -> DesignRepo
 
 
 def _assess_coordinates(
-    planned: PlannedStrokes, assumed: AssumedDamper, covariance: Array, observable: BoolArray
+    planned: PlannedStrokes, assumed: AssumedDamper, information: Array
 ) -> dict[str, ExpectedPrecision]:
+    covariance, observable = compute_relative_covariance(information), find_observable(information)
     deviations = np.sqrt(np.diag(covariance))
     limitations = find_plan_limitations(planned.excitation)
     precisions = {}

@@ -17,22 +17,18 @@ def describe_precision(quantity: Quantity, relative: float) -> str:
     return f"{quantity.meaning}: standard deviation {100 * relative:.2g} % at best"
 
 
-def explain_unidentifiable(
-    quantity: Quantity, limitations: PlanLimitations, most_correlated: tuple[str, float]
-) -> str:
+def explain_unidentifiable(quantity: Quantity, limitations: PlanLimitations, correlated: tuple[str, float]) -> str:
     """Return the reason why the strokes do not identify a coordinate.
 
-    Args:
-        quantity: the coordinate.
-        limitations: limitations of the planned strokes.
-        most_correlated: the other coordinate with the largest correlation to this one, and that correlation [1].
+    ``correlated`` is the other coordinate with the largest correlation to this one, and that correlation [1].
     """
     name = f"{quantity.symbol} ({quantity.meaning})"
+    # Limitations of the plan come first: they are causes, while a correlation is their effect.
     if quantity.symbol in _DRIVE_DEPENDENT and limitations.has_one_drive:
         return f"{name} is not observable: the drive never changes"
     if quantity.symbol == "eta" and limitations.has_steps_only_at_rest:
         return f"{name} is not observable: the drive never changes during a stroke"
-    other, correlation = most_correlated
+    other, correlation = correlated
     if abs(correlation) > _CONFOUNDED:
         return (
             f"{name} cannot be distinguished from {other}: in these strokes both change the force in the same way"

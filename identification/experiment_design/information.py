@@ -28,14 +28,10 @@ def compute_coordinate_scales(point: Coordinates) -> Array:
 
 
 def compute_information(point: Coordinates, stroke: Excitation, noise: float) -> Array:
-    """Return the information (15, 15) of a stroke on the coordinates and the two delays.
+    """Return the information (15, 15) of a stroke with unknown y(0) on a damper's coordinates and the two delays.
 
-    Coordinates are counted in their sizes, delays in standard deviations of mapped clocks.
-
-    Args:
-        point: the damper.
-        stroke: excitation; y(0) is unknown.
-        noise: standard deviation of the white noise in the recorded force [N].
+    Coordinates are counted in their sizes, delays in standard deviations of mapped clocks. ``noise`` is the
+    standard deviation of the white noise in the recorded force [N].
     """
     y0 = float(stroke.displacement[0])
     sensitivities = simulate(SimulationModel(point, y0=y0), stroke, sensitivities=True).sensitivities / noise

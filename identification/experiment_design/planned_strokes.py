@@ -7,6 +7,7 @@ acceleration [m/s²] and drive [V or A] at one rate. ``info`` is a JSON text wit
 
 import json
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -51,19 +52,23 @@ def read_planned_strokes(path: Path) -> PlannedStrokes:
     """
     try:
         with np.load(path) as file:
-            info = json.loads(str(file["info"]))
-            rate = float(info["rate_hz"])
-            plan = _make_excitation(rate, file["plan"])
-            additions = [
-                OptionalStroke(dict(segment), _make_excitation(rate, file[f"addition_{k}"]))
-                for k, segment in enumerate(info["additions"])
-            ]
-            return PlannedStrokes(str(info["method"]), str(info["drive_unit"]), plan, tuple(additions))
+            return _parse_strokes(file)
     except (OSError, KeyError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise IdentificationError(
             f"{path}: not a file of planned strokes ({error}); "
             "write one with `mrbench run METHOD --dry-run --planned FILE.npz`"
         ) from error
+
+
+def _parse_strokes(file: Mapping[str, Array]) -> PlannedStrokes:
+    info = json.loads(str(file["info"]))
+    rate = float(info["rate_hz"])
+    plan = _make_excitation(rate, file["plan"])
+    optional_strokes = tuple(
+        OptionalStroke(dict(segment), _make_excitation(rate, file[f"addition_{k}"]))
+        for k, segment in enumerate(info["additions"])
+    )
+    return PlannedStrokes(str(info["method"]), str(info["drive_unit"]), plan, optional_strokes)
 
 
 def _make_excitation(rate: float, channels: Array) -> Excitation:
@@ -96,6 +101,7 @@ def find_plan_limitations(stroke: Excitation) -> PlanLimitations:
     # Peaks of each second: a sweep or a ramp of amplitude has peaks of many sizes.
     block = max(1, round(stroke.rate))
     peaks = [float(velocity[k : k + block].max()) for k in range(0, len(velocity) - block + 1, block)]
+    # Seconds at rest or in a fade are no strokes.
     steady = [peak for peak in peaks if peak > 0.2 * max(peaks)] if peaks else []
     return PlanLimitations(
         has_one_drive=len(changes) == 0,

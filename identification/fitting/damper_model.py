@@ -57,13 +57,8 @@ def read_fit_or_model(path: Path) -> Fit | DamperModel:
     Raises:
         IdentificationError: the file is missing, is of another kind, or names an unknown effect.
     """
-    try:
-        content = json.loads(path.read_bytes())
-        schema = content.get("schema") if isinstance(content, dict) else None
-    except OSError as error:
-        raise IdentificationError(f"{path}: cannot be read ({error.strerror}); {_ADVICE}") from error
-    except ValueError as error:
-        raise IdentificationError(f"{path}: not a JSON document ({error}); {_ADVICE}") from error
+    content = _read_json(path)
+    schema = content.get("schema") if isinstance(content, dict) else None
     try:
         if schema == "mrbench.fit/1":
             return Fit.model_validate(content)
@@ -72,6 +67,15 @@ def read_fit_or_model(path: Path) -> Fit | DamperModel:
     except (ValidationError, KeyError, TypeError, ValueError) as error:
         raise IdentificationError(f"{path}: {_describe_error(error)}; {_ADVICE}") from error
     raise IdentificationError(f"{path}: unexpected schema {schema!r}; {_ADVICE}")
+
+
+def _read_json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_bytes())
+    except OSError as error:
+        raise IdentificationError(f"{path}: cannot be read ({error.strerror}); {_ADVICE}") from error
+    except ValueError as error:
+        raise IdentificationError(f"{path}: not a JSON document ({error}); {_ADVICE}") from error
 
 
 def make_damper_model(fit: Fit) -> DamperModel:

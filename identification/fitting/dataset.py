@@ -149,6 +149,7 @@ def assemble(
     for k, (mask, start, log) in enumerate(zip(held_out, starts, logs, strict=True)):
         motion = estimate_motion(stretches[k])
         stretch = stretches[k] = _exclude_unresolved(stretches[k], motion.unresolved, max_excluded, notes)
+        # Only valid samples of the force may enter its noise floor.
         floors.append(estimate_floor(replace(stretch, measured=stretch.valid_mask), motion))
         fitted = stretch.valid_mask & ~mask
         fitted[: round(_TRANSIENT_TIME * stretch.rate)] = False

@@ -29,7 +29,7 @@ _DASHPOT_RATIO = 12.0
 _LOW_SLIP_YIELD, _LOW_SLIP_VISCOUS, _LOW_SLIP_DASHPOT = 0.8, 0.2, 1.2
 """Yield force, and forces of c0 and c1 at the peak velocity, over the peak force of a low-slip damper."""
 ACCUMULATOR_SHARE = 0.3
-"""Fraction of the sliding stiffness that a start assigns to k1 [1]."""
+"""Fraction of the sliding stiffness k0 + k1 that a start assigns to k1 [1]; the regression gives only the sum."""
 
 
 def make_starting_points(problem: Problem) -> list[Array]:
@@ -99,6 +99,7 @@ def _regress_force(pieces: Sequence[Piece]) -> Array:
     for p in pieces:
         v, u = p.excitation.velocity, p.excitation.sampled_drive
         fast = np.flatnonzero((np.abs(v) > _SLIDING_FRACTION * np.abs(v).max()) & (p.train > 0))
+        # Six coefficients need no more rows than these.
         fast = fast[:: max(1, len(fast) * len(pieces) // _MAX_ROWS)]
         v, u, sign = v[fast], u[fast], np.sign(v[fast])
         rows.append(

@@ -55,6 +55,7 @@ class SearchSpace:
         for base, slope in _PAIRS:
             low = getattr(c, base) + getattr(c, slope) * self.lowest_drive
             high = getattr(c, base) + getattr(c, slope) * self.highest_drive
+            # A given damper may be negative at an end of the range, as the paper's Table 1 is at 0.5 V.
             floor = _BOUNDS[base][0]
             q[_NAMES.index(base)] = np.log(max(low, floor))
             q[_NAMES.index(slope)] = np.log(max(high, floor))

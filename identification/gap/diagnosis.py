@@ -103,12 +103,20 @@ def diagnose_prepared(
         posterior = compute_final_posterior(pool)
         notes = [*prepared.notes, *pool.notes]
         result = ReportBuilder(dataset, evaluation, pool, posterior, model, notes, seed).build_result()
-        named = frozenset(effect.name for effect in result.diagnosis.effects)
-        if not cross_check or not named:
-            return result
-        fit = pool.candidates[named].fit
-        problem = pool.full_problem.replace_effects(fit.effects)
-        comparison = cross_check_effects(fit, problem, dataset.drive_unit, seed, progress)
+        return _add_cross_check(result, pool, dataset.drive_unit, seed, progress) if cross_check else result
+
+
+def _add_cross_check(
+    result: DiagnosisResult, pool: CandidatePool, drive_unit: str, seed: int, progress: Progress
+) -> DiagnosisResult:
+    """Add the network's independent estimate of the named effects, if any are named."""
+    named = frozenset(effect.name for effect in result.diagnosis.effects)
+    if not named:
+        return result
+    fit = pool.candidates[named].fit
+    comparison = cross_check_effects(
+        fit, pool.full_problem.replace_effects(fit.effects), drive_unit, seed, progress
+    )
     return replace(result, diagnosis=result.diagnosis.model_copy(update={"cross_check": comparison}))
 
 

@@ -160,6 +160,7 @@ def _compute_deviations(fit: JointFit) -> Array:
     problem, unknowns = fit.problem, fit.minimum.unknowns
     free, effects = problem.free_mask, problem.layout.effects
     information = fit.minimum.evaluation.hessian[np.ix_(free, free)] / max(fit.ratio, 1.0) ** 2
+    # With a diagonal of ones, the tolerance applies to directions and not to units.
     scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
     covariance = np.zeros((len(free), len(free)))
     covariance[np.ix_(free, free)] = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-12) / np.outer(
@@ -173,12 +174,7 @@ def _compute_deviations(fit: JointFit) -> Array:
 
 
 def _make_quantity_trend(
-    quantity: str,
-    unit: str,
-    logs: Sequence[str],
-    values: Array,
-    deviations: Array,
-    min_change: float,
+    quantity: str, unit: str, logs: Sequence[str], values: Array, deviations: Array, min_change: float
 ) -> QuantityTrend:
     """Make the trend of one quantity; ``min_change`` is relative to its largest value [1]."""
     point = find_change_point(values, deviations)

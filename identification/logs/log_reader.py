@@ -66,17 +66,9 @@ def read_log(path: Path) -> RawLog:
     Raises:
         UnreadableLogError: the file is not an mrbench log, or is truncated.
     """
-    topics: dict[int, str] = {}
-    metadata: dict[str, dict[str, str]] = {}
-    blocks: list[Columns] = []
-    segments: list[dict[str, Any]] = []
     try:
         with path.open("rb") as file:
-            for messages in _read_chunks(file, topics, metadata):
-                if samples := _select_topic(messages, topics, SAMPLE_TOPIC):
-                    blocks.append(_make_columns(samples))
-                for message in _select_topic(messages, topics, SEGMENT_TOPIC):
-                    segments.append(orjson.loads(message.body) | {"time": message.time})
+            blocks, segments, metadata = _read_blocks(file)
     except _PARSE_ERRORS as error:
         raise UnreadableLogError(_describe_failure(path, error)) from error
     if not blocks:
@@ -84,6 +76,22 @@ def read_log(path: Path) -> RawLog:
             f"{path}: contains no {SAMPLE_TOPIC} messages; give the log of a run or an import"
         )
     return _join_chunks(blocks, segments, metadata)
+
+
+def _read_blocks(
+    file: IO[bytes],
+) -> tuple[list[Columns], list[dict[str, Any]], dict[str, dict[str, str]]]:
+    """Return the columns of each chunk, the marks of all segments, and the metadata."""
+    topics: dict[int, str] = {}
+    metadata: dict[str, dict[str, str]] = {}
+    blocks: list[Columns] = []
+    segments: list[dict[str, Any]] = []
+    for messages in _read_chunks(file, topics, metadata):
+        if samples := _select_topic(messages, topics, SAMPLE_TOPIC):
+            blocks.append(_make_columns(samples))
+        for message in _select_topic(messages, topics, SEGMENT_TOPIC):
+            segments.append(orjson.loads(message.body) | {"time": message.time})
+    return blocks, segments, metadata
 
 
 def _describe_failure(path: Path, error: Exception) -> str:

@@ -5,11 +5,9 @@ where another recording begins in the log. It contains the filters and delays th
 the samples that were measured.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +15,14 @@ from scipy.interpolate import make_interp_spline
 
 from identification.arrays import Array, BoolArray
 from identification.errors import UnreadableLogError
+from identification.logs.channel_info import (
+    CHANNEL_UNITS,
+    ChannelFilter,
+    ChannelInfo,
+    check_not_empty,
+    read_channel_info,
+    read_drive_unit,
+)
 from identification.logs.log_cache import RawLog
 from identification.logs.log_reader import read_cached
 
@@ -32,18 +38,6 @@ _MIN_SAMPLES = 50
 """Smallest number of samples of a stretch; with fewer, it is dropped."""
 PERIODIC_MOTIONS = ("sine", "triangle")
 """Kinds of motion that repeat."""
-_CHANNEL_UNITS = {"displacement": ("m",), "force": ("N",), "coil_drive": ("V", "A")}
-
-
-@dataclass(frozen=True)
-class ChannelFilter:
-    """Low-pass filter of a channel, as its device reports it."""
-
-    kind: str
-    """Kind of filter, such as butterworth."""
-    order: int
-    cutoff: float
-    """Cutoff frequency [Hz]."""
 
 
 @dataclass(frozen=True)
@@ -126,79 +120,21 @@ def load(path: Path) -> Recording:
     """Read an MCAP log with the profile mrbench; from the second reading on, its channels come from a cache.
 
     Raises:
-        UnreadableLogError: the file does not exist, is not an mrbench log, is truncated, or lacks units, channels
-            or samples.
+        UnreadableLogError: the file is missing, no mrbench log, truncated, or lacks units, channels or samples.
     """
     raw, sha256 = read_cached(Path(path))
     raw.metadata.setdefault("run", {})
-    drive_unit = _read_drive_unit(path, raw)
-    info = _ChannelInfo.from_log(path, raw)
+    drive_unit = read_drive_unit(path, raw)
+    info = read_channel_info(path, raw)
     names, indices = _find_recordings(raw)
-    stretches: list[Stretch] = []
-    for k, name in enumerate(names):
-        stretches += _split_stretches(raw, info, name, np.flatnonzero(indices == k))
+    stretches = [
+        s for k, name in enumerate(names) for s in _split_stretches(raw, info, name, np.flatnonzero(indices == k))
+    ]
     if not stretches:
-        _check_not_empty(path, raw)
+        check_not_empty(path, raw)
         raise UnreadableLogError(f"{path}: no {_MIN_SAMPLES} consecutive samples; record longer")
     kind = raw.metadata["run"].get("drive_kind") or f"coil_{drive_unit.lower()}"
     return Recording(Path(path), sha256, kind, drive_unit, tuple(stretches), raw.metadata)
-
-
-def _read_drive_unit(path: Path, raw: RawLog) -> str:
-    """Check the units of all channels, and return that of the drive."""
-    units = raw.metadata.get("units")
-    if units is None:
-        raise UnreadableLogError(f"{path}: no metadata record 'units'; record the log with mrbench, or import it")
-    for name, allowed in _CHANNEL_UNITS.items():
-        if name not in raw.samples:
-            raise UnreadableLogError(f"{path}: no channel '{name}' in the samples; record it")
-        if units.get(name) not in allowed:
-            given = units.get(name, "not given")
-            raise UnreadableLogError(
-                f"{path}: unit of '{name}' is {given}, must be {' or '.join(allowed)}; convert it"
-            )
-    return units["coil_drive"]
-
-
-def _check_not_empty(path: Path, raw: RawLog) -> None:
-    """Refuse a log with a channel that contains only NaN."""
-    for name in _CHANNEL_UNITS:
-        values = raw.samples[name]
-        if not np.isfinite(values).any():
-            raise UnreadableLogError(
-                f"{path}: channel '{name}' contains only NaN ({len(values)} samples); check its sensor"
-            )
-
-
-class _ChannelInfo(NamedTuple):
-    """Properties of the channels."""
-
-    filters: dict[str, ChannelFilter | None]
-    delays: dict[str, float]
-    velocity_measured: bool
-    interpolated: bool
-
-    @staticmethod
-    def from_log(path: Path, raw: RawLog) -> "_ChannelInfo":
-        """Read the metadata `channels` and `units`; a channel without description has no filter and no delay."""
-        filters: dict[str, ChannelFilter | None] = {}
-        delays: dict[str, float] = {}
-        for name in _CHANNEL_UNITS:
-            text = raw.metadata.get("channels", {}).get(name, "{}")
-            try:
-                description = json.loads(text)
-                low_pass = description.get("filter")
-                filters[name] = low_pass and ChannelFilter(
-                    str(low_pass["kind"]), int(low_pass["order"]), float(low_pass["cutoff_hz"])
-                )
-                delays[name] = float(description.get("delay_s") or 0.0)
-            except (ValueError, KeyError, TypeError, AttributeError) as error:
-                raise UnreadableLogError(
-                    f"{path}: metadata 'channels' describes '{name}' as {text}; a filter needs kind, order and "
-                    "cutoff_hz, a delay needs delay_s"
-                ) from error
-        measured = raw.metadata["units"].get("velocity_from") == "measured" and "velocity" in raw.samples
-        return _ChannelInfo(filters, delays, measured, bool(raw.metadata["units"].get("resampled")))
 
 
 def _find_recordings(raw: RawLog) -> tuple[list[str], npt.NDArray[np.int64]]:
@@ -228,9 +164,9 @@ def _skip_pause(time: Array, index: int) -> int:
     return int(pauses[-1]) + 1 if len(pauses) else index
 
 
-def _split_stretches(raw: RawLog, info: _ChannelInfo, name: str, rows: npt.NDArray[np.int64]) -> list[Stretch]:
+def _split_stretches(raw: RawLog, info: ChannelInfo, name: str, rows: npt.NDArray[np.int64]) -> list[Stretch]:
     """Return the stretches of one recording: complete samples without a longer break."""
-    complete = np.all([np.isfinite(raw.samples[channel][rows]) for channel in _CHANNEL_UNITS], axis=0)
+    complete = np.all([np.isfinite(raw.samples[channel][rows]) for channel in CHANNEL_UNITS], axis=0)
     rows = rows[complete]
     if len(rows) < _MIN_SAMPLES:
         return []
@@ -241,7 +177,7 @@ def _split_stretches(raw: RawLog, info: _ChannelInfo, name: str, rows: npt.NDArr
     return [_make_stretch(raw, info, name, piece) for piece in pieces]
 
 
-def _make_stretch(raw: RawLog, info: _ChannelInfo, name: str, rows: npt.NDArray[np.int64]) -> Stretch:
+def _make_stretch(raw: RawLog, info: ChannelInfo, name: str, rows: npt.NDArray[np.int64]) -> Stretch:
     """Return one stretch on a uniform time base."""
     time, nearest = _make_time_base(raw.samples["time"][rows])
     measured = np.zeros(len(time), bool)

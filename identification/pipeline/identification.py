@@ -75,13 +75,12 @@ def fit_damper(
     """Fit usable recordings; the network is trained here unless its result is given."""
     dataset, problem, stretches = prepared.dataset, prepared.problem, prepared.stretches
     if network is None and "pinn" in request.stages:
-        network = train_network(
-            problem, stretches, request.preset, request.settings.seed, request.network_budget, progress
-        )
+        preset, seed = request.preset, request.settings.seed
+        network = train_network(problem, stretches, preset, seed, request.network_budget, progress)
     if "refine" in request.stages:
+        # Without the network's result as a start, so that the comparison is one of two independent estimates.
         result = _fit_output_error(dataset, problem, stretches, request, progress)
-        if network is not None:
-            result = _compare_stages(dataset, result, network)
+        result = _compare_stages(dataset, result, network) if network else result
     else:
         result = _take_network_fit(dataset, problem, network)
     dataset = apply_corrections(dataset, problem, result.minimum.unknowns[problem.shared_columns])

@@ -61,14 +61,9 @@ def estimate_record_noise(fit: Fit, floor: float | None) -> float:
 def estimate_force_uncertainty(
     fit: Fit, model: "DamperModel", piece: Piece, prediction: PiecePrediction, noise: float
 ) -> ForceUncertainty:
-    """Estimate the uncertainty of the predicted force of one stretch.
+    """Estimate the uncertainty of the predicted force of one stretch; ``noise`` is that of the recorded force [N].
 
-    Args:
-        fit: fit with the covariance of its coordinates; without one, only the noise counts.
-        model: the fit as it was simulated.
-        piece: the stretch.
-        prediction: its simulated force, with y(0).
-        noise: noise of the recorded force [N].
+    The model is the fit as it was simulated. Without a covariance of the fit, its coordinates add nothing.
     """
     sensitivities = _compute_sensitivities(model, piece, prediction)
     count = len(COORDINATES)

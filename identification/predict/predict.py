@@ -50,6 +50,16 @@ class _LogPrediction:
             )
         ]
 
+    @property
+    def forces(self) -> list[Array]:
+        """Recorded force [N] at the valid samples of each stretch."""
+        return self.select_valid([p.force for p in self.dataset.pieces])
+
+    @property
+    def drives(self) -> list[Array]:
+        """Drive [V or A] at the valid samples of each stretch."""
+        return self.select_valid([p.excitation.drive for p in self.dataset.pieces])
+
     def select_valid(self, channels: Sequence[Array]) -> list[Array]:
         """Return the valid samples of a channel of each stretch."""
         return [c[s.valid_mask] for c, s in zip(channels, self.dataset.stretches, strict=True)]
@@ -91,9 +101,7 @@ def predict_log(
 def _make_prediction(
     log: _LogPrediction, before: float | None, free_offset: bool, band: Band | None, provenance: Provenance
 ) -> Prediction:
-    pieces, floor = log.dataset.pieces, log.dataset.floor.noise
-    errors, forces = log.errors, log.select_valid([p.force for p in pieces])
-    drives = log.select_valid([p.excitation.drive for p in pieces])
+    errors, forces, floor = log.errors, log.forces, log.dataset.floor.noise
     error, force = np.concatenate(errors), np.concatenate(forces)
     rmse = compute_rmse(error)
     return Prediction(
@@ -101,7 +109,7 @@ def _make_prediction(
         nrmse=compute_nrmse(error, force),
         bias_n=float(error.mean()),
         noise_floor_n=floor,
-        per_drive=compute_drive_errors(drives, errors, forces, log.dataset.drive_unit),
+        per_drive=compute_drive_errors(log.drives, errors, forces, log.dataset.drive_unit),
         samples=len(error),
         freed=["y0 of each stretch"] + (["force offset of each stretch"] if free_offset else []),
         before_n=before,

@@ -246,13 +246,9 @@ def describe_outlier_logs(names: Sequence[str], errors: Sequence[Array], ratio: 
         errors: force error (N,) [N] of each stretch.
         ratio: force error of the whole fit over its noise floor (dimensionless).
     """
-    logs = list(dict.fromkeys(names))
-    if len(logs) < 2 or ratio < _MISFIT_RATIO:
+    if len(set(names)) < 2 or ratio < _MISFIT_RATIO:
         return []
-    rmse = {}
-    for log in logs:
-        log_errors = np.concatenate([e for e, name in zip(errors, names, strict=True) if name == log])
-        rmse[log] = float(np.sqrt(np.mean(log_errors**2)))
+    rmse = {log: _compute_log_rmse(log, names, errors) for log in dict.fromkeys(names)}
     best = min(rmse.values())
     return [
         f"{log}: force error {error:.3g} N, {error / best:.2g} times that of the best log: another damper or "
@@ -260,3 +256,8 @@ def describe_outlier_logs(names: Sequence[str], errors: Sequence[Array], ratio: 
         for log, error in rmse.items()
         if error > _OUTLIER_RATIO * best
     ]
+
+
+def _compute_log_rmse(log: str, names: Sequence[str], errors: Sequence[Array]) -> float:
+    log_errors = np.concatenate([e for e, name in zip(errors, names, strict=True) if name == log])
+    return float(np.sqrt(np.mean(log_errors**2)))

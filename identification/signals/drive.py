@@ -59,10 +59,14 @@ def bin_drive(drive: Array, max_bins: int = 8) -> list[tuple[float, Indices]]:
     coarse = np.round((drive - drive.min()) / (0.02 * span))
     levels, counts = np.unique(coarse, return_counts=True)
     frequent = levels[counts >= 0.01 * len(drive)]
-    if len(frequent) <= 12 and counts[np.isin(levels, frequent)].sum() > 0.9 * len(drive):
-        nearest = np.abs(coarse[:, None] - frequent[None, :]).argmin(axis=1)
-        groups = [np.flatnonzero(nearest == k) for k in range(len(frequent))]
-        return [(float(np.median(drive[g])), g) for g in groups]
+    if len(frequent) > 12 or counts[np.isin(levels, frequent)].sum() <= 0.9 * len(drive):
+        return _bin_evenly(drive, span, max_bins)
+    nearest = np.abs(coarse[:, None] - frequent[None, :]).argmin(axis=1)
+    groups = [np.flatnonzero(nearest == k) for k in range(len(frequent))]
+    return [(float(np.median(drive[g])), g) for g in groups]
+
+
+def _bin_evenly(drive: Array, span: float, max_bins: int) -> list[tuple[float, Indices]]:
     bins = np.minimum((max_bins * (drive - drive.min()) / span).astype(int), max_bins - 1)
     width = span / max_bins
     return [

@@ -93,21 +93,16 @@ def fit_harmonics(values: Array, weights: Array, rate: float, frequency: float, 
 def find_steady_cycles(
     values: Array, weights: Array, rate: float, frequency: float, noise: float
 ) -> SteadyCycles | None:
-    """Find the steady cycles of a segment on decimated samples.
+    """Find the steady cycles of a segment on decimated samples; None if fewer than two are steady.
 
-    Args:
-        values, weights, rate, frequency, noise: as for `fit_harmonics`.
-
-    Returns:
-        The cycles; None if fewer than two are steady.
+    The arguments are those of `fit_harmonics`.
     """
     if len(values) * frequency < _MIN_CYCLES * rate:
         return None
     # Frequency and steadiness need six samples a cycle of the highest harmonic used here, and 3000 in all.
     stride = max(1, min(len(values) // 3000, int(rate / (24.0 * frequency))))
-    start, stop, frequency, disturbance = _grow_steady_part(
-        values[::stride], weights[::stride], rate / stride, frequency, noise
-    )
+    decimated = values[::stride], weights[::stride]
+    start, stop, frequency, disturbance = _grow_steady_part(*decimated, rate / stride, frequency, noise)
     # A disturbance begins and ends between two decimated samples.
     disturbance = maximum_filter1d(disturbance, 3)
     start, stop = start * stride, min(stop * stride, len(values))
@@ -206,15 +201,20 @@ def _refine_frequency(
     for _ in range(4):
         basis = _make_basis(position[part], _FEW_HARMONICS, frequency / rate)
         amplitudes = _regress(basis, values[part], weights[part])
-        orders = np.repeat(np.arange(1, _FEW_HARMONICS + 1), 2)
-        quadrature = basis[2:].reshape(_FEW_HARMONICS, 2, -1)[:, ::-1].reshape(2 * _FEW_HARMONICS, -1)
-        sensitivity = (amplitudes[2:] * orders * np.tile([-1.0, 1.0], _FEW_HARMONICS)) @ quadrature * angle
+        sensitivity = _differentiate_by_phase(basis, amplitudes) * angle
         change = _regress(np.vstack([basis, sensitivity]), values[part], weights[part])[-1]
         # Far from the achieved frequency a full step may diverge.
         frequency += float(np.clip(change, -0.05 * frequency, 0.05 * frequency))
     basis = _make_basis(position, _FEW_HARMONICS, frequency / rate)
     amplitudes = _regress(basis[:, part], values[part], weights[part])
     return frequency, values - amplitudes @ basis
+
+
+def _differentiate_by_phase(basis: Array, amplitudes: Array) -> Array:
+    """Return the derivative (N,) of the few harmonics over the phase [rad] of the first one."""
+    factors = np.repeat(np.arange(1, _FEW_HARMONICS + 1), 2) * np.tile([-1.0, 1.0], _FEW_HARMONICS)
+    quadrature = basis[2:].reshape(_FEW_HARMONICS, 2, -1)[:, ::-1].reshape(2 * _FEW_HARMONICS, -1)
+    return np.asarray((amplitudes[2:] * factors) @ quadrature)
 
 
 def _find_cycle_run(deviation: Array, disturbed: BoolArray, cycle: float, limit: float) -> tuple[int, int]:

@@ -238,15 +238,10 @@ def _compute_unexplained(stretch: Stretch, displacement: Array, velocity: Array)
     """
     typical = float(np.std(velocity[stretch.measured])) or 1.0
     dashpots = [velocity, np.tanh(velocity / (0.1 * typical)), np.tanh(velocity / (0.5 * typical))]
-    terms = np.stack(
-        [
-            np.ones_like(velocity),
-            stretch.drive,
-            displacement,
-            *dashpots,
-            *(term * stretch.drive for term in dashpots),
-        ]
-    )[:, stretch.measured]
+    driven = [term * stretch.drive for term in dashpots]
+    terms = np.stack([np.ones_like(velocity), stretch.drive, displacement, *dashpots, *driven])[
+        :, stretch.measured
+    ]
     force = stretch.force[stretch.measured]
     amplitudes = np.linalg.lstsq(terms @ terms.T, terms @ force, rcond=1e-12)[0]
     return float(np.mean((force - amplitudes @ terms) ** 2))

@@ -61,10 +61,7 @@ def find_disturbances(stretch: Stretch, deviation: Array) -> list[Indices]:
     """Return the samples of each disturbance.
 
     A small departure that begins at a change of drive or stroke is the actuator's response and not a disturbance.
-
-    Args:
-        stretch: the recording.
-        deviation: (N,) distance of the rod from its wave in candidate disturbances [m]; 0 elsewhere.
+    ``deviation`` (N,) is the distance of the rod from its wave in candidate disturbances [m], and 0 elsewhere.
     """
     if not deviation.any():
         return []

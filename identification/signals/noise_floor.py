@@ -83,9 +83,7 @@ class _RepeatStatistics(NamedTuple):
 def estimate_floor(stretch: Stretch, motion: Motion) -> NoiseFloorEstimate:
     """Estimate the noise of the force of one stretch, without the effect of displacement noise.
 
-    Args:
-        stretch: recorded force, drive and segments.
-        motion: its motion, whose change from cycle to cycle explains part of the force's change.
+    The motion's change from cycle to cycle explains part of the force's change.
     """
     high_frequency = estimate_high_frequency_noise(stretch.force)
     periodic = [s for s in stretch.segments if s.motion in PERIODIC_MOTIONS and s.frequency]
@@ -243,8 +241,15 @@ def _subtract_previous_cycle(values: Array, lag: float) -> tuple[Array, float]:
         (N - n,) differences of the last samples, and their variance for white noise of variance 1.
     """
     whole = math.floor(lag)
-    t = lag - whole
-    weights = np.array(
+    weights = _make_cubic_weights(lag - whole)
+    before = np.convolve(values, weights[::-1], "valid")
+    skip = whole + 2
+    return values[skip:] - before[: len(values) - skip], float(1.0 + weights @ weights)
+
+
+def _make_cubic_weights(t: float) -> Array:
+    """Return Lagrange's weights of four samples at -1, 0, 1 and 2 for the value at -t."""
+    return np.array(
         [
             (t + 1.0) * t * (t - 1.0) / 6.0,
             -(t + 1.0) * t * (t - 2.0) / 2.0,
@@ -252,9 +257,6 @@ def _subtract_previous_cycle(values: Array, lag: float) -> tuple[Array, float]:
             -t * (t - 1.0) * (t - 2.0) / 6.0,
         ]
     )
-    before = np.convolve(values, weights[::-1], "valid")
-    skip = whole + 2
-    return values[skip:] - before[: len(values) - skip], float(1.0 + weights @ weights)
 
 
 def _find_repeating_samples(drive: Array, measured: BoolArray, lag: float, rate: float) -> BoolArray:
@@ -266,6 +268,7 @@ def _find_repeating_samples(drive: Array, measured: BoolArray, lag: float, rate:
     tolerance = max(6.0 * noise, 2e-3 * np.ptp(drive))
     differs = np.abs(drive[skip:] - drive[skip - whole : len(drive) - whole]) > tolerance
     differs |= ~measured[skip:] | ~measured[skip - whole : len(drive) - whole]
+    # Before the first of these samples, the recent past of the drive is unknown.
     differs[:settling] = True
     recent_differences = np.convolve(differs, np.ones(settling + 1), "full")[: len(differs)]
     return np.asarray(recent_differences < 0.5)

@@ -31,7 +31,7 @@ def compute_penalty(cutoff: Array | float, rate: float) -> Array:
 def smooth_signal(
     values: Array, weights: Array, penalty: Array, expected: Array, *, twicing: bool = False
 ) -> Array:
-    """Smooth a signal.
+    """Return the smooth signal (N,), in the unit of the measured one.
 
     Args:
         values: (N,) measured signal; ignored where its weight is 0.
@@ -39,9 +39,6 @@ def smooth_signal(
         penalty: (N-3,) penalty of each third difference (dimensionless).
         expected: (N-3,) expected third difference, in the signal's unit.
         twicing: whether the remainder is smoothed and added.
-
-    Returns:
-        (N,) smooth, in the signal's unit.
     """
     known = np.where(weights > 0, values, 0.0)
     bands = np.ones((4, len(values) + 3))

@@ -97,11 +97,8 @@ class _SimulationChain:
         self._h = 1.0 / excitation.rate
         self._parallel_force = channel.compute_parallel_force(model, motion, self._h)
         extra = (*field.columns, -1, *motion.columns, *scales.columns)
-        self._columns = [
-            _ETA,
-            _DRIVE_DELAY,
-            *(_FORCE_DELAY if at < 0 else len(SENSITIVITY_COLUMNS) + at for at in extra),
-        ]
+        further = (_FORCE_DELAY if at < 0 else len(SENSITIVITY_COLUMNS) + at for at in extra)
+        self._columns = [_ETA, _DRIVE_DELAY, *further]
 
     def simulate_rigid(
         self, step_counts: StepCounts, max_travel: float, sensitivities: bool

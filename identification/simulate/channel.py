@@ -66,12 +66,8 @@ def differentiate_parallel_force(
         rows = differentiate_by_parameters(partial(form.function, motion.x, motion.v), values, form.parameters)
         own += [(at + k, np.broadcast_to(row, len(motion.x))) for k, row in enumerate(rows)]
     for at, form, values in model.select_forms("hysteretic_force", "relaxation_force"):
-        moving += np.stack(
-            [
-                _differentiate_memory_force(form, h, values, motion, dx, dv)
-                for dx, dv in zip(motion.dx, motion.dv, strict=True)
-            ]
-        )
+        pairs = zip(motion.dx, motion.dv, strict=True)
+        moving += np.stack([_differentiate_memory_force(form, h, values, motion, *pair) for pair in pairs])
         whole = partial(_compute_memory_force, form, h, motion.x, motion.v)
         own += [(at + k, row) for k, row in enumerate(differentiate_by_parameters(whole, values, form.parameters))]
     return moving, own

@@ -98,6 +98,12 @@ def _apply_coil(coil: Any, parameters: tuple[float, ...], drive: Array, h: float
         u = apply_lag(u, lag, 0.5 * h)
     if part < 1.0:
         u = part * u + (1.0 - part) * apply_two_lags(drive, eta, 0.0, delay, h)
+    # Lags act on the command and maps on the field, so all lags come first, whatever the order of the effects.
+    return _apply_maps(maps, u)
+
+
+def _apply_maps(maps: list[tuple[Any, tuple[float, ...]]], u: Array) -> Array:
+    """Apply functions of the field, with and without memory, in the order of the chain."""
     for form, own in maps:
         if form.action == "field":
             u = form.function(u, *own)

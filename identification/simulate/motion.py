@@ -54,10 +54,7 @@ def compute_damper_motion(
     for at, form, values in model.select_forms("displacement_map"):
         motion = _invert_channel(motion, form, values, at, sensitivities)
     for at, form, values in model.select_forms("displacement_backlash"):
-        followed = _apply_backlash(
-            compile_once(form.function), motion.x, motion.v, motion.dx, motion.dv, values[0]
-        )
-        motion = DamperMotion(*followed[:2], motion.a, *followed[2:], motion.da, (*motion.columns, at))
+        motion = _follow_with_backlash(motion, form, values, at)
     return motion
 
 
@@ -109,11 +106,7 @@ def _invert_channel(
     moved = motion._replace(x=x, v=motion.v / gain)
     if not sensitivities:
         return moved
-    bend = (
-        form.function(x + _SECOND_STEP, *values)
-        + form.function(x - _SECOND_STEP, *values)
-        - 2.0 * form.function(x, *values)
-    ) / _SECOND_STEP**2
+    bend = _compute_bend(form.function, x, values)
     over_v = -motion.v * bend / gain**3
     moved = moved._replace(dx=motion.dx / gain, dv=motion.dv / gain + motion.dx * over_v)
     shifts = differentiate_by_parameters(lambda *p: form.function(x, *p), values, form.parameters)
@@ -123,11 +116,25 @@ def _invert_channel(
     return _append_rows(moved, dx, dv, tuple(range(at, at + len(values))))
 
 
-def _compute_gain(bend: Callable[..., Any], x: Array, values: tuple[float, ...]) -> Array:
+def _compute_bend(error: Callable[..., Any], x: Array, values: tuple[float, ...]) -> Array:
+    """Compute the second derivative [1/m] of the channel's error at displacements x (N,)."""
+    ahead, back = error(x + _SECOND_STEP, *values), error(x - _SECOND_STEP, *values)
+    return np.asarray((ahead + back - 2.0 * error(x, *values)) / _SECOND_STEP**2)
+
+
+def _compute_gain(error: Callable[..., Any], x: Array, values: tuple[float, ...]) -> Array:
     """Compute the gain [1] of the channel at displacements x (N,)."""
-    steepness = (bend(x + _FIRST_STEP, *values) - bend(x - _FIRST_STEP, *values)) / (2.0 * _FIRST_STEP)
+    steepness = (error(x + _FIRST_STEP, *values) - error(x - _FIRST_STEP, *values)) / (2.0 * _FIRST_STEP)
     # A channel with zero or negative gain has no inverse, but a search may try one.
     return np.asarray(np.maximum(1.0 + steepness, 0.1))
+
+
+def _follow_with_backlash(motion: DamperMotion, form: Form, values: tuple[float, ...], at: int) -> DamperMotion:
+    """Return the motion of a damper that follows its mount with backlash."""
+    x, v, dx, dv = _apply_backlash(
+        compile_once(form.function), motion.x, motion.v, motion.dx, motion.dv, values[0]
+    )
+    return DamperMotion(x, v, motion.a, dx, dv, motion.da, (*motion.columns, at))
 
 
 _COMPILED: dict[Any, Any] = {}

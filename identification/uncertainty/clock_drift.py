@@ -154,18 +154,24 @@ def _find_likeliest_drift(
 ) -> float:
     """Return the drift [s] with the largest likelihood of the residuals; 0 if it may be chance.
 
-    The unknowns are fitted along. The drift is at most the clock deviation [s].
+    The drift is at most the clock deviation [s].
     """
-    shared = terms.cross_information[interior]
-    solved = np.linalg.solve(H, np.column_stack([shared, gradient]))
-    information = terms.information - shared.T @ solved[:, :-1]
-    # Along the eigenvectors the knots are independent, so one decomposition serves every trial.
-    size, vectors = np.linalg.eigh(information)
-    informative = size > _MIN_INFORMATION * size[-1]
-    size, slope = size[informative], (vectors.T @ (terms.gradient - shared.T @ solved[:, -1]))[informative]
+    size, slope = _separate_knots(terms, H, gradient, interior)
     trials = np.concatenate([[0.0], np.geomspace(_MIN_DRIFT, max(clock_deviation, 2.0 * _MIN_DRIFT), _TRIALS)])
     variances = 1.0 + trials[:, None] ** 2 * size
     # Twice the negative log-likelihood, up to terms that do not depend on the drift.
     deviance = np.sum(np.log(variances) + slope**2 / (size * variances), axis=1)
     best = int(np.argmin(deviance))
     return float(trials[best]) if deviance[0] - deviance[best] > _MIN_LIKELIHOOD_GAIN else 0.0
+
+
+def _separate_knots(terms: _DriftTerms, H: Array, gradient: Array, interior: BoolArray) -> tuple[Array, Array]:
+    """Return information and gradient over the knots, (M,) each, with the unknowns fitted along.
+
+    Along the eigenvectors the knots are independent, so one decomposition serves every trial.
+    """
+    shared = terms.cross_information[interior]
+    solved = np.linalg.solve(H, np.column_stack([shared, gradient]))
+    size, vectors = np.linalg.eigh(terms.information - shared.T @ solved[:, :-1])
+    informative = size > _MIN_INFORMATION * size[-1]
+    return size[informative], (vectors.T @ (terms.gradient - shared.T @ solved[:, -1]))[informative]

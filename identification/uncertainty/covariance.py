@@ -80,6 +80,7 @@ def _compute_block_scores(problem: Problem, unknowns: Array) -> Array:
         r, J = problem.compute_residuals(unknowns, i)
         starts = np.arange(0, len(r), max(1, round(block * p.excitation.rate)))
         table = np.zeros((len(starts), len(unknowns)))
+        # Neighbouring errors of a misfit are correlated: they add up in a block, while white ones average out.
         table[:, problem.find_columns(i)] = np.add.reduceat(J * r[:, None], starts, axis=0)
         rows.append(table)
     return np.vstack(rows)

@@ -109,19 +109,22 @@ def _make_estimate(
     if reason := _explain_missing_interval(quantity, sd, unobservable, at_bound):
         note = f"{quantity.meaning}: {reason}"
         return Estimate(value=value, unit=unit, ci95=None, identifiable=False, note=note)
+    # A value near zero, such as a slope over the drive, is judged by the usual size of its quantity.
     relative = sd / max(abs(value), 0.1 * quantity.scale)
     identifiable = bool(relative < _IDENTIFIABLE)
-    note = (
-        f"known to {100 * relative:.2g} %"
-        if identifiable
-        else f"{quantity.meaning}: these strokes determine it to {100 * relative:.0f} % at best"
-    )
+    note = _describe_precision(quantity, relative)
     positive = quantity.low >= 0 and value > 0
     ci95, ci99 = (
         clip_interval(make_interval(value, sd, z, positive=positive), value, quantity.low, quantity.high)
         for z in (Z95, Z99)
     )
     return Estimate(value=value, unit=unit, ci95=ci95, ci99=ci99, identifiable=identifiable, note=note)
+
+
+def _describe_precision(quantity: Quantity, relative: float) -> str:
+    if relative < _IDENTIFIABLE:
+        return f"known to {100 * relative:.2g} %"
+    return f"{quantity.meaning}: these strokes determine it to {100 * relative:.0f} % at best"
 
 
 def _explain_missing_interval(quantity: Quantity, sd: float, unobservable: bool, at_bound: bool) -> str:

@@ -82,13 +82,9 @@ class InputNoiseStatistics:
 def resample_input_noise(
     problem: Problem, stretches: Sequence[Stretch], minimum: Minimum, seed: int
 ) -> InputNoiseStatistics:
-    """Estimate the errors that input noise causes, from replicas with fresh noise.
+    """Estimate the errors at a minimum that input noise causes, from replicas with fresh noise.
 
-    Args:
-        problem: problem with one piece for each stretch, in the same order.
-        stretches: recordings of the pieces.
-        minimum: minimum of the problem.
-        seed: seed of the noise.
+    The problem has one piece for each stretch, in the same order.
     """
     fitted = _replace_recorded_force(problem.make_fast(), minimum.unknowns)
     interior = fitted.find_interior(minimum.unknowns)
@@ -100,9 +96,8 @@ def resample_input_noise(
     for number in range(REPLICAS):
         replica = replace(fitted, pieces=tuple(_draw_replica(fitted, simulated, cutoffs, [seed, number])))
         plain[number, interior], biased[number, interior] = _solve_steps(replica, minimum, sensitivities, interior)
-    return InputNoiseStatistics(
-        np.asarray(_STUDENT_FACTOR * (plain.T @ plain) / REPLICAS), (biased - plain).mean(axis=0)
-    )
+    scatter = np.asarray(_STUDENT_FACTOR * (plain.T @ plain) / REPLICAS)
+    return InputNoiseStatistics(scatter, (biased - plain).mean(axis=0))
 
 
 def _solve_steps(
@@ -130,6 +125,7 @@ def remove_bias(problem: Problem, minimum: Minimum, bias: Array) -> Minimum:
 
 def _replace_recorded_force(problem: Problem, unknowns: Array) -> Problem:
     """Return the problem with its own simulated force in place of the recorded one."""
+    # Without a residual at the minimum, the fresh noise of a replica alone moves the unknowns.
     forces = problem.simulate(unknowns)
     return replace(problem, pieces=tuple(replace(p, force=f) for p, f in zip(problem.pieces, forces, strict=True)))
 

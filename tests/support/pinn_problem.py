@@ -10,7 +10,7 @@ from identification.fitting.force_channel import LowPass
 from identification.fitting.piece import Piece
 from identification.fitting.problem import Problem
 from identification.fitting.search_space import SearchSpace
-from identification.logs.recording import ChannelFilter
+from identification.logs import ChannelFilter
 from identification.pinn.common.initialisation import InitialStates
 from identification.pinn.common.training_pieces import make_training_pieces
 from identification.pinn.elements.batches import make_batches

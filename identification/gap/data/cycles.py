@@ -117,6 +117,7 @@ def _number_cycles(segment: Segment, piece: Piece, rate: float) -> tuple[Indices
     turns = np.arange(count) * segment.frequency / rate
     part = slice(segment.start, segment.stop)
     wave = np.exp(-2j * np.pi * turns)
+    # A segment may begin anywhere in its stroke, so the phase comes from the motion itself.
     first = np.sum(piece.excitation.displacement[part] * wave)
     phase = (turns + (np.angle(first) / (2 * np.pi) + 0.25)) % 1.0
     whole = max(int(count * segment.frequency / rate + _CYCLE_TOLERANCE), 1)

@@ -44,15 +44,18 @@ def mask_disturbed_cycles(pieces: Sequence[Piece], cycles: Cycles) -> tuple[tupl
     disturbed = _drop_segment_ends(known & (jerks > limit), cycles)
     if not disturbed.any():
         return tuple(pieces), []
-    note = (
-        f"the rod did not repeat its stroke in {np.count_nonzero(disturbed)} of {cycles.count} cycles (jerk up to "
+    note = _describe_disturbed(jerks, disturbed, limit)
+    if disturbed.mean() > _MAX_DISTURBED_SHARE:
+        note += "; no cycle was excluded, and the diagnosis of this recording is unreliable: record again"
+        return tuple(pieces), [note]
+    return _mask_cycles(pieces, cycles, disturbed), [f"{note}; these cycles were excluded"]
+
+
+def _describe_disturbed(jerks: Array, disturbed: BoolArray, limit: float) -> str:
+    return (
+        f"the rod did not repeat its stroke in {np.count_nonzero(disturbed)} of {len(jerks)} cycles (jerk up to "
         f"{1e6 * jerks[disturbed].max():.3g} µm, limit {1e6 * limit:.2g} µm; late setpoints or a shock)"
     )
-    if disturbed.mean() > _MAX_DISTURBED_SHARE:
-        return tuple(pieces), [
-            f"{note}; no cycle was excluded, and the diagnosis of this recording is unreliable: record again"
-        ]
-    return _mask_cycles(pieces, cycles, disturbed), [f"{note}; these cycles were excluded"]
 
 
 def _drop_segment_ends(disturbed: BoolArray, cycles: Cycles) -> BoolArray:

@@ -119,6 +119,7 @@ def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replica
     before, after = _resample_cycles(errors, random)
     gap = np.maximum(before - noise**2, _MIN_GAP_SHARE * noise**2)
     form_error = np.maximum(after - noise**2 - replicates.evaluated, 0.0) / gap
+    # The factor's mean is one for many strokes, a representative sample, and larger for few (decision 0014).
     deviation = _FORM_DEVIATION + _FEW_STROKES_DEVIATION / max(strokes, 1)
     form_error *= np.exp(deviation * random.standard_normal(_DRAWS) - 0.5 * _FORM_DEVIATION**2)
     size = (replicates.before - noise**2) * np.exp(_GAP_DEVIATION * random.standard_normal(_DRAWS))
@@ -132,6 +133,7 @@ def _resample_cycles(errors: CycleErrors, random: np.random.Generator) -> Array:
     members = [np.flatnonzero(index == k) for k in range(len(segments))]
     sums, means = np.stack(errors[:2]), np.empty((2, _DRAWS))
     for draw in range(_DRAWS):
+        # Segments first: cycles of one condition are alike, and drawn alone would make the interval too narrow.
         chosen = random.integers(0, len(segments), len(segments))
         rows = np.concatenate([random.choice(members[k], len(members[k])) for k in chosen])
         means[:, draw] = sums[:, rows].sum(axis=1) / errors.counts[rows].sum()

@@ -35,16 +35,24 @@ def take_joint_step(problem: Problem, unknowns: Array) -> tuple[StartPoint, Eval
     if not np.isfinite(here.cost):
         return StartPoint(unknowns), here, np.inf
     step, predicted = predict_joint_step(problem, here, unknowns)
-    best = StartPoint(unknowns, here.cost)
+    return _search_line(problem, StartPoint(unknowns, here.cost), step, predicted), here, predicted
+
+
+def _search_line(problem: Problem, start: StartPoint, step: Array, predicted: float) -> StartPoint:
+    """Return the best point of a step that is shortened as long as shorter is better."""
+    best = start
     for fraction in STEP_FRACTIONS:
-        there = StartPoint(unknowns + fraction * step, problem.compute_cost(unknowns + fraction * step))
+        # The whole step is shortened: clipped by element, it would leave the direction of descent.
+        there = StartPoint(
+            start.unknowns + fraction * step, problem.compute_cost(start.unknowns + fraction * step)
+        )
         if there.cost < best.cost:
             best = there
-            if here.cost - there.cost > _SUFFICIENT_DECREASE * (here.cost - predicted):
+            if start.cost - there.cost > _SUFFICIENT_DECREASE * (start.cost - predicted):
                 break
-        elif best.cost < here.cost:
+        elif best.cost < start.cost:
             break
-    return best, here, predicted
+    return best
 
 
 def predict_joint_step(problem: Problem, here: Evaluation, unknowns: Array) -> tuple[Array, float]:

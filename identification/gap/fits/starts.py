@@ -6,7 +6,7 @@ coordinates of the regression.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -29,24 +29,19 @@ def generate_starts(
     """Yield every start of a joint fit, each after its joint step.
 
     Args:
-        problem: problem with the effects.
         start: unknowns (U,) of an earlier fit of the same law; None for the regression.
         known: values of effects from that fit.
         options: number and kind of starts.
         further: unknowns (U,) of the problem that are starts as well; they come first.
     """
-    for unknowns in further:
-        yield take_joint_step(problem, _settle_law(problem, unknowns, options.law_steps))[0]
+    for u in further:
+        yield take_joint_step(problem, _settle_law(problem, u, options.law_steps))[0]
     origins = [] if start is None else [start]
     if options.starts and (start is None or options.regression_start):
         origins.append(make_starting_points(problem.replace_effects(()))[0])
-    count = 0
-    for unknowns in origins:
-        for values in _combine_starts(problem.effects, known):
-            if count >= options.starts:
-                return
-            count += 1
-            yield take_joint_step(problem, replace_effect_unknowns(problem, unknowns, values))[0]
+    combinations = ((u, values) for u in origins for values in _combine_starts(problem.effects, known))
+    for unknowns, values in islice(combinations, options.starts):
+        yield take_joint_step(problem, replace_effect_unknowns(problem, unknowns, values))[0]
 
 
 def _settle_law(problem: Problem, unknowns: Array, steps: int) -> Array:
@@ -63,11 +58,11 @@ def _settle_law(problem: Problem, unknowns: Array, steps: int) -> Array:
         scale = np.diag(here.hessian)
         damping = _LAW_DAMPING * np.maximum(scale, 1e-9 * scale.max())
         step = solve_bounded_step(problem, here, free, damping, unknowns)
-        decreasing = (f for f in STEP_FRACTIONS if problem.compute_cost(unknowns + f * step) < here.cost)
-        fraction = next(decreasing, None)
-        if fraction is None:
+        trials = (unknowns + fraction * step for fraction in STEP_FRACTIONS)
+        lower = next((trial for trial in trials if problem.compute_cost(trial) < here.cost), None)
+        if lower is None:
             break
-        unknowns = unknowns + fraction * step
+        unknowns = lower
     return unknowns
 
 

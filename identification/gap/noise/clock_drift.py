@@ -20,11 +20,7 @@ def subtract_clock_drift(
 ) -> tuple[Candidate, float]:
     """Remove clock drift from a candidate's residual, on fitted and held-out samples.
 
-    Args:
-        candidate: a set of effects.
-        full_problem: problem of all samples.
-        evaluation: the same recordings, cut into cycles.
-        clock_deviation: standard deviation of the delay between the channels [s].
+    ``clock_deviation`` is the standard deviation of the delay between the channels [s].
 
     Returns:
         The corrected candidate, and the root mean square drift of the delay [s].

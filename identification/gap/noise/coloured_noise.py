@@ -65,12 +65,14 @@ def _sum_repeating_power(residual: Residual, cycles: Cycles) -> tuple[float, flo
     segment = np.where(chosen, cycles.segment[cycles.cycle], -1)
     for number, condition in enumerate(cycles.conditions):
         rows = np.flatnonzero(segment == number)
+        # Where the drive varies, the force changes from cycle to cycle without any noise.
         if not condition.frequency or not len(rows) or np.ptp(residual.drive[rows]) > _STEADY_DRIVE * drive_range:
             continue
         table = _bin_by_phase(residual.values[rows], cycles.cycle[rows], cycles.phase[rows])
         if table is None:
             continue
         mean, variance = table.mean(axis=0), table.var(axis=0, ddof=1)
+        # The mean over the cycles still contains a share of their noise.
         repeating += len(rows) * max(float(np.mean(mean**2 - variance / len(table))), 0.0)
         total += float(np.sum(residual.values[rows] ** 2))
     return repeating, total
@@ -131,6 +133,7 @@ def _has_line(means: Array) -> bool:
 
 def _has_constant_power(means: Array) -> bool:
     """Return True if the power varies from window to window no more than that of surrogates."""
+    # A fixed seed, because the verdict on a recording must not depend on chance.
     random = np.random.default_rng(0)
     size = np.abs(np.fft.rfft(means))
     phases = random.uniform(0.0, 2.0 * np.pi, (_SURROGATES, len(size)))

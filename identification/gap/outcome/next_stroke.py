@@ -57,11 +57,7 @@ def find_best_segment(
 ) -> ProposedSegment | None:
     """Return the trial segment that separates the rivals best; None with fewer than two rivals.
 
-    Args:
-        rivals: rival models.
-        law: coordinates of the damper without effects.
-        limits: limits of motion and drive.
-        noise: noise of the force [N].
+    ``law`` is the damper without effects, ``noise`` that of the force [N].
     """
     best: ProposedSegment | None = None
     for segment, excitation in generate_trial_segments(limits) if len(rivals) > 1 else ():
@@ -125,6 +121,7 @@ class _PredictedForce:
 def _compute_detectability(a: _PredictedForce, b: _PredictedForce, noise: float) -> float:
     """Return the difference of two rivals that no refit removes, over noise and form error [1]."""
     difference = (a.force - b.force) / noise
+    # The rival that imitates the other better counts: a refit of it would hide the difference.
     irreducible = min(_compute_irreducible_norm(difference, p.sensitivities / noise, p.rival) for p in (a, b))
     return irreducible * noise / max(a.total_error, b.total_error)
 

@@ -1,5 +1,6 @@
 """Trial segments: strokes inside the limits of a recording, among which the next stroke is chosen."""
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -48,26 +49,30 @@ class StrokeLimits:
 
 def generate_trial_segments(limits: StrokeLimits) -> Iterator[tuple[dict[str, Any], Excitation]]:
     """Yield segments of a method with their excitations."""
-    low, high = limits.drives
+    for motion, drive in itertools.product(_generate_motions(limits), _make_drives(*limits.drives)):
+        cycles = _count_cycles(motion["frequency_hz"], len(drive.get("levels", [0])))
+        segment = {
+            "name": _format_name(motion, drive),
+            "motion": motion,
+            "centre_m": round(limits.centre, 5),
+            "fade_s": _FADE,
+            "cycles": cycles,
+            "drive": drive,
+        }
+        yield segment, _make_excitation(motion, drive, limits.centre, cycles)
+
+
+def _make_drives(low: float, high: float) -> list[dict[str, Any]]:
+    """Return constant drives and, if the drive may change, a staircase up and down."""
     middle = 0.5 * (low + high)
     drives: list[dict[str, Any]] = [
         {"kind": "constant", "value": round(level, 4)} for level in sorted({low, middle, high})
     ]
     if high > low:
+        # Only steps excite the coil. Levels passed upwards and downwards differ if the field has a memory.
         levels = [round(v, 4) for v in (low, middle, high, middle, low)]
         drives.append({"kind": "staircase", "levels": levels})
-    for motion in _generate_motions(limits):
-        for drive in drives:
-            cycles = _count_cycles(motion["frequency_hz"], len(drive.get("levels", [0])))
-            segment = {
-                "name": _format_name(motion, drive),
-                "motion": motion,
-                "centre_m": round(limits.centre, 5),
-                "fade_s": _FADE,
-                "cycles": cycles,
-                "drive": drive,
-            }
-            yield segment, _make_excitation(motion, drive, limits.centre, cycles)
+    return drives
 
 
 def _count_cycles(frequency: float, levels: int) -> int:
@@ -83,18 +88,22 @@ def _generate_motions(limits: StrokeLimits) -> Iterator[dict[str, Any]]:
         for frequency_share in _FREQUENCY_SHARES:
             yield {
                 "kind": "sine",
-                "amplitude_m": float(f"{amplitude:.3g}"),
-                "frequency_hz": float(f"{max(frequency_share * highest, _LOWEST_FREQUENCY):.3g}"),
+                "amplitude_m": _round(amplitude),
+                "frequency_hz": _round(max(frequency_share * highest, _LOWEST_FREQUENCY)),
             }
     frequency = _TRIANGLE_SPEED_SHARE * limits.velocity / (4 * limits.amplitude)
-    frequency = float(f"{max(frequency, _LOWEST_FREQUENCY):.3g}")
-    amplitude = float(f"{limits.amplitude:.3g}")
+    frequency, amplitude = _round(max(frequency, _LOWEST_FREQUENCY)), _round(limits.amplitude)
     yield {
         "kind": "triangle",
         "amplitude_m": amplitude,
         "frequency_hz": frequency,
-        "corner_acceleration_mps2": float(f"{_CORNER_ACCELERATION * amplitude * frequency**2:.3g}"),
+        "corner_acceleration_mps2": _round(_CORNER_ACCELERATION * amplitude * frequency**2),
     }
+
+
+def _round(value: float) -> float:
+    """Round to three significant digits, as a person would write a method."""
+    return float(f"{value:.3g}")
 
 
 def _format_name(motion: dict[str, Any], drive: dict[str, Any]) -> str:

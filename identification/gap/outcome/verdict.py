@@ -24,13 +24,8 @@ _MIN_PROBABILITY = 0.01
 def decide_verdict(baseline: Candidate, named: Candidate, floor: float, posterior: Posterior) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts.
 
-    A set that leaves a gap is not named where an unknown cause is more probable.
-
-    Args:
-        baseline: candidate without effects.
-        named: the most probable set.
-        floor: noise floor [N].
-        posterior: probabilities of all sets.
+    A set that leaves a gap is not named where an unknown cause is more probable. ``named`` is the most probable
+    set, ``floor`` the noise floor [N].
     """
     at_floor = baseline.held_out_rmse < NO_GAP_RATIO * floor and baseline.train_rmse < _FLOOR_RATIO * floor
     if at_floor or (not named.names and posterior.unknown < UNKNOWN_THRESHOLD):

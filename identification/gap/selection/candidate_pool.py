@@ -119,10 +119,7 @@ class CandidatePool:
     ) -> Candidate:
         """Fit a set on decimated data, evaluate it on all samples, and keep it if it is the best of its names.
 
-        Args:
-            effects: forms of the effects.
-            starts: unknowns (U,) of the joint problem.
-            options: further starts, and iterations.
+        Starts are unknowns (U,) of the joint problem; the options add further ones.
 
         Returns:
             The best known candidate of this set, which may come from an earlier fit.
@@ -190,6 +187,7 @@ class CandidatePool:
     def _find_mains_frequency(self, parent: Candidate) -> float:
         """Find the mains frequency [Hz] in the residual of the longest stretch."""
         counts = [len(p.force) for p in self.full_problem.pieces]
+        # The resolution of a frequency increases with the length of the stretch.
         longest = counts.index(max(counts))
         part = slice(sum(counts[:longest]), sum(counts[: longest + 1]))
         error = np.where(parent.residual.valid, parent.residual.values, 0.0)[part]

@@ -152,6 +152,7 @@ class _Linearisation:
         """Return the starts of a form; mains interference starts at one frequency only."""
         if model.name != "mains_hum":
             return model.form.starts
+        # The spectrum of the residual shows the frequency directly.
         return [(*model.form.starts[0][:-1], self.mains_frequency)]
 
     def _predict_gain(self, model: EffectModel, values: tuple[float, ...]) -> ScreeningResult:

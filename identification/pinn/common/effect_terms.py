@@ -134,6 +134,7 @@ class _PieceTerms:
 
     def evaluate_points(self, b: Batch) -> ResidualInputs:
         """Return the inputs at the Gauss points of a batch, interpolated linearly between half steps."""
+        # Short of the last point, so that a right neighbour exists everywhere.
         last = self._half_step_inputs.field.u.shape[-1] - 1.001
         position = np.clip(2.0 * b.time / b.source.inputs.h, 0.0, last)
         i = position.astype(np.int64)
@@ -167,13 +168,16 @@ class _PieceTerms:
             "u": self._scatter_columns((*(1 + k for k in field.columns), 0), field.du[2:]),
         }
         if scales.values.shape[1]:
+            # Of the three factors, only that of c1 is in the force; the others enter the law at the Gauss points.
+            columns = (*motion_columns, *(1 + k for k in scales.columns))
             values["c1_factor"] = scales.values[2]
-            partials["c1_factor"] = self._scatter_columns(
-                (*motion_columns, *(1 + k for k in scales.columns)), scales.derivatives[:, 2]
-            )
-        delay_factors = np.zeros(self._count)
-        delay_factors[[0, *self._delayed_columns]], delay_factors[self._advanced_columns] = 1.0, -1.0
-        return ResidualInputs(FieldSamples(field.u, *field.du[:2]), values, partials, delay_factors)
+            partials["c1_factor"] = self._scatter_columns(columns, scales.derivatives[:, 2])
+        return ResidualInputs(FieldSamples(field.u, *field.du[:2]), values, partials, self._make_delay_factors())
+
+    def _make_delay_factors(self) -> Array:
+        factors = np.zeros(self._count)
+        factors[[0, *self._delayed_columns]], factors[self._advanced_columns] = 1.0, -1.0
+        return factors
 
     def _compute_parallel_force(
         self, motion: DamperMotion, motion_columns: tuple[int, ...]
@@ -185,16 +189,8 @@ class _PieceTerms:
         J = self._scatter_columns(motion_columns, over_motion)
         for k, row in over_parameters:
             J[1 + k] += row
-        force = apply_force_channel(
-            model,
-            excitation,
-            motion,
-            compute_parallel_force(model, motion, h),
-            J.T,
-            1,
-            [0, *self._delayed_columns],
-        )
-        return force, J
+        force = compute_parallel_force(model, motion, h)
+        return apply_force_channel(model, excitation, motion, force, J.T, 1, [0, *self._delayed_columns]), J
 
     @cached_property
     def _half_step_inputs(self) -> ResidualInputs:
@@ -210,9 +206,8 @@ class _PieceTerms:
         if scales.values.shape[1]:
             values = dict(zip(_FACTOR_NAMES, _interleave(scales.values, scales.midpoints), strict=True))
             columns = [1 + k for k in (*motion.columns, *scales.columns)]
-            rows = self._scatter_columns(
-                columns, _interleave(scales.derivatives, scales.midpoint_derivatives)[1:].swapaxes(0, 1)
-            )
+            derivatives = _interleave(scales.derivatives, scales.midpoint_derivatives)[1:]
+            rows = self._scatter_columns(columns, derivatives.swapaxes(0, 1))
             # On the displacement channel's own time, the motion does not depend on a shift of that channel.
             rows[:, self._advanced_columns] = 0.0
             partials |= dict(zip(_FACTOR_NAMES, rows, strict=True))
@@ -224,6 +219,7 @@ class _PieceTerms:
         if not maps:
             return {}, {}
         effects = tuple(e for e in self._model.effects if e.form.action == "displacement_map")
+        # A map acts on each instant alone, so any rate and acceleration will do.
         flat = Excitation(1.0, x.ravel(), v.ravel(), np.zeros(x.size), np.zeros(x.size))
         motion = compute_damper_motion(SimulationModel(self._model.coordinates, effects=effects), flat)
         columns = [1 + first + k for first, _, values in maps for k in range(len(values))]

@@ -124,6 +124,7 @@ def _fit_memoryless(problem: Problem) -> MemorylessDamper:
 
     typical_force = float(np.median(np.abs(force))) + problem.noise
     viscous = 0.2 * typical_force / max(float(np.sqrt(np.mean(v**2))), 1e-9)
+    # Robust, because this damper has no loop, and samples after a reversal are far from it.
     fits = []
     for ratio in _C1_STARTS:
         c1 = ratio * float(np.abs(force).max() / np.abs(v).max())

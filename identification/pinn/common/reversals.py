@@ -45,15 +45,15 @@ def find_reversals(time: Array, slip_velocity: Array, yield_displacement: float)
         yield_displacement: slip over which the hysteresis turns [m].
     """
     slip = integrate_slip(time, slip_velocity)
-    reversals = []
-    for i in find_turning_points(slip, REVERSAL_THRESHOLD * yield_displacement):
-        crossings = [
-            k for k in (i - 1, i) if 0 <= k < len(time) - 1 and slip_velocity[k] * slip_velocity[k + 1] < 0
-        ]
-        if not crossings:
-            reversals.append(float(time[i]))
-            continue
-        k = crossings[0]
-        fraction = slip_velocity[k] / (slip_velocity[k] - slip_velocity[k + 1])
-        reversals.append(float(time[k] + fraction * (time[k + 1] - time[k])))
-    return np.array(reversals)
+    # A threshold, because noise of the slip velocity crosses zero many times around one reversal.
+    turning_points = find_turning_points(slip, REVERSAL_THRESHOLD * yield_displacement)
+    return np.array([_interpolate_zero(time, slip_velocity, i) for i in turning_points])
+
+
+def _interpolate_zero(time: Array, values: Array, i: int) -> float:
+    """Return the time [s] of the zero next to a sample; without a change of sign, that of the sample."""
+    for k in (i - 1, i):
+        if 0 <= k < len(time) - 1 and values[k] * values[k + 1] < 0:
+            fraction = values[k] / (values[k] - values[k + 1])
+            return float(time[k] + fraction * (time[k + 1] - time[k]))
+    return float(time[i])

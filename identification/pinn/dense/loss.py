@@ -105,10 +105,8 @@ class DenseLoss:
     ) -> Tensor:  # fmt: skip
         """Return the Jacobian (B, 3 N, W + 13), written in place: a copy would take as long as its computation."""
         count, (dampers, samples) = self.network.weight_count, du_deta.shape
-        search_jacobian = du_deta.new_tensor(
-            np.array([d.problem.space.differentiate(row) for d, row in zip(self.dampers, q, strict=True)])
-        )
-        units = du_deta.new_tensor(_OUTPUT_UNITS)
+        derivatives = [d.problem.space.differentiate(row) for d, row in zip(self.dampers, q, strict=True)]
+        search_jacobian, units = du_deta.new_tensor(np.array(derivatives)), du_deta.new_tensor(_OUTPUT_UNITS)
         jacobian = du_deta.new_empty(dampers, _RESIDUAL_KINDS * samples, count + COORDINATE_COUNT)
         for k, (partials, scale) in enumerate(zip(_differentiate_residuals(values), scales, strict=True)):
             partials["eta"] = partials.get("u", torch.zeros_like(scale)) * du_deta
@@ -117,9 +115,8 @@ class DenseLoss:
                 _stack_columns(partials, names, scale) * units for names in (("z", "y"), ("z_rate", "y_rate"))
             )
             self.network.write_jacobian(weights, cache, over_outputs, over_rates, rows[..., :count])
-            torch.matmul(
-                _stack_columns(partials, Coordinates._fields, scale), search_jacobian, out=rows[..., count:]
-            )
+            over_coordinates = _stack_columns(partials, Coordinates._fields, scale)
+            torch.matmul(over_coordinates, search_jacobian, out=rows[..., count:])
         return jacobian
 
     def assemble_normal_equations(

@@ -134,12 +134,8 @@ class DenseTraining:
 
     def _pretrain(self) -> None:
         """Fit the weights to the initial states, with fixed coordinates."""
-        samples = [np.linspace(0, d.size[0] - 1, self.samples).astype(np.int64) for d in self.dampers]
-        inputs, states = zip(
-            *(d.compute_initial_states(k) for d, k in zip(self.dampers, samples, strict=True)), strict=True
-        )
-        value, rate = (self._to_tensor(np.stack(part)) for part in zip(*inputs, strict=True))
-        target = self._to_tensor(np.stack(states))
+        # From random weights, free coordinates would follow the network's errors far from the damper.
+        value, rate, target = self._gather_initial_states()
 
         def compute_residuals(weights: Tensor, dampers: Tensor) -> Tensor:
             outputs = self.network.forward(weights, value[dampers], rate[dampers])[0]
@@ -154,6 +150,15 @@ class DenseTraining:
             normal = NormalEquations.assemble(jacobian, residuals)
             self.weights = self.solver.step(normal, self.weights, torch.zeros_like(self.weights), evaluate)
             self.monitor.report(f"pinn, initial states {k + 1}", float("nan"))
+
+    def _gather_initial_states(self) -> tuple[Tensor, Tensor, Tensor]:
+        """Return inputs, their rates, and initial states at evenly spaced samples of each damper."""
+        samples = [np.linspace(0, d.size[0] - 1, self.samples).astype(np.int64) for d in self.dampers]
+        inputs, states = zip(
+            *(d.compute_initial_states(k) for d, k in zip(self.dampers, samples, strict=True)), strict=True
+        )
+        value, rate = (self._to_tensor(np.stack(part)) for part in zip(*inputs, strict=True))
+        return value, rate, self._to_tensor(np.stack(states))
 
     def _compute_state_jacobian(self, value: Tensor, rate: Tensor) -> Tensor:
         """Return the derivatives (B, 2 N, W) of z, then of y, over the weights."""
@@ -178,8 +183,8 @@ class DenseTraining:
             residuals = loss.select(k).compute_weighted_residuals(samples.select(k), weights, q, law_weight)
             return torch.cat([weights, self._to_tensor(q)], 1), (residuals**2).sum(1)
 
-        normal = loss.assemble_normal_equations(samples, self.weights, q_before, law_weight)
-        normal = normal.restrict(torch.cat([torch.ones_like(self.weights), self._to_tensor(free)], 1))
+        movable = torch.cat([torch.ones_like(self.weights), self._to_tensor(free)], 1)
+        normal = loss.assemble_normal_equations(samples, self.weights, q_before, law_weight).restrict(movable)
         point = torch.cat([self.weights, self._to_tensor(q_before)], 1)
         extra_damping = torch.zeros_like(point)
         extra_damping[:, count:] = damping * self.samples

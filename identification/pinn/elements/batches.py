@@ -32,11 +32,9 @@ def make_batches(
     points: int,
     weighting: ResidualWeighting = "galerkin",
 ) -> list[Batch]:
-    """Return all elements in batches.
+    """Return all elements of the learned pieces in batches.
 
     Args:
-        pieces: pieces that are learned.
-        network: network with the elements and the hidden layer.
         force_delay: present estimate of the force channel's residual delay, with that of effects [s].
         points: number of Gauss points in an element.
         weighting: how law residuals enter the loss.
@@ -139,25 +137,28 @@ def _evaluate_sample_basis(
     source: TrainingPiece, network: ElementNetwork, elements: Sequence[Element], samples: Indices, delay: float
 ) -> tuple[Array, Array, Array]:
     """Return first and second time derivatives of the basis functions at the samples, and the filter memory."""
-    taps = len(source.impulse_response)
-    grid = samples * source.oversampling
-    if taps > 1:
-        grid = grid[:, :1] + np.arange(1 - taps, (samples.shape[1] - 1) * source.stride + 1)
-    time = grid * source.inputs.h / source.oversampling - delay
+    time = _make_sample_grid(source, samples) * source.inputs.h / source.oversampling - delay
     inside = np.stack([np.clip(t, e.start, e.end) for t, e in zip(time, elements, strict=True)])
     mapped = [e.time_map.evaluate(t - e.start) for t, e in zip(inside, elements, strict=True)]
     place, speed, bend = (np.stack(values) for values in zip(*mapped, strict=True))
     slopes, curvatures = network.layer.differentiate_twice(place)
     change = curvatures * speed[..., None] ** 2 + slopes * bend[..., None]
     rate = slopes * speed[..., None]
-    if taps == 1:
+    if len(source.impulse_response) == 1:
         return rate, change, np.zeros(samples.shape)
-    earlier = _compute_filter_memory(network, elements, time)
-    return (
-        _apply_filter(source, rate),
-        _apply_filter(source, change),
-        _apply_filter(source, earlier[..., None])[..., 0],
-    )
+    earlier = _apply_filter(source, _compute_filter_memory(network, elements, time)[..., None])
+    return _apply_filter(source, rate), _apply_filter(source, change), earlier[..., 0]
+
+
+def _make_sample_grid(source: TrainingPiece, samples: Indices) -> Indices:
+    """Return the indices (K, L) on the fine grid at which the force of samples (K, S) is evaluated.
+
+    With a filter, they begin as early as its impulse response reaches back.
+    """
+    taps, grid = len(source.impulse_response), samples * source.oversampling
+    if taps == 1:
+        return grid
+    return grid[:, :1] + np.arange(1 - taps, (samples.shape[1] - 1) * source.stride + 1)
 
 
 def _compute_filter_memory(network: ElementNetwork, elements: Sequence[Element], time: Array) -> Array:

@@ -55,8 +55,7 @@ class Factorisation:
         Args:
             free: which unknowns may move (C,).
             damping: terms (C,) added to the information's diagonal.
-            low: lower bounds of the step (C,).
-            high: upper bounds of the step (C,).
+            low, high: bounds of the step (C,).
         """
         step, moving = np.zeros(len(free)), free.copy()
         for _ in range(len(free)):
@@ -80,12 +79,7 @@ class Factorisation:
         node = np.zeros((mesh.node_count, 2))
         for piece, rows in enumerate(self.nodes):
             first = mesh.elements[int(mesh.find_elements(piece)[0])].left_node
-            after = np.zeros(2)
-            for k in range(len(rows) - 1, -1, -1):
-                row = rows[k]
-                right = row[:, -1] - row[:, 2:4] @ after - row[:, 4:-1] @ step
-                after = np.asarray(np.linalg.solve(row[:, :2], right))
-                node[first + k] = after
+            node[first : first + len(rows)] = _solve_nodes(rows, step)
         count = self.inner[0].shape[1]
         inner = np.zeros((len(mesh.elements), count))
         for b, R in zip(batches, self.inner, strict=True):
@@ -95,6 +89,17 @@ class Factorisation:
             inner[b.elements] = solve_triangular(R[..., :count], remainder[..., None])[..., 0]
         half = count // 2
         return OutputWeights(node[:, 0], node[:, 1], inner[:, :half], inner[:, half:])
+
+
+def _solve_nodes(rows: Sequence[Array], step: Array) -> Array:
+    """Return the nodes (nodes, 2) of one piece for a step of the shared unknowns, from the last one backwards."""
+    nodes, after = np.empty((len(rows), 2)), np.zeros(2)
+    # The chain was eliminated forwards in time, so only the last node depends on no other one.
+    for k in range(len(rows) - 1, -1, -1):
+        row = rows[k]
+        right = row[:, -1] - row[:, 2:4] @ after - row[:, 4:-1] @ step
+        nodes[k] = after = np.asarray(np.linalg.solve(row[:, :2], right))
+    return nodes
 
 
 def factorise(

@@ -238,7 +238,7 @@ class ElementNetwork:
 
     def refit(self, mesh: Mesh, states: Callable[[int, Array], States], points: Array) -> "ElementNetwork":
         """Return the network on another mesh, its weights fitted to states at ``points`` (M,) of each element."""
-        rank, functions = self.layer.rank, self.layer.evaluate(points)
+        functions = self.layer.evaluate(points)
         node_z, node_y = np.zeros(mesh.node_count), np.zeros(mesh.node_count)
         targets = []
         for piece in {e.piece: None for e in mesh.elements}:
@@ -252,8 +252,13 @@ class ElementNetwork:
         node_y /= Y_UNIT
         left = mesh.left_nodes
         ends = np.stack([np.stack([node[left], node[left + 1]], 1) for node in (node_z, node_y)])
-        remainder = np.concatenate(targets, axis=1) - ends @ functions[:, :2].T
-        table = np.vstack([functions[:, 2:], _FIT_RIDGE * np.eye(rank - 2)])
-        projection = np.linalg.pinv(table)[:, : len(points)]
-        z, y = remainder @ projection.T
+        z, y = _fit_inner_weights(functions[:, 2:], np.concatenate(targets, axis=1) - ends @ functions[:, :2].T)
         return replace(self, mesh=mesh, output_weights=OutputWeights(node_z, node_y, z, y))
+
+
+def _fit_inner_weights(functions: Array, remainder: Array) -> Array:
+    """Return the weights (2, elements, rank - 2) of functions (M, rank - 2) for values (2, elements, M) inside."""
+    points, count = functions.shape
+    # Without a ridge, nearly dependent functions would get large weights of opposite sign.
+    projection = np.linalg.pinv(np.vstack([functions, _FIT_RIDGE * np.eye(count)]))[:, :points]
+    return np.asarray(remainder @ projection.T)

@@ -180,33 +180,30 @@ class ElementLoss:
         if "u" in partials:
             coordinates[..., _ETA_COLUMN] = partials["u"] * inputs.field.du_deta
             table[..., _DRIVE_DELAY_COLUMN] = self.problem.delay_prior * partials["u"] * inputs.field.du_ddelay
+        self._add_input_columns(table, partials, inputs, r.value_derivatives)
+        search = coordinates @ r.search_jacobian
+        coordinates[...] = search[..., :COORDINATE_COUNT]
+        table[..., COMMON_COUNT + len(r.value_derivatives) :] = search[..., COORDINATE_COUNT:]
+        return table
+
+    def _add_input_columns(
+        self, table: Array, partials: dict[str, Array], inputs: ResidualInputs, value_derivatives: Array
+    ) -> None:
+        """Add the derivatives over the force delay and the effect parameters, through the inputs of the law."""
         # In the order of a dict: that of a set of strings, and with it the rounding, differs between processes.
         for name in (n for n in inputs.partials if n in partials):
             over_delay, *over_parameters = inputs.partials[name]
             table[..., _FORCE_DELAY_COLUMN] += self.problem.delay_prior * partials[name] * over_delay
             for k, row in enumerate(over_parameters):
-                table[..., COMMON_COUNT + k] += partials[name] * row * r.value_derivatives[k]
-        search = coordinates @ r.search_jacobian
-        coordinates[...] = search[..., :COORDINATE_COUNT]
-        table[..., COMMON_COUNT + len(r.value_derivatives) :] = search[..., COORDINATE_COUNT:]
-        return table
+                table[..., COMMON_COUNT + k] += partials[name] * row * value_derivatives[k]
 
 
 def _compute_law_residuals(
     b: Batch, r: ResolvedUnknowns, output_weights: OutputWeights, jacobian: bool
 ) -> tuple[_ResidualTerm, _ResidualTerm]:
     """Return the residuals of eqs. 3 and 4 at a batch's Gauss points."""
-    z, y = output_weights.select(b.left_node, b.elements)
     inputs = r.evaluate_points(b)
-    values = r.coordinates._asdict() | {
-        "z": z @ b.basis.T,
-        "z_rate": _combine(b.basis_rates, z),
-        "y": y @ b.basis.T * Y_UNIT,
-        "y_rate": _combine(b.basis_rates, y) * Y_UNIT,
-        "x": b.motion[0],
-        "v": b.motion[1],
-        "u": inputs.field.u,
-    } | inputs.values  # fmt: skip
+    values = r.coordinates._asdict() | _evaluate_states(b, output_weights) | {"u": inputs.field.u} | inputs.values
     hysteresis = law_residuals.differentiate_hysteresis(values, np.log) if jacobian else {}
     balance = law_residuals.differentiate_balance(values) if jacobian else {}
     if jacobian and r.effect_terms:
@@ -216,6 +213,19 @@ def _compute_law_residuals(
         _ResidualTerm(law_residuals.compute_hysteresis_residual(values), hysteresis, inputs),
         _ResidualTerm(law_residuals.compute_balance_residual(values), balance, inputs),
     )
+
+
+def _evaluate_states(b: Batch, output_weights: OutputWeights) -> dict[str, Array]:
+    """Return states, their rates and the motion (K, M) at a batch's Gauss points by name."""
+    z, y = output_weights.select(b.left_node, b.elements)
+    return {
+        "z": z @ b.basis.T,
+        "z_rate": _combine(b.basis_rates, z),
+        "y": y @ b.basis.T * Y_UNIT,
+        "y_rate": _combine(b.basis_rates, y) * Y_UNIT,
+        "x": b.motion[0],
+        "v": b.motion[1],
+    }
 
 
 def _compute_force(b: Batch, r: ResolvedUnknowns, output_weights: OutputWeights, jacobian: bool) -> _ResidualTerm:

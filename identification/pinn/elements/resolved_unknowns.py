@@ -70,7 +70,6 @@ def _resolve_common(
     """Return the shared unknowns without any log correction."""
     q, space = unknowns[:COORDINATE_COUNT], problem.space
     force_delay, drive_delay = problem.compute_residual_delays(unknowns)
-    value_derivatives = problem.differentiate_effects(problem.expand_shared(unknowns))
     effect_terms = None
     if problem.effects:
         sources = {b.source.number: b.source for b in batches}
@@ -81,7 +80,7 @@ def _resolve_common(
         space.differentiate(q),
         force_delay - grid_delay,
         drive_delay,
-        value_derivatives,
+        problem.differentiate_effects(problem.expand_shared(unknowns)),
         effect_terms,
     )
 

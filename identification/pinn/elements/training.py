@@ -56,14 +56,9 @@ class ElementTraining:
         self, problem: Problem, settings: ElementSettings, monitor: TrainingMonitor, start: TrainingStart
     ) -> None:
         self.problem, self.settings, self.monitor = problem, settings, monitor
-        self.unknowns = np.concatenate(
-            [
-                problem.space.to_search(start.coordinates),
-                np.zeros(2),
-                start.effects,
-                np.zeros(problem.layout.per_log_count),
-            ]
-        )
+        coordinates, per_log = problem.space.to_search(start.coordinates), np.zeros(problem.layout.per_log_count)
+        self.unknowns = np.concatenate([coordinates, np.zeros(2), start.effects, per_log])
+        # The misfit of a start counts as noise; else the network would fit it at the law's expense.
         self.noise = max(problem.noise, start.misfit)
         self.steps = 0
         self.history: list[TrainingRecord] = []
@@ -166,11 +161,9 @@ class ElementTraining:
         directions that its finite weight still allows, and not return where the strokes hardly show the shape of
         the loop.
         """
-        self.phase = "multipliers"
-        pieces = make_training_pieces(self.problem)
-        loss, weights = self._make_loss(self.problem, pieces), LossWeights(law_weight, self.noise)
-        free = self._select_free(self.settings.schedule[-1], 1, 1)
-        multipliers = None
+        self.phase, multipliers = "multipliers", None
+        loss = self._make_loss(self.problem, make_training_pieces(self.problem))
+        weights, free = LossWeights(law_weight, self.noise), self._select_free(self.settings.schedule[-1], 1, 1)
         for number in range(self.settings.multiplier_steps):
             for _ in range(_LATER_STATE_STEPS if number else _FIRST_STATE_STEPS):
                 multipliers = loss.compute_weighted_residuals(
@@ -184,6 +177,7 @@ class ElementTraining:
         """Return which shared unknowns (C,) may move."""
         free = self.problem.free_mask[self.problem.shared_columns]
         is_first = number == 0 and mesh_number == 0
+        # Freed while the states are still those of a start, the loop's shape would run to its bounds.
         frozen = [name in stage.frozen_coordinates or (name == "eta" and is_first) for name in Coordinates._fields]
         free[:COORDINATE_COUNT] &= ~np.array(frozen)
         free[COORDINATE_COUNT:COMMON_COUNT] &= number > 0
@@ -233,14 +227,9 @@ class ElementTraining:
         return total if np.isfinite(total) else np.inf
 
     def _search_line(
-        self,
-        loss: ElementLoss,
-        weights: LossWeights,
-        multipliers: Sequence[WeightedResiduals] | None,
-        step: Array,
-        weight_step: OutputWeights,
-        cost: float,
-    ) -> float:
+        self, loss: ElementLoss, weights: LossWeights, multipliers: Sequence[WeightedResiduals] | None,
+        step: Array, weight_step: OutputWeights, cost: float,
+    ) -> float:  # fmt: skip
         """Shorten a step until the cost decreases, take it, and return the decrease; 0 if there is none."""
         share = min(1.0, _LARGEST_STEP / max(self._measure_step(step), 1e-12))
         for _ in range(_MAX_REDUCTIONS):

@@ -92,12 +92,7 @@ class PaperTraining:
         self.start_parameters = to_parameters(next(generate_starts(self.problem)).coordinates)
         self.data = self._gather_samples(validation)
         self.monitor_samples = self._select_evenly(settings.samples)
-        saturated = self.start_parameters.A * to_coordinates(self.start_parameters).D_y
-        velocity = float(torch.sqrt(torch.mean(self.data.v**2)))
-        self.scales = _Scales(
-            u=max(problem.space.highest_drive, 1e-9), y=float(self.data.x.abs().max()), z=saturated,
-            velocity=velocity, force=float(self.data.force.std()), rate=self.start_parameters.eta,
-        )  # fmt: skip
+        self.scales = self._choose_scales()
         self.network = Perceptron([4, *[settings.width] * settings.layers, 3])
         self.weights = self.network.initialise_weights(settings.seed, settings.device).requires_grad_()
         self.search_coordinates = torch.zeros(
@@ -105,6 +100,15 @@ class PaperTraining:
         ).requires_grad_()
         self.history: list[TrainingRecord] = []
         self.steps = 0
+
+    def _choose_scales(self) -> _Scales:
+        """Return scales from the data and the initial guess, with which all residuals are of the order of one."""
+        saturated = self.start_parameters.A * to_coordinates(self.start_parameters).D_y
+        velocity = float(torch.sqrt(torch.mean(self.data.v**2)))
+        return _Scales(
+            u=max(self.problem.space.highest_drive, 1e-9), y=float(self.data.x.abs().max()), z=saturated,
+            velocity=velocity, force=float(self.data.force.std()), rate=self.start_parameters.eta,
+        )  # fmt: skip
 
     def run(self) -> None:
         """Train by Adam on random batches, then by L-BFGS on one fixed batch."""
@@ -127,11 +131,9 @@ class PaperTraining:
         if not self.settings.lbfgs_steps:
             return
         samples = self._select_evenly(4 * self.settings.samples)
+        parameters = [self.weights, self.search_coordinates]
         lbfgs = torch.optim.LBFGS(
-            [self.weights, self.search_coordinates],
-            max_iter=_LBFGS_REPORT_INTERVAL,
-            history_size=50,
-            line_search_fn="strong_wolfe",
+            parameters, max_iter=_LBFGS_REPORT_INTERVAL, history_size=50, line_search_fn="strong_wolfe"
         )
 
         def closure() -> Tensor:

@@ -16,7 +16,7 @@ from identification.fitting.output_error import fit_output_error
 from identification.fitting.piece import Piece
 from identification.fitting.problem import Problem
 from identification.fitting.search_space import SearchSpace
-from identification.logs.recording import ChannelFilter
+from identification.logs import ChannelFilter
 from identification.pipeline import FitRequest, identify
 from identification.predict.predict import predict_log
 from identification.signals.motion import estimate_recorded_noise

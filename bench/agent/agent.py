@@ -265,6 +265,7 @@ class Agent:
     def _on_instrument_failed(self, name: str, error: DriverError) -> None:
         driver = next(one.driver for one in self._rig.instruments if one.name == name)
         is_in_use = self._run_slot.current is not None or self._setup.is_moving
+        # The configured actions stop a motion; while nothing moves, the failure is only indicated.
         action = self._config.silence.get_action(driver) if is_in_use else Action.INDICATE
         self._supervisor.apply(action, str(error))
 

@@ -43,8 +43,7 @@ class RunSupervision:
         self._scope = contextlib.ExitStack()
 
     def __enter__(self) -> None:
-        # The move to the start may be outside the range of the method, which therefore applies from the arrival
-        # on.
+        # The move to the start may be outside the method's range, which therefore applies from the arrival on.
         approach_limits: LimitMatrix = {
             quantity: limits for quantity, limits in self._specimen_limits.items() if quantity != "displacement"
         }

@@ -71,6 +71,7 @@ class SafetySupervisor:
 
     def on_timer(self) -> None:
         """Check for missing samples."""
+        # A silent load cell delivers no batch, so the force age has to be checked by time as well.
         self._apply_violations(self._interlocks.check((), self._clock()))
 
     def on_late_setpoint(self, now_ns: int, delay: float) -> None:

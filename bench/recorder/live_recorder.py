@@ -63,8 +63,10 @@ class LiveRecorder(LogContext):
         """Open the log; from now on it can be salvaged.
 
         Args:
-            path: file of the log; an existing file is replaced. header: metadata at the begin of the log. maps:
-            clock maps of the instruments by name, for their readings; without one, the time of receipt counts.
+            path: file of the log; an existing file is replaced.
+            header: metadata at the begin of the log.
+            maps: clock maps of the instruments by name, for their readings; without one, the time of receipt
+                counts.
             capacity: largest number of queued items.
 
         Raises:
@@ -180,6 +182,7 @@ class LiveRecorder(LogContext):
     def _run(self) -> None:
         is_ending = False
         while not is_ending:
+            # After the request to stop there is one more turn, for the rest of the queue.
             is_ending = self._stop_requested.wait(WRITE_PERIOD)
             try:
                 self._write_queue()
@@ -195,6 +198,7 @@ class LiveRecorder(LogContext):
     def _write_queue(self) -> None:
         """Write all queued items: readings and frames grouped by topic, everything else in order."""
         groups: dict[str, list[Any]] = {}
+        # Only the items queued now: those that arrive meanwhile belong to the next turn.
         for _ in range(len(self._queue)):
             topic, content = self._queue.popleft()
             if topic:

@@ -260,6 +260,7 @@ class _AcquisitionThread:
         with contextlib.suppress(Exception):
             self._instrument.close()
             self._instrument.connect()
+            # The instrument may have restarted, and its clock with it.
             self._clock_map.restart()
             return True
         return False

@@ -68,6 +68,7 @@ def play_scenario(
 
 def _start_rig(command: list[str]) -> "subprocess.Popen[str]":
     try:
+        # Its standard output is not read, and as a pipe would block the rig once it is full.
         return subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )

@@ -127,6 +127,7 @@ class Interlocks:
             blocks: samples as acquired.
             now_ns: bench clock [ns].
         """
+        # Before the lock, for which the check of a setpoint may be waiting.
         measured = [(block, _find_largest(block.values.tolist())) for block in blocks if _is_limited(block)]
         with self._lock:
             violations = []
@@ -201,6 +202,7 @@ def _check_command(limits: LimitMatrix, quantity: Quantity, value: float) -> Non
     if not math.isfinite(value):
         raise InterlockError(f"commanded {quantity.replace('_', ' ')} is {value}, not a number; nothing was sent")
     violation = evaluate_limits(limits, quantity, value)
+    # Weaker actions do not end a run, so a command may exceed their thresholds.
     if violation is not None and violation.action >= Action.CONTROLLED_STOP:
         raise InterlockError(f"commanded {violation}; nothing was sent")
 

@@ -65,6 +65,7 @@ def bring_to_rest(
         except Exception as error:  # an unreported failure would look like an instrument at rest
             failures[instrument.name] = f"{error!r}; internal error of the driver, please report"
 
+    # One thread each, so that an instrument that does not reply delays no other.
     threads = {one.name: threading.Thread(target=stop, args=(one,), daemon=True) for one in instruments}
     for thread in threads.values():
         thread.start()

@@ -137,7 +137,9 @@ class Sequencer:
             return
         try:
             position = self._actuator.arm()
+            # The first setpoints are the present position, so that the rod does not jump when they begin.
             self._generator.hold_at(position)
+            # From now on no idle request may send a SYNC, which would start an armed table.
             self._observer.on_setpoints_active(True)
             with self._thread:
                 try:
@@ -163,6 +165,7 @@ class Sequencer:
             if self._stop_requested.is_set():
                 return
             self._upload_drive(section)
+            # A stop may have been requested during the upload, which takes several exchanges.
             if not self._stop_requested.is_set():
                 self._start_section(section)
                 self._await_rest(section.trajectory.duration, "the end of the section")
@@ -185,6 +188,7 @@ class Sequencer:
 
     def _upload_drive(self, section: PlaybackSection) -> None:
         times, levels = section.list_drive_steps()
+        # The amplifier plays the table by itself, so all levels are checked before the upload.
         self._guard.permit(drive=float(np.abs(levels).max()))
         # The table runs by the amplifier's clock, the motion by the bench clock.
         self._amplifier.upload_table(times * (1 + self._get_amplifier_rate()), levels)
@@ -211,6 +215,7 @@ class Sequencer:
             if has_started:
                 self._check_table_started()
                 return
+            # The suspension has expired: the table would start with a SYNC other than that of the section.
             self._amplifier.abort_table()
         longest = self._actuator.settings.setpoint_timeout * PAUSE_SHARE * 1e3
         raise RunError(
@@ -284,6 +289,7 @@ class Sequencer:
         """Remove the voltage from coil and drive; use the drive's quick stop if the rod may still move."""
         if self._guard.trip_reason:  # the supervisor stops both
             return None
+        # It does not wait for zero, so the coil ramps down while the drive is switched off.
         self._amplifier.make_safe()
         if self._thread.failure is not None:
             return self._actuator.make_safe()
@@ -306,5 +312,6 @@ class Sequencer:
 
     def _raise_failure(self) -> None:
         failure = self._thread.failure
+        # After a trip every setpoint is forbidden, so this failure is only its consequence.
         if failure is not None and not self._guard.trip_reason:
             raise failure

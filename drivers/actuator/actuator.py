@@ -56,17 +56,14 @@ class Actuator:
         eds: Path = ACTUATOR_EDS,
     ) -> None:
         self.settings = settings
-        self._name = name
-        self._clock = clock
-        self._master_id = master_id
+        self._name, self._clock, self._master_id = name, clock, master_id
         self._bus = CanBus(address, clock)
         self._node = CanopenNode(
             name, self._bus, node_id, eds, clock, heartbeat_timeout=settings.drive_heartbeat_timeout
         )
         self._drive = ServoDrive(name, self._node)
         self._reference_state = find_initial_state(clamped, referenced=False)
-        self._clamped = clamped
-        self._origin = 0.0
+        self._clamped, self._origin = clamped, 0.0
         self._channels = make_channels(self.settings, self._origin, self._drive.rated_torque)
         self._samples = SampleReader(self._bus, self._node, clock, settings.cycle)
         self._setpoints = SetpointSender(name, self._node, self._drive, clock, settings, master_id)

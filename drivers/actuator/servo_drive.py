@@ -87,6 +87,7 @@ class ServoDrive:
             NoReplyError, NotConnectedError: the drive or the bus is gone.
         """
         node = self._node
+        # First, so that an absent node is reported as such, not as an object access without a reply.
         node.heartbeat.wait_for_next(_STEP_TIMEOUT)
         self._identify()
         # An earlier master may have left it in motion.
@@ -108,6 +109,7 @@ class ServoDrive:
     def enable_operation(self, master_id: int, settings: ActuatorSettings) -> None:
         """Switch on in cyclic synchronous position mode; the drive then expects heartbeats after the first."""
         self._node.write_verified(0x6060, cia402.CYCLIC_POSITION)
+        # Not earlier: heartbeats accompany setpoints, so there are none while the drive is off.
         self._node.write_verified(0x1016, master_id << 16 | round(settings.master_heartbeat_timeout * 1e3), 1)
         self._switch_on()
 
@@ -131,6 +133,7 @@ class ServoDrive:
         state = self.read_state()
         if state in (DriveState.ENABLED, DriveState.QUICK_STOP):
             self._node.download(0x6040, cia402.QUICK_STOP)
+        # In its fault reaction the drive already brakes by itself, so it is only waited for.
         if state in (DriveState.ENABLED, DriveState.QUICK_STOP, DriveState.FAULT_REACTION):
             self._wait_until(self._is_at_rest, timeout, "the rod to come to rest")
         # The master falls silent now, on purpose.

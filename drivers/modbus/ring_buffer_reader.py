@@ -139,7 +139,7 @@ class RingBufferReader:
         """Read the next block as `_read_block` does; record a failure, after which it is read again."""
         try:
             return self._read_block(blocks)
-        except NotConnectedError:
+        except NotConnectedError:  # reading again helps neither after a restart nor on a line that is gone
             raise
         except DriverError as error:
             self._record_failure(error)

@@ -120,6 +120,7 @@ class CanopenNode:
         Raises:
             NoReplyError: it was not confirmed in time.
         """
+        # Commands of CiA 301: 1 start, 2 stop, 128 enter pre-operational.
         self._bus.send(0x000, bytes([{5: 1, 4: 2, 127: 128}[state], self.node_id]))
         self.heartbeat.wait_for_state(state, timeout)
 
@@ -238,6 +239,7 @@ class CanopenNode:
 
     def _on_frame(self, received_ns: int, identifier: int, data: bytes) -> None:
         """Handle a frame, on the receiving thread."""
+        # Identifiers of the predefined connection set (CiA 301): heartbeat, emergency, reply to an object access.
         if identifier == 0x700 + self.node_id:
             self.heartbeat.on_heartbeat(received_ns, data)
         elif identifier == 0x80 + self.node_id:

@@ -68,20 +68,16 @@ class ModbusLine:
             address: address of the line.
             unit: unit number of the instrument, 1 to 247.
             clock: bench clock [ns].
-            timeout: [s] without a reply after which a request has failed; the transfer time of the bytes on a
-                serial line is added.
+            timeout: [s] without a reply after which a request has failed; on a serial line, the transfer time
+                of the largest request and reply is added.
         """
-        self.name = name
-        self.address = address
+        self.name, self.address, self._unit = name, address, unit
         self.timeout = timeout + address.compute_transfer_time(2 * _MAX_FRAME_BYTES)
-        self.received = self.corrupted = self.resynchronised = 0
+        self.received = self.corrupted = self.resynchronised = self._token = 0
         self.last_ns: int | None = None
-        self._unit = unit
-        self._lock = threading.RLock()
-        self._trace = FrameTrace(clock)
+        self._lock, self._trace = threading.RLock(), FrameTrace(clock)
         self._client: Client | None = None
         self._open_requested = self._synchronised = False
-        self._token = 0
 
     @property
     def connected(self) -> bool:
@@ -197,6 +193,7 @@ class ModbusLine:
 
     def _check_reply(self, reply: ModbusPDU, function: int, action: str) -> None:
         """Check that a reply is for the requested function, and not a refusal."""
+        # The highest bit marks a refusal, so it does not belong to the function.
         if reply.function_code & 0x7F != function:
             raise self._make_invalid_reply(
                 action, f"function {reply.function_code} is in the reply, {function} was requested"
@@ -268,7 +265,7 @@ class ModbusLine:
         self._client = client
 
     def _synchronise(self, client: Client, action: str) -> None:
-        """Exchange a token: all input before it is stale."""
+        """Exchange a new token: all input before it is stale, late returns of earlier tokens included."""
         self._synchronised = False
         self._token = (self._token + 1) & 0xFFFF
         query = ReturnQueryDataRequest(self._token.to_bytes(2, "big"), dev_id=self._unit)

@@ -136,6 +136,7 @@ class ServoDriveDevice:
 
     def on_master_lost(self, now_ns: int) -> None:
         """React to a lost master as object 6007h defines."""
+        # CiA 402: 0 no action, 1 fault, 2 voltage off, 3 quick stop.
         reaction = self.objects.get_number(0x6007)
         if reaction == 1 and self.state is DriveState.ENABLED:
             self.raise_fault(_MASTER_LOST, now_ns)
@@ -262,6 +263,7 @@ class ServoDriveDevice:
             self._finish_homing()
         elif self.state is DriveState.FAULT_REACTION:
             self.state = DriveState.FAULT
+        # CiA 402: below 5 the drive switches off after its quick stop, otherwise it holds the rod.
         elif self.state is DriveState.QUICK_STOP and self.objects.get_number(0x605A) < 5:
             self.state = DriveState.SWITCH_ON_DISABLED
 
@@ -271,6 +273,7 @@ class ServoDriveDevice:
 
     def _start_homing(self) -> None:
         self._homed, self._homing, self.referenced = False, True, False
+        # Method 37 takes the present position as home, so nothing moves.
         if self.objects.get_number(0x6098) != 37:
             self.generator.move_to(self._mechanics.limit_switch, self.objects.get_number(0x6099, 1) * _COUNT)
 

@@ -25,13 +25,13 @@ def make_rig_constants(scenario: Scenario, law: Array) -> Array:
     actuator, amplifier, thermal = scenario.actuator, scenario.amplifier, scenario.thermal
     k = np.zeros(states.Z_SATURATION + 1)
     k[states.COMMAND_LAG] = 1 / actuator.command_lag
-    k[states.SERVO_BANDWIDTH] = 2 * math.pi * actuator.bandwidth
-    k[states.SERVO_DAMPING] = actuator.damping
+    k[[states.SERVO_BANDWIDTH, states.SERVO_DAMPING]] = 2 * math.pi * actuator.bandwidth, actuator.damping
     k[states.ACTUATOR_COMPLIANCE] = 1 / actuator.stiffness
     k[states.AMPLIFIER_RATE] = 2 * math.pi * amplifier.bandwidth
-    k[[states.HEAT_CAPACITY, states.HEAT_LOSS]] = thermal.capacity, thermal.loss
-    k[states.AMBIENT] = thermal.ambient
+    k[[states.HEAT_CAPACITY, states.HEAT_LOSS, states.AMBIENT]] = thermal.capacity, thermal.loss, thermal.ambient
+    # The drive is a current or a voltage: the coil's heat is R i² or u² / R.
     k[states.COIL_HEAT] = amplifier.resistance if scenario.drive_unit == "A" else 1 / amplifier.resistance
+    # Saturation of z: there the rate of z is zero during sliding, (beta + gamma) |z|^n = A.
     k[states.Z_SATURATION] = (law[5] / (law[2] + law[3])) ** (1 / law[12])
     return k
 

@@ -172,6 +172,7 @@ class SocketcandServer:
     def _accept(self) -> None:
         with contextlib.suppress(OSError):
             connection, _ = self._listener.accept()
+            # Otherwise a small frame could wait until the client has acknowledged the one before.
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             with contextlib.suppress(OSError):  # without stamps, a frame counts from its reading
                 connection.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)

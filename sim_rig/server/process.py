@@ -47,6 +47,7 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: ServerSettings) -
         signal.signal(number, lambda *_: stopping.set())
     thread_errors = _stop_on_thread_failure(stopping)
     _remove_stale_config(out)
+    # In proportion to the speed, so that the batches per second of real time stay the same.
     batch = max(_BATCH_SAMPLES, round(_BATCH_SAMPLES * settings.speed))
     clock = RunningClock(settings.speed)
     rig = RigServer(scenario, clock, settings.transports, settings.faults, batch)

@@ -36,6 +36,7 @@ def record_over_wires(method: Path, scenario: Path, log: Path) -> None:
 
 
 def _stop(rig: "subprocess.Popen[bytes]") -> None:
+    # By a signal that the rig handles, so that it closes its wires; killed only if it does not react.
     rig.terminate()
     try:
         rig.wait(_STOP_TIMEOUT)

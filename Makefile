@@ -44,11 +44,13 @@ unit: $(READY)
 	@rm -rf $(RESULTS) && mkdir -p $(RESULTS)
 	$(BIN)/pytest -n 2 --junitxml=$(RESULTS)/unit.xml $(TEST_OPTIONS)
 
-# In real time: what a busy machine has made late is tried once more, alone.
+# In real time: what a busy machine has made late is tried twice more, alone.
+AGAIN := --last-failed --last-failed-no-failures none
 wire: $(READY)
 	@mkdir -p $(RESULTS) && rm -f $(RESULTS)/wire*.xml
-	$(BIN)/pytest -m wire --junitxml=$(RESULTS)/wire.xml $(TEST_OPTIONS) || \
-		$(BIN)/pytest -m wire --junitxml=$(RESULTS)/wire_again.xml --last-failed --last-failed-no-failures none $(TEST_OPTIONS)
+	$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
+		$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_2.xml $(AGAIN) $(TEST_OPTIONS) || \
+		$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_3.xml $(AGAIN) $(TEST_OPTIONS)
 
 test: check unit wire
 	@$(BIN)/pytest -m slow --collect-only -q > $(RESULTS)/slow.txt || true

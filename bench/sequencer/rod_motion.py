@@ -55,10 +55,8 @@ def move_rod(
     try:
         with thread:
             if not _await_rest(generator, thread, clock, approach.duration + time_margin, stop_requested):
-                raise RunError(
-                    f"the rod has not arrived {time_margin:g} s after the planned end of the move; check the "
-                    "actuator"
-                )
+                late = f"{time_margin:g} s after the planned end of the move"
+                raise RunError(f"the rod has not arrived {late}; check the actuator")
         is_at_rest = thread.failure is None
     finally:
         on_setpoints_active(False)

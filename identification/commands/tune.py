@@ -59,10 +59,16 @@ def tune(
     plot = out.with_suffix(".png")
     if importances:
         write_plot(plot, importances)
+    summary = format_summary(finished, settings, importances, plot.name if importances else None)
+    _write_files(out, settings + "\n", summary)
+    typer.echo(f"{out}: best of {len(finished.trials)} trials, value {finished.best_value:.4f}", err=True)
+
+
+def _write_files(out: Path, settings: str, summary: str) -> None:
+    from identification.errors import IdentificationError
+
     try:
-        out.write_text(settings + "\n", encoding="utf-8")
-        summary = format_summary(finished, settings, importances, plot.name if importances else None)
+        out.write_text(settings, encoding="utf-8")
         out.with_suffix(".md").write_text(summary, encoding="utf-8")
     except OSError as error:
         raise IdentificationError(f"{out}: cannot be written ({error.strerror}); choose another place") from error
-    typer.echo(f"{out}: best of {len(finished.trials)} trials, value {finished.best_value:.4f}", err=True)

@@ -156,8 +156,8 @@ def compute_skew_bound(skews):
 def check(seconds, quiet=False):
     """Check skew, order and number of the samples.
 
-    The skew depends on how soon processes are scheduled. On any machine it is within the bounds that the clock maps
-    report; on a quiet one it is within ``MAX_SKEW``.
+    The skew depends on how soon processes are scheduled. On any machine it is within the bounds that the clock
+    maps report; on a quiet one it is within ``MAX_SKEW``.
     """
     clock_errors, aligned, lost, skews, errors = record(seconds)
     print_errors(clock_errors, skews)

@@ -93,6 +93,10 @@ def make_baseline_fit(
     residual, force = baseline.residual.values, evaluation.force
     fitted, held_out = evaluation.fitted_samples, evaluation.held_out_samples
     errors = [-part for part in split_by_piece(residual, evaluation.pieces)]
+    noise = dataset.floor
+    noise_floor = NoiseFloor(
+        cycle_to_cycle=noise.cycle_to_cycle, high_frequency=noise.high_frequency, basis=noise.basis
+    )
     return Fit(
         specimen=dataset.recordings[0].metadata["run"].get("specimen", ""),
         drive_kind=dataset.recordings[0].drive_kind,
@@ -102,11 +106,7 @@ def make_baseline_fit(
         coordinates=coordinates,
         nuisances=_make_nuisances(baseline),
         noise_floor_n=floor,
-        floor=NoiseFloor(
-            cycle_to_cycle=dataset.floor.cycle_to_cycle,
-            high_frequency=dataset.floor.high_frequency,
-            basis=dataset.floor.basis,
-        ),
+        floor=noise_floor,
         rmse_n=SplitErrors(train=baseline.train_rmse, validation=None, held_out=baseline.held_out_rmse),
         nrmse=SplitErrors(
             train=compute_nrmse(residual[fitted], force[fitted]),
@@ -116,15 +116,7 @@ def make_baseline_fit(
         per_drive=compute_drive_errors(
             [p.excitation.drive for p in evaluation.pieces], errors, [p.force for p in evaluation.pieces], unit
         ),
-        stages=[
-            FitStage(
-                name="refine",
-                seconds=0.0,
-                rmse_n=compute_rmse(residual[fitted]),
-                iterations=minimum.iterations,
-                note="baseline of a diagnosis, with channel delays limited to the error of their clocks",
-            )
-        ],
+        stages=[_make_stage(compute_rmse(residual[fitted]), minimum.iterations)],
         agreement=None,
         result="converged" if minimum.converged else f"not converged: stopped after {minimum.iterations} steps",
         correlations=find_strong_correlations(coordinate_covariance),
@@ -132,6 +124,11 @@ def make_baseline_fit(
             logs=provenance.logs, version=version("mrbench"), seed=provenance.seed, settings={"stages": "refine"}
         ),
     )
+
+
+def _make_stage(rmse: float, iterations: int) -> FitStage:
+    note = "baseline of a diagnosis, with channel delays limited to the error of their clocks"
+    return FitStage(name="refine", seconds=0.0, rmse_n=rmse, iterations=iterations, note=note)
 
 
 def _make_nuisances(candidate: Candidate) -> Nuisances:

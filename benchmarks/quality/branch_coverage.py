@@ -12,6 +12,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,6 +29,8 @@ INTERPRETED = (
     "tests/unit/sim_rig/plant",
 )
 """Tests of functions that are otherwise compiled."""
+INTERPRETED_TIME = 120.0
+"""Time [s] for each file of these tests."""
 CONFIG = f"""[run]
 branch = true
 parallel = true
@@ -76,17 +80,35 @@ def main() -> int:
 def measure() -> None:
     """Run all tests under coverage and combine the data."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for old in FOLDER.glob("coverage*"):
+    for old in (*FOLDER.glob("coverage*"), *FOLDER.glob("interpreted_*")):
         old.unlink()
     config = FOLDER / "settings.ini"
     config.write_text(CONFIG, encoding="utf-8")
     cov = ("--cov", f"--cov-config={config}", "--cov-context=test", "--cov-report=", "-p", "no:cacheprovider")
     _run("pytest", "-n", "2", "-q", *cov)
     _run("pytest", "-m", "wire and not slow", "-q", "--cov-append", *cov)
-    # Without the compiler most of these tests take minutes; their first seconds run every line that they reach.
-    _run("pytest", "-n", "2", "-q", "--timeout=10", "--cov-append", *cov, *INTERPRETED, NUMBA_DISABLE_JIT="1")
-    if list(FOLDER.glob("coverage.*.*")):
-        _run("coverage", "combine", "--append", f"--rcfile={config}")
+    paths = sorted(path for folder in INTERPRETED for path in (ROOT / folder).glob("test_*.py"))
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(lambda path: run_interpreted(path, cov), paths))
+    parts = [*FOLDER.glob("coverage.*"), *FOLDER.glob("interpreted_*")]
+    _run("coverage", "combine", "--append", f"--rcfile={config}", *map(str, parts))
+
+
+def run_interpreted(path: Path, options: Sequence[str]) -> None:
+    """Run the tests of a file without the compiler, at most for ``INTERPRETED_TIME``.
+
+    A long test of an integrator repeats its first second many times. Coverage saves its data on SIGTERM.
+    """
+    print("$ without the compiler:", path.relative_to(ROOT), flush=True)
+    command = [sys.executable, "-m", "pytest", "-q", *options, str(path)]
+    # A data file of its own: at its start, a run erases the data of the runs that share its file.
+    data = FOLDER / f"interpreted_{path.parent.name}_{path.stem}"
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "COVERAGE_FILE": str(data)}
+    with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.DEVNULL) as process:
+        try:
+            process.wait(INTERPRETED_TIME)
+        except subprocess.TimeoutExpired:
+            process.terminate()
 
 
 def _run(*words: str, **environment: str) -> None:

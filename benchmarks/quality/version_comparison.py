@@ -28,7 +28,7 @@ IGNORED = re.compile(r"(^|\.)(seconds|version|versions|path|sha256|created|histo
 """Fields that hold times, versions and paths."""
 RENAMED: dict[str, str] = {
     "each_log": "per_log", "how": "basis", "inside": "coverage", "witness": "cross_check", "agrees": "consistent",
-    "said": "message",
+    "said": "message", "local": "elements", "global": "dense",
 }  # fmt: skip
 """Last part of a field's path, or an identifier: old name to new name."""
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_./-]+")

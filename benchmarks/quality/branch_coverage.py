@@ -97,7 +97,8 @@ def measure() -> None:
 def run_interpreted(path: Path, options: Sequence[str]) -> None:
     """Run the tests of a file without the compiler, at most for ``INTERPRETED_TIME``.
 
-    A long test of an integrator repeats its first second many times. Coverage saves its data on SIGTERM.
+    A long test of an integrator repeats its first second many times. Coverage stores the data of each test as it
+    ends.
     """
     print("$ without the compiler:", path.relative_to(ROOT), flush=True)
     command = [sys.executable, "-m", "pytest", "-q", *options, str(path)]
@@ -108,7 +109,8 @@ def run_interpreted(path: Path, options: Sequence[str]) -> None:
         try:
             process.wait(INTERPRETED_TIME)
         except subprocess.TimeoutExpired:
-            process.terminate()
+            # Not SIGTERM: its handler blocks if it interrupts the tracer, which holds the lock of the data.
+            process.kill()
 
 
 def _run(*words: str, **environment: str) -> None:

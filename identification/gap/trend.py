@@ -31,10 +31,11 @@ from identification.gap.diagnosis import (
     prepare_recordings,
 )
 from identification.gap.fits import JointFit, fit_jointly
-from identification.gap.outcome import NORMAL_QUANTILE, suggest_check
+from identification.gap.outcome import suggest_check
 from identification.logs import Recording
 from identification.progress import Progress, ignore_progress
 from identification.signals import check_single_specimen
+from identification.uncertainty import Z95_ROUNDED
 
 MIN_RUNS = 3
 """Smallest number of runs of a trend."""
@@ -195,7 +196,7 @@ def _make_quantity_trend(
 def _make_value(log: str, value: float, deviation: float) -> TrendValue:
     if not np.isfinite(deviation):
         return TrendValue(log=log, value=float(value), ci95=None)
-    width = NORMAL_QUANTILE * deviation
+    width = Z95_ROUNDED * deviation
     return TrendValue(log=log, value=float(value), ci95=(value - width, value + width))
 
 

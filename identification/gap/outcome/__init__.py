@@ -2,11 +2,9 @@
 
 from identification.gap.outcome.cross_check import cross_check_effects
 from identification.gap.outcome.explanation import suggest_check, summarise_diagnosis
-from identification.gap.outcome.interval import NORMAL_QUANTILE
 from identification.gap.outcome.report import DiagnosisResult, ReportBuilder
 
 __all__ = [
-    "NORMAL_QUANTILE",
     "DiagnosisResult",
     "ReportBuilder",
     "cross_check_effects",

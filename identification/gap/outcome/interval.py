@@ -1,20 +1,12 @@
 """95 % intervals of effect parameters."""
 
-import numpy as np
+import math
 
-NORMAL_QUANTILE = 1.96
-"""Half width of a 95 % interval of a normal distribution [standard deviations]."""
-_MAX_LOG_WIDTH = 50.0
-"""Largest half width of an interval on the logarithm; it prevents an overflow."""
+from identification.uncertainty import Z95_ROUNDED, clip_interval, make_interval
 
 
 def compute_interval(value: float, deviation: float, low: float, high: float) -> tuple[float, float]:
     """Return the 95 % interval inside the bounds, on the logarithm where the value cannot be zero."""
-    if not np.isfinite(deviation):
+    if not math.isfinite(deviation):
         return min(low, value), max(high, value)
-    if low > 0:
-        factor = float(np.exp(min(NORMAL_QUANTILE * deviation / value, _MAX_LOG_WIDTH)))
-        interval = value / factor, value * factor
-    else:
-        interval = value - NORMAL_QUANTILE * deviation, value + NORMAL_QUANTILE * deviation
-    return min(max(interval[0], low), value), max(min(interval[1], high), value)
+    return clip_interval(make_interval(value, deviation, Z95_ROUNDED, positive=low > 0), value, low, high)

@@ -53,7 +53,7 @@ wire: $(READY)
 		$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_3.xml $(AGAIN) $(TEST_OPTIONS)
 
 test: check unit wire
-	@$(BIN)/pytest -m slow --collect-only -q > $(RESULTS)/slow.txt || true
+	@$(BIN)/pytest -m slow --collect-only > $(RESULTS)/slow.txt || true
 	@$(BIN)/python -m tests.summary $(RESULTS)/unit.xml $(RESULTS)/wire*.xml --deselected $(RESULTS)/slow.txt
 
 coverage: $(READY)

@@ -82,7 +82,7 @@ def make_baseline_fit(
     coordinate_covariance = compute_coordinate_covariance(problem, minimum, covariance)
     names = np.array(baseline.fit.coordinates._fields)
     observable, interior = covariance.observable[:COORDINATE_COUNT], covariance.interior[:COORDINATE_COUNT]
-    unit = dataset.drive_unit
+    unit, noise = dataset.drive_unit, dataset.floor
     coordinates = make_coordinate_estimates(
         baseline.fit.coordinates,
         coordinate_covariance,
@@ -93,7 +93,6 @@ def make_baseline_fit(
     residual, force = baseline.residual.values, evaluation.force
     fitted, held_out = evaluation.fitted_samples, evaluation.held_out_samples
     errors = [-part for part in split_by_piece(residual, evaluation.pieces)]
-    noise = dataset.floor
     noise_floor = NoiseFloor(
         cycle_to_cycle=noise.cycle_to_cycle, high_frequency=noise.high_frequency, basis=noise.basis
     )

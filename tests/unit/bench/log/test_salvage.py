@@ -8,7 +8,7 @@ from bench.cli import _make_application
 from bench.errors import LogError
 from bench.log.mcap_file import finish
 from bench.log.reader import read_log
-from bench.log.salvage import salvage_log
+from bench.log.salvage import SalvageResult, salvage_log
 from bench.log.writer import LogWriter
 from tests.support.logs import header, write_log
 
@@ -171,3 +171,12 @@ def test_command_prints_the_losses(killed):
 
     assert result.exit_code == 0
     assert "samples kept" in result.output
+
+
+@pytest.mark.parametrize(
+    ("known_until", "lost"), [(2.75, "0.250 s after"), (2.5, "0.000 s after"), (1.0, "0.000 s after")]
+)
+def test_description_of_a_repair_gives_the_time_lost_after_the_last_sample(tmp_path, known_until, lost):
+    result = SalvageResult(tmp_path, False, 3, last_time=2.5, known_until=known_until)
+
+    assert f"up to 2.500 s; 0 bytes dropped, {lost}" in str(result)

@@ -31,3 +31,25 @@ def test_velocity_of_a_few_samples_is_their_slope(samples):
     displacement = 0.5 * np.arange(samples) / 100.0
 
     np.testing.assert_allclose(smooth_velocity(displacement, 100.0), 0.5)
+
+
+@pytest.mark.parametrize(("rate", "half", "slope"), [(100.0, 2, 3.4), (1000.0, 10, 65.8)])
+def test_window_is_20_ms_and_at_least_five_samples(rate, half, slope):
+    """The parabola fitted to i³ has at its middle the slope sum(i⁴) / sum(i²), which depends on the window."""
+    cube = np.arange(-half - 3, half + 4, dtype=float) ** 3
+
+    assert smooth_velocity(cube, rate)[half + 3] == pytest.approx(slope * rate)
+
+
+@pytest.mark.parametrize("samples", [5, 8, 9])
+def test_velocity_of_a_parabola_is_exact_up_to_both_ends(samples):
+    time = np.arange(samples) / 1000
+
+    np.testing.assert_allclose(smooth_velocity(3 * time**2, 1000.0), 6 * time, atol=1e-12)
+
+
+@pytest.mark.parametrize(("samples", "slope"), [(6, 3.4), (7, 7.0)])
+def test_window_in_a_short_recording_is_its_largest_odd_number_of_samples(samples, slope):
+    cube = (np.arange(samples) - (samples - 1) // 2.0) ** 3
+
+    assert smooth_velocity(cube, 1000.0)[(samples - 1) // 2] == pytest.approx(slope * 1000)

@@ -221,3 +221,28 @@ def test_full_disk_is_an_error_that_names_the_log(tmp_path, monkeypatch):
 
     with pytest.raises(LogError, match=r"run\.mcap: no space left on device"):
         log.close()
+
+
+def test_samples_one_nanosecond_apart_are_accepted_and_the_first_that_goes_back_is_named():
+    assert len(list(make_sample_messages(np.array([0, 1, 2]), values(3)))) == 3
+    with pytest.raises(LogError, match=r"sample at 4\.000000 s after one at 5\.000000 s"):
+        list(make_sample_messages(np.array([0, 1, 5_000_000_000, 4_000_000_000]), values(4)))
+
+
+@pytest.mark.parametrize(("segment", "fields"), [(-1, set()), (0, {"segment"}), (1, {"segment"})])
+def test_segment_zero_is_a_segment_and_a_negative_one_is_none(tmp_path, segment, fields):
+    with LogWriter(tmp_path / "run.mcap", header()) as log:
+        log.write_sample(0, {**ONE, "segment": segment, "temperature": float("nan")})
+
+    assert read_log(tmp_path / "run.mcap").samples.keys() - {"time", "time_ns", *ONE} == fields
+
+
+def test_attachment_has_the_time_of_the_last_sample_and_zero_before_the_first(tmp_path):
+    with LogWriter(tmp_path / "run.mcap", header()) as log:
+        log.attach("before", "text/plain", b"")
+        log.write_sample(7, ONE)
+        log.attach("after", "text/plain", b"")
+
+    with (tmp_path / "run.mcap").open("rb") as file:
+        times_by_name = {one.name: one.log_time for one in make_reader(file).iter_attachments()}
+    assert (times_by_name["before"], times_by_name["after"]) == (0, 7)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.fitting import Piece
-from identification.gap.data.cycles import cut_cycles, select_held_out_cycles
+from identification.gap.data.cycles import Cycles, StrokeCondition, cut_cycles, select_held_out_cycles
 from identification.logs.recording import Segment
 from identification.simulate import Excitation
 from tests.support.strokes import stretch
@@ -78,3 +78,84 @@ def test_of_few_segments_some_cycle_after_a_step_of_the_drive_is_held_out():
     held_out = select_held_out_cycles(cycles)
     first = [int(np.flatnonzero(cycles.segment == k)[0]) for k in range(5)]
     assert 0 < np.count_nonzero(held_out[first]) < 5
+
+
+def cut_one(segment, x, rate=100.0, drive=None):
+    """Cycles of one stretch with one segment."""
+    drive = 0.0 * x if drive is None else drive
+    piece = Piece("one", Excitation(rate, x, 0.0 * x, 0.0 * x, drive), 0.0 * x, np.ones(len(x)))
+    return cut_cycles([stretch(x, drive=drive, segments=[segment], rate=rate)], [piece])
+
+
+@pytest.mark.parametrize(
+    ("count", "last"), [(60, 0), (189, 0), (190, 1), (289, 1), (290, 2)]
+)  # one cycle is 100 samples; a tenth of it may be missing
+def test_a_last_cycle_counts_if_at_most_a_tenth_is_missing(count, last):
+    x = np.sin(2 * np.pi * np.arange(count) / 100.0)
+    cycles = cut_one(Segment(0, "s", 0, count, "sine", 1.0, 1.0, None), x)
+    assert cycles.cycle[-1] == last
+    assert cycles.count == last + 1
+
+
+@pytest.mark.parametrize(("motion", "frequency"), [("ramp", 2.0), ("sine", None)])
+def test_a_segment_without_a_periodic_motion_has_cycles_of_one_second_and_no_frequency(motion, frequency):
+    x = np.linspace(-0.01, 0.01, 250)
+    cycles = cut_one(Segment(0, "s", 0, 250, motion, None, frequency, None), x)
+    assert np.bincount(cycles.cycle).tolist() == [100, 150]
+    assert not cycles.phase.any()
+    assert cycles.conditions == (StrokeCondition(0.0, 0.01, 0.0),)
+
+
+def test_less_than_a_second_without_periodic_motion_is_one_cycle():
+    assert cut_one(Segment(0, "s", 0, 60, "ramp", None, None, None), np.zeros(60)).count == 1
+
+
+def test_a_condition_comes_from_the_segment_and_only_then_from_the_recording():
+    x, drive = 0.02 * np.sin(2 * np.pi * np.arange(200) / 100.0), np.linspace(0.1, 0.3, 200)
+    measured = cut_one(Segment(0, "s", 0, 200, "sine", None, 1.0, None), x, drive=drive)
+    planned = cut_one(Segment(0, "s", 0, 200, "sine", 0.025, 1.0, 0.5), x, drive=drive)
+    one = measured.conditions[0]
+    assert (one.drive, one.amplitude, one.frequency) == pytest.approx((0.2, 0.02, 1.0))
+    assert planned.conditions == (StrokeCondition(0.5, 0.025, 1.0),)
+
+
+def test_samples_outside_all_segments_belong_to_no_cycle():
+    x = np.sin(2 * np.pi * np.arange(400) / 100.0)
+    cycles = cut_one(Segment(0, "s", 50, 250, "sine", 1.0, 1.0, None), x)
+    assert set(cycles.cycle[:50]) == set(cycles.cycle[250:]) == {-1}
+    assert np.bincount(cycles.cycle[50:250]).tolist() == [100, 100]
+    # The segment begins half a cycle after the middle in extension.
+    assert cycles.phase[[50, 75, 100, 125]] == pytest.approx([0.5, 0.75, 0.0, 0.25], abs=1e-9)
+    assert cycles.sum_by_cycle(np.ones(400), np.ones(400, bool)).tolist() == [100.0, 100.0]
+
+
+def make_cycles(segment, count):
+    conditions = tuple(StrokeCondition(0.0, 0.01, 1.0) for _ in range(count))
+    return Cycles(np.zeros(0, int), np.zeros(0), np.array(segment), conditions)
+
+
+@pytest.mark.parametrize(
+    # Of nine segments with two cycles each, cycle 0 of segments 2 and 6 and cycle 1 of segments 3 and 7.
+    ("segments", "expected"),
+    [(9, [4, 7, 12, 15]), (10, [4, 5, 12, 13])],
+)
+def test_from_ten_segments_on_whole_segments_are_held_out(segments, expected):
+    held_out = select_held_out_cycles(make_cycles(np.repeat(np.arange(segments), 2), segments))
+    assert np.flatnonzero(held_out).tolist() == expected
+
+
+def test_of_few_segments_the_held_out_cycles_start_at_the_third_and_move_on_by_one():
+    held_out = select_held_out_cycles(make_cycles(np.repeat([0, 1], 8), 2))
+    assert np.flatnonzero(held_out).tolist() == [2, 6, 8 + 3, 8 + 7]
+
+
+def test_of_two_cycles_the_second_is_held_out():
+    assert select_held_out_cycles(make_cycles([0, 0], 1)).tolist() == [False, True]
+
+
+def test_strokes_differ_by_amplitude_or_frequency_and_need_a_frequency():
+    conditions = ((0.0, 0.01, 1.0), (0.5, 0.01, 1.0), (0.0, 0.02, 1.0), (0.0, 0.01, 2.0), (0.0, 0.03, 0.0))
+    cycles = Cycles(
+        np.zeros(0, int), np.zeros(0), np.zeros(5, int), tuple(StrokeCondition(*c) for c in conditions)
+    )
+    assert cycles.stroke_count == 3

@@ -1,9 +1,10 @@
 """Cycles in which the rod did not repeat its stroke are excluded."""
 
 import numpy as np
+import pytest
 
 from identification.fitting.piece import Piece
-from identification.gap.data.cycles import cut_cycles
+from identification.gap.data.cycles import Cycles, StrokeCondition, cut_cycles
 from identification.gap.data.disturbed_cycles import mask_disturbed_cycles, measure_disturbance
 from identification.logs.recording import Segment
 from identification.simulate import Excitation
@@ -70,3 +71,57 @@ def test_a_recording_with_mostly_disturbed_cycles_is_kept_and_reported():
     (masked,), notes = mask_disturbed_cycles([piece], cycles)
     assert masked is piece
     assert "record again" in notes[0]
+
+
+def test_the_note_states_the_jerks_in_micrometres():
+    piece, cycles = make_strokes(1e-3, (10, 11, 12, 21))
+    _, (note,) = mask_disturbed_cycles([piece], cycles)
+    largest = 1e6 * np.nanmax(measure_disturbance([piece], cycles))
+    assert 50.0 < largest < 2000.0
+    # The limit is 0.004 of the standard deviation of the stroke.
+    assert f"jerk up to {largest:.3g} µm, limit {4000.0 * np.std(piece.excitation.displacement):.2g} µm;" in note
+
+
+def test_the_first_cycle_is_excluded_with_a_disturbed_neighbour():
+    piece, cycles = make_strokes(2e-3, (0, 1))
+    (masked,), _ = mask_disturbed_cycles([piece], cycles)
+    assert set(cycles.cycle[masked.train == 0.0]) == {0, 1}
+
+
+def repeat_stroke(cycles, samples=100, frequency=1.0, rounding=0.0):
+    """Equal cycles of one segment; later cycles start a rounding error before their zero phase."""
+    phase = np.tile(np.arange(samples) / samples, cycles)
+    x = 0.01 * np.sin(2 * np.pi * phase)
+    phase[samples::samples] = (phase[samples::samples] - rounding) % 1.0
+    zero = 0.0 * x
+    numbers = np.repeat(np.arange(cycles), samples)
+    piece = Piece("rod", Excitation(RATE, x, zero, zero, zero), zero, np.ones(len(x)))
+    return piece, Cycles(numbers, phase, np.zeros(cycles, int), (StrokeCondition(0.0, 0.01, frequency),))
+
+
+@pytest.mark.parametrize(
+    ("cycles", "samples", "frequency", "known"),
+    [(3, 100, 1.0, True), (2, 100, 1.0, False), (3, 100, 0.0, False), (3, 17, 1.0, True), (3, 16, 1.0, False)],
+)
+def test_cycles_are_compared_from_three_on_with_enough_samples_of_a_periodic_stroke(
+    cycles, samples, frequency, known
+):
+    piece, made = repeat_stroke(cycles, samples, frequency)
+    assert np.isfinite(measure_disturbance([piece], made)).all() == known
+    assert np.isfinite(measure_disturbance([piece], made)).any() == known
+
+
+def test_a_phase_rounded_to_below_zero_is_no_disturbance():
+    piece, cycles = repeat_stroke(4, samples=60, rounding=1e-12)
+    x = piece.excitation.displacement
+    x[::60] += 1e-3  # the start of every cycle differs from the common motion
+    assert measure_disturbance([piece], cycles) == pytest.approx(np.zeros(4), abs=1e-7)
+
+
+def test_the_jerk_is_the_third_difference_of_a_cycle_against_the_median():
+    piece, cycles = repeat_stroke(9, samples=50)
+    piece.excitation.displacement[4 * 50 + 20] += 1e-4
+    jerks = measure_disturbance([piece], cycles)
+    # Half of the pulse falls into each of two bins. Third differences: half of 1, -2, 0, 2, -1 in 47 places.
+    assert jerks[4] == pytest.approx(1e-4 * np.sqrt(2.5 / 47.0), rel=0.02)
+    assert np.delete(jerks, 4).max() < 0.1 * jerks[4]

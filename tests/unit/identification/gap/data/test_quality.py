@@ -64,3 +64,25 @@ def test_a_floor_without_repeating_cycles_is_noted():
     floor = replace(FLOOR, cycle_to_cycle=None, basis="no cycles")
     notes = describe_unobservable_effects(make_cycles(6, StrokeCondition(0.0, 0.01, 0.0)), floor)
     assert any("high frequencies only: no cycles" in note for note in notes)
+
+
+def test_one_piece_with_force_at_speed_is_enough_and_the_largest_limit_is_stated():
+    fast, slow = (size * np.sin(np.arange(4000) / 100.0) for size in (0.2, 0.1))
+    unmeasured = make_piece(fast, np.zeros(4000))
+    check_sliding_recorded([unmeasured, make_piece(slow, np.ones(4000))])
+    with pytest.raises(UnusableDataError, match=r"above 0\.1 m/s"):
+        check_sliding_recorded([make_piece(slow, np.zeros(4000)), unmeasured])
+
+
+@pytest.mark.parametrize("count", [0, 2, 3])
+def test_fewer_than_four_cycles_are_refused(count):
+    with pytest.raises(UnusableDataError, match=f"contains {count} cycles of"):
+        check_cycle_count(make_cycles(count))
+
+
+def test_strokes_that_agree_in_two_digits_count_as_one():
+    alike = make_cycles(6, StrokeCondition(0.201, 0.01, 1.001), StrokeCondition(0.202, 0.01001, 1.002))
+    assert len(describe_unobservable_effects(alike, FLOOR)) == 4
+    two = make_cycles(6, StrokeCondition(0.2, 0.01, 1.0), StrokeCondition(0.21, 0.011, 0.0))
+    (frequency, _) = describe_unobservable_effects(two, FLOOR)
+    assert "one frequency" in frequency

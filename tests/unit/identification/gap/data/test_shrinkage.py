@@ -107,3 +107,61 @@ def test_at_the_floor_there_is_no_shrinkage():
     shrinkage = estimate_shrinkage(errors, NOISE, replicate(), strokes=5)
     assert shrinkage.value is None
     assert shrinkage.ci95 is None
+
+
+def test_equal_errors_in_another_array_do_not_shrink_either():
+    errors = close_gap(9.0, 0.1)
+    shrinkage = estimate_shrinkage(errors._replace(after=errors.before.copy()), NOISE, replicate(), strokes=5)
+    assert (shrinkage.value, shrinkage.ci95) == (0.0, (0.0, 0.0))
+
+
+def test_one_stroke_is_less_certain_than_two_and_none_counts_as_one():
+    none, one, two = (
+        estimate_shrinkage(close_gap(9.0, 0.1), NOISE, replicate(), strokes=strokes) for strokes in (0, 1, 2)
+    )
+    assert none == one
+    assert one.value < two.value - 0.02
+    assert one.ci95[0] < two.ci95[0] - 0.05
+
+
+def make_uniform(before, after, counts):
+    """Cycles of one segment with the same mean squares [N²]; the last one is held out."""
+    counts = np.array(counts, float)
+    return CycleErrors(
+        counts * before, counts * after, counts, np.zeros(len(counts), int), np.arange(len(counts)) > 0
+    )
+
+
+def test_without_form_error_the_input_noise_of_other_runs_alone_remains():
+    errors = make_uniform(NOISE**2 + 9.0, NOISE**2, [10.0, 30.0, 20.0])
+    shrinkage = estimate_shrinkage(errors, NOISE, replicate(0.9), strokes=5)
+    # 0.9 / 9 over a gap with a logarithmic deviation of 0.35: mean factor exp(0.35^2 / 2) = 1.063.
+    assert shrinkage.value == pytest.approx(1.0 - 0.1063, abs=0.005)
+    # Quantiles at 1.96 x 0.35: factors 0.5036 and 1.986.
+    assert shrinkage.ci95 == pytest.approx((1.0 - 0.1986, 1.0 - 0.0504), abs=0.012)
+    assert shrinkage.expected_benefit == pytest.approx(0.9)
+    assert shrinkage.before == pytest.approx(np.sqrt(13.0))
+    assert shrinkage.after == pytest.approx(np.sqrt(4.0 + (1.0 - shrinkage.value) * 9.0))
+
+
+def test_the_form_error_of_many_strokes_keeps_its_mean_and_scatters_by_a_factor():
+    errors = make_uniform(NOISE**2 + 10.0, NOISE**2 + 1.5, [10.0, 30.0, 20.0])
+    shrinkage = estimate_shrinkage(errors, NOISE, replicate(cycles=0.5, gap=10.0), strokes=10**9)
+    # (1.5 - 0.5) / 10 remains; quantiles at exp(+-1.96 x 0.8 - 0.32): 0.1514 and 3.483.
+    assert shrinkage.value == pytest.approx(0.9, abs=0.008)
+    assert shrinkage.ci95 == pytest.approx((1.0 - 0.348, 1.0 - 0.0151), abs=0.04)
+    assert shrinkage.expected_benefit == pytest.approx(1.0 - (1.5 - 0.5) / 10.0)
+
+
+@pytest.mark.parametrize(("ratio", "shrinks"), [(1.019, False), (1.021, True)])
+def test_a_gap_within_two_per_cent_of_the_floor_has_no_shrinkage(ratio, shrinks):
+    errors = make_uniform((ratio * NOISE) ** 2, NOISE**2, [10.0, 30.0])
+    shrinkage = estimate_shrinkage(errors, NOISE, replicate(gap=1.0), strokes=5)
+    assert (shrinkage.value is not None) == shrinks
+    assert shrinkage.before == pytest.approx(ratio * NOISE)
+
+
+def test_a_gap_that_is_smaller_than_the_noise_is_divided_by_a_hundredth_of_it():
+    errors = make_uniform(NOISE**2 + 9.0, NOISE**2 + 1.0, [10.0, 30.0])
+    shrinkage = estimate_shrinkage(errors, NOISE, replicate(0.02, gap=0.0), strokes=5)
+    assert shrinkage.expected_benefit == pytest.approx(1.0 - 1.02 / 0.04)

@@ -104,3 +104,30 @@ def test_a_fit_in_place_of_a_diagnosis_is_refused(tmp_path):
     path.write_text('{"schema": "mrbench.fit/1"}')
     with pytest.raises(ReportError, match=r"fit\.json: not a diagnosis written by `mrbench diagnose`"):
         read_diagnosis(path)
+
+
+def test_bars_show_the_errors_in_order_and_stages_that_are_more_likely_than_not(written):
+    left, right = diagnosis_plots.plot_shrinkage(read_diagnosis(written())).axes
+    assert [round(bar.get_width(), 3) for bar in left.patches] == [31.0, 13.2, 2.6]
+    assert (left.get_ylim(), left.get_xlim()) == ((2.5, -0.5), (0, 1.25 * 31.0))
+    colours = [bar.get_facecolor() for bar in right.patches]
+    assert (len(set(colours)), colours.count(colours[STAGES.index("force_channel")])) == (2, 1)
+
+
+def test_a_single_error_has_the_bar_of_one_of_two(written):
+    gap = document()["gap"] | {"nominal_n": None}
+    left = diagnosis_plots.plot_shrinkage(read_diagnosis(written(effects=[], gap=gap))).axes[0]
+    assert (len(left.patches), left.get_ylim()) == (1, (1.5, -0.5))
+
+
+def test_the_map_omits_motions_without_a_frequency(written):
+    where = document()["where"]
+    slow, still = (where["map"][0] | {"frequency_hz": value} for value in (0.5, 0.0))
+    figure = diagnosis_plots.plot_gap_map(read_diagnosis(written(where=where | {"map": [slow, still]})), "V")
+    assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["10.0 mm, 0.500 Hz, 0.500 V"]
+    assert diagnosis_plots.plot_gap_map(read_diagnosis(written(where=where | {"map": [still]})), "V") is None
+
+
+def test_no_gap_is_closed_without_a_named_effect(written):
+    labels = dict(make_context(read_diagnosis(written(effects=[])), "V")["gap"])
+    assert "Part of the gap that they close" not in labels

@@ -4,6 +4,7 @@ import re
 from datetime import UTC, datetime
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from typer import BadParameter
 
@@ -11,8 +12,8 @@ from bench.commands.report import report
 from bench.errors import LogError, ReportError
 from bench.log.reader import read_log
 from bench.report import page
-from bench.report.content import make_header_rows
-from bench.report.documents import Fit
+from bench.report.content import make_correlation_rows, make_drive_rows, make_header_rows
+from bench.report.documents import DriveError, Fit
 from bench.report.summary import make_findings
 from tests.support.reports import fit_document, prediction, series, write_fit, write_log
 
@@ -213,3 +214,69 @@ def test_the_recording_begins_at_its_first_sample_not_when_the_agent_was_started
     )
     assert dict(make_header_rows(log, ""))["Recorded"] == "2026-05-04 03:02:01 UTC"
     assert dict(make_header_rows(later, ""))["Recorded"] == "2026-05-04 04:02:01 UTC"
+
+
+@pytest.mark.parametrize(
+    ("drive", "fitted", "is_warned"),
+    [
+        ((0.1, 0.3), (0.1039, 0.3), False),  # 2 % of the fitted span: 3.9 mV
+        ((0.1, 0.3), (0.1041, 0.3), True),
+        ((0.1, 0.3), (0.1, 0.2961), False),
+        ((0.1, 0.3), (0.1, 0.2959), True),
+        ((0.1, 0.1), (0.1009, 0.1009), False),  # at least 1 mV
+        ((0.1, 0.1), (0.1011, 0.1011), True),
+    ],
+)
+def test_extrapolation_is_a_warning_above_2_percent_of_the_fitted_drives_or_1_mv(log, drive, fitted, is_warned):
+    recorded = read_log(log)
+    recorded = dataclasses.replace(recorded, samples={**recorded.samples, "coil_drive": np.array(drive)})
+    fit = Fit.model_validate(fit_document(drive_range=fitted))
+    texts = [finding.text for finding in make_findings(recorded, fit, prediction(), True)]
+    assert any("the fit extrapolates" in text for text in texts) == is_warned
+
+
+def test_the_recordings_of_a_fit_are_counted_if_there_are_several(log):
+    one = fit_document()["provenance"]
+    two = one | {"logs": {"a.mcap": "1", "b.mcap": "2"}}
+    assert "The law was fitted to 2 recordings: a.mcap, b.mcap." in describe(log, {"provenance": two})
+    assert not any("The law was fitted" in text for text in describe(log, {"provenance": one}))
+
+
+@pytest.mark.parametrize(
+    ("rmse", "floor", "severity"),
+    [(1.04, 1.0, "good"), (1.06, 1.0, "plain"), (1.19, 1.0, "plain"), (1.21, 1.0, "warning"), (0.5, 0.5, "good"),
+     (0.5, 0.0, "warning")],
+)  # fmt: skip
+def test_an_error_of_5_and_of_20_percent_above_the_floor_is_the_limit(log, rmse, floor, severity):
+    found = describe(log, rmse=rmse, floor=floor)
+    assert [found[text] for text in found if text.startswith("The law reproduces")] == [severity]
+
+
+@pytest.mark.parametrize(("result", "severity"), [("converged", None), ("converged at a bound", "plain")])
+def test_a_fit_that_converged_with_a_remark_is_no_warning(log, result, severity):
+    found = describe(log, {"result": result})
+    assert found.get(f"Result of the fit: {result}.") == severity
+
+
+def test_held_out_errors_are_described_only_if_all_are_known(log):
+    for name in ("rmse_n", "nrmse"):
+        errors = fit_document()[name] | {"held_out": None}
+        assert not any(text.startswith("On held-out") for text in describe(log, {name: errors}))
+
+
+@pytest.mark.parametrize(("floor", "ratio"), [(0.0, "–"), (0.5, "4.00 times"), (1.0, "2.00 times")])
+def test_an_error_by_drive_is_a_multiple_of_the_floor(floor, ratio):
+    (row,) = make_drive_rows([DriveError(drive=0.1, unit="V", rmse_n=2.0, nrmse=0.1, samples=7)], floor)
+    assert ratio in row
+    assert "mostly noise" not in row
+
+
+@pytest.mark.parametrize(("nrmse", "note"), [(0.99, ""), (1.01, "mostly noise"), (0.0, "")])
+def test_a_force_below_twice_the_floor_is_mostly_noise(nrmse, note):
+    (row,) = make_drive_rows([DriveError(drive=0.1, unit="V", rmse_n=2.0, nrmse=nrmse, samples=7)], 1.0)
+    assert row[-1] == note
+
+
+def test_correlations_are_listed_from_the_strongest_of_either_sign():
+    fit = Fit.model_validate(fit_document(correlations={"a,b": 0.91, "c,d": -0.95, "e,f": 0.93}))
+    assert make_correlation_rows(fit) == [("c and d", "−0.950"), ("e and f", "+0.930"), ("a and b", "+0.910")]

@@ -12,6 +12,7 @@ from bench.report.drawing import (
     compute_plot_envelope,
     decimate,
     draw_envelope,
+    lighten,
     make_figure,
 )
 from bench.report.recording import make_recording
@@ -151,3 +152,99 @@ def test_a_segment_shorter_than_a_cycle_is_shown_as_it_is(recording):
     (stroke, *_) = choose_strokes(dataclasses.replace(recording, segments=(short,)))
     rows = stroke.traces[0].rows
     assert (rows.start, rows.stop) == (short.start, short.stop)
+
+
+def get_lines(axes):
+    return [(line.get_xdata(), line.get_ydata()) for line in axes.get_lines()]
+
+
+def test_loops_are_drawn_in_millimetres_and_metres_per_second(recording):
+    constant = choose_strokes(recording)[0]
+    rows = constant.traces[0].loop
+    left, right = plots.plot_loops(recording).axes[:2]
+    for axes, values in ((left, 1000 * recording.displacement[rows]), (right, recording.velocity[rows])):
+        (x, simulated), (_, recorded) = get_lines(axes)[:2]
+        np.testing.assert_allclose(x, values)
+        np.testing.assert_array_equal(simulated, recording.simulated[rows])
+        np.testing.assert_array_equal(recorded, recording.force[rows])
+
+
+def test_the_cycles_of_all_drives_start_at_time_zero(recording):
+    figure = plots.plot_over_time(recording)
+    constant, varying = figure.axes[:2]
+    assert [line[0][0] for line in get_lines(constant)] == [0.0] * 4
+    assert [axes.get_xlabel() for axes in (constant, varying)] == [
+        "time from the start of the cycles [s]",
+        "time [s]",
+    ]
+    assert varying.get_title(loc="left").startswith("sine, 10 mm, 2 Hz, drive steps, from ")
+
+
+def test_the_whole_recording_is_drawn_in_millimetres(recording):
+    displacement = plots.plot_recording(recording).axes[0]
+    low, high = displacement.dataLim.intervaly
+    assert (low, high) == pytest.approx((-10, 10), abs=0.01)
+
+
+def test_the_residual_is_simulated_minus_recorded_force_with_a_band_of_twice_the_floor(recording):
+    biased = dataclasses.replace(recording, simulated=recording.force + 5.0)
+    axes = plots.plot_residual(biased, 1.5).axes[0]
+    band, held_out = axes.patches
+    assert (band.get_y(), band.get_height()) == (-3.0, 6.0)
+    assert (held_out.get_x(), held_out.get_width()) == pytest.approx((3.0, 2.998))
+    assert axes.collections[1].get_paths()[0].vertices[0][1] == pytest.approx(5.0)
+
+
+@pytest.mark.parametrize("held_out", [(), (0, 3000)])
+def test_nothing_is_marked_as_held_out_if_none_or_all_of_it_is(recording, held_out):
+    mask = np.zeros(3000, bool)
+    mask[slice(*held_out) if held_out else slice(0, 0)] = True
+    axes = plots.plot_residual(dataclasses.replace(recording, held_out=mask), 1.5).axes[0]
+    assert len(axes.patches) == 1
+
+
+def test_bars_of_the_error_by_drive_keep_the_width_of_one_of_six(recording):
+    axes = plots.plot_error_by_drive(prediction().per_drive, 1.9, recording).axes[0]
+    assert axes.get_xlim() == pytest.approx((-0.7, 5.7))
+    assert axes.get_ylim() == pytest.approx((0, 1.25 * 2.2))
+    assert [label.get_text() for label in axes.get_xticklabels()] == ["0.1 V", "0.3 V"]
+    assert plots.plot_error_by_drive(prediction().per_drive, 4.0, recording).axes[0].get_ylim()[1] == 5.0
+
+
+@pytest.mark.parametrize(("length", "step"), [(1, 1), (2000, 1), (2001, 2), (4000, 2), (4001, 3)])
+def test_points_are_left_out_only_above_the_largest_number(length, step):
+    assert decimate(slice(7, 7 + length)) == slice(7, 7 + length, step)
+
+
+def test_an_envelope_has_the_extremes_mean_time_and_middle_drive_of_each_bin():
+    time = np.array([0.0, 1, 2, 3, 4, 5, 6])
+    found = compute_plot_envelope(time, time**2, 10 * time, bins=3)
+    assert found.rows.tolist() == [0, 3, 6]
+    assert found.time.tolist() == [1.0, 4.0, 6.0]
+    assert (found.low.tolist(), found.high.tolist()) == ([0, 9, 36], [4, 25, 36])
+    assert found.drive.tolist() == [10, 40, 60]
+    assert compute_plot_envelope(time, time, time).rows.tolist() == [0, 1, 2, 3, 4, 5, 6]
+
+
+@pytest.mark.parametrize(("gap", "rows"), [(9.0, [0, 4]), (11.0, [0, 3, 4])])
+def test_a_bin_ends_at_a_gap_of_more_than_ten_samples(gap, rows):
+    time = np.array([0.0, 1, 2, 2 + gap, 3 + gap, 4 + gap, 5 + gap])
+    assert compute_plot_envelope(time, time, time, bins=2).rows.tolist() == rows
+
+
+def test_equal_drives_have_a_finite_colour_scale():
+    colours = DriveColours(0.2, 0.2, "V")
+    assert all(np.isfinite(colours.get_colour(0.2)))
+    assert colours.scale.norm.vmax > colours.scale.norm.vmin
+    assert colours.scale.norm.vmax == pytest.approx(0.2, abs=1e-6)
+
+
+def test_a_recorded_line_is_lighter_by_45_percent_of_white():
+    assert lighten((0.0, 0.4, 1.0)) == pytest.approx((0.45, 0.67, 1.0))
+
+
+@pytest.mark.parametrize(("first", "expected"), [(0.0, (0, 1000)), (0.0019, (1, 1000)), (3.0, (0, 0))])
+def test_a_segment_keeps_its_samples_on_a_later_time_base(log, first, expected):
+    arrays = {name: array[series().arrays["time"] >= first] for name, array in series().arrays.items()}
+    found = make_recording(log, dataclasses.replace(series(), arrays=arrays)).segments[0]
+    assert found.stop - found.start == expected[1] - expected[0]

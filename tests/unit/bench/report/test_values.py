@@ -7,6 +7,7 @@ from bench.report.values import (
     format_force,
     format_percent,
     format_quantity,
+    format_ratio,
     format_rounded,
     format_significant,
     format_unit,
@@ -51,3 +52,39 @@ def test_forces_shares_and_units_are_written_out():
 @pytest.mark.parametrize(("drive", "shown"), [(-9e-6, "0"), (0.100009, "0.1"), (0.03125, "0.031")])
 def test_a_drive_is_rounded_to_its_span_and_never_a_negative_zero(drive, shown):
     assert format_drive(drive, 0.5) == shown
+
+
+@pytest.mark.parametrize(
+    ("value", "interval", "unit", "shown"),
+    [
+        (1.0, None, "m", "1 m"),
+        (0.999, None, "m", "999 mm"),
+        (1e-3, None, "m", "1 mm"),
+        (0.999e-3, None, "s", "999 µs"),
+        (2e-9, None, "m", "0.002 µm"),
+        (-0.002, None, "s", "−2 ms"),
+        (0.0, (-0.003, 0.002), "s", "0 (−3.0 … 2.0) ms"),
+        (99999.0, None, "N", "1e+05 N"),
+        (100000.0, None, "N", "1 × 10⁵ N"),
+        (0.01, None, "N", "0.01 N"),
+        (0.00999, None, "N", "9.99 × 10⁻³ N"),
+        (10.0, (9.0, 10.8), "N", "10.0 ± 1.0 N"),
+        (10.0, (9.0, 10.7), "N", "10.0 (9.0 … 11) N"),
+        (10.0, (-math.inf, 11.0), "N", "10.0000 N"),
+    ],
+)
+def test_multiple_and_interval_change_at_their_limits(value, interval, unit, shown):
+    found = str(format_quantity(value, interval, unit))
+    assert found == shown
+
+
+@pytest.mark.parametrize(("ratio", "shown"), [(9.994, "9.99 times"), (10.0, "10.0 times"), (10.44, "10.4 times")])
+def test_a_ratio_has_two_decimals_below_ten(ratio, shown):
+    assert format_ratio(ratio) == shown
+
+
+@pytest.mark.parametrize(
+    ("drive", "span", "shown"), [(0.12344, 0.0, "0.1234"), (0.126, 5.0, "0.13"), (0.126, 4.9, "0.126")]
+)
+def test_a_drive_is_rounded_to_a_power_of_ten_below_a_five_hundredth_of_the_span(drive, span, shown):
+    assert format_drive(drive, span) == shown

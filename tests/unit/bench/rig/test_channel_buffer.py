@@ -76,3 +76,66 @@ def test_slope_is_not_taken_across_a_gap():
     slopes = buffer.differentiate(10 * MS).values
     assert slopes[:50] == pytest.approx(2.0)
     assert slopes[50:] == pytest.approx(-3.0)
+
+
+@pytest.mark.parametrize(
+    ("times", "half_window_ms"),
+    [
+        ([], 10.0),  # half of the smoothing window of 20 ms
+        ([5], 10.0),
+        ([5, 7], 12.0),  # and one step
+        ([0, 1, 3], 11.5),  # the median step of 1 ms and 2 ms
+        ([0, 4], 14.0),
+        ([0, 6], 18.0),  # at least three steps
+        ([*range(0, 100, 10), *range(100, 133)], 11.0),  # of the latest 32 samples
+    ],
+)
+def test_slope_needs_half_a_smoothing_window_and_a_step(times, half_window_ms):
+    assert make_buffer(times, [0] * len(times)).half_window_ns == round(half_window_ms * MS)
+
+
+def test_two_samples_can_be_interpolated_three_without_a_cubic():
+    assert make_buffer([0, 4], [0, 8]).interpolate(instants(1), 10 * MS, cubic=True) == pytest.approx([2])
+    assert make_buffer([0, 1, 2], [0, 0, 6]).interpolate(instants(1.5), MS, cubic=True) == pytest.approx([3])
+
+
+def test_four_samples_are_enough_for_a_cubic_but_it_is_used_on_request_only():
+    """The cubic t³ at 1.5 is 3.375; the straight line from 1 to 8 gives 4.5."""
+    buffer = make_buffer([0, 1, 2, 3], [0, 1, 8, 27])
+    assert buffer.interpolate(instants(1.5), MS, cubic=True) == pytest.approx([3.375])
+    assert buffer.interpolate(instants(1.5), MS, cubic=False) == pytest.approx([4.5])
+
+
+def test_gap_and_age_equal_to_their_limit_are_permitted():
+    buffer = make_buffer([0, 10], [0, 10])
+    assert buffer.interpolate(instants(5), 10 * MS, cubic=False) == pytest.approx([5])
+    assert np.isnan(buffer.interpolate(instants(5), 10 * MS - 1, cubic=False)).all()
+    assert buffer.hold_last(instants(20), 10 * MS).tolist() == [10]
+    assert np.isnan(buffer.hold_last(instants(20), 10 * MS - 1)).all()
+
+
+def test_first_sample_may_be_at_time_zero_and_stays_the_start():
+    buffer = make_buffer([0], [1])
+    assert (buffer.size, buffer.start_ns) == (1, 0)
+    buffer.add(instants(3), np.array([2.0]))
+    buffer.discard_before(3 * MS)
+    assert buffer.start_ns == 0
+
+
+def test_empty_addition_has_no_start():
+    buffer = make_buffer([], [])
+    buffer.add(instants(7, 8), np.array([1.0, 2.0]))
+    assert (buffer.start_ns, buffer.first_ns, buffer.newest_ns) == (7 * MS, 7 * MS, 8 * MS)
+
+
+@pytest.mark.parametrize(("before", "first"), [(4, 0), (5, 1), (4.5, 1), (9, 5), (20, 6)])
+def test_discarding_keeps_four_older_samples(before, first):
+    buffer = make_buffer(range(10), range(10))
+    buffer.discard_before(round(before * MS))
+    assert (buffer.first_ns, buffer.values[0]) == (first * MS, first)
+
+
+def test_slope_of_two_samples_is_known_that_of_one_is_zero():
+    """Samples more than 5 ms apart are in separate parts."""
+    buffer = make_buffer([0, 5, 11], [0.0, 0.01, 7.0])
+    assert buffer.differentiate(5 * MS).values == pytest.approx([2.0, 2.0, 0.0])

@@ -125,3 +125,14 @@ def test_the_jerk_is_the_third_difference_of_a_cycle_against_the_median():
     # Half of the pulse falls into each of two bins. Third differences: half of 1, -2, 0, 2, -1 in 47 places.
     assert jerks[4] == pytest.approx(1e-4 * np.sqrt(2.5 / 47.0), rel=0.02)
     assert np.delete(jerks, 4).max() < 0.1 * jerks[4]
+
+
+def test_a_motion_that_all_cycles_share_or_that_grows_steadily_is_no_disturbance():
+    piece, cycles = repeat_stroke(4)
+    x, trend = piece.excitation.displacement, np.linspace(-1.0, 1.0, 400)
+    x += (
+        0.002 * np.sin(12 * 2 * np.pi * cycles.phase)
+        + 0.003 * trend
+        + 0.004 * trend * np.cos(2 * np.pi * cycles.phase)
+    )
+    assert measure_disturbance([piece], cycles).max() < 1e-9

@@ -118,13 +118,14 @@ def test_a_part_below_the_noise_has_no_gap():
     assert [e.gap_n for e in map_gap(make_plain([1, 1]), cycles, 2.0)] == [0.0]
 
 
-def test_harmonics_are_averaged_over_the_cycles_of_periodic_segments():
+@pytest.mark.parametrize("order", [1, 2, 9])
+def test_harmonics_are_averaged_over_the_cycles_of_periodic_segments(order):
     phase = np.tile(np.arange(20) / 20.0, 3)
     cycles = make_cycles(np.repeat([0, 1, 2], 20), phase, [0, 0, 1], (0.0, 0.01, 0.5), (0.0, 0.01, 0.0))
     # The amplitude is 4 in the first cycle and 0 in the second; the last segment is not periodic.
-    values = np.repeat([4.0, 0.0, 7.0], 20) * np.cos(2 * 2 * np.pi * phase + 0.3)
+    values = np.repeat([4.0, 0.0, 7.0], 20) * np.cos(order * 2 * np.pi * phase + 0.3)
     rms = [h.rms_n for h in compute_harmonics(make_plain(values), cycles)]
-    assert rms == pytest.approx([0.0, np.sqrt(2.0), *[0.0] * 7], abs=1e-9)
+    assert rms == pytest.approx(np.where(np.arange(1, 10) == order, np.sqrt(2.0), 0.0), abs=1e-9)
 
 
 def test_without_a_periodic_segment_there_are_no_harmonics():

@@ -1,6 +1,7 @@
 """Texts of a diagnosis for a person."""
 
 import json
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,7 +10,12 @@ from identification.damper.parameter_sets import PARAMETER_SETS
 from identification.documents.diagnosis import EffectSet, EffectValue, Gap, NamedEffect
 from identification.errors import IdentificationError
 from identification.fitting.damper_model import make_effect_entries, read_damper_model
-from identification.gap.outcome.explanation import describe_nearest, explain_diagnosis, suggest_check
+from identification.gap.outcome.explanation import (
+    describe_nearest,
+    explain_diagnosis,
+    suggest_check,
+    summarise_diagnosis,
+)
 
 GAP = Gap(
     before_n=12.0,
@@ -78,3 +84,51 @@ def test_the_closest_known_effects_are_noted_with_their_errors():
 def test_the_remainder_follows_the_checks_of_a_partly_explained_gap():
     text = explain_diagnosis("partly_explained", GAP, [MASS], [], "The remainder is largest at 0.5 V.")
     assert text.endswith("; the remainder is largest at 0.5 V.")
+
+
+def test_two_effects_reduce_the_error_together_and_close_no_more_than_all_of_the_gap():
+    spring = MASS.model_copy(update={"name": "gas_spring"})
+    gap = GAP.model_copy(update={"shrinkage": 1.04})
+    text = explain_diagnosis("explained", gap, [MASS, spring], [], "")
+    assert "together reduce this error to 3 N and close 100 % of the gap" in text
+    assert " reduces this error to 3 N and closes 98 % of the gap" in explain_diagnosis(
+        "explained", GAP, [MASS], [], ""
+    )
+    unknown = GAP.model_copy(update={"shrinkage": None})
+    assert "reduces this error to 3 N. Check" in explain_diagnosis("explained", unknown, [MASS], [], "")
+
+
+@pytest.mark.parametrize(("probability", "mentioned"), [(0.1, True), (0.099, False)])
+def test_alternatives_are_mentioned_from_a_tenth_on(probability, mentioned):
+    others = [EffectSet(effects=[], probability=probability), EffectSet(effects=["a", "b"], probability=0.2)]
+    text = explain_diagnosis("explained", GAP, [MASS], others, "")
+    assert ("would also allow no effect at all or a with b)" in text) == mentioned
+    assert "would also allow" in text
+
+
+def test_a_gap_of_noise_needs_nothing():
+    text = explain_diagnosis("no_gap", GAP, [], [], "")
+    assert "is 12 N, and noise accounts for 2.5 N of it. Nothing needs" in text
+
+
+@pytest.mark.parametrize(
+    ("effects", "gap", "message", "summary"),
+    [
+        (
+            [MASS],
+            GAP,
+            "Checked.",
+            "moving_mass 80%; held-out force error 12 to 3 N, noise floor 2.5 N, shrinkage 0.98. Checked",
+        ),
+        (
+            [],
+            GAP.model_copy(update={"shrinkage": None}),
+            None,
+            "no effect named; held-out force error 12 to 3 N, noise floor 2.5 N",
+        ),
+    ],
+)
+def test_a_summary_has_effects_errors_and_cross_check_in_one_line(effects, gap, message, summary):
+    check = message and SimpleNamespace(message=message)
+    diagnosis = SimpleNamespace(verdict="explained", effects=effects, gap=gap, cross_check=check)
+    assert summarise_diagnosis(diagnosis) == f"explained: {summary}"

@@ -8,7 +8,14 @@ import pytest
 from bench.methods.compile import compile_method
 from bench.methods.document import Method, MethodSegment
 from identification.damper.effects import EFFECTS
-from identification.gap.outcome.next_stroke import RivalModel, compute_information, find_best_segment
+from identification.gap.outcome.next_stroke import (
+    RivalModel,
+    _compute_detectability,
+    _compute_irreducible_norm,
+    _PredictedForce,
+    compute_information,
+    find_best_segment,
+)
 from identification.gap.outcome.trial_segments import StrokeLimits, generate_trial_segments
 from identification.simulate import ActiveEffect
 from tests.support.candidate_pools import fit_baseline
@@ -96,3 +103,44 @@ def test_the_bench_compiles_every_trial_segment():
         }
         programme = compile_method(Method.model_validate(document))
         assert len(programme.displacement) >= len(excitation.displacement)
+
+
+def make_rival_with(information):
+    return RivalModel(("law",), LABORATORY, (), 0.5, 0.0, np.array(information, float))
+
+
+@pytest.mark.parametrize(
+    ("information", "remaining"),
+    [
+        # The difference (3, 4, 12) has a part of 3 along the only column, of which a refit removes 1 / (1 + I).
+        ([[0.0]], np.sqrt(16.0 + 144.0)),
+        ([[1.0]], np.sqrt(169.0 - 4.5)),
+        ([[1e12]], 13.0),
+    ],
+)
+def test_a_refit_removes_the_part_that_the_recording_leaves_free(information, remaining):
+    J = np.array([[1.0], [0.0], [0.0]])
+    norm = _compute_irreducible_norm(np.array([3.0, 4.0, 12.0]), J, make_rival_with(information))
+    assert norm == pytest.approx(remaining)
+
+
+def test_the_unknown_zero_of_the_channel_is_free_and_an_insensitive_parameter_harmless():
+    J = np.array([[0.0, 1.0], [0.0, 1.0]])
+    assert _compute_irreducible_norm(np.array([5.0, 3.0]), J, make_rival_with([[0.0]])) == pytest.approx(
+        np.sqrt(2.0)
+    )
+    small = np.array([1e-3, 1e-3])
+    assert _compute_irreducible_norm(small, J, make_rival_with([[0.0]])) == pytest.approx(0.0, abs=1e-9)
+
+
+def make_prediction(force, slope, error):
+    J = np.zeros((3, 1))
+    J[slope] = 1.0
+    return _PredictedForce(make_rival_with([[0.0]]), np.array(force, float), J, error)
+
+
+def test_the_rival_that_imitates_the_other_better_and_the_larger_error_count():
+    a, b = make_prediction([6, 8, 0], 0, 2.0), make_prediction([0, 0, 0], 1, 4.0)
+    # Refits leave 8 N and 6 N: 6 N over an error of 4 N.
+    assert _compute_detectability(a, b, 2.0) == pytest.approx(1.5)
+    assert _compute_detectability(b, a, 2.0) == pytest.approx(1.5)

@@ -4,8 +4,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from identification.damper.effects import EFFECTS
+from identification.fitting import EffectModel
 from identification.gap.fits.candidate import Candidate
 from identification.gap.outcome.verdict import (
+    build_named_effects,
     compute_shares,
     decide_unnamed_verdict,
     decide_verdict,
@@ -88,3 +91,26 @@ def test_shares_are_the_parts_of_the_explained_variance_that_are_lost_without_an
     }
     shares = compute_shares(candidates, both, sorted(both))
     assert shares == pytest.approx({"gas_spring": 1.0, "moving_mass": 3.0 / 8.0})
+
+
+@pytest.mark.parametrize(("probabilities", "expected"), [((0.3, 0.4), 0.7), ((0.6, 0.41), 1.0)])
+def test_a_named_effect_has_its_probability_in_all_sets_and_an_interval(probabilities, expected):
+    models = (EffectModel("gas_spring", EFFECTS["gas_spring"].forms[0].name), EffectModel("moving_mass", "rigid"))
+    actives = [SimpleNamespace(values=m.form.starts[0]) for m in models]
+    deviations = {m.name: dict.fromkeys((q.symbol for q in m.quantities), 0.5) for m in models}
+    fit = SimpleNamespace(effects=models, active_effects=actives, deviations=deviations)
+    sets = zip(({"gas_spring"}, {"gas_spring", "moving_mass"}), probabilities, strict=True)
+    posterior = Posterior({frozenset(names): p for names, p in sets}, 0.0)
+    shares = {"gas_spring": 0.2, "moving_mass": 0.8}
+    mass, spring = build_named_effects(SimpleNamespace(fit=fit), posterior, shares, "V")
+    assert (mass.name, mass.stage, mass.form, mass.share, mass.note) == (
+        "moving_mass",
+        "mounting",
+        "rigid",
+        0.8,
+        "",
+    )
+    assert (mass.probability, spring.probability) == pytest.approx((probabilities[1], expected))
+    value = mass.parameters["mass"]
+    assert value.unit == "kg"
+    assert value.ci95[1] == pytest.approx(value.value + 1.96 * 0.5)

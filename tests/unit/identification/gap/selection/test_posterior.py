@@ -1,9 +1,12 @@
 """Probabilities of sets of effects and of an unknown cause."""
 
+import math
+
 import pytest
 
 from identification.gap.selection.posterior import (
     BlockEvidence,
+    Posterior,
     SetEvidence,
     compute_complexity_penalty,
     compute_posterior,
@@ -100,3 +103,82 @@ def test_block_evidence_beyond_the_penalty_names_a_second_effect():
     assert name_with_block_evidence(penalty + 1.0) == frozenset({"end_stop", "coil_lag"})
     assert name_with_block_evidence(penalty - 1.0) == frozenset({"end_stop"})
     assert compute_complexity_penalty(frozenset({"end_stop", "coil_lag"})) > penalty > 0.0
+
+
+def compute_odds(posterior, first, second):
+    return posterior.sets[frozenset(first)] / posterior.sets[frozenset(second)]
+
+
+PRIOR_OF_ONE = 0.5 / 16.0 * 0.1
+"""Prior of one of sixteen common effects, with the factor for its parameters."""
+
+
+def test_odds_follow_the_ratio_of_excesses_beyond_the_resolution():
+    # Resolution: 0.004 + 10 / 1000 + 0.05 x 0.1 + 0.01 x gap.
+    posterior = compute_posterior(make_sets(none=1.0, gas_spring=0.3), 1000, coloured_share=0.1)
+    expected = PRIOR_OF_ONE / 0.2 * (1.029 / 0.329) ** 6
+    assert compute_odds(posterior, {"gas_spring"}, ()) == pytest.approx(expected)
+    single = compute_posterior(make_sets(none=1.0, gas_spring=0.3), 1)
+    assert compute_odds(single, {"gas_spring"}, ()) == pytest.approx(PRIOR_OF_ONE / 0.2 * (11.014 / 10.314) ** 6)
+
+
+def test_a_set_that_leaves_more_than_a_fifth_of_a_large_gap_loses_odds():
+    posterior = compute_posterior(make_sets(none=2.0, gas_spring=0.5, end_stop=0.39), 1000)
+    # Of the gap of 2, the empty set leaves 5 times a fifth, the first effect 1.25 times, the second less than one.
+    odds = compute_odds(posterior, {"gas_spring"}, ())
+    assert odds == pytest.approx(PRIOR_OF_ONE / 0.2 * (2.034 / 0.534 * 5.0 / 1.25) ** 6)
+    odds = compute_odds(posterior, {"end_stop"}, {"gas_spring"})
+    assert odds == pytest.approx((0.534 / 0.424 * 1.25) ** 6)
+
+
+@pytest.mark.parametrize(
+    ("names", "prior"),
+    [
+        ({"gas_spring", "end_stop"}, 0.25 / 120.0 * 0.1**2),
+        ({"force_filter"}, 0.5 / 16.0 * 0.1 * 0.3),
+        ({"gas_spring", "force_filter"}, 0.25 / 120.0 * 0.1**2 * 0.3),
+        ({"gas_spring", "end_stop", "coil_lag", "moving_mass", "force_delay"}, 0.005 / 4368.0 * 0.1**5),
+    ],
+)
+def test_the_prior_falls_with_the_number_of_effects_and_their_rarity(names, prior):
+    sets = [SetEvidence(frozenset(), 0.2), SetEvidence(frozenset(names), 0.2, weight=0.5)]
+    posterior = compute_posterior(sets, 1000)
+    assert compute_odds(posterior, names, ()) == pytest.approx(0.5 * prior / 0.2)
+
+
+@pytest.mark.parametrize(
+    ("gap", "excess", "known", "unknown"),
+    [
+        # Odds of effect, none and unknown: 1, 0.3611, 0.4529. Misattribution: (0.02 + 0.4 x 0.4220) x 0.8009.
+        (0.5, 0.2, 0.4679, 0.3631),
+        # Odds of effect and unknown: 1, 1.5182. Misattribution: 0.02 + 0.4 x 0.2625.
+        (2.0, 0.5, 0.34746, 0.65253),
+    ],
+)
+def test_an_unknown_cause_competes_and_misattribution_counts_as_one(gap, excess, known, unknown):
+    posterior = compute_posterior(make_sets(none=gap, gas_spring=excess), 1000)
+    assert posterior.sets[frozenset({"gas_spring"})] == pytest.approx(known, rel=1e-3)
+    assert posterior.unknown == pytest.approx(unknown, rel=1e-3)
+
+
+def test_an_excess_below_the_floor_counts_as_none():
+    below = compute_posterior(make_sets(none=0.5, gas_spring=-0.1), 1000)
+    at_zero = compute_posterior(make_sets(none=0.5, gas_spring=0.0), 1000)
+    assert below.sets[frozenset({"gas_spring"})] == pytest.approx(
+        at_zero.sets[frozenset({"gas_spring"})], rel=5e-3
+    )
+    assert compute_posterior(make_sets(none=-0.5), 1000).sets[frozenset()] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_complexity_penalty_is_the_ratio_of_the_priors():
+    assert compute_complexity_penalty(frozenset()) == pytest.approx(math.log(0.2 / PRIOR_OF_ONE))
+    one = compute_complexity_penalty(frozenset({"end_stop"}))
+    assert one == pytest.approx(math.log(PRIOR_OF_ONE / (0.25 / 120.0 * 0.01)))
+
+
+def test_a_stage_has_the_probability_of_its_effects_and_a_share_of_the_unknown():
+    sets = {frozenset(): 0.1, frozenset({"gas_spring", "end_stop"}): 0.3, frozenset({"end_stop", "coil_lag"}): 0.2}
+    stages = compute_stage_probabilities(Posterior(sets, 0.4), ("coil", "damper", "mounting", "force_channel"))
+    assert stages == pytest.approx({"coil": 0.3, "damper": 0.6, "mounting": 0.1, "force_channel": 0.1})
+    full = compute_stage_probabilities(Posterior({frozenset({"coil_lag"}): 0.9}, 0.4), ("coil", "damper"))
+    assert full == pytest.approx({"coil": 1.0, "damper": 0.2})

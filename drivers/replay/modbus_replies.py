@@ -46,10 +46,12 @@ class ModbusReplyDecoder:
         # Bytes before the function code, and of the checksum at the end.
         head, tail = (1, 2) if self._rtu else (7, 0)
         # On RTU a stale reply, or noise, may precede the reply that the driver took, which is always the last.
-        reply = received[-(head + 2 + self._length + tail) :]
+        size = head + 2 + self._length + tail
+        reply = received[-size:]
         block_request = request[head : head + 5]
         header = bytes((block_request[0], self._length)) if block_request in self._block_requests else None
-        if header is None or reply[head : head + 2] != header:
+        # On TCP a reply may have ended early; the driver has refused it, too.
+        if header is None or len(reply) < size or reply[head : head + 2] != header:
             return None
         is_valid = _is_valid_rtu(reply, request) if self._rtu else reply[:2] == request[:2]
         return struct.unpack_from(f">{self._length // 2}H", reply, head + 2) if is_valid else None

@@ -169,3 +169,16 @@ def test_status_of_a_run_without_outcome_shows_its_progress(run):
     status = run.get_status()
     assert (status.outcome, status.reason, status.elapsed_s) == (None, "", 0.0)
     assert status.duration_s == pytest.approx(run.request.programme.duration)
+
+
+def test_samples_are_recorded_for_a_fifth_of_a_second_after_the_rest(run):
+    """The rod is at rest at 5 s, so samples up to 5.2 s are awaited."""
+    newest = iter([5_199_999_999, 5_200_000_000])
+
+    class Recording(FakeRecordingThread):
+        newest_ns = property(lambda self: next(newest))
+
+    run._recording_thread, run._timing = Recording(), AgentTiming(final_samples=10.0)
+    run._clock = lambda: 5_000_000_000
+    assert execute(run).outcome == "clean"
+    assert list(newest) == []

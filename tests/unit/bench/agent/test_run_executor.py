@@ -4,9 +4,11 @@ import contextlib
 import gc
 import time
 import tomllib
+from types import SimpleNamespace
 
 import pytest
 
+from bench.agent.timing import AgentTiming
 from bench.agent_protocol.messages import RunCommand
 from bench.config import BenchConfig
 from bench.errors import LogError, RunError
@@ -236,3 +238,33 @@ class TestPreparation:
         method = bench.executor.prepare(RunCommand(method=METHOD)).run.request.method
         with pytest.raises(RunError, match=r"none\.pdf cannot be read"):
             make_attachments(method, config, bench.rig, tmp_path / "bench.toml")
+
+
+class TestClocks:
+    """Instruments were connected at 100 s of the bench clock."""
+
+    @pytest.fixture
+    def now(self):
+        return [100 * SECOND]
+
+    @pytest.fixture
+    def bench(self, tmp_path, now):
+        bench = RunBench(tmp_path, lambda: now[0])
+        bench.executor.note_connection()
+        return bench
+
+    @pytest.mark.parametrize(("elapsed", "wait"), [(0.0, 4.0), (1.5, 2.5), (4.0, 0.0), (9.0, 0.0)])
+    def test_run_waits_until_the_clocks_are_known(self, bench, now, tmp_path, monkeypatch, elapsed, wait):
+        waits = []
+        monkeypatch.setattr("bench.agent.run_executor.time", SimpleNamespace(sleep=waits.append))
+        bench.executor._timing = AgentTiming(clock_settling=4.0)
+        prepared = bench.prepare(lambda supervision: None, tmp_path / "a.mcap")
+        now[0] += round(elapsed * SECOND)
+        bench.executor.execute(prepared)
+        assert waits == [pytest.approx(wait)]
+
+    @pytest.mark.parametrize(("elapsed_ns", "rate"), [(0, 0.0), (20 * SECOND - 1, 0.0), (20 * SECOND, 5e-5)])
+    def test_rate_of_the_amplifier_counts_after_twenty_seconds(self, bench, now, elapsed_ns, rate):
+        bench.acquisition.maps[bench.rig.amplifier.name].estimate_rate = lambda: 5e-5
+        now[0] += elapsed_ns
+        assert bench.executor._estimate_amplifier_rate() == rate

@@ -132,3 +132,28 @@ def test_trip_stops_coil_and_actuator_once(events):
     assert supervisor._rig.amplifier.calls == ["coil safe"]
     assert events.list_texts("trip") == ["force 1600 N"]
     assert stops == [("force 1600 N", False)]
+
+
+@pytest.mark.parametrize(("delay", "is_event"), [(0.008, False), (0.008_001, True)])
+def test_two_cycles_of_four_milliseconds_are_bridged(supervisor, events, delay, is_event):
+    supervisor.on_late_setpoint(0, delay)
+    assert bool(events.events) is is_event
+    assert supervisor._interlocks.values == {"setpoint_lateness": delay}
+
+
+def test_following_error_is_that_of_the_actuator_only(supervisor):
+    batch = late_batch(None)
+    with supervisor.follow(HISTORY):
+        supervisor.on_samples(batch._replace(instrument="lvdt"))
+    assert supervisor._interlocks.values == {}
+
+
+def test_largest_of_several_following_errors_counts():
+    """The last of three samples was taken on receipt at 112 ms, the others one and two cycles before."""
+    interlocks = RecordingInterlocks()
+    supervisor = make_supervisor(interlocks, EventLog())
+    values = np.array([0.104, 0.105, 0.112])
+    with supervisor.follow(HISTORY):
+        block = SampleBlock("actuator_position", 40, None, 112 * MS, values, values, "good")
+        supervisor.on_samples(Batch("actuator", (block,)))
+    assert interlocks.values["following_error"] == pytest.approx(-0.003, abs=1e-9)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bench.rig.clock_map import ClockMap
+from drivers.channel import ClockReading
 from tests.support.clock_wire import BENCH, ClockWire
 
 MS = 1_000_000
@@ -149,3 +150,78 @@ def test_one_instant_is_converted_as_many_are():
 def test_instant_of_an_unread_clock_is_refused():
     with pytest.raises(ValueError, match="never read"):
         ClockMap().map_instant(0)
+
+
+def read_first(device_ns=1_000 * MS):
+    """Return a map with one reading at device time 1 s: request at 5 s, reply 0.2 ms later.
+
+    The device rounds down by up to 1 us, so the offset is within 4 s - 1 us and 4 s + 200 us.
+    """
+    clock = ClockMap()
+    clock.add_reading(ClockReading(device_ns, 5_000 * MS, 5_000 * MS + 200_000))
+    return clock
+
+
+def test_first_estimate_is_at_the_request_share_of_the_exchange():
+    """15 % of 201 us after the lower bound, so 29.15 us after the request; 170.85 us remain to the upper bound."""
+    clock = read_first()
+    assert clock.map_instant(1_000 * MS) == 5_000 * MS + 29_150
+    assert clock.map_instants([1_000 * MS]).tolist() == [5_000 * MS + 29_150]
+    assert clock.compute_error_bound() == pytest.approx(170.85e-6, rel=1e-9)
+    assert clock.estimate_rate() == pytest.approx(0.0, abs=1e-9)
+
+
+def test_request_share_of_a_slow_exchange_is_limited():
+    clock = ClockMap()
+    clock.add_reading(ClockReading(1_000 * MS, 5_000 * MS, 5_010 * MS))
+    assert clock.map_instant(1_000 * MS) == 5_000 * MS - 1_000 + 100_000
+
+
+@pytest.mark.parametrize(
+    ("sent", "received", "rejected"),
+    [(202_000, 300_000, 0), (202_001, 300_000, 1), (-300_000, -2_000, 0), (-300_000, -2_001, 1)],
+)
+def test_reading_contradicts_if_it_differs_by_more_than_the_resolution(sent, received, rejected):
+    """Lower bound 200 us + 1 us + 1 us after the first request, upper bound 1 us + 1 us before it."""
+    clock = read_first()
+    clock.add_reading(ClockReading(1_000 * MS, 5_000 * MS + sent, 5_000 * MS + received))
+    assert clock.rejected_count == rejected
+
+
+@pytest.mark.parametrize(("step_ms", "jump_ms"), [(10_000, 10_000), (51, 51), (49, 0)])
+def test_fifth_contradiction_in_a_row_replaces_the_readings(step_ms, jump_ms):
+    """If the clock was set by more than 50 ms, the map jumps; otherwise it slews from the converted times."""
+    clock = read_first()
+    before = clock.map_instant(1_000 * MS)
+    clock.map_instants([1_000 * MS])
+    for k in range(5):
+        assert clock.map_instant(1_000 * MS) == before
+        sent = (5_000 + step_ms) * MS + 200_000 + k  # a repetition would be ignored
+        clock.add_reading(ClockReading(1_000 * MS, sent, sent + 200_000))
+    assert clock.rejected_count == 5
+    assert abs(clock.map_instant(1_000 * MS) - before - jump_ms * MS) <= (250_000 if jump_ms else 0)
+
+
+def test_consistent_reading_ends_a_row_of_contradictions():
+    clock = read_first()
+    before = clock.map_instant(1_000 * MS)
+    for k in range(20):
+        offset = 0 if k % 5 == 4 else 10_000 * MS
+        clock.add_reading(ClockReading(1_000 * MS, 5_000 * MS + offset + k, 5_000 * MS + offset + 200_000))
+    assert clock.rejected_count == 16
+    assert abs(clock.map_instant(1_000 * MS) - before) < 1_000
+
+
+def test_reply_before_its_request_is_ignored():
+    clock = ClockMap()
+    clock.add_reading(ClockReading(1_000 * MS, 5_000 * MS, 5_000 * MS - 1_001))
+    assert not clock.is_known
+    clock.add_reading(ClockReading(1_000 * MS, 5_000 * MS, 5_000 * MS - 1_000))
+    assert clock.is_known
+
+
+def test_restarted_map_is_unknown():
+    clock = read_first()
+    clock.restart()
+    assert not clock.is_known
+    assert clock.estimate_rate() == 0.0

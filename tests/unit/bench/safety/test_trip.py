@@ -36,3 +36,26 @@ def test_no_instrument_waits_for_another_and_every_failure_is_named():
     assert result.failures["dead"] == "no reply"
     assert "division by zero" in result.failures["defect"]
     assert "defect: ZeroDivisionError" in str(result)
+
+
+def test_stop_times_are_measured_from_the_begin():
+    ticks = iter([100.0, 100.25, 100.5])
+    result = bring_to_rest([instrument("rod", lambda: None)], timeout=10.0, clock=lambda: next(ticks))
+    assert result.seconds == {"rod": 0.25}
+    assert str(result) == "rod after 250 ms"
+
+
+def test_instruments_share_one_deadline():
+    """When it is over by the clock, an instrument that hangs is not waited for."""
+    release, now = threading.Event(), [0.0]
+
+    def clock():
+        now[0] += 20.0
+        return now[0]
+
+    begin = time.monotonic()
+    hanging = [instrument(name, lambda: release.wait(30)) for name in ("a", "b")]
+    result = bring_to_rest(hanging, timeout=15.0, clock=clock)
+    assert time.monotonic() - begin < 10
+    release.set()
+    assert set(result.failures) == {"a", "b"}

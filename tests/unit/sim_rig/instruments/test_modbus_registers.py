@@ -102,7 +102,8 @@ def test_registers_and_sections_are_written(bank):
 
 
 @pytest.mark.parametrize(("address", "words"), [
-    (20, [0, 21]), (20, [65535, 65525]), (20, [0]), (21, [0]), (10, [1]), (22, [1, 1]), (103, [1, 2]), (99, [1, 2]),
+    (20, [0, 21]), (20, [65535, 65525]), (20, [0]), (21, [0]),
+    (10, [1]), (22, [1, 1]), (103, [1, 2]), (99, [1, 2]),
 ])  # fmt: skip
 def test_values_beyond_their_limits_and_incomplete_registers_are_refused(bank, address, words):
     with pytest.raises(ModbusRequestError):

@@ -3,6 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import optuna
@@ -232,3 +233,64 @@ def test_values_of_a_study_become_valid_settings_of_the_other_networks(preset, v
     settings = apply_values(read_settings(preset), values)
     assert type(settings).model_validate(settings.model_dump()) == settings
     assert settings.width == values["width"]
+
+
+@pytest.mark.parametrize(
+    ("error", "offset", "time_weight", "value"),
+    [(1.2, 0.0, 0.0, 1.2), (1.2, 0.75, 0.0, 1.45), (1.2, 0.75, 0.1, 1.95), (500.0, 0.0, 0.1, 100.5)],
+)
+def test_the_objective_adds_error_offset_and_time(error, offset, time_weight, value):
+    # An offset of 0.75 adds sqrt(1 + 0.75^2) - 1 = 0.25.
+    assert study.TrialResult(error, offset, 5.0).compute_value(time_weight) == pytest.approx(value)
+
+
+def test_a_trial_reports_the_error_over_the_noise_once_in_half_a_second():
+    reports = []
+    trial = SimpleNamespace(report=lambda value, step: reports.append((value, step)), should_prune=lambda: False)
+    monitor = study._TrialMonitor(trial, 2.0, 100_000)
+    for seconds, error in ((0.1, 6.0), (0.4, 5.0), (0.6, float("nan")), (0.7, 4.0), (2.1, 3.0)):
+        monitor.clock = lambda seconds=seconds: seconds
+        monitor.report("", error)
+    assert reports == [(3.0, 100_000), (2.0, 100_001), (1.5, 100_004)]
+    assert not monitor.should_stop()
+    trial.should_prune = lambda: True
+    assert monitor.should_stop()
+    trial.should_prune = lambda: False
+    assert monitor.should_stop()  # once pruned, it stays so
+
+
+@pytest.mark.parametrize(
+    ("state", "attributes", "text"),
+    [
+        (optuna.trial.TrialState.PRUNED, {}, "trial 3: pruned"),
+        (optuna.trial.TrialState.COMPLETE, {}, "trial 3: no parameters found"),
+        (
+            optuna.trial.TrialState.COMPLETE,
+            {"error": 1.25, "offset": 0.5, "seconds": 7.0},
+            "trial 3: 1.2500 of the noise, 0.50 deviations off, 7.0 s",
+        ),
+    ],
+)
+def test_a_trial_is_described_in_one_line(state, attributes, text):
+    assert study._describe_trial(SimpleNamespace(number=3, state=state, user_attrs=attributes)) == text
+
+
+@pytest.mark.parametrize(("gradient", "offset"), [([2.0, 0.0], np.sqrt(0.5)), ([1e6, 0.0], 100.0)])
+def test_the_offset_is_the_root_mean_square_step_in_deviations_and_limited(gradient, offset):
+    # Information 4 gives a deviation of 1/2; a gradient of 2 a step of 1/2. The delay is not counted.
+    information = np.diag([4.0] * 2 + [9.0])
+    evaluation = SimpleNamespace(cost=1.0, hessian=np.zeros((15, 15)), gradient=np.zeros(15))
+    free = np.zeros(15, bool)
+    free[[0, 1, 13]] = True
+    evaluation.hessian[np.ix_(free, free)] = information
+    evaluation.gradient[free] = [*gradient, 7.0]
+    starts = []
+    problem = SimpleNamespace(
+        make_start=lambda coordinates: np.zeros(15), layout=SimpleNamespace(delays=slice(13, 15)),
+        delay_prior=1e-5, free_mask=free, evaluate=lambda unknowns: starts.append(unknowns) or evaluation,
+    )  # fmt: skip
+    result = SimpleNamespace(coordinates=None, delays=(2e-5, -1e-5))
+    assert estimate_offset(problem, result) == pytest.approx(offset)
+    assert starts[0][13:] == pytest.approx([2.0, -1.0])
+    evaluation.cost = np.inf
+    assert estimate_offset(problem, result) == 100.0

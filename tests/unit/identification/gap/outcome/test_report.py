@@ -1,0 +1,174 @@
+"""Decisions of the report, from stand-ins of candidates, posterior and recording."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from identification.damper.effects import STAGES
+from identification.gap.data.cycles import Cycles, StrokeCondition
+from identification.gap.data.residual_map import Residual
+from identification.gap.data.shrinkage import Shrinkage
+from identification.gap.fits.candidate import Candidate
+from identification.gap.outcome.report import ReportBuilder
+from identification.gap.selection.posterior import Posterior
+
+FLOOR = 2.0
+NONE, SPRING = frozenset(), frozenset({"gas_spring"})
+CYCLES = Cycles(np.zeros(8, int), np.arange(8) / 8.0, np.zeros(1, int), (StrokeCondition(0.25, 0.012, 1.5),))
+
+
+def make_candidate(names, train, held_out, values=3.0):
+    """A candidate with errors relative to the floor and constant residuals [N]."""
+    fit = SimpleNamespace(effects=tuple(SimpleNamespace(name=name) for name in names))
+    ones = np.ones(8)
+    residual = Residual(values * ones, ones, 0.25 * ones, np.arange(8.0), ones > 0, ((8, 1.0),))
+    return Candidate(fit, residual, train * FLOOR, held_out * FLOOR, 0.0)
+
+
+def make_builder(
+    *, baseline=3.0, named=1.0, benefit=0.5, sets=None, unknown=0.05, conditions=(), pieces=(), drives=None
+):
+    candidates = {
+        NONE: make_candidate((), baseline, baseline, baseline * FLOOR),
+        SPRING: make_candidate(SPRING, named, named, named * FLOOR),
+    }
+    noise_model = SimpleNamespace(
+        estimate_noise=lambda candidate: 1.9, sample_other_runs=lambda candidate, problem: np.ones((3, 8))
+    )
+    pool = SimpleNamespace(
+        baseline=candidates[NONE],
+        candidates=candidates,
+        floor=FLOOR,
+        noise_model=noise_model,
+        full_problem=SimpleNamespace(space=drives),
+        baseline_excess=8.0,
+        compute_excess=lambda candidate: candidate.compute_excess(FLOOR),
+    )
+
+    def estimate_shrinkage(before, after, noise, input_noise):
+        return Shrinkage(6.0, float(np.mean(input_noise)), 0.9, (0.8, 0.95), benefit)
+
+    cycles = Cycles(CYCLES.cycle, CYCLES.phase, CYCLES.segment, conditions) if conditions else CYCLES
+    evaluation = SimpleNamespace(
+        force=np.zeros(8), estimate_shrinkage=estimate_shrinkage, cycles=cycles, pieces=pieces,
+        select_fitted_pieces=lambda: (1.0, 2.0), compute_residual=lambda forces: forces,
+        compute_rmse=lambda forces: (sum(forces), 10 * sum(forces)),
+    )  # fmt: skip
+    posterior = Posterior(sets or {NONE: 0.15, SPRING: 0.8}, unknown)
+    dataset = SimpleNamespace(drive_unit="V")
+    return ReportBuilder(dataset, evaluation, pool, posterior, None, [], 1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "verdict", "names", "input_noise"),
+    [
+        ({}, "explained", SPRING, 1.0),
+        ({"benefit": 0.0}, "explained", SPRING, 1.0),
+        ({"benefit": None}, "explained", SPRING, 1.0),
+        ({"benefit": -0.01}, "unexplained", NONE, 0.0),
+        ({"benefit": -0.01, "baseline": 1.02}, "no_gap", NONE, 0.0),
+        ({"named": 2.9}, "unexplained", NONE, 0.0),
+        ({"sets": {NONE: 0.8, SPRING: 0.1}, "benefit": -0.01}, "no_gap", NONE, 0.0),
+    ],
+)
+def test_a_set_is_named_if_it_explains_the_gap_and_benefits_another_run(changes, verdict, names, input_noise):
+    chosen, named, shrinkage = make_builder(**changes)._choose_named_set()
+    assert (chosen, named.names, shrinkage.after) == (verdict, names, input_noise)
+
+
+def test_the_gap_of_noise_has_no_shrinkage():
+    builder = make_builder()
+    named, shrinkage = builder.pool.candidates[SPRING], Shrinkage(6.0, 2.0, 0.9, (0.8, 0.95))
+    gap = builder._build_gap("explained", named, shrinkage)
+    assert (gap.shrinkage, gap.shrinkage_ci95, gap.noise_floor_n, gap.nominal_n) == (0.9, (0.8, 0.95), 1.9, None)
+    assert (gap.before_n, gap.after_n, gap.train_before_n, gap.train_after_n) == (6.0, 2.0, 6.0, 2.0)
+    gap = builder._build_gap("no_gap", named, shrinkage)
+    assert (gap.shrinkage, gap.shrinkage_ci95) == (None, None)
+
+
+def test_a_given_simulation_is_compared_on_the_held_out_cycles():
+    builder = make_builder()
+    with_model = ReportBuilder(
+        builder.dataset, builder.evaluation, builder.pool, builder.posterior,
+        SimpleNamespace(simulate_force=lambda piece: 3.0 * piece), [], 1,
+    )  # fmt: skip
+    assert with_model._compute_nominal_rmse() == 90.0
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named", "noted"),
+    [("unexplained", 2.8, True), ("unexplained", 2.9, False), ("explained", 1.0, False)],
+)
+def test_the_nearest_effects_are_noted_if_they_reduce_an_unexplained_error_by_a_twentieth(verdict, named, noted):
+    notes = make_builder(named=named)._describe_nearest(verdict)
+    assert bool(notes) == noted
+    if noted:
+        assert "from 6 to 5.6 N, 2.8 times" in notes[0]
+
+
+@pytest.mark.parametrize(
+    ("baseline", "sets", "unknown", "stage"),
+    [
+        (3.0, {NONE: 0.15, SPRING: 0.8}, 0.0, "damper"),
+        (1.0, {NONE: 0.15, SPRING: 0.8}, 0.0, None),  # at the floor
+        (3.0, {NONE: 0.96, SPRING: 0.04}, 0.0, None),
+        (3.0, {NONE: 0.94, SPRING: 0.06}, 0.0, "damper"),
+    ],
+)
+def test_a_gap_has_the_most_probable_stage(baseline, sets, unknown, stage):
+    builder = make_builder(baseline=baseline, sets=sets, unknown=unknown)
+    object.__setattr__(builder.pool.baseline, "held_out_rmse", baseline * FLOOR)
+    location = _locate_without_regression(builder)
+    assert location.stage == stage
+    assert set(location.stages) == set(STAGES)
+    assert location.map[0].gap_n == pytest.approx(np.sqrt((baseline * FLOOR) ** 2 - FLOOR**2))
+
+
+def _locate_without_regression(builder):
+    builder = SimpleNamespace(
+        pool=builder.pool, evaluation=builder.evaluation, posterior=builder.posterior,
+        _estimate_explainable_share=lambda candidate: 0.0,
+    )  # fmt: skip
+    return ReportBuilder._locate_gap(builder)
+
+
+@pytest.mark.parametrize(
+    ("share", "dependence"),
+    [(0.31, "a flexible model of stroke and drive explains 31% of it"), (0.3, "it does not correlate with any")],
+)
+def test_the_remainder_is_located_in_millimetres(share, dependence):
+    builder = make_builder()
+    stand_in = SimpleNamespace(
+        evaluation=builder.evaluation, pool=builder.pool, dataset=builder.dataset,
+        _estimate_explainable_share=lambda candidate: share,
+    )  # fmt: skip
+    text = ReportBuilder._describe_remainder(stand_in, builder.pool.baseline)
+    assert text.startswith(f"The remainder is largest at 0.25 V, 12 mm and 1.5 Hz (5.66 N), and {dependence}")
+
+
+def test_nothing_is_explainable_within_two_per_cent_of_the_floor():
+    builder = make_builder()
+    assert builder._estimate_explainable_share(make_candidate((), 1.5, 1.019)) == 0.0
+    with pytest.raises(ValueError, match="concatenate"):  # the regression needs pieces
+        builder._estimate_explainable_share(make_candidate((), 1.0, 1.021))
+
+
+def make_piece(low, high, speed):
+    velocity = np.full(2000, 0.1)
+    velocity[:3] = speed
+    return SimpleNamespace(excitation=SimpleNamespace(displacement=np.array([low, 0.0, high]), velocity=-velocity))
+
+
+@pytest.mark.parametrize(("recorded", "frequency"), [(0.4, 0.5), (1.5, 1.5)])
+def test_the_limits_are_those_of_the_recording(recorded, frequency):
+    builder = make_builder(
+        pieces=(make_piece(-0.02, 0.01, 9.0), make_piece(-0.01, 0.03, 0.2)),
+        conditions=(StrokeCondition(0.0, 0.01, recorded), StrokeCondition(0.0, 0.01, 0.0)),
+        drives=SimpleNamespace(lowest_drive=0.1, highest_drive=0.6),
+    )
+    limits = builder._find_limits()
+    assert (limits.amplitude, limits.centre) == pytest.approx((0.025, 0.005))
+    assert (limits.frequency, limits.drives) == (frequency, (0.1, 0.6))
+    # Three of two thousand samples are faster than the quantile of 99.9 %.
+    assert limits.velocity == pytest.approx(9.0)

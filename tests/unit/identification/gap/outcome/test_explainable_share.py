@@ -1,10 +1,17 @@
 """The explainable share separates structure from noise."""
 
 import numpy as np
+import pytest
 from numpy.random import default_rng
 
-from identification.fitting import assemble
-from identification.gap.outcome.explainable_share import build_features, estimate_explainable_share
+from identification.fitting import Piece, assemble
+from identification.gap.outcome.explainable_share import (
+    _build_piece_features,
+    _subsample,
+    build_features,
+    estimate_explainable_share,
+)
+from identification.simulate import Excitation
 from tests.support.candidate_pools import record
 
 
@@ -30,3 +37,77 @@ def test_features_of_a_recording_are_standardised():
     assert len(features) == len(dataset.pieces[0].force)
     assert np.allclose(features.mean(axis=0), 0.0, atol=1e-9)
     assert np.allclose(features.std(axis=0), 1.0)
+
+
+def make_piece(x, v, drive, rate=100.0):
+    x, v, drive = (np.array(values, float) for values in (x, v, drive))
+    return Piece("p", Excitation(rate, x, v, 0.5 * v, drive), 0.0 * x, np.ones(len(x)))
+
+
+def test_features_have_the_direction_and_the_distance_from_the_last_reversal():
+    v = np.array([1.0, 1.0, -1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
+    x = np.array([0.0, 1e-5, 5e-5, 4e-5, 2e-5, 0.0, 1e-5, 3e-5])
+    columns = _build_piece_features(make_piece(x, v, np.ones(8))).T
+    assert columns[:4].tolist() == [x.tolist(), v.tolist(), (0.5 * v).tolist(), [1.0] * 8]
+    # The standard deviation of the velocity is 1; its sign is smoothed over a tenth of it.
+    assert columns[4] == pytest.approx(np.tanh(v / 0.1))
+    distances = np.array([0.0, 1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0])  # in hundredths of a millimetre
+    assert columns[5] == pytest.approx(np.log(1.0 + distances) * np.sign(v))
+    assert columns[8:] == pytest.approx(np.ones((2, 8)))  # the past of a constant drive
+    assert len(columns) == 10
+
+
+def test_the_smoothed_direction_is_relative_to_the_scatter_of_the_velocity():
+    v = 1e-3 * np.array([1.0, -1.0, 0.1, -0.1])
+    columns = _build_piece_features(make_piece(0.0 * v, v, 0.0 * v)).T
+    assert columns[4] == pytest.approx(np.tanh(v / (0.1 * np.std(v))))
+
+
+@pytest.mark.parametrize(("tau", "column"), [(0.01, 6), (0.1, 7)])
+def test_the_past_velocity_forgets_with_its_time_constant(tau, column):
+    v = np.array([2.0, 5.0, 5.0, 5.0])
+    columns = _build_piece_features(make_piece(0.0 * v, v, 0.0 * v)).T
+    decay = np.exp(-0.01 / tau)
+    assert columns[column] == pytest.approx(5.0 - 3.0 * decay ** np.arange(4.0))
+
+
+def test_time_runs_over_all_pieces():
+    v = np.array([1.0, -1.0, 1.0, -1.0])
+    features = build_features([make_piece(v, v, v), make_piece(v, v, v)])
+    time = features[:, -1]
+    assert np.diff(time) == pytest.approx(np.full(7, 1.0 / 7.0 / np.std(np.arange(8.0) / 7.0)))
+
+
+@pytest.mark.parametrize(
+    ("count", "kept"), [(24_000, 24_000), (47_999, 47_999), (48_000, 24_000), (72_000, 24_000)]
+)
+def test_a_regression_uses_about_24000_evenly_spaced_samples(count, kept):
+    mask = np.ones(count + 5, bool)
+    mask[:5] = False
+    rows = _subsample(mask)
+    assert len(rows) == kept
+    assert rows[0] == 5
+    assert set(np.diff(rows)) == {count // kept}
+
+
+def test_the_share_of_a_linear_structure_is_that_of_the_excess_variance():
+    # Structure 3 x and unpredictable noise of variance 1, of which 0.25 counts as the floor.
+    random = default_rng(5)
+    features, noise = random.standard_normal((6000, 1)), random.standard_normal(6000)
+    train = np.arange(6000) % 2 == 0
+    residual = 3.0 * features[:, 0] + noise
+    share = estimate_explainable_share(features, residual, train, ~train, 0.5)
+    structure = np.mean((3.0 * features[~train, 0]) ** 2)
+    assert share == pytest.approx(structure / (np.mean(residual[~train] ** 2) - 0.25), abs=0.03)
+
+
+def test_the_share_of_a_small_residual_is_the_same():
+    random = default_rng(5)
+    features = random.standard_normal((1200, 1))
+    residual = 3e-3 * features[:, 0] + 1e-3 * random.standard_normal(1200)
+    train = np.arange(1200) % 2 == 0
+    small, large = (
+        estimate_explainable_share(features, s * residual, train, ~train, s * 5e-4) for s in (1.0, 1e3)
+    )
+    assert small == pytest.approx(large, rel=1e-6)
+    assert small > 0.5

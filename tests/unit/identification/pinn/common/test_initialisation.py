@@ -1,6 +1,8 @@
 """Starts of a training."""
 
+from dataclasses import replace
 from itertools import islice
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +10,11 @@ import pytest
 from identification.pinn.common.initialisation import (
     InitialStates,
     MemorylessDamper,
+    _estimate_misfit,
+    _estimate_yield_displacement,
+    _make_coordinates,
     _measure_slips,
+    _normalise_drive,
     generate_starts,
     smooth_force,
 )
@@ -97,3 +103,60 @@ def test_initial_states_balance_the_forces_of_the_law(states):
     assert initial.make_slip_velocity()(time) == pytest.approx(v - s.y_rate)
     assert np.gradient(s.y, time) == pytest.approx(s.y_rate, abs=0.2 * np.abs(s.y_rate).max())
     assert np.abs(s.z).max() <= 1.0
+
+
+def test_coordinates_are_lines_over_the_drive_and_split_the_stiffness():
+    space = SimpleNamespace(lowest_drive=0.2, highest_drive=0.6, has_one_drive=False)
+    c = _make_coordinates(SimpleNamespace(space=space), MEMORYLESS, 1e-4)
+    # 10 at 0.2 V and 30 at 0.6 V are 0 + 50 u; 100 and 200: 50 + 250 u; 400 and 1000: 100 + 1500 u.
+    assert (c.F_a, c.F_b, c.c0_a, c.c0_b, c.c1_a, c.c1_b) == pytest.approx((0, 50, 50, 250, 100, 1500), abs=1e-9)
+    assert (c.k0 + c.k1, c.f0, c.D_y) == pytest.approx((500.0, 20.0, 1e-4))
+    assert 0.0 < c.k1 < c.k0
+    space.has_one_drive = True
+    constant = _make_coordinates(SimpleNamespace(space=space), MEMORYLESS, 1e-4)
+    assert (constant.F_a, constant.F_b) == (10.0, 0.0)
+
+
+def test_drives_are_normalised_to_their_range():
+    problem = SimpleNamespace(space=SimpleNamespace(lowest_drive=0.2, highest_drive=0.6))
+    assert _normalise_drive(problem, np.array([0.1, 0.2, 0.3, 0.6, 0.9])) == pytest.approx([0, 0, 0.25, 1, 1])
+
+
+def test_the_misfit_is_a_standard_deviation_from_the_median():
+    piece = make_problem().pieces[0]
+    shifted = replace(piece, force=np.full(len(piece.force), 80.0))
+    problem = replace(make_problem(), pieces=(shifted,))
+    rigid = MemorylessDamper((1.0, 1.0), (0.0, 0.0), (0.0, 0.0), 0.0, 20.0)._replace(c1=(1e-12, 1e-12))
+    # The damper has a constant force of -20 N.
+    assert _estimate_misfit(problem, rigid) == pytest.approx(1.4826 * 100.0)
+
+
+def test_a_parallel_force_and_the_preload_shift_the_inner_velocity(states):
+    initial, source = states
+    shifted = InitialStates(source, TRUTH, 5.0)
+    c1 = TRUTH.c1_a + TRUTH.c1_b * source.inputs.evaluate_field(source.sample_times, TRUTH.eta, 0.0).u
+    time = source.sample_times
+    assert initial.evaluate(time).y_rate - shifted.evaluate(time).y_rate == pytest.approx(5.0 / c1)
+
+
+def test_the_inner_displacement_has_the_mean_of_the_stroke():
+    piece = make_problem().pieces[0]
+    excitation = replace(piece.excitation, displacement=piece.excitation.displacement + 0.004)
+    (source,) = make_training_pieces(replace(make_problem(), pieces=(replace(piece, excitation=excitation),)))
+    y = InitialStates(source, TRUTH).evaluate(source.sample_times).y
+    assert np.mean(y) == pytest.approx(np.mean(excitation.displacement), rel=1e-6)
+
+
+def test_the_yield_displacement_stays_between_its_shares_of_the_largest_half_stroke():
+    problem = make_problem()
+    short = replace(problem.pieces[0], excitation=replace(problem.pieces[0].excitation))
+    both = replace(problem, pieces=(problem.pieces[0], short))
+    still = MEMORYLESS._replace(c0=(1e9, 1e9))
+    low, high = 1.5e-3 * 0.01, 5e-2 * 0.01
+    for damper in (MEMORYLESS, still):
+        assert low * 0.999 <= _estimate_yield_displacement(both, damper) <= high * 1.001
+    true = MemorylessDamper(
+        (TRUTH.F_a, TRUTH.F_a + 0.5 * TRUTH.F_b), (TRUTH.c0_a, TRUTH.c0_a + 0.5 * TRUTH.c0_b),
+        (TRUTH.c1_a, TRUTH.c1_a + 0.5 * TRUTH.c1_b), TRUTH.k0 + TRUTH.k1, TRUTH.f0,
+    )  # fmt: skip
+    assert 0.3 < _estimate_yield_displacement(problem, true) / TRUTH.D_y < 3.0

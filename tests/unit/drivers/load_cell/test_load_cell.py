@@ -60,7 +60,7 @@ def cell(monkeypatch):
 
 def test_a_connection_stops_the_stream_checks_the_instrument_and_starts_at_the_rate(cell):
     assert cell._line.requests == [("stop", 0), ("identify", 0), ("set_rate", 1000), ("start", 0)]
-    assert cell.get_health() == Health(True, 0, 0, 0, 0, 0, "")
+    assert cell.get_health() == Health(True, 1, 0, 0, 0, 0, "")  # the reply to start
 
 
 def test_forces_are_in_newtons_and_the_tared_range_is_doubled(cell):

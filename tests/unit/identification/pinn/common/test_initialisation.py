@@ -15,6 +15,7 @@ from identification.pinn.common.initialisation import (
     _make_coordinates,
     _measure_slips,
     _normalise_drive,
+    _select_samples,
     generate_starts,
     smooth_force,
 )
@@ -160,3 +161,12 @@ def test_the_yield_displacement_stays_between_its_shares_of_the_largest_half_str
         (TRUTH.c1_a, TRUTH.c1_a + 0.5 * TRUTH.c1_b), TRUTH.k0 + TRUTH.k1, TRUTH.f0,
     )  # fmt: skip
     assert 0.3 < _estimate_yield_displacement(problem, true) / TRUTH.D_y < 3.0
+
+
+@pytest.mark.parametrize(("pieces", "length", "count"), [(1, 900, 880), (2, 4500, 4480), (2, 900, 1760)])
+def test_the_regression_uses_about_3000_fitted_samples(pieces, length, count):
+    problem = make_problem()
+    piece = problem.pieces[0]
+    train = np.where(np.arange(len(piece.train)) < length, piece.train, 0.0)
+    several = replace(problem, pieces=(replace(piece, train=train),) * pieces)
+    assert [len(row) for row in _select_samples(several)] == [count] * 4

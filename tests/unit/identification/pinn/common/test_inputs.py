@@ -61,8 +61,8 @@ def test_a_step_is_a_change_by_a_fiftieth_of_the_range(change, count):
 
 def test_the_field_starts_settled_and_follows_a_step_with_its_rate():
     inputs = make_inputs(drive=(0.2, 0.2, 1.2, 1.2, 1.2, 1.2))
-    field = inputs.evaluate_field(np.array([-1.0, 0.01, 0.034]), 50.0, 0.004)
+    field = inputs.evaluate_field(np.array([-1.0, 0.01, 0.034, 9.0]), 50.0, 0.004)
     decay = np.exp(-50.0 * 0.01)  # the drive steps at 20 ms + 4 ms
-    assert field.u == pytest.approx([0.2, 0.2, 1.2 - decay])
-    assert field.du_deta == pytest.approx([0.0, 0.0, 0.01 * decay])
-    assert field.du_ddelay == pytest.approx([0.0, 0.0, -50.0 * decay])
+    assert field.u == pytest.approx([0.2, 0.2, 1.2 - decay, 1.2 - decay**3])  # it ends after 50 ms
+    assert field.du_deta == pytest.approx([0.0, 0.0, 0.01 * decay, 0.03 * decay**3])
+    assert field.du_ddelay == pytest.approx([0.0, 0.0, -50.0 * decay, -50.0 * decay**3])

@@ -241,3 +241,48 @@ def test_a_packed_frame_contains_its_objects_and_zero_for_the_others():
     assert mapping.pack({0x6040: 0x1F, 0x607A: -2}) == b"\x1f\x00" + b"\x00" + b"\xfe\xff\xff\xff"
     with pytest.raises(OverflowError):
         mapping.pack({0x6040: 1 << 16})
+
+
+def test_the_drives_clock_is_read_between_the_request_and_its_reply():
+    """A frame lasts 108 us, by which the clock was read after the begin and before the end."""
+    wire = Wire()
+    wire.cycles([1])
+    wire.add(1_010_000_000, 0x605, b"\x40\x13\x10\x00" + bytes(4), sent=True)
+    wire.add(1_012_000_000, 0x585, b"\x43\x13\x10\x00" + (9_500).to_bytes(4, "little"))
+    wire.decoder.decode_pending()
+    assert wire.decoder.clock_reading == (9_500_000, 1_010_108_000, 1_011_892_000)
+    assert wire.decoder.last_ns == 1_004 * MILLISECOND
+
+
+def test_a_clock_reply_faster_than_two_frames_is_an_instant():
+    wire = Wire()
+    wire.add(1_000_000, 0x605, b"\x40\x13\x10\x00", sent=True)
+    wire.add(1_150_000, 0x585, b"\x43\x13\x10\x00\x07\x00\x00\x00")
+    wire.decoder.decode_pending()
+    assert wire.decoder.clock_reading == (7_000, 1_108_000, 1_108_000)
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        [(0x585, b"\x43\x13\x10\x00\x07\x00\x00\x00")],  # not requested
+        [(0x605, b"\x40\x13\x10\x00"), (0x585, b"\x43\x14\x10\x00\x07\x00\x00\x00")],
+        [(0x605, b"\x40\x14\x10\x00"), (0x585, b"\x43\x13\x10\x00\x07\x00\x00\x00")],
+    ],
+)
+def test_the_reply_of_another_object_is_not_a_clock_reading(frames):
+    wire = Wire()
+    for identifier, data in frames:
+        wire.add(1_000_000, identifier, data)
+    wire.decoder.decode_pending()
+    assert wire.decoder.clock_reading is None
+
+
+@pytest.mark.parametrize(("step", "accepted"), [(2**31, 2), (2**31 + 1, 1)])
+def test_a_clock_that_went_backwards_gives_no_sample(step, accepted):
+    wire = Wire()
+    for at, device_us in ((1000, 500), (1004, 500 + step)):
+        wire.sync(at)
+        wire.reply(at, 0, device_us)
+    wire.decoder.decode_pending()
+    assert wire.decoder.received == accepted

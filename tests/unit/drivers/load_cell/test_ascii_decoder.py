@@ -134,3 +134,25 @@ def test_an_overload_is_a_lost_reading():
 def test_noise_without_line_ends_is_discarded():
     decoder = make_decoder()
     assert decode(decoder, bytes([65]) * 10_000, b"\r\n", text(10.0)) == [10.0]
+
+
+@pytest.mark.parametrize(("pause_ns", "is_joined"), [(500_000_000, True), (500_000_001, False)])
+def test_pieces_of_a_line_are_joined_within_half_a_second(pause_ns, is_joined):
+    decoder = make_decoder()
+    decoder.feed(10, text(10.0)[:10])
+    assert bool(decoder.feed(10 + pause_ns, text(10.0)[10:])) is is_joined
+    assert (decoder.corrupted > 0) is not is_joined
+
+
+@pytest.mark.parametrize(("noise", "is_kept"), [(62, True), (63, False)])
+def test_at_most_64_bytes_wait_for_their_line_end(noise, is_kept):
+    decoder = make_decoder()
+    decoder.feed(2, b"ST" + b"x" * noise)
+    assert bytes.fromhex(decoder.snapshot()["buffer"]) == (b"ST" if is_kept else b"T") + b"x" * noise
+
+
+@pytest.mark.parametrize(("newtons", "accepted"), [(110.0, True), (110.1, False), (-90.0, True), (-90.1, False)])
+def test_a_step_up_to_the_limit_is_plausible(newtons, accepted):
+    decoder = make_decoder(10.0, max_step=100.0)
+    assert decode(decoder, text(newtons)) == ([newtons] if accepted else [])
+    assert decoder.corrupted == (not accepted)

@@ -126,3 +126,26 @@ def test_a_file_that_is_not_npz_is_refused(tmp_path):
     (tmp_path / "commands.npz").write_text("time,displacement,drive")
     with pytest.raises(CommandsError, match="is not a readable npz file"):
         read_commands(tmp_path / "commands.npz")
+
+
+@pytest.mark.parametrize(
+    ("samples", "step", "error", "accepted"),
+    [
+        (9, 1e-3, 0.0, False),
+        (10, 1e-3, 0.0, True),
+        (100, 1e-3, 0.9e-6, True),  # 0.09 % of a step
+        (100, 1e-3, 1.1e-6, False),
+        (100, 0.02, 0.0, True),  # 50 Hz
+        (100, 0.0201, 0.0, False),
+    ],
+)
+def test_commands_are_at_least_ten_at_a_uniform_rate_of_50_hz_or_more(tmp_path, samples, step, error, accepted):
+    time = np.arange(samples) * step
+    time[5] += error
+    path = tmp_path / "commands.npz"
+    np.savez(path, time=time, displacement=time, drive=time)
+    if accepted:
+        assert len(read_commands(path).time) == samples
+    else:
+        with pytest.raises(CommandsError):
+            read_commands(path)

@@ -243,3 +243,12 @@ def test_segments_are_never_empty_and_have_no_gaps(seed):
     displacement, drive, rate = changing_strokes(seed)
     segments, _ = segment(displacement, drive, rate, seed=seed)
     assert all(segment.stop > segment.start for segment in segments)
+
+
+def test_short_excursion_of_the_drive_does_not_divide_a_sine_and_a_long_one_does():
+    short, long = np.full(3000, 0.2), np.full(3000, 0.2)
+    short[1500:1550] = 0.4
+    long[1000:1500] = np.linspace(0.2, 0.5, 500)
+
+    assert segment(sine(0.01, 1, 6), short)[1] == ["10mm_1Hz_0.2V"]
+    assert segment(sine(0.01, 1, 6), long)[1] == ["10mm_1Hz_0.2V", "10mm_1Hz", "10mm_1Hz_0.2V_2"]

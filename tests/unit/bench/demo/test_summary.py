@@ -1,4 +1,6 @@
-from bench.demo.summary import describe_late_setpoints
+from bench.demo.summary import _make_error_table, describe_late_setpoints
+from bench.report import Fit
+from tests.support.reports import fit_document, prediction
 
 
 def event(kind, quantity, value):
@@ -18,3 +20,11 @@ def test_the_largest_lateness_of_setpoints_is_described():
 def test_a_recording_without_alarms_on_late_setpoints_has_no_description():
     assert describe_late_setpoints([*OTHER, LATE]) == ""
     assert describe_late_setpoints([]) == ""
+
+
+def test_errors_are_listed_for_fit_and_validation_as_a_multiple_of_their_floor():
+    fit = Fit.model_validate(fit_document())
+    table = _make_error_table(fit, prediction(rmse=4.0, floor=2.0))
+    rows = list(zip(*(column.cells for column in table.columns), strict=True))
+    assert rows == [("fitted", "1.98 N", "1.90 N", "1.04 times"), ("validation", "4.00 N", "2.00 N", "2.00 times")]
+    assert _make_error_table(fit, None).row_count == 1

@@ -8,7 +8,7 @@ import pytest
 
 from identification.fitting.dataset import assemble
 from identification.gap.diagnosis import diagnose, make_candidate_pool, prepare_recordings
-from identification.gap.noise.clock_drift import subtract_clock_drift
+from identification.gap.noise.clock_drift import describe_drift_explanation, subtract_clock_drift
 from identification.gap.selection import SearchSettings
 from tests.support.candidate_pools import BASELINE_FIT
 from tests.support.runs import NOISE, run, stiffening
@@ -70,3 +70,7 @@ def test_an_effect_is_named_despite_drift():
     diagnosis = diagnose([add_drift(run(stiffening))], settings=SHORT_SEARCH).diagnosis
     assert [effect.name for effect in diagnosis.effects] == ["gas_spring"]
     assert not any("drifts by" in note for note in diagnosis.notes)
+
+
+def test_the_note_states_the_drift_in_microseconds():
+    assert "drifts by 23 µs within the run" in describe_drift_explanation(23.4e-6)

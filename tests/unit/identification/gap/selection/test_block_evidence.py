@@ -45,3 +45,35 @@ def test_blocks_with_few_valid_samples_do_not_count():
     assert compute_evidence(make_residual(outside, valid), make_residual(0.0 * outside, valid)) == pytest.approx(
         0.0
     )
+
+
+def make_blocks(*stretches, rate=10.0):
+    """Residuals of stretches; a block of 0.4 s has four samples. NaN is not valid."""
+    values = np.concatenate([np.array(part, float) for part in stretches])
+    valid = np.isfinite(values)
+    values = np.where(valid, values, 99.0)
+    zero = np.zeros(len(values))
+    return Residual(values, zero, zero, zero, valid, tuple((len(part), rate) for part in stretches))
+
+
+NAN = float("nan")
+
+
+def test_evidence_sums_the_logarithms_of_the_ratios_of_blocks():
+    # Mean squares 4 and 9 in the first stretch, whose last sample is no block, and 16 in the second.
+    before = make_blocks([2, -2, 2, 2, 3, 3, 3, 3, 50], [4, 4, 4, 4])
+    after = make_blocks([1, 1, 1, 1, 3, 3, -3, 3, 50], [8, 8, 8, 8])
+    assert compute_evidence(before, after) == pytest.approx(0.8 * np.log(4.0 * 1.0 / 4.0))
+    assert compute_evidence(after, before) == pytest.approx(0.8 * np.log(1.0 / 4.0 * 4.0))
+    first = make_blocks([2, -2, 2, 2])
+    assert compute_evidence(first, make_blocks([1, 1, 1, 1])) == pytest.approx(0.8 * np.log(4.0))
+
+
+def test_blocks_with_more_than_half_of_their_samples_count():
+    residual = make_blocks([2, 2, 2, NAN, 4, 4, NAN, NAN])
+    assert bound_evidence(residual, 1.0) == pytest.approx(0.8 * np.log(4.0))
+
+
+def test_a_block_below_the_floor_brings_no_evidence():
+    residual = make_blocks([1, 1, 1, 1, 6, 6, 6, 6])
+    assert bound_evidence(residual, 3.0) == pytest.approx(0.8 * np.log(4.0))

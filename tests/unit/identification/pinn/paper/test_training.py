@@ -54,3 +54,53 @@ def test_the_paper_network_learns_the_force_and_returns_parameters_of_a_damper()
     assert not result.accepted
     assert result.covariance is None
     assert to_coordinates(result.parameters).D_y > 0
+
+
+@pytest.fixture
+def training():
+    return PaperTraining(make_problem((0.0, 0.4), 1.0), [np.zeros(2000)], QUICK_PAPER, TrainingMonitor())
+
+
+def test_scales_are_the_sizes_of_the_data_and_of_the_first_guess(training):
+    scales, data, start = training.scales, training.data, training.start_parameters
+    assert (scales.u, scales.y, scales.rate) == pytest.approx((0.4, 0.01, start.eta), rel=1e-4)
+    assert scales.velocity == pytest.approx(0.01 * 2 * np.pi * 1.5 / np.sqrt(2.0), rel=1e-3)
+    assert scales.force == pytest.approx(data.force.numpy().std(ddof=1))
+    assert scales.z == pytest.approx(start.A * to_coordinates(start).D_y)
+
+
+def test_samples_are_selected_in_even_steps(training):
+    training.data.x[:] = torch.arange(2000)
+    assert training._select_evenly(3).x.tolist() == [0.0, 999.0, 1999.0]
+    assert training._select_evenly(5000).x.tolist() == list(range(2000))
+
+
+def test_forces_and_residuals_are_those_of_the_law(training, monkeypatch):
+    d = training.data.select(torch.tensor([300, 1400]))
+    u, y, z, u_rate, y_rate, z_rate = (np.array(pair) for pair in (
+        (0.1, 0.3), (0.004, -0.002), (2e-4, -3e-4), (0.5, -0.2), (0.02, 0.03), (0.01, -0.02),
+    ))  # fmt: skip
+    states = torch.as_tensor(np.stack([u, y, z])), torch.as_tensor(np.stack([u_rate, y_rate, z_rate]))
+    monkeypatch.setattr(training, "_compute_states", lambda samples: states)
+    p, s = training.start_parameters, training.scales
+    x, v, drive = (q.numpy() for q in (d.x, d.v, d.drive))
+    alpha, c0, c1 = p.alpha_a + p.alpha_b * u, p.c0_a + p.c0_b * u, p.c1_a + p.c1_b * u
+    inner = alpha * z + p.k0 * (x - y)
+    first = inner + c0 * (v - y_rate) + p.k1 * (x - p.x0)
+    second = c1 * y_rate + p.k1 * (x - p.x0)
+    slip = v - y_rate
+    hysteresis = p.A * slip - (
+        p.gamma * np.abs(slip) * z * np.abs(z) ** (p.n - 1) + p.beta * slip * np.abs(z) ** p.n
+    )
+    residuals = [
+        (u_rate + p.eta * (u - drive)) / (p.eta * 0.4),
+        (y_rate - (inner + c0 * v) / (c0 + c1)) / s.velocity,
+        (z_rate - hysteresis) / (p.A * s.velocity),
+    ]
+    forces, scaled = training._compute_equations(d)
+    assert forces.detach().numpy() == pytest.approx(np.stack([first, second]))
+    numbers = scaled.detach().numpy()
+    assert numbers == pytest.approx(np.stack(residuals))
+    misfits = (np.stack([first, second]) - d.force.numpy()) / s.force
+    loss = QUICK_PAPER.phi_data * np.sum(misfits**2) / 2.0 + QUICK_PAPER.phi_phys * np.sum(numbers**2) / 2.0
+    assert training._compute_loss(d).item() == pytest.approx(loss)

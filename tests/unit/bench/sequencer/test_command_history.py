@@ -80,3 +80,51 @@ def test_commanded_position_is_unknown_before_the_first_setpoint(history):
     history.add(CommandEntry(ScheduledTrajectory(make_standstill(0.003), 10)))
     assert math.isnan(history.find_position(9))
     assert history.find_position(10) == 0.003
+
+
+SECOND = 1_000_000_000
+
+
+@pytest.fixture
+def two_entries(history):
+    """Return a history with a standstill from 1 s and the programme from 2 s on, which lasts several seconds."""
+    history.add(CommandEntry(ScheduledTrajectory(make_standstill(0.03), SECOND)))
+    history.add(CommandEntry(ScheduledTrajectory(SECTION.trajectory, 2 * SECOND), SECTION))
+    return history
+
+
+def test_entry_applies_from_its_begin_to_that_of_the_next(two_entries):
+    instants = np.array([SECOND - 1, SECOND, 2 * SECOND - 1, 2 * SECOND, 2 * SECOND + 250_000_000])
+    expected = [math.nan, 0.03, 0.03, 0.0, TWO_SEGMENTS.displacement[250]]
+    assert two_entries.find_commands(instants).displacement == pytest.approx(expected, nan_ok=True)
+    assert [two_entries.find_position(int(one)) for one in instants] == pytest.approx(expected, nan_ok=True)
+
+
+@pytest.mark.parametrize(("sample", "at_ns", "has_reached"), [
+    (0, 2 * SECOND - 1, False), (0, 2 * SECOND, True), (100, 2_099_000_000, False), (100, 2_100_000_000, True),
+])  # fmt: skip
+def test_sample_is_reached_at_its_time(two_entries, sample, at_ns, has_reached):
+    assert two_entries.has_reached(sample, at_ns) is has_reached
+
+
+def test_progress_ends_with_the_drive(two_entries):
+    inside = TWO_SEGMENTS.segments[1].start + 10
+    at_ns = 2 * SECOND + inside * 1_000_000
+    assert two_entries.find_progress(at_ns) == (pytest.approx(inside / 1000), 1)
+    two_entries.switch_off(at_ns)
+    two_entries.switch_off(at_ns + 5)  # only the first call counts
+    assert two_entries.find_progress(at_ns - 1)[1] == 1
+    assert two_entries.find_progress(at_ns)[1] == NO_SEGMENT
+    commands = two_entries.find_commands(np.array([at_ns - 1, at_ns]))
+    assert (commands.drive.tolist(), commands.segment.tolist()) == ([0.4, 0.0], [1, NO_SEGMENT])
+
+
+def test_segment_ends_with_its_section(two_entries):
+    end_ns = 2 * SECOND + round(SECTION.trajectory.duration * 1e9)
+    assert two_entries.find_commands(np.array([end_ns])).segment.tolist() == [NO_SEGMENT]
+
+
+def test_entry_with_the_begin_of_the_last_one_replaces_it(two_entries):
+    stopped = two_entries.entries[-1].schedule.add_soft_stop(3 * SECOND, 8.0)
+    two_entries.add(CommandEntry(stopped, SECTION))
+    assert [entry.schedule for entry in two_entries.entries[1:]] == [stopped]

@@ -1,12 +1,19 @@
 """Split of a programme into sections, and the sample from which an interrupted run continues."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bench.errors import RunError
-from bench.sequencer.playback import find_resume_sample, split_into_sections
+from bench.methods import Programme
+from bench.sequencer.playback import (
+    PlaybackSection,
+    find_rest_samples,
+    find_resume_sample,
+    split_into_sections,
+)
 from tests.support.methods import constant, programme, sine
 
 TWO_SEGMENTS = programme(sine("a", 0.01, 2.0, constant(0.2)), sine("b", 0.005, 4.0, constant(0.4)))
@@ -54,3 +61,63 @@ def test_interrupted_run_continues_at_rest_after_a_checkpoint():
         find_resume_sample(TWO_SEGMENTS, "c")
     with pytest.raises(RunError, match="has no segment after b; the run was complete"):
         find_resume_sample(TWO_SEGMENTS, "b")
+
+
+def make_programme(rate=10.0, velocity=None, segment=None, segments=()):
+    """Return 13 samples at rest at every fourth, with drive levels 0 to 3 that begin at 0, 2, 5 and 9."""
+    velocity = np.where(np.arange(13) % 4, 0.1, 0.0) if velocity is None else np.array(velocity)
+    segment = np.full(13, -1) if segment is None else np.array(segment)
+    drive = np.array([0, 0, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3.0])
+    zero = np.zeros(13)
+    method = SimpleNamespace(name="m")
+    return Programme(method, rate, np.arange(13) / rate, zero, velocity, zero, drive, segment, segments)
+
+
+@pytest.mark.parametrize(("capacity", "stops"), [(2, [4, 8, 12]), (3, [8, 12]), (4, [12])])
+def test_table_holds_the_level_at_the_begin_and_each_change(capacity, stops):
+    assert [section.stop for section in split_into_sections(make_programme(), capacity)] == stops
+
+
+def test_section_with_more_levels_than_the_table_is_refused():
+    with pytest.raises(RunError, match=r"from 0.0 s on: the drive takes 2 values .* table holds 1; shorten"):
+        split_into_sections(make_programme(), 1)
+
+
+@pytest.mark.parametrize(
+    ("interval_s", "stops"),
+    [(5.0, [12]), (7.5, [8, 12]), (7.6, [4, 8, 12]), (15.0, [4, 8, 12]), (20.0, [4, 8, 12])],
+)
+def test_section_lasts_a_minute_at_most_if_the_programme_rests(interval_s, stops):
+    assert [section.stop for section in split_into_sections(make_programme(1 / interval_s), 9)] == stops
+
+
+def test_split_begins_after_the_first_sample():
+    (section,) = split_into_sections(make_programme(), 9, 4)
+    assert (section.start, section.stop) == (4, 12)
+    assert section.trajectory.duration == pytest.approx(0.8)
+    times, levels = section.list_drive_steps()
+    assert (times.tolist(), levels.tolist()) == ([0.0, 0.1, 0.5], [1.0, 2.0, 3.0])
+
+
+def test_sample_in_force_is_the_last_one_with_a_margin_for_rounding():
+    section = PlaybackSection(make_programme(), 4, 8)
+    time = np.array([-1.0, 0.0, 0.0999, 0.099_999_95, 0.1, 0.39, 0.4, 9.0])
+    assert section.find_samples(time).tolist() == [4, 4, 4, 5, 5, 7, 8, 8]
+
+
+def test_programme_is_at_rest_below_a_micrometre_per_second():
+    velocity = [0, 1e-6, 0.99e-6, -1e-6, -0.99e-6, *[0.1] * 8]
+    assert find_rest_samples(make_programme(velocity=velocity)).tolist() == [0, 2, 4, 12]
+
+
+def test_run_waits_between_segments_or_at_their_edges():
+    segment = [-1, 0, 0, 0, 1, 1, -1, -1, 1, 1, 1, 1, 1]
+    assert find_rest_samples(make_programme(velocity=np.zeros(13), segment=segment)).tolist() == [
+        0,
+        1,
+        4,
+        6,
+        7,
+        8,
+        12,
+    ]

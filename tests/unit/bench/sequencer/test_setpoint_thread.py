@@ -130,3 +130,58 @@ def test_internal_error_of_the_thread_is_reported_once():
     assert failures == [thread.failure]
     assert isinstance(thread.failure, RunError)
     assert "ZeroDivisionError" in str(thread.failure)
+
+
+def test_late_setpoints_keep_their_places_and_more_than_four_cycles_are_skipped(monkeypatch):
+    """The thread wakes late by 0, 0, 5, 1, 17 and 16 ms; the clock begins 1 ms after a cycle of 4 ms."""
+    now, overshoots, due, late = [10_001_000_000], iter([0, 0, 5, 0, 17, 16]), [], []
+
+    def sleep(seconds):
+        now[0] += round(seconds * 1e9) + next(overshoots) * 1_000_000
+
+    def step(due_ns):
+        due.append(due_ns)
+        if len(due) == 6:
+            thread._stopping.set()
+
+    monkeypatch.setattr("bench.sequencer.setpoint_thread.time", SimpleNamespace(sleep=sleep))
+    monkeypatch.setattr("bench.sequencer.setpoint_thread.raise_priority", lambda above: f"no priority {above}")
+    generator = SimpleNamespace(cycle_ns=4_000_000, step=step)
+    thread = SetpointThread(generator, lambda: now[0], lambda *one: late.append(one), pytest.fail)
+    thread._run()
+    assert [one / 1e9 for one in due] == [10.004, 10.008, 10.012, 10.016, 10.036, 10.040]
+    assert late == [
+        (10_017_000_000, pytest.approx(0.005)),
+        (10_037_000_000, pytest.approx(0.017)),
+        (10_056_000_000, pytest.approx(0.016)),
+    ]
+    assert (thread.late_cycles, thread.warning) == (1 + 4 + 4, "no priority 5")
+
+
+@pytest.mark.parametrize(("elapsed_ns", "is_withheld"), [(30_000_000, True), (30_000_001, False)])
+def test_suspension_lasts_three_fifths_of_the_setpoint_timeout(generator, elapsed_ns, is_withheld):
+    generator.hold_at(0.0)
+    generator.step(0)
+    generator.suspend(1_000)
+    assert generator.step(1_000 + elapsed_ns) is not is_withheld
+
+
+def test_motion_is_done_one_cycle_after_its_end(generator):
+    generator.start(SECTION.trajectory, SECTION)
+    assert not generator.is_done(10**12)
+    generator.step(7)
+    end_ns = generator.schedule.end_ns + 4_000_000
+    assert (generator.is_done(end_ns - 1), generator.is_done(end_ns)) == (False, True)
+
+
+def test_nothing_is_sent_before_a_start(generator, actuator):
+    assert generator.is_done(0)
+    assert not generator.step(0)
+    assert actuator.positions == []
+
+
+def test_soft_stop_begins_after_the_setpoint_that_was_sent(generator):
+    generator.start(SECTION.trajectory, SECTION)
+    now = step_cycles(generator, 0, 100)
+    generator.stop(now, 8.0)
+    assert generator.schedule.soft_stop.start == pytest.approx((now + 4_000_000) * 1e-9)

@@ -191,6 +191,12 @@ def test_a_run_at_an_extreme_shows_that_single_samples_there_are_clipped_as_well
     assert not find_clipped_runs(np.full(1000, 3.0)).any()
 
 
+def test_the_range_of_the_force_does_not_matter():
+    force = np.minimum(RAMP / 990.0, 1.0)
+    np.testing.assert_array_equal(np.flatnonzero(find_clipped_runs(force)), range(990, 1000))
+    np.testing.assert_array_equal(np.flatnonzero(find_clipping(1e-3 * force)), range(990, 1000))
+
+
 @pytest.mark.parametrize(("run", "clipped"), [(21, True), (19, False)])
 def test_a_run_counts_from_five_times_the_usual_one(run, clipped):
     coarse = np.repeat(np.arange(250.0), 4)

@@ -33,6 +33,7 @@ from identification.signals.motion import (
     _make_expected_differences,
     _raise_end_cutoffs,
     estimate_displacement_noise,
+    estimate_motion,
 )
 from identification.signals.motion_regions import (
     _find_runs,
@@ -54,6 +55,7 @@ from identification.signals.noise_floor import (
     _remove_explained,
     _subtract_previous_cycle,
     combine_floors,
+    estimate_floor,
     estimate_high_frequency_noise,
 )
 from identification.signals.smoother import compute_penalty
@@ -514,3 +516,13 @@ def test_each_region_has_its_own_cutoff():
 @pytest.mark.parametrize(("cutoff", "penalty"), [(500.0, 1.0 / 64.0), (1000.0 / 6.0, 1.0)])
 def test_the_penalty_is_the_inverse_sixth_power_of_the_wave_of_a_difference(cutoff, penalty):
     assert compute_penalty(cutoff, RATE) == pytest.approx(penalty)
+
+
+def test_only_periodic_segments_with_a_frequency_show_repeated_cycles():
+    x, v = sine(0.01, 2.0, 12.0)
+    force = 800.0 * v + 2.5 * np.random.default_rng(0).standard_normal(len(v))
+    given = stretch(recorded(x, 2e-6), force)
+    for motion, frequency, repeats in (("sine", 2.0, True), ("hold", 2.0, False), ("sine", None, False)):
+        part = Segment(0, "s", 0, len(x), motion, 0.01, frequency, None)
+        periodic = replace(given, segments=(part,))
+        assert (estimate_floor(periodic, estimate_motion(given)).cycle_to_cycle is not None) == repeats

@@ -18,3 +18,14 @@ def test_no_poll_coincides_with_the_setpoints_or_another_poll():
     offsets = [schedule.offset_ns % (4 * MS) for schedule in (ACTUATOR_SCHEDULE, LOAD_CELL_SCHEDULE)]
     assert len(set(offsets)) == 2
     assert all(offset > 0 for offset in offsets)
+
+
+@pytest.mark.parametrize(
+    ("schedule", "now_ms", "wait_ms"),
+    [
+        (ACTUATOR_SCHEDULE, 0, 1.5), (ACTUATOR_SCHEDULE, 1.5, 8.0), (ACTUATOR_SCHEDULE, 2, 7.5),
+        (LOAD_CELL_SCHEDULE, 0, 3.1), (LOAD_CELL_SCHEDULE, 3.1, 12.0), (LOAD_CELL_SCHEDULE, 20, 7.1),
+    ],
+)  # fmt: skip
+def test_polls_are_at_fixed_milliseconds(schedule, now_ms, wait_ms):
+    assert schedule.compute_wait(round(now_ms * MS)) == pytest.approx(wait_ms * 1e-3, abs=1e-9)

@@ -7,9 +7,12 @@ from hypothesis import strategies as st
 
 from drivers.errors import OutOfRangeError
 from drivers.modbus.instrument import check_rate
+from drivers.modbus.lvdt import Lvdt
 from drivers.modbus.ring_buffer_reader import RingBufferLayout
 from drivers.transport.modbus_address import ModbusAddress
+from drivers.transport.modbus_line import RegisterReply
 from drivers.transport.modbus_registers import (
+    Registers,
     RegisterType,
     count_words,
     decode_number,
@@ -104,3 +107,43 @@ def test_a_serial_line_without_a_baud_rate_is_refused():
 
 def test_tcp_is_fast_enough_for_any_rate():
     assert math.isinf(check_rate("lvdt", ModbusAddress("tcp://bench:502"), load_register_map("lvdt")))
+
+
+class RecordingLine:
+    """Line that records its requests and returns consecutive words."""
+
+    def __init__(self):
+        self.requests = []
+
+    def read(self, table, address, count):
+        self.requests.append((table, address, count))
+        return RegisterReply(list(range(address, address + count)), 1, 2)
+
+    def write(self, address, words):
+        self.requests.append((address, words))
+
+
+def test_adjacent_registers_are_read_in_one_request():
+    """Of the LVDT: interval at 2 and 3, newest at 4 and 5, clock at 6 and 7, in any order."""
+    registers = Registers(line := RecordingLine(), load_register_map("lvdt"))
+    values, reply = registers.read_group("clock", "interval", "newest")
+    assert line.requests == [("input", 2, 6)]
+    raw = {name: value.raw for name, value in values.items()}
+    assert raw == {"clock": 6 * 65_536 + 7, "interval": 2 * 65_536 + 3, "newest": 4 * 65_536 + 5}
+    assert values["clock"].value == pytest.approx(0.393223)
+    assert (reply.sent_ns, reply.received_ns) == (1, 2)
+
+
+def test_a_written_value_is_rounded_to_the_steps_of_its_register():
+    registers = Registers(line := RecordingLine(), load_register_map("lvdt"))
+    registers.write("block_start", 70_000.4)
+    assert line.requests == [(0, [1, 4_464])]
+
+
+def test_a_requested_displacement_has_the_time_of_its_sample():
+    lvdt = Lvdt("lvdt", ModbusAddress("tcp://127.0.0.1:5020"), lambda: 0)
+    lvdt._registers.line = RecordingLine()
+    reading = lvdt.read("displacement")
+    # Displacement at 8 and 9, sampled at 10 and 11, status at 12, whose lowest bit is not set.
+    assert reading.value == pytest.approx((8 * 65_536 + 9) * 1e-7)
+    assert (reading.received_ns, reading.device_ns, reading.quality) == (2, (10 * 65_536 + 11) * 1000, "good")

@@ -103,8 +103,17 @@ def test_a_request_waits_half_a_second_for_its_reply():
 def test_requests_leave_at_the_phase_of_the_shortest_round_trip_except_those_that_explore():
     """The parts of 0.3 ms and of 8 ms are multiples of the golden ratio modulo 1: 0.618, 0.236, 0.854, 0.472."""
     bench, waits, begin = Bench(), [], BEGIN
-    # Phase and round trip [ms]: the first is the best; the third replaces it, because the best grew by 2 %.
-    for phase, round_trip in ((3.0, 1.0), (3.1, 3.0), (4.0, 1.01), (7.0, 2.0), (4.5, 2.0)):
+    # Phase and round trip [ms]: the third replaces the first, because the best grew by 2 %; then two are shorter.
+    for phase, round_trip in (
+        (3.0, 1.0),
+        (3.1, 3.0),
+        (4.0, 1.01),
+        (7.0, 2.0),
+        (4.5, 0.5),
+        (5.0, 0.4),
+        (6.0, 0.9),
+        (5.0, 1.0),
+    ):
         bench.sample(begin)
         bench.now = begin
         waits.append(bench.reader.compute_wait() * 1e3)
@@ -113,7 +122,8 @@ def test_requests_leave_at_the_phase_of_the_shortest_round_trip_except_those_tha
         bench.reply(sent_ns + round(round_trip * MS))
         bench.poll()
         begin = sent_ns + 10 * MS
-    assert waits == pytest.approx([0.0, 3.035_410, 2.920_820, 6.832_816, 3.991_641], abs=1e-5)
+    expected = [0.0, 3.035_410, 2.920_820, 6.832_816, 3.991_641, 4.377_051, 5.665_631, 4.947_871]
+    assert waits == pytest.approx(expected, abs=1e-5)
 
 
 @pytest.mark.parametrize(("command", "code"), [(START, 0), (READ_CLOCK, 1)])

@@ -13,8 +13,8 @@ HALF = math.sqrt(0.5)
 SINE = Sine(kind="sine", amplitude_m=0.01, frequency_hz=2)
 RAMP = Ramp(kind="ramp", start_m=0.1, end_m=-0.06, corner_acceleration_mps2=1)
 """Trapezoid of 0.16 m in 1 s: 0.2 m/s between corners of 0.2 s."""
-TRIANGLE = Triangle(kind="triangle", amplitude_m=0.0225, frequency_hz=1, corner_acceleration_mps2=2)
-"""Triangle of 0.1 m/s with corners of 0.05 s on both sides of each end."""
+TRIANGLE = Triangle(kind="triangle", amplitude_m=0.01125, frequency_hz=2, corner_acceleration_mps2=4)
+"""Triangle of 0.1 m/s with corners of 0.025 s on both sides of each end."""
 LINEAR = Sweep(kind="sweep", amplitude_m=1, start_hz=1, end_hz=3)
 LOGARITHMIC = Sweep(kind="sweep", amplitude_m=1, start_hz=1, end_hz=4, law="logarithmic")
 TABLE = MotionTable(kind="table", time_s=(0, 1, 2), displacement_m=(0, 1, 0))
@@ -33,15 +33,15 @@ ANGLE = 2 * PI / math.log(2)
         (RAMP, 1.0, 0.6, (0.0, -0.2, 0)),
         (RAMP, 1.0, 0.9, (-0.055, -0.1, 1)),
         (RAMP, 1.0, 2.0, (-0.06, 0, 0)),
-        (TRIANGLE, 1.0, -0.1, (-0.01, 0.1, 0)),
-        (TRIANGLE, 1.0, 0.1, (0.01, 0.1, 0)),
-        (TRIANGLE, 1.0, 0.24, (0.0224, 0.02, -2)),
-        (TRIANGLE, 1.0, 0.26, (0.0224, -0.02, -2)),
-        (TRIANGLE, 1.0, 0.4, (0.01, -0.1, 0)),
-        (TRIANGLE, 1.0, 0.6, (-0.01, -0.1, 0)),
-        (TRIANGLE, 1.0, 0.74, (-0.0224, -0.02, 2)),
-        (TRIANGLE, 1.0, 0.76, (-0.0224, 0.02, 2)),
-        (TRIANGLE, 1.0, 1.1, (0.01, 0.1, 0)),
+        (TRIANGLE, 1.0, -0.05, (-0.005, 0.1, 0)),
+        (TRIANGLE, 1.0, 0.05, (0.005, 0.1, 0)),
+        (TRIANGLE, 1.0, 0.12, (0.0112, 0.02, -4)),
+        (TRIANGLE, 1.0, 0.13, (0.0112, -0.02, -4)),
+        (TRIANGLE, 1.0, 0.2, (0.005, -0.1, 0)),
+        (TRIANGLE, 1.0, 0.3, (-0.005, -0.1, 0)),
+        (TRIANGLE, 1.0, 0.37, (-0.0112, -0.02, 4)),
+        (TRIANGLE, 1.0, 0.38, (-0.0112, 0.02, 4)),
+        (TRIANGLE, 1.0, 0.55, (0.005, 0.1, 0)),
         (LINEAR, 2.0, -0.25, (-1, 0, 4 * PI**2)),
         (LINEAR, 2.0, 0.5, (-HALF, -3 * PI * HALF, -2 * PI * HALF + 9 * PI**2 * HALF)),
         (LINEAR, 2.0, 1.0, (0, -4 * PI, -2 * PI)),

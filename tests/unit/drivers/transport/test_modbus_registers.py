@@ -124,7 +124,7 @@ class RecordingLine:
 
 
 def test_adjacent_registers_are_read_in_one_request():
-    """Of the LVDT: interval at 2 and 3, newest at 4 and 5, clock at 6 and 7, in any order."""
+    """Registers of the LVDT: interval at 2 and 3, newest at 4 and 5, clock at 6 and 7, in any order."""
     registers = Registers(line := RecordingLine(), load_register_map("lvdt"))
     values, reply = registers.read_group("clock", "interval", "newest")
     assert line.requests == [("input", 2, 6)]

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Literal, Union, get_args, get_origin
 
 import typer
-from pydantic import BaseModel
+from pydantic import AliasChoices, BaseModel
 
 from bench.config import BenchConfig
 from bench.log import MESSAGES, TOPIC_FAMILIES, make_message_schema
@@ -31,8 +31,11 @@ from identification.documents import (
     Forecast,
     Prediction,
     Trend,
+    Twin,
 )
+from identification.pinn.common import DenseSettings, ElementSettings
 from sim_rig.scenario import Scenario
+from sim_rig.trial.cases import Seal, SealedTruth
 from sim_rig.trial.scoring import TrialReport
 
 FOLDER = Path(__file__).parent / "reference"
@@ -51,6 +54,15 @@ DOCUMENTS: dict[str, type[BaseModel]] = {
     "trial": TrialReport,
 }
 """Type of each document by the name of its schema file."""
+
+OTHER_FILES: dict[str, type[BaseModel]] = {
+    "twin": Twin,
+    "network preset `elements`": ElementSettings,
+    "network preset `dense`": DenseSettings,
+    "head of a trial": Seal,
+    "sealed truth of a trial": SealedTruth,
+}
+"""Type of each file without a schema file of its own, by its name."""
 
 LOG_MESSAGES: dict[str, str] = {
     model.__name__.lower(): topic for topic, model in {**MESSAGES, **TOPIC_FAMILIES}.items()
@@ -172,14 +184,36 @@ def _make_field_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str,
             yield from _make_field_rows(inner, f"{key}{_format_separator(field.annotation)}")
 
 
+def describe_former_names() -> str:
+    """Describe every renamed field of a document or settings file."""
+    files = {**DOCUMENTS, **OTHER_FILES}
+    rows = dict.fromkeys((name, *row) for name in sorted(files) for row in _make_former_rows(files[name], ""))
+    return make_table(("file", "former", "present"), rows)
+
+
+def _make_former_rows(model: type[BaseModel], prefix: str) -> Iterator[tuple[str, str]]:
+    for name, field in model.model_fields.items():
+        aliases = field.validation_alias
+        for former in aliases.choices if isinstance(aliases, AliasChoices) else ():
+            if former != name:
+                yield f"`{prefix}{former}`", f"`{name}`"
+        for inner in _find_models(field.annotation):
+            yield from _make_former_rows(inner, f"{prefix}{name}{_format_separator(field.annotation)}")
+
+
 def _find_model(annotation: Any) -> type[BaseModel] | None:
+    return next(_find_models(annotation), None)
+
+
+def _find_models(annotation: Any) -> Iterator[type[BaseModel]]:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    return next((model for part in get_args(annotation) if (model := _find_model(part)) is not None), None)
+        yield annotation
+    for part in get_args(annotation):
+        yield from _find_models(part)
 
 
 def _format_separator(annotation: Any) -> str:
-    return {list: "[].", dict: ".NAME."}.get(get_origin(annotation), ".")
+    return {list: "[].", tuple: "[].", dict: ".NAME."}.get(get_origin(annotation), ".")
 
 
 def _format_type(annotation: Any) -> str:
@@ -216,6 +250,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "diagnosis": lambda: describe_fields(Diagnosis),
     "estimate": lambda: describe_fields(Estimate),
     "delay": lambda: describe_fields(Delay),
+    "former names": describe_former_names,
 }
 """Function that makes each generated part of a page."""
 

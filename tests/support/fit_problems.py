@@ -33,3 +33,23 @@ def problem_of(c, strokes, seed=0, drives=(0.0, 0.5), prior=20e-6):
 
 
 STROKES = [sine(0.005, 2.5), sine(0.010, 1.0), sine(0.015, 2.0)]
+
+
+def piece_of(stroke, force=None, **more):
+    """Return a piece of which every sample is used; without a force, the force is zero."""
+    count = len(stroke.displacement)
+    return Piece("p", stroke, np.zeros(count) if force is None else force, np.ones(count), **more)
+
+
+def linear_force(stroke, scale=1.0):
+    """Return the force [N] of friction, damping and a spring without dynamics."""
+    v, u = stroke.velocity, stroke.sampled_drive
+    return scale * (
+        (50.0 + 400.0 * u) * np.sign(v) + (600.0 + 1500.0 * u) * v + 3000.0 * stroke.displacement - 20.0
+    )
+
+
+SLIDING_STROKES = [sine(0.01, 2.0), sine(0.005, 1.0)]
+SLIDING = [piece_of(s, linear_force(s)) for s in SLIDING_STROKES]
+"""Strokes of a damper that always slides."""
+SHORT = sine(0.01, 2.0, seconds=1.0)

@@ -43,9 +43,12 @@ class NetworkInputs(NamedTuple):
 
 
 def compute_network_inputs(
-    pieces: Sequence[TrainingPiece], times: Sequence[Array], slips: Sequence[SlipVelocity], c: Coordinates,
+    pieces: Sequence[TrainingPiece],
+    times: Sequence[Array],
+    slips: Sequence[SlipVelocity],
+    c: Coordinates,
     features: Sequence[FeatureGroup] = FEATURE_GROUPS,
-) -> NetworkInputs:  # fmt: skip
+) -> NetworkInputs:
     """Return the inputs of all pieces, one piece below the other.
 
     Args:

@@ -46,9 +46,13 @@ class _OutputFunction(torch.autograd.Function):
 
     @staticmethod
     def forward(
-        ctx: Any, network: "Perceptron", workspaces: list[Workspace],
-        weights: Tensor, inputs: Tensor, rates: Tensor,
-    ) -> tuple[Tensor, Tensor]:  # fmt: skip
+        ctx: Any,
+        network: "Perceptron",
+        workspaces: list[Workspace],
+        weights: Tensor,
+        inputs: Tensor,
+        rates: Tensor,
+    ) -> tuple[Tensor, Tensor]:
         layers, one, value, rate = network.split_layers(weights), inputs.new_ones(()), inputs, rates
         for (matrix, offset), workspace in zip(layers[:-1], workspaces, strict=True):
             value, rate = (

@@ -161,7 +161,8 @@ class ElementTraining:
         directions that its finite weight still allows, and not return where the strokes hardly show the shape of
         the loop.
         """
-        self.phase, multipliers = "multipliers", None
+        self.phase = "multipliers"
+        multipliers: Sequence[WeightedResiduals] | None = None
         loss = self._make_loss(self.problem, make_training_pieces(self.problem))
         weights, free = LossWeights(law_weight, self.noise), self._select_free(self.settings.schedule[-1], 1, 1)
         for number in range(self.settings.multiplier_steps):
@@ -185,9 +186,14 @@ class ElementTraining:
         return free
 
     def _minimise(
-        self, loss: ElementLoss, weights: LossWeights, free: BoolArray, steps: int, damping: float,
+        self,
+        loss: ElementLoss,
+        weights: LossWeights,
+        free: BoolArray,
+        steps: int,
+        damping: float,
         multipliers: Sequence[WeightedResiduals] | None = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Take Gauss-Newton steps on output weights and shared unknowns together."""
         for _ in range(steps):
             factorisation, cost = self._factorise(loss, weights, multipliers)
@@ -227,9 +233,14 @@ class ElementTraining:
         return total if np.isfinite(total) else np.inf
 
     def _search_line(
-        self, loss: ElementLoss, weights: LossWeights, multipliers: Sequence[WeightedResiduals] | None,
-        step: Array, weight_step: OutputWeights, cost: float,
-    ) -> float:  # fmt: skip
+        self,
+        loss: ElementLoss,
+        weights: LossWeights,
+        multipliers: Sequence[WeightedResiduals] | None,
+        step: Array,
+        weight_step: OutputWeights,
+        cost: float,
+    ) -> float:
         """Shorten a step until the cost decreases, take it, and return the decrease; 0 if there is none."""
         share = min(1.0, _LARGEST_STEP / max(self._measure_step(step), 1e-12))
         for _ in range(_MAX_REDUCTIONS):
@@ -274,9 +285,13 @@ class ElementTraining:
         return lambda time: np.interp(time, grid, slip)
 
     def _make_network(
-        self, pieces: Sequence[TrainingPiece], slips: Sequence[SlipVelocity], before: ElementNetwork | None,
-        layer: HiddenLayer, states: Callable[[int, Array], States],
-    ) -> ElementNetwork:  # fmt: skip
+        self,
+        pieces: Sequence[TrainingPiece],
+        slips: Sequence[SlipVelocity],
+        before: ElementNetwork | None,
+        layer: HiddenLayer,
+        states: Callable[[int, Array], States],
+    ) -> ElementNetwork:
         """Return a network on a new mesh, fitted to given states."""
         c = self.problem.space.to_coordinates(self.unknowns[:COORDINATE_COUNT])
         _, drive_delay = self.problem.compute_residual_delays(self.unknowns)

@@ -35,7 +35,6 @@ from identification.fitting.output_error import (
     minimise,
     solve_bounded_step,
 )
-from identification.fitting.piece import Piece
 from identification.fitting.prediction import compute_drive_errors, compute_nrmse, compute_rmse, make_piece_model
 from identification.fitting.problem import Evaluation, Problem
 from identification.fitting.search_space import SearchSpace
@@ -44,20 +43,22 @@ from identification.logs.channel_info import ChannelFilter
 from identification.logs.recording import Recording, Segment
 from identification.progress import ignore_progress
 from identification.simulate import Excitation
-from tests.support.fit_problems import LABORATORY, NOISE, recorded, sine
+from tests.support.fit_problems import (
+    LABORATORY,
+    NOISE,
+    SHORT,
+    SLIDING,
+    SLIDING_STROKES,
+    linear_force,
+    piece_of,
+    recorded,
+    sine,
+)
 from tests.support.strokes import stretch
-
-
-def piece_of(stroke, force=None, **more):
-    count = len(stroke.displacement)
-    return Piece("p", stroke, np.zeros(count) if force is None else force, np.ones(count), **more)
 
 
 def problem_of(*pieces, space=None, **more):
     return Problem(tuple(pieces), space or SearchSpace(0.0, 0.5), NOISE, 2e-5, **more)
-
-
-SHORT = sine(0.01, 2.0, seconds=1.0)
 
 
 LAYOUT = UnknownLayout(piece_count=3, effect_sizes=(2, 1), log_size=2, further_logs=2)
@@ -116,19 +117,6 @@ def test_a_drive_without_width_hides_slopes_and_eta(width, one):
     assert (mask[13], mask[14]) == (True, not one)
 
 
-def linear_force(stroke, scale=1.0):
-    v, u = stroke.velocity, stroke.sampled_drive
-    return scale * (
-        (50.0 + 400.0 * u) * np.sign(v) + (600.0 + 1500.0 * u) * v + 3000.0 * stroke.displacement - 20.0
-    )
-
-
-STROKES = [sine(0.01, 2.0), sine(0.005, 1.0)]
-
-
-SLIDING = [piece_of(s, linear_force(s)) for s in STROKES]
-
-
 def test_a_regression_finds_the_force_of_a_sliding_damper():
     assert _regress_force(SLIDING) == pytest.approx([50.0, 400.0, 600.0, 1500.0, 3000.0, -20.0])
     spoilt = replace(SLIDING[0], force=SLIDING[0].force + 1e4 * (np.arange(6000) < 3000))
@@ -137,7 +125,7 @@ def test_a_regression_finds_the_force_of_a_sliding_damper():
 
 
 def test_only_samples_above_a_quarter_of_the_peak_speed_count_as_sliding():
-    stroke = STROKES[0]
+    stroke = SLIDING_STROKES[0]
     slow = np.abs(stroke.velocity) < 0.249 * np.abs(stroke.velocity).max()
     force = np.where(slow, 1e4, linear_force(stroke))
     assert _regress_force([piece_of(stroke, force)]) == pytest.approx([50.0, 400.0, 600.0, 1500.0, 3000.0, -20.0])
@@ -164,7 +152,7 @@ def test_usual_starts_share_the_stiffness_and_try_fractions_of_half_the_longest_
 
 
 def test_sliding_damping_is_at_least_that_of_the_smallest_c0():
-    negative = [piece_of(s, linear_force(s, -1.0)) for s in STROKES]
+    negative = [piece_of(s, linear_force(s, -1.0)) for s in SLIDING_STROKES]
     assert estimate_sliding_damping(negative) == pytest.approx(13.0)
 
 

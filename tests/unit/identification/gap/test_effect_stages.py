@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from identification.damper.effects import COMMON_EFFECTS, EFFECTS
-from identification.documents import Gap
 from identification.fitting import EffectModel, Piece, Problem, SearchSpace
 from identification.gap.fits import FitOptions, JointFit, fit_jointly
 from identification.gap.outcome.explanation import explain_diagnosis
@@ -24,6 +23,7 @@ from identification.gap.selection import Posterior
 from identification.gap.selection.screening import list_effect_models, screen
 from identification.simulate import Excitation, SimulationModel, simulate
 from tests.support.effects import LABORATORY, MEDIUM, active, sine
+from tests.support.gaps import GAP
 from tests.support.sensitivities import compute_worst_error
 
 RATE, SECONDS = 500.0, 4.0
@@ -123,16 +123,7 @@ def test_the_contracts_name_every_common_effect():
 def test_the_report_names_the_effect_with_values_and_units(name):
     candidate, posterior = SimpleNamespace(fit=fit_effect(name)), Posterior({frozenset({name}): 0.9}, 0.05)
     (effect,) = build_named_effects(candidate, posterior, {name: 1.0}, "V")
-    gap = Gap(
-        before_n=12.0,
-        after_n=3.0,
-        noise_floor_n=2.5,
-        shrinkage=0.98,
-        shrinkage_ci95=(0.97, 0.99),
-        train_before_n=11.0,
-        train_after_n=3.0,
-    )
-    text = explain_diagnosis("explained", gap, [effect], [], "")
+    text = explain_diagnosis("explained", GAP, [effect], [], "")
     assert name in text
     assert EFFECTS[name].meaning in text
     for quantity, true in zip(EFFECTS[name].forms[0].parameters, MEDIUM[name][effect.form], strict=True):

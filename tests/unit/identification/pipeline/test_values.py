@@ -9,32 +9,10 @@ import pytest
 from identification.fitting.output_error import (
     OptimiserSettings,
 )
-from identification.fitting.piece import Piece
 from identification.pipeline.fit_document import FitResult, _describe_result
 from identification.pipeline.fit_input import _find_drive_range, _find_lowest_k0, make_problem
 from identification.pipeline.fit_request import FitRequest
-from tests.support.fit_problems import sine
-
-
-def piece_of(stroke, force=None, **more):
-    count = len(stroke.displacement)
-    return Piece("p", stroke, np.zeros(count) if force is None else force, np.ones(count), **more)
-
-
-SHORT = sine(0.01, 2.0, seconds=1.0)
-
-
-def linear_force(stroke, scale=1.0):
-    v, u = stroke.velocity, stroke.sampled_drive
-    return scale * (
-        (50.0 + 400.0 * u) * np.sign(v) + (600.0 + 1500.0 * u) * v + 3000.0 * stroke.displacement - 20.0
-    )
-
-
-STROKES = [sine(0.01, 2.0), sine(0.005, 1.0)]
-
-
-SLIDING = [piece_of(s, linear_force(s)) for s in STROKES]
+from tests.support.fit_problems import SHORT, SLIDING, linear_force, piece_of
 
 
 def test_the_lowest_k0_lets_y_grow_by_e_cubed_in_the_longest_stretch():

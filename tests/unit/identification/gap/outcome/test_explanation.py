@@ -7,7 +7,7 @@ import pytest
 
 from identification.damper.effects import EFFECTS
 from identification.damper.parameter_sets import PARAMETER_SETS
-from identification.documents.diagnosis import EffectSet, EffectValue, Gap, NamedEffect
+from identification.documents.diagnosis import EffectSet, EffectValue, NamedEffect
 from identification.errors import IdentificationError
 from identification.fitting.damper_model import make_effect_entries, read_damper_model
 from identification.gap.outcome.explanation import (
@@ -16,16 +16,8 @@ from identification.gap.outcome.explanation import (
     suggest_check,
     summarise_diagnosis,
 )
+from tests.support.gaps import GAP
 
-GAP = Gap(
-    before_n=12.0,
-    after_n=3.0,
-    noise_floor_n=2.5,
-    shrinkage=0.98,
-    shrinkage_ci95=(0.97, 0.99),
-    train_before_n=11.0,
-    train_after_n=3.0,
-)
 MASS = NamedEffect(
     name="moving_mass",
     stage="mounting",

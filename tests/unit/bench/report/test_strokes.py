@@ -53,6 +53,11 @@ def test_cycles_begin_where_the_motion_rises_through_its_mean():
     assert choose(shifted, make_segment(0, 401))[0].traces[0].rows == slice(176, 377)
 
 
+def test_a_drive_that_is_rounded_to_zero_has_no_sign():
+    trace = choose(make_sine(600), make_segment(0, 600, drive_value=-1e-4))[0].traces[0]
+    assert str(trace.drive) == "0.0"
+
+
 @pytest.mark.parametrize(("samples", "is_cut"), [(103, False), (105, True)])
 def test_a_stroke_of_at_most_one_cycle_is_shown_whole(samples, is_cut):
     trace = choose(make_sine(600), make_segment(0, samples))[0].traces[0]

@@ -35,6 +35,15 @@ def test_a_value_that_does_not_fit_its_object_is_not_sent():
         node.download(0x6072, 120_000)
 
 
+def test_a_reply_reaches_the_network_with_its_time_in_seconds(monkeypatch):
+    node = CanopenNode("rod", CanBus(NOWHERE, clock), 5, ACTUATOR_EDS, clock)
+    received = []
+    monkeypatch.setattr(node._network, "notify", lambda *frame: received.append(frame))
+    node._on_frame(2_500_000_000, 0x585, b"\x43\x00")
+    node._on_frame(2_600_000_000, 0x586, b"of another node")
+    assert received == [(0x585, bytearray(b"\x43\x00"), 2.5)]
+
+
 def test_failed_homing_leaves_no_reference(monkeypatch):
     actuator = Actuator("rod", NOWHERE, clock)
     actuator._reference_state = ReferenceState.HOMED

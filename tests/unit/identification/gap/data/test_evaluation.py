@@ -1,9 +1,12 @@
 """Samples that are fitted and held out, and the residual on them."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from identification.fitting import assemble
+from identification.gap.data.cycles import Cycles
 from identification.gap.data.evaluation import EvaluationData
 from tests.support.candidate_pools import RATE, record
 
@@ -37,3 +40,16 @@ def test_a_residual_has_one_rmse_on_fitted_and_one_on_held_out_samples(data):
 def test_only_fitted_samples_are_marked_in_the_pieces_of_a_fit(data):
     (piece,) = data.select_fitted_pieces()
     assert np.array_equal(piece.train > 0, data.fitted_samples)
+
+
+def test_a_cycle_with_one_usable_sample_has_an_error():
+    cycles = Cycles(np.array([0, 0, 1, 1, 2]), np.zeros(5), np.zeros(3, int), ())
+    usable = np.array([True, True, True, False, False])
+    data = SimpleNamespace(
+        cycles=cycles, usable=usable, force=np.zeros(5), held_out_cycles=np.array([False, True, False])
+    )
+    before, after = SimpleNamespace(values=np.full(5, 2.0)), SimpleNamespace(values=np.full(5, 1.0))
+    errors = EvaluationData._compute_cycle_errors(data, before, after)
+    np.testing.assert_array_equal(errors[2], [2, 1])
+    np.testing.assert_array_equal(errors[0], [8.0, 4.0])
+    np.testing.assert_array_equal(errors[1], [2.0, 1.0])

@@ -30,6 +30,11 @@ def test_in_the_second_start_the_outer_dashpot_increases_with_the_drive():
     assert second[:8] == first[:8]
 
 
+def test_the_third_start_has_three_times_the_yield_displacement():
+    first, _, third = (start.coordinates for start in islice(generate_starts(make_problem()), 3))
+    assert third.D_y == pytest.approx(3.0 * first.D_y)
+
+
 MEMORYLESS = MemorylessDamper((10.0, 30.0), (100.0, 200.0), (400.0, 1000.0), 500.0, 20.0)
 
 

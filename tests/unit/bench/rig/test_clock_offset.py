@@ -33,8 +33,8 @@ def test_true_offset_is_within_the_bounds_for_any_delays(delays, rate, ahead):
     bounds = estimate_offset_bounds(lows, highs, now)
     assert bounds is not None
     low, high = bounds.find_range(now + ahead)
-    # The edges of the possible rates are known to the spacing of the last grid.
-    tolerance = 1_000 + 1e-6 * ahead
+    # The edges of the possible rates are known to the spacing of the last grid, the offsets to a nanosecond.
+    tolerance = 1_010 + 1e-6 * ahead
     assert low - tolerance <= find_offset(now + ahead, rate) <= high + tolerance
 
 

@@ -114,7 +114,7 @@ def make_floor_rows(fit: Fit) -> PropertyRows:
     """Make the rows of the noise floor and its estimates."""
     cycle_to_cycle = fit.floor.cycle_to_cycle
     return [
-        ("Noise floor", f"{format_force(fit.noise_floor_n)}: {fit.floor.basis}"),
+        ("Noise floor", f"{format_quantity(fit.noise_floor_n, fit.floor.ci95, 'N')}: {fit.floor.basis}"),
         ("From repeated cycles", "no repeated cycles" if cycle_to_cycle is None else format_force(cycle_to_cycle)),
         ("From frequencies above those of a damper", format_force(fit.floor.high_frequency)),
     ]

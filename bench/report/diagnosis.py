@@ -52,6 +52,7 @@ class Gap(DocumentPart):
     before_n: float
     after_n: float
     noise_floor_n: float
+    noise_floor_ci95: tuple[float, float] | None = None
     shrinkage: float | None = None
     shrinkage_ci95: tuple[float, float] | None = None
     nominal_n: float | None = None
@@ -153,8 +154,8 @@ def make_context(diagnosis: Diagnosis, drive_unit: str) -> dict[str, Any]:
 
 def _make_gap_rows(diagnosis: Diagnosis) -> PropertyRows:
     gap = diagnosis.gap
-    rows = [
-        ("Noise floor of the force", format_force(gap.noise_floor_n)),
+    rows: PropertyRows = [
+        ("Noise floor of the force", f"{format_quantity(gap.noise_floor_n, gap.noise_floor_ci95, 'N')}"),
         ("Force error of the refitted law, on held-out strokes", format_force(gap.before_n)),
         ("Force error with the named effects", format_force(gap.after_n)),
     ]

@@ -54,6 +54,7 @@ class NoiseFloor(DocumentPart):
     basis: str = Field(
         validation_alias=AliasChoices("basis", "how"), description="estimate on which the noise floor rests"
     )
+    ci95: tuple[float, float] | None = Field(default=None, description="95 % interval of the noise floor, in N")
 
 
 class ForceErrors(DocumentPart):

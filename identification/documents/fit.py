@@ -65,6 +65,11 @@ class NoiseFloor(Document):
     basis: str = Field(
         validation_alias=AliasChoices("basis", "how"), description="which of the two was used, and why"
     )
+    ci95: tuple[float, float] | None = Field(
+        default=None,
+        description="95 % interval of the noise floor, in N; where no cycles repeat, its lower bound and the "
+        "error of the fit",
+    )
 
 
 class SplitErrors(Document):

@@ -13,13 +13,8 @@ from identification.errors import UnusableDataError
 from identification.fitting.force_channel import LowPass, compute_filter_delay
 from identification.fitting.piece import Piece
 from identification.logs import Recording, Stretch
-from identification.signals import (
-    NoiseFloorEstimate,
-    average_drive_levels,
-    combine_floors,
-    estimate_floor,
-    estimate_motion,
-)
+from identification.noise import NoiseFloorEstimate, estimate_floor
+from identification.signals import average_drive_levels, estimate_motion
 from identification.simulate import Excitation
 
 _TRANSIENT_TIME = 0.02
@@ -145,12 +140,11 @@ def assemble(
     held_out = [hold_out.make_mask(s) for s in stretches]
     starts = [s.time[0] - r.stretches[0].time[0] for r in recordings for s in r.stretches]
     logs = [k for k, r in enumerate(recordings) for _ in r.stretches]
-    pieces, floors, notes = [], [], list[str]()
+    pieces, motions, notes = [], [], list[str]()
     for k, (mask, start, log) in enumerate(zip(held_out, starts, logs, strict=True)):
         motion = estimate_motion(stretches[k])
         stretch = stretches[k] = _exclude_unresolved(stretches[k], motion.unresolved, max_excluded, notes)
-        # Only valid samples of the force may enter its noise floor.
-        floors.append(estimate_floor(replace(stretch, measured=stretch.valid_mask), motion))
+        motions.append(motion)
         fitted = stretch.valid_mask & ~mask
         fitted[: round(_TRANSIENT_TIME * stretch.rate)] = False
         power = np.abs(stretch.force * motion.velocity)
@@ -159,7 +153,8 @@ def assemble(
         )
         pieces.append(replace(_make_piece(stretch, excitation, fitted), log=log))
     _check_hold_out(hold_out, held_out, pieces)
-    floor = combine_floors(stretches, floors)
+    # Only valid samples of the force may enter its noise floor.
+    floor = estimate_floor([replace(s, measured=s.valid_mask) for s in stretches], motions)
     return Dataset(tuple(pieces), tuple(held_out), tuple(stretches), floor, tuple(recordings), tuple(notes))
 
 

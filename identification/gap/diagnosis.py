@@ -21,13 +21,11 @@ from identification.gap.selection import (
 from identification.logs import Recording
 from identification.pipeline import make_problem
 from identification.progress import Progress, ignore_progress
-from identification.signals import NoiseFloorEstimate, check_recordings, check_single_specimen, mask_clipping
+from identification.signals import check_recordings, check_single_specimen, mask_clipping
 from identification.threads import use_one_thread
 
 _CLOCK_DEVIATION = 5e-5
 """Standard deviation of the delay between channels that clocks and filters usually leave [s]."""
-_REPEAT_RATIO = 1.1
-"""Threshold on the ratio of cycle-to-cycle to high-frequency floor: above it, something does not repeat."""
 
 
 def diagnose(
@@ -130,22 +128,15 @@ def make_candidate_pool(
     """Make an empty candidate pool for prepared recordings."""
     dataset, evaluation = prepared.dataset, prepared.evaluation
     problem = make_diagnosis_problem(dataset, evaluation.select_fitted_pieces())
-    noise_model = NoiseModel(select_white_floor(dataset.floor), dataset.stretches, seed)
+    noise_model = NoiseModel(dataset.floor, dataset.stretches, seed)
     clock_deviation = dataset.clock_deviation if dataset.clock_deviation > _CLOCK_DEVIATION else 0.0
     return CandidatePool(problem, evaluation, noise_model, clock_deviation, progress, settings)
-
-
-def select_white_floor(floor: NoiseFloorEstimate) -> float:
-    """Return the white noise [N], which no model explains; effects may explain noise that does not repeat."""
-    if floor.cycle_to_cycle is None or floor.cycle_to_cycle > _REPEAT_RATIO * floor.high_frequency:
-        return floor.high_frequency
-    return floor.noise
 
 
 def make_diagnosis_problem(dataset: Dataset, pieces: tuple[Piece, ...]) -> Problem:
     """Make the fit problem of a diagnosis.
 
-    It uses the white noise floor. Delays are limited to the error of the clocks, because a larger delay is an
+    Delays are limited to the error of the clocks, because a larger delay is an
     effect. Each log after the first has its own force offset, because the zero of the load cell differs from
     run to run.
     """
@@ -153,7 +144,6 @@ def make_diagnosis_problem(dataset: Dataset, pieces: tuple[Piece, ...]) -> Probl
     return replace(
         problem,
         pieces=pieces,
-        noise=select_white_floor(dataset.floor),
         delay_limit=DELAY_LIMIT,
         per_log=("offset",) if len(dataset.recordings) > 1 else (),
     )

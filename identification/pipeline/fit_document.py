@@ -77,7 +77,10 @@ def make_fit_document(dataset: Dataset, result: FitResult, provenance: Provenanc
         nuisances=nuisances.model_copy(update={"per_log": per_log}),
         noise_floor_n=floor.noise,
         floor=NoiseFloor(
-            cycle_to_cycle=floor.cycle_to_cycle, high_frequency=floor.high_frequency, basis=floor.basis
+            cycle_to_cycle=floor.cycle_to_cycle,
+            high_frequency=floor.high_frequency,
+            basis=floor.basis,
+            ci95=floor.get_interval(compute_rmse(train[0])),
         ),
         rmse_n=SplitErrors(
             train=compute_rmse(train[0]),

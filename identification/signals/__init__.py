@@ -1,4 +1,4 @@
-"""Recorded arrays to states: motion, drive, noise floor, data quality."""
+"""Recorded arrays to states: motion, drive, data quality."""
 
 from identification.signals.data_quality import (
     check_recordings,
@@ -8,21 +8,25 @@ from identification.signals.data_quality import (
     mask_clipping,
 )
 from identification.signals.drive import average_drive_levels, bin_drive, estimate_drive_noise
-from identification.signals.motion import estimate_motion, estimate_recorded_noise
-from identification.signals.noise_floor import NoiseFloorEstimate, combine_floors, estimate_floor
+from identification.signals.harmonics import find_steady_cycles
+from identification.signals.motion import Motion, estimate_motion, estimate_recorded_noise
+from identification.signals.noise import estimate_white_noise
+from identification.signals.smoother import differentiate, smooth_below
 
 __all__ = [
-    "NoiseFloorEstimate",
+    "Motion",
     "average_drive_levels",
     "bin_drive",
     "check_recordings",
     "check_single_specimen",
     "clean_recordings",
-    "combine_floors",
     "describe_outlier_logs",
+    "differentiate",
     "estimate_drive_noise",
-    "estimate_floor",
     "estimate_motion",
     "estimate_recorded_noise",
+    "estimate_white_noise",
+    "find_steady_cycles",
     "mask_clipping",
+    "smooth_below",
 ]

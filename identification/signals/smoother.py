@@ -47,6 +47,12 @@ def smooth_signal(
     return np.asarray(once + _solve(bands, weights * (known - once), np.zeros(len(penalty))) if twicing else once)
 
 
+def smooth_below(values: Array, weights: Array, cutoff: float, rate: float) -> Array:
+    """Return the part (N,) of a measured signal below a cutoff frequency [Hz]; the weights are 0 or 1."""
+    penalty = np.full(len(values) - 3, float(compute_penalty(cutoff, rate)))
+    return smooth_signal(values, weights, penalty, np.zeros(len(values) - 3))
+
+
 @njit_cached
 def _factorise(bands: Array, weights: Array, penalty: Array) -> None:
     """Factorise the seven-diagonal normal equations as L D L^T; (4, N + 3) D, then three diagonals of L."""

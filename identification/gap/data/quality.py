@@ -7,7 +7,7 @@ import numpy as np
 from identification.errors import UnusableDataError
 from identification.fitting import Piece
 from identification.gap.data.cycles import Cycles
-from identification.signals import NoiseFloorEstimate
+from identification.noise import NoiseFloorEstimate
 
 _FEWEST_CYCLES = 4
 """Smallest number of cycles, or of seconds where nothing repeats: with fewer, nothing can be held out."""
@@ -60,5 +60,11 @@ def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> 
         notes.append("only one amplitude: gas spring, end stop and displacement nonlinearity look alike")
     if floor.cycle_to_cycle is None:
         notes.append(f"the noise floor is estimated from high frequencies only: {floor.basis}")
+    if floor.coloured_share > 0.0:
+        ratio = floor.noise / floor.high_frequency
+        notes.append(
+            f"the noise floor is {ratio:.2f} times the noise at high frequencies: part of the force does not "
+            "repeat; slow noise of the load cell, stick-slip and a loose part of the fixture look alike"
+        )
     notes.append("a gain error of the force or displacement channel can only be found by calibration")
     return notes

@@ -1,7 +1,6 @@
 """Noise model: current estimate of the noise, updated from the residuals of candidates.
 
-It starts with the white noise of the recorded force. Propagated input noise is added. Where the residual is
-stationary but not white, the noise of the force is raised to all of it.
+It starts with the noise floor of the recorded force. Propagated input noise is added.
 """
 
 import math
@@ -14,12 +13,10 @@ from identification.arrays import Array
 from identification.fitting import Piece, Problem
 from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import NO_GAP_RATIO, Candidate
-from identification.gap.noise.coloured_noise import estimate_coloured_floor
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
+from identification.noise import NoiseFloorEstimate
 
-_COLOURED_RATIO = 1.02
-"""Threshold on the noise of a residual, relative to the present floor: above it, the noise is coloured."""
 _SEARCH_DRAWS = 2
 """Draws of the input noise during the search; over the strokes, each estimates its size to some hundredths."""
 _REPORT_DRAWS = 8
@@ -30,21 +27,20 @@ _REPORT_DRAWS = 8
 class NoiseModel:
     """Estimated noise of force and displacement."""
 
-    noise: float
-    """Noise of the recorded force [N]: white, or coloured once a residual has shown it."""
+    estimate: NoiseFloorEstimate
+    """Noise of the recorded force."""
     stretches: Sequence[Stretch]
     """Recorded stretches, one for each piece."""
     seed: int = 1
     """Seed of the input noise."""
     input_noise: float | None = None
     """Propagated noise of the displacement [N]; None before the first update."""
-    white_noise: float = field(init=False)
-    """Noise of the recorded force at the start [N]."""
     _motion_draws: list[tuple[Piece, ...]] = field(default_factory=list)
 
-    def __post_init__(self) -> None:
-        """Store the initial noise as the white noise."""
-        self.white_noise = self.noise
+    @property
+    def noise(self) -> float:
+        """Noise of the recorded force [N]."""
+        return self.estimate.noise
 
     @property
     def floor(self) -> float:
@@ -52,9 +48,9 @@ class NoiseModel:
         return math.hypot(self.noise, self.input_noise or 0.0)
 
     @property
-    def coloured_share(self) -> float:
-        """Part of the variance of the force noise that is not white [1]."""
-        return 1.0 - (self.white_noise / self.noise) ** 2
+    def highest_floor(self) -> float:
+        """Upper end of the floor's 95 % interval [N]; the floor itself where no cycles repeat."""
+        return math.hypot(self.estimate.get_interval(self.noise)[1], self.input_noise or 0.0)
 
     def update(self, candidate: Candidate, full_problem: Problem, evaluation: EvaluationData) -> None:
         """Raise the floor by the noise in a candidate's residual.
@@ -70,15 +66,13 @@ class NoiseModel:
         size = math.sqrt(float(squares.mean()))
         # With missing effects the simulated loop may be far too steep. The smallest estimate is the safe one.
         self.input_noise = size if self.input_noise is None else min(size, self.input_noise)
-        coloured = estimate_coloured_floor(candidate.residual, evaluation.cycles)
-        if coloured is not None and coloured > _COLOURED_RATIO * self.floor:
-            self.noise = math.sqrt(coloured**2 - self.input_noise**2)
 
     def estimate_noise(self, candidate: Candidate) -> float:
         """Return the noise of the recorded force [N], limited by the residual of a candidate fitted later."""
         values = candidate.residual.values[candidate.residual.valid]
         limit = math.sqrt(max(float(np.mean(values**2)) - (self.input_noise or 0.0) ** 2, 0.0))
-        return max(min(self.noise, limit), self.white_noise)
+        white_noise = self.noise * math.sqrt(1.0 - self.estimate.coloured_share)
+        return max(min(self.noise, limit), white_noise)
 
     def sample_other_runs(self, candidate: Candidate, full_problem: Problem) -> Array:
         """Return the squared change of a candidate's force [N²] by the input noise of other runs, (runs, N).

@@ -105,11 +105,11 @@ class ReportBuilder:
         """Return the verdict, the named set (the baseline if none is named) and its shrinkage."""
         baseline, floor = self.pool.baseline, self.pool.floor
         named = self.pool.candidates[self.posterior.rank_sets()[0][0]]
-        verdict = decide_verdict(baseline, named, floor, self.posterior)
+        verdict = decide_verdict(baseline, named, floor, self.pool.no_gap_limit, self.posterior)
         shrinkage = self._estimate_shrinkage(named)
         benefit = shrinkage.expected_benefit
         if named.names and benefit is not None and benefit < 0.0:
-            verdict = decide_unnamed_verdict(baseline, floor)
+            verdict = decide_unnamed_verdict(baseline, floor, self.pool.no_gap_limit)
         if named.names and verdict in ("no_gap", "unexplained"):
             return verdict, baseline, self._estimate_shrinkage(baseline)
         return verdict, named, shrinkage
@@ -133,10 +133,14 @@ class ReportBuilder:
 
     def _build_gap(self, verdict: Verdict, named: Candidate, shrinkage: Shrinkage) -> Gap:
         no_gap = verdict == "no_gap"
+        noise = self.pool.noise_model.estimate_noise(named)
+        low, high = self.dataset.floor.get_interval(shrinkage.after)
         return Gap(
             before_n=shrinkage.before,
             after_n=shrinkage.after,
-            noise_floor_n=self.pool.noise_model.estimate_noise(named),
+            noise_floor_n=noise,
+            noise_floor_ci95=(min(low, noise), max(high, noise)),
+            floor_known=self.dataset.floor.is_known,
             shrinkage=None if no_gap else shrinkage.value,
             shrinkage_ci95=None if no_gap else shrinkage.ci95,
             nominal_n=self._compute_nominal_rmse(),

@@ -94,7 +94,10 @@ def make_baseline_fit(
     fitted, held_out = evaluation.fitted_samples, evaluation.held_out_samples
     errors = [-part for part in split_by_piece(residual, evaluation.pieces)]
     noise_floor = NoiseFloor(
-        cycle_to_cycle=noise.cycle_to_cycle, high_frequency=noise.high_frequency, basis=noise.basis
+        cycle_to_cycle=noise.cycle_to_cycle,
+        high_frequency=noise.high_frequency,
+        basis=noise.basis,
+        ci95=noise.get_interval(baseline.train_rmse),
     )
     return Fit(
         specimen=dataset.recordings[0].metadata["run"].get("specimen", ""),

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
-from identification.gap.fits import NO_GAP_RATIO, Candidate
+from identification.gap.fits import Candidate
 from identification.gap.outcome.interval import compute_interval
 from identification.gap.selection import UNKNOWN_THRESHOLD, Posterior
 
@@ -21,13 +21,23 @@ _MIN_PROBABILITY = 0.01
 """Smallest probability of an alternative."""
 
 
-def decide_verdict(baseline: Candidate, named: Candidate, floor: float, posterior: Posterior) -> Verdict:
+def decide_verdict(
+    baseline: Candidate, named: Candidate, floor: float, no_gap_limit: float, posterior: Posterior
+) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts.
 
-    A set that leaves a gap is not named where an unknown cause is more probable. ``named`` is the most probable
-    set, ``floor`` the noise floor [N].
+    A set that leaves a gap is not named where an unknown cause is more probable.
+
+    Args:
+        baseline: the law without effects.
+        named: the most probable set.
+        floor: noise floor [N].
+        no_gap_limit: RMSE of the baseline [N] up to which there is no gap.
+        posterior: probabilities of the sets.
     """
-    at_floor = baseline.held_out_rmse < NO_GAP_RATIO * floor and baseline.train_rmse < _FLOOR_RATIO * floor
+    at_floor = baseline.held_out_rmse < no_gap_limit and baseline.train_rmse < max(
+        _FLOOR_RATIO * floor, no_gap_limit
+    )
     if at_floor or (not named.names and posterior.unknown < UNKNOWN_THRESHOLD):
         return "no_gap"
     baseline_excess = max(baseline.compute_excess(floor), 1e-12)
@@ -41,9 +51,10 @@ def decide_verdict(baseline: Candidate, named: Candidate, floor: float, posterio
     return "partly_explained"
 
 
-def decide_unnamed_verdict(baseline: Candidate, floor: float) -> Verdict:
+def decide_unnamed_verdict(baseline: Candidate, floor: float, no_gap_limit: float) -> Verdict:
     """Decide the verdict where the most probable set is not named because it is expected to harm another run."""
-    return "no_gap" if max(baseline.train_rmse, baseline.held_out_rmse) < _FLOOR_RATIO * floor else "unexplained"
+    limit = max(_FLOOR_RATIO * floor, no_gap_limit)
+    return "no_gap" if max(baseline.train_rmse, baseline.held_out_rmse) < limit else "unexplained"
 
 
 def build_named_effects(

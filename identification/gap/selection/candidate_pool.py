@@ -68,6 +68,11 @@ class CandidatePool:
         return self.noise_model.floor
 
     @property
+    def no_gap_limit(self) -> float:
+        """RMSE of the baseline [N] up to which there is no gap."""
+        return max(self.settings.no_gap_ratio * self.floor, self.noise_model.highest_floor)
+
+    @property
     def baseline(self) -> Candidate:
         """Candidate without effects."""
         return self.candidates[frozenset()]
@@ -111,7 +116,7 @@ class CandidatePool:
     def compute_posterior(self) -> Posterior:
         """Compute the posterior of all fitted sets."""
         return compute_posterior(
-            self.collect_evidence(), self.full_problem.samples, self.noise_model.coloured_share
+            self.collect_evidence(), self.full_problem.samples, self.noise_model.estimate.coloured_share
         )
 
     def fit(

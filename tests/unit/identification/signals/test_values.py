@@ -33,7 +33,6 @@ from identification.signals.motion import (
     _make_expected_differences,
     _raise_end_cutoffs,
     estimate_displacement_noise,
-    estimate_motion,
 )
 from identification.signals.motion_regions import (
     _find_runs,
@@ -42,21 +41,6 @@ from identification.signals.motion_regions import (
     _widen,
     divide_stretch,
     find_disturbances,
-)
-from identification.signals.noise_floor import (
-    NoiseFloorEstimate,
-    _combine_estimates,
-    _compute_repeat_statistics,
-    _CyclePairs,
-    _explain_missing_repeats,
-    _find_motion_limit,
-    _find_repeating_samples,
-    _make_motion_terms,
-    _remove_explained,
-    _subtract_previous_cycle,
-    combine_floors,
-    estimate_floor,
-    estimate_high_frequency_noise,
 )
 from identification.signals.smoother import compute_penalty
 from tests.support.strokes import recorded, sine, sine_segment, stretch
@@ -341,132 +325,6 @@ def test_a_damper_without_memory_explains_its_own_force():
     assert _compute_unexplained(noisy, x, v) == pytest.approx(4.0, rel=0.05)
 
 
-@pytest.mark.parametrize("lag", [10.0, 10.25, 10.5, 12.75])
-def test_the_difference_to_the_previous_cycle_is_exact_for_cubics(lag):
-    def cubic(t):
-        return 1.0 + 0.5 * t - 0.2 * t**2 + 0.01 * t**3
-
-    found, ratio = _subtract_previous_cycle(cubic(np.arange(40.0)), lag)
-    t = np.arange(40.0)[-len(found) :]
-    np.testing.assert_allclose(found, cubic(t) - cubic(t - lag), atol=1e-9)
-    assert len(found) == 40 - int(lag) - 2
-    assert ratio == pytest.approx({10.0: 2.0, 10.5: 1.640625}.get(lag, ratio))
-
-
-@pytest.mark.parametrize(
-    ("cycles", "high", "noise", "text"),
-    [
-        (1.09, 1.0, 1.09**0.5, "the high-frequency estimate agrees"),
-        (1.0, 1.09, 1.09**0.5, "the high-frequency estimate agrees"),
-        (1.12, 1.0, 1.12, "1.12 times the high-frequency estimate: some force does not repeat"),
-        (1.0, 1.25, 1.0, "only 0.80 of the high-frequency estimate"),
-        (0.0, 0.0, 0.0, "agrees"),
-        (2.0, 0.0, 2.0, "some force does not repeat"),
-    ],
-)
-def test_two_estimates_agree_within_a_tenth(cycles, high, noise, text):
-    found, comparison = _combine_estimates(cycles, high)
-    assert found == pytest.approx(noise)
-    assert text in comparison
-
-
-def test_missing_repeats_are_explained():
-    periodic = stretch(np.zeros(10), segments=[sine_segment(0, 10, 1.0, 1.0)])
-    assert _explain_missing_repeats(stretch(np.zeros(10)), 0.0).startswith("no periodic motion")
-    assert _explain_missing_repeats(periodic, 0.0).startswith("no two cycles")
-    assert _explain_missing_repeats(periodic, -3.0).startswith("no two cycles")
-    assert _explain_missing_repeats(periodic, 1.0) == "only 1 samples in repeated cycles (minimum 200)"
-    both = replace(periodic, segments=(*periodic.segments, Segment(1, "h", 0, 10, "hold", None, None, None)))
-    assert _explain_missing_repeats(both, 9.0).startswith("only 9 samples")
-
-
-def test_floors_are_averaged_by_measured_samples_with_their_basis():
-    short, long = stretch(np.zeros(1000)), stretch(np.zeros(4000))
-    long = replace(long, measured=np.arange(4000) < 3000)
-    floors = [NoiseFloorEstimate(2.0, 1.0, 4.0, "differs"), NoiseFloorEstimate(4.0, 3.0, 2.0, "agrees")]
-    found = combine_floors([short, long], floors)
-    assert (found.noise, found.cycle_to_cycle, found.high_frequency) == pytest.approx((13**0.5, 7**0.5, 7**0.5))
-    assert found.basis == "cycle to cycle in 2 of 2 stretches; the two estimates differ by more than 10% in 1"
-    alone = combine_floors([short], floors[:1])
-    assert (alone.noise, alone.basis) == (2.0, "differs")
-    partly = combine_floors([short, long], [replace(floors[0], cycle_to_cycle=None), floors[1]])
-    assert partly.basis == "cycle to cycle in 1 of 2 stretches, high frequency in the others"
-
-
-def pairs(force, motion_difference, samples=60):
-    count = samples * len(motion_difference)
-    random = np.random.default_rng(2)
-    return _CyclePairs(
-        force(np.arange(count)), random.standard_normal((3, count)), random.standard_normal(count),
-        np.repeat(np.arange(len(motion_difference)), samples), np.array(motion_difference), 2.0,
-    )  # fmt: skip
-
-
-def test_cycles_repeat_up_to_twice_the_motion_difference_of_the_best_quarter():
-    given = [pairs(lambda k: k, [1.0, 2.0, 3.0]), pairs(lambda k: k, [4.0, 5.0])]
-    assert _find_motion_limit(given) == pytest.approx(4.0)
-    assert _find_motion_limit([]) == 0.0
-
-
-def test_noise_between_cycles_is_that_of_the_repeating_ones():
-    noise = np.random.default_rng(5).standard_normal(20 * 60)
-    given = pairs(lambda k: 3.0 * noise[: len(k)] + 100.0 * (k // 60), [1.0] * 19 + [9.0])
-    found = _compute_repeat_statistics(given, 1.0)
-    assert found.cycles == 19
-    assert found.degrees_of_freedom == 19 * 60 - 19 - 6
-    assert found.squares / found.degrees_of_freedom == pytest.approx(4.5, rel=0.1)
-    assert _compute_repeat_statistics(given, 0.9).cycles == 0
-    assert _compute_repeat_statistics(pairs(lambda k: 1.0 * k, [1.0], 49), 1.0).degrees_of_freedom == 0
-    assert _compute_repeat_statistics(pairs(lambda k: 1.0 * k, [1.0], 50), 1.0).degrees_of_freedom == 43
-
-
-def test_means_of_cycles_and_terms_explain_a_difference():
-    terms, cycle = np.random.default_rng(3).standard_normal((6, 90)), np.repeat([4, 7, 9], 30)
-    rest, freedom = _remove_explained(2.0 * terms[0] - terms[5] + 5.0 * cycle, terms, cycle)
-    np.testing.assert_allclose(rest, 0.0, atol=1e-9)
-    assert freedom == 90 - 3 - 6
-
-
-def test_motion_terms_are_scaled_and_repeated_near_the_reversals():
-    velocity = np.tile([1.0, -1.0, 0.0, 0.1], 10)
-    terms = _make_motion_terms(np.arange(120.0).reshape(3, 40), velocity)
-    np.testing.assert_allclose(terms[:3].std(axis=1), 1.0)
-    spread = np.std(velocity)
-    slow = np.exp(-((velocity / (0.1 * spread)) ** 2))
-    np.testing.assert_allclose(terms[3:], terms[:3] * slow, rtol=1e-6, atol=1e-9)
-
-
-def test_samples_repeat_a_tenth_of_a_second_after_the_drive_does():
-    drive = np.zeros(1000)
-    drive[500:] = 1.0
-    found = _find_repeating_samples(drive, np.ones(1000, bool), 200.0, RATE)
-    # From sample 500 on the drive of the previous cycle differs, up to sample 700, and settles for a tenth more.
-    expected = np.ones(1000, bool)
-    expected[: 202 + 200] = expected[500:800] = False
-    np.testing.assert_array_equal(found, expected[202:])
-    lost = np.arange(1000) != 850
-    expected[850:951] = False
-    np.testing.assert_array_equal(_find_repeating_samples(drive, lost, 200.0, RATE), expected[202:])
-
-
-@pytest.mark.parametrize(("change", "repeats"), [(0.0019, True), (0.0021, False)])
-def test_a_drive_repeats_within_two_thousandths_of_its_range(change, repeats):
-    drive = np.zeros(1000)
-    drive[0], drive[600:] = 1.0, change
-    assert _find_repeating_samples(drive, np.ones(1000, bool), 200.0, RATE)[650 - 202] == repeats
-
-
-@pytest.mark.parametrize(("digit", "noise"), [(0.0, 2.5), (0.5, 2.5), (3.0, 2.5)])
-def test_high_frequency_noise_contains_the_digits_of_the_force(digit, noise):
-    force = noise * np.random.default_rng(0).standard_normal(40_000) + 50.0 * np.sin(np.arange(40_000) / 300.0)
-    force = np.round(force / digit) * digit if digit else force
-    assert estimate_high_frequency_noise(force) == pytest.approx((noise**2 + digit**2 / 12) ** 0.5, rel=0.02)
-
-
-def test_a_force_of_few_digits_has_the_noise_of_its_smooth_steps():
-    assert estimate_high_frequency_noise(np.repeat([0.0, 100.0], 500)) < 30.0
-
-
 def test_a_triangle_of_weights_keeps_a_constant():
     impulse = np.zeros(11)
     impulse[5] = 9.0
@@ -516,13 +374,3 @@ def test_each_region_has_its_own_cutoff():
 @pytest.mark.parametrize(("cutoff", "penalty"), [(500.0, 1.0 / 64.0), (1000.0 / 6.0, 1.0)])
 def test_the_penalty_is_the_inverse_sixth_power_of_the_wave_of_a_difference(cutoff, penalty):
     assert compute_penalty(cutoff, RATE) == pytest.approx(penalty)
-
-
-def test_only_periodic_segments_with_a_frequency_show_repeated_cycles():
-    x, v = sine(0.01, 2.0, 12.0)
-    force = 800.0 * v + 2.5 * np.random.default_rng(0).standard_normal(len(v))
-    given = stretch(recorded(x, 2e-6), force)
-    for motion, frequency, repeats in (("sine", 2.0, True), ("hold", 2.0, False), ("sine", None, False)):
-        part = Segment(0, "s", 0, len(x), motion, 0.01, frequency, None)
-        periodic = replace(given, segments=(part,))
-        assert (estimate_floor(periodic, estimate_motion(given)).cycle_to_cycle is not None) == repeats

@@ -13,7 +13,7 @@ from identification.gap.data.quality import (
     check_sliding_recorded,
     describe_unobservable_effects,
 )
-from identification.signals.noise_floor import NoiseFloorEstimate
+from identification.noise.noise_floor import NoiseFloorEstimate
 from identification.simulate import Excitation
 
 FLOOR = NoiseFloorEstimate(2.0, 2.0, 2.0, "cycle to cycle")
@@ -64,6 +64,15 @@ def test_a_floor_without_repeating_cycles_is_noted():
     floor = replace(FLOOR, cycle_to_cycle=None, basis="no cycles")
     notes = describe_unobservable_effects(make_cycles(6, StrokeCondition(0.0, 0.01, 0.0)), floor)
     assert any("high frequencies only: no cycles" in note for note in notes)
+
+
+def test_force_that_does_not_repeat_is_noted():
+    cycles = make_cycles(6, StrokeCondition(0.0, 0.01, 0.0))
+    coloured = replace(FLOOR, noise=3.0, cycle_to_cycle=3.0)
+    assert any(
+        "1.50 times the noise at high frequencies" in n for n in describe_unobservable_effects(cycles, coloured)
+    )
+    assert not any("does not repeat" in note for note in describe_unobservable_effects(cycles, FLOOR))
 
 
 def test_one_piece_with_force_at_speed_is_enough_and_the_largest_limit_is_stated():

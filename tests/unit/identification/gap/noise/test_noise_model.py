@@ -7,6 +7,7 @@ import pytest
 
 from identification.gap.fits import Candidate
 from identification.gap.noise.noise_model import NoiseModel
+from identification.noise.noise_floor import NoiseFloorEstimate
 from tests.support.candidate_pools import NOISE, fit_baseline
 from tests.support.effects import active
 
@@ -23,7 +24,7 @@ def pool():
 
 def make_model(pool, *names):
     """A noise model after updates with some candidates."""
-    model = NoiseModel(pool.noise_model.white_noise, pool.noise_model.stretches)
+    model = NoiseModel(pool.noise_model.estimate, pool.noise_model.stretches)
     for name in names:
         model.update(pool.candidates[name], pool.full_problem, pool.evaluation)
     return model
@@ -62,16 +63,16 @@ def test_motions_are_drawn_for_the_first_candidate_and_reused(pool):
 
 @pytest.mark.parametrize(("estimate", "remaining", "noise"), [(2.4, 2.2, 2.2), (2.4, 2.6, 2.4), (2.4, 1.5, 2.0)])
 def test_the_noise_lies_between_white_noise_and_the_residual(pool, estimate, remaining, noise):
-    model = NoiseModel(2.0, ())
-    model.noise, model.input_noise = estimate, 0.3
+    model = NoiseModel(NoiseFloorEstimate(estimate, estimate, 2.0, "coloured", 0.1), (), input_noise=0.3)
     residual = pool.baseline.residual
     values = np.full(len(residual.values), np.hypot(remaining, 0.3))
     candidate = Candidate(pool.baseline.fit, replace(residual, values=values), 0.0, 0.0, 0.0)
     assert model.estimate_noise(candidate) == pytest.approx(noise)
 
 
-def test_the_coloured_share_is_the_part_of_the_variance_that_is_not_white():
-    model = NoiseModel(2.0, ())
-    assert model.coloured_share == 0.0
-    model.noise = 4.0
-    assert model.coloured_share == pytest.approx(0.75)
+def test_the_highest_floor_is_the_upper_end_of_the_interval_with_the_input_noise():
+    known = NoiseModel(NoiseFloorEstimate(3.0, 3.0, 2.0, "coloured", 0.1), ())
+    assert known.highest_floor == pytest.approx(3.196)
+    assert replace(known, input_noise=1.0).highest_floor == pytest.approx(np.hypot(3.196, 1.0))
+    unknown = NoiseModel(NoiseFloorEstimate(2.0, None, 2.0, "high frequency"), ())
+    assert unknown.highest_floor == 2.0

@@ -12,6 +12,7 @@ from identification.gap.data.shrinkage import Shrinkage
 from identification.gap.fits.candidate import Candidate
 from identification.gap.outcome.report import ReportBuilder
 from identification.gap.selection.posterior import Posterior
+from identification.noise.noise_floor import NoiseFloorEstimate
 
 FLOOR = 2.0
 NONE, SPRING = frozenset(), frozenset({"gas_spring"})
@@ -40,6 +41,7 @@ def make_builder(
         baseline=candidates[NONE],
         candidates=candidates,
         floor=FLOOR,
+        no_gap_limit=1.008 * FLOOR,
         noise_model=noise_model,
         full_problem=SimpleNamespace(space=drives),
         baseline_excess=8.0,
@@ -56,7 +58,7 @@ def make_builder(
         compute_rmse=lambda forces: (sum(forces), 10 * sum(forces)),
     )  # fmt: skip
     posterior = Posterior(sets or {NONE: 0.15, SPRING: 0.8}, unknown)
-    dataset = SimpleNamespace(drive_unit="V")
+    dataset = SimpleNamespace(drive_unit="V", floor=NoiseFloorEstimate(2.0, 2.0, 1.9, "", 0.05))
     return ReportBuilder(dataset, evaluation, pool, posterior, None, [], 1)
 
 
@@ -83,6 +85,8 @@ def test_the_gap_of_noise_has_no_shrinkage():
     gap = builder._build_gap("explained", named, shrinkage)
     assert (gap.shrinkage, gap.shrinkage_ci95, gap.noise_floor_n, gap.nominal_n) == (0.9, (0.8, 0.95), 1.9, None)
     assert (gap.before_n, gap.after_n, gap.train_before_n, gap.train_after_n) == (6.0, 2.0, 6.0, 2.0)
+    # The noise that a named set leaves may lie below the interval from the recording.
+    assert (gap.noise_floor_ci95, gap.floor_known) == (pytest.approx((1.9, 2.098)), True)
     gap = builder._build_gap("no_gap", named, shrinkage)
     assert (gap.shrinkage, gap.shrinkage_ci95) == (None, None)
 

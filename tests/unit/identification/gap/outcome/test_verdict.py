@@ -6,7 +6,7 @@ import pytest
 
 from identification.damper.effects import EFFECTS
 from identification.fitting import EffectModel
-from identification.gap.fits.candidate import Candidate
+from identification.gap.fits.candidate import NO_GAP_RATIO, Candidate
 from identification.gap.outcome.verdict import (
     build_named_effects,
     compute_shares,
@@ -28,7 +28,7 @@ def make_candidate(names, train, held_out):
 def decide(named, train, held_out, *, baseline=(3.0, 3.0), unknown=0.1):
     candidate = make_candidate(named, train, held_out)
     posterior = Posterior({candidate.names: 1.0 - unknown}, unknown)
-    return decide_verdict(make_candidate((), *baseline), candidate, FLOOR, posterior)
+    return decide_verdict(make_candidate((), *baseline), candidate, FLOOR, NO_GAP_RATIO * FLOOR, posterior)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_set_that_closes_the_gap_on_one_side_alone_does_not_explain_it(train, 
 def test_a_set_is_not_named_where_an_unknown_cause_is_more_probable(probability, unknown, verdict):
     candidate, baseline = make_candidate(("fixture_compliance",), 1.6, 1.6), make_candidate((), 3.0, 3.0)
     posterior = Posterior({candidate.names: probability}, unknown)
-    assert decide_verdict(baseline, candidate, FLOOR, posterior) == verdict
+    assert decide_verdict(baseline, candidate, FLOOR, NO_GAP_RATIO * FLOOR, posterior) == verdict
 
 
 def test_without_a_named_set_there_is_no_gap_unless_an_unknown_cause_is_probable():
@@ -72,8 +72,8 @@ def test_a_gap_on_the_fitted_samples_alone_is_one():
 
 
 def test_an_unnamed_set_leaves_a_gap_only_where_there_is_one():
-    assert decide_unnamed_verdict(make_candidate((), 1.005, 1.025), FLOOR) == "no_gap"
-    assert decide_unnamed_verdict(make_candidate((), 1.3, 1.02), FLOOR) == "unexplained"
+    assert decide_unnamed_verdict(make_candidate((), 1.005, 1.025), FLOOR, NO_GAP_RATIO * FLOOR) == "no_gap"
+    assert decide_unnamed_verdict(make_candidate((), 1.3, 1.02), FLOOR, NO_GAP_RATIO * FLOOR) == "unexplained"
 
 
 def test_alternatives_are_the_most_probable_other_sets():
@@ -114,3 +114,12 @@ def test_a_named_effect_has_its_probability_in_all_sets_and_an_interval(probabil
     value = mass.parameters["mass"]
     assert value.unit == "kg"
     assert value.ci95[1] == pytest.approx(value.value + 1.96 * 0.5)
+
+
+def test_a_baseline_within_the_interval_of_the_floor_has_no_gap():
+    candidate, baseline = make_candidate(("gas_spring",), 1.0, 1.0), make_candidate((), 1.06, 1.06)
+    posterior = Posterior({candidate.names: 0.9}, 0.1)
+    assert decide_verdict(baseline, candidate, FLOOR, 1.07 * FLOOR, posterior) == "no_gap"
+    assert decide_verdict(baseline, candidate, FLOOR, 1.05 * FLOOR, posterior) == "explained"
+    assert decide_unnamed_verdict(baseline, FLOOR, 1.07 * FLOOR) == "no_gap"
+    assert decide_unnamed_verdict(baseline, FLOOR, 1.05 * FLOOR) == "unexplained"

@@ -23,7 +23,7 @@ class WatchedNoiseModel(NoiseModel):
 
 
 def watch_noise(pool):
-    pool.noise_model = WatchedNoiseModel(pool.noise_model.noise, pool.noise_model.stretches)
+    pool.noise_model = WatchedNoiseModel(pool.noise_model.estimate, pool.noise_model.stretches)
     return pool
 
 

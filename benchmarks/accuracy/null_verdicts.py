@@ -1,0 +1,134 @@
+"""Verdicts on recordings without any effect, with force noise of several spectra.
+
+    python -m benchmarks.accuracy.null_verdicts [--recordings 10] [--seed 1] [--out PAGE.md]
+
+Each recording is of a random laboratory damper: three strokes at four drives and 1 kHz. Its noise is 1 % of the
+force's standard deviation. The force has a resolution of half the noise, the displacement noise of 2 µm and a
+resolution of 1 µm. Every verdict other than `no_gap` is wrong.
+"""
+
+import argparse
+from collections import Counter
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.accuracy.noise_floor import RELATIVE_NOISE, SPECTRA
+from benchmarks.speed import draw_damper
+from identification.arrays import Array
+from identification.gap import diagnose
+from identification.logs import Recording, Segment, Stretch
+from identification.simulate import Excitation, SimulationModel, simulate
+
+RATE = 1000.0
+STROKES = ((0.012, 1.0, 6), (0.005, 2.5, 12), (0.008, 1.7, 9))
+"""Amplitude [m], frequency [Hz] and cycles at each drive."""
+DRIVES = (0.0, 0.3, 0.15, 0.5)
+"""Drives of each stroke [V]."""
+DISPLACEMENT_NOISE, DISPLACEMENT_DIGIT = 2e-6, 1e-6
+"""Noise and resolution of the displacement [m]."""
+
+
+class Result(NamedTuple):
+    """Diagnosis of one recording."""
+
+    verdict: str
+    names: tuple[str, ...]
+    ratio: float
+    """Error of the law on held-out strokes over the stated noise floor [1]."""
+
+
+def try_null(job: tuple[str, int]) -> Result:
+    """Record and diagnose one damper without any effect."""
+    name, seed = job
+    random = np.random.default_rng([seed, sorted(SPECTRA).index(name)])
+    diagnosis = diagnose([record(name, seed, random)]).diagnosis
+    gap = diagnosis.gap
+    return Result(diagnosis.verdict, tuple(e.name for e in diagnosis.effects), gap.before_n / gap.noise_floor_n)
+
+
+def record(name: str, seed: int, random: np.random.Generator) -> Recording:
+    """Return a recording of a random damper with noise of one spectrum."""
+    x, drive, segments = make_strokes()
+    velocity = np.gradient(x) * RATE
+    stroke = Excitation(RATE, x, velocity, np.gradient(velocity) * RATE, drive)
+    clean = simulate(SimulationModel(draw_damper(seed)), stroke, max_travel=0.005).force
+    noise = sum(np.sqrt(share) * make(len(x), RATE, random) for share, make in SPECTRA[name])
+    deviation = RELATIVE_NOISE * float(np.std(clean))
+    force = round_to(clean + deviation * noise, 0.5 * deviation)
+    displacement = round_to(x + DISPLACEMENT_NOISE * random.standard_normal(len(x)), DISPLACEMENT_DIGIT)
+    count = len(x)
+    stretch = Stretch(
+        "drawn", np.arange(count) / RATE, RATE, displacement, force, drive, None, segments, None, None, 0.0, 0.0,
+        0.0, np.ones(count, bool),
+    )  # fmt: skip
+    metadata = {"run": {"source": "import", "specimen": f"null {seed}"}}
+    return Recording(Path(f"null-{seed}.mcap"), "0" * 64, "coil_v", "V", (stretch,), metadata)
+
+
+def make_strokes() -> tuple[Array, Array, tuple[Segment, ...]]:
+    """Return displacement [m], drive [V] and segments."""
+    amplitude, frequency, drive, start = [], [], [], 0
+    segments: list[Segment] = []
+    for half_stroke, repeat, cycles in STROKES:
+        for level in DRIVES:
+            count = round(cycles * RATE / repeat)
+            name = f"{1e3 * half_stroke:g}mm_{repeat:g}Hz_{level:g}V"
+            segments.append(Segment(len(segments), name, start, start + count, "sine", half_stroke, repeat, level))
+            amplitude.append(np.full(count, half_stroke))
+            frequency.append(np.full(count, repeat))
+            drive.append(np.full(count, level))
+            start += count
+    smooth = np.hanning(121) / np.hanning(121).sum()
+    size, rate = (
+        np.convolve(np.pad(np.concatenate(part), 60, "edge"), smooth, "valid") for part in (amplitude, frequency)
+    )
+    angle = 2.0 * np.pi * np.cumsum(rate) / RATE
+    return np.asarray(size * np.sin(angle)), np.concatenate(drive), tuple(segments)
+
+
+def round_to(values: Array, digit: float) -> Array:
+    """Return values with a resolution."""
+    return np.asarray(np.round(values / digit) * digit)
+
+
+def format_row(name: str, results: Sequence[Result]) -> str:
+    """Return one row of the table."""
+    verdicts = Counter(r.verdict for r in results)
+    others = ", ".join(f"{n} {v}" for v, n in sorted(verdicts.items()) if v != "no_gap") or "-"
+    named = Counter(name for r in results for name in r.names)
+    ratios = [r.ratio for r in results]
+    return (
+        f"| {name} | {verdicts['no_gap']} of {len(results)} | {others} | {', '.join(sorted(named)) or '-'} "
+        f"| {min(ratios):.3f}-{max(ratios):.3f} |"
+    )
+
+
+def main() -> None:
+    """Print the table; also write it to a page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--recordings", type=int, default=10, help="recordings of each spectrum")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path)
+    options = parser.parse_args()
+    lines = [
+        "| noise | `no_gap` | other verdicts | named | error of the law over the floor |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    print(*lines, sep="\n", flush=True)
+    first = 1000 * options.seed
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for name in SPECTRA:
+            jobs = [(name, seed) for seed in range(first, first + options.recordings)]
+            lines.append(format_row(name, list(pool.map(try_null, jobs))))
+            print(lines[-1], flush=True)
+    if options.out:
+        options.out.write_text("\n".join(lines) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,200 @@
+"""Noise floor of the recorded force: the part that no model of the damper can explain.
+
+Where whole cycles repeat, the floor is what the cycle, its slow change and the achieved motion leave of the force,
+for noise of any spectrum. Fourth differences give a lower bound: they see only noise too fast for a damper. Where
+nothing repeats, the floor lies between this bound and the error of the best model.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.logs import PERIODIC_MOTIONS, Stretch
+from identification.noise.high_frequency import estimate_high_frequency_noise
+from identification.noise.mains_line import MainsLine, find_mains_line
+from identification.noise.repeated_windows import MIN_CYCLES, RepeatedWindow, find_repeated_windows
+from identification.noise.spectrum import WindowNoise, estimate_window_noise, fit_low_spectrum, make_spectrum
+from identification.noise.window_fit import CycleFit, WindowFit
+from identification.signals import Motion
+from identification.threads import use_one_thread
+
+_AGREEMENT = 3.0
+"""Difference of the two estimates up to which they agree [standard deviations]."""
+_HIGH_FREQUENCY_SCATTER = 1.6
+"""Relative standard deviation of the high-frequency estimate times the root of its samples [1]; measured."""
+_MIN_SAMPLES = 200
+"""Smallest number of samples in repeated windows for an estimate."""
+_MOTION_RATIO = 2.0
+"""Threshold on the motion difference of a cycle over that of the best quarter: above it, it does not repeat."""
+_SAME_MOTION = 2e-4
+"""Motion difference over the displacement's standard deviation up to which a cycle always repeats."""
+_NORMAL_95 = 1.96
+"""Half the width of a 95 % interval [standard deviations]."""
+
+
+@dataclass(frozen=True)
+class NoiseFloorEstimate:
+    """Noise of a recorded force."""
+
+    noise: float
+    """Noise floor [N]."""
+    cycle_to_cycle: float | None
+    """Estimate from repeated cycles [N]; None if no cycles repeat."""
+    high_frequency: float
+    """Estimate from fourth differences [N]."""
+    basis: str
+    """Estimate on which ``noise`` rests, and the reason, as text for a person."""
+    deviation: float | None = None
+    """Standard deviation of ``noise`` [N]; None if no cycles repeat."""
+
+    @property
+    def is_known(self) -> bool:
+        """True if cycles repeat, so that the floor is more than a lower bound."""
+        return self.deviation is not None
+
+    @property
+    def coloured_share(self) -> float:
+        """Part of the variance that is not white [1]; 0 where the estimates agree or no cycles repeat."""
+        if self.noise != self.cycle_to_cycle:
+            return 0.0
+        return max(1.0 - (self.high_frequency / max(self.noise, 1e-300)) ** 2, 0.0)
+
+    def get_interval(self, error: float) -> tuple[float, float]:
+        """Return the 95 % interval of the floor [N].
+
+        Args:
+            error: error of the best model [N], the upper bound where no cycles repeat.
+        """
+        if self.deviation is None:
+            return min(self.noise, error), max(self.noise, error)
+        return max(self.noise - _NORMAL_95 * self.deviation, 0.0), self.noise + _NORMAL_95 * self.deviation
+
+
+class _StretchNoise(NamedTuple):
+    """Noise in the windows of one stretch."""
+
+    windows: list[WindowNoise]
+    line: MainsLine | None
+
+
+def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> NoiseFloorEstimate:
+    """Estimate the common noise of the force of some stretches, without the effect of displacement noise.
+
+    If the estimate from repeated cycles agrees with that from high frequencies, the noise is white, and the two
+    are averaged by their precision. A mains line is not part of the floor: the effect ``mains_hum`` predicts it.
+
+    Args:
+        stretches: recordings; ``measured`` marks the samples that are used.
+        motions: their estimated motions.
+    """
+    counts = np.array([np.count_nonzero(s.measured) for s in stretches], float)
+    squares = [estimate_high_frequency_noise(s.force) ** 2 for s in stretches]
+    high_frequency = math.sqrt(float(counts @ squares) / max(float(counts.sum()), 1.0))
+    with use_one_thread():
+        parts = [_estimate_stretch(s, m) for s, m in zip(stretches, motions, strict=True)]
+    windows = [window for part in parts for window in part.windows]
+    samples = sum(w.samples for w in windows)
+    if samples < _MIN_SAMPLES:
+        reason = _explain_missing_repeats(stretches, samples)
+        return NoiseFloorEstimate(high_frequency, None, high_frequency, f"high frequency: {reason}")
+    cycle_to_cycle, deviation = _combine_windows(windows)
+    basis = f"cycle to cycle over {sum(w.cycles for w in windows)} cycles{_describe_extent(parts)}"
+    basis = f"{basis}; {_compare(cycle_to_cycle, deviation, high_frequency)}{_describe_lines(parts)}"
+    other = _HIGH_FREQUENCY_SCATTER * high_frequency / math.sqrt(max(float(counts.sum()), 1.0))
+    noise, combined = _average(cycle_to_cycle, deviation, high_frequency, other)
+    return NoiseFloorEstimate(noise, cycle_to_cycle, high_frequency, basis, combined)
+
+
+def _average(first: float, first_deviation: float, second: float, second_deviation: float) -> tuple[float, float]:
+    """Return the average of two estimates that agree, or the first, with its standard deviation; all in N."""
+    if abs(first - second) > _AGREEMENT * first_deviation:
+        return first, first_deviation
+    total = math.hypot(first_deviation, second_deviation)
+    if total == 0.0:
+        return first, 0.0
+    share = (second_deviation / total) ** 2
+    return share * first + (1.0 - share) * second, first_deviation * second_deviation / total
+
+
+def _estimate_stretch(stretch: Stretch, motion: Motion) -> _StretchNoise:
+    windows = find_repeated_windows(stretch, motion.displacement, motion.noise)
+    fits = [WindowFit(fit) for fit in _exclude_disturbed_cycles(windows, float(np.std(stretch.displacement)))]
+    if not fits:
+        return _StretchNoise([], None)
+    remainders = [fit.remove(fit.window.force[:, None])[:, 0] for fit in fits]
+    line = find_mains_line(fits, remainders, stretch.rate)
+    cleaned = remainders if line is None else line.remainders
+    spectra = [make_spectrum(fit, remainder, stretch.rate) for fit, remainder in zip(fits, cleaned, strict=True)]
+    low, duration = fit_low_spectrum(spectra), len(stretch.force) / stretch.rate
+    return _StretchNoise([estimate_window_noise(spectrum, low, duration) for spectrum in spectra], line)
+
+
+def _exclude_disturbed_cycles(windows: Sequence[RepeatedWindow], size: float) -> list[CycleFit]:
+    """Return the fits of the windows without the cycles whose motion does not repeat.
+
+    After a disturbance the force differs too. A force that is steep over some micrometres is not explained by
+    terms that are linear in the difference.
+
+    Args:
+        windows: the windows of one stretch.
+        size: standard deviation of its displacement [m].
+    """
+    fits = [CycleFit(window) for window in windows]
+    if not fits:
+        return []
+    differences = [fit.measure_motion_difference() for fit in fits]
+    limit = max(_MOTION_RATIO * float(np.quantile(np.concatenate(differences), 0.25)), _SAME_MOTION * size)
+    repeated = [d <= limit for d in differences]
+    return [
+        fit if r.all() else CycleFit(fit.window._replace(valid=fit.window.valid & r[fit.window.cycle]))
+        for fit, r in zip(fits, repeated, strict=True)
+        if np.count_nonzero(r) >= MIN_CYCLES
+    ]
+
+
+def _combine_windows(noises: Sequence[WindowNoise]) -> tuple[float, float]:
+    """Return the noise of all windows [N] and its standard deviation [N]."""
+    weights = np.array([n.samples for n in noises], float) / sum(n.samples for n in noises)
+    variance = float(weights @ [n.variance for n in noises])
+    # Windows have independent noise, but one extrapolation, which may be wrong by all of it.
+    independent = float(np.linalg.norm(weights * [n.deviation for n in noises]))
+    deviation = math.hypot(independent, float(weights @ [n.extrapolated for n in noises]))
+    return math.sqrt(variance), 0.5 * deviation / math.sqrt(max(variance, 1e-300))
+
+
+def _compare(cycle_to_cycle: float, deviation: float, high_frequency: float) -> str:
+    """Return the comparison of the two estimates as text."""
+    if abs(cycle_to_cycle - high_frequency) <= _AGREEMENT * deviation:
+        return "the high-frequency estimate agrees"
+    ratio = cycle_to_cycle / max(high_frequency, 1e-12)
+    if ratio > 1.0:
+        return (
+            f"{ratio:.2f} times the high-frequency estimate: some force does not repeat, or the noise is coloured"
+        )
+    return f"only {ratio:.2f} of the high-frequency estimate: fast force repeats with the stroke"
+
+
+def _describe_extent(parts: Sequence[_StretchNoise]) -> str:
+    """Return in how many of several stretches cycles repeat, as text."""
+    repeated = sum(bool(part.windows) for part in parts)
+    return "" if len(parts) == 1 else f" in {repeated} of {len(parts)} stretches"
+
+
+def _describe_lines(parts: Sequence[_StretchNoise]) -> str:
+    """Return the strongest mains line as text; empty if there is none."""
+    lines = [part.line for part in parts if part.line is not None]
+    if not lines:
+        return ""
+    line = max(lines, key=lambda each: each.deviation)
+    return f"; without a mains line of {line.deviation:.3g} N rms at {line.frequency:.2f} Hz, which is no noise"
+
+
+def _explain_missing_repeats(stretches: Sequence[Stretch], samples: int) -> str:
+    if not any(segment.motion in PERIODIC_MOTIONS for s in stretches for segment in s.segments):
+        return "no periodic motion, so no cycles repeat"
+    if samples <= 0:
+        return "no two cycles with the same steady motion and drive"
+    return f"only {samples} samples in repeated cycles (minimum {_MIN_SAMPLES})"

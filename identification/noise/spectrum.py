@@ -1,0 +1,134 @@
+"""Spectrum of the noise in repeated windows, completed where the windows' fits remove it.
+
+A fit removes the noise at the harmonics of the stroke and at the lowest frequencies. At the harmonics, the missing
+part is taken from the frequencies around them. Below the lowest bins, the spectrum is the sum of white and of 1/f
+noise, down to one cycle in the whole recording. No form of the spectrum is assumed elsewhere.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.optimize import nnls
+
+from identification.arrays import Array, BoolArray
+from identification.noise.repeated_windows import RepeatedWindow
+from identification.noise.window_fit import WindowFit
+
+_KNOWN_GAIN = 0.5
+"""Gain from which a bin shows the noise itself [1]."""
+_LOW_DECADE = 10.0
+"""Ratio of the highest to the lowest frequency that determine the spectrum at low frequencies [1]."""
+_ITERATIONS = 30
+"""Steps of its maximum-likelihood fit; the weights then change by less than a millionth."""
+_SMOOTHED_BINS = 9
+"""Frequency bins over which the spectrum is averaged for the variance of its sum."""
+
+
+class WindowSpectrum(NamedTuple):
+    """Power of the noise in one window of N samples, (N // 2 + 1,) each."""
+
+    frequency: Array
+    """Frequencies of the bins [Hz]."""
+    power: Array
+    """Power of what the fit leaves, |rfft|² / N [N²]."""
+    gain: Array
+    """Part of the power of white noise that the fit leaves [1]."""
+    window: RepeatedWindow
+
+    @property
+    def is_known(self) -> BoolArray:
+        """True in bins that show the noise itself."""
+        return np.asarray((self.gain > _KNOWN_GAIN) & (self.frequency > 0.0))
+
+
+class LowSpectrum(NamedTuple):
+    """Power of the noise at low frequencies: a white part and a part that falls with the frequency."""
+
+    white: float
+    """Power of the white part [N²]."""
+    pink: float
+    """Power of the other part at 1 Hz [N²]."""
+
+    def evaluate(self, frequency: Array) -> Array:
+        """Return the power (B,) [N²] at frequencies (B,) [Hz]."""
+        return np.asarray(self.white + self.pink / frequency)
+
+    def integrate(self, start: float, stop: float) -> float:
+        """Return the integral of the power [N² Hz] from one frequency to another [Hz]."""
+        return self.white * (stop - start) + self.pink * float(np.log(stop / start))
+
+
+class WindowNoise(NamedTuple):
+    """Noise of one window."""
+
+    variance: float
+    """Variance of the noise [N²]."""
+    deviation: float
+    """Standard deviation of that variance where the spectrum was observed [N²]."""
+    extrapolated: float
+    """Part of the variance below the observed frequencies [N²]."""
+    samples: int
+    """Number of valid samples."""
+    cycles: int
+
+
+def make_spectrum(fit: WindowFit, remainder: Array, rate: float) -> WindowSpectrum:
+    """Return the spectrum of what a window's fit leaves of the force (N,) [N] at a rate [Hz]."""
+    count = len(remainder)
+    power = np.asarray(np.abs(np.fft.rfft(remainder)) ** 2 / count, float)
+    frequency = np.asarray(np.arange(len(power)) * (rate / count), float)
+    return WindowSpectrum(frequency, power, fit.gain, fit.window)
+
+
+def fit_low_spectrum(spectra: Sequence[WindowSpectrum]) -> LowSpectrum:
+    """Fit the spectrum to the lowest decade that the spectra of one stretch show, by maximum likelihood."""
+    frequency = np.concatenate([s.frequency[s.is_known] for s in spectra])
+    power = np.concatenate([(s.power / s.gain)[s.is_known] for s in spectra])
+    if not len(frequency):
+        return LowSpectrum(
+            sum(float(s.power.sum()) for s in spectra) / sum(float(s.gain.sum()) for s in spectra), 0.0
+        )
+    low = frequency <= _LOW_DECADE * frequency.min()
+    frequency, scale = frequency[low], float(power[low].mean())
+    if scale < 1e-300:
+        return LowSpectrum(0.0, 0.0)
+    power = power[low] / scale
+    columns = np.column_stack([np.ones(len(frequency)), frequency.min() / frequency])
+    level = np.ones(len(frequency))
+    for _ in range(_ITERATIONS):
+        # A power is exponentially distributed: its standard deviation is its mean (Whittle 1953).
+        white, pink = nnls(columns / level[:, None], power / level)[0]
+        level = np.maximum(columns @ [white, pink], 1e-6)
+    return LowSpectrum(scale * float(white), scale * float(pink) * float(frequency.min()))
+
+
+def estimate_window_noise(spectrum: WindowSpectrum, low: LowSpectrum, duration: float) -> WindowNoise:
+    """Return the noise of a window.
+
+    Args:
+        spectrum: its spectrum.
+        low: spectrum at the lowest frequencies.
+        duration: duration of the whole recording [s], whose mean is not noise.
+    """
+    values = _fill_harmonics(spectrum)
+    step, gain = float(spectrum.frequency[1]), spectrum.gain
+    lowest = int(np.argmax(spectrum.is_known))
+    values[1:lowest] = low.evaluate(spectrum.frequency[1:lowest])
+    # A bin stands for half a step on both sides; the first one begins at one cycle a recording.
+    values[0] = low.integrate(min(1.0 / duration, 0.25 * step), 0.5 * step) / step
+    count = len(spectrum.window.force)
+    last = values[-1] if count % 2 == 0 else 0.0
+    variance = float(2.0 * values.sum() - last) / count
+    smooth = uniform_filter1d(values, min(_SMOOTHED_BINS, len(values)), mode="nearest")[1:]
+    deviation = 2.0 * float(np.sqrt((smooth**2).sum() / gain[1:].mean())) / count
+    samples = int(np.count_nonzero(spectrum.window.valid))
+    return WindowNoise(variance, deviation, 2.0 * float(values[0]) / count, samples, spectrum.window.cycles)
+
+
+def _fill_harmonics(spectrum: WindowSpectrum) -> Array:
+    """Return the power (N // 2 + 1,) [N²] with the removed part from the frequencies around."""
+    width, gain = 2 * spectrum.window.cycles + 1, spectrum.gain
+    local = uniform_filter1d(spectrum.power, width, mode="reflect") / uniform_filter1d(gain, width, mode="reflect")
+    return np.asarray(spectrum.power + (1.0 - gain) * local)

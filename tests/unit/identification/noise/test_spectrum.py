@@ -1,0 +1,98 @@
+"""Noise behind what the fits of windows leave."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from identification.noise.repeated_windows import RepeatedWindow
+from identification.noise.spectrum import (
+    LowSpectrum,
+    WindowSpectrum,
+    estimate_window_noise,
+    fit_low_spectrum,
+    make_spectrum,
+)
+from identification.noise.window_fit import CycleFit, WindowFit
+
+RATE = 500.0
+
+
+def make_noisy_spectra(noise, windows=6, cycles=6, period=250.0):
+    count = int(cycles * period)
+    angle = 2.0 * np.pi * np.arange(count) / period
+    motion = np.stack([np.sin(angle), np.cos(angle), -np.sin(angle)])
+    spectra = []
+    for k in range(windows):
+        force = 40.0 * np.tanh(5.0 * np.cos(angle)) + noise[k * count : (k + 1) * count]
+        fit = WindowFit(CycleFit(RepeatedWindow(0, period, cycles, force, motion, np.ones(count, bool))))
+        spectra.append(make_spectrum(fit, fit.remove(force[:, None])[:, 0], RATE))
+    return spectra
+
+
+def estimate(noise, **more):
+    spectra = make_noisy_spectra(noise, **more)
+    law = fit_low_spectrum(spectra)
+    return [estimate_window_noise(s, law, len(noise) / RATE) for s in spectra], law
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_the_variance_of_noise_of_any_spectrum_is_found(correlation):
+    white = np.random.default_rng(8).standard_normal(9000)
+    noise = lfilter([1.0], [1.0, -correlation], white)
+    found, _ = estimate(noise)
+    mean = np.mean([n.variance for n in found])
+    assert mean == pytest.approx(np.var(noise), rel=0.12)
+    assert {n.samples for n in found} == {1500}
+    assert {n.cycles for n in found} == {6}
+    # The stated deviation is that of the scatter between windows.
+    scatter = np.std([n.variance for n in found])
+    assert 0.3 * scatter < np.mean([n.deviation for n in found]) < 3.0 * scatter
+
+
+def test_slow_noise_is_found_with_two_cycles():
+    noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(5).standard_normal(8000))
+    found, _ = estimate(noise, windows=16, cycles=2)
+    assert np.mean([n.variance for n in found]) == pytest.approx(np.var(noise), rel=0.25)
+
+
+def draw_spectra(make, count=400):
+    frequency = np.arange(1001) * 0.2
+    window = make_noisy_spectra(np.zeros(1500), windows=1)[0].window
+    mean = make(np.maximum(frequency, 0.1))
+    draws = np.random.default_rng(7).exponential(size=(count, 1001)) * mean
+    return [WindowSpectrum(frequency, power, np.ones(1001), window) for power in draws]
+
+
+@pytest.mark.parametrize(("white", "pink"), [(3.0, 0.0), (0.0, 3.0), (2.0, 3.0)])
+def test_the_low_spectrum_is_white_and_pink_noise_in_the_lowest_decade(white, pink):
+    found = fit_low_spectrum(draw_spectra(lambda f: np.where(f < 2.1, white + pink / f, 1e3)))
+    assert found == pytest.approx((white, pink), rel=0.15, abs=0.15)
+
+
+def test_the_low_spectrum_never_rises_with_the_frequency():
+    found = fit_low_spectrum(draw_spectra(lambda f: f**2))
+    assert found.pink == 0.0
+    assert found.white > 0.0
+
+
+def test_a_window_that_shows_nothing_has_a_flat_spectrum():
+    window = make_noisy_spectra(np.zeros(1500), windows=1)[0].window
+    spectrum = WindowSpectrum(np.arange(100.0), np.full(100, 2.0), np.full(100, 0.4), window)
+    assert fit_low_spectrum([spectrum]) == LowSpectrum(pytest.approx(5.0), 0.0)
+
+
+def test_the_low_spectrum_is_integrated():
+    low = LowSpectrum(3.0, 2.0)
+    f = np.linspace(0.1, 2.0, 200_001)
+    assert low.integrate(0.1, 2.0) == pytest.approx(np.trapezoid(low.evaluate(f), f), rel=1e-6)
+
+
+def test_the_extrapolated_part_is_that_below_the_windows():
+    white, _ = estimate(np.random.default_rng(8).standard_normal(9000))
+    assert white[0].extrapolated < 2e-3
+    random = np.random.default_rng(9)
+    spectrum = (random.standard_normal(9000) + 1j * random.standard_normal(9000)) / np.sqrt(np.arange(1, 9001))
+    pink = np.fft.irfft(np.concatenate([[0.0], spectrum]), 18_000)[:9000]
+    found, law = estimate(pink)
+    assert law.pink > 0.0
+    assert 0.05 < np.mean([n.extrapolated for n in found]) / np.var(pink) < 0.5

@@ -18,6 +18,7 @@ from identification.fitting import (
     compute_rmse,
     predict_piece,
 )
+from identification.noise import NoiseFloorEstimate
 from identification.uncertainty import (
     Agreement,
     Covariance,
@@ -76,12 +77,7 @@ def make_fit_document(dataset: Dataset, result: FitResult, provenance: Provenanc
         coordinates=coordinates,
         nuisances=nuisances.model_copy(update={"per_log": per_log}),
         noise_floor_n=floor.noise,
-        floor=NoiseFloor(
-            cycle_to_cycle=floor.cycle_to_cycle,
-            high_frequency=floor.high_frequency,
-            basis=floor.basis,
-            ci95=floor.get_interval(compute_rmse(train[0])),
-        ),
+        floor=make_noise_floor(floor, compute_rmse(train[0])),
         rmse_n=SplitErrors(
             train=compute_rmse(train[0]),
             validation=None,
@@ -102,6 +98,16 @@ def make_fit_document(dataset: Dataset, result: FitResult, provenance: Provenanc
         correlations=find_strong_correlations(covariance),
         covariance=covariance.tolist(),
         provenance=provenance,
+    )
+
+
+def make_noise_floor(estimate: NoiseFloorEstimate, error: float) -> NoiseFloor:
+    """Return the noise floor as a part of a document; ``error`` is that of the fit [N]."""
+    return NoiseFloor(
+        cycle_to_cycle=estimate.cycle_to_cycle,
+        high_frequency=estimate.high_frequency,
+        basis=estimate.basis,
+        ci95=estimate.get_interval(error),
     )
 
 

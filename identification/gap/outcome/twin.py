@@ -11,7 +11,6 @@ from identification.documents import (
     DriveKind,
     Fit,
     FitStage,
-    NoiseFloor,
     Nuisances,
     Provenance,
     SplitErrors,
@@ -28,6 +27,7 @@ from identification.fitting import (
 )
 from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import Candidate
+from identification.pipeline import make_noise_floor
 from identification.signals import estimate_recorded_noise
 from identification.uncertainty import (
     compute_coordinate_covariance,
@@ -93,12 +93,6 @@ def make_baseline_fit(
     residual, force = baseline.residual.values, evaluation.force
     fitted, held_out = evaluation.fitted_samples, evaluation.held_out_samples
     errors = [-part for part in split_by_piece(residual, evaluation.pieces)]
-    noise_floor = NoiseFloor(
-        cycle_to_cycle=noise.cycle_to_cycle,
-        high_frequency=noise.high_frequency,
-        basis=noise.basis,
-        ci95=noise.get_interval(baseline.train_rmse),
-    )
     return Fit(
         specimen=dataset.recordings[0].metadata["run"].get("specimen", ""),
         drive_kind=dataset.recordings[0].drive_kind,
@@ -108,7 +102,7 @@ def make_baseline_fit(
         coordinates=coordinates,
         nuisances=_make_nuisances(baseline),
         noise_floor_n=floor,
-        floor=noise_floor,
+        floor=make_noise_floor(noise, baseline.train_rmse),
         rmse_n=SplitErrors(train=baseline.train_rmse, validation=None, held_out=baseline.held_out_rmse),
         nrmse=SplitErrors(
             train=compute_nrmse(residual[fitted], force[fitted]),

@@ -28,13 +28,11 @@ MAX_REQUEST_NS = 100_000
 Late replies are due to a busy instrument and its adapter. Measured: 0.03 ms on Modbus TCP, 0.06 ms on the serial
 line, 0.17 ms on CANopen."""
 _RATE_COUNT = 65
-"""Number of rates that are tried at a time."""
+"""Number of possible rates that are compared."""
 _TYPICAL_RATE = 1e-4
 """Typical relative rate deviation (dimensionless): scale of its prior, which counts if readings are few."""
 _MIN_DELAY_NS = 20_000.0
 """[ns] Lower limit of the mean delay."""
-_REFINEMENTS = 4
-"""Number of grids of rates, each within the possible rates of the one before."""
 
 
 class OffsetBound(NamedTuple):
@@ -88,37 +86,44 @@ def estimate_offset_bounds(
     high_x, high_y = _make_arrays(highs, device_ns, origin)
     # Older bounds are wider, because the rates may have drifted since.
     low_y, high_y = low_y + MAX_RATE_DRIFT * np.minimum(low_x, 0), high_y - MAX_RATE_DRIFT * np.minimum(high_x, 0)
-    rates = np.linspace(-MAX_RATE, MAX_RATE, _RATE_COUNT)
-    bounds: ClockOffsetBounds | None = None
-    for _ in range(_REFINEMENTS):
-        least = (low_y[:, None] - np.outer(low_x, rates)).max(axis=0)
-        most = (high_y[:, None] - np.outer(high_x, rates)).min(axis=0)
-        possible = np.flatnonzero(most >= least)
-        first, last = possible[[0, -1]] if possible.size else [np.argmax(most - least)] * 2
-        if possible.size:
-            edges = least[possible].min(), most[possible].max(), rates[first], rates[last]
-            width = most - least
-            # The width alone must not decide: an adapter that delays replies would then determine the rate, and
-            # the force would be displaced by up to 0.5 ms.
-            cost = _compute_delay_cost(least - (low_y.mean() - low_x.mean() * rates), len(low_y))
-            cost += _compute_delay_cost((high_y.mean() - high_x.mean() * rates) - most, len(high_y))
-            # Negative log-likelihood of the delays, plus that of the rate.
-            best = possible[np.argmin((cost + np.abs(rates) / _TYPICAL_RATE)[possible])]
-            low, high, rate_low, rate_high = (float(edge) for edge in edges)
-            bounds = ClockOffsetBounds(
-                device_ns,
-                origin + low,
-                origin + high,
-                rate_low,
-                rate_high,
-                origin + float(least[best]),
-                float(width[best]),
-                float(rates[best]),
-            )
-        # The edge of the possible rates is between two that were tried, so the next grid has one more on each
-        # side.
-        rates = np.linspace(rates[max(first - 1, 0)], rates[min(last + 1, _RATE_COUNT - 1)], _RATE_COUNT)
-    return bounds
+    rate_low, rate_high = _find_rate_range(low_x, low_y, high_x, high_y)
+    if rate_low > rate_high:
+        return None
+    rates = np.linspace(rate_low, rate_high, _RATE_COUNT)
+    least = (low_y[:, None] - np.outer(low_x, rates)).max(axis=0)
+    # At the ends of the range the bounds meet; rounding must not make them cross.
+    most = np.maximum((high_y[:, None] - np.outer(high_x, rates)).min(axis=0), least)
+    # The width alone must not decide: an adapter that delays replies would then determine the rate, and the force
+    # would be displaced by up to 0.5 ms.
+    cost = _compute_delay_cost(least - (low_y.mean() - low_x.mean() * rates), len(low_y))
+    cost += _compute_delay_cost((high_y.mean() - high_x.mean() * rates) - most, len(high_y))
+    # Negative log-likelihood of the delays, plus that of the rate.
+    best = int(np.argmin(cost + np.abs(rates) / _TYPICAL_RATE))
+    return ClockOffsetBounds(
+        device_ns,
+        origin + float(least.min()),
+        origin + float(most.max()),
+        rate_low,
+        rate_high,
+        origin + float(least[best]),
+        float(most[best] - least[best]),
+        float(rates[best]),
+    )
+
+
+def _find_rate_range(low_x: _Numbers, low_y: _Numbers, high_x: _Numbers, high_y: _Numbers) -> tuple[float, float]:
+    """Return the smallest and the largest rate that all bounds allow; the first exceeds the second if none is.
+
+    A line fits all bounds exactly if it fits each pair of a lower and an upper one: the pair limits its rate.
+    """
+    distance, rise = low_x[:, None] - high_x, low_y[:, None] - high_y
+    if np.any(rise[distance == 0.0] > 0.0):
+        return MAX_RATE, -MAX_RATE
+    with np.errstate(divide="ignore", invalid="ignore"):
+        limits = rise / distance
+    lowest = limits[distance > 0.0].max(initial=-MAX_RATE)
+    highest = limits[distance < 0.0].min(initial=MAX_RATE)
+    return float(lowest), float(highest)
 
 
 def _compute_delay_cost(mean: _Numbers, count: int) -> _Numbers:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bench.rig.clock_offset import MAX_RATE_DRIFT, OffsetBound, estimate_offset_bounds
@@ -28,13 +28,15 @@ def make_bounds(delays, rate=0.0, interval=SECOND // 10):
 
 
 @given(DELAYS, st.floats(-9e-4, 9e-4), st.integers(0, 5 * SECOND))
+@example([(0, 0), (75_503, 0)], 0.0008300406470549177, 0)
+@example([(0, 0), (0, 71_403)], -0.0007376035833924683, 0)
 def test_true_offset_is_within_the_bounds_for_any_delays(delays, rate, ahead):
     lows, highs, now = make_bounds(delays, rate)
     bounds = estimate_offset_bounds(lows, highs, now)
     assert bounds is not None
     low, high = bounds.find_range(now + ahead)
-    # The edges of the possible rates are known to the spacing of the last grid, the offsets to a nanosecond.
-    tolerance = 1_010 + 1e-6 * ahead
+    # The offsets of the readings are rounded to a nanosecond, and the rates between two of them accordingly.
+    tolerance = 1 + 1e-8 * ahead
     assert low - tolerance <= find_offset(now + ahead, rate) <= high + tolerance
 
 

@@ -180,6 +180,8 @@ def _make_actuator_settings(section: ActuatorSection, realtime: bool) -> Actuato
         setpoint_timeout=timeout,
         # Heartbeats accompany punctual setpoints only, so they may be absent for longer than setpoints.
         master_heartbeat_timeout=2 * timeout,
+        # A machine that may send late may also receive late.
+        drive_heartbeat_timeout=max(ActuatorSettings.drive_heartbeat_timeout, 2 * timeout),
         travel=section.travel,
         max_speed=section.max_speed,
         torque_limit=section.torque_limit,

@@ -8,15 +8,14 @@ in every fit.
 """
 
 import argparse
-from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
+from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, print_table, round_to
 from identification.arrays import Array
 from identification.damper import Coordinates
 from identification.logs import Segment, Stretch
@@ -24,10 +23,13 @@ from identification.noise import NoiseFloorEstimate, estimate_floor
 from identification.signals import estimate_motion
 from identification.simulate import Excitation, SimulationModel, simulate
 
-RELATIVE_NOISE, DISPLACEMENT_NOISE = 0.01, 1e-4
-"""Noise of the force over its standard deviation, and of the displacement over its amplitude [1]."""
-CORRELATION_TIME = 0.02
-"""Correlation time of slow noise [s]."""
+DISPLACEMENT_NOISE = 1e-4
+"""Noise of the displacement over its amplitude [1]."""
+MAINS_FREQUENCY = 50.02
+"""Frequency of the mains line [Hz]."""
+
+
+COLUMNS = ("noise", "fourth differences", "floor", "least and largest", "inside the 95 % interval", "half width")
 
 
 class Size(NamedTuple):
@@ -69,60 +71,22 @@ class Result(NamedTuple):
 def draw_damper(random: np.random.Generator, size: Size) -> Coordinates:
     """Draw a damper of a size: yield force, damping, stiffness and shape within wide ranges."""
     speed = 2.0 * np.pi * size.frequencies[1] * size.amplitude
-    highest = np.array([random.uniform(0.35, 0.95) * size.force])
+    highest = random.uniform(0.35, 0.95) * size.force
     lowest = highest / np.exp(random.uniform(np.log(1.3), np.log(20.0)))
     viscous = (size.force - highest) / speed
     roll_off = viscous * np.exp(random.uniform(np.log(3.0), np.log(40.0)))
     least, least_roll_off = viscous * random.uniform(0.3, 1.5), roll_off * random.uniform(0.3, 1.5)
-
-    def rise(low: Array, high: Array) -> float:
-        return float((high - low)[0] / size.highest_drive)
-
     stiffness = size.force / size.amplitude
     return Coordinates(
-        F_a=float(lowest[0]), F_b=rise(lowest, highest),
+        F_a=lowest, F_b=(highest - lowest) / size.highest_drive,
         D_y=size.amplitude * np.exp(random.uniform(np.log(1e-3), np.log(0.08))),
         rho=random.uniform(0.15, 0.9), n=np.exp(random.uniform(np.log(1.1), np.log(3.0))),
         eta=20.0 * speed / size.amplitude,
-        c0_a=float(least[0]), c0_b=rise(least, viscous),
-        c1_a=float(least_roll_off[0]), c1_b=rise(least_roll_off, roll_off),
+        c0_a=least, c0_b=(viscous - least) / size.highest_drive,
+        c1_a=least_roll_off, c1_b=(roll_off - least_roll_off) / size.highest_drive,
         k0=stiffness * random.uniform(0.0, 0.3), k1=stiffness * random.uniform(0.0, 0.2),
         f0=size.force * random.uniform(-0.5, 0.5),
     )  # fmt: skip
-
-
-def make_slow_noise(count: int, rate: float, random: np.random.Generator) -> Array:
-    """Return noise (N,) of variance 1 whose correlation decays within the correlation time."""
-    decay = np.exp(-1.0 / (rate * CORRELATION_TIME))
-    burn_in = round(20.0 * CORRELATION_TIME * rate) + 10
-    white = random.standard_normal(count + burn_in) * np.sqrt(1.0 - decay**2)
-    return np.asarray(lfilter([1.0], [1.0, -decay], white)[burn_in:])
-
-
-def make_pink_noise(count: int, rate: float, random: np.random.Generator) -> Array:
-    """Return noise (N,) of variance 1 whose power falls with the frequency."""
-    bins = np.arange(1, count + 1)
-    spectrum = np.concatenate(
-        [[0.0], (random.standard_normal(count) + 1j * random.standard_normal(count)) / np.sqrt(bins)]
-    )
-    noise = np.fft.irfft(spectrum, 2 * count)[:count]
-    return np.asarray(noise / noise.std())
-
-
-def make_white_noise(count: int, rate: float, random: np.random.Generator) -> Array:
-    """Return white noise (N,) of variance 1."""
-    return random.standard_normal(count)
-
-
-Source = Callable[[int, float, np.random.Generator], Array]
-SPECTRA: dict[str, tuple[tuple[float, Source], ...]] = {
-    "white": ((1.0, make_white_noise),),
-    "half slow (20 ms)": ((0.5, make_white_noise), (0.5, make_slow_noise)),
-    "nine tenths slow": ((0.1, make_white_noise), (0.9, make_slow_noise)),
-    "1/f": ((1.0, make_pink_noise),),
-    "half 1/f": ((0.5, make_white_noise), (0.5, make_pink_noise)),
-}
-"""Shares of the variance and their sources, by name."""
 
 
 class Disturbance(NamedTuple):
@@ -162,16 +126,11 @@ def try_case(job: tuple[Size, str, int]) -> Result:
     random = np.random.default_rng([seed, SIZES.index(size), sorted(CASES).index(name)])
     clean, stretch = record(size, disturbance, random)
     deviation = RELATIVE_NOISE * float(np.std(clean))
-    noise = sum(np.sqrt(share) * source(len(clean), size.rate, random) for share, source in SPECTRA[spectrum])
-    noise = deviation * noise
-    force = (
-        clean
-        + noise
-        + deviation * np.sqrt(2.0 * disturbance.mains) * np.sin(2.0 * np.pi * 50.02 * stretch.time + 1.0)
-    )
+    noise = deviation * draw_noise(spectrum, len(clean), size.rate, random)
+    mains = np.sqrt(2.0 * disturbance.mains) * np.sin(2.0 * np.pi * MAINS_FREQUENCY * stretch.time + 1.0)
+    force = clean + noise + deviation * mains
     if disturbance.digit:
-        digit = disturbance.digit * deviation
-        force = np.round(force / digit) * digit
+        force = round_to(force, disturbance.digit * deviation)
         noise = force - clean
     return compare(estimate_floor_of(stretch, force), float(np.std(noise)))
 
@@ -216,18 +175,8 @@ def record(size: Size, disturbance: Disturbance, random: np.random.Generator) ->
         Segment(k, f"segment {k}", edges[k], edges[k + 1], "sine", size.amplitude, f, None)
         for k, f in enumerate(frequencies)
     )
-    return clean, make_stretch(
-        size, x + DISPLACEMENT_NOISE * size.amplitude * random.standard_normal(len(x)), excitation.drive, segments
-    )
-
-
-def make_stretch(size: Size, displacement: Array, drive: Array, segments: tuple[Segment, ...]) -> Stretch:
-    """Return a recorded stretch without force."""
-    count = len(displacement)
-    return Stretch(
-        "drawn", np.arange(count) / size.rate, size.rate, displacement, np.zeros(count), drive, None, segments,
-        None, None, 0.0, 0.0, 0.0, np.ones(count, bool),
-    )  # fmt: skip
+    measured = x + DISPLACEMENT_NOISE * size.amplitude * random.standard_normal(len(x))
+    return clean, make_stretch(size.rate, measured, np.zeros(len(x)), excitation.drive, segments)
 
 
 def format_row(name: str, results: list[Result]) -> str:
@@ -251,19 +200,16 @@ def main() -> None:
     parser.add_argument("--cases", default="", help="only cases whose name contains this")
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    lines = [
-        "| noise | fourth differences | floor | least and largest | inside the 95 % interval | half width |",
-        "| --- | --- | --- | --- | --- | --- |",
-    ]
-    print(*lines, sep="\n", flush=True)
     with ProcessPoolExecutor(options.jobs) as pool:
-        for name in (n for n in CASES if options.cases in n):
-            seeds = range(1000 * options.seed, 1000 * options.seed + options.recordings)
-            jobs = [(size, name, seed) for size in SIZES for seed in seeds]
-            lines.append(format_row(name, list(pool.map(try_case, jobs))))
-            print(lines[-1], flush=True)
-    if options.out:
-        options.out.write_text("\n".join(lines) + "\n", "utf-8")
+        names = [name for name in CASES if options.cases in name]
+        rows = (format_row(name, list(pool.map(try_case, draw_jobs(name, options)))) for name in names)
+        print_table(COLUMNS, rows, options.out)
+
+
+def draw_jobs(name: str, options: argparse.Namespace) -> list[tuple[Size, str, int]]:
+    """Return the recordings of one row."""
+    first = 1000 * options.seed
+    return [(size, name, seed) for size in SIZES for seed in range(first, first + options.recordings)]
 
 
 if __name__ == "__main__":

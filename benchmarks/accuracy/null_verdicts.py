@@ -16,11 +16,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.accuracy.noise_floor import RELATIVE_NOISE, SPECTRA
+from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, print_table, round_to
 from benchmarks.speed import draw_damper
 from identification.arrays import Array
 from identification.gap import diagnose
-from identification.logs import Recording, Segment, Stretch
+from identification.logs import Recording, Segment
 from identification.simulate import Excitation, SimulationModel, simulate
 
 RATE = 1000.0
@@ -30,6 +30,9 @@ DRIVES = (0.0, 0.3, 0.15, 0.5)
 """Drives of each stroke [V]."""
 DISPLACEMENT_NOISE, DISPLACEMENT_DIGIT = 2e-6, 1e-6
 """Noise and resolution of the displacement [m]."""
+
+
+COLUMNS = ("noise", "`no_gap`", "other verdicts", "named", "error of the law over the floor")
 
 
 class Result(NamedTuple):
@@ -56,15 +59,11 @@ def record(name: str, seed: int, random: np.random.Generator) -> Recording:
     velocity = np.gradient(x) * RATE
     stroke = Excitation(RATE, x, velocity, np.gradient(velocity) * RATE, drive)
     clean = simulate(SimulationModel(draw_damper(seed)), stroke, max_travel=0.005).force
-    noise = sum(np.sqrt(share) * make(len(x), RATE, random) for share, make in SPECTRA[name])
+    noise = draw_noise(name, len(x), RATE, random)
     deviation = RELATIVE_NOISE * float(np.std(clean))
     force = round_to(clean + deviation * noise, 0.5 * deviation)
     displacement = round_to(x + DISPLACEMENT_NOISE * random.standard_normal(len(x)), DISPLACEMENT_DIGIT)
-    count = len(x)
-    stretch = Stretch(
-        "drawn", np.arange(count) / RATE, RATE, displacement, force, drive, None, segments, None, None, 0.0, 0.0,
-        0.0, np.ones(count, bool),
-    )  # fmt: skip
+    stretch = make_stretch(RATE, displacement, force, drive, segments)
     metadata = {"run": {"source": "import", "specimen": f"null {seed}"}}
     return Recording(Path(f"null-{seed}.mcap"), "0" * 64, "coil_v", "V", (stretch,), metadata)
 
@@ -90,11 +89,6 @@ def make_strokes() -> tuple[Array, Array, tuple[Segment, ...]]:
     return np.asarray(size * np.sin(angle)), np.concatenate(drive), tuple(segments)
 
 
-def round_to(values: Array, digit: float) -> Array:
-    """Return values with a resolution."""
-    return np.asarray(np.round(values / digit) * digit)
-
-
 def format_row(name: str, results: Sequence[Result]) -> str:
     """Return one row of the table."""
     verdicts = Counter(r.verdict for r in results)
@@ -115,19 +109,10 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
-    lines = [
-        "| noise | `no_gap` | other verdicts | named | error of the law over the floor |",
-        "| --- | --- | --- | --- | --- |",
-    ]
-    print(*lines, sep="\n", flush=True)
-    first = 1000 * options.seed
+    seeds = range(1000 * options.seed, 1000 * options.seed + options.recordings)
     with ProcessPoolExecutor(options.jobs) as pool:
-        for name in SPECTRA:
-            jobs = [(name, seed) for seed in range(first, first + options.recordings)]
-            lines.append(format_row(name, list(pool.map(try_null, jobs))))
-            print(lines[-1], flush=True)
-    if options.out:
-        options.out.write_text("\n".join(lines) + "\n", "utf-8")
+        rows = (format_row(name, list(pool.map(try_null, [(name, seed) for seed in seeds]))) for name in SPECTRA)
+        print_table(COLUMNS, rows, options.out)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,12 @@ from identification.logs import PERIODIC_MOTIONS, Stretch
 from identification.noise.high_frequency import estimate_high_frequency_noise
 from identification.noise.mains_line import MainsLine, find_mains_line
 from identification.noise.repeated_windows import MIN_CYCLES, RepeatedWindow, find_repeated_windows
-from identification.noise.spectrum import WindowNoise, estimate_window_noise, fit_low_spectrum, make_spectrum
+from identification.noise.spectrum import (
+    WindowNoise,
+    estimate_window_noise,
+    fit_low_frequency_spectrum,
+    make_spectrum,
+)
 from identification.noise.window_fit import CycleFit, WindowFit
 from identification.signals import Motion
 from identification.threads import use_one_thread
@@ -128,7 +133,7 @@ def _estimate_stretch(stretch: Stretch, motion: Motion) -> _StretchNoise:
     line = find_mains_line(fits, remainders, stretch.rate)
     cleaned = remainders if line is None else line.remainders
     spectra = [make_spectrum(fit, remainder, stretch.rate) for fit, remainder in zip(fits, cleaned, strict=True)]
-    low, duration = fit_low_spectrum(spectra), len(stretch.force) / stretch.rate
+    low, duration = fit_low_frequency_spectrum(spectra), len(stretch.force) / stretch.rate
     return _StretchNoise([estimate_window_noise(spectrum, low, duration) for spectrum in spectra], line)
 
 
@@ -189,7 +194,8 @@ def _describe_lines(parts: Sequence[_StretchNoise]) -> str:
     if not lines:
         return ""
     line = max(lines, key=lambda each: each.deviation)
-    return f"; without a mains line of {line.deviation:.3g} N rms at {line.frequency:.2f} Hz, which is no noise"
+    size = f"{line.deviation:.3g} N rms at {line.frequency:.2f} Hz"
+    return f"; without a mains line of {size}, which is not part of the floor"
 
 
 def _explain_missing_repeats(stretches: Sequence[Stretch], samples: int) -> str:

@@ -21,6 +21,8 @@ _MAX_HARMONIC = 6.0
 """Multiple of the stroke's frequency up to which its motion may differ from cycle to cycle [1]."""
 _DRIVE_DEVIATIONS = 6.0
 """Difference of the drives of two cycles up to which they are equal [standard deviations of its noise]."""
+_DRIVE_SHARE = 2e-3
+"""Difference of the drives of two cycles up to which they are equal, over the range of the drive [1]."""
 _SETTLING_CYCLES, _SHORT_SETTLING_CYCLES = 1.0, 0.5
 """Part of a window that is left out while the damper settles [cycles]: of a long window, and of a short one."""
 _LONG_WINDOW = 5.0
@@ -67,11 +69,26 @@ def find_repeated_windows(stretch: Stretch, displacement: Array, noise: float) -
         noise: standard deviation of the noise of the recorded displacement [m].
     """
     periodic = [s for s in stretch.segments if s.motion in PERIODIC_MOTIONS and s.frequency]
-    return [w for s in periodic for w in _find_windows(stretch, displacement, noise, s)]
+    levels = _DriveLevels.of(stretch.drive)
+    return [w for s in periodic for w in _find_windows(stretch, displacement, noise, s, levels)]
+
+
+class _DriveLevels(NamedTuple):
+    """Drive of a stretch, averaged where it is constant: its noise would divide a window by chance."""
+
+    values: Array
+    """(N,) averaged drive [V or A]."""
+    tolerance: float
+    """Difference up to which two drives are equal [V or A]."""
+
+    @classmethod
+    def of(cls, drive: Array) -> "_DriveLevels":
+        tolerance = max(_DRIVE_DEVIATIONS * estimate_drive_noise(drive), _DRIVE_SHARE * float(np.ptp(drive)))
+        return cls(average_drive_levels(drive), tolerance)
 
 
 def _find_windows(
-    stretch: Stretch, displacement: Array, noise: float, segment: Segment
+    stretch: Stretch, displacement: Array, noise: float, segment: Segment, levels: _DriveLevels
 ) -> Iterator[RepeatedWindow]:
     part = slice(segment.start, segment.stop)
     weights = stretch.measured[part].astype(float)
@@ -81,7 +98,7 @@ def _find_windows(
     steady = slice(segment.start + cycles.start, segment.start + cycles.stop)
     period = stretch.rate / cycles.frequency
     motion = _filter_motion(stretch, steady, cycles.frequency)
-    for start, stop in _find_equal_drives(stretch.drive, steady, round(period)):
+    for start, stop in _find_equal_drives(levels, steady, round(period)):
         length = _choose_length((stop - start) / period)
         if length < _SHORTEST_WINDOW:
             continue
@@ -100,12 +117,10 @@ def _choose_length(available: float) -> float:
     return min(whole, available) if whole >= MIN_CYCLES else settled
 
 
-def _find_equal_drives(drive: Array, steady: slice, period: int) -> Iterator[tuple[int, int]]:
+def _find_equal_drives(levels: _DriveLevels, steady: slice, period: int) -> Iterator[tuple[int, int]]:
     """Yield start and stop of each part of the steady cycles in which the drive equals that a cycle before."""
-    # Averaged levels have no noise that would divide a window by chance.
-    values = average_drive_levels(drive)[steady]
-    tolerance = max(_DRIVE_DEVIATIONS * estimate_drive_noise(drive), 2e-3 * float(np.ptp(drive)))
-    equal = np.abs(values[period:] - values[:-period]) <= tolerance
+    values = levels.values[steady]
+    equal = np.abs(values[period:] - values[:-period]) <= levels.tolerance
     edges = np.flatnonzero(np.diff(np.concatenate([[False], equal, [False]]).astype(int)))
     for first, last in edges.reshape(-1, 2):
         # The first comparison already needs the cycle before it.

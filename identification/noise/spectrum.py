@@ -43,7 +43,7 @@ class WindowSpectrum(NamedTuple):
         return np.asarray((self.gain > _KNOWN_GAIN) & (self.frequency > 0.0))
 
 
-class LowSpectrum(NamedTuple):
+class LowFrequencySpectrum(NamedTuple):
     """Power of the noise at low frequencies: a white part and a part that falls with the frequency."""
 
     white: float
@@ -82,18 +82,18 @@ def make_spectrum(fit: WindowFit, remainder: Array, rate: float) -> WindowSpectr
     return WindowSpectrum(frequency, power, fit.gain, fit.window)
 
 
-def fit_low_spectrum(spectra: Sequence[WindowSpectrum]) -> LowSpectrum:
+def fit_low_frequency_spectrum(spectra: Sequence[WindowSpectrum]) -> LowFrequencySpectrum:
     """Fit the spectrum to the lowest decade that the spectra of one stretch show, by maximum likelihood."""
     frequency = np.concatenate([s.frequency[s.is_known] for s in spectra])
     power = np.concatenate([(s.power / s.gain)[s.is_known] for s in spectra])
     if not len(frequency):
-        return LowSpectrum(
+        return LowFrequencySpectrum(
             sum(float(s.power.sum()) for s in spectra) / sum(float(s.gain.sum()) for s in spectra), 0.0
         )
     low = frequency <= _LOW_DECADE * frequency.min()
     frequency, scale = frequency[low], float(power[low].mean())
     if scale < 1e-300:
-        return LowSpectrum(0.0, 0.0)
+        return LowFrequencySpectrum(0.0, 0.0)
     power = power[low] / scale
     columns = np.column_stack([np.ones(len(frequency)), frequency.min() / frequency])
     level = np.ones(len(frequency))
@@ -101,10 +101,10 @@ def fit_low_spectrum(spectra: Sequence[WindowSpectrum]) -> LowSpectrum:
         # A power is exponentially distributed: its standard deviation is its mean (Whittle 1953).
         white, pink = nnls(columns / level[:, None], power / level)[0]
         level = np.maximum(columns @ [white, pink], 1e-6)
-    return LowSpectrum(scale * float(white), scale * float(pink) * float(frequency.min()))
+    return LowFrequencySpectrum(scale * float(white), scale * float(pink) * float(frequency.min()))
 
 
-def estimate_window_noise(spectrum: WindowSpectrum, low: LowSpectrum, duration: float) -> WindowNoise:
+def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, duration: float) -> WindowNoise:
     """Return the noise of a window.
 
     Args:

@@ -24,7 +24,7 @@ DEADLINE = 90.0
 
 
 TCP = TransportOptions(load_cell="tcp")
-_TOLERANT_DRIVE = "setpoint_timeout = 0.3\nfollowing_error_window = 0.02"
+_TOLERANT_DRIVE = "setpoint_timeout = 0.5\nfollowing_error_window = 0.02"
 """Setpoint timeout [s] and following error [m] that a simulated drive needs on a slow or busy machine."""
 
 
@@ -149,6 +149,17 @@ def served_agent(bench):
 def fetch_status(agent):
     """Return the present status of an agent."""
     return agent.send(StatusCommand()).status
+
+
+def until_segment(agent, name):
+    """Wait until an agent's run is in a segment."""
+
+    def is_reached():
+        run = fetch_status(agent).run
+        assert run.outcome is None, f"the run ended before segment {name}: {run.reason}"
+        return run.segment == name
+
+    until(is_reached)
 
 
 def until_ended(agent):

@@ -29,6 +29,7 @@ from tests.support.live_bench import (
     served_agent,
     until,
     until_ended,
+    until_segment,
 )
 
 pytestmark = [pytest.mark.wire, pytest.mark.timeout(240)]
@@ -44,6 +45,12 @@ def finished(process):
     """Return exit status and error output of a run."""
     _, output = process.communicate(timeout=DEADLINE)
     return process.returncode, output
+
+
+def find_correlation(recorded, command):
+    """Return the highest correlation of a recording with its command, for a servo that follows late."""
+    lags, count = range(250), len(command) - 250
+    return max(np.corrcoef(recorded[lag : lag + count], command[:count])[0, 1] for lag in lags)
 
 
 def list_event_texts(log, kind):
@@ -67,8 +74,7 @@ def test_run_is_recorded_as_commanded(bench):
         assert np.isfinite(samples[name]).mean() > 0.99, name
     segment, command = log.segments[1], samples["displacement_command"]
     inside = slice(segment.start, segment.stop)
-    # The servo follows at least 12 ms late, on a busy machine later: a time the test does not limit.
-    assert np.corrcoef(samples["displacement"][inside], command[inside])[0, 1] > 0.9
+    assert find_correlation(samples["displacement"][inside], command[inside]) > 0.97
     assert np.ptp(samples["displacement"][inside]) == pytest.approx(0.016, rel=0.1)
     assert np.median(samples["coil_drive"][inside]) == pytest.approx(0.4, abs=2e-3)
     assert {"method.json", "bench.toml", "instruments.json"} <= log.attachments.keys()
@@ -115,7 +121,7 @@ def test_trip_is_latched_until_a_reset(tmp_path):
 def test_stopped_run_can_be_resumed_after_its_checkpoint(bench):
     with served_agent(bench) as agent:
         assert agent.send(RunCommand(method=method(), log=str(bench.log))).ok
-        until(lambda: fetch_status(agent).run.segment == "b")
+        until_segment(agent, "b")
         agent.send(StopCommand())
         status = until_ended(agent)
         assert (status.state, status.run.outcome, status.run.reason) == (
@@ -190,7 +196,7 @@ def test_agent_publishes_samples_and_the_end_of_a_run(bench):
             if isinstance(message, AgentEvent) and message.kind == "run_finished":
                 stopping.set()
         live = [message for message in seen if isinstance(message, Samples)]
-        assert {"force", "displacement", "displacement_command"} <= live[-1].values.keys()
+        assert {"force", "displacement", "displacement_command"} <= set().union(*(one.values for one in live))
         assert all(len(column) == len(one.time_ns) for one in live for column in one.values.values())
         assert "running" in {message.state for message in seen if isinstance(message, AgentStatus)}
         assert fetch_status(agent).run.outcome == "clean"

@@ -53,7 +53,7 @@ class NoiseModel:
         return math.hypot(self.estimate.get_interval(self.noise)[1], self.input_noise or 0.0)
 
     def update(self, candidate: Candidate, full_problem: Problem, evaluation: EvaluationData) -> None:
-        """Raise the floor by the noise in a candidate's residual.
+        """Estimate the propagated noise of the displacement from a candidate's simulated loop.
 
         Args:
             candidate: the best set so far; the baseline comes first.

@@ -32,7 +32,7 @@ def decide_verdict(
         baseline: the law without effects.
         named: the most probable set.
         floor: noise floor [N].
-        no_gap_limit: RMSE of the baseline [N] up to which there is no gap.
+        no_gap_limit: RMSE of the baseline [N] up to which the verdict is ``no_gap``.
         posterior: probabilities of the sets.
     """
     at_floor = baseline.held_out_rmse < no_gap_limit and baseline.train_rmse < max(

@@ -69,7 +69,7 @@ class CandidatePool:
 
     @property
     def no_gap_limit(self) -> float:
-        """RMSE of the baseline [N] up to which there is no gap."""
+        """RMSE of the baseline [N] up to which the verdict is ``no_gap``."""
         return max(self.settings.no_gap_ratio * self.floor, self.noise_model.highest_floor)
 
     @property

@@ -6,10 +6,10 @@ from scipy.signal import lfilter
 
 from identification.noise.repeated_windows import RepeatedWindow
 from identification.noise.spectrum import (
-    LowSpectrum,
+    LowFrequencySpectrum,
     WindowSpectrum,
     estimate_window_noise,
-    fit_low_spectrum,
+    fit_low_frequency_spectrum,
     make_spectrum,
 )
 from identification.noise.window_fit import CycleFit, WindowFit
@@ -31,7 +31,7 @@ def make_noisy_spectra(noise, windows=6, cycles=6, period=250.0):
 
 def estimate(noise, **more):
     spectra = make_noisy_spectra(noise, **more)
-    law = fit_low_spectrum(spectra)
+    law = fit_low_frequency_spectrum(spectra)
     return [estimate_window_noise(s, law, len(noise) / RATE) for s in spectra], law
 
 
@@ -65,12 +65,12 @@ def draw_spectra(make, count=400):
 
 @pytest.mark.parametrize(("white", "pink"), [(3.0, 0.0), (0.0, 3.0), (2.0, 3.0)])
 def test_the_low_spectrum_is_white_and_pink_noise_in_the_lowest_decade(white, pink):
-    found = fit_low_spectrum(draw_spectra(lambda f: np.where(f < 2.1, white + pink / f, 1e3)))
+    found = fit_low_frequency_spectrum(draw_spectra(lambda f: np.where(f < 2.1, white + pink / f, 1e3)))
     assert found == pytest.approx((white, pink), rel=0.15, abs=0.15)
 
 
 def test_the_low_spectrum_never_rises_with_the_frequency():
-    found = fit_low_spectrum(draw_spectra(lambda f: f**2))
+    found = fit_low_frequency_spectrum(draw_spectra(lambda f: f**2))
     assert found.pink == 0.0
     assert found.white > 0.0
 
@@ -78,11 +78,11 @@ def test_the_low_spectrum_never_rises_with_the_frequency():
 def test_a_window_that_shows_nothing_has_a_flat_spectrum():
     window = make_noisy_spectra(np.zeros(1500), windows=1)[0].window
     spectrum = WindowSpectrum(np.arange(100.0), np.full(100, 2.0), np.full(100, 0.4), window)
-    assert fit_low_spectrum([spectrum]) == LowSpectrum(pytest.approx(5.0), 0.0)
+    assert fit_low_frequency_spectrum([spectrum]) == LowFrequencySpectrum(pytest.approx(5.0), 0.0)
 
 
 def test_the_low_spectrum_is_integrated():
-    low = LowSpectrum(3.0, 2.0)
+    low = LowFrequencySpectrum(3.0, 2.0)
     f = np.linspace(0.1, 2.0, 200_001)
     assert low.integrate(0.1, 2.0) == pytest.approx(np.trapezoid(low.evaluate(f), f), rel=1e-6)
 

@@ -139,10 +139,10 @@ def _format_default(parameter: Any) -> str:
     return f" By default `{default}`." if has_default else ""
 
 
-def describe_quantities(quantities: Iterable[Quantity]) -> str:
+def describe_quantities(quantities: Iterable[Quantity], bounds: str = "bounds of the search") -> str:
     """Describe parameters or coordinates by symbol, unit, bounds and meaning."""
     rows = ((f"`{q.symbol}`", q.format_unit("drive"), f"{q.low:g} … {q.high:g}", q.meaning) for q in quantities)
-    return make_table(("", "unit", "bounds of the search", "meaning"), rows)
+    return make_table(("", "unit", bounds, "meaning"), rows)
 
 
 def describe_effects() -> str:
@@ -241,8 +241,8 @@ def make_table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 PARTS: dict[str, Callable[[], str]] = {
     "commands": describe_commands,
-    "parameters": lambda: describe_quantities(PARAMETERS),
-    "coordinates": lambda: describe_quantities(COORDINATES),
+    "parameters": lambda: describe_quantities(PARAMETERS, "accepted values"),
+    "coordinates": lambda: describe_quantities(COORDINATES, "accepted values"),
     "effects": describe_effects,
     "messages": describe_messages,
     "fit": lambda: describe_fields(Fit),

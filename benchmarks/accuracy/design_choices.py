@@ -16,7 +16,7 @@ from benchmarks.common import make_sine, measure_cpu_time, print_line
 from benchmarks.speed import SHUFFLED_LEVELS, TRAINING_STROKES, make_excitation
 from identification.arrays import Array
 from identification.damper import Coordinates, Parameters, find_parameter_set, to_coordinates, to_parameters
-from identification.fitting import LowPass, SearchSpace, compute_filter_delay
+from identification.fitting import LowPass, Piece, SearchSpace, compute_filter_delay, measure_scales
 from identification.logs import ChannelFilter
 from identification.simulate import SENSITIVITY_COLUMNS, Excitation, SimulationModel, simulate
 
@@ -126,7 +126,9 @@ def compare_conditioning() -> None:
     )
     parameters = to_parameters(c)
     relative = np.diag([abs(value) for value in parameters])
-    space = SearchSpace(0.0, 0.5)
+    forces = [simulate(SimulationModel(c), s).force for s in strokes]
+    pieces = [Piece(str(i), s, f, np.ones(len(f))) for i, (s, f) in enumerate(zip(strokes, forces, strict=True))]
+    space = SearchSpace(0.0, 0.5, measure_scales(pieces))
     print("condition number of the sensitivities of the force: laboratory damper, the four strokes of `fitting`")
     for label, J in (
         ("the paper's fourteen, relative", over @ differentiate_coordinates(parameters) @ relative),

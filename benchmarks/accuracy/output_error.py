@@ -37,6 +37,7 @@ from identification.fitting import (
     compute_rmse,
     fit_output_error,
     make_starting_points,
+    measure_scales,
     predict_piece,
 )
 from identification.uncertainty import compute_coordinate_covariance, estimate_covariance
@@ -65,7 +66,7 @@ def make_case_problem(
     pieces = tuple(
         Piece(str(i), s, f, np.ones(len(f))) for i, (s, f) in enumerate(zip(strokes, forces, strict=True))
     )
-    return Problem(pieces, SearchSpace(0.0, 0.5), noise, 20e-6)
+    return Problem(pieces, SearchSpace(0.0, 0.5, measure_scales(pieces)), noise, 20e-6)
 
 
 def fit_seed(c: Coordinates, seed: int) -> dict[str, Any]:

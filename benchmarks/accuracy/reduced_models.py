@@ -22,6 +22,7 @@ from identification.fitting import (
     compute_rmse,
     fit_output_error,
     make_starting_points,
+    measure_scales,
     predict_piece,
 )
 from identification.simulate import SimulationModel, simulate
@@ -63,7 +64,9 @@ def record_stroke(amplitude: float, frequency: float, seed: int) -> Piece:
 
 def fit_model(piece: Piece, fixed: dict[str, float]) -> tuple[Coordinates, Array]:
     """Fit a model; return its coordinates and the deviations (13,) that it estimates."""
-    problem = ReducedProblem((piece,), SearchSpace(0.0, 0.5), NOISE, 20e-6, fixed=tuple(fixed))
+    problem = ReducedProblem(
+        (piece,), SearchSpace(0.0, 0.5, measure_scales([piece])), NOISE, 20e-6, fixed=tuple(fixed)
+    )
     first = problem.space.to_coordinates(make_starting_points(problem)[0][:COORDINATE_COUNT])
     minimum = fit_output_error(
         problem, OptimiserSettings(restarts=0, iterations=100), start=problem.make_start(first._replace(**fixed))

@@ -22,6 +22,7 @@ from identification.fitting import (
     SearchSpace,
     assemble,
     compute_rmse,
+    measure_scales,
     predict_piece,
 )
 from identification.logs import Recording, Stretch
@@ -70,7 +71,7 @@ def make_case_problem(c: Coordinates, seed: int, *, pairs: bool = False) -> Prob
     fitted[:_SETTLING_SAMPLES] = 0.0
     pieces = [Piece(str(i), s, f, fitted[: len(f)]) for i, (s, f) in enumerate(zip(strokes, forces, strict=True))]
     # Synthetic channels have no delays, so a narrow prior keeps the delays at zero.
-    return Problem(tuple(pieces), SearchSpace(0.0, 0.5), noise, 1e-9)
+    return Problem(tuple(pieces), SearchSpace(0.0, 0.5, measure_scales(pieces)), noise, 1e-9)
 
 
 def train_preset(

@@ -16,7 +16,15 @@ from benchmarks.common import make_scenario
 from benchmarks.pinn.cases import LABORATORY
 from benchmarks.speed import RISING_LEVELS, SHUFFLED_LEVELS, TRAINING_STROKES, VALIDATION_STROKES, make_excitation
 from identification.damper.effects import COMMON_EFFECTS, EFFECTS
-from identification.fitting import EffectModel, Piece, Problem, SearchSpace, compute_rmse, predict_piece
+from identification.fitting import (
+    EffectModel,
+    Piece,
+    Problem,
+    SearchSpace,
+    compute_rmse,
+    measure_scales,
+    predict_piece,
+)
 from identification.pinn import train
 from identification.pinn.common import PinnResult, is_supported, read_settings
 from identification.simulate import ActiveEffect, SimulationModel
@@ -81,7 +89,9 @@ def compare_training(names: str) -> str:
     effects = tuple(read_shipped_effect(name) for name in names.split("+"))
     pieces = make_pieces(effects, TRAINING_STROKES, SHUFFLED_LEVELS, 0)
     noise = 0.01 * float(np.mean([p.force.std() for p in pieces]))
-    problem = Problem(pieces, SearchSpace(0.0, 0.5), noise, _CLOCK_DEVIATION, delay_limit=3.0)
+    problem = Problem(
+        pieces, SearchSpace(0.0, 0.5, measure_scales(pieces)), noise, _CLOCK_DEVIATION, delay_limit=3.0
+    )
     settings = read_settings("elements")
     models = tuple(EffectModel.from_name(e.effect.name, e.form.name) for e in effects)
     without, inside = (train(p, settings) for p in (problem, problem.replace_effects(models)))

@@ -13,6 +13,7 @@ from identification.fitting import (
     SearchSpace,
     compute_rmse,
     fit_output_error,
+    measure_scales,
     predict_piece,
 )
 from identification.simulate import Excitation, SimulationModel, simulate
@@ -55,7 +56,7 @@ def fit_seed(c: Coordinates, seed: int) -> tuple[float, float]:
     pieces = tuple(
         Piece(str(i), s, f, np.ones(len(f))) for i, (s, f) in enumerate(zip(strokes, forces, strict=True))
     )
-    problem = Problem(pieces, SearchSpace(0.0, 0.5), noise, 20e-6)
+    problem = Problem(pieces, SearchSpace(0.0, 0.5, measure_scales(pieces)), noise, 20e-6)
     began = time.process_time()
     minimum = fit_output_error(problem)
     spent = time.process_time() - began

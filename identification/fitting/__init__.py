@@ -12,10 +12,10 @@ from identification.fitting.effect_model import EffectModel
 from identification.fitting.force_channel import LowPass, compute_filter_delay
 from identification.fitting.initial_guess import (
     ACCUMULATOR_SHARE,
-    START_ETA,
+    START_FIELD_RATE,
     START_N,
     START_RHO,
-    estimate_sliding_damping,
+    estimate_least_damping,
     make_starting_points,
 )
 from identification.fitting.log_correction import PER_LOG_PARAMETERS, PerLogParameter
@@ -37,10 +37,10 @@ from identification.fitting.prediction import (
 )
 from identification.fitting.problem import (
     DELAY_LIMIT,
-    Y0_SCALE,
     Evaluation,
     Problem,
 )
+from identification.fitting.recording_scales import RecordingScales, measure_scales
 from identification.fitting.search_space import SearchSpace
 from identification.fitting.unknown_layout import COMMON_COUNT, COORDINATE_COUNT
 
@@ -50,10 +50,9 @@ __all__ = [
     "COORDINATE_COUNT",
     "DELAY_LIMIT",
     "PER_LOG_PARAMETERS",
-    "START_ETA",
+    "START_FIELD_RATE",
     "START_N",
     "START_RHO",
-    "Y0_SCALE",
     "DamperModel",
     "Dataset",
     "EffectModel",
@@ -66,18 +65,20 @@ __all__ = [
     "Piece",
     "PiecePrediction",
     "Problem",
+    "RecordingScales",
     "SearchSpace",
     "assemble",
     "compute_drive_errors",
     "compute_filter_delay",
     "compute_nrmse",
     "compute_rmse",
-    "estimate_sliding_damping",
+    "estimate_least_damping",
     "fit_output_error",
     "make_damper_model",
     "make_effect_entries",
     "make_piece_model",
     "make_starting_points",
+    "measure_scales",
     "minimise",
     "predict_piece",
     "read_damper_model",

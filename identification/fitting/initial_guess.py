@@ -1,107 +1,137 @@
 """Starting points of a fit, from the recording alone.
 
 Away from reversals the hysteretic variable is saturated and the inner displacement barely moves. The force is then
-linear: (F_a + F_b u) sgn v + (c0_a + c0_b u) v + (k0 + k1) x - f0. One regression gives these coefficients, and
-the yield displacement is tried at a few fractions of the stroke.
+linear: (F_a + F_b u) sgn v + (c0_a + c0_b u) v + (k0 + k1) x - f0. One regression gives these coefficients.
 
-In a damper that hardly yields, most of that viscous force is due to c1. Low-slip starts distribute the same peak
-force accordingly, and are tried if the first starts fail.
+In a damper that hardly yields, most of that viscous force is due to c1, and the regression fails. The second start
+distributes the same peak force accordingly.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.damper import Coordinates
 from identification.fitting.piece import Piece
 from identification.fitting.problem import Problem
+from identification.fitting.recording_scales import RecordingScales
+from identification.fitting.search_space import SearchSpace
 from identification.fitting.unknown_layout import COORDINATE_COUNT
 
-_SLIDING_FRACTION = 0.25
+_SLIDING_FRACTION = 0.3
 """Threshold on velocity over a piece's peak velocity: above it, the hysteretic variable is saturated."""
-_MAX_ROWS = 20_000
-_YIELD_FRACTIONS = (0.002, 0.008, 0.04)
-START_RHO, START_N, START_ETA = 0.5, 1.7, 80.0
-"""Starting values of rho [1], n [1] and eta [1/s], on which no regression depends."""
-_DASHPOT_RATIO = 12.0
-"""Ratio of c1 to c0. Origin: order of magnitude in published dampers."""
-_LOW_SLIP_YIELD, _LOW_SLIP_VISCOUS, _LOW_SLIP_DASHPOT = 0.8, 0.2, 1.2
-"""Yield force, and forces of c0 and c1 at the peak velocity, over the peak force of a low-slip damper."""
+_PEAK_QUANTILE = 0.99
+"""Quantile of the speed that counts as a piece's peak velocity [1]."""
+_SETTLING = 0.3
+"""Time in which the field follows a change of the drive, in units of the recording's time."""
+_DRIVE_CHANGE = 0.1
+"""Change of the drive over its range above which a sample is not settled [1]."""
+_MAX_ROWS, _MIN_ROWS = 20_000, 60
+_YIELD_DISPLACEMENT, _LOW_SLIP_YIELD_DISPLACEMENT = 0.008, 0.02
+"""Yield displacement of the two starts, in units of the length."""
+START_RHO, START_N, START_FIELD_RATE = 0.5, 1.7, 20.0
+"""Starting values of rho [1], n [1] and eta [units of the rate], on which no regression depends."""
+_DASHPOT_RATIO, _LOW_SLIP_DASHPOT_RATIO = 12.0, 6.0
+"""Ratio of c1 to c0 in the two starts. Origin: order of magnitude in published dampers."""
+_LOW_SLIP_YIELD, _LOW_SLIP_VISCOUS = 0.8, 0.2
+"""Yield force, and force of c0 at the peak velocity, over the peak force of a low-slip damper."""
+_LEAST_SHARE = 0.02
+"""Smallest yield force, and force of c0 at the peak velocity, over the peak force [1]."""
 ACCUMULATOR_SHARE = 0.3
 """Fraction of the sliding stiffness k0 + k1 that a start assigns to k1 [1]; the regression gives only the sum."""
 
 
 def make_starting_points(problem: Problem) -> list[Array]:
-    """Return starting points (U,), in the order of their cost."""
-    return _sort_by_cost(problem, _make_starts(problem.pieces))
-
-
-def make_low_slip_points(problem: Problem) -> list[Array]:
-    """Return starting points (U,) for a damper that hardly yields, in the order of their cost."""
-    return _sort_by_cost(problem, _make_low_slip_starts(problem.pieces))
-
-
-def _sort_by_cost(problem: Problem, points: Iterator[Coordinates]) -> list[Array]:
-    return sorted((problem.make_start(c) for c in points), key=lambda unknowns: _compute_cost(problem, unknowns))
+    """Return the starting points (U,): that of the regression, and that of a damper that hardly yields."""
+    coefficients = _regress_force(problem.pieces, problem.space.scales)
+    return [
+        problem.make_start(make_start(coefficients, problem.space))
+        for make_start in (_make_sliding_start, _make_low_slip_start)
+    ]
 
 
 def draw_random_start(problem: Problem, unknowns: Array, factor: float, seed: int) -> Array:
-    """Return a start with every search coordinate moved at random by up to the logarithm of a factor."""
+    """Return a start with every search coordinate moved at random.
+
+    Logarithmic ones move by up to the logarithm of the factor, the others by up to a tenth of it.
+    """
     random = np.random.default_rng(seed)
     low, high = problem.get_bounds()
     start = unknowns.copy()
-    start[problem.layout.coordinates] += random.uniform(-1.0, 1.0, COORDINATE_COUNT) * np.log(factor)
+    size = np.log(factor) * np.where(problem.space.log_mask, 1.0, 0.1)
+    start[problem.layout.coordinates] += random.uniform(-1.0, 1.0, COORDINATE_COUNT) * size
     return np.clip(start, low, high)
 
 
-def estimate_sliding_damping(pieces: Sequence[Piece]) -> float:
-    """Return an estimate of c0 + c1 [N s/m] at zero drive, from the regression."""
-    return (1.0 + _DASHPOT_RATIO) * max(float(_regress_force(pieces)[2]), 1.0)
+def estimate_least_damping(pieces: Sequence[Piece], scales: RecordingScales) -> float:
+    """Return the least c0 + c1 [N s/m] at zero drive that the regression allows.
+
+    Its damping is c0 in a damper that slides, and c1 in a damper that hardly yields.
+    """
+    return max(float(_regress_force(pieces, scales)[2]), _LEAST_SHARE * scales.damping)
 
 
-def _make_starts(pieces: Sequence[Piece]) -> Iterator[Coordinates]:
-    F_a, F_b, c0_a, c0_b, stiffness, offset = _regress_force(pieces)
-    stroke = max(float(np.ptp(p.excitation.displacement)) for p in pieces) / 2.0
-    for fraction in _YIELD_FRACTIONS:
-        yield Coordinates(
-            F_a=F_a,
-            F_b=F_b,
-            D_y=fraction * stroke,
-            rho=START_RHO,
-            n=START_N,
-            eta=START_ETA,
-            c0_a=c0_a,
-            c0_b=c0_b,
-            c1_a=_DASHPOT_RATIO * c0_a,
-            c1_b=_DASHPOT_RATIO * c0_b,
-            k0=(1 - ACCUMULATOR_SHARE) * stiffness,
-            k1=ACCUMULATOR_SHARE * stiffness,
-            f0=-offset,
-        )
+def _make_sliding_start(coefficients: Array, space: SearchSpace) -> Coordinates:
+    F_a, F_b, c0_a, c0_b, _, _ = coefficients
+    velocity = space.scales.velocity
+    drives = np.array([space.lowest_drive, space.highest_drive])
+    peaks = _LEAST_SHARE * _compute_peak_forces(coefficients, space)
+    return _make_coordinates(
+        coefficients, space, _YIELD_DISPLACEMENT,
+        np.maximum(F_a + F_b * drives, peaks), np.maximum(c0_a + c0_b * drives, peaks / velocity), _DASHPOT_RATIO,
+    )  # fmt: skip
 
 
-def _make_low_slip_starts(pieces: Sequence[Piece]) -> Iterator[Coordinates]:
-    """Yield starts with the same peak forces in which the dashpot c1 carries most of the motion."""
-    v = max(float(np.abs(p.excitation.velocity).max()) for p in pieces)
-    for c in _make_starts(pieces):
-        a, b = c.F_a + c.c0_a * v, c.F_b + c.c0_b * v
-        yield c._replace(
-            F_a=_LOW_SLIP_YIELD * a, F_b=_LOW_SLIP_YIELD * b,
-            c0_a=_LOW_SLIP_VISCOUS * a / v, c0_b=_LOW_SLIP_VISCOUS * b / v,
-            c1_a=_LOW_SLIP_DASHPOT * a / v, c1_b=_LOW_SLIP_DASHPOT * b / v,
-        )  # fmt: skip
+def _make_low_slip_start(coefficients: Array, space: SearchSpace) -> Coordinates:
+    """Return a start with the same peak forces in which the dashpot c1 carries most of the motion."""
+    peaks = _compute_peak_forces(coefficients, space)
+    viscous = _LOW_SLIP_VISCOUS * peaks / space.scales.velocity
+    return _make_coordinates(
+        coefficients,
+        space,
+        _LOW_SLIP_YIELD_DISPLACEMENT,
+        _LOW_SLIP_YIELD * peaks,
+        viscous,
+        _LOW_SLIP_DASHPOT_RATIO,
+    )
 
 
-def _regress_force(pieces: Sequence[Piece]) -> Array:
+def _compute_peak_forces(coefficients: Array, space: SearchSpace) -> Array:
+    """Return the forces [N] at the peak velocity, at the lowest and at the highest drive, (2,)."""
+    F_a, F_b, c0_a, c0_b, _, _ = coefficients
+    drives, velocity = np.array([space.lowest_drive, space.highest_drive]), space.scales.velocity
+    peaks = F_a + F_b * drives + (c0_a + c0_b * drives) * velocity
+    return np.asarray(np.maximum(peaks, _LEAST_SHARE * space.scales.force))
+
+
+def _make_coordinates(
+    coefficients: Array, space: SearchSpace, slip: float, yields: Array, c0: Array, dashpot_ratio: float
+) -> Coordinates:
+    """Return coordinates from the yield forces [N] and c0 [N s/m] at both ends of the drive range, (2,) each."""
+    F_a, F_b = space.fit_line(*yields)
+    c0_a, c0_b = space.fit_line(*c0)
+    stiffness, offset = coefficients[4:]
+    return Coordinates(
+        F_a=F_a, F_b=F_b, D_y=slip * space.scales.length,
+        rho=START_RHO, n=START_N, eta=START_FIELD_RATE * space.scales.rate,
+        c0_a=c0_a, c0_b=c0_b, c1_a=dashpot_ratio * c0_a, c1_b=dashpot_ratio * c0_b,
+        k0=(1 - ACCUMULATOR_SHARE) * stiffness, k1=ACCUMULATOR_SHARE * stiffness, f0=-offset,
+    )  # fmt: skip
+
+
+def _regress_force(pieces: Sequence[Piece], scales: RecordingScales) -> Array:
     """Return F_a, F_b, c0_a, c0_b, k0 + k1 and the force offset, (6,)."""
+    sliding = [_find_sliding_samples(p) for p in pieces]
+    settled = [s & _find_settled_samples(p, scales) for s, p in zip(sliding, pieces, strict=True)]
+    used = settled if sum(np.count_nonzero(s) for s in settled) >= _MIN_ROWS else sliding
     rows, forces = [], []
-    for p in pieces:
-        v, u = p.excitation.velocity, p.excitation.sampled_drive
-        fast = np.flatnonzero((np.abs(v) > _SLIDING_FRACTION * np.abs(v).max()) & (p.train > 0))
+    for p, mask in zip(pieces, used, strict=True):
+        fast = np.flatnonzero(mask)
         # Six coefficients need no more rows than these.
         fast = fast[:: max(1, len(fast) * len(pieces) // _MAX_ROWS)]
-        v, u, sign = v[fast], u[fast], np.sign(v[fast])
+        v, u = p.excitation.velocity[fast], p.excitation.sampled_drive[fast]
+        sign = np.sign(v)
         rows.append(
             np.column_stack([sign, u * sign, v, u * v, p.excitation.displacement[fast], np.ones(len(fast))])
         )
@@ -114,9 +144,14 @@ def _regress_force(pieces: Sequence[Piece]) -> Array:
     return coefficients
 
 
-def _compute_cost(problem: Problem, unknowns: Array) -> float:
-    """Return the sum of squared force errors [N²] over the fitted samples; infinite if unstable."""
-    forces = problem.simulate(unknowns)
-    errors = [((f - p.force) ** 2 * p.train).sum() for f, p in zip(forces, problem.pieces, strict=True)]
-    total = float(np.sum(errors))
-    return total if np.isfinite(total) else float("inf")
+def _find_sliding_samples(piece: Piece) -> BoolArray:
+    speed = np.abs(piece.excitation.velocity)
+    return np.asarray((speed > _SLIDING_FRACTION * np.quantile(speed, _PEAK_QUANTILE)) & (piece.train > 0))
+
+
+def _find_settled_samples(piece: Piece, scales: RecordingScales) -> BoolArray:
+    """Return where the field has followed the drive."""
+    drive = piece.excitation.sampled_drive
+    lag = min(round(_SETTLING / scales.rate * piece.excitation.rate), len(drive) - 1)
+    before = np.concatenate([np.full(lag, drive[0]), drive[: len(drive) - lag]])
+    return np.asarray(np.abs(drive - before) <= _DRIVE_CHANGE * np.ptp(drive))

@@ -1,7 +1,7 @@
 """Output-error fit: Levenberg-Marquardt on the simulated force, started from a regression.
 
 Steps are scaled as a whole. Unknowns that would leave their bounds are fixed at them, and the others are solved
-again. If the best minimum is above the noise floor, further starts are tried.
+again. If the best minimum is above the noise floor or at a bound, further starts are tried.
 """
 
 import itertools
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.fitting.initial_guess import draw_random_start, make_low_slip_points, make_starting_points
+from identification.fitting.initial_guess import draw_random_start, make_starting_points
 from identification.fitting.problem import Evaluation, Problem
 from identification.progress import Progress, ignore_progress
 from identification.threads import use_one_thread
@@ -32,8 +32,12 @@ _MIN_GAIN = 0.02
 
 A decrease of 0.02 is a seventh of a standard deviation.
 """
-_PREVIEW_RATE, _PREVIEW_SAMPLES = 250.0, 10_000
-"""Rate [Hz] and number of samples of the preview, a cheaper minimisation on decimated samples that comes first."""
+_PREVIEW_RATE, _PREVIEW_SAMPLES = 25.0, 10_000
+"""Sampling rate [units of the recording's rate] and number of samples of the preview.
+
+It is a cheaper minimisation on decimated samples that comes first."""
+_FIRST_STAGE = 12
+"""Largest number of steps in which the shape of the loop is held."""
 _DELAY_RELEASE = 0.1
 """Threshold on the expected relative decrease of the cost: below it, the delays are freed."""
 
@@ -85,17 +89,15 @@ def _search(problem: Problem, settings: OptimiserSettings, progress: Progress, s
     start_time = time.process_time()
     preview = _decimate_for_preview(problem)
     starts = make_starting_points(preview) if start is None else [start]
-    first = starts[0]
-    if start is None and preview is not problem:
-        first = minimise(preview, first, settings.iterations, progress).unknowns
+    first = _approach(preview, starts[0], settings.iterations, progress) if start is None else start
     best = minimise(problem, first, settings.iterations, progress)
-    restarts, agreeing = _generate_restarts(preview, starts, settings.seed), 0
-    for _ in range(settings.restarts):
+    agreeing = 0
+    for other_start in itertools.islice(_generate_restarts(preview, starts, settings.seed), settings.restarts):
         is_late = settings.budget is not None and time.process_time() - start_time > settings.budget
-        is_at_floor = best.evaluation.cost / problem.samples < _FLOOR_RATIO
-        if is_late or is_at_floor or agreeing >= _MIN_AGREEING:
+        if is_late or _is_conclusive(problem, best) or agreeing >= _MIN_AGREEING:
             break
-        other = minimise(problem, next(restarts), settings.iterations, progress)
+        approached = _approach(preview, other_start, settings.iterations, progress)
+        other = minimise(problem, approached, settings.iterations, progress)
         change = other.evaluation.cost / best.evaluation.cost - 1.0
         agreeing += abs(change) < _SAME_COST
         if change < 0.0:
@@ -103,13 +105,31 @@ def _search(problem: Problem, settings: OptimiserSettings, progress: Progress, s
     return best
 
 
+def _is_conclusive(problem: Problem, minimum: Minimum) -> bool:
+    """Return whether a minimum is at the noise floor with every coordinate within its bounds.
+
+    A wrong minimum may reach the floor of few samples, but its coordinates then run into bounds.
+    """
+    coordinates = problem.layout.coordinates
+    interior = problem.find_interior(minimum.unknowns)[coordinates] | ~problem.free_mask[coordinates]
+    return minimum.evaluation.cost / problem.samples < _FLOOR_RATIO and bool(interior.all())
+
+
+def _approach(preview: Problem, start: Array, iterations: int, progress: Progress) -> Array:
+    """Return the unknowns (U,) of a start's minimum on the preview.
+
+    The first steps hold the shape of the loop and the rate of the field, which cannot be found while the forces
+    are wrong.
+    """
+    shape = np.zeros(len(start), bool)
+    shape[preview.layout.coordinates] = preview.space.shape_mask
+    near = minimise(preview, start, min(_FIRST_STAGE, iterations), progress, held=shape)
+    return minimise(preview, near.unknowns, iterations, progress).unknowns
+
+
 def _generate_restarts(problem: Problem, starts: list[Array], seed: int) -> Iterator[Array]:
-    """Yield low-slip and remaining starts in turn, then random ones."""
-    if len(starts) > 1:
-        low_slip = make_low_slip_points(problem)
-        yield low_slip[0]
-        for pair in zip(starts[1:], low_slip[1:], strict=True):
-            yield from pair
+    """Yield the further starts, then random ones."""
+    yield from starts[1:]
     for number in itertools.count(seed):
         yield draw_random_start(problem, starts[0], _SCATTER_FACTOR, number)
 
@@ -117,15 +137,27 @@ def _generate_restarts(problem: Problem, starts: list[Array], seed: int) -> Iter
 def _decimate_for_preview(problem: Problem) -> Problem:
     """Return the problem on fewer samples, or the problem itself if it has few."""
     rate = max(p.excitation.rate for p in problem.pieces)
-    factor = int(min(rate / _PREVIEW_RATE, problem.samples / _PREVIEW_SAMPLES))
+    lowest = _PREVIEW_RATE * problem.space.scales.rate
+    factor = int(min(rate / lowest, problem.samples / _PREVIEW_SAMPLES))
     return problem.decimate(factor) if factor > 1 else problem
 
 
-def minimise(problem: Problem, start: Array, iterations: int, progress: Progress) -> Minimum:
-    """Minimise the cost by Levenberg-Marquardt from one start; the delays are fixed far from the minimum."""
+def minimise(
+    problem: Problem, start: Array, iterations: int, progress: Progress, held: BoolArray | None = None
+) -> Minimum:
+    """Minimise the cost by Levenberg-Marquardt from one start; the delays are fixed far from the minimum.
+
+    Args:
+        problem: the least-squares problem.
+        start: starting point (U,).
+        iterations: largest number of steps.
+        progress: receives every step.
+        held: (U,) True for unknowns that stay at the start; None for none.
+    """
     unknowns, here = start, problem.evaluate(start)
     damping, scale = 1e-2, np.zeros(len(start))
-    free = problem.free_mask & ~problem.delay_mask
+    allowed = problem.free_mask if held is None else problem.free_mask & ~held
+    free = allowed & ~problem.delay_mask
     for iteration in range(iterations):
         # Largest curvature so far (Moré 1978): it bounds the step of an unknown that has lost its influence.
         scale = np.maximum(scale, np.diag(here.hessian))
@@ -133,9 +165,9 @@ def minimise(problem: Problem, start: Array, iterations: int, progress: Progress
         gain = -float(2.0 * here.gradient @ step + step @ here.hessian @ step)
         small = _MIN_GAIN * max(1.0, here.cost / problem.samples)
         if gain < (small if free[problem.delay_mask].any() else _DELAY_RELEASE * here.cost):
-            if (free == problem.free_mask).all():
+            if (free == allowed).all():
                 return Minimum(unknowns, here, iteration, converged=True)
-            free = problem.free_mask
+            free = allowed
             continue
         there = problem.evaluate(unknowns + step)
         if there.cost < here.cost:

@@ -20,10 +20,8 @@ from identification.fitting.search_space import SearchSpace
 from identification.fitting.unknown_layout import COMMON_COUNT, COORDINATE_COUNT, UnknownLayout
 from identification.simulate import SENSITIVITY_COLUMNS, ActiveEffect, SimulationModel
 
-Y0_SCALE = 1e-3
-"""Inner displacement [m] of one unit of a y(0) unknown."""
 _Y0_PRIOR = 1.0
-"""Standard deviation of y(0) about the middle of the motion, in half strokes."""
+"""Standard deviation of y(0) about the middle of the motion, in units of the length."""
 _BOUND_TOLERANCE = 1e-9
 """Distance from a bound, in search coordinates, within which an unknown is at it."""
 _EFFECT_STEP_SCALE = 10.0
@@ -74,6 +72,11 @@ class Problem:
         return int(sum(p.train.sum() for p in self.pieces))
 
     @property
+    def y0_scale(self) -> float:
+        """Inner displacement of one unit of a y(0) unknown [m]."""
+        return self.space.scales.length
+
+    @property
     def free_mask(self) -> BoolArray:
         """(U,) True where an unknown is free."""
         mask = np.ones(self.layout.size, bool)
@@ -108,7 +111,7 @@ class Problem:
         """Return unknowns (U,) at coordinates, with y(0) in the middle of the motion and effects at a start."""
         unknowns = np.zeros(self.layout.size)
         unknowns[self.layout.coordinates] = self.space.to_search(coordinates)
-        unknowns[self.layout.y0] = [p.excitation.displacement.mean() / Y0_SCALE for p in self.pieces]
+        unknowns[self.layout.y0] = [p.excitation.displacement.mean() / self.y0_scale for p in self.pieces]
         for effect, columns in self.iterate_effects():
             unknowns[columns] = effect.to_search(effect.form.starts[0])
         return unknowns
@@ -195,7 +198,7 @@ class Problem:
         force_delay, drive_delay = self.compute_residual_delays(unknowns)
         return SimulationModel(
             self.space.to_coordinates(unknowns[self.layout.coordinates]),
-            y0=float(unknowns[self.layout.y0][piece]) * Y0_SCALE,
+            y0=float(unknowns[self.layout.y0][piece]) * self.y0_scale,
             force_delay=p.force_delay + force_delay,
             drive_delay=p.drive_delay + drive_delay,
             effects=self.make_active_effects(unknowns),
@@ -241,12 +244,11 @@ class Problem:
 
     def _compute_priors(self) -> tuple[Array, Array]:
         """Return centre and weight (U,) of the priors; a weight of zero means none."""
-        half_stroke = max(float(np.ptp(p.excitation.displacement)) for p in self.pieces) / 2.0
         means = np.array([p.excitation.displacement.mean() for p in self.pieces])
         centre, weight = np.zeros(self.layout.size), np.zeros(self.layout.size)
         weight[self.layout.delays] = 1.0
-        centre[self.layout.y0] = means / Y0_SCALE
-        weight[self.layout.y0] = Y0_SCALE / (_Y0_PRIOR * half_stroke)
+        centre[self.layout.y0] = means / self.y0_scale
+        weight[self.layout.y0] = 1.0 / _Y0_PRIOR
         weight[self.layout.per_log] = 1.0
         return centre, weight
 
@@ -263,7 +265,7 @@ class Problem:
         D[layout.coordinates, layout.coordinates] = self.space.differentiate(unknowns[layout.coordinates])
         D[SENSITIVITY_COLUMNS.index("force_delay"), COORDINATE_COUNT] = self.delay_prior
         D[SENSITIVITY_COLUMNS.index("drive_delay"), COORDINATE_COUNT + 1] = self.delay_prior
-        D[SENSITIVITY_COLUMNS.index("y0"), COMMON_COUNT] = Y0_SCALE
+        D[SENSITIVITY_COLUMNS.index("y0"), COMMON_COUNT] = self.y0_scale
         D[len(SENSITIVITY_COLUMNS) :, effects] = np.diag(self.differentiate_effects(unknowns))
         if columns := self._find_log_columns(piece):
             log_columns = [column - layout.per_log.start for column in columns]

@@ -77,6 +77,7 @@ def _find_frequency(fits: Sequence[WindowFit], remainders: Sequence[Array], rate
         return None
     resolution = rate / len(series)
     grid = frequency[strongest] + resolution * np.linspace(-1.0, 1.0, 2 * _PADDING_FACTOR + 1)
+    grid = grid[_measure_gain(fits, grid, rate) > _MIN_GAIN]
     return float(grid[np.argmax([_measure_explained(fits, remainders, f / rate) for f in grid])])
 
 

@@ -11,9 +11,11 @@ from identification.fitting import (
     Dataset,
     Piece,
     Problem,
+    RecordingScales,
     SearchSpace,
     assemble,
-    estimate_sliding_damping,
+    estimate_least_damping,
+    measure_scales,
 )
 from identification.logs import Recording, Stretch
 from identification.pipeline.fit_request import FitRequest
@@ -66,18 +68,19 @@ def make_problem(dataset: Dataset, delay_prior: float | None = None) -> Problem:
     limit = np.inf if delay_prior is None else DELAY_LIMIT
     prior = dataset.delay_prior if delay_prior is None else delay_prior
     pieces = tuple(p for p in dataset.pieces if p.train.any())
-    space = SearchSpace(*_find_drive_range(drives), lowest_k0=_find_lowest_k0(pieces))
+    scales = measure_scales(pieces)
+    space = SearchSpace(*_find_drive_range(drives), scales, lowest_k0=_find_lowest_k0(pieces, scales))
     # Delays are counted in deviations of their prior, so a prior of zero would leave them without a unit.
     return Problem(pieces, space, dataset.floor.noise, max(prior, 1e-9), delay_limit=limit)
 
 
-def _find_lowest_k0(pieces: Sequence[Piece]) -> float:
+def _find_lowest_k0(pieces: Sequence[Piece], scales: RecordingScales) -> float:
     """Return the stiffness [N/m] at which the inner displacement grows by e^3 in the longest stretch.
 
     Its time constant is (c0 + c1) / k0. A more negative k0 fits a drift and makes the simulation diverge.
     """
     longest = max(len(p.force) / p.excitation.rate for p in pieces)
-    return -_MAX_GROWTH * estimate_sliding_damping(pieces) / longest
+    return -_MAX_GROWTH * estimate_least_damping(pieces, scales) / longest
 
 
 def _find_drive_range(drives: Array) -> tuple[float, float]:

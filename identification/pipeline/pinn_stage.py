@@ -14,7 +14,7 @@ import numpy as np
 from identification.damper import Coordinates
 from identification.documents import FitStage, SplitErrors
 from identification.errors import IdentificationError
-from identification.fitting import COORDINATE_COUNT, Y0_SCALE, Minimum, Problem, predict_piece
+from identification.fitting import COORDINATE_COUNT, Minimum, Problem, predict_piece
 from identification.logs import Stretch
 from identification.progress import Progress
 from identification.uncertainty import (
@@ -140,7 +140,7 @@ def make_minimum(problem: Problem, network: "PinnResult") -> tuple[Minimum, Cova
     unknowns[problem.shared_columns] = network.unknowns
     pieces = [problem.get_piece(unknowns, i) for i in range(len(problem.pieces))]
     y0 = [predict_piece(p, network.coordinates, network.delays, effects=network.effects).y0 for p in pieces]
-    unknowns[problem.layout.y0] = np.array(y0) / Y0_SCALE
+    unknowns[problem.layout.y0] = np.array(y0) / problem.y0_scale
     minimum = Minimum(unknowns, problem.evaluate(unknowns), network.steps, converged=network.accepted)
     covariance = np.zeros((len(unknowns), len(unknowns)))
     if network.covariance is not None:

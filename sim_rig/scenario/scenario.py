@@ -186,7 +186,7 @@ def _check_effect(effect: ActiveEffect) -> None:
 def _check_bounds(quantities: Iterable[Quantity], values: dict[str, float], prefix: str = "") -> None:
     for q in quantities:
         # Coordinates are computed, so rounding may put one that is at its bound slightly beyond it.
-        value, rounding = values[q.symbol], 1e-9 * (abs(q.low) + abs(q.high))
+        value, rounding = values[q.symbol], 1e-9 * (abs(values[q.symbol]) + q.scale)
         if not q.low - rounding <= value <= q.high + rounding:
             unit = "" if q.unit == "1" else f" {q.format_unit('drive')}"
             raise ValueError(

@@ -6,11 +6,13 @@ from identification.damper.coordinates import to_coordinates
 from identification.damper.parameter_sets import find_parameter_set
 from identification.fitting.piece import Piece
 from identification.fitting.problem import Problem
+from identification.fitting.recording_scales import RecordingScales
 from identification.fitting.search_space import SearchSpace
 from identification.simulate import Excitation, SimulationModel, simulate
 
 LABORATORY = to_coordinates(find_parameter_set("laboratory").parameters)
 RATE, NOISE = 1000.0, 2.5
+SCALES = RecordingScales(force=200.0, length=0.01, velocity=0.1, sampling_rate=RATE)
 LEVELS = (0.0, 0.3, 0.1, 0.5, 0.2, 0.4)
 
 
@@ -29,7 +31,7 @@ def recorded(c, stroke, seed, noise=NOISE):
 
 def problem_of(c, strokes, seed=0, drives=(0.0, 0.5), prior=20e-6):
     pieces = [Piece(f"s{i}", s, recorded(c, s, seed + i), np.ones(len(s.drive))) for i, s in enumerate(strokes)]
-    return Problem(tuple(pieces), SearchSpace(*drives), NOISE, prior)
+    return Problem(tuple(pieces), SearchSpace(*drives, SCALES), NOISE, prior)
 
 
 STROKES = [sine(0.005, 2.5), sine(0.010, 1.0), sine(0.015, 2.0)]

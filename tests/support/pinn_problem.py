@@ -9,6 +9,7 @@ from identification.damper.parameter_sets import find_parameter_set
 from identification.fitting.force_channel import LowPass
 from identification.fitting.piece import Piece
 from identification.fitting.problem import Problem
+from identification.fitting.recording_scales import measure_scales
 from identification.fitting.search_space import SearchSpace
 from identification.logs import ChannelFilter
 from identification.pinn.common.initialisation import InitialStates
@@ -33,7 +34,7 @@ def make_problem(levels=(0.0, 0.3, 0.5), seconds=1.5, seed=1, low_pass=False, pi
     """
     made = [_make_piece(levels, seconds, seed + k, low_pass, effects) for k in range(pieces)]
     noise = 0.01 * float(np.std(made[0].force))
-    return Problem(tuple(made), SearchSpace(min(levels), max(levels)), noise, 1e-4)
+    return Problem(tuple(made), SearchSpace(min(levels), max(levels), measure_scales(made)), noise, 1e-4)
 
 
 def _make_piece(levels, seconds, seed, low_pass, effects) -> Piece:

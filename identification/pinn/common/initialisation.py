@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from identification.arrays import Array
 from identification.damper import Coordinates
-from identification.fitting import ACCUMULATOR_SHARE, START_ETA, START_N, START_RHO, Problem
+from identification.fitting import ACCUMULATOR_SHARE, START_FIELD_RATE, START_N, START_RHO, Problem
 from identification.pinn.common.reversals import find_turning_points
 from identification.pinn.common.states import SlipVelocity, States
 from identification.pinn.common.training_pieces import TrainingPiece
@@ -192,16 +192,10 @@ def _measure_slips(hysteretic: Array, slip: Array) -> list[float]:
 
 
 def _make_coordinates(problem: Problem, damper: MemorylessDamper, slip: float) -> Coordinates:
-    low, high = problem.space.lowest_drive, problem.space.highest_drive
-
-    def fit_line(pair: tuple[float, float]) -> tuple[float, float]:
-        slope = 0.0 if problem.space.has_one_drive else (pair[1] - pair[0]) / (high - low)
-        return pair[0] - slope * low, slope
-
-    F, c0, c1 = (fit_line(pair) for pair in (damper.yield_force, damper.c0, damper.c1))
+    F, c0, c1 = (problem.space.fit_line(*pair) for pair in (damper.yield_force, damper.c0, damper.c1))
     k1 = ACCUMULATOR_SHARE * damper.stiffness
     return Coordinates(
-        F_a=F[0], F_b=F[1], D_y=slip, rho=START_RHO, n=START_N, eta=START_ETA,
+        F_a=F[0], F_b=F[1], D_y=slip, rho=START_RHO, n=START_N, eta=START_FIELD_RATE * problem.space.scales.rate,
         c0_a=c0[0], c0_b=c0[1], c1_a=c1[0], c1_b=c1[1],
         k0=damper.stiffness - k1, k1=k1, f0=damper.preload,
     )  # fmt: skip

@@ -23,6 +23,7 @@ from identification.gap.selection import Posterior
 from identification.gap.selection.screening import list_effect_models, screen
 from identification.simulate import Excitation, SimulationModel, simulate
 from tests.support.effects import LABORATORY, MEDIUM, active, sine
+from tests.support.fit_problems import SCALES
 from tests.support.gaps import GAP
 from tests.support.sensitivities import compute_worst_error
 
@@ -51,7 +52,7 @@ def record(name: str) -> Problem:
         excitation = Excitation(RATE, x, v, -(w**2) * x, drive, start=start, power=power)
         piece = Piece(f"{frequency:g} Hz", excitation, np.zeros(len(t)), np.ones(len(t)))
         pieces.append(replace(piece, force=piece.simulate(model)[0]))
-    return Problem(tuple(pieces), SearchSpace(0.0, 0.5), NOISE, 2e-5)
+    return Problem(tuple(pieces), SearchSpace(0.0, 0.5, SCALES), NOISE, 2e-5)
 
 
 @cache

@@ -22,6 +22,7 @@ from identification.predict.predict import predict_log
 from identification.signals.motion import estimate_recorded_noise
 from identification.simulate import Excitation
 from identification.uncertainty.input_noise import remove_bias, replace_motion, resample_input_noise
+from tests.support.fit_problems import SCALES
 from tests.support.laboratory import FAST, LABORATORY, NOISE, RATE, SLOW, recording, stretch
 
 FILTER = ChannelFilter("butterworth", 2, 300.0)
@@ -155,7 +156,7 @@ def test_a_filter_on_a_finer_grid_keeps_a_steady_force_and_rounds_a_step():
 
 def test_displacement_noise_adds_to_the_uncertainty():
     assembled = assemble([recording(FAST)])
-    problem = Problem(assembled.pieces, SearchSpace(0.0, 0.5), NOISE, 20e-6)
+    problem = Problem(assembled.pieces, SearchSpace(0.0, 0.5, SCALES), NOISE, 20e-6)
     minimum = fit_output_error(problem)
     quiet = replace(FAST, displacement=np.array(assembled.pieces[0].excitation.displacement))
     noisy = resample_input_noise(problem, [FAST], minimum, 1).scatter
@@ -168,7 +169,7 @@ def test_the_bias_of_input_noise_is_that_of_many_fits_to_noisy_motions():
     loud = replace(
         FAST, displacement=FAST.displacement + 8e-6 * np.random.default_rng(5).standard_normal(len(FAST.time))
     )
-    problem = Problem(assemble([recording(loud)]).pieces, SearchSpace(0.0, 0.5), NOISE, 20e-6)
+    problem = Problem(assemble([recording(loud)]).pieces, SearchSpace(0.0, 0.5, SCALES), NOISE, 20e-6)
     minimum = fit_output_error(problem)
     input_noise = resample_input_noise(problem, [loud], minimum, 1)
     force, motion = problem.simulate(minimum.unknowns)[0], problem.pieces[0].excitation.displacement
@@ -192,7 +193,7 @@ def test_noise_of_the_measured_drive_adds_to_the_uncertainty_of_the_yield_force(
     noisy = replace(quiet, drive=FAST.drive + 3e-3 * random.standard_normal(len(FAST.drive)))
     scatter = []
     for noised in (quiet, noisy):
-        problem = Problem(assemble([recording(noised)]).pieces, SearchSpace(0.0, 0.5), NOISE, 20e-6)
+        problem = Problem(assemble([recording(noised)]).pieces, SearchSpace(0.0, 0.5, SCALES), NOISE, 20e-6)
         scatter.append(resample_input_noise(problem, [noised], fit_output_error(problem), 1).scatter)
     assert scatter[1][0, 0] > 1.5 * scatter[0][0, 0]
 

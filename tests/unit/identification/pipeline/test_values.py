@@ -12,13 +12,13 @@ from identification.fitting.output_error import (
 from identification.pipeline.fit_document import FitResult, _describe_result
 from identification.pipeline.fit_input import _find_drive_range, _find_lowest_k0, make_problem
 from identification.pipeline.fit_request import FitRequest
-from tests.support.fit_problems import SHORT, SLIDING, linear_force, piece_of
+from tests.support.fit_problems import SCALES, SHORT, SLIDING, linear_force, piece_of
 
 
 def test_the_lowest_k0_lets_y_grow_by_e_cubed_in_the_longest_stretch():
-    assert _find_lowest_k0(SLIDING) == pytest.approx(-3.0 * 7800.0 / 6.0)
+    assert _find_lowest_k0(SLIDING, SCALES) == pytest.approx(-3.0 * 600.0 / 6.0)
     shorter = piece_of(SHORT, linear_force(SHORT))
-    assert _find_lowest_k0([*SLIDING, shorter]) == pytest.approx(-3.0 * 7800.0 / 6.0, rel=1e-3)
+    assert _find_lowest_k0([*SLIDING, shorter], SCALES) == pytest.approx(-3.0 * 600.0 / 6.0, rel=1e-3)
 
 
 def test_overshoots_do_not_widen_the_range_of_drives():

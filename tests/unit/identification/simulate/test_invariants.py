@@ -7,8 +7,9 @@ import pytest
 from scipy.integrate import trapezoid
 
 from identification.arrays import Array
-from identification.damper import COORDINATES, Coordinates
+from identification.damper import Coordinates
 from identification.simulate import ActiveEffect, Excitation, Response, SimulationModel, simulate
+from tests.support.damper_box import LABORATORY_BOX
 from tests.support.effects import LABORATORY, active
 
 DRIVE = 0.3
@@ -42,9 +43,9 @@ def one_way(rate: float) -> Excitation:
 
 def draw_passive(random: np.random.Generator) -> Coordinates:
     """Draw coordinates whose elements all dissipate: no negative spring, and gamma not below the size of beta."""
-    values = {q.symbol: random.uniform(q.low, q.high) for q in COORDINATES}
+    values = {q.symbol: random.uniform(q.low, q.high) for q in LABORATORY_BOX}
     values |= {
-        q.symbol: float(np.exp(random.uniform(np.log(q.low), np.log(q.high)))) for q in COORDINATES if q.low > 0
+        q.symbol: float(np.exp(random.uniform(np.log(q.low), np.log(q.high)))) for q in LABORATORY_BOX if q.low > 0
     }
     values |= {"c0_b": 0.0, "c1_b": 0.0, "k0": abs(values["k0"]), "rho": min(values["rho"], 0.5)}
     return Coordinates(**values)

@@ -7,10 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from identification.damper import law
-from identification.damper.coordinates import COORDINATES, Coordinates, to_coordinates
+from identification.damper.coordinates import Coordinates, to_coordinates
 from identification.damper.effects import EFFECTS
 from identification.damper.parameter_sets import find_parameter_set
 from identification.simulate import SENSITIVITY_COLUMNS, ActiveEffect, Excitation, SimulationModel, simulate
+from tests.support.damper_box import LABORATORY_BOX
 from tests.support.sensitivities import compare_sensitivities
 
 LABORATORY = to_coordinates(find_parameter_set("laboratory").parameters)
@@ -85,7 +86,7 @@ def test_every_corner_of_the_search_bounds_gives_a_finite_force():
     random = np.random.default_rng(7)
     stroke = sine(seconds=1.0)
     for _ in range(200):
-        corner = {q.symbol: random.choice([q.low, q.high]) for q in COORDINATES}
+        corner = {q.symbol: random.choice([q.low, q.high]) for q in LABORATORY_BOX}
         corner |= {"c0_b": 0.0, "c1_b": 0.0, "k0": abs(corner["k0"])}
         found = simulate(SimulationModel(Coordinates(**corner)), stroke, sensitivities=True)
         assert np.isfinite(found.force).all()
@@ -98,9 +99,9 @@ def test_force_is_accurate_for_random_dampers_all_over_the_search_bounds():
     stroke = sine(0.01, 2.0, 2.0)
     finest = np.full(len(stroke.drive) - 1, 250, np.uint8)
     for _ in range(60):
-        values = {q.symbol: random.uniform(q.low, q.high) for q in COORDINATES}
+        values = {q.symbol: random.uniform(q.low, q.high) for q in LABORATORY_BOX}
         values |= {
-            q.symbol: np.exp(random.uniform(np.log(q.low), np.log(q.high))) for q in COORDINATES if q.low > 0
+            q.symbol: np.exp(random.uniform(np.log(q.low), np.log(q.high))) for q in LABORATORY_BOX if q.low > 0
         }
         slopes = {"c0_b": values["c0_a"], "c1_b": values["c1_a"]}
         values |= {name: random.uniform(-1.8, 4.0) * base for name, base in slopes.items()}

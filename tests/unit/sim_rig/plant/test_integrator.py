@@ -2,12 +2,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification.damper.coordinates import COORDINATES, Coordinates, to_parameters
+from identification.damper.coordinates import Coordinates, to_parameters
 from sim_rig.errors import PlantError
 from sim_rig.plant.derivatives import compute_rates
 from sim_rig.plant.jit import identity, no_force, rigid_mounting, unit_scale
 from sim_rig.plant.plant import Plant
 from sim_rig.plant.states import STATE_COUNT
+from tests.support.damper_box import LABORATORY_BOX
 
 
 def reference_force(plant: Plant, dt: float, command, drive):
@@ -40,7 +41,7 @@ def test_force_agrees_with_a_tight_scipy_solution(varied, name):
 def draw_coordinates(random: np.random.Generator) -> Coordinates:
     """Draw a damper anywhere in the search box, half of its coordinates on a bound, with positive c0 and c1."""
     spread = {}
-    for q in COORDINATES:
+    for q in LABORATORY_BOX:
         inside = (
             np.exp(random.uniform(np.log(q.low), np.log(q.high))) if q.low > 0 else random.uniform(q.low, q.high)
         )

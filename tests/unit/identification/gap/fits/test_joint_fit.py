@@ -11,6 +11,7 @@ from identification.gap.selection.screening import list_effect_models, screen
 from identification.pipeline import make_problem
 from identification.simulate import Excitation, SimulationModel, simulate
 from tests.support.effects import LABORATORY, MEDIUM, active
+from tests.support.fit_problems import SCALES
 from tests.support.runs import run
 
 NOISE = 2.0
@@ -45,7 +46,7 @@ def simulate_problem(*names, seed=1):
         train = np.ones(len(force))
         train[:20] = 0.0
         pieces.append(Piece(f"stroke {k}", stroke, force + NOISE * random.standard_normal(len(force)), train))
-    return Problem(tuple(pieces), SearchSpace(0.0, 0.5), NOISE, 2e-5)
+    return Problem(tuple(pieces), SearchSpace(0.0, 0.5, SCALES), NOISE, 2e-5)
 
 
 @pytest.fixture(scope="module")

@@ -54,6 +54,13 @@ def test_a_rate_that_cannot_show_the_mains_has_no_line():
     assert find(lambda t: 2.0 * np.sin(2.0 * np.pi * 50.8 * t), rate=123.0) is None
 
 
+def test_a_line_near_half_the_sampling_rate_stays_where_it_can_be_seen():
+    """The frequency of this line is refined to one that the fits remove."""
+    found = find(lambda t: 2.0 * np.sin(2.0 * np.pi * 61.8 * t), rate=124.5)
+    assert found.frequency == pytest.approx(61.8, abs=0.05)
+    assert np.isfinite(np.concatenate(found.remainders)).all()
+
+
 def test_no_window_has_no_line():
     assert find_mains_line([], [], RATE) is None
 

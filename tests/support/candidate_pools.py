@@ -65,6 +65,11 @@ class WatchedPool(CandidatePool):
     fitted: list[tuple[EffectModel, ...]] = field(default_factory=list)
     starts: list[Sequence[Array]] = field(default_factory=list)
 
+    def fit_law(self) -> Candidate:
+        self.fitted.append(())
+        self.starts.append(())
+        return super().fit_law()
+
     def fit(
         self, effects: tuple[EffectModel, ...], starts: Sequence[Array] = (), options: FitOptions = QUICK_FIT
     ) -> Candidate:
@@ -110,5 +115,5 @@ def make_pool(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:
 def fit_baseline(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:
     """Return a pool of a short recording with the fit of the law alone."""
     pool = make_pool(*effects, **settings)
-    pool.fit((), options=BASELINE_FIT)
+    pool.fit_law()
     return pool.copy()

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from identification.arrays import Array
-from identification.fitting import EffectModel, Problem, make_starting_points
+from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, make_starting_points
 from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import Candidate, FitOptions, JointFit, fit_jointly, refit_all_samples
 from identification.gap.noise import NoiseModel, find_mains_frequency
@@ -27,6 +27,10 @@ _CHANCE_DEVIATIONS = 2.0
 """Standard deviations of a sample variance that count as chance."""
 QUICK_FIT = FitOptions(decimation=1, starts=0, descents=1, iterations=25, regression_start=False, refit_full=False)
 """One descent from the best of the given starts, on decimated data."""
+
+
+_LAW_FIT = OptimiserSettings(iterations=40, restarts=1)
+"""Fit of the law alone: from the regression and, if its minimum is not conclusive, from the low-slip start."""
 
 
 @dataclass
@@ -118,6 +122,15 @@ class CandidatePool:
         return compute_posterior(
             self.collect_evidence(), self.full_problem.samples, self.noise_model.estimate.coloured_share
         )
+
+    def fit_law(self) -> Candidate:
+        """Fit the law alone on decimated data, by the search of an identification, and keep it as the baseline."""
+        self.fit_count += 1
+        problem = self.decimated_problem.replace_effects(())
+        candidate = self._evaluate(JointFit(problem, fit_output_error(problem, _LAW_FIT)))
+        self.progress("law alone", candidate.held_out_rmse)
+        self.candidates[candidate.names] = candidate
+        return candidate
 
     def fit(
         self, effects: tuple[EffectModel, ...], starts: Sequence[Array] = (), options: FitOptions = QUICK_FIT

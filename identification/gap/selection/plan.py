@@ -5,7 +5,7 @@ best sets grow by a second and a third effect. Then each effect of a set is left
 in its place. All of this uses decimated data. Finally the most probable sets are fitted on all samples.
 """
 
-from identification.gap.fits import Candidate, FitOptions
+from identification.gap.fits import Candidate
 from identification.gap.noise import describe_drift_explanation, subtract_clock_drift
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
@@ -20,12 +20,10 @@ from identification.gap.selection.posterior import (
 )
 from identification.gap.selection.screening import MOUNTING_EFFECTS, compute_expected_gain, select_shortlist
 
-_BASELINE_FIT = FitOptions(decimation=1, starts=1, descents=1, iterations=40, refit_full=False)
-
 
 def search_forward(pool: CandidatePool) -> None:
     """Fit the promising sets of effects on decimated data."""
-    baseline = pool.fit((), options=_BASELINE_FIT)
+    baseline = pool.fit_law()
     pool.noise_model.update(baseline, pool.full_problem, pool.evaluation)
     if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
         return

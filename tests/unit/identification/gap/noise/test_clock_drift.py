@@ -10,7 +10,6 @@ from identification.fitting.dataset import assemble
 from identification.gap.diagnosis import diagnose, make_candidate_pool, prepare_recordings
 from identification.gap.noise.clock_drift import describe_drift_explanation, subtract_clock_drift
 from identification.gap.selection import SearchSettings
-from tests.support.candidate_pools import BASELINE_FIT
 from tests.support.runs import NOISE, run, stiffening
 
 CLOCK_ERROR = 2e-4
@@ -38,7 +37,7 @@ def test_the_clock_deviation_comes_from_the_log():
 def subtract_drift(recording):
     """Excess [N²] of the law before and after the correction, and the drift [s]."""
     pool = make_candidate_pool(prepare_recordings([recording]))
-    baseline = pool.fit((), options=BASELINE_FIT)
+    baseline = pool.fit_law()
     corrected, drift = subtract_clock_drift(baseline, pool.full_problem, pool.evaluation, CLOCK_ERROR)
     return baseline.train_rmse**2 - NOISE**2, corrected.train_rmse**2 - NOISE**2, drift
 

@@ -48,7 +48,7 @@ def test_progress_names_the_effects_and_the_held_out_error(gas):
     reports = []
     pool = gas.copy()
     pool.progress = lambda message, error: reports.append((message, error))
-    pool.fit((), options=BASELINE_FIT)
+    pool.fit_law()
     candidate = pool.fit(SPRING, [pool.candidates[GAS].fit.minimum.unknowns])
     assert [message for message, _ in reports] == ["law alone", "gas_spring"]
     assert reports[1][1] == pytest.approx(candidate.held_out_rmse, rel=1e-3)

@@ -1,10 +1,11 @@
 """Verdicts on recordings without any effect, with force noise of several spectra.
 
-    python -m benchmarks.accuracy.null_verdicts [--recordings 10] [--seed 1] [--out PAGE.md]
+    python -m benchmarks.accuracy.null_verdicts [--recordings 10] [--seed 1] [--cases 20] [--out PAGE.md]
 
 Each recording is of a random laboratory damper: three strokes at four drives and 1 kHz. Its noise is 1 % of the
 force's standard deviation. The force has a resolution of half the noise, the displacement noise of 2 µm and a
-resolution of 1 µm. Every verdict other than `no_gap` is wrong.
+resolution of 1 µm. Dampers of other sizes make the same strokes in their own units. Every verdict other than
+`no_gap` is wrong.
 """
 
 import argparse
@@ -16,8 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.accuracy.noise_floor import SIZES, Size, draw_damper
 from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, print_table, round_to
-from benchmarks.speed import draw_damper
+from benchmarks.speed import draw_damper as draw_laboratory_damper
 from identification.arrays import Array
 from identification.gap import diagnose
 from identification.logs import Recording, Segment
@@ -44,49 +46,75 @@ class Result(NamedTuple):
     """Error of the law on held-out strokes over the stated noise floor [1]."""
 
 
+class Condition(NamedTuple):
+    """Noise and size of a row of recordings."""
+
+    spectrum: str = "white"
+    size: Size | None = None
+    """Class of random dampers; None for laboratory dampers."""
+
+
+CONDITIONS = {
+    **{name: Condition(name) for name in SPECTRA},
+    **{f"white, {size.name}": Condition(size=size) for size in SIZES},
+}
+"""Rows of the table by name."""
+
+
 def try_null(job: tuple[str, int]) -> Result:
     """Record and diagnose one damper without any effect."""
     name, seed = job
-    random = np.random.default_rng([seed, sorted(SPECTRA).index(name)])
-    diagnosis = diagnose([record(name, seed, random)]).diagnosis
+    condition = CONDITIONS[name]
+    row = [sorted(SPECTRA).index(condition.spectrum), *([SIZES.index(condition.size)] if condition.size else [])]
+    diagnosis = diagnose([record(condition, seed, np.random.default_rng([seed, *row]))]).diagnosis
     gap = diagnosis.gap
     return Result(diagnosis.verdict, tuple(e.name for e in diagnosis.effects), gap.before_n / gap.noise_floor_n)
 
 
-def record(name: str, seed: int, random: np.random.Generator) -> Recording:
-    """Return a recording of a random damper with noise of one spectrum."""
-    x, drive, segments = make_strokes()
-    velocity = np.gradient(x) * RATE
-    stroke = Excitation(RATE, x, velocity, np.gradient(velocity) * RATE, drive)
-    clean = simulate(SimulationModel(draw_damper(seed)), stroke, max_travel=0.005).force
-    noise = draw_noise(name, len(x), RATE, random)
+def record(condition: Condition, seed: int, random: np.random.Generator) -> Recording:
+    """Return a recording of a random damper.
+
+    A larger damper makes the same strokes in its own units of length, time and drive.
+    """
+    size = condition.size
+    length, rate, drive_factor, damper = 1.0, RATE, 1.0, draw_laboratory_damper(seed)
+    if size:
+        length, drive_factor = size.amplitude / STROKES[0][0], size.highest_drive / max(DRIVES)
+        rate = RATE * size.frequencies[1] / STROKES[2][1]
+        damper = draw_damper(random, size)
+    x, drive, segments = make_strokes(length, rate, drive_factor)
+    velocity = np.gradient(x) * rate
+    stroke = Excitation(rate, x, velocity, np.gradient(velocity) * rate, drive)
+    clean = simulate(SimulationModel(damper), stroke, max_travel=0.005).force
+    noise = draw_noise(condition.spectrum, len(x), rate, random)
     deviation = RELATIVE_NOISE * float(np.std(clean))
     force = round_to(clean + deviation * noise, 0.5 * deviation)
-    displacement = round_to(x + DISPLACEMENT_NOISE * random.standard_normal(len(x)), DISPLACEMENT_DIGIT)
-    stretch = make_stretch(RATE, displacement, force, drive, segments)
+    measured = x + length * DISPLACEMENT_NOISE * random.standard_normal(len(x))
+    stretch = make_stretch(rate, round_to(measured, length * DISPLACEMENT_DIGIT), force, drive, segments)
     metadata = {"run": {"source": "import", "specimen": f"null {seed}"}}
     return Recording(Path(f"null-{seed}.mcap"), "0" * 64, "coil_v", "V", (stretch,), metadata)
 
 
-def make_strokes() -> tuple[Array, Array, tuple[Segment, ...]]:
-    """Return displacement [m], drive [V] and segments."""
+def make_strokes(length: float, rate: float, drive_factor: float) -> tuple[Array, Array, tuple[Segment, ...]]:
+    """Return displacement [m], drive [V] and segments: the strokes of `STROKES` in other units."""
     amplitude, frequency, drive, start = [], [], [], 0
     segments: list[Segment] = []
     for half_stroke, repeat, cycles in STROKES:
         for level in DRIVES:
             count = round(cycles * RATE / repeat)
-            name = f"{1e3 * half_stroke:g}mm_{repeat:g}Hz_{level:g}V"
-            segments.append(Segment(len(segments), name, start, start + count, "sine", half_stroke, repeat, level))
-            amplitude.append(np.full(count, half_stroke))
+            size, hertz, value = length * half_stroke, repeat * rate / RATE, drive_factor * level
+            name = f"{1e3 * size:g}mm_{hertz:g}Hz_{value:g}V"
+            segments.append(Segment(len(segments), name, start, start + count, "sine", size, hertz, value))
+            amplitude.append(np.full(count, size))
             frequency.append(np.full(count, repeat))
-            drive.append(np.full(count, level))
+            drive.append(np.full(count, value))
             start += count
     smooth = np.hanning(121) / np.hanning(121).sum()
-    size, rate = (
+    sizes, repeats = (
         np.convolve(np.pad(np.concatenate(part), 60, "edge"), smooth, "valid") for part in (amplitude, frequency)
     )
-    angle = 2.0 * np.pi * np.cumsum(rate) / RATE
-    return np.asarray(size * np.sin(angle)), np.concatenate(drive), tuple(segments)
+    angle = 2.0 * np.pi * np.cumsum(repeats) / RATE
+    return np.asarray(sizes * np.sin(angle)), np.concatenate(drive), tuple(segments)
 
 
 def format_row(name: str, results: Sequence[Result]) -> str:
@@ -106,12 +134,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--recordings", type=int, default=10, help="recordings of each spectrum")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--cases", default="", help="only rows whose name contains this")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
+    names = [name for name in CONDITIONS if options.cases in name]
     seeds = range(1000 * options.seed, 1000 * options.seed + options.recordings)
     with ProcessPoolExecutor(options.jobs) as pool:
-        rows = (format_row(name, list(pool.map(try_null, [(name, seed) for seed in seeds]))) for name in SPECTRA)
+        rows = (format_row(name, list(pool.map(try_null, [(name, seed) for seed in seeds]))) for name in names)
         print_table(COLUMNS, rows, options.out)
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identification.fitting.search_space import SearchSpace
 from identification.pinn.common.initialisation import (
     InitialStates,
     MemorylessDamper,
@@ -20,6 +21,7 @@ from identification.pinn.common.initialisation import (
     smooth_force,
 )
 from identification.pinn.common.training_pieces import make_training_pieces
+from tests.support.fit_problems import SCALES
 from tests.support.pinn_problem import TRUTH, make_problem
 
 
@@ -112,14 +114,15 @@ def test_initial_states_balance_the_forces_of_the_law(states):
 
 
 def test_coordinates_are_lines_over_the_drive_and_split_the_stiffness():
-    space = SimpleNamespace(lowest_drive=0.2, highest_drive=0.6, has_one_drive=False)
+    space = SearchSpace(0.2, 0.6, SCALES)
     c = _make_coordinates(SimpleNamespace(space=space), MEMORYLESS, 1e-4)
     # 10 at 0.2 V and 30 at 0.6 V are 0 + 50 u; 100 and 200: 50 + 250 u; 400 and 1000: 100 + 1500 u.
     assert (c.F_a, c.F_b, c.c0_a, c.c0_b, c.c1_a, c.c1_b) == pytest.approx((0, 50, 50, 250, 100, 1500), abs=1e-9)
     assert (c.k0 + c.k1, c.f0, c.D_y) == pytest.approx((500.0, 20.0, 1e-4))
     assert 0.0 < c.k1 < c.k0
-    space.has_one_drive = True
-    constant = _make_coordinates(SimpleNamespace(space=space), MEMORYLESS, 1e-4)
+    assert c.eta == pytest.approx(20.0 * SCALES.rate)
+    one_drive = SearchSpace(0.2, 0.2, SCALES)
+    constant = _make_coordinates(SimpleNamespace(space=one_drive), MEMORYLESS, 1e-4)
     assert (constant.F_a, constant.F_b) == (10.0, 0.0)
 
 

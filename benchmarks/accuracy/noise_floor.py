@@ -7,15 +7,14 @@ deviation. The displacement is recorded with noise of 0.01 % of its amplitude. T
 in every fit.
 """
 
-import argparse
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, print_table, round_to
+from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, round_to
+from benchmarks.common.drawn_table import list_seeds, make_parser, print_table
 from identification.arrays import Array
 from identification.damper import Coordinates
 from identification.logs import Segment, Stretch
@@ -193,23 +192,12 @@ def format_row(name: str, results: list[Result]) -> str:
 
 def main() -> None:
     """Print the table; also write it to a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--recordings", type=int, default=4, help="recordings of each size and case")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--cases", default="", help="only cases whose name contains this")
-    parser.add_argument("--out", type=Path)
-    options = parser.parse_args()
+    options = make_parser(__doc__, "recordings", 4).parse_args()
+    names = [name for name in CASES if options.cases in name]
     with ProcessPoolExecutor(options.jobs) as pool:
-        names = [name for name in CASES if options.cases in name]
-        rows = (format_row(name, list(pool.map(try_case, draw_jobs(name, options)))) for name in names)
+        jobs = ([(size, name, seed) for size in SIZES for seed in list_seeds(options)] for name in names)
+        rows = (format_row(name, list(pool.map(try_case, job))) for name, job in zip(names, jobs, strict=True))
         print_table(COLUMNS, rows, options.out)
-
-
-def draw_jobs(name: str, options: argparse.Namespace) -> list[tuple[Size, str, int]]:
-    """Return the recordings of one row."""
-    first = 1000 * options.seed
-    return [(size, name, seed) for size in SIZES for seed in range(first, first + options.recordings)]
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ resolution of 1 µm. Dampers of other sizes make the same strokes in their own u
 `no_gap` is wrong.
 """
 
-import argparse
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -18,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.accuracy.noise_floor import SIZES, Size, draw_damper
-from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, print_table, round_to
+from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, round_to
+from benchmarks.common.drawn_table import list_seeds, make_parser, print_table
 from benchmarks.speed import draw_damper as draw_laboratory_damper
 from identification.arrays import Array
 from identification.gap import diagnose
@@ -131,17 +131,11 @@ def format_row(name: str, results: Sequence[Result]) -> str:
 
 def main() -> None:
     """Print the table; also write it to a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--recordings", type=int, default=10, help="recordings of each spectrum")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--cases", default="", help="only rows whose name contains this")
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path)
-    options = parser.parse_args()
+    options = make_parser(__doc__, "recordings", 10).parse_args()
     names = [name for name in CONDITIONS if options.cases in name]
-    seeds = range(1000 * options.seed, 1000 * options.seed + options.recordings)
     with ProcessPoolExecutor(options.jobs) as pool:
-        rows = (format_row(name, list(pool.map(try_null, [(name, seed) for seed in seeds]))) for name in names)
+        jobs = ([(name, seed) for seed in list_seeds(options)] for name in names)
+        rows = (format_row(name, list(pool.map(try_null, job))) for name, job in zip(names, jobs, strict=True))
         print_table(COLUMNS, rows, options.out)
 
 

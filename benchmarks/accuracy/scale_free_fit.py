@@ -7,7 +7,6 @@ sines at seven drives and 1 % noise; two further sines are unseen. A fit has con
 most 1.01 times that of the true damper.
 """
 
-import argparse
 import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -16,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.common.drawn_noise import RELATIVE_NOISE, make_stretch, print_table
+from benchmarks.common.drawn_noise import RELATIVE_NOISE, make_stretch
+from benchmarks.common.drawn_table import list_seeds, make_parser, print_table
 from identification.arrays import Array
 from identification.damper import Coordinates
 from identification.fitting import (
@@ -190,21 +190,14 @@ def format_row(name: str, results: Sequence[Result]) -> str:
 
 def main() -> None:
     """Print the table; also write it to a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--dampers", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path)
-    options = parser.parse_args()
-    seeds = range(1000 * options.seed, 1000 * options.seed + options.dampers)
+    options = make_parser(__doc__, "dampers", 100).parse_args()
+    seeds = list_seeds(options)
     with ProcessPoolExecutor(options.jobs) as pool:
         results = list(pool.map(try_damper, seeds))
-    rows = [
-        format_row(f"{low:g} N to {high:g} N", chosen)
-        for low, high in CLASSES
-        if (chosen := [r for r in results if low <= r.force < high])
-    ]
-    print_table(COLUMNS, [*rows, format_row("all", results)], options.out)
+    groups = {f"{low:g} N to {high:g} N": [r for r in results if low <= r.force < high] for low, high in CLASSES}
+    groups["all"] = results
+    rows = [format_row(name, group) for name, group in groups.items() if group and options.cases in name]
+    print_table(COLUMNS, rows, options.out)
     for seed, result in zip(seeds, results, strict=True):
         if result.ratio > CONVERGED:
             print(f"damper {seed}: {result.force:.3g} N, {result.ratio:.4f}")

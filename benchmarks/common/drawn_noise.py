@@ -1,7 +1,6 @@
-"""Noise of several spectra for drawn recordings, and the table of a benchmark that draws them."""
+"""Recordings drawn at random: noise of several spectra, resolution, and the stretch around them."""
 
-from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 from scipy.signal import lfilter
@@ -69,19 +68,3 @@ def make_stretch(
         "drawn", np.arange(count) / rate, rate, displacement, force, drive, None, segments, None, None, 0.0, 0.0,
         0.0, np.ones(count, bool),
     )  # fmt: skip
-
-
-def print_table(columns: Sequence[str], rows: Iterable[str], page: Path | None) -> None:
-    """Print a Markdown table row by row as its rows are ready; also write it to a page."""
-    lines = []
-    for line in _make_lines(columns, rows):
-        print(line, flush=True)
-        lines.append(line)
-    if page:
-        page.write_text("\n".join(lines) + "\n", "utf-8")
-
-
-def _make_lines(columns: Sequence[str], rows: Iterable[str]) -> Iterable[str]:
-    yield f"| {' | '.join(columns)} |"
-    yield f"| {' | '.join('---' for _ in columns)} |"
-    yield from rows

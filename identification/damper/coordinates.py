@@ -11,7 +11,7 @@ and ``zeta = z / z_ss`` obeys the same law with A = 1/D_y, beta = rho/D_y, gamma
 
 from typing import NamedTuple
 
-from identification.damper.parameters import GAUGE, Parameters, Quantity
+from identification.damper.parameters import GAUGE, PARAMETERS, Parameters, Quantity
 
 
 class Coordinates(NamedTuple):
@@ -45,20 +45,13 @@ class Coordinates(NamedTuple):
     """Accumulator preload k1 x0 [N]."""
 
 
+_PARAMETERS = {q.symbol: q for q in PARAMETERS}
 COORDINATES: tuple[Quantity, ...] = (
     Quantity("F_a", "N", 1e-4, 1e7, 50.0, "yield force at zero drive"),
     Quantity("F_b", "N/{drive}", 0.0, 1e10, 900.0, "growth of the yield force with drive"),
     Quantity("D_y", "m", 1e-9, 10.0, 3e-5, "slip over which the loop turns at a reversal"),
     Quantity("rho", "1", 0.02, 0.98, 0.5, "asymmetry between loading and unloading of the loop"),
-    # Below n = 1 the derivative of z' over z would be infinite at z = 0.
-    Quantity("n", "1", 1.0, 6.0, 2.0, "sharpness of the yield"),
-    Quantity("eta", "1/s", 1e-4, 1e6, 100.0, "rate constant with which the field follows the drive"),
-    Quantity("c0_a", "N s/m", 1e-5, 1e10, 1e3, "viscous damping at large velocity, zero drive"),
-    Quantity("c0_b", "N s/(m {drive})", -1e13, 1e13, 1e3, "growth of that damping with drive"),
-    Quantity("c1_a", "N s/m", 1e-4, 1e13, 2e4, "dashpot that rounds the force at low velocity, zero drive"),
-    Quantity("c1_b", "N s/(m {drive})", -1e16, 1e16, 2e4, "growth of that dashpot with drive"),
-    Quantity("k0", "N/m", -1e10, 1e10, 2e3, "stiffness at large velocity"),
-    Quantity("k1", "N/m", -1e10, 1e10, 1e3, "stiffness of the gas accumulator"),
+    *(_PARAMETERS[symbol] for symbol in ("n", "eta", "c0_a", "c0_b", "c1_a", "c1_b", "k0", "k1")),
     Quantity("f0", "N", -1e8, 1e8, 50.0, "preload of the gas accumulator and zero of the load cell"),
 )
 

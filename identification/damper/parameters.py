@@ -76,6 +76,7 @@ PARAMETERS: tuple[Quantity, ...] = (
     Quantity("c1_b", "N s/(m {drive})", -1e16, 1e16, 2e4, "growth of that dashpot with drive"),
     Quantity("k0", "N/m", -1e10, 1e10, 2e3, "stiffness at large velocity"),
     Quantity("k1", "N/m", -1e10, 1e10, 1e3, "stiffness of the gas accumulator"),
+    # Below n = 1 the derivative of z' over z would be infinite at z = 0.
     Quantity("n", "1", 1.0, 6.0, 2.0, "sharpness of the yield"),
     Quantity("x0", "m", -1e6, 1e6, 0.1, "rest position of the accumulator spring"),
 )

@@ -28,6 +28,7 @@ _SETTLING = 0.3
 _DRIVE_CHANGE = 0.1
 """Change of the drive over its range above which a sample is not settled [1]."""
 _MAX_ROWS, _MIN_ROWS = 20_000, 60
+"""Largest number of samples in the regression, and smallest number of settled ones."""
 _YIELD_DISPLACEMENT, _LOW_SLIP_YIELD_DISPLACEMENT = 0.008, 0.02
 """Yield displacement of the two starts, in units of the length."""
 START_RHO, START_N, START_FIELD_RATE = 0.5, 1.7, 20.0

@@ -69,7 +69,7 @@ def find_repeated_windows(stretch: Stretch, displacement: Array, noise: float) -
         noise: standard deviation of the noise of the recorded displacement [m].
     """
     periodic = [s for s in stretch.segments if s.motion in PERIODIC_MOTIONS and s.frequency]
-    levels = _DriveLevels.of(stretch.drive)
+    levels = _DriveLevels.from_drive(stretch.drive)
     return [w for s in periodic for w in _find_windows(stretch, displacement, noise, s, levels)]
 
 
@@ -82,7 +82,7 @@ class _DriveLevels(NamedTuple):
     """Difference up to which two drives are equal [V or A]."""
 
     @classmethod
-    def of(cls, drive: Array) -> "_DriveLevels":
+    def from_drive(cls, drive: Array) -> "_DriveLevels":
         tolerance = max(_DRIVE_DEVIATIONS * estimate_drive_noise(drive), _DRIVE_SHARE * float(np.ptp(drive)))
         return cls(average_drive_levels(drive), tolerance)
 

@@ -149,7 +149,9 @@ def describe_effects() -> str:
     """Describe every effect with its stage, its forms and their parameters."""
     parts = []
     for effect in EFFECTS.values():
-        parts.append(f"## {effect.name}\n\nStage `{effect.stage}`: {effect.meaning}.")
+        parts.append(
+            f"## {effect.name}\n\nStage `{effect.stage}`, variable `{effect.variable}`: {effect.meaning}."
+        )
         for form in effect.forms:
             table = describe_quantities(form.parameters)
             parts.append(f"Form `{form.name}`, acts as `{form.action}`:\n\n{table}")

@@ -34,7 +34,8 @@ class Effect(DocumentPart):
     stage: str
     form: str
     parameters: dict[str, ParameterValue]
-    share: float = Field(description="part of the explained gap that returns without this effect")
+    share: float = Field(description="part of the gap that returns without this effect")
+    share_ci95: tuple[float, float] | None = None
     probability: float
     note: str = ""
 
@@ -51,6 +52,7 @@ class Gap(DocumentPart):
 
     before_n: float
     after_n: float
+    explainable_n: float | None = None
     noise_floor_n: float
     noise_floor_ci95: tuple[float, float] | None = None
     shrinkage: float | None = None
@@ -77,6 +79,16 @@ class GapLocation(DocumentPart):
     explainable: float
 
 
+class Remainder(DocumentPart):
+    """Part of the gap that the named effects leave."""
+
+    gap_n: float
+    explainable: float
+    not_repeating: float | None = None
+    stage: str | None = None
+    variables: tuple[str, ...] = ()
+
+
 class NextStroke(DocumentPart):
     """Proposed stroke that separates sets of effects."""
 
@@ -101,6 +113,7 @@ class Diagnosis(DocumentPart):
     unknown_probability: float
     gap: Gap
     where: GapLocation
+    remainder: Remainder | None = None
     next_stroke: NextStroke | None = None
     explanation: str
     cross_check: CrossCheck | None = Field(default=None, validation_alias=AliasChoices("cross_check", "witness"))
@@ -165,6 +178,25 @@ def _make_gap_rows(diagnosis: Diagnosis) -> PropertyRows:
         bounds = gap.shrinkage_ci95
         interval = f" ({format_percent(bounds[0])} to {format_percent(bounds[1])})" if bounds else ""
         rows.append(("Part of the gap that they close", f"{format_percent(gap.shrinkage)}{interval}"))
+    if gap.explainable_n is not None and diagnosis.remainder is not None:
+        rows.append(("Lowest force error that any model reached", format_force(gap.explainable_n)))
+    return [*rows, *_make_remainder_rows(diagnosis.remainder)]
+
+
+def _make_remainder_rows(remainder: Remainder | None) -> PropertyRows:
+    """Make the rows of the part of the gap that is left; none where nothing is."""
+    if remainder is None:
+        return []
+    rows: PropertyRows = [
+        ("Remaining error beyond the noise", format_force(remainder.gap_n)),
+        ("Part of it that follows stroke and drive", format_percent(remainder.explainable)),
+    ]
+    if remainder.not_repeating is not None:
+        rows.append(("Part of it that differs from cycle to cycle", format_percent(remainder.not_repeating)))
+    if remainder.variables:
+        rows.append(("It depends on", ", ".join(map(format_name, remainder.variables))))
+    if remainder.stage is not None:
+        rows.append(("Its most probable stage", format_name(remainder.stage)))
     return rows
 
 
@@ -177,10 +209,16 @@ def _make_effect_row(effect: Effect) -> EffectRow:
         format_name(effect.name),
         format_name(effect.stage),
         values,
-        format_percent(effect.share),
+        _format_share(effect),
         format_percent(effect.probability),
         effect.note,
     )
+
+
+def _format_share(effect: Effect) -> str:
+    bounds = effect.share_ci95
+    interval = f" ({format_percent(bounds[0])} to {format_percent(bounds[1])})" if bounds else ""
+    return f"{format_percent(effect.share)}{interval}"
 
 
 def _make_set_rows(diagnosis: Diagnosis) -> PropertyRows:

@@ -21,6 +21,13 @@ class Quantity(NamedTuple):
     """Usual magnitude in a laboratory damper, in ``unit``: the size of a change of order one."""
     meaning: str
     """Description for a person, one line."""
+    scaling: str = ""
+    """Unit by which it follows the damper's size, if not ``unit``: for a value that holds at a fixed reference."""
+
+    @property
+    def scaling_unit(self) -> str:
+        """Unit by which the quantity follows the damper's size."""
+        return self.scaling or self.unit
 
     def format_unit(self, drive_unit: str) -> str:
         """Return the unit with the drive's unit, ``V`` or ``A``, filled in."""

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import AliasChoices, Field
 
-from identification.damper.effects import Stage
+from identification.damper.effects import Place, Stage, Variable
 from identification.documents.document import Document
 from identification.documents.fit import Fit, Nuisances, Provenance
 
@@ -25,9 +25,19 @@ class NamedEffect(Document):
 
     name: str = Field(description="name in the library of effects")
     stage: Stage = Field(description="stage of the signal chain")
+    place: Place | None = Field(default=None, description="place in the signal chain; null in older documents")
+    variable: Variable | None = Field(
+        default=None, description="variable on which it depends most; null in older documents"
+    )
     form: str = Field(description="fitted functional form")
     parameters: dict[str, EffectValue] = Field(description="parameters by their names in the library")
-    share: float = Field(description="part of the explained excess variance that is lost without this effect")
+    share: float = Field(
+        description="part of the gap's variance that returns without this effect: (error² without it - "
+        "`after_n`²) / (`before_n`² - `noise_floor_n`²), on held-out strokes"
+    )
+    share_ci95: tuple[float, float] | None = Field(
+        default=None, description="95 % interval of the share, from resampled held-out cycles"
+    )
     probability: float = Field(ge=0, le=1, description="probability that this effect is active")
     note: str = Field(default="", description="limits of the values, such as the sense of an asymmetry")
 
@@ -46,6 +56,11 @@ class Gap(Document):
     after_n: float = Field(
         description="RMSE with the named effects that is expected of another run, in N: remaining error beyond "
         "the floor, and input noise of that run; equal to `before_n` if no effect is named"
+    )
+    explainable_n: float | None = Field(
+        default=None,
+        description="lowest RMSE that any model of stroke, drive and time reached, in N: a fitted set of effects, "
+        "or a flexible regression on its residual",
     )
     noise_floor_n: float = Field(description="noise of the recorded force, in N, the same for both")
     noise_floor_ci95: tuple[float, float] | None = Field(
@@ -109,6 +124,23 @@ class GapLocation(Document):
     )
 
 
+class Remainder(Document):
+    """Part of the gap that the named effects leave, on held-out strokes."""
+
+    gap_n: float = Field(description="root mean square residual beyond the noise floor, in N")
+    explainable: float = Field(
+        description="part of its variance that a flexible regression on stroke, drive and time predicts"
+    )
+    not_repeating: float | None = Field(
+        description="part of its variance that differs between cycles of a segment; null where no cycles repeat"
+    )
+    stage: Stage | None = Field(
+        description="stage of the effect with the largest expected gain; null where none is expected to gain"
+    )
+    map: list[GapMapEntry] = Field(description="by drive, amplitude, frequency and phase of the stroke")
+    variables: list[Variable] = Field(description="variables that the regression needs, the strongest first")
+
+
 class NextStroke(Document):
     """The stroke that best separates the sets that these data cannot."""
 
@@ -143,9 +175,15 @@ class Diagnosis(Document):
     effects: list[NamedEffect] = Field(description="most probable set; empty for no_gap and unexplained")
     alternatives: list[EffectSet] = Field(max_length=3, description="other sets, the most probable first")
     probability: float = Field(ge=0, le=1, description="probability of exactly the named set")
+    ambiguous: bool = Field(
+        default=False, description="whether an alternative has more than half of the named set's probability"
+    )
     unknown_probability: float = Field(ge=0, le=1, description="probability of a cause outside the library")
     gap: Gap
     where: GapLocation
+    remainder: Remainder | None = Field(
+        default=None, description="what is left with the named effects; null where nothing is left"
+    )
     next_stroke: NextStroke | None = Field(description="null where nothing is left to separate")
     explanation: str = Field(description="two sentences for a person")
     cross_check: CrossCheck | None = Field(

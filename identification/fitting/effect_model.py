@@ -1,15 +1,16 @@
 """Effect in a fit: its form and its search coordinates.
 
 The search coordinate of a parameter that cannot be zero (length, velocity, time constant) is its logarithm. That
-of any other parameter is its value over its usual size. Both are of order one.
+of any other parameter is its value over its usual size. Both are of order one for a damper of any size.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.damper import Quantity
+from identification.damper import LIBRARY_SIZE, DamperSize, Quantity, compute_scale_factor, scale_quantity
 from identification.damper.effects import EFFECTS, Effect, Form
 from identification.simulate import ActiveEffect
 
@@ -22,6 +23,8 @@ class EffectModel:
     """Name of the effect."""
     form_name: str
     """Name of the form."""
+    size: DamperSize = LIBRARY_SIZE
+    """Size of the damper, by which bounds, scales and starts are scaled."""
 
     @staticmethod
     def from_name(name: str, form_name: str | None = None) -> "EffectModel":
@@ -38,10 +41,16 @@ class EffectModel:
         """The form of the effect."""
         return self.effect.find_form(self.form_name)
 
-    @property
+    @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
-        """The parameters of the form."""
-        return self.form.parameters
+        """The parameters of the form, with bounds and scales for the damper's size."""
+        return tuple(scale_quantity(q, self.size) for q in self.form.parameters)
+
+    @cached_property
+    def starts(self) -> tuple[tuple[float, ...], ...]:
+        """Starting values of a search, for the damper's size."""
+        factors = [compute_scale_factor(q.scaling_unit, self.size) for q in self.form.parameters]
+        return tuple(tuple(v * f for v, f in zip(start, factors, strict=True)) for start in self.form.starts)
 
     @property
     def log_mask(self) -> BoolArray:

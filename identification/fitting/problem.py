@@ -113,7 +113,7 @@ class Problem:
         unknowns[self.layout.coordinates] = self.space.to_search(coordinates)
         unknowns[self.layout.y0] = [p.excitation.displacement.mean() / self.y0_scale for p in self.pieces]
         for effect, columns in self.iterate_effects():
-            unknowns[columns] = effect.to_search(effect.form.starts[0])
+            unknowns[columns] = effect.to_search(effect.starts[0])
         return unknowns
 
     def measure_step(self, step: Array) -> float:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.damper import DamperSize
 from identification.fitting.piece import Piece
 
 _PEAK_QUANTILE = 0.995
@@ -27,8 +28,15 @@ class RecordingScales:
     """Half of the largest stroke [m]."""
     velocity: float
     """Peak speed [m/s]."""
+    drive: float
+    """Highest drive [V or A]; one where the drive is always zero."""
     sampling_rate: float
     """Highest sampling rate [Hz]."""
+
+    @property
+    def damper_size(self) -> DamperSize:
+        """Size of the damper, by which the ranges of effects are scaled."""
+        return DamperSize(self.force, self.length, self.velocity, self.drive)
 
     @property
     def rate(self) -> float:
@@ -56,5 +64,6 @@ def measure_scales(pieces: Sequence[Piece]) -> RecordingScales:
         force=max(float(force.std()), _SMALLEST),
         length=max(float(max(strokes)) / 2.0, _SMALLEST),
         velocity=max(float(np.quantile(speed, _PEAK_QUANTILE)), _SMALLEST),
+        drive=float(max(np.abs(p.excitation.drive[used]).max() for p, used in fitted)) or 1.0,
         sampling_rate=max(p.excitation.rate for p in pieces),
     )

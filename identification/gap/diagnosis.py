@@ -13,9 +13,11 @@ from identification.gap.noise import NoiseModel
 from identification.gap.outcome import DiagnosisResult, ReportBuilder, cross_check_effects
 from identification.gap.selection import (
     DEFAULT_SETTINGS,
+    UNKNOWN_THRESHOLD,
     CandidatePool,
     SearchSettings,
     compute_final_posterior,
+    find_partial_sets,
     search_forward,
 )
 from identification.logs import Recording
@@ -99,8 +101,10 @@ def diagnose_prepared(
     with use_one_thread():
         search_forward(pool)
         posterior = compute_final_posterior(pool)
+        partial = find_partial_sets(pool) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]
-        result = ReportBuilder(dataset, evaluation, pool, posterior, model, notes, seed).build_result()
+        builder = ReportBuilder(dataset, evaluation, pool, posterior, partial, model, notes, seed)
+        result = builder.build_result()
         return _add_cross_check(result, pool, dataset.drive_unit, seed, progress) if cross_check else result
 
 

@@ -6,6 +6,7 @@ if a line with a change point, constant before it and linear after it, differs s
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from typing import NamedTuple
 
@@ -114,7 +115,9 @@ def collect_effects(diagnoses: Sequence[Diagnosis]) -> tuple[EffectModel, ...]:
 
 def _fit_run(run: PreparedRecordings, effects: tuple[EffectModel, ...]) -> JointFit:
     """Fit the law with the effects to all samples of one run."""
-    return fit_jointly(make_diagnosis_problem(run.dataset, run.evaluation.pieces), effects)
+    problem = make_diagnosis_problem(run.dataset, run.evaluation.pieces)
+    size = problem.space.scales.damper_size
+    return fit_jointly(problem, tuple(replace(model, size=size) for model in effects))
 
 
 def _summarise_run(log: str, diagnosis: Diagnosis) -> TrendRun:

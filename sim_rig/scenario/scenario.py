@@ -18,6 +18,7 @@ from identification.damper import (
     Quantity,
     find_parameter_set,
     to_coordinates,
+    widen_bounds,
 )
 from identification.damper.effects import EFFECTS, rename_form, rename_parameters
 from sim_rig.errors import ScenarioError
@@ -176,7 +177,7 @@ def _check_effect(effect: ActiveEffect) -> None:
     forms = [form.name for form in known.forms]
     if effect.form is not None and effect.form not in forms:
         raise ValueError(f"{effect.name} has the form {_join_names(forms)}, not {effect.form}")
-    quantities = known.find_form(effect.form).parameters
+    quantities = tuple(widen_bounds(q) for q in known.find_form(effect.form).parameters)
     symbols = {quantity.symbol for quantity in quantities}
     if effect.parameters.keys() != symbols:
         raise ValueError(f"{effect.name} takes {_join_names(symbols)}, not {_join_names(effect.parameters)}")

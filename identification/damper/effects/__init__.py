@@ -8,7 +8,7 @@ from identification.damper.effects.connection import compute_elongation
 from identification.damper.effects.direction_asymmetry import DIRECTION_ASYMMETRY
 from identification.damper.effects.displacement_delay import DISPLACEMENT_DELAY
 from identification.damper.effects.displacement_nonlinearity import DISPLACEMENT_NONLINEARITY
-from identification.damper.effects.effect import STAGES, Action, Effect, Form, Stage
+from identification.damper.effects.effect import STAGES, Action, Effect, Form, Place, Stage, Variable
 from identification.damper.effects.end_stop import END_STOP
 from identification.damper.effects.field_saturation import FIELD_SATURATION
 from identification.damper.effects.fixture_compliance import FIXTURE_COMPLIANCE
@@ -64,7 +64,9 @@ __all__ = [
     "Action",
     "Effect",
     "Form",
+    "Place",
     "Stage",
+    "Variable",
     "compute_elongation",
     "connection",
     "rename_form",

@@ -38,6 +38,7 @@ _CONTACT_COMPLIANCE = Quantity(
 CLEVIS_BACKLASH = Effect(
     name="clevis_backlash",
     stage="mounting",
+    variable="travel_since_reversal",
     meaning="the pin has backlash, so the damper starts late after each reversal",
     forms=(
         Form("backlash", "displacement_backlash", (_GAP,), ((3e-5,), (1e-4,), (3e-4,)), apply_backlash),

@@ -14,6 +14,7 @@ def compute_crosstalk(time: Any, drive: Any, gain: Any) -> Any:
 COIL_CROSSTALK = Effect(
     name="coil_crosstalk",
     stage="force_channel",
+    variable="drive",
     meaning="the coil's drive leaks into the force channel",
     forms=(
         Form(

@@ -44,6 +44,7 @@ _SLOW_FRACTION = Quantity("slow_fraction", "1", 0.0, 1.0, 0.3, "fraction of the 
 COIL_LAG = Effect(
     name="coil_lag",
     stage="coil",
+    variable="drive_history",
     meaning="the field follows the drive later or more slowly than one first-order lag",
     forms=(
         Form("second_lag", "drive_delay", (_LAG,), ((2e-3,), (1.5e-2,)), make_second_lag),

@@ -32,6 +32,7 @@ _WIDTH = Quantity("width", "m/s", 1e-3, 0.1, 0.01, "width in velocity of the tra
 DIRECTION_ASYMMETRY = Effect(
     name="direction_asymmetry",
     stage="damper",
+    variable="velocity",
     meaning="the damper resists one direction more than the other",
     forms=(
         Form(

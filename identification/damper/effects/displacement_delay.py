@@ -14,6 +14,7 @@ def make_delay(delay: Any) -> Any:
 DISPLACEMENT_DELAY = Effect(
     name="displacement_delay",
     stage="displacement_channel",
+    variable="velocity",
     meaning="the displacement channel arrives late",
     forms=(
         Form(

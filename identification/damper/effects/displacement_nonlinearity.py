@@ -40,6 +40,7 @@ _REFERENCE_DISPLACEMENT = 0.01
 DISPLACEMENT_NONLINEARITY = Effect(
     name="displacement_nonlinearity",
     stage="displacement_channel",
+    variable="displacement",
     meaning="the displacement channel is not linear",
     forms=(
         Form(
@@ -57,8 +58,8 @@ DISPLACEMENT_NONLINEARITY = Effect(
             "polynomial",
             "displacement_map",
             (
-                Quantity("even", "m", -5e-3, 5e-3, 5e-5, "even part of the error, 10 mm from the middle"),
-                Quantity("odd", "m", -5e-3, 5e-3, 5e-5, "odd part of the error, 10 mm from the middle"),
+                Quantity("even", "m", -5e-3, 5e-3, 5e-5, "even part of the error, 10 mm from the middle", "1/m"),
+                Quantity("odd", "m", -5e-3, 5e-3, 5e-5, "odd part of the error, 10 mm from the middle", "1/m^2"),
             ),
             ((0.0, 0.0),),
             compute_polynomial_error,

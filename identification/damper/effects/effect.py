@@ -18,6 +18,24 @@ from identification.damper.parameters import Quantity
 Stage = Literal["coil", "damper", "mounting", "force_channel", "displacement_channel"]
 STAGES: tuple[Stage, ...] = get_args(Stage)
 """Stages of the signal chain, in their order."""
+Place = Literal[
+    "drive", "field", "damper_gain", "parallel_force", "mounting", "force_channel", "displacement_channel"
+]
+"""Place in the chain at which an effect acts; it is finer than the stage."""
+Variable = Literal[
+    "displacement",
+    "velocity",
+    "acceleration",
+    "travel_since_reversal",
+    "travel_since_rest",
+    "force",
+    "drive",
+    "drive_history",
+    "temperature",
+    "time",
+    "dissipated_energy",
+]
+"""Variable on which an effect depends."""
 Action = Literal[
     "drive_delay",
     "field",
@@ -63,6 +81,26 @@ Action = Literal[
 - ``displacement_shift``: () -> delay of the displacement channel [s].
 """
 
+PLACES: dict[Action, Place] = {
+    "drive_delay": "drive",
+    "field": "field",
+    "field_memory": "field",
+    "scaling": "damper_gain",
+    "softening": "damper_gain",
+    "parallel_force": "parallel_force",
+    "hysteretic_force": "parallel_force",
+    "relaxation_force": "parallel_force",
+    "displacement_backlash": "mounting",
+    "connection": "mounting",
+    "inertia": "mounting",
+    "time_shift": "force_channel",
+    "force_lag": "force_channel",
+    "additive_force": "force_channel",
+    "displacement_map": "displacement_channel",
+    "displacement_shift": "displacement_channel",
+}
+"""Place of each action."""
+
 
 class Form(NamedTuple):
     """Functional form of an effect."""
@@ -80,6 +118,11 @@ class Form(NamedTuple):
     memory: Callable[..., Any] | None = None
     """Function that updates the memory after a change; None for forms without memory."""
 
+    @property
+    def place(self) -> Place:
+        """Place in the chain at which the form acts."""
+        return PLACES[self.action]
+
 
 class Effect(NamedTuple):
     """An effect: its name in documents, its stage in the chain and its forms."""
@@ -88,6 +131,8 @@ class Effect(NamedTuple):
     """Name in documents."""
     stage: Stage
     """Stage of the chain at which it acts."""
+    variable: Variable
+    """Variable on which it depends most."""
     meaning: str
     """Description for a person, one line."""
     forms: tuple[Form, ...]

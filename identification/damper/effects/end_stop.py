@@ -40,6 +40,7 @@ _STARTS = tuple((0.0, gap, 1e-3) for gap in (0.004, 0.007, 0.009, 0.012, 0.018, 
 END_STOP = Effect(
     name="end_stop",
     stage="damper",
+    variable="displacement",
     meaning="the piston meets a rubber stop near the end of its stroke",
     forms=(
         Form("both_ends", "parallel_force", _PARAMETERS, _STARTS, compute_both_stops),

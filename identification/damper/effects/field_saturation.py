@@ -32,6 +32,7 @@ _SHARPNESS = Quantity("sharpness", "1/{drive}", 0.0, 50.0, 1.0, "inverse of the 
 FIELD_SATURATION = Effect(
     name="field_saturation",
     stage="coil",
+    variable="drive",
     meaning="the iron saturates, so more drive brings less and less field",
     forms=(
         Form("tanh", "field", (_SHARPNESS,), ((0.5,), (1.5,), (4.0,)), saturate_tanh),

@@ -30,6 +30,7 @@ def make_closing_joint(compliance: Any, load: Any, ratio: Any) -> Any:
 FIXTURE_COMPLIANCE = Effect(
     name="fixture_compliance",
     stage="mounting",
+    variable="force",
     meaning="the fixture deforms under the force, so the damper moves less than the actuator",
     forms=(
         Form(
@@ -45,7 +46,7 @@ FIXTURE_COMPLIANCE = Effect(
             (
                 Quantity("compliance", "m/N", 0.0, 1e-4, 1e-6, "compliance of the fixture under a small load"),
                 Quantity(
-                    "hardening", "1/m²", 0.0, 1e12, 1e7, "growth of its stiffness over the squared elongation"
+                    "hardening", "1/m^2", 0.0, 1e12, 1e7, "growth of its stiffness over the squared elongation"
                 ),
             ),
             ((1e-7, 1e7), (4e-7, 1e7)),

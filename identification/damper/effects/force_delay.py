@@ -14,6 +14,7 @@ def make_delay(delay: Any) -> Any:
 FORCE_DELAY = Effect(
     name="force_delay",
     stage="force_channel",
+    variable="force",
     meaning="the load cell's filter or wire delays the force",
     forms=(
         Form(

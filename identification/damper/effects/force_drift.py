@@ -44,6 +44,7 @@ _HARMONICS = tuple(
 FORCE_DRIFT = Effect(
     name="force_drift",
     stage="force_channel",
+    variable="time",
     meaning="the zero of the load cell drifts",
     forms=(
         Form(

@@ -14,6 +14,7 @@ def make_lag(lag: Any) -> Any:
 FORCE_FILTER = Effect(
     name="force_filter",
     stage="force_channel",
+    variable="force",
     meaning="the force channel is filtered more than its device reports",
     forms=(
         Form(

@@ -65,6 +65,7 @@ _HEAT_EXCHANGE_STARTS = tuple((*start, exchange_time) for start in _STARTS[:2] f
 GAS_SPRING = Effect(
     name="gas_spring",
     stage="damper",
+    variable="displacement",
     meaning="the gas behind the piston pushes back more than a linear spring",
     forms=(
         Form("polytropic", "parallel_force", _PARAMETERS, _STARTS, compute_polytropic),

@@ -53,6 +53,7 @@ _WIDTH = Quantity("width", "{drive}", 5e-3, 5.0, 0.1, "change of drive over whic
 MAGNETIC_REMANENCE = Effect(
     name="magnetic_remanence",
     stage="coil",
+    variable="drive_history",
     meaning="the iron retains part of its former field",
     forms=(
         Form(

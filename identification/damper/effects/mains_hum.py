@@ -30,6 +30,7 @@ _FREQUENCY = Quantity("frequency", "Hz", 45.0, 65.0, 50.0, "mains frequency")
 MAINS_HUM = Effect(
     name="mains_hum",
     stage="force_channel",
+    variable="time",
     meaning="mains interference adds to the recorded force",
     forms=(
         Form(

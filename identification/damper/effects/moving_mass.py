@@ -14,6 +14,7 @@ def compute_inertia(acceleration: Any, mass: Any) -> Any:
 MOVING_MASS = Effect(
     name="moving_mass",
     stage="mounting",
+    variable="acceleration",
     meaning="the load cell also accelerates the mass between it and the damper",
     forms=(
         Form(

@@ -27,6 +27,7 @@ def compute_power_force(x: Any, velocity: Any, force: Any, exponent: Any) -> Any
 ORIFICE_TURBULENCE = Effect(
     name="orifice_turbulence",
     stage="damper",
+    variable="velocity",
     meaning="the flow becomes turbulent, so the damping grows with the speed",
     forms=(
         Form(
@@ -40,7 +41,7 @@ ORIFICE_TURBULENCE = Effect(
             "power",
             "parallel_force",
             (
-                Quantity("force", "N", 0.0, 5000.0, 10.0, "force at 0.1 m/s"),
+                Quantity("force", "N", 0.0, 5000.0, 10.0, "force at 0.1 m/s", "N s^2/m^2"),
                 Quantity("exponent", "1", 1.2, 3.5, 2.0, "power of the speed"),
             ),
             ((0.0, 1.75), (0.0, 2.5)),

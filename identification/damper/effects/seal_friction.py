@@ -54,6 +54,7 @@ _STARTS = ((0.0, 0.0, 0.006), (0.0, 0.0, 0.02), (0.0, 0.0, 0.06))
 SEAL_FRICTION = Effect(
     name="seal_friction",
     stage="damper",
+    variable="velocity",
     meaning="the seals rub, and stick before they slide",
     forms=(
         Form("stribeck", "parallel_force", _PARAMETERS, _STARTS, compute_stribeck_friction),

@@ -17,6 +17,7 @@ def scale_by_shear(x: Any, velocity: Any, loss: Any, speed: Any) -> Any:
 SHEAR_THINNING = Effect(
     name="shear_thinning",
     stage="damper",
+    variable="velocity",
     meaning="the oil becomes thinner at speed",
     forms=(
         Form(

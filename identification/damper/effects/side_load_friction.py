@@ -20,6 +20,7 @@ def compute_side_friction(x: Any, velocity: Any, growth: Any, middle: Any) -> An
 SIDE_LOAD_FRICTION = Effect(
     name="side_load_friction",
     stage="mounting",
+    variable="displacement",
     meaning="a side load presses on the rod, which rubs more towards the ends of the stroke",
     forms=(
         Form(

@@ -41,6 +41,7 @@ _STARTS = ((0.0, 15.0), (0.0, 60.0), (0.0, 400.0))
 VISCOUS_HEATING = Effect(
     name="viscous_heating",
     stage="damper",
+    variable="dissipated_energy",
     meaning="the damper softens with the heat that it has produced",
     forms=(
         Form("viscosity_only", "softening", _PARAMETERS, _STARTS, soften_viscosity),

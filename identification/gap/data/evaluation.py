@@ -1,6 +1,6 @@
 """Residual of a model on the fitted samples and on the held-out cycles."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,7 +11,14 @@ from identification.fitting import Dataset, Piece, compute_rmse
 from identification.gap.data.cycles import Cycles, cut_cycles, select_held_out_cycles, split_by_piece
 from identification.gap.data.disturbed_cycles import mask_disturbed_cycles
 from identification.gap.data.residual_map import Residual
-from identification.gap.data.shrinkage import CycleErrors, Replicates, Shrinkage, estimate_shrinkage
+from identification.gap.data.shrinkage import (
+    CycleErrors,
+    HeldOutErrors,
+    Replicates,
+    Shrinkage,
+    estimate_shares,
+    estimate_shrinkage,
+)
 
 _FIRST_MOTION = 0.1
 """Displacement relative to half the stroke, before which samples are not used: their hysteresis is unknown."""
@@ -111,6 +118,32 @@ class EvaluationData:
             float(np.mean(before.values[self.recorded] ** 2)),
         )
         return estimate_shrinkage(errors, noise, replicates, self.cycles.stroke_count)
+
+    def estimate_shares(
+        self, before: Residual, after: Residual, without: Mapping[str, Residual], expected: float, noise: float
+    ) -> dict[str, tuple[float, tuple[float, float]]]:
+        """Estimate the share of each named effect in the gap on held-out samples, with its 95 % interval.
+
+        Args:
+            before, after: residuals of the law without and with all named effects.
+            without: residuals without one of them, by its name.
+            expected: RMSE with all of them that is expected of another run [N].
+            noise: standard deviation of the noise in the recorded force [N].
+        """
+        counts = self.cycles.sum_by_cycle(np.ones(len(self.force)), self.held_out_samples)
+        used = counts > 0
+
+        def sum_squares(residual: Residual) -> Array:
+            return self.cycles.sum_by_cycle(residual.values**2, self.held_out_samples)[used]
+
+        errors = HeldOutErrors(
+            sum_squares(before),
+            sum_squares(after),
+            {name: sum_squares(residual) for name, residual in without.items()},
+            counts[used],
+            self.cycles.segment[used],
+        )
+        return estimate_shares(errors, self.compute_rmse(before)[1], expected, noise)
 
     def _compute_cycle_errors(self, before: Residual, after: Residual) -> CycleErrors:
         """Compute the errors of all cycles with usable samples."""

@@ -59,6 +59,21 @@ class CycleErrors(NamedTuple):
         return float(self.before[self.held_out].sum()) / total, float(self.after[self.held_out].sum()) / total
 
 
+class HeldOutErrors(NamedTuple):
+    """Errors of the held-out cycles; each array is (cycles,)."""
+
+    before: Array
+    """Sum of squared residuals without effects [N²]."""
+    after: Array
+    """Sum of squared residuals with all named effects [N²]."""
+    without: dict[str, Array]
+    """The same without one of them, by its name [N²]."""
+    counts: Array
+    """Number of samples."""
+    segment: Indices
+    """Number of the cycle's segment."""
+
+
 class Replicates(NamedTuple):
     """Mean squared changes of the simulated force in simulations of the same strokes with new input noise."""
 
@@ -104,6 +119,34 @@ def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates
     return Shrinkage(math.sqrt(before), expected, value, interval, _estimate_benefit(after, noise, replicates))
 
 
+def estimate_shares(
+    held_out: HeldOutErrors, before: float, after: float, noise: float
+) -> dict[str, tuple[float, tuple[float, float]]]:
+    """Estimate the part of the gap's variance that returns without each effect, with its 95 % interval.
+
+    Args:
+        held_out: errors of the held-out cycles.
+        before: RMSE without effects [N].
+        after: RMSE with all named effects that is expected of another run [N].
+        noise: standard deviation of the noise in the recorded force [N].
+    """
+    random = np.random.default_rng(0)
+    names = list(held_out.without)
+    sums = np.stack([held_out.before, held_out.after, *(held_out.without[name] for name in names)])
+    measured = sums.sum(axis=1) / held_out.counts.sum()
+    drawn = _resample_cycles(sums, held_out.counts, held_out.segment, random)
+    # The error expected of another run replaces the measured one in the value and in every draw.
+    expected = after**2 - measured[1]
+    gap = max(before**2 - noise**2, _MIN_GAP_SHARE * noise**2)
+    gaps = np.maximum(drawn[0] - noise**2, _MIN_GAP_SHARE * noise**2)
+    shares = {}
+    for k, name in enumerate(names, 2):
+        value = float((measured[k] - measured[1] - expected) / gap)
+        low, high = np.quantile((drawn[k] - drawn[1] - expected) / gaps, [0.025, 0.975])
+        shares[name] = (value, (min(float(low), value), max(float(high), value)))
+    return shares
+
+
 def _estimate_benefit(after: float, noise: float, replicates: Replicates) -> float:
     """Estimate the part [1] of the whole run's gap that the effects close if the run is repeated.
 
@@ -116,7 +159,7 @@ def _estimate_benefit(after: float, noise: float, replicates: Replicates) -> flo
 def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replicates, strokes: int) -> Array:
     """Draw the parts of the gap [1] that remain on other runs, (draws,)."""
     random = np.random.default_rng(0)
-    before, after = _resample_cycles(errors, random)
+    before, after = _resample_cycles(np.stack(errors[:2]), errors.counts, errors.segment, random)
     gap = np.maximum(before - noise**2, _MIN_GAP_SHARE * noise**2)
     form_error = np.maximum(after - noise**2 - replicates.evaluated, 0.0) / gap
     # The factor's mean is one for many strokes, a representative sample, and larger for few (decision 0014).
@@ -127,14 +170,14 @@ def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replica
     return np.asarray(form_error + input_noise)
 
 
-def _resample_cycles(errors: CycleErrors, random: np.random.Generator) -> Array:
-    """Resample segments, then cycles; return mean squares [N²] without and with effects, (2, draws)."""
-    segments, index = np.unique(errors.segment, return_inverse=True)
+def _resample_cycles(sums: Array, counts: Array, segment: Indices, random: np.random.Generator) -> Array:
+    """Resample segments, then cycles; return mean squares [N²] of each row of sums (K, cycles), (K, draws)."""
+    segments, index = np.unique(segment, return_inverse=True)
     members = [np.flatnonzero(index == k) for k in range(len(segments))]
-    sums, means = np.stack(errors[:2]), np.empty((2, _DRAWS))
+    means = np.empty((len(sums), _DRAWS))
     for draw in range(_DRAWS):
         # Segments first: cycles of one condition are alike, and drawn alone would make the interval too narrow.
         chosen = random.integers(0, len(segments), len(segments))
         rows = np.concatenate([random.choice(members[k], len(members[k])) for k in chosen])
-        means[:, draw] = sums[:, rows].sum(axis=1) / errors.counts[rows].sum()
+        means[:, draw] = sums[:, rows].sum(axis=1) / counts[rows].sum()
     return means

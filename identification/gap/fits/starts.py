@@ -68,6 +68,6 @@ def _settle_law(problem: Problem, unknowns: Array, steps: int) -> Array:
 
 def _combine_starts(effects: tuple[EffectModel, ...], known: KnownValues) -> Iterator[Array]:
     """Yield search coordinates of all effects: known values, or all combinations of the starts of their forms."""
-    per_effect = [[known[e]] if e in known else list(e.form.starts) for e in effects]
+    per_effect = [[known[e]] if e in known else list(e.starts) for e in effects]
     for chosen in product(*per_effect):
         yield np.concatenate([e.to_search(v) for e, v in zip(effects, chosen, strict=True)] or [np.empty(0)])

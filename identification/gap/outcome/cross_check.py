@@ -83,9 +83,9 @@ class _ParameterComparison(NamedTuple):
 
 def _compare_parameters(fit: JointFit, result: PinnResult) -> Iterator[_ParameterComparison]:
     deviations = iter(result.effect_deviations.tolist())
-    for effect in result.effects:
+    for effect, model in zip(result.effects, fit.effects, strict=True):
         name = effect.effect.name
-        for q, value in zip(effect.form.parameters, effect.values, strict=True):
+        for q, value in zip(model.quantities, effect.values, strict=True):
             deviation = next(deviations)
             larger = max(deviation, fit.deviations[name][q.symbol], 1e-300)
             distance = abs(value - fit.values[name][q.symbol]) / larger

@@ -5,14 +5,21 @@ rest is noise, or depends on a quantity that was not recorded. It is a ridge reg
 features (Rahimi and Recht 2007) of the stroke and its past.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy.signal import lfilter
 
 from identification.arrays import Array, BoolArray
+from identification.damper.effects import Variable
 from identification.fitting import Piece
+from identification.gap.data import NEAR_FLOOR_RATIO, EvaluationData
+from identification.gap.fits import Candidate
 
 Indices = npt.NDArray[np.intp]
 
@@ -28,8 +35,18 @@ _TIME_CONSTANTS = (0.01, 0.1)
 """Time constants of the low-pass filters of the stroke's past [s]."""
 _SIGN_WIDTH = 0.1
 """Width of the smoothed sign of the velocity, relative to its standard deviation."""
-_REVERSAL_LENGTH = 1e-5
-"""Distance from the last reversal at which its logarithmic feature begins to grow [m]."""
+FEATURE_VARIABLES: dict[Variable, tuple[int, ...]] = {
+    "displacement": (0,),
+    "velocity": (1, 4, 6, 7),
+    "acceleration": (2,),
+    "drive": (3,),
+    "travel_since_reversal": (5,),
+    "drive_history": (8, 9),
+    "time": (10,),
+}
+"""Columns of the features that belong to each variable."""
+_REVERSAL_SHARE = 1e-3
+"""Distance from the last reversal, over half the stroke, at which its logarithmic feature begins to grow [1]."""
 
 
 def build_features(pieces: Sequence[Piece]) -> Array:
@@ -48,7 +65,8 @@ def _build_piece_features(piece: Piece) -> Array:
     x, v, u = piece.excitation.displacement, piece.excitation.velocity, piece.excitation.drive
     past = [_low_pass(signal, tau * piece.excitation.rate) for signal in (v, u) for tau in _TIME_CONSTANTS]
     direction = np.tanh(v / max(_SIGN_WIDTH * float(np.std(v)), 1e-12))
-    distance = np.log1p(np.abs(x - _find_last_reversal(x, v)) / _REVERSAL_LENGTH) * np.sign(v)
+    shortest = max(0.5 * _REVERSAL_SHARE * float(np.ptp(x)), 1e-12)
+    distance = np.log1p(np.abs(x - _find_last_reversal(x, v)) / shortest) * np.sign(v)
     return np.column_stack([x, v, piece.excitation.acceleration, u, direction, distance, *past])
 
 
@@ -64,10 +82,56 @@ def _find_last_reversal(x: Array, v: Array) -> Array:
     return x[np.maximum.accumulate(np.where(turned, np.arange(len(x)), 0))]
 
 
-def estimate_explainable_share(
-    features: Array, residual: Array, train: BoolArray, held_out: BoolArray, floor: float
-) -> float:
-    """Estimate the part of the residual's excess variance that the features predict on held-out samples, 0 to 1.
+@dataclass(frozen=True)
+class ResidualRegression:
+    """Regression on the residuals of fitted sets of effects; each is computed once."""
+
+    evaluation: EvaluationData
+    floor: float
+    """Noise of the force [N]."""
+    _known: dict[frozenset[str], "Explained"] = field(default_factory=dict)
+
+    def explain(self, candidate: Candidate) -> "Explained":
+        """Return what the regression predicts of a set's residual; nothing near the noise floor."""
+        if candidate.held_out_rmse < NEAR_FLOOR_RATIO * self.floor:
+            return Explained(0.0, dict.fromkeys(FEATURE_VARIABLES, 0.0))
+        if candidate.names not in self._known:
+            self._known[candidate.names] = explain_residual(
+                build_features(self.evaluation.pieces),
+                candidate.residual.values,
+                self.evaluation.fitted_samples,
+                self.evaluation.held_out_samples,
+                self.floor,
+                FEATURE_VARIABLES,
+            )
+        return self._known[candidate.names]
+
+    def find_explainable_rmse(self, candidates: Sequence[Candidate], noise: float) -> float:
+        """Return the lowest held-out RMSE [N] that the regression reaches on top of any of some sets."""
+        return min(
+            math.sqrt(noise**2 + (1.0 - self.explain(c).share) * max(c.held_out_rmse**2 - noise**2, 0.0))
+            for c in candidates
+        )
+
+
+class Explained(NamedTuple):
+    """Part of a residual that a flexible regression predicts on held-out samples."""
+
+    share: float
+    """Part of the excess variance, 0 to 1."""
+    losses: dict[Variable, float]
+    """Part of the excess variance that is lost when a variable is exchanged between samples, by variable."""
+
+
+def explain_residual(
+    features: Array,
+    residual: Array,
+    train: BoolArray,
+    held_out: BoolArray,
+    floor: float,
+    variables: Mapping[Variable, Sequence[int]] = MappingProxyType({}),
+) -> Explained:
+    """Estimate the part of the residual's excess variance that the features predict on held-out samples.
 
     Args:
         features: standardised features (N, k).
@@ -75,29 +139,43 @@ def estimate_explainable_share(
         train: mask (N,) of the samples for the regression.
         held_out: mask (N,) of the samples that are predicted.
         floor: noise of the force [N].
+        variables: columns of each variable whose loss is estimated.
     """
     excess = float(np.mean(residual[held_out] ** 2)) - floor**2
     if excess <= 0.0:
-        return 0.0
+        return Explained(0.0, dict.fromkeys(variables, 0.0))
+    compute_basis = _draw_basis(features.shape[1])
+    fitted, predicted = _subsample(train), _subsample(held_out)
+    basis, target = compute_basis(features[fitted]), residual[predicted]
+    gram, moment = basis.T @ basis, basis.T @ residual[fitted]
+    table = features[predicted]
+
+    def compute_error(weights: Array, rows: Array) -> float:
+        return float(np.mean((target - compute_basis(rows) @ weights) ** 2))
+
+    identity = 1e-2 * len(fitted) * np.eye(len(gram))
+    candidates = [np.asarray(np.linalg.solve(gram + r * identity, moment), float) for r in _RIDGE_PENALTIES]
+    error, best = min(((compute_error(w, table), w) for w in candidates), key=lambda pair: pair[0])
+    losses = {v: (compute_error(best, _exchange(table, c)) - error) / excess for v, c in variables.items()}
+    share = (float(np.mean(target**2)) - error) / excess
+    return Explained(float(np.clip(share, 0.0, 1.0)), losses)
+
+
+def _draw_basis(count: int) -> Callable[[Array], Array]:
+    """Return the function from features (N, count) to the regression's basis (N, B)."""
     random = np.random.default_rng(0)
-    frequencies = random.standard_normal((features.shape[1], _FEATURE_COUNT)) * random.choice(
+    frequencies = random.standard_normal((count, _FEATURE_COUNT)) * random.choice(
         _FEATURE_SCALES, (1, _FEATURE_COUNT)
     )
     shifts = random.uniform(0.0, 2.0 * np.pi, _FEATURE_COUNT)
+    return lambda table: np.hstack([np.ones((len(table), 1)), table, np.cos(table @ frequencies + shifts)])
 
-    def compute_basis(rows: Indices) -> Array:
-        table = features[rows]
-        return np.hstack([np.ones((len(table), 1)), table, np.cos(table @ frequencies + shifts)])
 
-    fitted, predicted = _subsample(train), _subsample(held_out)
-    basis, test = compute_basis(fitted), compute_basis(predicted)
-    gram, moment = basis.T @ basis, basis.T @ residual[fitted]
-    best = 0.0
-    for ridge in _RIDGE_PENALTIES:
-        weights = np.linalg.solve(gram + ridge * len(fitted) * 1e-2 * np.eye(len(gram)), moment)
-        remaining = float(np.mean((residual[predicted] - test @ weights) ** 2))
-        best = max(best, (float(np.mean(residual[predicted] ** 2)) - remaining) / excess)
-    return float(np.clip(best, 0.0, 1.0))
+def _exchange(table: Array, columns: Sequence[int]) -> Array:
+    """Return features (N, k) with some columns exchanged between samples."""
+    exchanged, order = table.copy(), np.random.default_rng(1).permutation(len(table))
+    exchanged[:, list(columns)] = table[order][:, list(columns)]
+    return exchanged
 
 
 def _subsample(mask: BoolArray) -> Indices:

@@ -123,7 +123,7 @@ def _describe_checks(
     if likely:
         sets = " or ".join(" with ".join(a.effects) or "no effect at all" for a in likely)
         text += f" (these strokes would also allow {sets})"
-    if verdict == "partly_explained":
+    if verdict == "partly_explained" and remainder:
         text += f"; {remainder[0].lower()}{remainder[1:]}".rstrip(".")
     return f"{text}."
 

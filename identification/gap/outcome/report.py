@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
+from typing import NamedTuple
 
 import numpy as np
 
 from identification.damper.effects import STAGES
-from identification.documents import Diagnosis, Gap, GapLocation, NextStroke, Provenance, Twin, Verdict
+from identification.documents import Diagnosis, Gap, GapLocation, NextStroke, Provenance, Remainder, Twin, Verdict
 from identification.fitting import DamperModel, Dataset
 from identification.gap.data import (
-    NEAR_FLOOR_RATIO,
     EvaluationData,
     Shrinkage,
     compute_harmonics,
@@ -19,16 +20,18 @@ from identification.gap.data import (
     map_gap,
 )
 from identification.gap.fits import Candidate
-from identification.gap.outcome.explainable_share import build_features, estimate_explainable_share
+from identification.gap.outcome.explainable_share import ResidualRegression
 from identification.gap.outcome.explanation import describe_nearest, explain_diagnosis
 from identification.gap.outcome.next_stroke import RivalModel, compute_information, find_best_segment
+from identification.gap.outcome.remainder import describe_remainder
 from identification.gap.outcome.trial_segments import StrokeLimits
 from identification.gap.outcome.twin import make_baseline_fit, make_twin
 from identification.gap.outcome.verdict import (
+    Share,
     build_named_effects,
-    compute_shares,
     decide_unnamed_verdict,
     decide_verdict,
+    is_ambiguous,
     list_alternatives,
 )
 from identification.gap.selection import (
@@ -59,6 +62,17 @@ class DiagnosisResult:
     twin: Twin
 
 
+class NamedSet(NamedTuple):
+    """Set of effects that is named, with its verdict."""
+
+    verdict: Verdict
+    candidate: Candidate
+    """The named set; the law alone if none is named."""
+    shrinkage: Shrinkage
+    posterior: Posterior
+    """Probabilities from which it was chosen."""
+
+
 @dataclass(frozen=True)
 class ReportBuilder:
     """Inputs of the documents."""
@@ -67,29 +81,40 @@ class ReportBuilder:
     evaluation: EvaluationData
     pool: CandidatePool
     posterior: Posterior
+    partial: Posterior | None
+    """Probabilities of sets as a part of the cause; None where the cause is probably in the library."""
     model: DamperModel | None
     notes: Sequence[str]
     seed: int
 
+    @cached_property
+    def regression(self) -> ResidualRegression:
+        """Regression on the residuals of the sets."""
+        return ResidualRegression(self.evaluation, self.pool.floor)
+
     def build_result(self) -> DiagnosisResult:
         """Build the documents."""
-        verdict, named, shrinkage = self._choose_named_set()
+        verdict, named, shrinkage, posterior = self._choose_named_set()
         gap = self._build_gap(verdict, named, shrinkage)
-        shares = compute_shares(self.pool.candidates, named.names, sorted(named.names))
-        effects = build_named_effects(named, self.posterior, shares, self.dataset.drive_unit)
+        shares = self._estimate_shares(named, shrinkage)
+        effects = build_named_effects(named, posterior, shares, self.dataset.drive_unit)
         alternatives = list_alternatives(self.posterior, named.names)
-        remainder = self._describe_remainder(named)
+        remainder: Remainder | None = None
+        if verdict != "no_gap":
+            remainder = describe_remainder(self.pool, named, self.regression, gap.noise_floor_n)
         provenance = self._make_provenance()
         diagnosis = Diagnosis(
             verdict=verdict,
             effects=effects,
             alternatives=alternatives,
             probability=self.posterior.sets[named.names],
+            ambiguous=is_ambiguous(alternatives, self.posterior.sets[named.names]),
             unknown_probability=self.posterior.unknown,
             gap=gap,
-            where=self._locate_gap(),
+            where=self._locate_gap(posterior),
             next_stroke=self._propose_next_stroke(),
-            explanation=explain_diagnosis(verdict, gap, effects, alternatives, remainder),
+            remainder=remainder,
+            explanation=explain_diagnosis(verdict, gap, effects, alternatives, self._describe_place(remainder)),
             notes=[
                 *self.notes,
                 *self._describe_nearest(verdict),
@@ -101,18 +126,40 @@ class ReportBuilder:
         fit = make_baseline_fit(self.dataset, self.evaluation, self.pool.baseline, noise, provenance)
         return DiagnosisResult(diagnosis, make_twin(self.dataset, named, fit, noise, fit.specimen, provenance))
 
-    def _choose_named_set(self) -> tuple[Verdict, Candidate, Shrinkage]:
-        """Return the verdict, the named set (the baseline if none is named) and its shrinkage."""
+    def _choose_named_set(self) -> NamedSet:
+        """Return the verdict and the named set; the law alone if none is named.
+
+        Where no set explains the gap, one that reduces it on unseen strokes is named as a part of the cause.
+        """
+        chosen = self._judge_set(self.posterior)
+        if chosen.verdict == "unexplained" and self.partial is not None:
+            partial = self._judge_set(self.partial)
+            if partial.candidate.names:
+                return partial._replace(verdict="partly_explained")
+        return chosen
+
+    def _judge_set(self, posterior: Posterior) -> NamedSet:
+        """Return the verdict with the most probable set of a posterior."""
         baseline, floor = self.pool.baseline, self.pool.floor
-        named = self.pool.candidates[self.posterior.rank_sets()[0][0]]
-        verdict = decide_verdict(baseline, named, floor, self.pool.no_gap_limit, self.posterior)
+        named = self.pool.candidates[posterior.rank_sets()[0][0]]
+        verdict = decide_verdict(baseline, named, floor, self.pool.no_gap_limit, posterior)
         shrinkage = self._estimate_shrinkage(named)
         benefit = shrinkage.expected_benefit
+        if verdict == "partly_explained" and not self._closes_gap(named):
+            verdict = "unexplained"
         if named.names and benefit is not None and benefit < 0.0:
             verdict = decide_unnamed_verdict(baseline, floor, self.pool.no_gap_limit)
         if named.names and verdict in ("no_gap", "unexplained"):
-            return verdict, baseline, self._estimate_shrinkage(baseline)
-        return verdict, named, shrinkage
+            return NamedSet(verdict, baseline, self._estimate_shrinkage(baseline), posterior)
+        return NamedSet(verdict, named, shrinkage, posterior)
+
+    def _closes_gap(self, named: Candidate) -> bool:
+        """Return True if the interval of the gap that a set closes on held-out strokes is above zero."""
+        baseline, noise = self.pool.baseline.residual, self.pool.noise_model.estimate_noise(named)
+        closed = self.evaluation.estimate_shares(
+            baseline, named.residual, {"all": baseline}, named.held_out_rmse, noise
+        )
+        return closed["all"][1][0] > 0.0
 
     def _describe_nearest(self, verdict: Verdict) -> list[str]:
         """Return the note on the most similar known effects where none is named."""
@@ -131,6 +178,13 @@ class ReportBuilder:
         noise = noise_model.estimate_noise(named)
         return self.evaluation.estimate_shrinkage(self.pool.baseline.residual, named.residual, noise, input_noise)
 
+    def _estimate_shares(self, named: Candidate, shrinkage: Shrinkage) -> dict[str, Share]:
+        """Return the share of each named effect; a set without it that was not fitted counts as the law alone."""
+        candidates, baseline = self.pool.candidates, self.pool.baseline
+        without = {n: candidates.get(named.names - {n}, baseline).residual for n in sorted(named.names)}
+        noise = self.pool.noise_model.estimate_noise(named)
+        return self.evaluation.estimate_shares(baseline.residual, named.residual, without, shrinkage.after, noise)
+
     def _build_gap(self, verdict: Verdict, named: Candidate, shrinkage: Shrinkage) -> Gap:
         no_gap = verdict == "no_gap"
         noise = self.pool.noise_model.estimate_noise(named)
@@ -138,6 +192,7 @@ class ReportBuilder:
         return Gap(
             before_n=shrinkage.before,
             after_n=shrinkage.after,
+            explainable_n=self._find_explainable_rmse(named, noise),
             noise_floor_n=noise,
             noise_floor_ci95=(min(low, noise), max(high, noise)),
             floor_known=self.dataset.floor.is_known,
@@ -155,9 +210,9 @@ class ReportBuilder:
         forces = [self.model.simulate_force(p) for p in self.evaluation.select_fitted_pieces()]
         return self.evaluation.compute_rmse(self.evaluation.compute_residual(forces))[1]
 
-    def _locate_gap(self) -> GapLocation:
+    def _locate_gap(self, posterior: Posterior) -> GapLocation:
         baseline, floor, cycles = self.pool.baseline, self.pool.floor, self.evaluation.cycles
-        stages = compute_stage_probabilities(self.posterior, STAGES)
+        stages = compute_stage_probabilities(posterior, STAGES)
         no_stage = baseline.held_out_rmse <= floor or max(stages.values()) < _MIN_STAGE_PROBABILITY
         return GapLocation(
             stage=None if no_stage else sorted(STAGES, key=stages.__getitem__)[-1],
@@ -165,27 +220,24 @@ class ReportBuilder:
             map=map_gap(baseline.residual, cycles, floor),
             harmonics=compute_harmonics(baseline.residual, cycles),
             drift=estimate_drift(baseline.residual, cycles),
-            explainable=self._estimate_explainable_share(baseline),
+            explainable=self.regression.explain(baseline).share,
         )
 
-    def _estimate_explainable_share(self, candidate: Candidate) -> float:
-        if candidate.held_out_rmse < NEAR_FLOOR_RATIO * self.pool.floor:
-            return 0.0
-        return estimate_explainable_share(
-            build_features(self.evaluation.pieces),
-            candidate.residual.values,
-            self.evaluation.fitted_samples,
-            self.evaluation.held_out_samples,
-            self.pool.floor,
-        )
+    def _find_explainable_rmse(self, named: Candidate, noise: float) -> float:
+        """Return the lowest held-out RMSE [N] of a fitted set or of a regression on the residual."""
+        lowest = min(c.held_out_rmse for c in self.pool.candidates.values())
+        return min(lowest, self.regression.find_explainable_rmse((self.pool.baseline, named), noise))
 
-    def _describe_remainder(self, named: Candidate) -> str:
-        """Return the sentence on the residual with the named effects."""
-        largest = map_gap(named.residual, self.evaluation.cycles, self.pool.floor)[0]
-        share = self._estimate_explainable_share(named)
+    def _describe_place(self, remainder: Remainder | None) -> str:
+        """Return the sentence on the residual with the named effects; empty where nothing is left."""
+        if remainder is None:
+            return ""
+        largest = remainder.map[0]
+        variables = " and ".join(v.replace("_", " ") for v in remainder.variables[:2])
         dependence = (
-            f"a flexible model of stroke and drive explains {share:.0%} of it"
-            if share > _EXPLAINABLE_THRESHOLD
+            f"a flexible model of stroke and drive explains {remainder.explainable:.0%} of it"
+            + (f", mostly from {variables}" if variables else "")
+            if remainder.explainable > _EXPLAINABLE_THRESHOLD
             else "it does not correlate with any recorded stroke or drive quantity"
         )
         return (

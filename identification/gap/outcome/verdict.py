@@ -2,23 +2,28 @@
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
 from identification.gap.fits import Candidate
 from identification.gap.outcome.interval import compute_interval
 from identification.gap.selection import UNKNOWN_THRESHOLD, Posterior
 
-_MIN_NAMED_SHARE = 0.3
+_MIN_NAMED_SHARE = 0.2
 """Smallest part of the gap that a named set closes."""
-_EXPLAINED_SHARE = 0.9
+_EXPLAINED_SHARE = 0.95
 """Part of the gap above which it counts as explained, unless an unknown cause is more probable than the set."""
 _FLOOR_RATIO = 1.03
-"""Threshold on the RMSE relative to the noise floor: below it, nothing is left to explain."""
+"""Threshold on the RMSE of the law relative to the noise floor: below it, nothing is left to explain."""
+_EXPLAINED_RATIO = 1.05
+"""Threshold on the RMSE with effects relative to the noise floor: below it, they explain the gap."""
+_AMBIGUOUS_RATIO = 0.5
+"""Threshold on the probability of an alternative over that of the named set: above it, the answer is ambiguous."""
 _MAX_ALTERNATIVES = 3
 """Largest number of alternatives."""
 _MIN_PROBABILITY = 0.01
 """Smallest probability of an alternative."""
+
+Share = tuple[float, tuple[float, float]]
+"""Part of the gap's variance that returns without an effect [1], with its 95 % interval."""
 
 
 def decide_verdict(
@@ -26,7 +31,8 @@ def decide_verdict(
 ) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts.
 
-    A set that leaves a gap is not named where an unknown cause is more probable.
+    Effects that close a part of the gap are named even where an unknown cause is more probable, because they
+    reduce the error on strokes that no fit used. Their probabilities then say that the cause may be another one.
 
     Args:
         baseline: the law without effects.
@@ -43,9 +49,9 @@ def decide_verdict(
     baseline_excess = max(baseline.compute_excess(floor), 1e-12)
     closed = 1.0 - named.compute_relative_excess(baseline, floor) / baseline_excess
     unknown = posterior.unknown > posterior.sets[named.names]
-    if not named.names or closed < _MIN_NAMED_SHARE or (unknown and closed < _EXPLAINED_SHARE):
+    if not named.names or closed < _MIN_NAMED_SHARE:
         return "unexplained"
-    reaches_floor = max(named.train_rmse, named.held_out_rmse) < _FLOOR_RATIO * floor
+    reaches_floor = max(named.train_rmse, named.held_out_rmse) < _EXPLAINED_RATIO * floor
     if reaches_floor or (closed > _EXPLAINED_SHARE and not unknown):
         return "explained"
     return "partly_explained"
@@ -58,7 +64,7 @@ def decide_unnamed_verdict(baseline: Candidate, floor: float, no_gap_limit: floa
 
 
 def build_named_effects(
-    candidate: Candidate, posterior: Posterior, shares: Mapping[str, float], drive_unit: str
+    candidate: Candidate, posterior: Posterior, shares: Mapping[str, Share], drive_unit: str
 ) -> list[NamedEffect]:
     """Return the effects of a set with their parameters and intervals, the largest share first."""
     fit = candidate.fit
@@ -77,9 +83,12 @@ def build_named_effects(
             NamedEffect(
                 name=model.name,
                 stage=model.effect.stage,
+                place=model.form.place,
+                variable=model.effect.variable,
                 form=model.form_name,
                 parameters=parameters,
-                share=shares[model.name],
+                share=shares[model.name][0],
+                share_ci95=shares[model.name][1],
                 probability=min(posterior.compute_effect_probability(model.name), 1.0),
                 note=_describe_sense(model.form_name),
             )
@@ -100,15 +109,6 @@ def list_alternatives(posterior: Posterior, named: frozenset[str]) -> list[Effec
     return [EffectSet(effects=sorted(names), probability=p) for names, p in others[:_MAX_ALTERNATIVES]]
 
 
-def compute_shares(
-    candidates: Mapping[frozenset[str], Candidate], named: frozenset[str], order: Sequence[str]
-) -> dict[str, float]:
-    """Return the part of the explained variance that is lost without each effect, by its name."""
-    before, after = candidates[frozenset()].held_out_rmse ** 2, candidates[named].held_out_rmse ** 2
-    explained = max(before - after, 1e-12)
-    shares = {}
-    for name in order:
-        without = candidates.get(named - {name})
-        lost = 1.0 if without is None else (without.held_out_rmse**2 - after) / explained
-        shares[name] = float(np.clip(lost, 0.0, 1.0))
-    return shares
+def is_ambiguous(alternatives: Sequence[EffectSet], probability: float) -> bool:
+    """Return True if an alternative is nearly as probable as the named set of a probability [1]."""
+    return any(a.probability > _AMBIGUOUS_RATIO * probability for a in alternatives)

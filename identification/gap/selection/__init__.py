@@ -1,6 +1,7 @@
 """Selection of the sets of effects that explain a recording."""
 
 from identification.gap.selection.candidate_pool import CandidatePool
+from identification.gap.selection.partial_sets import find_partial_sets
 from identification.gap.selection.plan import compute_final_posterior, search_forward
 from identification.gap.selection.posterior import (
     MAX_TIED_SETS,
@@ -9,6 +10,7 @@ from identification.gap.selection.posterior import (
     Posterior,
     compute_stage_probabilities,
 )
+from identification.gap.selection.screening import compute_expected_gain
 from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
 
 __all__ = [
@@ -19,7 +21,9 @@ __all__ = [
     "CandidatePool",
     "Posterior",
     "SearchSettings",
+    "compute_expected_gain",
     "compute_final_posterior",
     "compute_stage_probabilities",
+    "find_partial_sets",
     "search_forward",
 ]

@@ -1,4 +1,4 @@
-"""Block evidence: logarithm of the odds between two candidates, summed over blocks of 0.4 s (decision 0016).
+"""Block evidence: logarithm of the odds between two candidates, summed over short blocks (decision 0016).
 
 The correct effect in another form than the damper's leaves a form error, which is large in some blocks and
 small in others. In the total sum of squares, the large blocks hide the contribution of a second effect in all
@@ -15,30 +15,33 @@ from identification.arrays import Array
 from identification.gap.data import Residual
 
 _BLOCK_LENGTH = 0.4
-"""Length of a block [s]: shorter than a stroke, longer than the field takes to settle."""
+"""Usual length of a block [s]: shorter than a stroke, longer than the field takes to settle."""
 _EFFECTIVE_SAMPLES = 1.6
 """Independent samples in a block. Origin: chosen between the evidence of true effects and of confusable ones."""
 _MIN_VALID_SHARE = 0.5
 """Share of valid samples above which a block counts."""
 
 
-def compute_evidence(before: Residual, after: Residual) -> float:
-    """Return the log odds (natural) of the candidate that leaves ``after`` over the one that leaves ``before``."""
-    ratios = _compute_mean_squares(before) / _compute_mean_squares(after)
+def compute_evidence(before: Residual, after: Residual, block_length: float = _BLOCK_LENGTH) -> float:
+    """Return the log odds (natural) of the candidate that leaves ``after`` over the one that leaves ``before``.
+
+    ``block_length`` is in seconds.
+    """
+    ratios = _compute_mean_squares(before, block_length) / _compute_mean_squares(after, block_length)
     return 0.5 * _EFFECTIVE_SAMPLES * float(np.sum(np.log(ratios)))
 
 
-def bound_evidence(residual: Residual, floor: float) -> float:
+def bound_evidence(residual: Residual, floor: float, block_length: float = _BLOCK_LENGTH) -> float:
     """Compute the evidence for a candidate whose error would be the floor [N] in every block above it."""
-    ratios = np.maximum(_compute_mean_squares(residual) / floor**2, 1.0)
+    ratios = np.maximum(_compute_mean_squares(residual, block_length) / floor**2, 1.0)
     return 0.5 * _EFFECTIVE_SAMPLES * float(np.sum(np.log(ratios)))
 
 
-def _compute_mean_squares(residual: Residual) -> Array:
+def _compute_mean_squares(residual: Residual, block_length: float) -> Array:
     """Return the mean squared residual of each block [N²], (blocks,)."""
     means, start = [], 0
     for count, rate in residual.rates:
-        size = max(math.ceil(_BLOCK_LENGTH * rate), 1)
+        size = max(math.ceil(block_length * rate), 1)
         part = slice(start, start + count // size * size)
         valid = residual.valid[part].reshape(-1, size)
         sums = np.sum(np.where(valid, residual.values[part].reshape(-1, size) ** 2, 0.0), axis=1)

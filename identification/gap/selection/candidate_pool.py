@@ -25,6 +25,10 @@ from identification.progress import Progress, ignore_progress
 
 _CHANCE_DEVIATIONS = 2.0
 """Standard deviations of a sample variance that count as chance."""
+_BLOCK_ANGLE = 4.0
+"""Length of a block of the block evidence, over half stroke divided by peak speed [1]."""
+_USUAL_RATE = 10.0
+"""Peak speed over half stroke [1/s] of the recordings for which the sampling rates of the settings are stated."""
 QUICK_FIT = FitOptions(decimation=1, starts=0, descents=1, iterations=25, regression_start=False, refit_full=False)
 """One descent from the best of the given starts, on decimated data."""
 
@@ -59,7 +63,7 @@ class CandidatePool:
 
     def __post_init__(self) -> None:
         """Create the cache of screenings."""
-        self._screenings = ScreeningCache(self.settings.screening_rate)
+        self._screenings = ScreeningCache(self._resolve_rate(self.settings.screening_rate))
 
     @property
     def budget_spent(self) -> bool:
@@ -75,6 +79,11 @@ class CandidatePool:
     def no_gap_limit(self) -> float:
         """RMSE of the baseline [N] up to which the verdict is ``no_gap``."""
         return max(self.settings.no_gap_ratio * self.floor, self.noise_model.highest_floor)
+
+    @property
+    def block_length(self) -> float:
+        """Length of a block of the block evidence [s]: part of a stroke of this recording."""
+        return _BLOCK_ANGLE / self.full_problem.space.scales.rate
 
     @property
     def baseline(self) -> Candidate:
@@ -107,11 +116,12 @@ class CandidatePool:
         )
         floor = min(self.floor, lowest)
         x = np.concatenate([p.excitation.displacement for p in self.full_problem.pieces])
+        size = self.full_problem.space.scales.damper_size
         return [
             SetEvidence(
                 names,
                 c.compute_relative_excess(self.baseline, floor),
-                math.prod(compute_size_weight(e, x) for e in c.fit.active_effects),
+                math.prod(compute_size_weight(e, x, size) for e in c.fit.active_effects),
                 self.block_evidence.get(names),
             )
             for names, c in self.candidates.items()
@@ -132,6 +142,16 @@ class CandidatePool:
         self.candidates[candidate.names] = candidate
         return candidate
 
+    def search(self, effects: tuple[EffectModel, ...]) -> Candidate:
+        """Fit a set by the search of an identification, and keep it if it is the best of its names.
+
+        The other starts come from fits without the set or without one of its effects. A large effect has moved the
+        law there to values from which no descent returns.
+        """
+        self.fit_count += 1
+        problem = self.decimated_problem.replace_effects(effects)
+        return self._keep(self._evaluate(JointFit(problem, fit_output_error(problem, _LAW_FIT))))
+
     def fit(
         self, effects: tuple[EffectModel, ...], starts: Sequence[Array] = (), options: FitOptions = QUICK_FIT
     ) -> Candidate:
@@ -143,7 +163,11 @@ class CandidatePool:
             The best known candidate of this set, which may come from an earlier fit.
         """
         self.fit_count += 1
-        candidate = self._evaluate(fit_jointly(self.decimated_problem, effects, None, options, starts))
+        return self._keep(self._evaluate(fit_jointly(self.decimated_problem, effects, None, options, starts)))
+
+    def _keep(self, candidate: Candidate) -> Candidate:
+        """Keep a candidate if it is the best of its names, and return the best."""
+        effects = candidate.fit.effects
         self.progress(" and ".join(model.name for model in effects) or "law alone", candidate.held_out_rmse)
         known = self.candidates.get(candidate.names)
         if known is None or self.compute_excess(candidate) < self.compute_excess(known):
@@ -168,9 +192,14 @@ class CandidatePool:
         """Problem of the decimated data on which sets are searched, as a fast variant."""
         rate = max(p.excitation.rate for p in self.full_problem.pieces)
         samples = sum(len(p.force) for p in self.full_problem.pieces)
-        factor = max(rate / self.settings.decimation_rate, samples / self.settings.long_recording)
-        factor = min(factor, rate / self.settings.screening_rate)
+        factor = rate / self._resolve_rate(self.settings.decimation_rate)
+        factor = max(factor, samples / self.settings.long_recording)
+        factor = min(factor, rate / self._resolve_rate(self.settings.screening_rate))
         return self.full_problem.make_fast().decimate(max(1, round(factor)))
+
+    def _resolve_rate(self, rate: float) -> float:
+        """Return a sampling rate [Hz] that resolves the electronics and the motion of this recording."""
+        return rate * max(1.0, self.full_problem.space.scales.rate / _USUAL_RATE)
 
     @cached_property
     def regression_start(self) -> Array:

@@ -33,7 +33,9 @@ def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
     extended = _fit_extensions(pool, names, names | confusable)
     for larger in extended:
         pool.fit_fully(larger)
-        evidence = compute_evidence(pool.candidates[names].residual, pool.candidates[larger].residual)
+        evidence = compute_evidence(
+            pool.candidates[names].residual, pool.candidates[larger].residual, pool.block_length
+        )
         confusion = pool.settings.confusion_penalty if larger & confusable - names else 0.0
         pool.block_evidence[larger] = BlockEvidence(names, evidence - confusion)
     accepted = [larger for larger in extended if pool.block_evidence[larger].log_odds > penalty]
@@ -61,4 +63,6 @@ def _is_extension_promising(pool: CandidatePool, names: frozenset[str]) -> bool:
         return False
     known = pool.candidates[names]
     explains = pool.compute_excess(known) < pool.settings.max_remaining_share * pool.baseline_excess
-    return explains and bound_evidence(known.residual, pool.floor) > compute_complexity_penalty(names)
+    return explains and bound_evidence(known.residual, pool.floor, pool.block_length) > compute_complexity_penalty(
+        names
+    )

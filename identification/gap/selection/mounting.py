@@ -38,7 +38,7 @@ def _fit_forms(pool: CandidatePool, parent: Candidate, gains: Sequence[Screening
             continue  # Its contacts need a high rate, and a free pin shows together with other effects as well.
         if pool.is_at_floor(pool.find_best()) or pool.compute_excess(parent) < settings.mounting_excess:
             return
-        values = [*_make_starts(simpler, gain.effect_model), *gain.effect_model.form.starts]
+        values = [*_make_starts(simpler, gain.effect_model), *gain.effect_model.starts]
         extended = fit_extension(pool, parent, gain, values)
         simpler = extended.fit.values[gain.effect_model.name]
         if pool.compute_excess(extended) > settings.richer_form_share * pool.compute_excess(parent):
@@ -50,5 +50,5 @@ def _make_starts(simpler: Mapping[str, float], model: EffectModel) -> list[tuple
     if not simpler:
         return []
     symbols = [q.symbol for q in model.quantities]
-    starts = {tuple(simpler.get(s, v) for s, v in zip(symbols, start, strict=True)) for start in model.form.starts}
+    starts = {tuple(simpler.get(s, v) for s, v in zip(symbols, start, strict=True)) for start in model.starts}
     return sorted(starts)

@@ -5,6 +5,7 @@ best sets grow by a second and a third effect. Then each effect of a set is left
 in its place. All of this uses decimated data. Finally the most probable sets are fitted on all samples.
 """
 
+from identification.fitting import EffectModel
 from identification.gap.fits import Candidate
 from identification.gap.noise import describe_drift_explanation, subtract_clock_drift
 from identification.gap.selection.candidate_pool import CandidatePool
@@ -18,7 +19,15 @@ from identification.gap.selection.posterior import (
     UNKNOWN_THRESHOLD,
     Posterior,
 )
-from identification.gap.selection.screening import MOUNTING_EFFECTS, compute_expected_gain, select_shortlist
+from identification.gap.selection.screening import (
+    MOUNTING_EFFECTS,
+    compute_expected_gain,
+    list_effect_models,
+    select_shortlist,
+)
+
+_CONTACTS = ("connection", "displacement_backlash")
+"""Actions that need starts at several sizes, so that a search from one size of the effect finds nothing."""
 
 
 def search_forward(pool: CandidatePool) -> None:
@@ -33,12 +42,35 @@ def search_forward(pool: CandidatePool) -> None:
             break
         for parent in beam:
             _fit_extensions(pool, parent, count)
-        sets = sorted((c for n, c in pool.candidates.items() if len(n) == size), key=pool.compute_excess)
+        _search_best_sets(pool, size)
+        sets = _sort_sets(pool, size)
         beam = _select_beam(pool, size, sets, beam[0])
         if not beam:
             break
     fit_subsets(pool)
     exchange_effects(pool)
+
+
+def _sort_sets(pool: CandidatePool, size: int) -> list[Candidate]:
+    """Return the fitted sets of one size, the best first."""
+    return sorted((c for n, c in pool.candidates.items() if len(n) == size), key=pool.compute_excess)
+
+
+def _search_best_sets(pool: CandidatePool, size: int) -> None:
+    """Search the best sets of one size from the starts of the law, until one is at the floor.
+
+    A single effect is searched in all its forms.
+    """
+    scale = pool.full_problem.space.scales.damper_size
+    for candidate in _sort_sets(pool, size)[: pool.settings.searched_sets]:
+        models = candidate.fit.effects
+        forms = list_effect_models([models[0].name], scale) if size == 1 else ()
+        choices: list[tuple[EffectModel, ...]] = [(model,) for model in forms]
+        for effects in choices or [models]:
+            if pool.budget_spent or pool.is_at_floor(pool.find_best()):
+                return
+            if not any(e.form.action in _CONTACTS for e in effects):
+                pool.search(effects)
 
 
 def _select_beam(pool: CandidatePool, size: int, sets: list[Candidate], parent: Candidate) -> list[Candidate]:

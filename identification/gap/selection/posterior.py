@@ -117,7 +117,7 @@ def compute_posterior(sets: Sequence[SetEvidence], samples: int, coloured_share:
     scores = _compute_scores(sets, resolution, gap)
     insignificant = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
     best = max(sets, key=lambda s: scores[s.names])
-    unknown = _compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
+    unknown = compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
     unknown -= _LIKELIHOOD_EXPONENT * math.log(_UNKNOWN_FORM_ERROR * gap + resolution + insignificant)
     unknown -= _penalise_incomplete(best, gap)
     # An unknown cause is only an alternative where known effects leave an excess that the floor cannot explain.
@@ -125,14 +125,14 @@ def compute_posterior(sets: Sequence[SetEvidence], samples: int, coloured_share:
     shares = _normalise(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
     remaining = (max(best.excess, 0.0) + resolution) / (gap + resolution)
     any_effect = 1.0 - float(shares[list(scores).index(frozenset())])
-    misattributed = (_MISATTRIBUTION + _MISATTRIBUTION_SLOPE * remaining) * any_effect
+    misattributed = compute_misattribution(remaining) * any_effect
     known = (1.0 - misattributed) * shares[:-1]
     return Posterior(dict(zip(scores, map(float, known), strict=True)), 1.0 - float(known.sum()))
 
 
 def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) -> dict[frozenset[str], float]:
     """Return the log odds of each set, from its excess or from its block evidence, whichever is larger."""
-    prior = {s.names: _compute_log_prior(s.names) + math.log(s.weight) for s in sets}
+    prior = {s.names: compute_log_prior(s.names) + math.log(s.weight) for s in sets}
     loss = {
         s.names: _LIKELIHOOD_EXPONENT * math.log(max(s.excess, 0.0) + resolution) + _penalise_incomplete(s, gap)
         for s in sets
@@ -150,13 +150,18 @@ def _penalise_incomplete(evidence: SetEvidence, gap: float) -> float:
     return _LIKELIHOOD_EXPONENT * math.log(max(ratio, 1.0))
 
 
+def compute_misattribution(remaining: float) -> float:
+    """Return the probability that a set which leaves a part of the gap [1] is not the cause."""
+    return _MISATTRIBUTION + _MISATTRIBUTION_SLOPE * remaining
+
+
 def compute_complexity_penalty(names: frozenset[str]) -> float:
     """Return the logarithm of the odds that one more common effect has to bring to a set."""
     larger = names | {next(name for name in COMMON_EFFECTS if name not in names)}
-    return _compute_log_prior(names) - _compute_log_prior(larger)
+    return compute_log_prior(names) - compute_log_prior(larger)
 
 
-def _compute_log_prior(names: frozenset[str]) -> float:
+def compute_log_prior(names: frozenset[str]) -> float:
     """Return the logarithm of the prior of a set: that of its size, shared among all sets of this size."""
     count = len(names)
     size_prior = _COUNT_PRIOR[min(count, len(_COUNT_PRIOR) - 1)]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array
+from identification.damper import LIBRARY_SIZE, DamperSize
 from identification.damper.effects import COMMON_EFFECTS, EFFECTS
 from identification.fitting import EffectModel, Evaluation, Problem
 from identification.gap.fits import JointFit, insert_effect_unknowns, predict_joint_step, take_joint_step
@@ -49,9 +50,11 @@ class ScreeningResult:
     """(U,) unknowns of the joint problem at the end of the step, from which a fit can start."""
 
 
-def list_effect_models(names: Sequence[str] = COMMON_EFFECTS) -> tuple[EffectModel, ...]:
-    """Return every form of some effects."""
-    return tuple(EffectModel(name, form.name) for name in names for form in EFFECTS[name].forms)
+def list_effect_models(
+    names: Sequence[str] = COMMON_EFFECTS, size: DamperSize = LIBRARY_SIZE
+) -> tuple[EffectModel, ...]:
+    """Return every form of some effects, for a damper of a size."""
+    return tuple(EffectModel(name, form.name, size) for name in names for form in EFFECTS[name].forms)
 
 
 def screen(
@@ -75,8 +78,9 @@ def screen(
         # The baseline was fitted on more samples. Its own step on these must not count as gain of an effect.
         start, _, _ = take_joint_step(quick, baseline.minimum.unknowns)
         linearisation = _Linearisation.make(quick, start.unknowns, mains_frequency)
+        listed = models or list_effect_models(size=problem.space.scales.damper_size)
         predicted = sorted(
-            (linearisation.find_best_start(model) for model in models or list_effect_models()),
+            (linearisation.find_best_start(model) for model in listed),
             key=lambda g: -g.predicted_gain,
         )
         stepped = [linearisation.take_step(gain) for gain in predicted[:_STEPPED_FORMS]]
@@ -151,9 +155,9 @@ class _Linearisation:
     def _list_starts(self, model: EffectModel) -> Sequence[tuple[float, ...]]:
         """Return the starts of a form; mains interference starts at one frequency only."""
         if model.name != "mains_hum":
-            return model.form.starts
+            return model.starts
         # The spectrum of the residual shows the frequency directly.
-        return [(*model.form.starts[0][:-1], self.mains_frequency)]
+        return [(*model.starts[0][:-1], self.mains_frequency)]
 
     def _predict_gain(self, model: EffectModel, values: tuple[float, ...]) -> ScreeningResult:
         """Predict the gain of the linear step from a start."""

@@ -61,7 +61,9 @@ class ScreeningCache:
             or abs(excess - entry.excess) > _CACHE_TOLERANCE * entry.excess
         ):
             highest = max(p.excitation.rate for p in problem.pieces)
-            models = list_effect_models([name for name in EFFECTS if name in wanted])
+            models = list_effect_models(
+                [name for name in EFFECTS if name in wanted], problem.space.scales.damper_size
+            )
             decimation = max(1, round(highest / self.rate))
             gains = screen(problem, parent.fit, models, decimation, find_mains_frequency(parent))
             entry = self._entries[parent.names] = _Screening(excess, wanted, gains)

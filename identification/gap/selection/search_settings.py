@@ -11,7 +11,7 @@ class SearchSettings:
 
     # Data
     decimation_rate: float = 250.0
-    """Sampling rate to which recordings are decimated for the search [Hz]."""
+    """Sampling rate to which recordings are decimated for the search [Hz]; higher where the motion is fast."""
     long_recording: int = 15_000
     """Number of samples above which a recording is decimated further, down to the screening rate."""
     screening_rate: float = 125.0
@@ -34,6 +34,8 @@ class SearchSettings:
     """Threshold on the baseline's excess: above it, a linear step from the baseline predicts little."""
     large_shortlist: int = 10
     """Number of effects that are fitted alone above this threshold."""
+    searched_sets: int = 3
+    """Number of sets of each size that are fitted again from the starts of the law alone."""
     small_excess: float = 0.05
     """Threshold on the excess of a set: below it, an effect is only fitted if its expected gain is large."""
     small_excess_gain: float = 0.15

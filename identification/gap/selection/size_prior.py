@@ -3,6 +3,7 @@
 import numpy as np
 
 from identification.arrays import Array
+from identification.damper import LIBRARY_SIZE, DamperSize, scale_quantity
 from identification.simulate import ActiveEffect
 
 _IMPLAUSIBLE_WEIGHT = 0.03
@@ -19,14 +20,15 @@ _GRID_POINTS = 50
 """Displacements at which the nonlinearity of a channel is evaluated."""
 
 
-def compute_size_weight(effect: ActiveEffect, displacement: Array) -> float:
+def compute_size_weight(effect: ActiveEffect, displacement: Array, size: DamperSize = LIBRARY_SIZE) -> float:
     """Return the weight [1] of an effect for the plausibility of its size: one where it is plausible.
 
     Args:
         effect: the effect with its values.
         displacement: displacement of the strokes [m], any number of samples.
+        size: size of the damper, from which the bounds of the search follow.
     """
-    plausible = _has_plausible_size(effect, displacement) and not _is_at_bound(effect)
+    plausible = _has_plausible_size(effect, displacement) and not _is_at_bound(effect, size)
     return 1.0 if plausible else _IMPLAUSIBLE_WEIGHT
 
 
@@ -46,11 +48,12 @@ def _has_plausible_size(effect: ActiveEffect, displacement: Array) -> bool:
             return True
 
 
-def _is_at_bound(effect: ActiveEffect) -> bool:
+def _is_at_bound(effect: ActiveEffect, size: DamperSize) -> bool:
     """Return True if a size is at a bound of its search range."""
+    quantities = [scale_quantity(q, size) for q in effect.form.parameters]
     bounds = [
         (value, bound)
-        for q, value in zip(effect.form.parameters, effect.values, strict=True)
+        for q, value in zip(quantities, effect.values, strict=True)
         if q.low <= 0.0
         for bound in (q.low, q.high)
         if bound != 0.0

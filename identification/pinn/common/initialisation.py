@@ -106,7 +106,7 @@ def generate_starts(problem: Problem) -> Iterator[TrainingStart]:
 
 def _choose_effect_starts(problem: Problem, number: int) -> Array:
     """Return search coordinates (P,) of the effect parameters at their forms' own starts, mostly size zero."""
-    starts = [e.to_search(e.form.starts[number % len(e.form.starts)]) for e in problem.effects]
+    starts = [e.to_search(e.starts[number % len(e.starts)]) for e in problem.effects]
     return np.concatenate([np.empty(0), *starts])
 
 

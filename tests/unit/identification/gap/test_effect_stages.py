@@ -123,7 +123,7 @@ def test_the_contracts_name_every_common_effect():
 @each_effect
 def test_the_report_names_the_effect_with_values_and_units(name):
     candidate, posterior = SimpleNamespace(fit=fit_effect(name)), Posterior({frozenset({name}): 0.9}, 0.05)
-    (effect,) = build_named_effects(candidate, posterior, {name: 1.0}, "V")
+    (effect,) = build_named_effects(candidate, posterior, {name: (1.0, (0.9, 1.1))}, "V")
     text = explain_diagnosis("explained", GAP, [effect], [], "")
     assert name in text
     assert EFFECTS[name].meaning in text

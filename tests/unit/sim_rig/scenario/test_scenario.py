@@ -61,8 +61,8 @@ REFUSED = {
     ),
     "unknown value": ({"effects": [{**BACKLASH, "parameters": {"width": 1.0}}]}, "takes gap, not width"),
     "effect out of bounds": (
-        {"effects": [{**BACKLASH, "parameters": {"gap": 0.1}}]},
-        r"clevis_backlash.gap \(.*\) is 0.1 m, outside 0 to 0.002 m$",
+        {"effects": [{**BACKLASH, "parameters": {"gap": 0.2}}]},
+        r"clevis_backlash.gap \(.*\) is 0.2 m, outside 0 to 0.133333 m$",
     ),
     "effect twice": ({"effects": [BACKLASH, BACKLASH]}, "listed twice"),
     "units at odds": ({"drive_unit": "A"}, "drive_unit is A, but coil_v is in V"),

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from identification.gap.data.shrinkage import CycleErrors, Replicates, estimate_shrinkage
+from identification.gap.data.shrinkage import (
+    CycleErrors,
+    HeldOutErrors,
+    Replicates,
+    estimate_shares,
+    estimate_shrinkage,
+)
 
 NOISE = 2.0
 
@@ -165,3 +171,27 @@ def test_a_gap_that_is_smaller_than_the_noise_is_divided_by_a_hundredth_of_it():
     errors = make_uniform(NOISE**2 + 9.0, NOISE**2 + 1.0, [10.0, 30.0])
     shrinkage = estimate_shrinkage(errors, NOISE, replicate(0.02, gap=0.0), strokes=5)
     assert shrinkage.expected_benefit == pytest.approx(1.0 - 1.02 / 0.04)
+
+
+def make_held_out(without, segments=6, cycles=8):
+    """Held-out cycles with a gap of 9 N² and mean squares [N²] without each effect."""
+    counts = np.full(segments * cycles, 100.0)
+    segment = np.repeat(np.arange(segments), cycles)
+    scatter = 1.0 + 0.1 * default_rng(3).standard_normal(len(counts))
+    squares = {name: counts * scatter * square for name, square in without.items()}
+    return HeldOutErrors(counts * scatter * 10.0, counts * scatter * 1.0, squares, counts, segment)
+
+
+def test_a_share_is_the_part_of_the_gap_that_returns_without_the_effect():
+    shares = estimate_shares(make_held_out({"a": 10.0, "b": 2.8}), np.sqrt(10.0), 1.0, 1.0)
+    for name, expected in (("a", 1.0), ("b", 0.2)):
+        value, (low, high) = shares[name]
+        assert value == pytest.approx(expected, abs=0.02)
+        assert low <= value <= high
+        assert high - low < 0.2
+
+
+def test_a_share_counts_from_the_error_that_is_expected_of_another_run():
+    # The measured error is the noise; 0.9 N² more are expected, a tenth of the gap.
+    shares = estimate_shares(make_held_out({"a": 10.0}), np.sqrt(10.0), np.sqrt(1.9), 1.0)
+    assert shares["a"][0] == pytest.approx(0.9, abs=0.02)

@@ -9,7 +9,7 @@ from identification.gap.outcome.explainable_share import (
     _build_piece_features,
     _subsample,
     build_features,
-    estimate_explainable_share,
+    explain_residual,
 )
 from identification.simulate import Excitation
 from tests.support.candidate_pools import record
@@ -21,14 +21,14 @@ def test_structure_is_explainable_and_noise_is_not():
     noise = random.standard_normal(8000)
     train = np.arange(8000) % 4 != 2
     structure = 3.0 * np.sin(features[:, 0]) * features[:, 1]
-    assert estimate_explainable_share(features, structure + noise, train, ~train, 1.0) > 0.8
-    assert estimate_explainable_share(features, 2.0 * noise, train, ~train, 1.0) < 0.1
+    assert explain_residual(features, structure + noise, train, ~train, 1.0).share > 0.8
+    assert explain_residual(features, 2.0 * noise, train, ~train, 1.0).share < 0.1
 
 
 def test_at_the_floor_nothing_is_explainable():
     features, noise = default_rng(0).standard_normal((400, 2)), default_rng(1).standard_normal(400)
     train = np.arange(400) % 2 == 0
-    assert estimate_explainable_share(features, 0.5 * noise, train, ~train, 1.0) == 0.0
+    assert explain_residual(features, 0.5 * noise, train, ~train, 1.0).share == 0.0
 
 
 def test_features_of_a_recording_are_standardised():
@@ -51,7 +51,8 @@ def test_features_have_the_direction_and_the_distance_from_the_last_reversal():
     assert columns[:4].tolist() == [x.tolist(), v.tolist(), (0.5 * v).tolist(), [1.0] * 8]
     # The standard deviation of the velocity is 1; its sign is smoothed over a tenth of it.
     assert columns[4] == pytest.approx(np.tanh(v / 0.1))
-    distances = np.array([0.0, 1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0])  # in hundredths of a millimetre
+    hundredths = np.array([0.0, 1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 3.0])  # of a millimetre
+    distances = 1e-5 * hundredths / (1e-3 * 2.5e-5)  # over a thousandth of half the stroke
     assert columns[5] == pytest.approx(np.log(1.0 + distances) * np.sign(v))
     assert columns[8:] == pytest.approx(np.ones((2, 8)))  # the past of a constant drive
     assert len(columns) == 10
@@ -96,7 +97,7 @@ def test_the_share_of_a_linear_structure_is_that_of_the_excess_variance():
     features, noise = random.standard_normal((6000, 1)), random.standard_normal(6000)
     train = np.arange(6000) % 2 == 0
     residual = 3.0 * features[:, 0] + noise
-    share = estimate_explainable_share(features, residual, train, ~train, 0.5)
+    share = explain_residual(features, residual, train, ~train, 0.5).share
     structure = np.mean((3.0 * features[~train, 0]) ** 2)
     assert share == pytest.approx(structure / (np.mean(residual[~train] ** 2) - 0.25), abs=0.03)
 
@@ -106,8 +107,6 @@ def test_the_share_of_a_small_residual_is_the_same():
     features = random.standard_normal((1200, 1))
     residual = 3e-3 * features[:, 0] + 1e-3 * random.standard_normal(1200)
     train = np.arange(1200) % 2 == 0
-    small, large = (
-        estimate_explainable_share(features, s * residual, train, ~train, s * 5e-4) for s in (1.0, 1e3)
-    )
+    small, large = (explain_residual(features, s * residual, train, ~train, s * 5e-4).share for s in (1.0, 1e3))
     assert small == pytest.approx(large, rel=1e-6)
     assert small > 0.5

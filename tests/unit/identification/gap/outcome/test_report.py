@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from identification.damper.effects import STAGES
+from identification.documents import GapMapEntry, Remainder
 from identification.gap.data.cycles import Cycles, StrokeCondition
 from identification.gap.data.residual_map import Residual
 from identification.gap.data.shrinkage import Shrinkage
 from identification.gap.fits.candidate import Candidate
+from identification.gap.outcome.explainable_share import Explained
 from identification.gap.outcome.report import ReportBuilder
 from identification.gap.selection.posterior import Posterior
 from identification.noise.noise_floor import NoiseFloorEstimate
@@ -28,7 +30,17 @@ def make_candidate(names, train, held_out, values=3.0):
 
 
 def make_builder(
-    *, baseline=3.0, named=1.0, benefit=0.5, sets=None, unknown=0.05, conditions=(), pieces=(), drives=None
+    *,
+    baseline=3.0,
+    named=1.0,
+    benefit=0.5,
+    sets=None,
+    unknown=0.05,
+    partial=None,
+    low=0.8,
+    conditions=(),
+    pieces=(),
+    drives=None,
 ):
     candidates = {
         NONE: make_candidate((), baseline, baseline, baseline * FLOOR),
@@ -55,11 +67,13 @@ def make_builder(
     evaluation = SimpleNamespace(
         force=np.zeros(8), estimate_shrinkage=estimate_shrinkage, cycles=cycles, pieces=pieces,
         select_fitted_pieces=lambda: (1.0, 2.0), compute_residual=lambda forces: forces,
+        estimate_shares=lambda before, after, without, rmse, noise: {"all": (0.5, (low, 0.9))},
         compute_rmse=lambda forces: (sum(forces), 10 * sum(forces)),
     )  # fmt: skip
     posterior = Posterior(sets or {NONE: 0.15, SPRING: 0.8}, unknown)
     dataset = SimpleNamespace(drive_unit="V", floor=NoiseFloorEstimate(2.0, 2.0, 1.9, "", 0.05))
-    return ReportBuilder(dataset, evaluation, pool, posterior, None, [], 1)
+    partial = None if partial is None else Posterior(partial, 1.0 - sum(partial.values()))
+    return ReportBuilder(dataset, evaluation, pool, posterior, partial, None, [], 1)
 
 
 @pytest.mark.parametrize(
@@ -71,20 +85,43 @@ def make_builder(
         ({"benefit": -0.01}, "unexplained", NONE, 0.0),
         ({"benefit": -0.01, "baseline": 1.02}, "no_gap", NONE, 0.0),
         ({"named": 2.9}, "unexplained", NONE, 0.0),
+        ({"named": 2.0, "unknown": 0.9}, "partly_explained", SPRING, 1.0),
+        ({"named": 2.0, "low": 0.0}, "unexplained", NONE, 0.0),
+        ({"named": 2.0, "sets": {NONE: 0.1, SPRING: 0.05}, "unknown": 0.8}, "unexplained", NONE, 0.0),
+        (
+            {"named": 2.0, "sets": {NONE: 0.1, SPRING: 0.05}, "unknown": 0.8, "partial": {NONE: 0.1, SPRING: 0.6}},
+            "partly_explained",
+            SPRING,
+            1.0,
+        ),
+        (
+            {"named": 1.0, "sets": {NONE: 0.1, SPRING: 0.05}, "unknown": 0.8, "partial": {NONE: 0.1, SPRING: 0.6}},
+            "partly_explained",
+            SPRING,
+            1.0,
+        ),
+        (
+            {"named": 2.9, "sets": {NONE: 0.1, SPRING: 0.05}, "unknown": 0.8, "partial": {NONE: 0.1, SPRING: 0.6}},
+            "unexplained",
+            NONE,
+            0.0,
+        ),
         ({"sets": {NONE: 0.8, SPRING: 0.1}, "benefit": -0.01}, "no_gap", NONE, 0.0),
     ],
 )
 def test_a_set_is_named_if_it_explains_the_gap_and_benefits_another_run(changes, verdict, names, input_noise):
-    chosen, named, shrinkage = make_builder(**changes)._choose_named_set()
+    chosen, named, shrinkage, _ = make_builder(**changes)._choose_named_set()
     assert (chosen, named.names, shrinkage.after) == (verdict, names, input_noise)
 
 
 def test_the_gap_of_noise_has_no_shrinkage():
     builder = make_builder()
     named, shrinkage = builder.pool.candidates[SPRING], Shrinkage(6.0, 2.0, 0.9, (0.8, 0.95))
+    object.__setattr__(builder, "regression", SimpleNamespace(find_explainable_rmse=lambda sets, noise: 1.9))
     gap = builder._build_gap("explained", named, shrinkage)
     assert (gap.shrinkage, gap.shrinkage_ci95, gap.noise_floor_n, gap.nominal_n) == (0.9, (0.8, 0.95), 1.9, None)
     assert (gap.before_n, gap.after_n, gap.train_before_n, gap.train_after_n) == (6.0, 2.0, 6.0, 2.0)
+    assert gap.explainable_n == 1.9
     # The noise that a named set leaves may lie below the interval from the recording.
     assert (gap.noise_floor_ci95, gap.floor_known) == (pytest.approx((1.9, 2.098)), True)
     gap = builder._build_gap("no_gap", named, shrinkage)
@@ -94,7 +131,7 @@ def test_the_gap_of_noise_has_no_shrinkage():
 def test_a_given_simulation_is_compared_on_the_held_out_cycles():
     builder = make_builder()
     with_model = ReportBuilder(
-        builder.dataset, builder.evaluation, builder.pool, builder.posterior,
+        builder.dataset, builder.evaluation, builder.pool, builder.posterior, None,
         SimpleNamespace(simulate_force=lambda piece: 3.0 * piece), [], 1,
     )  # fmt: skip
     assert with_model._compute_nominal_rmse() == 90.0
@@ -132,30 +169,32 @@ def test_a_gap_has_the_most_probable_stage(baseline, sets, unknown, stage):
 def _locate_without_regression(builder):
     builder = SimpleNamespace(
         pool=builder.pool, evaluation=builder.evaluation, posterior=builder.posterior,
-        _estimate_explainable_share=lambda candidate: 0.0,
+        regression=SimpleNamespace(explain=lambda candidate: Explained(0.0, {})),
     )  # fmt: skip
-    return ReportBuilder._locate_gap(builder)
+    return ReportBuilder._locate_gap(builder, builder.posterior)
 
 
 @pytest.mark.parametrize(
-    ("share", "dependence"),
-    [(0.31, "a flexible model of stroke and drive explains 31% of it"), (0.3, "it does not correlate with any")],
+    ("share", "variables", "dependence"),
+    [
+        (0.31, [], "a flexible model of stroke and drive explains 31% of it."),
+        (
+            0.31,
+            ["velocity", "travel_since_reversal", "time"],
+            "a flexible model of stroke and drive explains 31% of it, mostly from velocity and travel since "
+            "reversal.",
+        ),
+        (0.3, ["velocity"], "it does not correlate with any"),
+    ],
 )
-def test_the_remainder_is_located_in_millimetres(share, dependence):
-    builder = make_builder()
-    stand_in = SimpleNamespace(
-        evaluation=builder.evaluation, pool=builder.pool, dataset=builder.dataset,
-        _estimate_explainable_share=lambda candidate: share,
-    )  # fmt: skip
-    text = ReportBuilder._describe_remainder(stand_in, builder.pool.baseline)
+def test_the_remainder_is_located_in_millimetres(share, variables, dependence):
+    entry = GapMapEntry(drive=0.25, amplitude_m=0.012, frequency_hz=1.5, phase=0.25, gap_n=5.66)
+    remainder = Remainder(
+        gap_n=4.0, explainable=share, not_repeating=None, stage=None, map=[entry], variables=variables
+    )
+    text = make_builder()._describe_place(remainder)
     assert text.startswith(f"The remainder is largest at 0.25 V, 12 mm and 1.5 Hz (5.66 N), and {dependence}")
-
-
-def test_nothing_is_explainable_within_two_per_cent_of_the_floor():
-    builder = make_builder()
-    assert builder._estimate_explainable_share(make_candidate((), 1.5, 1.019)) == 0.0
-    with pytest.raises(ValueError, match="concatenate"):  # the regression needs pieces
-        builder._estimate_explainable_share(make_candidate((), 1.0, 1.021))
+    assert make_builder()._describe_place(None) == ""
 
 
 def make_piece(low, high, speed):

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identification.damper import LIBRARY_SIZE
 from identification.gap.fits.candidate import Candidate
 from identification.gap.selection.candidate_pool import CandidatePool
 
@@ -16,8 +17,10 @@ def make_candidate(names, train, held_out, chance=0.0):
     return Candidate(SimpleNamespace(effects=effects, active_effects=()), None, train, held_out, chance)
 
 
-def make_pool(problem=None, evaluation=None, **settings):
+def make_pool(problem=None, evaluation=None, rate=10.0, **settings):
     settings = {"screening_rate": 100.0, "fit_budget": 3} | settings
+    problem = SimpleNamespace() if problem is None else problem
+    problem.space = SimpleNamespace(scales=SimpleNamespace(rate=rate, damper_size=LIBRARY_SIZE))
     noise_model = SimpleNamespace(floor=FLOOR)
     pool = CandidatePool(problem, evaluation, noise_model, settings=SimpleNamespace(**settings))
     pool.candidates[frozenset()] = make_candidate((), 6.0, 6.0)
@@ -74,17 +77,20 @@ class Problem(SimpleNamespace):
 
 
 @pytest.mark.parametrize(
-    ("rates", "length", "factor"),
+    ("rates", "length", "motion", "factor"),
     [
-        ((1000.0, 500.0), 1000, 4),  # 1000 Hz to the rate of 250 Hz
-        ((1000.0,), 60_000, 6),  # 60 000 samples to the length of a long recording
-        ((1000.0,), 900_000, 10),  # not below the screening rate of 100 Hz
-        ((100.0,), 1000, 1),
+        ((1000.0, 500.0), 1000, 10.0, 4),  # 1000 Hz to the rate of 250 Hz
+        ((1000.0, 500.0), 1000, 1.0, 4),  # the electronics stay as fast
+        ((1000.0, 500.0), 1000, 20.0, 2),  # a motion of twice the usual rate needs twice the samples
+        ((1000.0,), 60_000, 10.0, 6),  # 60 000 samples to the length of a long recording
+        ((1000.0,), 900_000, 10.0, 10),  # not below the screening rate of 100 Hz
+        ((1000.0,), 900_000, 20.0, 5),
+        ((100.0,), 1000, 10.0, 1),
     ],
 )
-def test_data_are_decimated_by_rate_and_length(rates, length, factor):
+def test_data_are_decimated_by_rate_and_length(rates, length, motion, factor):
     pieces = [SimpleNamespace(excitation=SimpleNamespace(rate=r), force=np.zeros(length)) for r in rates]
-    pool = make_pool(Problem(pieces=pieces), decimation_rate=250.0, long_recording=10_000)
+    pool = make_pool(Problem(pieces=pieces), rate=motion, decimation_rate=250.0, long_recording=10_000)
     assert pool.decimated_problem == factor
 
 

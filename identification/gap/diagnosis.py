@@ -101,7 +101,7 @@ def diagnose_prepared(
     with use_one_thread():
         search_forward(pool)
         posterior = compute_final_posterior(pool)
-        partial = find_partial_sets(pool) if posterior.unknown > UNKNOWN_THRESHOLD else None
+        partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]
         builder = ReportBuilder(dataset, evaluation, pool, posterior, partial, model, notes, seed)
         result = builder.build_result()

@@ -16,10 +16,14 @@ from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.neighbours import find_subset
 from identification.gap.selection.posterior import Posterior, compute_log_prior, compute_misattribution
 
+_GENUINE_PROBABILITY = 0.5
+"""Probability that an effect which closes a part of the gap of an unknown cause is at work, and no look-alike."""
 
-def find_partial_sets(pool: CandidatePool) -> Posterior:
-    """Return the probabilities of the fitted sets as parts of a cause that the library does not contain.
 
+def find_partial_sets(pool: CandidatePool, posterior: Posterior) -> Posterior:
+    """Return the probabilities of the fitted sets, also as parts of a cause that the library does not contain.
+
+    ``posterior`` has the probabilities of the sets as the whole cause, and that of an unknown one.
     The most probable set, and its subsets with one effect less, are fitted if they are not.
     """
     for _ in range(pool.settings.max_refits):
@@ -30,7 +34,9 @@ def find_partial_sets(pool: CandidatePool) -> Posterior:
         pool.fit_fully(best)
     for model in pool.candidates[best].fit.effects:
         find_subset(pool, pool.candidates[best], model)
-    return compute_partial_posterior(pool)
+    partial, part = compute_partial_posterior(pool), _GENUINE_PROBABILITY * posterior.unknown
+    sets = {n: posterior.sets.get(n, 0.0) + part * p for n, p in partial.sets.items()}
+    return Posterior(sets, 1.0 - sum(sets.values()))
 
 
 def compute_partial_posterior(pool: CandidatePool) -> Posterior:

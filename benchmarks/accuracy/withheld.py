@@ -1,13 +1,17 @@
 """Diagnoses of recordings whose effects are withheld, imported by `mrbench import` and diagnosed in one process.
 
-`MRBENCH_SHARED` names the folder with `blind/caseNN.csv.gz`. The results are
-`docs/evidence/blind-predictions.json` (case -> diagnosis) and `docs/evidence/blind.md`. `--only case00,case01`
-selects cases. `--keep FOLDER` keeps logs, diagnoses and twins, and continues an interrupted call.
+    python -m benchmarks.accuracy.withheld [--recordings blind2] [--jobs 2] [--keep FOLDER] [--only case00,case01]
+
+`MRBENCH_SHARED` names the folder with `blind/caseNN.csv.gz` and `blind2/caseNN.csv.gz`. The results are
+`docs/evidence/blind-predictions.json` (case -> diagnosis) and `docs/evidence/blind.md`, with the name of the
+recordings. `--keep FOLDER` keeps logs, diagnoses and twins, and continues an interrupted call.
 """
 
 import json
 import os
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +22,10 @@ from identification.gap.outcome import summarise_diagnosis
 from identification.logs import load
 
 EVIDENCE = Path(__file__).parents[2] / "docs" / "evidence"
-_HEAD = """# Recordings with withheld effects
+_HEAD = """# Recordings with withheld effects: {folder}
 
-{count} recordings, each with one effect, two effects, none, or a cause outside the library. The true effects were
-unknown when the diagnoses in `blind-predictions.json` were made. Errors are on held-out strokes; "after" and
+{count} recordings, each with one effect or several, none, or a cause outside the library. The true effects were
+unknown when the diagnoses in `{folder}-predictions.json` were made. Errors are on held-out strokes; "after" and
 shrinkage are the values expected of another run. Command:
 
 ```
@@ -62,25 +66,34 @@ def render_row(name: str, diagnosis: dict[str, Any], seconds: str) -> str:
 
 def main() -> None:
     """Diagnose every case and write the evidence."""
-    asked = make_parser(__doc__, "logs, diagnoses and twins").parse_args()
+    parser = make_parser(__doc__, "logs, diagnoses and twins")
+    parser.add_argument("--recordings", choices=("blind", "blind2"), default="blind", help="folder of the cases")
+    parser.add_argument("--jobs", type=int, default=1, help="cases that are diagnosed at the same time")
+    asked = parser.parse_args()
     shared = Path(os.environ.get("MRBENCH_SHARED", "."))
-    sources = {s.name.removesuffix(".csv.gz"): s for s in sorted(shared.glob("blind/case*.csv.gz"))}
+    sources = {s.name.removesuffix(".csv.gz"): s for s in sorted(shared.glob(f"{asked.recordings}/case*.csv.gz"))}
     if not sources:
-        sys.exit("MRBENCH_SHARED: not a folder with blind/caseNN.csv.gz; set it to the folder of the recordings")
-    with open_folder(asked.keep) as kept:
-        found = {name: diagnose_recording(sources[name], kept) for name in select_names(asked.only, list(sources))}
+        sys.exit(
+            f"MRBENCH_SHARED: not a folder with {asked.recordings}/caseNN.csv.gz; "
+            "set it to the folder of the recordings"
+        )
+    names = select_names(asked.only, list(sources))
+    with open_folder(asked.keep) as kept, ProcessPoolExecutor(asked.jobs) as pool:
+        results = pool.map(partial(diagnose_recording, kept=kept), [sources[name] for name in names])
+        found = dict(zip(names, results, strict=True))
         seconds = {name: (kept / f"{name}.seconds").read_text(encoding="utf-8") for name in found}
     if len(found) == len(sources):
-        _write_evidence(found, seconds)
+        _write_evidence(asked.recordings, found, seconds)
 
 
-def _write_evidence(found: dict[str, dict[str, Any]], seconds: dict[str, str]) -> None:
+def _write_evidence(folder: str, found: dict[str, dict[str, Any]], seconds: dict[str, str]) -> None:
     EVIDENCE.mkdir(parents=True, exist_ok=True)
     text = json.dumps(found, separators=(",", ":"), ensure_ascii=False)
-    (EVIDENCE / "blind-predictions.json").write_text(text + "\n", encoding="utf-8")
-    head = _HEAD.format(count=len(found), command="MRBENCH_SHARED=... python -m benchmarks.accuracy.withheld")
+    (EVIDENCE / f"{folder}-predictions.json").write_text(text + "\n", encoding="utf-8")
+    command = f"MRBENCH_SHARED=... python -m benchmarks.accuracy.withheld --recordings {folder}"
     rows = [render_row(name, diagnosis, seconds[name]) for name, diagnosis in found.items()]
-    (EVIDENCE / "blind.md").write_text(head + "\n".join(rows) + "\n", encoding="utf-8")
+    page = _HEAD.format(count=len(found), folder=folder, command=command) + "\n".join(rows) + "\n"
+    (EVIDENCE / f"{folder}.md").write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":

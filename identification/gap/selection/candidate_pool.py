@@ -6,14 +6,14 @@ decide which sets are fitted.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, make_starting_points
-from identification.gap.data import EvaluationData, split_by_piece
+from identification.gap.data import EvaluationData, Residual, split_by_piece
 from identification.gap.fits import Candidate, FitOptions, JointFit, fit_jointly, refit_all_samples
 from identification.gap.noise import NoiseModel, find_mains_frequency
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
@@ -55,6 +55,8 @@ class CandidatePool:
     """Sets that were fitted on all samples."""
     block_evidence: dict[frozenset[str], BlockEvidence] = field(default_factory=dict)
     """Block evidence of the sets for which it was computed."""
+    held_out_evidence: dict[frozenset[str], tuple[BlockEvidence, ...]] = field(default_factory=dict)
+    """Block evidence on the held-out samples over sets with one effect less, where it was computed."""
     fit_count: int = 0
     """Number of fits."""
     notes: list[str] = field(default_factory=list)
@@ -123,6 +125,7 @@ class CandidatePool:
                 c.compute_relative_excess(self.baseline, floor),
                 math.prod(compute_size_weight(e, x, size) for e in c.fit.active_effects),
                 self.block_evidence.get(names),
+                self.held_out_evidence.get(names, ()),
             )
             for names, c in self.candidates.items()
         ]
@@ -173,6 +176,11 @@ class CandidatePool:
         if known is None or self.compute_excess(candidate) < self.compute_excess(known):
             self.candidates[candidate.names] = candidate
         return self.candidates[candidate.names]
+
+    def select_held_out(self, names: frozenset[str]) -> Residual:
+        """Return the residual of a fitted set on the held-out samples."""
+        residual = self.candidates[names].residual
+        return replace(residual, valid=residual.valid & self.evaluation.held_out_samples)
 
     def fit_fully(self, names: frozenset[str]) -> None:
         """Fit a set on all samples, once, starting from its best fit on decimated data."""

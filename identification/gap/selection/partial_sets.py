@@ -6,11 +6,9 @@ part of the gap that a set leaves, the less certain it is that its effects are a
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.data import Residual
 from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.neighbours import find_subset
@@ -41,14 +39,14 @@ def find_partial_sets(pool: CandidatePool, posterior: Posterior) -> Posterior:
 
 def compute_partial_posterior(pool: CandidatePool) -> Posterior:
     """Compute the probabilities of the fitted sets from block evidence on the held-out strokes."""
-    before = _select_held_out(pool, frozenset())
+    before = pool.select_held_out(frozenset())
     names = list(pool.candidates)
     weights = {s.names: s.weight for s in pool.collect_evidence()}
     scores = np.array(
         [
             compute_log_prior(n)
             + math.log(weights[n])
-            + compute_evidence(before, _select_held_out(pool, n), pool.block_length)
+            + compute_evidence(before, pool.select_held_out(n), pool.block_length)
             for n in names
         ]
     )
@@ -59,9 +57,3 @@ def compute_partial_posterior(pool: CandidatePool) -> Posterior:
     certain = 1.0 - compute_misattribution(remaining)
     sets = {n: float(s) * (certain if n else 1.0) for n, s in zip(names, shares, strict=True)}
     return Posterior(sets, 1.0 - sum(sets.values()))
-
-
-def _select_held_out(pool: CandidatePool, names: frozenset[str]) -> Residual:
-    """Return the residual of a set on the held-out samples."""
-    residual = pool.candidates[names].residual
-    return replace(residual, valid=residual.valid & pool.evaluation.held_out_samples)

@@ -5,18 +5,22 @@ best sets grow by a second and a third effect. Then each effect of a set is left
 in its place. All of this uses decimated data. Finally the most probable sets are fitted on all samples.
 """
 
+import numpy as np
+
 from identification.fitting import EffectModel
-from identification.gap.fits import Candidate
+from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import describe_drift_explanation, subtract_clock_drift
+from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
 from identification.gap.selection.extension import try_extension
 from identification.gap.selection.mounting import fit_mounting, is_mounting_promising
-from identification.gap.selection.neighbours import fit_extension
+from identification.gap.selection.neighbours import find_subset, fit_extension
 from identification.gap.selection.posterior import (
     MAX_TIED_SETS,
     MIN_TIED_PROBABILITY,
     UNKNOWN_THRESHOLD,
+    BlockEvidence,
     Posterior,
 )
 from identification.gap.selection.screening import (
@@ -43,12 +47,24 @@ def search_forward(pool: CandidatePool) -> None:
         for parent in beam:
             _fit_extensions(pool, parent, count)
         _search_best_sets(pool, size)
+        _refit_law(pool)
         sets = _sort_sets(pool, size)
         beam = _select_beam(pool, size, sets, beam[0])
         if not beam:
             break
     fit_subsets(pool)
     exchange_effects(pool)
+
+
+def _refit_law(pool: CandidatePool) -> None:
+    """Fit the law alone from the law of the best set.
+
+    Where the first fit of the law ended in a wrong minimum, an effect may have led to the right one.
+    """
+    best = pool.find_best()
+    if best.names:
+        law = replace_effect_unknowns(best.fit.problem, best.fit.minimum.unknowns, np.empty(0))
+        pool.fit((), [law])
 
 
 def _sort_sets(pool: CandidatePool, size: int) -> list[Candidate]:
@@ -137,7 +153,27 @@ def compute_final_posterior(pool: CandidatePool) -> Posterior:
         most_probable = pool.compute_posterior().rank_sets()[0][0]
         pool.fit_fully(most_probable)
     exchange_mounting(pool, most_probable)
+    _check_effects(pool)
     return pool.compute_posterior()
+
+
+def _check_effects(pool: CandidatePool) -> None:
+    """Compute what each effect of the most probable set gains on held-out samples, until that set stays the same.
+
+    An effect that only takes up the form error of another gains on the fitted samples, and hardly on others.
+    """
+    for _ in range(pool.settings.max_refits):
+        names = pool.compute_posterior().rank_sets()[0][0]
+        if len(names) < 2 or names in pool.held_out_evidence:
+            return
+        pool.fit_fully(names)
+        evidence = []
+        for model in pool.candidates[names].fit.effects:
+            subset = find_subset(pool, pool.candidates[names], model).names
+            pool.fit_fully(subset)
+            before, after = pool.select_held_out(subset), pool.select_held_out(names)
+            evidence.append(BlockEvidence(subset, compute_evidence(before, after, pool.block_length)))
+        pool.held_out_evidence[names] = tuple(evidence)
 
 
 def _fit_probable_sets(pool: CandidatePool) -> None:

@@ -79,6 +79,8 @@ class SetEvidence:
     """Weight of the sizes of its effects [1]."""
     block_evidence: BlockEvidence | None = None
     """Block evidence, where it was computed."""
+    held_out_evidence: tuple[BlockEvidence, ...] = ()
+    """Block evidence on the held-out samples over sets with one effect less, where it was computed."""
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,10 @@ def compute_posterior(sets: Sequence[SetEvidence], samples: int, coloured_share:
 
 
 def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) -> dict[frozenset[str], float]:
-    """Return the log odds of each set, from its excess or from its block evidence, whichever is larger."""
+    """Return the log odds of each set, from its excess or from its block evidence, whichever is larger.
+
+    A set with an effect that increases the error on held-out samples is less probable than the set without it.
+    """
     prior = {s.names: compute_log_prior(s.names) + math.log(s.weight) for s in sets}
     loss = {
         s.names: _LIKELIHOOD_EXPONENT * math.log(max(s.excess, 0.0) + resolution) + _penalise_incomplete(s, gap)
@@ -141,6 +146,10 @@ def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) 
     with_blocks = [(s.names, s.block_evidence) for s in sets if s.block_evidence]
     for names, (parent, log_odds) in sorted(with_blocks, key=lambda item: len(item[0])):
         scores[names] = max(scores[names], scores[parent] + log_odds + prior[names] - prior[parent])
+    for s in sorted(sets, key=lambda s: len(s.names)):
+        for parent, log_odds in s.held_out_evidence:
+            if log_odds < 0.0:
+                scores[s.names] = min(scores[s.names], scores[parent] + log_odds)
     return scores
 
 

@@ -1,11 +1,21 @@
 """The plan fits sets from the law to the most probable set on all samples."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+import numpy as np
 import pytest
 
+from identification.fitting import EffectModel
+from identification.gap.fits import fit_jointly
 from identification.gap.noise import NoiseModel
-from identification.gap.selection.plan import compute_final_posterior, search_forward
+from identification.gap.selection.candidate_pool import QUICK_FIT
+from identification.gap.selection.neighbours import fit_extension
+from identification.gap.selection.plan import (
+    _refit_law,
+    _search_best_sets,
+    compute_final_posterior,
+    search_forward,
+)
 from tests.support.candidate_pools import make_pool
 
 BOTH = frozenset({"gas_spring", "moving_mass"})
@@ -58,3 +68,38 @@ def test_a_recording_below_the_gap_ratio_is_not_searched():
     assert len(pool.fitted) == 1
     assert pool.noise_model.updates == [frozenset()]
     assert compute_final_posterior(pool).rank_sets()[0][0] == frozenset()
+
+
+def test_each_effect_of_the_most_probable_set_has_evidence_on_held_out_samples(searched):
+    compute_final_posterior(searched)
+    evidence = dict(searched.held_out_evidence[BOTH])
+    assert set(evidence) == {frozenset({name}) for name in BOTH}
+    assert min(evidence.values()) > 1.0
+
+
+def test_a_law_in_a_wrong_minimum_is_fitted_again_from_the_law_of_the_best_set():
+    pool = make_pool()
+    right = pool.fit_law()
+    start = pool.regression_start.copy()
+    start[pool.decimated_problem.layout.coordinates] += 1.0
+    wrong = pool._evaluate(
+        fit_jointly(pool.decimated_problem, (), None, replace(QUICK_FIT, iterations=0), [start])
+    )
+    assert wrong.held_out_rmse > 2.0 * right.held_out_rmse
+    pool.candidates[frozenset()] = wrong
+    pool.fit((EffectModel.from_name("coil_crosstalk"),), [np.append(right.fit.minimum.unknowns, 0.0)])
+    _refit_law(pool)
+    assert pool.baseline.held_out_rmse == pytest.approx(right.held_out_rmse, rel=1e-2)
+
+
+def test_the_best_sets_are_searched_from_the_starts_of_the_law():
+    pool = make_pool("seal_friction")
+    baseline = pool.fit_law()
+    gains = pool.screen(baseline, frozenset())
+    friction = next(g for g in gains if g.effect_model.name == "seal_friction")
+    stuck = fit_extension(pool, baseline, friction)
+    before = pool.fit_count
+    _search_best_sets(pool, 1)
+    assert pool.fit_count > before or pool.is_at_floor(stuck)
+    assert pool.find_best().names == {"seal_friction"}
+    assert pool.is_at_floor(pool.find_best())

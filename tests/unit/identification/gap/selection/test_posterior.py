@@ -182,3 +182,26 @@ def test_a_stage_has_the_probability_of_its_effects_and_a_share_of_the_unknown()
     assert stages == pytest.approx({"coil": 0.3, "damper": 0.6, "mounting": 0.1, "force_channel": 0.1})
     full = compute_stage_probabilities(Posterior({frozenset({"coil_lag"}): 0.9}, 0.4), ("coil", "damper"))
     assert full == pytest.approx({"coil": 1.0, "damper": 0.2})
+
+
+def name_with_held_out_evidence(log_odds):
+    """The most probable set where a second effect closes the gap, with this evidence on held-out samples."""
+    first, both = frozenset({"end_stop"}), frozenset({"end_stop", "coil_lag"})
+    sets = make_sets(none=30.0, end_stop=4.0)
+    evidence = (BlockEvidence(first, log_odds),)
+    return compute_posterior([*sets, SetEvidence(both, 0.1, held_out_evidence=evidence)], SAMPLES).rank_sets()[0][
+        0
+    ]
+
+
+def test_a_second_effect_is_not_named_if_it_gains_nothing_on_held_out_samples():
+    assert name_with_held_out_evidence(1.0) == frozenset({"end_stop", "coil_lag"})
+    assert name_with_held_out_evidence(-1.0) == frozenset({"end_stop"})
+
+
+def test_a_set_that_harms_held_out_samples_is_less_probable_than_the_one_without_the_effect():
+    first, both = frozenset({"end_stop"}), frozenset({"end_stop", "coil_lag"})
+    evidence = (BlockEvidence(first, -2.0), BlockEvidence(frozenset(), 50.0))
+    sets = [*make_sets(none=30.0, end_stop=4.0), SetEvidence(both, 0.1, held_out_evidence=evidence)]
+    posterior = compute_posterior(sets, SAMPLES)
+    assert posterior.sets[both] / posterior.sets[first] == pytest.approx(math.exp(-2.0))

@@ -1,0 +1,254 @@
+"""Diagnoses of dampers of any size with drawn forms of effects, causes outside the library, or none.
+
+    python -m benchmarks.accuracy.drawn_effects [--recordings 60] [--seed 1] [--out PAGE.md]
+
+Each recording has a random damper from 10 N to 400 kN, a noise spectrum, and one of: no effect, one effect, two
+effects, or an unknown cause whose place and variable no effect of the library has. Forms are drawn from the class
+of functions of their effect (`benchmarks.common.drawn_forms`), so that no list of forms helps. The simulation is
+that of the identification: only the forms are independent of it, not the integrator.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.accuracy.noise_floor import SIZES, Size, draw_damper
+from benchmarks.accuracy.null_verdicts import DRIVES, RATE, STROKES, make_strokes
+from benchmarks.common.drawn_forms import DRAWN_EFFECTS, DrawnForm, draw_form
+from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, round_to
+from benchmarks.common.drawn_table import list_seeds, make_parser
+from identification.arrays import Array
+from identification.damper import Coordinates, DamperSize
+from identification.damper.effects import EFFECTS
+from identification.documents import Diagnosis
+from identification.gap import diagnose
+from identification.logs import Recording
+from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
+
+KINDS = ("none", "one", "one", "one", "two", "unknown")
+"""Kinds of cases, in turn."""
+SMALLEST_CHANGE, LARGEST_CHANGE = 2.0, 30.0
+"""Change of the force by an effect, over the noise [1]; a refit of the law removes a part of it."""
+UNKNOWN_CAUSES = ("gain over displacement", "drive over time", "load cell over force")
+"""Causes outside the library."""
+_CALIBRATIONS = 4
+"""Steps in which the strength of an effect is set."""
+
+
+class Case(NamedTuple):
+    """A recording and its true cause."""
+
+    recording: Recording
+    kind: str
+    effects: frozenset[str]
+    label: str
+
+
+class Outcome(NamedTuple):
+    """Answer to one case."""
+
+    case: str
+    kind: str
+    truth: frozenset[str]
+    named: frozenset[str]
+    verdict: str
+    blamed: bool
+    """True if an effect that is not at work is named with confidence, or the answer explains an unknown cause."""
+    ratio: float
+    """Error of the refitted law over the noise floor [1]."""
+    after: float
+    """Error with the named effects over the noise floor [1]."""
+    is_among_four: bool
+    stage_right: bool
+
+    @property
+    def right(self) -> bool:
+        """True if the verdict and the named set are right."""
+        if self.kind == "none":
+            return self.verdict == "no_gap"
+        if self.kind == "unknown":
+            return not self.blamed
+        return self.named == self.truth
+
+
+def try_case(job: tuple[int, int]) -> Outcome:
+    """Draw, record and diagnose one case."""
+    seed, number = job
+    case = draw_case(seed, KINDS[number % len(KINDS)])
+    return judge(case, diagnose([case.recording]).diagnosis)
+
+
+def judge(case: Case, diagnosis: Diagnosis) -> Outcome:
+    """Compare a diagnosis with the truth."""
+    named = frozenset(e.name for e in diagnosis.effects)
+    confident = {e.name for e in diagnosis.effects if e.probability > 0.9 and e.share > 0.5}
+    explained_unknown = case.kind == "unknown" and diagnosis.verdict == "explained"
+    sets = [named, *(frozenset(a.effects) for a in diagnosis.alternatives)]
+    stages = {EFFECTS[n].stage for n in case.effects}
+    return Outcome(
+        case.label, case.kind, case.effects, named, diagnosis.verdict,
+        bool(confident - case.effects) or explained_unknown,
+        diagnosis.gap.before_n / diagnosis.gap.noise_floor_n, diagnosis.gap.after_n / diagnosis.gap.noise_floor_n,
+        case.effects in sets, diagnosis.where.stage in stages if stages else True,
+    )  # fmt: skip
+
+
+def draw_case(seed: int, kind: str) -> Case:
+    """Draw a damper, its noise and its cause, and record it."""
+    random = np.random.default_rng([seed, 20])
+    size = SIZES[random.integers(0, len(SIZES))]
+    spectrum = sorted(SPECTRA)[random.integers(0, len(SPECTRA))]
+    damper = draw_damper(random, size)
+    length, drive_factor = size.amplitude / STROKES[0][0], size.highest_drive / max(DRIVES)
+    rate = RATE * size.frequencies[1] / STROKES[2][1]
+    x, drive, segments = make_strokes(length, rate, drive_factor)
+    velocity = np.gradient(x) * rate
+    stroke = Excitation(rate, x, velocity, np.gradient(velocity) * rate, drive)
+    names = draw_names(random, {"one": 1, "two": 2}.get(kind, 0))
+    cause = UNKNOWN_CAUSES[random.integers(0, len(UNKNOWN_CAUSES))] if kind == "unknown" else ""
+    clean = (
+        _add_unknown(damper, stroke, cause, random) if cause else _add_effects(damper, stroke, names, size, random)
+    )
+    deviation = RELATIVE_NOISE * float(np.std(clean))
+    force = round_to(clean + deviation * draw_noise(spectrum, len(x), rate, random), 0.5 * deviation)
+    digit = 1e-4 * length * STROKES[0][0]
+    measured = round_to(x + 2.0 * digit * random.standard_normal(len(x)), digit)
+    stretch = make_stretch(rate, measured, force, drive, segments)
+    metadata = {"run": {"source": "import", "specimen": f"drawn {seed}"}}
+    recording = Recording(Path(f"drawn-{seed}.mcap"), "0" * 64, "coil_v", "V", (stretch,), metadata)
+    label = f"{seed}: {size.name}, {spectrum}, {' and '.join(sorted(names)) or cause or 'none'}"
+    return Case(recording, kind, frozenset(names), label)
+
+
+def draw_names(random: np.random.Generator, count: int) -> list[str]:
+    """Draw the names of some effects."""
+    return [str(n) for n in random.choice(DRAWN_EFFECTS, count, replace=False)]
+
+
+def _add_effects(
+    damper: Coordinates, stroke: Excitation, names: Sequence[str], size: Size, random: np.random.Generator
+) -> Array:
+    """Simulate the force with drawn forms of some effects, each with a drawn change of the force."""
+    plain = _simulate(damper, stroke, ())
+    scale = measure_size(plain, stroke)
+    duration = len(plain) / stroke.rate
+    active: list[ActiveEffect] = []
+    for name in names:
+        form = draw_form(name, random, scale, duration)
+        change = np.exp(random.uniform(np.log(SMALLEST_CHANGE), np.log(LARGEST_CHANGE)))
+        active.append(_calibrate(damper, stroke, form, change * RELATIVE_NOISE * float(np.std(plain)), plain))
+    return _simulate(damper, stroke, tuple(active))
+
+
+def measure_size(force: Array, stroke: Excitation) -> DamperSize:
+    """Return the size of a damper from its force (N,) [N] and motion."""
+    return DamperSize(
+        float(np.std(force)),
+        0.5 * float(np.ptp(stroke.displacement)),
+        float(np.abs(stroke.velocity).max()),
+        float(np.abs(stroke.drive).max()),
+    )
+
+
+def _calibrate(
+    damper: Coordinates, stroke: Excitation, form: DrawnForm, change: float, plain: Array
+) -> ActiveEffect:
+    """Return the effect with the strength at which it changes the force by about ``change`` [N]."""
+    strength = 0.1
+    for _ in range(_CALIBRATIONS):
+        reached = float(np.std(_simulate(damper, stroke, (form.activate(strength),)) - plain))
+        strength = float(np.clip(strength * np.clip(change / max(reached, 1e-300), 0.1, 10.0), 1e-4, 3.0))
+    return form.activate(strength)
+
+
+def _simulate(damper: Coordinates, stroke: Excitation, effects: tuple[ActiveEffect, ...]) -> Array:
+    """Simulate the force (N,) [N]; heating needs the power of the damper without it."""
+    model = SimulationModel(damper, effects=effects)
+    if any(e.form.action == "softening" for e in effects):
+        cold = SimulationModel(damper, effects=tuple(e for e in effects if e.form.action != "softening"))
+        force = simulate(cold, stroke, max_travel=0.005).force
+        stroke = replace(stroke, power=np.abs(force * stroke.velocity))
+    return simulate(model, stroke, max_travel=0.005).force
+
+
+def _add_unknown(damper: Coordinates, stroke: Excitation, cause: str, random: np.random.Generator) -> Array:
+    """Simulate the force with a cause outside the library, of a drawn strength."""
+    plain = _simulate(damper, stroke, ())
+    strength = float(np.exp(random.uniform(np.log(0.05), np.log(0.3))))
+    size = measure_size(plain, stroke)
+    shape = _draw_wave(random)
+    if cause == "load cell over force":
+        relative = plain / np.abs(plain).max()
+        return np.asarray(plain + strength * size.force * shape(relative) * np.abs(relative))
+    if cause == "drive over time":
+        time = np.linspace(-1.0, 1.0, len(plain))
+        return _simulate(damper, replace(stroke, drive=stroke.drive * (1.0 + strength * shape(time))), ())
+    gain = 1.0 + strength * shape(stroke.displacement / size.length)
+    return np.asarray(plain + (gain - 1.0) * (plain - damper.f0))
+
+
+def _draw_wave(random: np.random.Generator) -> Callable[[Array], Array]:
+    """Return a smooth function on -1 to 1 with values of about one."""
+    weights, phases = random.standard_normal(3) / np.sqrt(3.0), random.uniform(0.0, 2.0 * np.pi, 3)
+
+    def wave(r: Array) -> Array:
+        return np.asarray(
+            sum(w * np.cos(k * 2.0 * r + p) for k, (w, p) in enumerate(zip(weights, phases, strict=True), 1))
+        )
+
+    return wave
+
+
+def format_summary(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return the table of right answers by kind."""
+    groups = {
+        "no effect": [o for o in outcomes if o.kind == "none"],
+        "one effect": [o for o in outcomes if o.kind == "one"],
+        "two effects": [o for o in outcomes if o.kind == "two"],
+        "unknown cause": [o for o in outcomes if o.kind == "unknown"],
+    }
+    lines = [
+        "| recordings | right | true set among four | right stage | blamed |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for name, rows in groups.items():
+        if rows:
+            counts = (
+                sum(getattr(o, f) for o in rows) for f in ("right", "is_among_four", "stage_right", "blamed")
+            )
+            lines.append(f"| {name} | " + " | ".join(f"{c} of {len(rows)}" for c in counts) + " |")
+    return lines
+
+
+def format_row(o: Outcome) -> str:
+    """Return one case as a row."""
+    named = " and ".join(sorted(o.named)) or "-"
+    return (
+        f"| {o.case} | {o.ratio:.2f} | {o.verdict} | {named} | {o.after:.2f} | {'yes' if o.right else '**no**'} |"
+    )
+
+
+def main() -> None:
+    """Print every case and the summary; also write them to a page."""
+    options = make_parser(__doc__, "recordings", 60).parse_args()
+    lines = ["| case | error of the law over the floor | verdict | named | with them | right |"]
+    lines.append("| --- | --- | --- | --- | --- | --- |")
+    print("\n".join(lines), flush=True)
+    outcomes = []
+    with ProcessPoolExecutor(options.jobs) as pool:
+        for outcome in pool.map(try_case, [(s, n) for n, s in enumerate(list_seeds(options))]):
+            outcomes.append(outcome)
+            lines.append(format_row(outcome))
+            print(lines[-1], flush=True)
+    summary = format_summary(outcomes)
+    print("\n".join(summary))
+    if options.out:
+        options.out.write_text("\n".join([*summary, "", *lines]) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -136,14 +136,24 @@ def _find_condition(segment: Segment, piece: Piece) -> StrokeCondition:
     )
 
 
+def _select_held_out_segments(conditions: Sequence[StrokeCondition]) -> BoolArray:
+    """Select every fourth segment of each drive, (segments,)."""
+    drives = [f"{c.drive:.3g}" for c in conditions]
+    offsets = {drive: k for k, drive in enumerate(sorted(set(drives), key=float))}
+    numbers = [drives[:i].count(drive) for i, drive in enumerate(drives)]
+    places = np.array([n + offsets[d] for n, d in zip(numbers, drives, strict=True)])
+    return np.asarray(places % _HOLD_OUT_STRIDE == _HOLD_OUT_STRIDE // 2)
+
+
 def select_held_out_cycles(cycles: Cycles) -> BoolArray:
     """Select the held-out cycles, (cycles,): every fourth segment, or every fourth cycle where segments are few.
 
-    A held-out segment is a stroke condition that no fit has used. In each of few segments, the cycles start at
-    another offset, so that some held-out cycle follows a step of the drive.
+    A held-out segment is a stroke condition that no fit has used. The segments of each drive start at another
+    offset: a method that repeats its drives would otherwise hold out one drive and fit the others. In each of few
+    segments, the cycles start at another offset, so that some held-out cycle follows a step of the drive.
     """
     if len(cycles.conditions) >= _FEWEST_SEGMENTS:
-        return np.asarray(cycles.segment % _HOLD_OUT_STRIDE == _HOLD_OUT_STRIDE // 2)
+        return np.asarray(_select_held_out_segments(cycles.conditions)[cycles.segment])
     held_out = np.zeros(cycles.count, bool)
     for offset, segment in enumerate(np.unique(cycles.segment), _HOLD_OUT_STRIDE // 2):
         members = np.flatnonzero(cycles.segment == segment)

@@ -202,12 +202,18 @@ class CandidatePool:
         samples = sum(len(p.force) for p in self.full_problem.pieces)
         factor = rate / self._resolve_rate(self.settings.decimation_rate)
         factor = max(factor, samples / self.settings.long_recording)
-        factor = min(factor, rate / self._resolve_rate(self.settings.screening_rate))
+        # A long recording of a slow damper may lose the electronics, but not the motion.
+        factor = min(factor, rate / (self.settings.screening_rate * self._relative_rate))
         return self.full_problem.make_fast().decimate(max(1, round(factor)))
 
     def _resolve_rate(self, rate: float) -> float:
         """Return a sampling rate [Hz] that resolves the electronics and the motion of this recording."""
-        return rate * max(1.0, self.full_problem.space.scales.rate / _USUAL_RATE)
+        return rate * max(1.0, self._relative_rate)
+
+    @property
+    def _relative_rate(self) -> float:
+        """Rate of the motion over that of the usual recordings [1]."""
+        return self.full_problem.space.scales.rate / _USUAL_RATE
 
     @cached_property
     def regression_start(self) -> Array:

@@ -170,7 +170,6 @@ def _check_effects(pool: CandidatePool) -> None:
         evidence = []
         for model in pool.candidates[names].fit.effects:
             subset = find_subset(pool, pool.candidates[names], model).names
-            pool.fit_fully(subset)
             before, after = pool.select_held_out(subset), pool.select_held_out(names)
             evidence.append(BlockEvidence(subset, compute_evidence(before, after, pool.block_length)))
         pool.held_out_evidence[names] = tuple(evidence)

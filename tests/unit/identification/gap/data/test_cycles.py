@@ -159,3 +159,17 @@ def test_strokes_differ_by_amplitude_or_frequency_and_need_a_frequency():
         np.zeros(0, int), np.zeros(0), np.zeros(5, int), tuple(StrokeCondition(*c) for c in conditions)
     )
     assert cycles.stroke_count == 3
+
+
+@pytest.mark.parametrize(("drives", "strokes"), [(4, 3), (5, 9), (6, 6), (3, 4), (12, 1), (1, 12)])
+def test_a_drive_is_held_out_and_fitted_as_well_where_it_repeats(drives, strokes):
+    conditions = tuple(
+        StrokeCondition(0.1 * d, 0.01 * (s + 1), 1.0) for s in range(strokes) for d in range(drives)
+    )
+    count = len(conditions)
+    held_out = select_held_out_cycles(Cycles(np.zeros(0, int), np.zeros(0), np.arange(count), conditions))
+    assert 0.2 <= held_out.mean() <= 0.35
+    by_drive = [held_out[d::drives] for d in range(drives)]
+    if strokes > 1:
+        assert not any(part.all() for part in by_drive)
+    assert sum(part.any() for part in by_drive) >= min(drives, 3)

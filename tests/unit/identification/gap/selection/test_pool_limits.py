@@ -86,6 +86,8 @@ class Problem(SimpleNamespace):
         ((1000.0,), 900_000, 10.0, 10),  # not below the screening rate of 100 Hz
         ((1000.0,), 900_000, 20.0, 5),
         ((100.0,), 1000, 10.0, 1),
+        ((100.0,), 60_000, 1.0, 6),  # a slow motion needs a tenth of the usual samples
+        ((100.0,), 60_000, 10.0, 1),
     ],
 )
 def test_data_are_decimated_by_rate_and_length(rates, length, motion, factor):

@@ -28,12 +28,24 @@ def diagnose(
             help="Also estimate the named effects with a network that has them in its residual, and compare.",
         ),
     ] = False,
+    hold_out: Annotated[
+        str,
+        typer.Option(
+            metavar="PATTERN,...",
+            help="Stretches or segments that no fit and no choice reads, such as `5mm_4Hz*`; the error on them is "
+            "reported.",
+        ),
+    ] = "",
+    hold_out_after: Annotated[
+        float | None,
+        typer.Option(min=0.05, max=0.95, help="Fraction of each stretch after which it is held out likewise."),
+    ] = None,
     witness: Annotated[bool, typer.Option("--witness", hidden=True, help="Former name of --cross-check.")] = False,
     seed: Seed = 1,
 ) -> None:
     """Find where simulation and recording differ, which effects explain it, and how far they close the gap."""
     from identification.documents import check_output_path, describe_output_path, write_document
-    from identification.fitting import read_damper_model
+    from identification.fitting import HoldOut, read_damper_model
     from identification.gap import diagnose as diagnose_recordings
     from identification.gap.outcome import summarise_diagnosis
     from identification.logs import load
@@ -49,6 +61,7 @@ def diagnose(
             simulation,
             seed=seed,
             cross_check=cross_check or witness,
+            hold_out=HoldOut.from_text(hold_out, hold_out_after),
             progress=progress,
         )
     write_document(out, result.diagnosis)

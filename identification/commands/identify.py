@@ -91,7 +91,7 @@ def identify(
     if not names:
         raise IdentificationError("--stages is empty; the stages are pinn and refine")
     request = FitRequest(
-        HoldOut(_split_names(hold_out), hold_out_after),
+        HoldOut.from_text(hold_out, hold_out_after),
         delay_prior,
         OptimiserSettings(seed=seed, budget=budget),
         names,

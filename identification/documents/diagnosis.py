@@ -49,6 +49,13 @@ class EffectSet(Document):
     probability: float = Field(ge=0, le=1, description="probability of exactly this set")
 
 
+class HeldOutError(Document):
+    """Error on the strokes that the user held out; no fit and no choice has read them."""
+
+    rmse_n: float = Field(description="RMSE with the named effects, in N; y(0) is estimated for unread stretches")
+    nrmse: float = Field(description="the same over the standard deviation of the recorded force")
+
+
 class Gap(Document):
     """Difference between simulated and recorded force on held-out strokes."""
 
@@ -75,6 +82,9 @@ class Gap(Document):
         description="95 % interval for other runs: resampled conditions and cycles, input noise and form error"
     )
     nominal_n: float | None = Field(default=None, description="RMSE of the given simulation, in N; null if none")
+    held_out: HeldOutError | None = Field(
+        default=None, description="error on the strokes of `--hold-out` or `--hold-out-after`; null without either"
+    )
     train_before_n: float = Field(description="RMSE without effects on the fitted strokes, in N")
     train_after_n: float = Field(description="RMSE with the named effects on the fitted strokes, in N")
 

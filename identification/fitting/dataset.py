@@ -23,6 +23,8 @@ _MAX_EXCLUDED = 0.5
 """Threshold on the unresolved part of a stretch: above it, nothing is excluded."""
 _MIN_SAMPLES = 200
 """Smallest number of samples for a fit."""
+_MIN_FLOOR_SAMPLES = 10
+"""Number of measured samples of a stretch above which its noise is estimated: fourth differences need some."""
 _FILTER_RATE = 4000.0
 """Rate [Hz] at which the force is simulated before a filter."""
 _TIMED_CHANNELS = {"force", "displacement", "coil_voltage", "coil_current"}
@@ -39,6 +41,11 @@ class HoldOut:
     """Names of stretches or segments, with wildcards."""
     after_fraction: float | None = None
     """Fraction of each stretch after which it is held out (dimensionless)."""
+
+    @staticmethod
+    def from_text(patterns: str, after_fraction: float | None = None) -> "HoldOut":
+        """Return the selection by patterns that are separated by commas, and by a fraction of each stretch."""
+        return HoldOut(tuple(name for name in patterns.split(",") if name), after_fraction)
 
     def make_mask(self, stretch: Stretch) -> BoolArray:
         """Return a mask (N,) of the held-out samples of a stretch."""
@@ -68,6 +75,8 @@ class Dataset:
     recordings: tuple[Recording, ...]
     notes: tuple[str, ...] = ()
     """Disturbances, as text."""
+    hold_out: HoldOut = HoldOut()
+    """Selection of the held-out samples."""
 
     @property
     def drive_unit(self) -> str:
@@ -153,9 +162,13 @@ def assemble(
         )
         pieces.append(replace(_make_piece(stretch, excitation, fitted), log=log))
     _check_hold_out(hold_out, held_out, pieces)
-    # Only valid samples of the force may enter its noise floor.
-    floor = estimate_floor([replace(s, measured=s.valid_mask) for s in stretches], motions)
-    return Dataset(tuple(pieces), tuple(held_out), tuple(stretches), floor, tuple(recordings), tuple(notes))
+    # Only valid samples of the force may enter its noise floor, and none that a choice must not read.
+    read = [replace(s, measured=s.valid_mask & ~m) for s, m in zip(stretches, held_out, strict=True)]
+    known = [k for k, s in enumerate(read) if np.count_nonzero(s.measured) > _MIN_FLOOR_SAMPLES]
+    floor = estimate_floor([read[k] for k in known], [motions[k] for k in known])
+    return Dataset(
+        tuple(pieces), tuple(held_out), tuple(stretches), floor, tuple(recordings), tuple(notes), hold_out
+    )
 
 
 def _exclude_unresolved(stretch: Stretch, unresolved: BoolArray, max_excluded: float, notes: list[str]) -> Stretch:

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from identification.fitting import DELAY_LIMIT, DamperModel, Dataset, Piece, Problem, assemble
+from identification.fitting import DELAY_LIMIT, DamperModel, Dataset, HoldOut, Piece, Problem, assemble
 from identification.gap.data import (
     EvaluationData,
     check_cycle_count,
@@ -36,6 +36,7 @@ def diagnose(
     *,
     seed: int = 1,
     cross_check: bool = False,
+    hold_out: HoldOut | None = None,
     progress: Progress = ignore_progress,
     settings: SearchSettings = DEFAULT_SETTINGS,
 ) -> DiagnosisResult:
@@ -46,6 +47,7 @@ def diagnose(
         model: a simulation whose own gap is reported as well.
         seed: seed of all random numbers.
         cross_check: train a network with the named effects and compare its estimates.
+        hold_out: strokes that no fit and no choice reads; the error on them is reported.
         progress: receives the fitted effects and the force error on held-out cycles [N].
         settings: limits and thresholds of the search.
 
@@ -53,7 +55,7 @@ def diagnose(
         UnusableDataError: the recordings are too short, clipped, of different specimens, or do not contain force
             and motion of a damper.
     """
-    prepared = prepare_recordings(recordings)
+    prepared = prepare_recordings(recordings, hold_out)
     return diagnose_prepared(
         prepared, model, seed=seed, cross_check=cross_check, progress=progress, settings=settings
     )
@@ -69,8 +71,10 @@ class PreparedRecordings:
     """Messages about excluded samples."""
 
 
-def prepare_recordings(recordings: Sequence[Recording]) -> PreparedRecordings:
+def prepare_recordings(recordings: Sequence[Recording], hold_out: HoldOut | None = None) -> PreparedRecordings:
     """Check, clean and smooth recordings of one damper, and cut them into cycles.
+
+    ``hold_out`` selects strokes that no fit and no choice reads.
 
     Raises:
         UnusableDataError: as in ``diagnose``.
@@ -79,7 +83,7 @@ def prepare_recordings(recordings: Sequence[Recording]) -> PreparedRecordings:
         check_single_specimen(recordings, "diagnose")
         check_recordings(recordings)
         cleaned, notes = mask_clipping(recordings)
-        dataset = assemble(cleaned)
+        dataset = assemble(cleaned, hold_out or HoldOut())
         evaluation = EvaluationData.make(dataset)
     check_cycle_count(evaluation.cycles)
     check_sliding_recorded(dataset.pieces)

@@ -96,7 +96,7 @@ def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> N
         motions: their estimated motions.
     """
     counts = np.array([np.count_nonzero(s.measured) for s in stretches], float)
-    squares = [estimate_high_frequency_noise(s.force) ** 2 for s in stretches]
+    squares = [estimate_high_frequency_noise(s.force[s.measured]) ** 2 for s in stretches]
     high_frequency = math.sqrt(float(counts @ squares) / max(float(counts.sum()), 1.0))
     with use_one_thread():
         parts = [_estimate_stretch(s, m) for s, m in zip(stretches, motions, strict=True)]

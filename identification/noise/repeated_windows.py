@@ -27,6 +27,8 @@ _SETTLING_CYCLES, _SHORT_SETTLING_CYCLES = 1.0, 0.5
 """Part of a window that is left out while the damper settles [cycles]: of a long window, and of a short one."""
 _LONG_WINDOW = 5.0
 """Length from which a window counts as long [cycles]."""
+_MIN_MEASURED = 0.5
+"""Smallest share of measured samples of a segment and of a window [1]."""
 _SHORTEST_WINDOW = 1.25
 """Length below which too few samples of a window repeat [cycles]."""
 MIN_CYCLES = 2
@@ -92,6 +94,8 @@ def _find_windows(
 ) -> Iterator[RepeatedWindow]:
     part = slice(segment.start, segment.stop)
     weights = stretch.measured[part].astype(float)
+    if weights.mean() < _MIN_MEASURED:
+        return
     cycles = find_steady_cycles(displacement[part], weights, stretch.rate, segment.frequency or 0.0, noise)
     if cycles is None:
         return
@@ -103,6 +107,8 @@ def _find_windows(
         if length < _SHORTEST_WINDOW:
             continue
         first, count = stop - math.floor(length * period), max(math.floor(length), MIN_CYCLES)
+        if stretch.measured[first:stop].mean() < _MIN_MEASURED:
+            continue
         window = slice(first - steady.start, stop - steady.start)
         yield RepeatedWindow(
             first, period, count, stretch.force[first:stop], motion[:, window], stretch.measured[first:stop]

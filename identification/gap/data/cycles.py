@@ -145,19 +145,24 @@ def _select_held_out_segments(conditions: Sequence[StrokeCondition]) -> BoolArra
     return np.asarray(places % _HOLD_OUT_STRIDE == _HOLD_OUT_STRIDE // 2)
 
 
-def select_held_out_cycles(cycles: Cycles) -> BoolArray:
+def select_held_out_cycles(cycles: Cycles, usable: BoolArray | None = None) -> BoolArray:
     """Select the held-out cycles, (cycles,): every fourth segment, or every fourth cycle where segments are few.
+
+    Only ``usable`` cycles (cycles,) are counted and held out; None for all.
 
     A held-out segment is a stroke condition that no fit has used. The segments of each drive start at another
     offset: a method that repeats its drives would otherwise hold out one drive and fit the others. In each of few
     segments, the cycles start at another offset, so that some held-out cycle follows a step of the drive.
     """
-    if len(cycles.conditions) >= _FEWEST_SEGMENTS:
-        return np.asarray(_select_held_out_segments(cycles.conditions)[cycles.segment])
+    usable = np.ones(cycles.count, bool) if usable is None else usable
+    segments = np.unique(cycles.segment[usable])
     held_out = np.zeros(cycles.count, bool)
-    for offset, segment in enumerate(np.unique(cycles.segment), _HOLD_OUT_STRIDE // 2):
-        members = np.flatnonzero(cycles.segment == segment)
+    if len(segments) >= _FEWEST_SEGMENTS:
+        chosen = segments[_select_held_out_segments([cycles.conditions[s] for s in segments])]
+        return np.asarray(usable & np.isin(cycles.segment, chosen))
+    for offset, segment in enumerate(segments, _HOLD_OUT_STRIDE // 2):
+        members = np.flatnonzero(usable & (cycles.segment == segment))
         held_out[members[offset % _HOLD_OUT_STRIDE :: _HOLD_OUT_STRIDE]] = True
     if not held_out.any():
-        held_out[1::_HOLD_OUT_STRIDE] = True
+        held_out[np.flatnonzero(usable)[1::_HOLD_OUT_STRIDE]] = True
     return held_out

@@ -51,8 +51,12 @@ class EvaluationData:
         time = np.concatenate([s.time - first for s in dataset.stretches])
         undisturbed, notes = mask_disturbed_cycles(dataset.pieces, cycles)
         pieces = tuple(map(_mask_before_motion, undisturbed))
-        recorded = np.concatenate([s.valid_mask for s in dataset.stretches])
-        return EvaluationData(pieces, cycles, select_held_out_cycles(cycles), time, recorded, tuple(notes))
+        recorded = np.concatenate(
+            [s.valid_mask & ~held_out for s, held_out in zip(dataset.stretches, dataset.held_out, strict=True)]
+        )
+        usable = np.concatenate([p.train for p in pieces]) > 0
+        held_out_cycles = select_held_out_cycles(cycles, cycles.sum_by_cycle(usable.astype(float), usable) > 0)
+        return EvaluationData(pieces, cycles, held_out_cycles, time, recorded, tuple(notes))
 
     @cached_property
     def usable(self) -> BoolArray:

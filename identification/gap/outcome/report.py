@@ -22,6 +22,7 @@ from identification.gap.data import (
 from identification.gap.fits import Candidate
 from identification.gap.outcome.explainable_share import ResidualRegression
 from identification.gap.outcome.explanation import describe_nearest, explain_diagnosis
+from identification.gap.outcome.held_out_strokes import measure_held_out_strokes
 from identification.gap.outcome.next_stroke import RivalModel, compute_information, find_best_segment
 from identification.gap.outcome.remainder import describe_remainder
 from identification.gap.outcome.trial_segments import StrokeLimits
@@ -132,7 +133,7 @@ class ReportBuilder:
         Where no set explains the gap, one that reduces it on unseen strokes is named as a part of the cause.
         """
         chosen = self._judge_set(self.posterior)
-        if chosen.verdict == "unexplained" and self.partial is not None:
+        if self.partial is not None and chosen.verdict in ("unexplained", "partly_explained"):
             partial = self._judge_set(self.partial)
             if partial.candidate.names:
                 return partial._replace(verdict="partly_explained")
@@ -192,6 +193,7 @@ class ReportBuilder:
         return Gap(
             before_n=shrinkage.before,
             after_n=shrinkage.after,
+            held_out=measure_held_out_strokes(self.dataset, self.pool.full_problem, named),
             explainable_n=self._find_explainable_rmse(named, noise),
             noise_floor_n=noise,
             noise_floor_ci95=(min(low, noise), max(high, noise)),
@@ -292,5 +294,9 @@ class ReportBuilder:
             logs={r.path.name: r.sha256 for r in self.dataset.recordings},
             version=version("mrbench"),
             seed=self.seed,
-            settings={"held_out": "every fourth segment, or cycle where segments are few"},
+            settings={
+                "held_out": "every fourth segment of each drive, or cycle where segments are few",
+                "hold_out": ",".join(self.dataset.hold_out.patterns) or None,
+                "hold_out_after": self.dataset.hold_out.after_fraction,
+            },
         )

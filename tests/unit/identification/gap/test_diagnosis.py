@@ -1,6 +1,7 @@
 """A diagnosis from recordings to its documents."""
 
 import json
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from identification.damper.effects import STAGES
 from identification.documents import Diagnosis
 from identification.errors import UnusableDataError
+from identification.fitting import HoldOut
 from identification.fitting.damper_model import read_damper_model
 from identification.gap.diagnosis import diagnose, prepare_recordings
 from sim_rig.scenario.scenario import parse_scenario
@@ -123,3 +125,29 @@ def test_the_twin_keeps_the_residual_delays_of_its_fit(gas, tmp_path):
 def test_logs_of_two_dampers_are_refused():
     with pytest.raises(UnusableDataError, match="different specimens"):
         diagnose([run(), run(specimen="LAB-002")])
+
+
+def hold_out_and_spoil(pattern, gain):
+    """A recording with a gas spring whose held-out force has a gain, diagnosed without that segment."""
+    recording = run(stiffening)
+    (stretch,) = recording.stretches
+    held_out = HoldOut((pattern,)).make_mask(stretch)
+    assert 0.05 < held_out.mean() < 0.5
+    spoiled = replace(stretch, force=np.where(held_out, gain * stretch.force, stretch.force))
+    return diagnose([replace(recording, stretches=(spoiled,))], hold_out=HoldOut((pattern,))).diagnosis
+
+
+def test_held_out_strokes_are_read_by_no_choice():
+    pattern = "10mm_*_0.[35]V"
+    true, spoiled = (hold_out_and_spoil(pattern, gain).model_dump() for gain in (1.0, 1.5))
+    good, bad = true["gap"].pop("held_out"), spoiled["gap"].pop("held_out")
+    assert good["rmse_n"] < 1.3 * NOISE
+    assert bad["rmse_n"] > 3.0 * good["rmse_n"]
+    assert good["nrmse"] < 0.1
+    assert true == spoiled
+    assert true["provenance"]["settings"]["hold_out"] == pattern
+
+
+def test_without_a_hold_out_there_is_no_error_of_held_out_strokes(gas):
+    assert gas.diagnosis.gap.held_out is None
+    assert gas.diagnosis.provenance.settings["hold_out"] is None

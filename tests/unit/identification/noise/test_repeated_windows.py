@@ -76,3 +76,11 @@ def test_lost_samples_are_marked():
     measured[3000:3005] = False
     (window,) = find(measured=measured)
     np.testing.assert_array_equal(np.flatnonzero(~window.valid) + window.start, range(3000, 3005))
+
+
+def test_a_window_without_measured_force_does_not_count():
+    levels, measured = np.repeat([0.1, 0.5, 0.3], 4000), np.ones(12_000, bool)
+    measured[4000:8000] = False
+    assert [w.stop for w in find(levels, measured=measured)] == [4000, 12_000]
+    measured[4000:6500] = True  # five of eight cycles
+    assert [w.stop for w in find(levels, measured=measured)] == [4000, 8000, 12_000]

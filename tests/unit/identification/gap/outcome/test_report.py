@@ -71,7 +71,9 @@ def make_builder(
         compute_rmse=lambda forces: (sum(forces), 10 * sum(forces)),
     )  # fmt: skip
     posterior = Posterior(sets or {NONE: 0.15, SPRING: 0.8}, unknown)
-    dataset = SimpleNamespace(drive_unit="V", floor=NoiseFloorEstimate(2.0, 2.0, 1.9, "", 0.05))
+    dataset = SimpleNamespace(
+        drive_unit="V", floor=NoiseFloorEstimate(2.0, 2.0, 1.9, "", 0.05), held_out=(), stretches=()
+    )
     partial = None if partial is None else Posterior(partial, 1.0 - sum(partial.values()))
     return ReportBuilder(dataset, evaluation, pool, posterior, partial, None, [], 1)
 
@@ -121,7 +123,7 @@ def test_the_gap_of_noise_has_no_shrinkage():
     gap = builder._build_gap("explained", named, shrinkage)
     assert (gap.shrinkage, gap.shrinkage_ci95, gap.noise_floor_n, gap.nominal_n) == (0.9, (0.8, 0.95), 1.9, None)
     assert (gap.before_n, gap.after_n, gap.train_before_n, gap.train_after_n) == (6.0, 2.0, 6.0, 2.0)
-    assert gap.explainable_n == 1.9
+    assert (gap.explainable_n, gap.held_out) == (1.9, None)
     # The noise that a named set leaves may lie below the interval from the recording.
     assert (gap.noise_floor_ci95, gap.floor_known) == (pytest.approx((1.9, 2.098)), True)
     gap = builder._build_gap("no_gap", named, shrinkage)

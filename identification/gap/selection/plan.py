@@ -62,7 +62,7 @@ def _refit_law(pool: CandidatePool) -> None:
     Where the first fit of the law ended in a wrong minimum, an effect may have led to the right one.
     """
     best = pool.find_best()
-    if best.names:
+    if best.names and not pool.budget_spent:
         law = replace_effect_unknowns(best.fit.problem, best.fit.minimum.unknowns, np.empty(0))
         pool.fit((), [law])
 

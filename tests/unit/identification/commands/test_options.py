@@ -12,6 +12,7 @@ from identification.commands.diagnose import diagnose
 from identification.commands.identify import _is_recording, _parse_free, predict
 from identification.commands.tune import tune
 from identification.errors import IdentificationError
+from identification.fitting import HoldOut
 
 
 def run(command, *arguments):
@@ -67,7 +68,8 @@ def test_the_noise_of_planned_strokes_is_positive(tmp_path):
 def test_a_cross_check_is_run_under_its_present_and_its_former_name(monkeypatch, tmp_path, options, asked):
     given = []
 
-    def record(recordings, simulation, *, seed, cross_check, progress):
+    def record(recordings, simulation, *, seed, cross_check, hold_out, progress):
+        assert hold_out == HoldOut()
         given.append((recordings, simulation, cross_check))
         raise IdentificationError("not run")
 
@@ -75,6 +77,19 @@ def test_a_cross_check_is_run_under_its_present_and_its_former_name(monkeypatch,
     monkeypatch.setattr("identification.logs.load", lambda path: path)
     run(diagnose, "a.mcap", "--out", tmp_path / "d.json", *options)
     assert given == [([Path("a.mcap")], None, asked)]
+
+
+def test_a_diagnosis_holds_out_the_strokes_that_are_named(monkeypatch, tmp_path):
+    given = []
+
+    def record(recordings, simulation, *, hold_out, **others):
+        given.append(hold_out)
+        raise IdentificationError("not run")
+
+    monkeypatch.setattr("identification.gap.diagnose", record)
+    monkeypatch.setattr("identification.logs.load", lambda path: path)
+    run(diagnose, "a.mcap", "--out", tmp_path / "d.json", "--hold-out", "5mm*,25mm*", "--hold-out-after", "0.8")
+    assert given == [HoldOut(("5mm*", "25mm*"), 0.8)]
 
 
 def test_a_log_is_an_mcap_file_or_any_other_file_that_is_no_plan(tmp_path):

@@ -58,6 +58,7 @@ def test_a_wrong_fit_is_reported_with_the_parameter_that_differs(problem):
     unknowns = fit.minimum.unknowns.copy()
     unknowns[problem.layout.effects.start] += 1.0
     wrong = replace(fit, minimum=replace(fit.minimum, unknowns=unknowns))
+    wrong.__dict__["covariance"] = fit.covariance  # as certain as the right one
     check = cross_check_effects(wrong, problem.replace_effects(friction), "V", 1, ignore_progress)
     assert check.consistent is False
     assert "seal_friction.sliding" in check.message

@@ -29,7 +29,7 @@ Share = tuple[float, tuple[float, float]]
 def decide_verdict(
     baseline: Candidate, named: Candidate, floor: float, no_gap_limit: float, posterior: Posterior
 ) -> Verdict:
-    """Decide the verdict; the worse of fitted and held-out samples counts.
+    """Decide the verdict; the worse of fitted and held-out samples counts, and the held-out ones for a part.
 
     Effects that close a part of the gap are named even where an unknown cause is more probable, because they
     reduce the error on strokes that no fit used. Their probabilities then say that the cause may be another one.
@@ -49,12 +49,21 @@ def decide_verdict(
     baseline_excess = max(baseline.compute_excess(floor), 1e-12)
     closed = 1.0 - named.compute_relative_excess(baseline, floor) / baseline_excess
     unknown = posterior.unknown > posterior.sets[named.names]
-    if not named.names or closed < _MIN_NAMED_SHARE:
+    unseen = _compute_closed_part(baseline, named, floor)
+    if not named.names or max(closed, unseen) < _MIN_NAMED_SHARE:
         return "unexplained"
     reaches_floor = max(named.train_rmse, named.held_out_rmse) < _EXPLAINED_RATIO * floor
     if reaches_floor or (closed > _EXPLAINED_SHARE and not unknown):
         return "explained"
     return "partly_explained"
+
+
+def _compute_closed_part(baseline: Candidate, named: Candidate, floor: float) -> float:
+    """Compute the part of the gap that a set closes on held-out samples [1]; zero if it harms the fitted ones."""
+    gap = baseline.held_out_rmse**2 - floor**2
+    if gap <= 0.0 or named.train_rmse > baseline.train_rmse:
+        return 0.0
+    return 1.0 - (named.held_out_rmse**2 - floor**2) / gap
 
 
 def decide_unnamed_verdict(baseline: Candidate, floor: float, no_gap_limit: float) -> Verdict:

@@ -54,6 +54,14 @@ def test_a_set_that_closes_the_gap_on_one_side_alone_does_not_explain_it(train, 
     assert decide(("force_drift",), train, held_out) == "partly_explained"
 
 
+@pytest.mark.parametrize(
+    ("train", "held_out", "verdict"),
+    [(2.9, 2.0, "partly_explained"), (3.01, 2.0, "unexplained"), (2.9, 2.73, "unexplained")],
+)
+def test_a_set_is_named_as_a_part_if_it_closes_a_fifth_of_the_gap_on_unseen_strokes(train, held_out, verdict):
+    assert decide(("force_drift",), train, held_out) == verdict
+
+
 def test_without_a_named_set_there_is_no_gap_unless_an_unknown_cause_is_probable():
     assert decide((), 1.005, 1.02, baseline=(1.005, 1.02)) == "no_gap"
     assert decide((), 3.0, 3.0, unknown=0.9) == "unexplained"

@@ -13,6 +13,7 @@ from identification.errors import UnusableDataError
 from identification.fitting import HoldOut
 from identification.fitting.damper_model import read_damper_model
 from identification.gap.diagnosis import diagnose, prepare_recordings
+from identification.gap.selection import Posterior, compute_final_posterior
 from sim_rig.scenario.scenario import parse_scenario
 from tests.support.runs import NOISE, run, stiffening
 
@@ -151,3 +152,18 @@ def test_held_out_strokes_are_read_by_no_choice():
 def test_without_a_hold_out_there_is_no_error_of_held_out_strokes(gas):
     assert gas.diagnosis.gap.held_out is None
     assert gas.diagnosis.provenance.settings["hold_out"] is None
+
+
+def test_a_part_of_the_cause_may_be_a_set_that_was_fitted_last(monkeypatch):
+    # The probabilities of whole causes were computed before this set was fitted.
+    def forget(pool):
+        compute_final_posterior(pool)
+        return Posterior({frozenset(): 0.01}, 0.99)
+
+    monkeypatch.setattr("identification.gap.diagnosis.compute_final_posterior", forget)
+    diagnosis = diagnose([run(stiffening)]).diagnosis
+    assert diagnosis.verdict == "partly_explained"
+    assert [e.name for e in diagnosis.effects] == ["gas_spring"]
+    assert diagnosis.probability == 0.0
+    assert 0.2 < diagnosis.effects[0].probability <= 0.5
+    assert diagnosis.gap.explainable_n <= diagnosis.gap.after_n * 1.01

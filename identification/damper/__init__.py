@@ -6,9 +6,7 @@ Nothing here imports a compiler or a framework: each caller passes its own numbe
 from identification.damper import law
 from identification.damper.coordinates import COORDINATES, Coordinates, to_coordinates, to_parameters
 from identification.damper.damper_size import (
-    LARGEST_SIZE,
     LIBRARY_SIZE,
-    SMALLEST_SIZE,
     DamperSize,
     compute_scale_factor,
     scale_quantity,
@@ -21,11 +19,9 @@ from identification.damper.parameters import GAUGE, PARAMETERS, Parameters, Quan
 __all__ = [
     "COORDINATES",
     "GAUGE",
-    "LARGEST_SIZE",
     "LIBRARY_SIZE",
     "PARAMETERS",
     "PARAMETER_SETS",
-    "SMALLEST_SIZE",
     "Coordinates",
     "DamperSize",
     "Number",

@@ -147,7 +147,7 @@ class EvaluationData:
             counts[used],
             self.cycles.segment[used],
         )
-        return estimate_shares(errors, self.compute_rmse(before)[1], expected, noise)
+        return estimate_shares(errors, expected, noise)
 
     def _compute_cycle_errors(self, before: Residual, after: Residual) -> CycleErrors:
         """Compute the errors of all cycles with usable samples."""

@@ -120,13 +120,12 @@ def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates
 
 
 def estimate_shares(
-    held_out: HeldOutErrors, before: float, after: float, noise: float
+    held_out: HeldOutErrors, after: float, noise: float
 ) -> dict[str, tuple[float, tuple[float, float]]]:
     """Estimate the part of the gap's variance that returns without each effect, with its 95 % interval.
 
     Args:
         held_out: errors of the held-out cycles.
-        before: RMSE without effects [N].
         after: RMSE with all named effects that is expected of another run [N].
         noise: standard deviation of the noise in the recorded force [N].
     """
@@ -137,7 +136,7 @@ def estimate_shares(
     drawn = _resample_cycles(sums, held_out.counts, held_out.segment, random)
     # The error expected of another run replaces the measured one in the value and in every draw.
     expected = after**2 - measured[1]
-    gap = max(before**2 - noise**2, _MIN_GAP_SHARE * noise**2)
+    gap = max(measured[0] - noise**2, _MIN_GAP_SHARE * noise**2)
     gaps = np.maximum(drawn[0] - noise**2, _MIN_GAP_SHARE * noise**2)
     shares = {}
     for k, name in enumerate(names, 2):

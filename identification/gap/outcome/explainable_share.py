@@ -8,6 +8,7 @@ features (Rahimi and Recht 2007) of the stroke and its past.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -91,13 +92,18 @@ class ResidualRegression:
     """Noise of the force [N]."""
     _known: dict[frozenset[str], "Explained"] = field(default_factory=dict)
 
+    @cached_property
+    def _features(self) -> Array:
+        """(N, k) features of the recording."""
+        return build_features(self.evaluation.pieces)
+
     def explain(self, candidate: Candidate) -> "Explained":
         """Return what the regression predicts of a set's residual; nothing near the noise floor."""
         if candidate.held_out_rmse < NEAR_FLOOR_RATIO * self.floor:
             return Explained(0.0, dict.fromkeys(FEATURE_VARIABLES, 0.0))
         if candidate.names not in self._known:
             self._known[candidate.names] = explain_residual(
-                build_features(self.evaluation.pieces),
+                self._features,
                 candidate.residual.values,
                 self.evaluation.fitted_samples,
                 self.evaluation.held_out_samples,

@@ -14,24 +14,22 @@ import numpy as np
 from identification.arrays import Array
 from identification.gap.data import Residual
 
-_BLOCK_LENGTH = 0.4
-"""Usual length of a block [s]: shorter than a stroke, longer than the field takes to settle."""
 _EFFECTIVE_SAMPLES = 1.6
 """Independent samples in a block. Origin: chosen between the evidence of true effects and of confusable ones."""
 _MIN_VALID_SHARE = 0.5
 """Share of valid samples above which a block counts."""
 
 
-def compute_evidence(before: Residual, after: Residual, block_length: float = _BLOCK_LENGTH) -> float:
+def compute_evidence(before: Residual, after: Residual, block_length: float) -> float:
     """Return the log odds (natural) of the candidate that leaves ``after`` over the one that leaves ``before``.
 
-    ``block_length`` is in seconds.
+    A block lasts ``block_length`` [s]: less than a stroke, more than the field takes to settle.
     """
     ratios = _compute_mean_squares(before, block_length) / _compute_mean_squares(after, block_length)
     return 0.5 * _EFFECTIVE_SAMPLES * float(np.sum(np.log(ratios)))
 
 
-def bound_evidence(residual: Residual, floor: float, block_length: float = _BLOCK_LENGTH) -> float:
+def bound_evidence(residual: Residual, floor: float, block_length: float) -> float:
     """Compute the evidence for a candidate whose error would be the floor [N] in every block above it."""
     ratios = np.maximum(_compute_mean_squares(residual, block_length) / floor**2, 1.0)
     return 0.5 * _EFFECTIVE_SAMPLES * float(np.sum(np.log(ratios)))

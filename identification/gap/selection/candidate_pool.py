@@ -33,8 +33,8 @@ QUICK_FIT = FitOptions(decimation=1, starts=0, descents=1, iterations=25, regres
 """One descent from the best of the given starts, on decimated data."""
 
 
-_LAW_FIT = OptimiserSettings(iterations=40, restarts=1)
-"""Fit of the law alone: from the regression and, if its minimum is not conclusive, from the low-slip start."""
+_SEARCH = OptimiserSettings(iterations=40, restarts=1)
+"""Search from the regression and, if its minimum is not conclusive, from the low-slip start."""
 
 
 @dataclass
@@ -137,23 +137,18 @@ class CandidatePool:
         )
 
     def fit_law(self) -> Candidate:
-        """Fit the law alone on decimated data, by the search of an identification, and keep it as the baseline."""
-        self.fit_count += 1
-        problem = self.decimated_problem.replace_effects(())
-        candidate = self._evaluate(JointFit(problem, fit_output_error(problem, _LAW_FIT)))
-        self.progress("law alone", candidate.held_out_rmse)
-        self.candidates[candidate.names] = candidate
-        return candidate
+        """Fit the law alone, which is the baseline."""
+        return self.search(())
 
     def search(self, effects: tuple[EffectModel, ...]) -> Candidate:
-        """Fit a set by the search of an identification, and keep it if it is the best of its names.
+        """Fit a set on decimated data by the search of an identification, and keep it if it is the best.
 
-        The other starts come from fits without the set or without one of its effects. A large effect has moved the
-        law there to values from which no descent returns.
+        `fit` starts where another set ended. A large effect has moved that law to values from which no descent
+        returns.
         """
         self.fit_count += 1
         problem = self.decimated_problem.replace_effects(effects)
-        return self._keep(self._evaluate(JointFit(problem, fit_output_error(problem, _LAW_FIT))))
+        return self._keep(self._evaluate(JointFit(problem, fit_output_error(problem, _SEARCH))))
 
     def fit(
         self, effects: tuple[EffectModel, ...], starts: Sequence[Array] = (), options: FitOptions = QUICK_FIT

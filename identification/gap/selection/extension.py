@@ -63,6 +63,5 @@ def _is_extension_promising(pool: CandidatePool, names: frozenset[str]) -> bool:
         return False
     known = pool.candidates[names]
     explains = pool.compute_excess(known) < pool.settings.max_remaining_share * pool.baseline_excess
-    return explains and bound_evidence(known.residual, pool.floor, pool.block_length) > compute_complexity_penalty(
-        names
-    )
+    bound = bound_evidence(known.residual, pool.floor, pool.block_length)
+    return explains and bound > compute_complexity_penalty(names)

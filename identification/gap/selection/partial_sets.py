@@ -12,7 +12,12 @@ import numpy as np
 from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.neighbours import find_subset
-from identification.gap.selection.posterior import Posterior, compute_log_prior, compute_misattribution
+from identification.gap.selection.posterior import (
+    Posterior,
+    compute_log_prior,
+    compute_misattribution,
+    normalise_scores,
+)
 
 _GENUINE_PROBABILITY = 0.5
 """Probability that an effect which closes a part of the gap of an unknown cause is at work, and no look-alike."""
@@ -50,8 +55,7 @@ def compute_partial_posterior(pool: CandidatePool) -> Posterior:
             for n in names
         ]
     )
-    shares = np.exp(scores - scores.max())
-    shares /= shares.sum()
+    shares = normalise_scores(scores)
     excess = pool.compute_excess(pool.candidates[names[int(np.argmax(scores))]])
     remaining = min(max(excess, 0.0) / max(pool.baseline_excess, 1e-12), 1.0)
     certain = 1.0 - compute_misattribution(remaining)

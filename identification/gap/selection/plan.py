@@ -79,10 +79,10 @@ def _search_best_sets(pool: CandidatePool, size: int) -> None:
     """
     scale = pool.full_problem.space.scales.damper_size
     for candidate in _sort_sets(pool, size)[: pool.settings.searched_sets]:
-        models = candidate.fit.effects
-        forms = list_effect_models([models[0].name], scale) if size == 1 else ()
-        choices: list[tuple[EffectModel, ...]] = [(model,) for model in forms]
-        for effects in choices or [models]:
+        choices: list[tuple[EffectModel, ...]] = [candidate.fit.effects]
+        if size == 1:
+            choices = [(model,) for model in list_effect_models(sorted(candidate.names), scale)]
+        for effects in choices:
             if pool.budget_spent or pool.is_at_floor(pool.find_best()):
                 return
             if not any(e.form.action in _CONTACTS for e in effects):

@@ -124,7 +124,7 @@ def compute_posterior(sets: Sequence[SetEvidence], samples: int, coloured_share:
     unknown -= _penalise_incomplete(best, gap)
     # An unknown cause is only an alternative where known effects leave an excess that the floor cannot explain.
     weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
-    shares = _normalise(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
+    shares = normalise_scores(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
     remaining = (max(best.excess, 0.0) + resolution) / (gap + resolution)
     any_effect = 1.0 - float(shares[list(scores).index(frozenset())])
     misattributed = compute_misattribution(remaining) * any_effect
@@ -183,7 +183,8 @@ def _compute_logistic(value: float, width: float) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(value / width, -40.0), 40.0)))
 
 
-def _normalise(scores: Array) -> Array:
+def normalise_scores(scores: Array) -> Array:
+    """Return probabilities that add to one from their logarithms (sets,), which may have a common offset."""
     shares = np.exp(scores - scores.max())
     return np.asarray(shares / shares.sum())
 

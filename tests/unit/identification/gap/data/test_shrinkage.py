@@ -183,7 +183,7 @@ def make_held_out(without, segments=6, cycles=8):
 
 
 def test_a_share_is_the_part_of_the_gap_that_returns_without_the_effect():
-    shares = estimate_shares(make_held_out({"a": 10.0, "b": 2.8}), np.sqrt(10.0), 1.0, 1.0)
+    shares = estimate_shares(make_held_out({"a": 10.0, "b": 2.8}), 1.0, 1.0)
     for name, expected in (("a", 1.0), ("b", 0.2)):
         value, (low, high) = shares[name]
         assert value == pytest.approx(expected, abs=0.02)
@@ -193,5 +193,5 @@ def test_a_share_is_the_part_of_the_gap_that_returns_without_the_effect():
 
 def test_a_share_counts_from_the_error_that_is_expected_of_another_run():
     # The measured error is the noise; 0.9 N² more are expected, a tenth of the gap.
-    shares = estimate_shares(make_held_out({"a": 10.0}), np.sqrt(10.0), np.sqrt(1.9), 1.0)
+    shares = estimate_shares(make_held_out({"a": 10.0}), np.sqrt(1.9), 1.0)
     assert shares["a"][0] == pytest.approx(0.9, abs=0.02)

@@ -46,7 +46,7 @@ def test_confusable_effects_are_not_fitted(pool):
 def test_a_confusable_effect_that_the_search_has_fitted_pays_a_penalty(pool):
     pool = pool.copy(extension_effects=0)
     assert not try_extension(pool, GAS)
-    evidence = compute_evidence(pool.candidates[GAS].residual, pool.candidates[STOP].residual)
+    evidence = compute_evidence(pool.candidates[GAS].residual, pool.candidates[STOP].residual, pool.block_length)
     assert pool.block_evidence[STOP].log_odds == pytest.approx(evidence - 8.0)
     assert set(pool.block_evidence) == {STOP}
 

@@ -1,6 +1,7 @@
 """Errors of the identification.
 
 IdentificationError
+├── EffectFileError       not an effect file, or not a valid one
 ├── UnreadableLogError    not an mrbench log, or truncated, or without a channel
 └── UnusableDataError     too few or unsuitable samples for a fit
 
@@ -13,6 +14,10 @@ class IdentificationError(Exception):
     """Base class of all expected errors of the identification."""
 
     exit_code = 1
+
+
+class EffectFileError(IdentificationError, ValueError):
+    """An effect file is not valid, or cannot be read or written."""
 
 
 class UnreadableLogError(IdentificationError):

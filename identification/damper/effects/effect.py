@@ -53,6 +53,13 @@ Action = Literal[
     "additive_force",
     "displacement_map",
     "displacement_shift",
+    "drive_function",
+    "field_function",
+    "gain_function",
+    "force_function",
+    "mount_function",
+    "channel_function",
+    "displacement_function",
 ]
 """Quantity on which a form acts. It fixes the function's result and its arguments before the parameters:
 
@@ -79,6 +86,9 @@ Action = Literal[
 - ``additive_force``: time since the start of the run [s], drive -> force that the channel adds [N].
 - ``displacement_map``: displacement -> error that the channel adds to it [m].
 - ``displacement_shift``: () -> delay of the displacement channel [s].
+- ``drive_function``, ``field_function``, ``gain_function``, ``force_function``, ``mount_function``,
+  ``channel_function``, ``displacement_function``: variables by name -> value at the place, as in
+  `identification.damper.definitions`.
 """
 
 PLACES: dict[Action, Place] = {
@@ -98,6 +108,13 @@ PLACES: dict[Action, Place] = {
     "additive_force": "force_channel",
     "displacement_map": "displacement_channel",
     "displacement_shift": "displacement_channel",
+    "drive_function": "drive",
+    "field_function": "field",
+    "gain_function": "damper_gain",
+    "force_function": "parallel_force",
+    "mount_function": "mounting",
+    "channel_function": "force_channel",
+    "displacement_function": "displacement_channel",
 }
 """Place of each action."""
 

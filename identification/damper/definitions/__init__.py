@@ -1,0 +1,44 @@
+"""Effects of the user's own: files that define them, expressions, and the library that includes them."""
+
+from identification.damper.definitions.defined_effect import (
+    ACTIONS,
+    CURVE,
+    DEFINED_FORM,
+    DefinedFunction,
+    make_effect,
+)
+from identification.damper.definitions.effect_file import (
+    STAGE_OF,
+    VARIABLES_AT,
+    Curve,
+    EffectFile,
+    EffectParameter,
+    parse_effect_file,
+)
+from identification.damper.definitions.expression import Expression, Instruction
+from identification.damper.definitions.library import (
+    find_effect_folder,
+    load_effects,
+    read_effect_files,
+    write_effect_file,
+)
+
+__all__ = [
+    "ACTIONS",
+    "CURVE",
+    "DEFINED_FORM",
+    "STAGE_OF",
+    "VARIABLES_AT",
+    "Curve",
+    "DefinedFunction",
+    "EffectFile",
+    "EffectParameter",
+    "Expression",
+    "Instruction",
+    "find_effect_folder",
+    "load_effects",
+    "make_effect",
+    "parse_effect_file",
+    "read_effect_files",
+    "write_effect_file",
+]

@@ -1,0 +1,83 @@
+"""Defined effects: effects whose function comes from a definition and not from the library.
+
+The value of the function acts at the definition's place:
+
+- ``drive``, ``field``: adds to the drive before the coil's lag, or to the field behind it [drive].
+- ``damper_gain``: the factor on alpha, c0 and c1 is one plus the value [1].
+- ``parallel_force``: adds to the law's force [N].
+- ``mounting``: adds to the force between load cell and damper [N].
+- ``force_channel``: adds to the recorded force [N].
+- ``displacement_channel``: adds to the recorded displacement [m].
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.damper.definitions.effect_file import EffectFile
+from identification.damper.definitions.expression import Expression
+from identification.damper.effects import Action, Effect, Form, Place
+from identification.damper.parameters import Quantity
+
+CURVE = "curve"
+"""Name by which an expression refers to the curve of its file."""
+DEFINED_FORM = "defined"
+"""Name of the only form of a defined effect."""
+ACTIONS: dict[Place, Action] = {
+    "drive": "drive_function",
+    "field": "field_function",
+    "damper_gain": "gain_function",
+    "parallel_force": "force_function",
+    "mounting": "mount_function",
+    "force_channel": "channel_function",
+    "displacement_channel": "displacement_function",
+}
+"""Action of a defined effect at each place."""
+
+
+@dataclass(frozen=True)
+class DefinedFunction:
+    """Function of a defined effect; hashable, and it can be sent to another process."""
+
+    variables: tuple[str, ...]
+    """Names of the variables on which the expression depends."""
+    expression: Expression
+    symbols: tuple[str, ...]
+    """Names of the parameters, in their order."""
+    curve_variable: str = ""
+    """Variable of the curve; empty without one."""
+    curve_positions: tuple[float, ...] = ()
+    """Values of that variable at which the curve is given, increasing."""
+    curve_values: tuple[float, ...] = ()
+    """Values of the curve there; it is constant beyond its ends."""
+
+    def __call__(self, variables: Mapping[str, Any], *values: Any) -> Any:
+        """Return the value (N,) for variables (N,) each and values of the parameters."""
+        known = {name: variables[name] for name in self.variables}
+        known.update(zip(self.symbols, values, strict=True))
+        if self.curve_variable:
+            known[CURVE] = np.interp(known[self.curve_variable], self.curve_positions, self.curve_values)
+        return self.expression.evaluate(known) + 0.0 * known[self.variables[0]]
+
+
+def make_effect(file: EffectFile) -> Effect:
+    """Return the effect that a file defines."""
+    quantities = tuple(
+        Quantity(symbol, p.unit, p.lo, p.hi, abs(p.value) or max(abs(p.lo), abs(p.hi), 1.0), "of the definition")
+        for symbol, p in file.parameters.items()
+    )
+    expression = Expression.parse(file.expression or CURVE)
+    curve = file.curve
+    function = DefinedFunction(
+        tuple(file.variables),
+        expression,
+        tuple(file.parameters),
+        curve.variable if curve else "",
+        tuple(curve.x) if curve else (),
+        tuple(curve.value) if curve else (),
+    )
+    start = tuple(p.value for p in file.parameters.values())
+    form = Form(DEFINED_FORM, ACTIONS[file.place], quantities, (start,), function)
+    return Effect(file.name, file.stage, file.variables[0], file.describe(), (form,))

@@ -120,7 +120,7 @@ def _fit_sets(logs: Logs, sets: Sequence[Names]) -> list[dict[str, Any]]:
     problem = make_diagnosis_problem(fitted, EvaluationData.make(fitted).pieces)
     last, found = None, []
     for names in sets:
-        last = fit_jointly(problem, tuple(EffectModel(*name) for name in names), last, _FIT_OPTIONS)
+        last = fit_jointly(problem, tuple(EffectModel.from_name(*name) for name in names), last, _FIT_OPTIONS)
         found.append({"set": [list(name) for name in names], **compute_errors(last, fitted, validation)})
         print(names, found[-1]["fitted"], found[-1]["unseen"], file=sys.stderr, flush=True)
     return found

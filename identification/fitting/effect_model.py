@@ -19,22 +19,24 @@ from identification.simulate import ActiveEffect
 class EffectModel:
     """One form of one effect."""
 
-    name: str
-    """Name of the effect."""
+    effect: Effect
+    """The effect."""
     form_name: str
     """Name of the form."""
     size: DamperSize = LIBRARY_SIZE
-    """Size of the damper, by which bounds, scales and starts are scaled."""
+    """Size of the damper, by which bounds, scales and starts of the library's effects are scaled."""
+    prior_deviation: float = np.inf
+    """Standard deviation of each search coordinate about zero, before any measurement."""
 
     @staticmethod
     def from_name(name: str, form_name: str | None = None) -> "EffectModel":
         """Return a form of an effect; the usual one if ``form_name`` is None."""
-        return EffectModel(name, EFFECTS[name].find_form(form_name).name)
+        return EffectModel(EFFECTS[name], EFFECTS[name].find_form(form_name).name)
 
     @property
-    def effect(self) -> Effect:
-        """The effect."""
-        return EFFECTS[self.name]
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
 
     @property
     def form(self) -> Form:
@@ -44,13 +46,22 @@ class EffectModel:
     @cached_property
     def quantities(self) -> tuple[Quantity, ...]:
         """The parameters of the form, with bounds and scales for the damper's size."""
+        if not self._is_scaled:
+            return self.form.parameters
         return tuple(scale_quantity(q, self.size) for q in self.form.parameters)
 
     @cached_property
     def starts(self) -> tuple[tuple[float, ...], ...]:
         """Starting values of a search, for the damper's size."""
+        if not self._is_scaled:
+            return self.form.starts
         factors = [compute_scale_factor(q.scaling_unit, self.size) for q in self.form.parameters]
         return tuple(tuple(v * f for v, f in zip(start, factors, strict=True)) for start in self.form.starts)
+
+    @property
+    def _is_scaled(self) -> bool:
+        """True for an effect of the library; others are defined for one damper."""
+        return EFFECTS.get(self.name) is self.effect
 
     @property
     def log_mask(self) -> BoolArray:

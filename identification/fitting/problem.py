@@ -250,6 +250,8 @@ class Problem:
         centre[self.layout.y0] = means / self.y0_scale
         weight[self.layout.y0] = 1.0 / _Y0_PRIOR
         weight[self.layout.per_log] = 1.0
+        for effect, columns in self.iterate_effects():
+            weight[columns] = 1.0 / effect.prior_deviation
         return centre, weight
 
     def _compute_errors(self, unknowns: Array, piece: int) -> tuple[Array, Array, Array]:

@@ -110,7 +110,7 @@ def collect_effects(diagnoses: Sequence[Diagnosis]) -> tuple[EffectModel, ...]:
         known = best.get(effect.name)
         if known is None or effect.probability >= known[0]:
             best[effect.name] = (effect.probability, effect.form)
-    return tuple(EffectModel(name, form) for name, (_, form) in best.items())
+    return tuple(EffectModel.from_name(name, form) for name, (_, form) in best.items())
 
 
 def _fit_run(run: PreparedRecordings, effects: tuple[EffectModel, ...]) -> JointFit:

@@ -6,7 +6,7 @@ from identification.simulate.channel import (
     compute_parallel_force,
     differentiate_parallel_force,
 )
-from identification.simulate.inputs import compute_damper_field
+from identification.simulate.inputs import COIL_ACTIONS, compute_damper_field
 from identification.simulate.kernel import StepCounts
 from identification.simulate.motion import DamperMotion, compute_damper_motion
 from identification.simulate.scaling import compute_scale_factors
@@ -17,12 +17,15 @@ from identification.simulate.simulation_model import (
     Response,
     SimulationModel,
 )
+from identification.simulate.variables import DamperVariables, make_coil_variables
 
 __all__ = [
+    "COIL_ACTIONS",
     "MAX_TRAVEL",
     "SENSITIVITY_COLUMNS",
     "ActiveEffect",
     "DamperMotion",
+    "DamperVariables",
     "Excitation",
     "Response",
     "SimulationModel",
@@ -33,5 +36,6 @@ __all__ = [
     "compute_parallel_force",
     "compute_scale_factors",
     "differentiate_parallel_force",
+    "make_coil_variables",
     "simulate",
 ]

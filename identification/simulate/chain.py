@@ -95,7 +95,7 @@ class _SimulationChain:
         self._s = np.array([model.coordinates[i] for i in _STRUCTURAL_COLUMNS])
         self._zeta0 = inputs.estimate_settled_hysteresis(motion.v[0])
         self._h = 1.0 / excitation.rate
-        self._parallel_force = channel.compute_parallel_force(model, motion, self._h)
+        self._parallel_force = channel.compute_parallel_force(model, excitation, motion)
         extra = (*field.columns, -1, *motion.columns, *scales.columns)
         further = (_FORCE_DELAY if at < 0 else len(SENSITIVITY_COLUMNS) + at for at in extra)
         self._columns = [_ETA, _DRIVE_DELAY, *further]
@@ -145,7 +145,7 @@ class _SimulationChain:
         J[:, _K1] = self._motion.x
         J[:, _F0] = -1.0
         moving = [_FORCE_DELAY, *(len(SENSITIVITY_COLUMNS) + at for at in self._motion.columns)]
-        over_motion, own = channel.differentiate_parallel_force(self._model, self._motion, self._h)
+        over_motion, own = channel.differentiate_parallel_force(self._model, self._excitation, self._motion)
         rows = self._model.coordinates.k1 * self._motion.dx + over_motion
         for column, row in zip(moving, rows, strict=True):
             J[:, column] += row
@@ -169,7 +169,7 @@ class _SimulationChain:
         if not sensitivities:
             y, zeta, force = compliant_mount.integrate(fixed, *g, h, start, max_travel, step_counts)
             return Response(force, y, zeta, self._field.u, step_counts), None
-        over_motion, own = channel.differentiate_parallel_force(self._model, self._motion, self._h)
+        over_motion, own = channel.differentiate_parallel_force(self._model, self._excitation, self._motion)
         rows = compliant_mount.stack_derivatives(self._motion, self._field, self._scales, over_motion, own, h)
         y, zeta, force, partial = compliant_sensitivities.integrate_with_sensitivities(
             fixed, *g, h, start, max_travel, step_counts, *rows

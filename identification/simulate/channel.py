@@ -1,34 +1,38 @@
 """Path from the law's force to the recorded force: parallel forces, inertia and the force channel."""
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from identification.arrays import Array, njit_cached
+from identification.arrays import Array
 from identification.damper.effects import Form
 from identification.simulate.curves import apply_lag, differentiate_by_argument, differentiate_by_parameters
 from identification.simulate.inputs import trace_memory
 from identification.simulate.motion import DamperMotion, compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
+from identification.simulate.variables import DEADBAND, DamperVariables, apply_deadband
 
 _DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-8, 1e-7
 """Steps of differences of parallel forces [m], [m/s]."""
 _ACCELERATION_STEP = 1e-3
 """Step of differences of inertia [m/s^2]."""
+_FORCE_STEP = 1e-6
+"""Step of differences of a force channel, relative to the largest force [1]."""
 _LAG_STEP = 1e-7
 """Step of differences of the channel's lag [s]."""
-_DEADBAND = 1e-6
-"""Half width of the deadband of a seal's displacement [m]; without it, noise at rest would erase the memory."""
 
 
-def compute_parallel_force(model: SimulationModel, motion: DamperMotion, h: float) -> Array:
-    """Compute the sum of all parallel forces (N,) [N]; samples are h [s] apart."""
-    total = np.zeros(len(motion.x))
+def compute_parallel_force(model: SimulationModel, excitation: Excitation, motion: DamperMotion) -> Array:
+    """Compute the sum of all parallel forces (N,) [N]."""
+    total, h = np.zeros(len(motion.x)), 1.0 / excitation.rate
     for _, form, values in model.select_forms("parallel_force"):
         total += form.function(motion.x, motion.v, *values)
     for _, form, values in model.select_forms("hysteretic_force", "relaxation_force"):
         total += _compute_memory_force(form, h, motion.x, motion.v, *values)
+    for _, form, values in model.select_forms("force_function", "mount_function"):
+        total += form.function(DamperVariables(excitation, motion.x, motion.v, motion.a), *values)
     return total
 
 
@@ -38,28 +42,15 @@ def _compute_memory_force(form: Form, h: float, x: Array, v: Array, *values: flo
         exchange = values[[q.symbol for q in form.parameters].index("exchange_time")]
         return np.asarray(form.function(x, v, apply_lag(x, exchange, h), *values))
     return np.asarray(
-        form.function(
-            x, v, trace_memory(compile_once(form.memory), _apply_deadband(x, _DEADBAND), *values), *values
-        )
+        form.function(x, v, trace_memory(compile_once(form.memory), apply_deadband(x, DEADBAND), *values), *values)
     )
 
 
-@njit_cached
-def _apply_deadband(x: Array, still: float) -> Array:
-    """Return the displacement (N,) [m] that follows x only where x leaves a band of ``still`` to either side."""
-    found = np.empty(len(x))
-    held = x[0]
-    for i in range(len(x)):
-        held = min(max(held, x[i] - still), x[i] + still)
-        found[i] = held
-    return found
-
-
 def differentiate_parallel_force(
-    model: SimulationModel, motion: DamperMotion, h: float
+    model: SimulationModel, excitation: Excitation, motion: DamperMotion
 ) -> tuple[Array, list[tuple[int, Array]]]:
     """Differentiate the parallel forces over the unknowns of the motion (M, N), and over parameters by column."""
-    moving, own = np.zeros_like(motion.dx), []
+    moving, own, h = np.zeros_like(motion.dx), [], 1.0 / excitation.rate
     for at, form, values in model.select_forms("parallel_force"):
         over_x, over_v = _differentiate_by_motion(form, values, motion)
         moving += over_x * motion.dx + over_v * motion.dv
@@ -67,20 +58,57 @@ def differentiate_parallel_force(
         own += [(at + k, np.broadcast_to(row, len(motion.x))) for k, row in enumerate(rows)]
     for at, form, values in model.select_forms("hysteretic_force", "relaxation_force"):
         pairs = zip(motion.dx, motion.dv, strict=True)
-        moving += np.stack([_differentiate_memory_force(form, h, values, motion, *pair) for pair in pairs])
+        at_motion = partial(_evaluate_memory_force, form, h, values)
+        moving += np.stack([_differentiate_by_unknown(at_motion, motion, *pair) for pair in pairs])
         whole = partial(_compute_memory_force, form, h, motion.x, motion.v)
         own += [(at + k, row) for k, row in enumerate(differentiate_by_parameters(whole, values, form.parameters))]
+    for at, form, values in model.select_forms("force_function", "mount_function"):
+        variables = DamperVariables(excitation, motion.x, motion.v, motion.a)
+        moving += _differentiate_defined_force(
+            form, excitation, values, motion, _differentiate_acceleration(model, motion)
+        )
+        rows = differentiate_by_parameters(partial(form.function, variables), values, form.parameters)
+        own += [(at + k, row) for k, row in enumerate(rows)]
     return moving, own
 
 
-def _differentiate_memory_force(
-    form: Form, h: float, values: tuple[float, ...], motion: DamperMotion, dx: Array, dv: Array
+def _evaluate_memory_force(form: Form, h: float, values: tuple[float, ...], x: Array, v: Array) -> Array:
+    return _compute_memory_force(form, h, x, v, *values)
+
+
+def _differentiate_defined_force(
+    form: Form, excitation: Excitation, values: tuple[float, ...], motion: DamperMotion, da: Array
 ) -> Array:
-    """Differentiate a force with memory over an unknown with derivatives dx, dv (N,) of the motion."""
+    """Differentiate the force of a defined effect over the unknowns of the motion, (M, N)."""
+    rows = []
+    for over_x, over_v, over_a in zip(motion.dx, motion.dv, da, strict=True):
+        step = _DISPLACEMENT_STEP / max(float(np.abs(over_x).max()), 1e-9)
+        ahead, back = (
+            form.function(
+                DamperVariables(excitation, motion.x + s * over_x, motion.v + s * over_v, motion.a + s * over_a),
+                *values,
+            )
+            for s in (step, -step)
+        )
+        rows.append((ahead - back) / (2.0 * step))
+    return np.stack(rows)
+
+
+def _differentiate_acceleration(model: SimulationModel, motion: DamperMotion) -> Array:
+    """Return the derivatives (M, N) of the acceleration: a delay of the displacement is a negative delay."""
+    da = np.zeros_like(motion.dx)
+    da[0] = motion.da
+    for at, _, _ in model.select_forms("displacement_shift"):
+        da[1 + motion.columns.index(at)] = -motion.da
+    return da
+
+
+def _differentiate_by_unknown(
+    at_motion: Callable[[Array, Array], Array], motion: DamperMotion, dx: Array, dv: Array
+) -> Array:
+    """Differentiate a force (N,) over an unknown with derivatives dx, dv (N,) of the motion."""
     step = _DISPLACEMENT_STEP / max(float(np.abs(dx).max()), 1e-9)
-    ahead, back = (
-        _compute_memory_force(form, h, motion.x + s * dx, motion.v + s * dv, *values) for s in (step, -step)
-    )
+    ahead, back = (at_motion(motion.x + s * dx, motion.v + s * dv) for s in (step, -step))
     return np.asarray((ahead - back) / (2.0 * step))
 
 
@@ -127,6 +155,8 @@ def apply_force_channel(
             _add_columns(
                 J, first + at, partial(form.function, excitation.time, excitation.sampled_drive), form, values
             )
+    for at, form, values in model.select_forms("channel_function"):
+        force = _apply_channel_function(excitation, force, J, form, values, first + at)
     for at, _, values in model.select_forms("force_lag"):
         force = _apply_lag_to_both(force, values[0], 1.0 / excitation.rate, J, first + at)
     return force
@@ -139,6 +169,22 @@ def _differentiate_inertia(form: Form, values: tuple[float, ...], motion: Damper
 def _add_columns(J: Array, at: int, function: Any, form: Form, values: tuple[float, ...]) -> None:
     for k, row in enumerate(differentiate_by_parameters(function, values, form.parameters)):
         J[:, at + k] += row
+
+
+def _apply_channel_function(
+    excitation: Excitation, force: Array, J: Array | None, form: Form, values: tuple[float, ...], at: int
+) -> Array:
+    """Return the force with the value of a defined effect added; the sensitivities J follow in place."""
+    variables = {"force": force, "drive": excitation.sampled_drive, "time": excitation.time}
+
+    def at_force(recorded: Array) -> Array:
+        return np.asarray(form.function({**variables, "force": recorded}, *values))
+
+    if J is not None:
+        step = _FORCE_STEP * max(float(np.abs(force).max()), 1.0)
+        J *= (1.0 + differentiate_by_argument(at_force, force, step))[:, None]
+        _add_columns(J, at, partial(form.function, variables), form, values)
+    return np.asarray(force + at_force(force))
 
 
 def _apply_lag_to_both(force: Array, lag: float, h: float, J: Array | None, at: int) -> Array:

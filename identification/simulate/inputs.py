@@ -11,10 +11,14 @@ import numpy as np
 
 from identification.arrays import Array, njit_cached, njit_uncached
 from identification.damper import Quantity
+from identification.damper.effects import Action
 from identification.simulate.curves import apply_lag, differentiate_by_parameters
 from identification.simulate.motion import compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
+from identification.simulate.variables import make_coil_variables
 
+COIL_ACTIONS: tuple[Action, ...] = ("drive_delay", "field", "field_memory", "drive_function", "field_function")
+"""Actions that change the field."""
 _MIN_LAG = 1e-6
 """Second lag below which the drive passes without lag [s]."""
 _REST_SPEED = 1e-3
@@ -45,7 +49,7 @@ def compute_damper_field(
     late = sum(values[0] for _, _, values in model.select_forms("time_shift"))
     finer = excitation.drive_oversampling
     delay, h = model.force_delay + model.drive_delay + late, 1.0 / (excitation.rate * finer)
-    coil = model.select_forms("drive_delay", "field", "field_memory")
+    coil = model.select_forms(*COIL_ACTIONS)
     if not coil:
         u, middle, du, dmiddle = compute_field(excitation.drive, model.coordinates.eta, delay, h)
         u, middle = _decimate_field(u, middle, finer)
@@ -56,7 +60,7 @@ def compute_damper_field(
     quantities = (_ETA, _DELAY, *(q for _, form, _ in coil for q in form.parameters))
 
     def whole(*parameters: float) -> Array:
-        return _apply_coil(coil, parameters, excitation.drive, h)
+        return _apply_coil(coil, parameters, excitation, h)
 
     both = whole(*values)
     columns = tuple(at + k for at, _, some in coil for k in range(len(some)))
@@ -81,8 +85,9 @@ def _decimate_field(at: Array, middle: Array, finer: int) -> tuple[Array, Array]
     return np.ascontiguousarray(at[..., ::finer]), np.ascontiguousarray(halves)
 
 
-def _apply_coil(coil: Any, parameters: tuple[float, ...], drive: Array, h: float) -> Array:
+def _apply_coil(coil: Any, parameters: tuple[float, ...], excitation: Excitation, h: float) -> Array:
     """Apply all effects of the coil in the order of the chain; return the field at half samples (2N-1,)."""
+    drive = excitation.drive
     eta, delay, lag, part, layers, at = parameters[0], parameters[1], 0.0, 1.0, 1, 2
     maps = []
     for _, form, some in coil:
@@ -91,6 +96,8 @@ def _apply_coil(coil: Any, parameters: tuple[float, ...], drive: Array, h: float
         if form.action == "drive_delay":
             further, slower, part, layers = form.function(*own)
             delay, lag = delay + further, lag + slower
+        elif form.action == "drive_function":
+            drive = drive + form.function(make_coil_variables(drive, excitation.start, h), *own)
         else:
             maps.append((form, own))
     u = apply_two_lags(drive, eta, lag, delay, h)
@@ -99,14 +106,16 @@ def _apply_coil(coil: Any, parameters: tuple[float, ...], drive: Array, h: float
     if part < 1.0:
         u = part * u + (1.0 - part) * apply_two_lags(drive, eta, 0.0, delay, h)
     # Lags act on the command and maps on the field, so all lags come first, whatever the order of the effects.
-    return _apply_maps(maps, u)
+    return _apply_maps(maps, u, excitation.start, 0.5 * h)
 
 
-def _apply_maps(maps: list[tuple[Any, tuple[float, ...]]], u: Array) -> Array:
+def _apply_maps(maps: list[tuple[Any, tuple[float, ...]]], u: Array, start: float, h: float) -> Array:
     """Apply functions of the field, with and without memory, in the order of the chain."""
     for form, own in maps:
         if form.action == "field":
             u = form.function(u, *own)
+        elif form.action == "field_function":
+            u = u + form.function(make_coil_variables(u, start, h), *own)
         else:
             u = form.function(u, trace_memory(compile_once(form.memory), u, *own), *own)
     return np.asarray(u)

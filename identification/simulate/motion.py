@@ -1,6 +1,7 @@
 """Motion of the damper from the recorded displacement: delays, nonlinearity of the channel, backlash."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,6 +54,8 @@ def compute_damper_motion(
         motion = _append_rows(motion, -motion.dx[:1], -motion.dv[:1], (at,))
     for at, form, values in model.select_forms("displacement_map"):
         motion = _invert_channel(motion, form, values, at, sensitivities)
+    for at, form, values in model.select_forms("displacement_function"):
+        motion = _invert_defined_channel(motion, form, values, at, excitation)
     for at, form, values in model.select_forms("displacement_backlash"):
         motion = _follow_with_backlash(motion, form, values, at)
     return motion
@@ -114,6 +117,35 @@ def _invert_channel(
     dx = -np.stack(shifts) / gain
     dv = -motion.v / gain**2 * (np.stack(gains) + bend * dx)
     return _append_rows(moved, dx, dv, tuple(range(at, at + len(values))))
+
+
+def _invert_defined_channel(
+    motion: DamperMotion, form: Form, values: tuple[float, ...], at: int, excitation: Excitation
+) -> DamperMotion:
+    """Return the true motion behind a channel with a defined effect, which recorded x + error(x, v, time)."""
+
+    def invert(x: Array, v: Array, *own: float) -> Array:
+        return _find_true_motion(form, excitation, x, v, *own)
+
+    x, v = invert(motion.x, motion.v, *values)
+    step = _FIRST_STEP / max(float(np.abs(motion.dx).max(initial=0.0)), _FIRST_STEP)
+    moved = [
+        (invert(motion.x + step * dx, motion.v + step * dv, *values) - [x, v]) / step
+        for dx, dv in zip(motion.dx, motion.dv, strict=True)
+    ]
+    own = np.stack(differentiate_by_parameters(partial(invert, motion.x, motion.v), values, form.parameters))
+    dx, dv = np.stack(moved).swapaxes(0, 1)
+    columns = tuple(range(at, at + len(values)))
+    return _append_rows(motion._replace(x=x, v=v, dx=dx, dv=dv), own[:, 0], own[:, 1], columns)
+
+
+def _find_true_motion(form: Form, excitation: Excitation, x: Array, v: Array, *own: float) -> Array:
+    """Return the true displacement [m] and velocity [m/s], (2, N), that a channel recorded as x and v (N,)."""
+    true_x, true_v, h = x, v, 1.0 / excitation.rate
+    for _ in range(_INVERSION_STEPS):
+        error = form.function({"displacement": true_x, "velocity": true_v, "time": excitation.time}, *own)
+        true_x, true_v = x - error, v - np.gradient(error, h)
+    return np.stack([true_x, true_v])
 
 
 def _compute_bend(error: Callable[..., Any], x: Array, values: tuple[float, ...]) -> Array:

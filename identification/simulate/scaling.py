@@ -1,11 +1,10 @@
 """Factors on alpha, c0 and c1 along an excitation from effects that scale the law, and their derivatives."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from identification.arrays import Array
 from identification.simulate.curves import (
@@ -15,6 +14,8 @@ from identification.simulate.curves import (
 )
 from identification.simulate.motion import DamperMotion
 from identification.simulate.simulation_model import Excitation, SimulationModel
+from identification.simulate.stored_energy import compute_stored_energy
+from identification.simulate.variables import DamperVariables, MovedVariables
 
 _DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-7, 1e-6
 """Steps of differences [m], [m/s]."""
@@ -39,7 +40,7 @@ def compute_scale_factors(
     model: SimulationModel, excitation: Excitation, motion: DamperMotion, sensitivities: bool = True
 ) -> ScaleFactors:
     """Compute the factors of all scaling effects; derivatives only with ``sensitivities``."""
-    scaling = model.select_forms("scaling", "softening")
+    scaling = model.select_forms("scaling", "softening", "gain_function")
     if not scaling:
         return ScaleFactors(np.ones((3, 0)), np.ones((3, 0)), np.ones((0, 3, 0)), np.ones((0, 3, 0)), ())
     h = 1.0 / excitation.rate
@@ -48,16 +49,18 @@ def compute_scale_factors(
     # No scaling effect depends on the acceleration. x fills its two places.
     middle = DamperMotion(x, v, x, dx, dv, x, motion.columns)
     columns = tuple(at + k for at, _, values in scaling for k in range(len(values)))
-    at, over = _multiply_factors(scaling, motion, excitation, half=False, sensitivities=sensitivities)
-    at_middle, over_middle = _multiply_factors(scaling, middle, excitation, half=True, sensitivities=sensitivities)
+    variables = DamperVariables(excitation, motion.x, motion.v, motion.a)
+    parts = [_bind_form(form, values, variables, excitation, half=False) for _, form, values in scaling]
+    parts_between = [_bind_form(form, values, variables, excitation, half=True) for _, form, values in scaling]
+    at, over = _multiply_factors(parts, motion, sensitivities=sensitivities)
+    at_middle, over_middle = _multiply_factors(parts_between, middle, sensitivities=sensitivities)
     return ScaleFactors(at, at_middle, over, over_middle, columns)
 
 
 def _multiply_factors(
-    scaling: Any, motion: DamperMotion, excitation: Excitation, *, half: bool, sensitivities: bool
+    parts: Sequence["_FormFactor"], motion: DamperMotion, *, sensitivities: bool
 ) -> tuple[Array, Array]:
     """Return the product of all factors (3, N) and its derivatives (S, 3, N)."""
-    parts = [_bind_form(form, values, motion, excitation, half) for _, form, values in scaling]
     total = np.prod([part.function(motion.x, motion.v, *part.values) for part in parts], axis=0)
     if not sensitivities:
         return total, np.ones((0, 3, 0))
@@ -95,8 +98,11 @@ class _FormFactor(NamedTuple):
 
 
 def _bind_form(
-    form: Any, values: tuple[float, ...], motion: DamperMotion, excitation: Excitation, half: bool
+    form: Any, values: tuple[float, ...], variables: DamperVariables, excitation: Excitation, *, half: bool
 ) -> _FormFactor:
+    """Return the factors of a form over the motion, at the samples or half way between."""
+    if form.action == "gain_function":
+        return _FormFactor(partial(_evaluate_gain, form, variables), values, form.parameters)
     if form.action == "scaling":
         return _FormFactor(lambda x, v, *own: np.stack(form.function(x, v, *own)), values, form.parameters)
     recovery = [q.symbol for q in form.parameters].index("recovery_time")
@@ -109,18 +115,6 @@ def _bind_form(
     return _FormFactor(warmed, values, form.parameters)
 
 
-def compute_stored_energy(excitation: Excitation, recovery: float) -> Array:
-    """Compute the energy (N,) [J] that the damper has dissipated and not yet lost.
-
-    Args:
-        excitation: excitation with the dissipated power.
-        recovery: time constant with which the energy leaves [s].
-    """
-    if excitation.power is None:
-        return np.zeros(len(excitation.displacement))
-    h = 1.0 / excitation.rate
-    fade = np.exp(-h / recovery)
-    # Exact for a power that is constant over a sample. expm1, because a recovery takes many samples.
-    gain = -recovery * np.expm1(-h / recovery)
-    power = np.concatenate([[0.0], 0.5 * (excitation.power[1:] + excitation.power[:-1])])
-    return np.asarray(signal.lfilter([gain], [1.0, -fade], power))
+def _evaluate_gain(form: Any, samples: DamperVariables, x: Array, v: Array, *own: float) -> Array:
+    """Return the factors (3, N) of a defined effect at a motion near that of the samples."""
+    return np.stack([1.0 + form.function(MovedVariables(samples, x, v), *own)] * 3)

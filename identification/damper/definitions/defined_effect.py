@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.damper.definitions.effect_file import EffectFile
+from identification.damper.definitions.effect_file import EffectFile, EffectParameter
 from identification.damper.definitions.expression import Expression
 from identification.damper.effects import Action, Effect, Form, Place
 from identification.damper.parameters import Quantity
@@ -65,9 +65,9 @@ class DefinedFunction:
 def make_effect(file: EffectFile) -> Effect:
     """Return the effect that a file defines."""
     quantities = tuple(
-        Quantity(symbol, p.unit, p.lo, p.hi, abs(p.value) or max(abs(p.lo), abs(p.hi), 1.0), "of the definition")
+        Quantity(symbol, p.unit, p.lo, p.hi, _find_scale(p), "of the definition", scaling="1")
         for symbol, p in file.parameters.items()
-    )
+    )  # scaling: the bounds of a file are those of the user's damper, whatever its size
     expression = Expression.parse(file.expression or CURVE)
     curve = file.curve
     function = DefinedFunction(
@@ -81,3 +81,7 @@ def make_effect(file: EffectFile) -> Effect:
     start = tuple(p.value for p in file.parameters.values())
     form = Form(DEFINED_FORM, ACTIONS[file.place], quantities, (start,), function)
     return Effect(file.name, file.stage, file.variables[0], file.describe(), (form,))
+
+
+def _find_scale(parameter: EffectParameter) -> float:
+    return abs(parameter.value) or max(abs(parameter.lo), abs(parameter.hi)) or 1.0

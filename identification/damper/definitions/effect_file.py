@@ -11,6 +11,7 @@ from identification.errors import EffectFileError
 from identification.validation import FrozenModel, describe_validation_error
 
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z_]+$", max_length=40)]
+Unit = Annotated[str, StringConstraints(pattern=r"^([^{}]|\{drive\})+$", max_length=40)]
 _RESERVED = {"curve", *FUNCTIONS, *get_args(Variable)}
 """Names that no parameter may have."""
 _MOTION: tuple[Variable, ...] = ("displacement", "velocity", "acceleration")
@@ -42,8 +43,10 @@ STAGE_OF: dict[Place, Stage] = {
 class EffectParameter(FrozenModel):
     """One parameter of a defined effect."""
 
+    model_config = ConfigDict(allow_inf_nan=False)
+
     value: float = Field(description="value at which a search starts, and with which the effect is played")
-    unit: str = Field(description="SI unit; {drive} stands for V or A")
+    unit: Unit = Field(description="SI unit; {drive} stands for V or A")
     lo: float = Field(description="smallest value that a search tries")
     hi: float = Field(description="largest value that a search tries")
 
@@ -57,8 +60,10 @@ class EffectParameter(FrozenModel):
 class Curve(FrozenModel):
     """Function of one variable, given at points."""
 
+    model_config = ConfigDict(allow_inf_nan=False)
+
     variable: Variable = Field(description="variable of the curve")
-    unit: str = Field(description="SI unit of the values")
+    unit: Unit = Field(description="SI unit of the values; {drive} stands for V or A")
     x: list[float] = Field(min_length=2, max_length=1000, description="values of the variable, increasing")
     value: list[float] = Field(description="values of the curve there")
     lo: list[float] | None = Field(default=None, description="lower bound of the 95 % band")
@@ -98,6 +103,8 @@ class EffectFile(FrozenModel):
             raise ValueError(f"the library has an effect {self.name}; choose another name")
         if self.stage != STAGE_OF[self.place]:
             raise ValueError(f"place {self.place} belongs to stage {STAGE_OF[self.place]}, not {self.stage}")
+        if len(set(self.variables)) < len(self.variables):
+            raise ValueError(f"a variable is listed twice among {_join(self.variables)}")
         for variable in self.variables:
             if variable not in VARIABLES_AT[self.place]:
                 raise ValueError(f"at {self.place} there are {_join(VARIABLES_AT[self.place])}, not {variable}")
@@ -112,12 +119,13 @@ class EffectFile(FrozenModel):
         taken = sorted(set(self.parameters) & _RESERVED)
         if taken:
             raise ValueError(f"{_join(taken)} cannot be the name of a parameter")
-        known = {*self.variables, *self.parameters, *(["curve"] if self.curve else [])}
+        own = {*self.parameters, *(["curve"] if self.curve else [])}
         used = Expression.parse(self.expression or "curve").names
-        if used - known:
-            raise ValueError(f"the expression uses {_join(sorted(used - known))}, which is not declared")
-        if set(self.parameters) - used:
-            raise ValueError(f"the expression does not use {_join(sorted(set(self.parameters) - used))}")
+        unknown = used - own - set(self.variables)
+        if unknown:
+            raise ValueError(f"the expression uses {_join(sorted(unknown))}, which is not declared")
+        if own - used:
+            raise ValueError(f"the expression does not use {_join(sorted(own - used))}")
 
     def describe(self) -> str:
         """Return the meaning, or else the expression and its place."""
@@ -137,6 +145,14 @@ def parse_effect_file(text: str | bytes, origin: str) -> EffectFile:
     try:
         return EffectFile.model_validate_json(text)
     except ValidationError as error:
-        raise EffectFileError(f"{origin}: {describe_validation_error(error)}") from error
-    except EffectFileError as error:
-        raise EffectFileError(f"{origin}: {error}") from error
+        raise EffectFileError(f"{origin}: {_describe_refusal(error)}") from error
+
+
+def _describe_refusal(error: ValidationError) -> str:
+    """Return location and reason of the first error; the reason in full where a check of this module gives it."""
+    first = error.errors()[0]
+    reason = first.get("ctx", {}).get("error")
+    if not isinstance(reason, ValueError):
+        return describe_validation_error(error)
+    location = ".".join(map(str, first["loc"]))
+    return f"{location}: {reason}" if location else str(reason)

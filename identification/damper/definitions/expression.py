@@ -5,6 +5,7 @@ compiled code of the simulated rig.
 """
 
 import ast
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -27,7 +28,10 @@ _MAX_LENGTH = 1000
 _MAX_EXPONENT = 50.0
 """Largest argument of exp: a search that leaves its range meets a large number and no overflow."""
 _SMALLEST = 1e-12
-"""Smallest size of a divisor, of the argument of log, and of the base of a power with a broken exponent."""
+"""Smallest size of a divisor and of a base with a negative exponent.
+
+It is also the smallest argument of log and the smallest base with a fractional exponent.
+"""
 
 
 class Instruction(NamedTuple):
@@ -51,8 +55,8 @@ class Expression:
         """Parse an expression.
 
         Raises:
-            EffectFileError: the text is too long or contains anything but numbers, names, ``+ - * / **`` and the
-                functions of ``FUNCTIONS``.
+            EffectFileError: the text is too long or contains anything but finite numbers, names, ``+ - * / **``
+                and the functions of ``FUNCTIONS``.
         """
         if len(text) > _MAX_LENGTH:
             raise EffectFileError(f"the expression has {len(text)} characters; at most {_MAX_LENGTH} are admitted")
@@ -60,7 +64,7 @@ class Expression:
             instructions = _translate(ast.parse(text.strip(), mode="eval").body)
         except EffectFileError:
             raise
-        except (SyntaxError, RecursionError, MemoryError, ValueError) as error:
+        except (SyntaxError, RecursionError, MemoryError, ValueError, OverflowError) as error:
             raise EffectFileError(f"expression {text[:80]!r} cannot be read: {str(error)[:80]}") from error
         return Expression(text, tuple(instructions))
 
@@ -100,7 +104,7 @@ def _translate(node: ast.expr) -> list[Instruction]:
         case ast.Constant(value=bool()):
             pass
         case ast.Constant(value=int() | float() as number):
-            return [Instruction("number", float(number))]
+            return [Instruction("number", _make_finite(number))]
         case ast.Name(id=name):
             return [Instruction("name", name)]
         case ast.UnaryOp(op=ast.USub(), operand=operand):
@@ -115,6 +119,18 @@ def _translate(node: ast.expr) -> list[Instruction]:
         f"the expression contains {ast.unparse(node)[:40]!r}; admitted are numbers, names, + - * / ** and "
         f"{', '.join(FUNCTIONS)} of one argument"
     )
+
+
+def _make_finite(number: float) -> float:
+    """Return a number as a float.
+
+    Raises:
+        OverflowError: a float cannot hold it.
+    """
+    value = float(number)
+    if math.isinf(value):
+        raise OverflowError("number too large for a float")
+    return value
 
 
 def _apply_function(name: str, value: Any) -> Any:
@@ -134,7 +150,14 @@ def _apply_operator(operator: str, left: Any, right: Any) -> Any:
         case "*":
             return left * right
         case "/":
-            return left / np.where(np.abs(right) < _SMALLEST, _SMALLEST, right)
+            return left / _keep_from_zero(right)
         case _:
-            whole = np.asarray(right) == np.round(right)
-            return np.where(whole, left, np.maximum(left, _SMALLEST)) ** np.asarray(right, float)
+            exponent = np.asarray(right, float)
+            whole_base = np.where(exponent < 0.0, _keep_from_zero(left), left)
+            whole = exponent == np.round(exponent)
+            return np.where(whole, whole_base, np.maximum(left, _SMALLEST)) ** exponent
+
+
+def _keep_from_zero(value: Any) -> Any:
+    """Return a value that can be a divisor."""
+    return np.where(np.abs(value) < _SMALLEST, _SMALLEST, value)

@@ -55,7 +55,8 @@ def write_effect_file(file: EffectFile, folder: Path | None = None) -> Path:
     """Write an effect file into a folder, the user's if None, and return its path.
 
     Raises:
-        EffectFileError: there is an effect of this name, or the file cannot be written.
+        EffectFileError: there is an effect of this name, the file cannot be written, or another file of the folder
+            is not valid.
     """
     folder = folder or find_effect_folder()
     path = folder / f"{file.name}{_SUFFIX}"
@@ -63,7 +64,7 @@ def write_effect_file(file: EffectFile, folder: Path | None = None) -> Path:
         raise EffectFileError(f"{path}: there is an effect {file.name}; choose another name or remove its file")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        path.write_text(file.model_dump_json(by_alias=True, indent=2) + "\n")
+        path.write_text(file.model_dump_json(by_alias=True, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise EffectFileError(f"{path}: cannot be written ({error.strerror})") from error
     return path

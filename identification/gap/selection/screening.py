@@ -54,7 +54,7 @@ def list_effect_models(
     names: Sequence[str] = COMMON_EFFECTS, size: DamperSize = LIBRARY_SIZE
 ) -> tuple[EffectModel, ...]:
     """Return every form of some effects, for a damper of a size."""
-    return tuple(EffectModel(name, form.name, size) for name in names for form in EFFECTS[name].forms)
+    return tuple(EffectModel(EFFECTS[name], form.name, size) for name in names for form in EFFECTS[name].forms)
 
 
 def screen(

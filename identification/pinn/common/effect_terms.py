@@ -20,6 +20,7 @@ from identification.fitting import COMMON_COUNT, COORDINATE_COUNT, Problem
 from identification.pinn.common.inputs import FieldSamples
 from identification.pinn.common.training_pieces import Batch, TrainingPiece
 from identification.simulate import (
+    COIL_ACTIONS,
     ActiveEffect,
     DamperMotion,
     Excitation,
@@ -32,8 +33,14 @@ from identification.simulate import (
     differentiate_parallel_force,
 )
 
-_UNSUPPORTED_ACTIONS: tuple[Action, ...] = ("displacement_backlash", "connection", "force_lag")
-"""Backlash and compliance, and a lag through which the network's force would have to pass as well."""
+_UNSUPPORTED_ACTIONS: tuple[Action, ...] = (
+    "displacement_backlash",
+    "connection",
+    "force_lag",
+    "channel_function",
+    "displacement_function",
+)
+"""Backlash and compliance, and channels through which the network's force or motion would have to pass as well."""
 _FACTOR_NAMES = ("F_factor", "c0_factor", "c1_factor")
 
 InputPartials = dict[str, Array]
@@ -140,7 +147,7 @@ class _PieceTerms:
         i = position.astype(np.int64)
         t = position - i
         inputs = self._half_step_inputs.resample(lambda table: (1.0 - t) * table[..., i] + t * table[..., i + 1])
-        if not self._model.select_forms("drive_delay", "field", "field_memory"):
+        if not self._model.select_forms(*COIL_ACTIONS):
             # No effect changes the field, so its closed form holds.
             inputs = inputs._replace(field=self._compute_field(b))
             inputs.partials["u"][self._advanced_columns] = inputs.field.du_ddelay
@@ -184,12 +191,11 @@ class _PieceTerms:
     ) -> tuple[Array, Array]:
         """Return the parallel force [N] (N,) in the force channel, and its partials (1 + P, N)."""
         model, excitation = self._model, self._source.piece.excitation
-        h = 1.0 / excitation.rate
-        over_motion, over_parameters = differentiate_parallel_force(model, motion, h)
+        over_motion, over_parameters = differentiate_parallel_force(model, excitation, motion)
         J = self._scatter_columns(motion_columns, over_motion)
         for k, row in over_parameters:
             J[1 + k] += row
-        force = compute_parallel_force(model, motion, h)
+        force = compute_parallel_force(model, excitation, motion)
         return apply_force_channel(model, excitation, motion, force, J.T, 1, [0, *self._delayed_columns]), J
 
     @cached_property

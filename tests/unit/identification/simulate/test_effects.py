@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.damper.effects import EFFECTS
-from identification.simulate import ActiveEffect, SimulationModel, simulate
+from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
 from identification.simulate.channel import compute_parallel_force
 from identification.simulate.motion import DamperMotion
 from tests.support.effects import FORMS, IDS, LABORATORY, MEDIUM, active, sine
@@ -79,6 +79,7 @@ def test_a_lip_keeps_its_force_through_the_noise_of_a_rest():
     noise = 3e-7 * np.random.default_rng(0).standard_normal(4000)
     x = np.concatenate([np.linspace(0.0, 1e-3, 1000), 1e-3 + noise])
     motion = DamperMotion(x, *np.zeros((2, len(x))), *np.zeros((3, 0, len(x))), ())
-    force = compute_parallel_force(seal, motion, 1e-3)[1000:]
+    stroke = Excitation(1e3, x, *np.zeros((3, len(x))))
+    force = compute_parallel_force(seal, stroke, motion)[1000:]
     assert force[-500:].mean() == pytest.approx(force[:500].mean(), rel=0.03)
     assert force.mean() > 5.0

@@ -8,7 +8,6 @@ import pytest
 from identification.damper import Quantity
 from identification.damper.effects import EFFECTS
 from identification.simulate import ActiveEffect, Excitation, SimulationModel
-from identification.simulate.channel import _apply_deadband
 from identification.simulate.curves import (
     apply_lag,
     differentiate_by_argument,
@@ -24,7 +23,9 @@ from identification.simulate.inputs import (
     trace_memory,
 )
 from identification.simulate.motion import compile_once, compute_damper_motion
-from identification.simulate.scaling import compute_scale_factors, compute_stored_energy
+from identification.simulate.scaling import compute_scale_factors
+from identification.simulate.stored_energy import compute_stored_energy
+from identification.simulate.variables import apply_deadband
 from tests.support.effects import LABORATORY, active, sine
 
 H, ETA, LAG = 1e-3, 80.0, 0.004
@@ -114,7 +115,7 @@ def test_a_memory_changes_with_the_field_only():
 
 
 def test_a_deadband_follows_only_what_leaves_it():
-    found = _apply_deadband(np.array([0.0, 5e-7, 3e-6, 2.5e-6, 5e-7, -4e-6]), 1e-6)
+    found = apply_deadband(np.array([0.0, 5e-7, 3e-6, 2.5e-6, 5e-7, -4e-6]), 1e-6)
     np.testing.assert_allclose(found, [0.0, 0.0, 2e-6, 2e-6, 1.5e-6, -3e-6], atol=1e-18)
 
 

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import pytest
 
-from identification.damper.effects import EFFECTS
 from identification.documents import EffectSet
 from identification.fitting import EffectModel
 from identification.gap.fits.candidate import NO_GAP_RATIO, Candidate
@@ -86,7 +85,7 @@ def test_alternatives_are_the_most_probable_other_sets():
 
 @pytest.mark.parametrize(("probabilities", "expected"), [((0.3, 0.4), 0.7), ((0.6, 0.41), 1.0)])
 def test_a_named_effect_has_its_probability_in_all_sets_and_an_interval(probabilities, expected):
-    models = (EffectModel("gas_spring", EFFECTS["gas_spring"].forms[0].name), EffectModel("moving_mass", "rigid"))
+    models = (EffectModel.from_name("gas_spring"), EffectModel.from_name("moving_mass", "rigid"))
     actives = [SimpleNamespace(values=m.form.starts[0]) for m in models]
     deviations = {m.name: dict.fromkeys((q.symbol for q in m.quantities), 0.5) for m in models}
     fit = SimpleNamespace(effects=models, active_effects=actives, deviations=deviations)

@@ -20,7 +20,7 @@ STEP = 1e-6
 SPRING = ActiveEffect(EFFECTS["gas_spring"], (150.0, 0.03))
 DELAY = ActiveEffect(EFFECTS["force_delay"], (3e-3,))
 UNSUPPORTED = {"clevis_backlash", "fixture_compliance", "force_filter"}
-SUPPORTED = [EffectModel(e.name, f.name) for e in EFFECTS.values() for f in e.forms if is_supported(f)]
+SUPPORTED = [EffectModel(e, f.name) for e in EFFECTS.values() for f in e.forms if is_supported(f)]
 COMBINATIONS = [
     tuple(EffectModel.from_name(name) for name in names)
     for names in (

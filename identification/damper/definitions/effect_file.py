@@ -45,7 +45,7 @@ class EffectParameter(FrozenModel):
 
     model_config = ConfigDict(allow_inf_nan=False)
 
-    value: float = Field(description="value at which a search starts, and with which the effect is played")
+    value: float = Field(description="usual value, at which a search starts")
     unit: Unit = Field(description="SI unit; {drive} stands for V or A")
     lo: float = Field(description="smallest value that a search tries")
     hi: float = Field(description="largest value that a search tries")

@@ -148,6 +148,7 @@ def test_a_logarithm_has_a_smallest_argument():
 def test_a_base_may_be_negative_if_the_exponent_is_whole():
     np.testing.assert_allclose(evaluate("x ** 3", x=X), X**3)
     np.testing.assert_allclose(evaluate("x ** 0", x=X), np.ones(6))
+    np.testing.assert_allclose(evaluate("x ** 1", x=X), X)
     np.testing.assert_allclose(evaluate("x ** -1", x=X[X != 0.0]), 1.0 / X[X != 0.0])
 
 

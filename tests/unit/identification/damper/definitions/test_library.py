@@ -133,6 +133,13 @@ def test_a_name_in_a_file_of_another_name_is_taken_too(folder, content, file):
     assert [entry.name for entry in folder.iterdir()] == ["a.json"]
 
 
+def test_a_file_that_defines_another_effect_is_kept_too(folder, content, file):
+    save(folder, "rising_friction.json", content | {"name": "other_friction"})
+    with pytest.raises(EffectFileError, match="there is an effect rising_friction"):
+        write_effect_file(file)
+    assert list(read_effect_files()) == ["other_friction"]
+
+
 def test_nothing_is_written_into_a_folder_with_a_file_that_is_not_valid(folder, content, file):
     save(folder, "a.json", content | {"name": "gas_spring"})
     with pytest.raises(EffectFileError, match=r"a\.json: the library has an effect gas_spring"):

@@ -21,6 +21,7 @@ from bench.log import MESSAGES, TOPIC_FAMILIES, make_message_schema
 from bench.methods import Envelope, Method
 from bench.service.application import create_app
 from identification.damper import COORDINATES, PARAMETERS, Quantity
+from identification.damper.definitions import STAGE_OF, VARIABLES_AT, EffectFile
 from identification.damper.effects import EFFECTS
 from identification.documents import (
     Delay,
@@ -43,6 +44,7 @@ FOLDER = Path(__file__).parent / "reference"
 DOCUMENTS: dict[str, type[BaseModel]] = {
     "bench": BenchConfig,
     "diagnosis": Diagnosis,
+    "effect": EffectFile,
     "envelope": Envelope,
     "fit": Fit,
     "forecast": Forecast,
@@ -158,6 +160,15 @@ def describe_effects() -> str:
     return "\n\n".join(parts)
 
 
+def describe_effect_places() -> str:
+    """Describe every place of an effect file with its stage and its variables."""
+    rows = (
+        (f"`{place}`", f"`{STAGE_OF[place]}`", ", ".join(f"`{variable}`" for variable in variables))
+        for place, variables in VARIABLES_AT.items()
+    )
+    return make_table(("place", "stage", "variables"), rows)
+
+
 def describe_messages() -> str:
     """Describe the fields of the messages that every log has."""
     parts = []
@@ -250,6 +261,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "fit": lambda: describe_fields(Fit),
     "prediction": lambda: describe_fields(Prediction),
     "diagnosis": lambda: describe_fields(Diagnosis),
+    "effect file": lambda: describe_fields(EffectFile),
+    "effect places": describe_effect_places,
     "estimate": lambda: describe_fields(Estimate),
     "delay": lambda: describe_fields(Delay),
     "former names": describe_former_names,

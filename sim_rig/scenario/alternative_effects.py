@@ -41,6 +41,8 @@ def check_alternative_effects(effects: Sequence[ActiveEffect]) -> None:
 
 
 def _check_effect(effect: ActiveEffect) -> None:
+    if effect.definition is not None:
+        raise ValueError(f"{effect.name} has a definition; list it among `effects`")
     form = FORMS.get(str(effect.form))
     if form is None or form.effect != effect.name:
         known = ", ".join(sorted(f"{f.effect}: {f.form}" for f in FORMS.values()))

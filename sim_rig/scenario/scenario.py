@@ -15,13 +15,11 @@ from identification.damper import (
     PARAMETER_SETS,
     PARAMETERS,
     Parameters,
-    Quantity,
     find_parameter_set,
     to_coordinates,
-    widen_bounds,
 )
-from identification.damper.effects import EFFECTS, rename_form, rename_parameters
 from sim_rig.errors import ScenarioError
+from sim_rig.scenario.active_effects import check_bounds, check_effects
 from sim_rig.scenario.alternative_effects import check_alternative_effects, rename_former_symbols
 from sim_rig.scenario.sections import (
     ActiveEffect,
@@ -50,7 +48,7 @@ class Scenario(FrozenModel):
     )
     drive_unit: Literal["V", "A"] = Field(default="V", description="unit of the drive")
     specimen: Specimen = Field(default=Specimen(), description="name plate")
-    effects: tuple[ActiveEffect, ...] = Field(default=(), description="active effects, in forms of the library")
+    effects: tuple[ActiveEffect, ...] = Field(default=(), description="active effects, of the library or defined")
     alternative_effects: tuple[ActiveEffect, ...] = Field(
         default=(),
         max_length=3,
@@ -87,20 +85,14 @@ class Scenario(FrozenModel):
         else:
             parameters = Parameters(**damper.model_dump())
             # A and n first: coordinates do not contain the gauge A, and cannot be computed with a wrong n.
-            _check_bounds([q for q in PARAMETERS if q.symbol in ("A", "n")], parameters._asdict())
-            _check_bounds(COORDINATES, to_coordinates(parameters)._asdict())
+            check_bounds([q for q in PARAMETERS if q.symbol in ("A", "n")], parameters._asdict())
+            check_bounds(COORDINATES, to_coordinates(parameters)._asdict())
         return damper
 
     @field_validator("effects")
     @classmethod
     def _check_effects(cls, effects: tuple[ActiveEffect, ...]) -> tuple[ActiveEffect, ...]:
-        effects = tuple(_use_present_names(effect) for effect in effects)
-        for effect in effects:
-            _check_effect(effect)
-        names = [effect.name for effect in effects]
-        if len(set(names)) < len(names):
-            raise ValueError(f"an effect is listed twice among {_join_names(names)}; merge its entries")
-        return effects
+        return check_effects(effects)
 
     @field_validator("alternative_effects")
     @classmethod
@@ -161,38 +153,6 @@ def list_shipped_scenarios() -> list[str]:
     """Return the names of the scenarios that come with the rig."""
     folder = files("sim_rig.scenario") / "library"
     return sorted(f.name.removesuffix(".json") for f in folder.iterdir() if f.name.endswith(".json"))
-
-
-def _use_present_names(effect: ActiveEffect) -> ActiveEffect:
-    """Return the effect with the present names of its form and parameters, as the library has them."""
-    form = None if effect.form is None else rename_form(effect.name, effect.form)
-    parameters = rename_parameters(effect.name, effect.parameters)
-    return effect.model_copy(update={"form": form, "parameters": parameters})
-
-
-def _check_effect(effect: ActiveEffect) -> None:
-    known = EFFECTS.get(effect.name)
-    if known is None:
-        raise ValueError(f"no effect {effect.name!r}; there are {_join_names(EFFECTS)}")
-    forms = [form.name for form in known.forms]
-    if effect.form is not None and effect.form not in forms:
-        raise ValueError(f"{effect.name} has the form {_join_names(forms)}, not {effect.form}")
-    quantities = tuple(widen_bounds(q) for q in known.find_form(effect.form).parameters)
-    symbols = {quantity.symbol for quantity in quantities}
-    if effect.parameters.keys() != symbols:
-        raise ValueError(f"{effect.name} takes {_join_names(symbols)}, not {_join_names(effect.parameters)}")
-    _check_bounds(quantities, effect.parameters, f"{effect.name}.")
-
-
-def _check_bounds(quantities: Iterable[Quantity], values: dict[str, float], prefix: str = "") -> None:
-    for q in quantities:
-        # Coordinates are computed, so rounding may put one that is at its bound slightly beyond it.
-        value, rounding = values[q.symbol], 1e-9 * (abs(values[q.symbol]) + q.scale)
-        if not q.low - rounding <= value <= q.high + rounding:
-            unit = "" if q.unit == "1" else f" {q.format_unit('drive')}"
-            raise ValueError(
-                f"{prefix}{q.symbol} ({q.meaning}) is {value:g}{unit}, outside {q.low:g} to {q.high:g}{unit}"
-            )
 
 
 def _join_names(names: Iterable[str]) -> str:

@@ -4,10 +4,13 @@ SI units throughout. The defaults describe a decent laboratory with realistic se
 only what differs. A sensor that is named replaces the default one completely. Its omitted fields are ideal.
 """
 
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 from pydantic import AliasChoices, BeforeValidator, Field, NonNegativeFloat, PositiveFloat, model_validator
 
+from identification.damper.definitions import EffectFile, make_effect
+from identification.damper.effects import EFFECTS, Effect
 from sim_rig.validation import FrozenModel
 
 ChannelName = Literal[
@@ -184,11 +187,27 @@ class ClockDeviations(FrozenModel):
 
 
 class ActiveEffect(FrozenModel):
-    """An effect that this scenario switches on, in a form of the library and with its hidden values."""
+    """An effect that this scenario switches on, with its hidden values.
 
-    name: str = Field(description="name in the library of effects")
+    It is one of the library, or one that its definition describes.
+    """
+
+    name: str = Field(description="name in the library of effects, or that of the definition")
     form: str | None = Field(default=None, description="functional form; the effect's first form if null")
-    parameters: dict[str, float] = Field(description="[SI] values by the library's parameter names")
+    parameters: dict[str, float] = Field(description="[SI] values by the parameter names of the effect")
+    definition: EffectFile | None = Field(
+        default=None,
+        description="definition of an effect that the library does not have; the user's effect file if null",
+    )
+
+    @cached_property
+    def effect(self) -> Effect:
+        """The effect of the definition, or else that of the library.
+
+        Raises:
+            KeyError: there is no definition, and the library has no effect of this name.
+        """
+        return EFFECTS[self.name] if self.definition is None else make_effect(self.definition)
 
 
 _FORMER_FAULT_KINDS = {"cut": "missing"}

@@ -102,6 +102,7 @@ def _integrate(
     exponents: Array,
     forces: Array,
     positions: Array,
+    velocities: Array,
     outputs: Array,
     damper: Array,
     states: Array,
@@ -118,8 +119,8 @@ def _integrate(
         k, p: as in ``compute_rates``.
         first, second, third: functions of the forms.
         places, values, exponents: (3,), (3, MAX_PARAMETERS) and (3, 3) of the forms.
-        forces, positions: (M substeps,) filled with the force after the force channel [N] and the actuator's
-            position [m], at the start of each substep.
+        forces, positions, velocities: (M substeps,) filled with the force after the force channel [N] and the
+            actuator's position [m] and velocity [m/s], at the start of each substep.
         outputs: (M,) filled with the amplifier's output half way through each sample.
         damper: (M, 2) filled with displacement [m] and velocity [m/s] of the damper at each sample.
         states: (M, STATE_COUNT) filled with the states at each sample.
@@ -140,6 +141,7 @@ def _integrate(
                 s[OUTPUT] = drive[i]
             force, slip = compute_rates(s, instant, start, drive[i], now, forms, k, p, rate)
             forces[i * substeps + j], positions[i * substeps + j] = force, s[POSITION]
+            velocities[i * substeps + j] = s[VELOCITY]
             if j == 0:
                 damper[i, 0], damper[i, 1] = now[X], rate[DAMPER]
             if j == substeps // 2:
@@ -167,6 +169,7 @@ integrate = compile_function(
             _INDEX_VECTOR,
             _MATRIX,
             _MATRIX,
+            _VECTOR,
             _VECTOR,
             _VECTOR,
             _VECTOR,

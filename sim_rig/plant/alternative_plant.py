@@ -54,13 +54,13 @@ class AlternativePlant(Plant):
     def simulate(self, dt: float, command: Array, drive: Array) -> TrueSignals:
         """Advance through M samples of dt [s], as `Plant.simulate` does."""
         count, substeps = len(drive), count_substeps(dt)
-        force, position, output = np.empty(count * substeps), np.empty(count * substeps), np.empty(count)
+        (force, position, velocity), output = np.empty((3, count * substeps)), np.empty(count)
         damper, record = np.empty((count, 2)), np.empty((count, states.STATE_COUNT))
         done = integrator.integrate(
             self._states, self._inputs, self._time, np.ascontiguousarray(command, float),
             np.ascontiguousarray(drive, float), dt / substeps, substeps, self._constants, self._law,
             *self._forms.functions, self._forms.places, self._forms.values, self._forms.exponents,
-            force, position, output, damper, record,
+            force, position, velocity, output, damper, record,
         )  # fmt: skip
         if done < count:
             raise PlantError(
@@ -71,6 +71,7 @@ class AlternativePlant(Plant):
         self._time += count * dt
         return TrueSignals(
             position=position,
+            velocity=velocity,
             force=force,
             output=output,
             damper_displacement=damper[:, 0],

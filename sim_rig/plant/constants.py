@@ -5,8 +5,10 @@ import math
 import numpy as np
 
 from sim_rig.plant import states
+from sim_rig.plant.defined_functions import compute_steepest_slope
 from sim_rig.plant.effects import EffectFunctions
 from sim_rig.plant.jit import Array, QuaternaryFunction
+from sim_rig.plant.stack_machine import DefinedFunctions
 from sim_rig.scenario import Scenario
 
 _MIN_LAG = 2e-5
@@ -54,14 +56,18 @@ def compute_rig_rate(scenario: Scenario, law: Array, parallel_slope: float = 0.0
     )
 
 
-def make_plant_constants(scenario: Scenario, law: Array, effects: EffectFunctions) -> Array:
-    """Return all constants, (CONSTANT_COUNT,): those of the rig and those of its effects."""
+def make_plant_constants(
+    scenario: Scenario, law: Array, effects: EffectFunctions, defined: DefinedFunctions | None
+) -> Array:
+    """Return all constants, (CONSTANT_COUNT,): those of the rig and those of its effects, defined or not."""
     k = np.zeros(states.CONSTANT_COUNT)
     k[: states.Z_SATURATION + 1] = make_rig_constants(scenario, law)
     k[states.DEAD_TIME], lag, k[states.LAGGED_FRACTION], k[states.LAG_COUNT] = effects.get_coil_lag()
     k[states.SECOND_LAG_RATE] = 1.0 / lag if lag > _MIN_LAG else 0.0
     k[states.BRISTLE_RATE] = effects.get_bristle_rate()
-    k[states.BASE_RATE] = compute_rig_rate(scenario, law, _compute_max_slope(effects.make_parallel_force()))
+    slope = _compute_max_slope(effects.make_parallel_force())
+    slope += compute_steepest_slope(defined) if defined is not None else 0.0
+    k[states.BASE_RATE] = compute_rig_rate(scenario, law, slope)
     k[states.HEAT_EXCHANGE_RATE] = effects.get_exchange_rate()
     k[states.BASE_RATE] += k[states.SECOND_LAG_RATE] + k[states.HEAT_EXCHANGE_RATE]
     k[states.BASE_RATE] += _MAX_LIP_SPEED * k[states.BRISTLE_RATE]

@@ -1,12 +1,12 @@
-"""Time derivatives of the states of the plant: the damper's law, its effects and the servo.
+"""Time derivatives of the states of the plant: the damper's law with its effects, on the actuator.
 
-The law is that of ``identification.damper.law``, compiled. The actuator is a servo: a first-order lag of the
-command, followed by a second-order position loop that the force on the rod deflects by force / stiffness. It is
-integrated in the same steps as the specimen, so that displacement, velocity and acceleration are continuous
-between command samples.
+The law is that of ``identification.damper.law``, compiled. The actuator is integrated in the same steps as the
+specimen, so that displacement, velocity and acceleration are continuous between command samples.
 """
 
 from identification.damper.effects import connection
+from sim_rig.plant.effect_variables import VELOCITY as DAMPER_VELOCITY
+from sim_rig.plant.effect_variables import improve_acceleration, set_variables
 from sim_rig.plant.jit import (
     Array,
     BinaryFunction,
@@ -16,24 +16,24 @@ from sim_rig.plant.jit import (
     compile_inline,
 )
 from sim_rig.plant.law import (
-    compute_field_rate,
     compute_force,
     compute_hysteresis_rate,
     compute_inner_velocity,
     evaluate_coefficient,
 )
+from sim_rig.plant.rig_rates import compute_actuator_rates, compute_coil_rates, compute_heat_rates
+from sim_rig.plant.stack_machine import (
+    FIELD_PLACE,
+    FORCE_PLACE,
+    GAIN_PLACE,
+    MOUNTING_PLACE,
+    DefinedFunctions,
+    evaluate,
+)
 from sim_rig.plant.states import (
-    ACTUATOR_COMPLIANCE,
-    AMBIENT,
-    AMPLIFIER_RATE,
     BACKLASH,
     BRISTLE_RATE,
-    COIL_HEAT,
-    COMMAND,
-    COMMAND_LAG,
-    COOLING_RATE,
     DAMPER,
-    DEAD_TIME,
     ENERGY,
     FIELD,
     FILM_DAMPING,
@@ -41,22 +41,11 @@ from sim_rig.plant.states import (
     GAP,
     GAS_POSITION,
     HARDENING,
-    HEAT_CAPACITY,
     HEAT_EXCHANGE_RATE,
-    HEAT_LOSS,
     IN_GAP_STIFFNESS,
-    LAG_COUNT,
-    LAGGED,
-    LAGGED_FRACTION,
-    LAGGED_TWICE,
     LIP_BEND,
     MASS,
-    OUTPUT,
     POSITION,
-    SECOND_LAG_RATE,
-    SERVO_BANDWIDTH,
-    SERVO_DAMPING,
-    TEMPERATURE,
     VELOCITY,
     Y,
     Z,
@@ -90,16 +79,23 @@ def _compute_damper_force(
     p: Array,
     parallel_force: QuaternaryFunction,
     scale_factors: ScaleFunction,
+    defined: DefinedFunctions | None,
 ) -> tuple[float, float]:
     """Return the damper's force [N] and y' [m/s] at displacement x [m], velocity v [m/s] and field u [V or A]."""
     a, b, c = scale_factors(x, v, s[ENERGY])
+    force = parallel_force(x, v, s[LIP_BEND], s[GAS_POSITION])
+    if defined is not None:
+        defined.variables[DAMPER_VELOCITY] = v
+        gain = evaluate(defined, GAIN_PLACE)
+        a, b, c = gain * a, gain * b, gain * c
+        force += evaluate(defined, FORCE_PLACE)
     alpha, c0, c1 = (
         a * evaluate_coefficient(p[0], p[1], u),
         b * evaluate_coefficient(p[6], p[7], u),
         c * evaluate_coefficient(p[8], p[9], u),
     )
     y_rate = compute_inner_velocity(x, v, s[Y], s[Z], alpha, c0, c1, p[10])
-    return compute_force(y_rate, x, c1, p[11], p[13]) + parallel_force(x, v, s[LIP_BEND], s[GAS_POSITION]), y_rate
+    return compute_force(y_rate, x, c1, p[11], p[13]) + force, y_rate
 
 
 @compile_inline
@@ -112,9 +108,14 @@ def _compute_imbalance(
     p: Array,
     parallel_force: QuaternaryFunction,
     scale_factors: ScaleFunction,
+    defined: DefinedFunctions | None,
 ) -> float:
     """Return the force [N] of damper and film at a velocity [m/s], minus the load of the fixture."""
-    return _compute_damper_force(s, s[DAMPER], v, u, p, parallel_force, scale_factors)[0] + film_damping * v - load
+    return (
+        _compute_damper_force(s, s[DAMPER], v, u, p, parallel_force, scale_factors, defined)[0]
+        + film_damping * v
+        - load
+    )
 
 
 @compile_function
@@ -127,26 +128,27 @@ def _solve_velocity(
     p: Array,
     parallel_force: QuaternaryFunction,
     scale_factors: ScaleFunction,
+    defined: DefinedFunctions | None,
 ) -> float:
     """Return the velocity [m/s] at which damper and film balance the load [N], by bracketed secants (Illinois)."""
     width = 1e-3
     low, high = guess - width, guess + width
-    below = _compute_imbalance(low, s, load, film_damping, u, p, parallel_force, scale_factors)
-    above = _compute_imbalance(high, s, load, film_damping, u, p, parallel_force, scale_factors)
+    below = _compute_imbalance(low, s, load, film_damping, u, p, parallel_force, scale_factors, defined)
+    above = _compute_imbalance(high, s, load, film_damping, u, p, parallel_force, scale_factors, defined)
     for _ in range(60):
         if below <= 0.0 <= above:
             break
         width *= 2.0
         if below > 0.0:
             high, above, low = low, below, low - width
-            below = _compute_imbalance(low, s, load, film_damping, u, p, parallel_force, scale_factors)
+            below = _compute_imbalance(low, s, load, film_damping, u, p, parallel_force, scale_factors, defined)
         else:
             low, below, high = high, above, high + width
-            above = _compute_imbalance(high, s, load, film_damping, u, p, parallel_force, scale_factors)
+            above = _compute_imbalance(high, s, load, film_damping, u, p, parallel_force, scale_factors, defined)
     side = 0
     for _ in range(60):
         v = high - above * (high - low) / (above - below) if above != below else 0.5 * (low + high)
-        imbalance = _compute_imbalance(v, s, load, film_damping, u, p, parallel_force, scale_factors)
+        imbalance = _compute_imbalance(v, s, load, film_damping, u, p, parallel_force, scale_factors, defined)
         if high - low < _VELOCITY_TOLERANCE or abs(imbalance) < 1e-9:
             break
         # An end that stayed twice is weighted by half, so that the bracket closes from both sides (Illinois).
@@ -162,34 +164,28 @@ def _solve_velocity(
 
 
 @compile_function
-def _compute_actuator_rates(s: Array, command: float, force: float, k: Array, rate: Array) -> None:
-    """Write the rates of the actuator under the force [N] of the damper and the mass at the rod."""
-    rate[COMMAND] = k[COMMAND_LAG] * (command - s[COMMAND])
-    rate[POSITION] = s[VELOCITY]
-    error = s[COMMAND] - s[POSITION] - k[ACTUATOR_COMPLIANCE] * force
-    unloaded = k[SERVO_BANDWIDTH] * (k[SERVO_BANDWIDTH] * error - 2.0 * k[SERVO_DAMPING] * s[VELOCITY])
-    # The force of the mass also deflects the rod and is this rate times the mass: solved for the rate.
-    rate[VELOCITY] = unloaded / (1.0 + k[SERVO_BANDWIDTH] * k[SERVO_BANDWIDTH] * k[ACTUATOR_COMPLIANCE] * k[MASS])
+def _balance_mounting(
+    s: Array,
+    driven_x: float,
+    driven_v: float,
+    u: float,
+    k: Array,
+    p: Array,
+    parallel_force: QuaternaryFunction,
+    scale_factors: ScaleFunction,
+    defined: DefinedFunctions | None,
+) -> tuple[float, float, float]:
+    """Return force [N], velocity [m/s] and y' [m/s] of the damper behind a compliant fixture.
 
-
-@compile_function
-def _compute_coil_rates(s: Array, drive: float, delayed_output: float, eta: float, k: Array, rate: Array) -> None:
-    """Write the rates from the amplifier's output through the second lag to the field."""
-    rate[OUTPUT] = k[AMPLIFIER_RATE] * (drive - s[OUTPUT])
-    source = delayed_output if k[DEAD_TIME] > 0.0 else s[OUTPUT]
-    rate[LAGGED] = k[SECOND_LAG_RATE] * (source - s[LAGGED])
-    rate[LAGGED_TWICE] = k[SECOND_LAG_RATE] * (s[LAGGED] - s[LAGGED_TWICE])
-    fraction = k[LAGGED_FRACTION] if k[SECOND_LAG_RATE] > 0.0 else 0.0
-    lagged = s[LAGGED_TWICE] if k[LAG_COUNT] > 1.0 else s[LAGGED]
-    rate[FIELD] = compute_field_rate(s[FIELD], source + fraction * (lagged - source), eta)
-
-
-@compile_function
-def _compute_heat_rates(s: Array, power: float, k: Array, rate: Array) -> None:
-    """Write the rates of energy and temperature of a damper that dissipates a power [W]."""
-    rate[ENERGY] = power - k[COOLING_RATE] * s[ENERGY]
-    heat = power + k[COIL_HEAT] * s[OUTPUT] * s[OUTPUT]
-    rate[TEMPERATURE] = (heat - k[HEAT_LOSS] * (s[TEMPERATURE] - k[AMBIENT])) / k[HEAT_CAPACITY]
+    ``driven_x`` [m] and ``driven_v`` [m/s] are the motion at the fixture's other end.
+    """
+    load = compute_transmitted_force(
+        driven_x - s[DAMPER], k[FIXTURE_COMPLIANCE], k[GAP], k[HARDENING], k[IN_GAP_STIFFNESS]
+    )
+    load, film_damping = load + k[FILM_DAMPING] * driven_v, k[FILM_DAMPING]
+    v = _solve_velocity(s, load, film_damping, driven_v, u, p, parallel_force, scale_factors, defined)
+    y_rate = _compute_damper_force(s, s[DAMPER], v, u, p, parallel_force, scale_factors, defined)[1]
+    return load - film_damping * v, v, y_rate
 
 
 @compile_function
@@ -207,6 +203,8 @@ def compute_rates(
     field_map: BinaryFunction,
     scale_factors: ScaleFunction,
     rate: Array,
+    defined: DefinedFunctions | None = None,
+    time: float = 0.0,
 ) -> tuple[float, float, float, float]:
     """Write the rates of all states to ``rate``.
 
@@ -224,28 +222,37 @@ def compute_rates(
         field_map: field that the fluid sees over (field, remanence) [V or A].
         scale_factors: factors of alpha, c0 and c1 over displacement, velocity and energy.
         rate: (STATE_COUNT,) result.
+        defined: functions of defined effects; with None, their code is not compiled.
+        time: [s] since the start of the run, for defined effects.
 
     Returns:
         Force on the load cell [N], displacement [m], velocity [m/s] and slip velocity [m/s] of the damper.
     """
-    x, v = _compute_damper_motion(s[POSITION], s[VELOCITY], last_damper, k[BACKLASH], follower)
-    u = field_map(s[FIELD], remanence)
-    if k[FIXTURE_COMPLIANCE] > 0.0:
-        load = compute_transmitted_force(
-            x - s[DAMPER], k[FIXTURE_COMPLIANCE], k[GAP], k[HARDENING], k[IN_GAP_STIFFNESS]
-        )
-        x, load, film_damping = s[DAMPER], load + k[FILM_DAMPING] * v, k[FILM_DAMPING]
-        v = _solve_velocity(s, load, film_damping, v, u, p, parallel_force, scale_factors)
-        force, y_rate = _compute_damper_force(s, x, v, u, p, parallel_force, scale_factors)
-        force = load - film_damping * v
-    else:
-        force, y_rate = _compute_damper_force(s, x, v, u, p, parallel_force, scale_factors)
+    driven_x, driven_v = _compute_damper_motion(s[POSITION], s[VELOCITY], last_damper, k[BACKLASH], follower)
+    compliant = k[FIXTURE_COMPLIANCE] > 0.0
+    x, v, u = s[DAMPER] if compliant else driven_x, driven_v, field_map(s[FIELD], remanence)
+    passes, mounting_force = 1, 0.0
+    if defined is not None:
+        set_variables(defined, x, u, s[ENERGY], time)
+        u += evaluate(defined, FIELD_PLACE)
+        passes = defined.passes
+    for i in range(passes):
+        if compliant:
+            force, v, y_rate = _balance_mounting(
+                s, driven_x, driven_v, u, k, p, parallel_force, scale_factors, defined
+            )
+        else:
+            force, y_rate = _compute_damper_force(s, x, v, u, p, parallel_force, scale_factors, defined)
+        if defined is not None:
+            mounting_force = evaluate(defined, MOUNTING_PLACE)
+        compute_actuator_rates(s, command, force + mounting_force, k, rate)
+        if defined is not None:
+            improve_acceleration(defined, rate[VELOCITY], i == 0)
     slip = v - y_rate
     rate[Y], rate[DAMPER] = y_rate, v
     rate[Z] = compute_hysteresis_rate(slip, s[Z], p[5], p[2], p[3], p[12])
     rate[LIP_BEND] = k[BRISTLE_RATE] * (v - abs(v) * s[LIP_BEND])
     rate[GAS_POSITION] = k[HEAT_EXCHANGE_RATE] * (x - s[GAS_POSITION])
-    _compute_actuator_rates(s, command, force, k, rate)
-    _compute_coil_rates(s, drive, delayed_output, p[4], k, rate)
-    _compute_heat_rates(s, abs(force * v), k, rate)
-    return force + k[MASS] * rate[VELOCITY], x, v, slip
+    compute_coil_rates(s, drive, delayed_output, p[4], k, defined, rate)
+    compute_heat_rates(s, abs(force * v), k, rate)
+    return force + mounting_force + k[MASS] * rate[VELOCITY], x, v, slip

@@ -1,6 +1,6 @@
 """Active effects of a scenario as compiled functions and constants of the plant, by the action of their forms."""
 
-from identification.damper.effects import EFFECTS, Action, Form
+from identification.damper.effects import Action, Form
 from sim_rig.plant.jit import (
     BinaryFunction,
     QuaternaryFunction,
@@ -30,7 +30,7 @@ class EffectFunctions:
         self._forms = [
             (form, tuple(effect.parameters[q.symbol] for q in form.parameters))
             for effect in scenario.effects
-            for form in (EFFECTS[effect.name].find_form(effect.form),)
+            for form in (effect.effect.find_form(effect.form),)
         ]
 
     def select(self, *actions: Action) -> list[tuple[Form, ParameterValues]]:

@@ -6,13 +6,15 @@ hysteretic variable relaxes at about 2e4 1/s, and the law has a corner where the
 Substeps near a reversal are therefore divided into more steps.
 """
 
+import functools
 import math
+from collections.abc import Callable
 
 import numba
 import numpy as np
 
-from identification.damper.effects import connection
-from sim_rig.plant.derivatives import LOOKAHEAD, compute_rates
+from sim_rig.plant.derivatives import compute_rates
+from sim_rig.plant.effect_variables import hold_drive, update_memory
 from sim_rig.plant.jit import (
     BINARY_TYPE,
     QUATERNARY_TYPE,
@@ -23,96 +25,27 @@ from sim_rig.plant.jit import (
     ScaleFunction,
     compile_function,
 )
-from sim_rig.plant.law import evaluate_coefficient
+from sim_rig.plant.stack_machine import DEFINED_TYPE, DRIVE_PLACE, DefinedFunctions, evaluate
 from sim_rig.plant.states import (
-    ACTUATOR_COMPLIANCE,
-    AMPLIFIER_RATE,
-    BACKLASH,
-    BASE_RATE,
+    COOLING_RATE,
     DAMPER,
     DEAD_TIME,
+    ENERGY,
     FIELD,
     FIELD_MEMORY,
     FIXTURE_COMPLIANCE,
-    HARDENING,
     OUTPUT,
     POSITION,
-    SERVO_BANDWIDTH,
     STATE_COUNT,
     VELOCITY,
-    Z_SATURATION,
     Z,
 )
+from sim_rig.plant.step_counts import count_steps
 
-STABILITY_LIMIT = 0.8
-"""Limit on the product of rate and step [1]; the method is stable up to 2.78."""
-MAX_Z_STEP = 0.015
-"""Limit on the change of z in one step, relative to its saturation [1]."""
-CORNER_STEPS = 24.0
-"""Least number of steps in a substep that may contain a reversal."""
-CONTACT_STEPS = 96.0
-"""Least number of steps in a substep in which contact in the mounting begins or ends: the velocity jumps."""
 MAX_STEPS = 2e5
 """Threshold on the steps of a substep: above it, the motion counts as divergent."""
-_MIN_CORNER_MOVE = 1e-7
-"""Threshold on the change of z relative to its saturation [1]: below it, a corner gets no further steps."""
 _OUTPUT_TOLERANCE = 1e-7
 """Relative deviation from the drive [1] within which the amplifier's output is settled and needs no fine steps."""
-_COMPLIANT_STEPS = 8.0
-"""Least number of steps per substep with a compliant fixture: damper and actuator then differ in velocity."""
-
-compute_tangent_stiffness = compile_function(connection.compute_tangent_stiffness)
-
-
-@compile_function
-def _bound_rate(s: Array, slip: float, drive: float, k: Array, p: Array) -> float:
-    """Return an upper bound of the fastest rate [1/s] for a slip velocity of at most ``slip`` [m/s]."""
-    dashpots = abs(evaluate_coefficient(p[6] + p[8], p[7] + p[9], s[FIELD]))
-    tangent = 2.0 * abs(evaluate_coefficient(p[0], p[1], s[FIELD])) * p[5]
-    hysteresis = p[12] * slip * p[5] / k[Z_SATURATION]
-    inner = (tangent + abs(p[10])) / dashpots
-    servo = k[SERVO_BANDWIDTH] * math.sqrt(k[ACTUATOR_COMPLIANCE] * (tangent + abs(p[10]) + abs(p[11])))
-    settling = s[OUTPUT] != drive
-    if k[FIXTURE_COMPLIANCE] > 0.0:
-        c0, c1 = abs(evaluate_coefficient(p[6], p[7], s[FIELD])), abs(evaluate_coefficient(p[8], p[9], s[FIELD]))
-        stiff = compute_tangent_stiffness(s[POSITION] - s[DAMPER], k[FIXTURE_COMPLIANCE], 0.0, k[HARDENING], 0.0)
-        inner += (tangent + stiff) / c0 + stiff / c1
-    return float(hysteresis + inner + servo + k[BASE_RATE] + (k[AMPLIFIER_RATE] if settling else 0.0))
-
-
-@compile_function
-def count_steps(
-    s: Array,
-    rate: Array,
-    x: float,
-    slip: float,
-    drive: float,
-    h: float,
-    k: Array,
-    p: Array,
-    follower: BinaryFunction,
-) -> float:
-    """Return the steps that a substep of h [s] needs for stability, and for accuracy at reversals and contacts."""
-    turn = 2.0 * abs(rate[VELOCITY]) * h
-    fastest = abs(slip) + turn
-    steps = 1.0
-    if k[BACKLASH] != 0.0:
-        moves = follower(x, s[POSITION] + s[VELOCITY] * LOOKAHEAD) != x
-        moves_later = follower(x, s[POSITION] + s[VELOCITY] * h) != x
-        if moves != moves_later:  # contact in the clevis begins or ends within this substep
-            steps = CONTACT_STEPS
-            fastest += abs(s[VELOCITY])
-    if k[FIXTURE_COMPLIANCE] > 0.0:
-        steps = max(steps, _COMPLIANT_STEPS)
-    per_slip = p[5] * h / k[Z_SATURATION]
-    travel = abs(rate[Z]) * h / k[Z_SATURATION] + turn * per_slip
-    # After a reversal z returns at twice the rate until it has its new sign.
-    if slip * s[Z] < 0.0 or abs(slip) <= turn:
-        travel = max(travel, 2.0 * fastest * per_slip)
-    if abs(slip) <= turn and turn * per_slip > _MIN_CORNER_MOVE:
-        steps = max(steps, CORNER_STEPS)
-    stable = math.ceil(_bound_rate(s, fastest, drive, k, p) * h / STABILITY_LIMIT)
-    return float(max(steps, stable, math.ceil(travel / MAX_Z_STEP)))
 
 
 @compile_function
@@ -132,15 +65,17 @@ def _integrate_step(
     field_map: BinaryFunction,
     field_memory: BinaryFunction,
     scale_factors: ScaleFunction,
+    defined: DefinedFunctions | None,
+    time: float,
     work: Array,
 ) -> tuple[float, float]:
-    """Take one classical Runge-Kutta step of h [s] in place; the command is linear from start to end [m].
+    """Take one classical Runge-Kutta step of h [s] at a time [s]; the command is linear from start to end [m].
 
     Returns:
         Displacement of the damper [m] and remanence of the iron [V or A].
     """
     a, b, c, d, mid = work[0], work[1], work[2], work[3], work[4]
-    half, field = 0.5 * (start + end), s[FIELD]
+    half, field, energy = 0.5 * (start + end), s[FIELD], s[ENERGY]
     compute_rates(
         s,
         last_damper,
@@ -155,6 +90,8 @@ def _integrate_step(
         field_map,
         scale_factors,
         a,
+        defined,
+        time,
     )
     for j in range(STATE_COUNT):
         mid[j] = s[j] + 0.5 * h * a[j]
@@ -172,6 +109,8 @@ def _integrate_step(
         field_map,
         scale_factors,
         b,
+        defined,
+        time + 0.5 * h,
     )
     for j in range(STATE_COUNT):
         mid[j] = s[j] + 0.5 * h * b[j]
@@ -189,6 +128,8 @@ def _integrate_step(
         field_map,
         scale_factors,
         c,
+        defined,
+        time + 0.5 * h,
     )
     for j in range(STATE_COUNT):
         mid[j] = s[j] + h * c[j]
@@ -206,13 +147,20 @@ def _integrate_step(
         field_map,
         scale_factors,
         d,
+        defined,
+        time + h,
     )
     for j in range(STATE_COUNT):
         s[j] += h / 6.0 * (a[j] + 2.0 * (b[j] + c[j]) + d[j])
     # Once per step, from its end: stages are trial points that must not enter the memory of clevis and iron.
     if k[FIELD_MEMORY] != 0.0 and s[FIELD] != field:
         remanence = field_memory(remanence, s[FIELD] - field)
-    return float(follower(last_damper, s[POSITION])), remanence
+    last_damper = float(follower(last_damper, s[POSITION]))
+    if defined is not None:
+        x = s[DAMPER] if k[FIXTURE_COMPLIANCE] > 0.0 else last_damper
+        lost_energy = k[COOLING_RATE] * h * 0.5 * (energy + s[ENERGY])
+        update_memory(defined, x, field_map(s[FIELD], remanence), lost_energy, time + h)
+    return last_damper, remanence
 
 
 @compile_function
@@ -245,7 +193,9 @@ def _integrate(
     field_map: BinaryFunction,
     field_memory: BinaryFunction,
     scale_factors: ScaleFunction,
+    defined: DefinedFunctions | None,
     positions: Array,
+    velocities: Array,
     forces: Array,
     outputs: Array,
     damper: Array,
@@ -265,8 +215,9 @@ def _integrate(
         h: [s] one substep; ``substeps`` of them make a sample.
         k, p, follower, parallel_force, field_map, scale_factors: as in ``compute_rates``.
         field_memory: remanence over (last remanence, change of the field).
-        positions, forces: (M substeps,) filled with actuator position [m] and force on the load cell [N] at the
-            start of each substep.
+        defined: functions of defined effects, with their memory; None without such effects.
+        positions, velocities, forces: (M substeps,) filled with position [m] and velocity [m/s] of the actuator
+            and force on the load cell [N], at the start of each substep.
         outputs: (M,) filled with the amplifier's output half way through each sample.
         damper: (M, 2) filled with displacement [m] and velocity [m/s] of the damper at each sample.
         states: (M, STATE_COUNT) filled with the states at each sample.
@@ -283,7 +234,12 @@ def _integrate(
             if abs(drive[i] - s[OUTPUT]) < _OUTPUT_TOLERANCE * (abs(drive[i]) + 1e-3):
                 s[OUTPUT] = drive[i]
             substep = first_substep + i * substeps + j
+            time = substep * h
             output_history[substep % len(output_history)] = s[OUTPUT]
+            if defined is not None:
+                # Before the new drive, which the output has not followed yet.
+                output_history[substep % len(output_history)] += evaluate(defined, DRIVE_PLACE)
+                hold_drive(defined, drive[i])
             delayed_output = _interpolate_output(output_history, substep, k[DEAD_TIME] / h)
             force, x, v, slip = compute_rates(
                 s,
@@ -299,8 +255,11 @@ def _integrate(
                 field_map,
                 scale_factors,
                 rate,
+                defined,
+                time,
             )
-            positions[i * substeps + j], forces[i * substeps + j] = s[POSITION], force
+            positions[i * substeps + j], velocities[i * substeps + j] = s[POSITION], s[VELOCITY]
+            forces[i * substeps + j] = force
             if j == 0:
                 damper[i, 0], damper[i, 1] = x, v
             if j == substeps // 2:
@@ -313,26 +272,27 @@ def _integrate(
                 step_end = start + (end - start) * (step + 1) / steps
                 last_damper, remanence = _integrate_step(
                     s, last_damper, remanence, step_start, step_end, drive[i], delayed_output, h / steps, k, p,
-                    follower, parallel_force, field_map, field_memory, scale_factors, work,
+                    follower, parallel_force, field_map, field_memory, scale_factors,
+                    defined, time + h * step / steps, work,
                 )  # fmt: skip
     return last_damper, remanence, len(drive)
 
 
 _VECTOR, _MATRIX, _SCALAR = numba.float64[::1], numba.float64[:, ::1], numba.float64
-_SIGNATURE = (
+_INPUTS = (
     *(_VECTOR, _SCALAR, _SCALAR, _VECTOR, numba.int64, _VECTOR, _VECTOR, _SCALAR, numba.int64, _VECTOR, _VECTOR),
-    *(
-        BINARY_TYPE,
-        QUATERNARY_TYPE,
-        BINARY_TYPE,
-        BINARY_TYPE,
-        SCALE_TYPE,
-        _VECTOR,
-        _VECTOR,
-        _VECTOR,
-        _MATRIX,
-        _MATRIX,
-    ),
+    *(BINARY_TYPE, QUATERNARY_TYPE, BINARY_TYPE, BINARY_TYPE, SCALE_TYPE),
 )
-integrate = compile_function(_integrate, _SIGNATURE)
-"""`_integrate`, compiled at the first import, once for all kinds of effects."""
+_RESULTS = (_VECTOR, _VECTOR, _VECTOR, _VECTOR, _MATRIX, _MATRIX)
+integrate = compile_function(_integrate, (*_INPUTS, numba.types.none, *_RESULTS))
+"""`_integrate`, compiled at the first import, once for all kinds of effects of the library."""
+
+
+def choose_integrator(defined: DefinedFunctions | None) -> Callable[..., tuple[float, float, int]]:
+    """Return the compiled `_integrate`: without defined effects, it contains none of their code."""
+    return integrate if defined is None else _compile_with_defined_effects()
+
+
+@functools.cache
+def _compile_with_defined_effects() -> Callable[..., tuple[float, float, int]]:
+    return compile_function(_integrate, (*_INPUTS, DEFINED_TYPE, *_RESULTS))

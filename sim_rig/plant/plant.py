@@ -15,8 +15,11 @@ from identification.damper.effects import compute_elongation
 from sim_rig.errors import PlantError
 from sim_rig.plant import integrator, states
 from sim_rig.plant.constants import make_plant_constants
+from sim_rig.plant.defined_functions import make_defined_functions
+from sim_rig.plant.effect_variables import start_variables
 from sim_rig.plant.effects import EffectFunctions
 from sim_rig.plant.jit import Array
+from sim_rig.plant.stack_machine import DRIVE_PLACE, FORCE_PLACE, MOUNTING_PLACE, evaluate
 from sim_rig.scenario import Scenario
 
 _MAX_SUBSTEP = 1.25e-4
@@ -30,6 +33,8 @@ class TrueSignals(NamedTuple):
 
     position: Array
     """(M B,) of the actuator [m], at the start of each substep."""
+    velocity: Array
+    """(M B,) of the actuator [m/s], at the start of each substep."""
     force: Array
     """(M B,) on the load cell [N], at the start of each substep."""
     output: Array
@@ -65,13 +70,16 @@ class Plant:
         self._parallel_force, self._follower = effects.make_parallel_force(), effects.make_follower()
         self._scale_factors = effects.make_scale_factors()
         self._field_map, self._field_memory = effects.make_field_map(), effects.make_field_memory()
-        self._constants = make_plant_constants(scenario, self._law, effects)
+        self._defined = make_defined_functions(effects)
+        # Here and not at the first sample, because the first compilation takes seconds.
+        self._integrate = integrator.choose_integrator(self._defined)
+        self._constants = make_plant_constants(scenario, self._law, effects, self._defined)
         self._command = displacement
         self._states, self._damper_position = self._find_equilibrium(displacement, drive)
         self._remanence, self._substeps, self._samples = 0.0, 0, 0
         # The substep is not known yet, so the memory is long enough for the finest.
         dead_substeps = self._constants[states.DEAD_TIME] / _MIN_SUBSTEP
-        self._output_history = np.full(math.ceil(dead_substeps) + 3, float(drive))
+        self._output_history = np.full(math.ceil(dead_substeps) + 3, self._states[states.FIELD])
 
     def advance(self, dt: float, displacement: float, drive: float) -> TrueSignals:
         """Advance by dt [s]: the command goes linearly to ``displacement`` [m], the drive [V or A] is held.
@@ -93,14 +101,14 @@ class Plant:
             PlantError: the motion is not finite.
         """
         count, substeps = len(drive), count_substeps(dt)
-        position, force, output = np.empty(count * substeps), np.empty(count * substeps), np.empty(count)
+        (position, velocity, force), output = np.empty((3, count * substeps)), np.empty(count)
         damper, record = np.empty((count, 2)), np.empty((count, states.STATE_COUNT))
-        self._damper_position, self._remanence, done = integrator.integrate(
+        self._damper_position, self._remanence, done = self._integrate(
             self._states, self._damper_position, self._remanence, self._output_history, self._substeps,
             np.ascontiguousarray(command, float), np.ascontiguousarray(drive, float),
             dt / substeps, substeps, self._constants, self._law,
             self._follower, self._parallel_force, self._field_map, self._field_memory, self._scale_factors,
-            position, force, output, damper, record,
+            self._defined, position, velocity, force, output, damper, record,
         )  # fmt: skip
         self._substeps += count * substeps
         if done < count:
@@ -111,6 +119,7 @@ class Plant:
         self._command, self._samples = float(command[-1]), self._samples + count
         return TrueSignals(
             position,
+            velocity,
             force,
             output,
             damper[:, 0],
@@ -123,12 +132,11 @@ class Plant:
 
     def _find_equilibrium(self, displacement: float, drive: float) -> tuple[Array, float]:
         """Return the states at rest under the load of the resting damper, and its displacement [m]."""
-        stiffness, rest = self._law[11], self._law[13]
         position = displacement
         # The droop changes the load only slightly: each iteration reduces the error by a factor above one hundred.
         for _ in range(3):
-            load = stiffness * (position - rest) + self._parallel_force(position, 0.0, 0.0, position)
-            position = displacement - self._constants[states.ACTUATOR_COMPLIANCE] * load
+            load, mounting_force = self._compute_resting_forces(position, drive)
+            position = displacement - self._constants[states.ACTUATOR_COMPLIANCE] * (load + mounting_force)
         if not math.isfinite(position):
             raise PlantError(f"the specimen has no finite force at rest at {displacement:.4g} m")
         mounting = self._constants[
@@ -138,9 +146,27 @@ class Plant:
         state = np.zeros(states.STATE_COUNT)
         state[[states.COMMAND, states.POSITION, states.Y]] = displacement, position, damper
         state[[states.DAMPER, states.GAS_POSITION]] = damper
-        state[[states.FIELD, states.OUTPUT, states.LAGGED, states.LAGGED_TWICE]] = drive
+        field = self._start_defined_effects(damper, drive)
+        state[[states.FIELD, states.LAGGED, states.LAGGED_TWICE, states.OUTPUT]] = field, field, field, drive
         state[states.TEMPERATURE] = self._constants[states.AMBIENT]
         return state, position
+
+    def _compute_resting_forces(self, position: float, drive: float) -> tuple[float, float]:
+        """Return the forces of damper and defined effects in the mounting [N], at rest at a position [m]."""
+        force = self._law[11] * (position - self._law[13]) + self._parallel_force(position, 0.0, 0.0, position)
+        if self._defined is None:
+            return force, 0.0
+        start_variables(self._defined, position, drive, drive)
+        return force + evaluate(self._defined, FORCE_PLACE), evaluate(self._defined, MOUNTING_PLACE)
+
+    def _start_defined_effects(self, damper: float, drive: float) -> float:
+        """Start the memory of defined effects at rest; return the coil's settled field [V or A]."""
+        if self._defined is None:
+            return drive
+        start_variables(self._defined, damper, drive, drive)
+        field = drive + evaluate(self._defined, DRIVE_PLACE)
+        start_variables(self._defined, damper, drive, self._field_map(field, 0.0))
+        return field
 
 
 def count_substeps(dt: float) -> int:

@@ -91,8 +91,8 @@ def compute_true_values(scenario: Scenario, truth: TrueSignals, start: float, st
     current_driven = scenario.drive_unit == "A"
     effects = EffectFunctions(scenario)
     return {
-        "displacement": _apply_displacement_map(effects, apply_displacement_channel(scenario, truth.position)),
-        "force": truth.force + _compute_added_force(effects, truth, start, step),
+        "displacement": _apply_displacement_effects(effects, scenario, truth, start, step),
+        "force": _apply_force_effects(effects, truth, start, step),
         "coil_drive": drive,
         "actuator_position": truth.position,
         "coil_current": drive if current_driven else drive / resistance,
@@ -101,20 +101,38 @@ def compute_true_values(scenario: Scenario, truth: TrueSignals, start: float, st
     }
 
 
-def _apply_displacement_map(effects: EffectFunctions, position: Array) -> Array:
+def _apply_displacement_effects(
+    effects: EffectFunctions, scenario: Scenario, truth: TrueSignals, start: float, step: float
+) -> Array:
     """Return the actuator's position [m] with the errors that the displacement channel adds."""
+    position = apply_displacement_channel(scenario, truth.position)
     maps = effects.select("displacement_map")
-    return np.asarray(position + sum(form.function(position, *values) for form, values in maps))
+    position = position + sum(form.function(position, *values) for form, values in maps)
+    for form, values in effects.select("displacement_function"):
+        time = _compute_substep_times(truth, start, step)
+        true = {"displacement": truth.position, "velocity": truth.velocity, "time": time}
+        position = position + form.function(true, *values)
+    return np.asarray(position)
 
 
-def _compute_added_force(effects: EffectFunctions, truth: TrueSignals, start: float, step: float) -> Array:
-    """Return the force [N] that the force channel adds, at the start of each substep."""
-    substeps = len(truth.force) // len(truth.output)
-    time = start + np.arange(len(truth.force)) * (step / substeps)
-    drive = np.repeat(truth.output, substeps)
+def _apply_force_effects(effects: EffectFunctions, truth: TrueSignals, start: float, step: float) -> Array:
+    """Return the force on the load cell [N] with the force that its channel adds.
+
+    A defined effect acts on the force after all effects of the library and the defined effects before it.
+    """
+    time = _compute_substep_times(truth, start, step)
+    drive = np.repeat(truth.output, len(truth.force) // len(truth.output))
     added = effects.select("additive_force")
-    # The zeros give the sum its shape when there are no such effects.
-    return np.asarray(0.0 * time + sum(form.function(time, drive, *values) for form, values in added))
+    force = truth.force + sum(form.function(time, drive, *values) for form, values in added)
+    for form, values in effects.select("channel_function"):
+        force = force + form.function({"force": force, "drive": drive, "time": time}, *values)
+    return np.asarray(force)
+
+
+def _compute_substep_times(truth: TrueSignals, start: float, step: float) -> Array:
+    """Return the time (K,) [s] of each substep since the start of the run."""
+    substeps = len(truth.force) // len(truth.output)
+    return np.asarray(start + np.arange(len(truth.force)) * (step / substeps))
 
 
 def _make_models(scenario: Scenario, step: float) -> dict[str, SamplingModel]:

@@ -5,10 +5,9 @@ import math
 import numpy as np
 
 from sim_rig.plant import states
-from sim_rig.plant.defined_functions import compute_steepest_slope
+from sim_rig.plant.defined_effects import DefinedFunctions, compute_steepest_slope
 from sim_rig.plant.effects import EffectFunctions
 from sim_rig.plant.jit import Array, QuaternaryFunction
-from sim_rig.plant.stack_machine import DefinedFunctions
 from sim_rig.scenario import Scenario
 
 _MIN_LAG = 2e-5

@@ -5,8 +5,17 @@ specimen, so that displacement, velocity and acceleration are continuous between
 """
 
 from identification.damper.effects import connection
-from sim_rig.plant.effect_variables import VELOCITY as DAMPER_VELOCITY
-from sim_rig.plant.effect_variables import improve_acceleration, set_variables
+from sim_rig.plant.defined_effects import (
+    FIELD_PLACE,
+    FORCE_PLACE,
+    GAIN_PLACE,
+    MOUNTING_PLACE,
+    DefinedFunctions,
+    evaluate,
+    improve_acceleration,
+    set_variables,
+    set_velocity,
+)
 from sim_rig.plant.jit import (
     Array,
     BinaryFunction,
@@ -22,14 +31,6 @@ from sim_rig.plant.law import (
     evaluate_coefficient,
 )
 from sim_rig.plant.rig_rates import compute_actuator_rates, compute_coil_rates, compute_heat_rates
-from sim_rig.plant.stack_machine import (
-    FIELD_PLACE,
-    FORCE_PLACE,
-    GAIN_PLACE,
-    MOUNTING_PLACE,
-    DefinedFunctions,
-    evaluate,
-)
 from sim_rig.plant.states import (
     BACKLASH,
     BRISTLE_RATE,
@@ -85,7 +86,7 @@ def _compute_damper_force(
     a, b, c = scale_factors(x, v, s[ENERGY])
     force = parallel_force(x, v, s[LIP_BEND], s[GAS_POSITION])
     if defined is not None:
-        defined.variables[DAMPER_VELOCITY] = v
+        set_velocity(defined, v)
         gain = evaluate(defined, GAIN_PLACE)
         a, b, c = gain * a, gain * b, gain * c
         force += evaluate(defined, FORCE_PLACE)

@@ -13,8 +13,15 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
+from sim_rig.plant.defined_effects import (
+    DEFINED_TYPE,
+    DRIVE_PLACE,
+    DefinedFunctions,
+    evaluate,
+    hold_drive,
+    update_memory,
+)
 from sim_rig.plant.derivatives import compute_rates
-from sim_rig.plant.effect_variables import hold_drive, update_memory
 from sim_rig.plant.jit import (
     BINARY_TYPE,
     QUATERNARY_TYPE,
@@ -25,7 +32,6 @@ from sim_rig.plant.jit import (
     ScaleFunction,
     compile_function,
 )
-from sim_rig.plant.stack_machine import DEFINED_TYPE, DRIVE_PLACE, DefinedFunctions, evaluate
 from sim_rig.plant.states import (
     COOLING_RATE,
     DAMPER,

@@ -15,11 +15,16 @@ from identification.damper.effects import compute_elongation
 from sim_rig.errors import PlantError
 from sim_rig.plant import integrator, states
 from sim_rig.plant.constants import make_plant_constants
-from sim_rig.plant.defined_functions import make_defined_functions
-from sim_rig.plant.effect_variables import start_variables
+from sim_rig.plant.defined_effects import (
+    DRIVE_PLACE,
+    FORCE_PLACE,
+    MOUNTING_PLACE,
+    evaluate,
+    make_defined_functions,
+    start_variables,
+)
 from sim_rig.plant.effects import EffectFunctions
 from sim_rig.plant.jit import Array
-from sim_rig.plant.stack_machine import DRIVE_PLACE, FORCE_PLACE, MOUNTING_PLACE, evaluate
 from sim_rig.scenario import Scenario
 
 _MAX_SUBSTEP = 1.25e-4

@@ -4,9 +4,9 @@ The actuator is a servo: a first-order lag of the command, followed by a second-
 on the rod deflects by force / stiffness.
 """
 
+from sim_rig.plant.defined_effects import DRIVE_PLACE, DefinedFunctions, evaluate
 from sim_rig.plant.jit import Array, compile_function
 from sim_rig.plant.law import compute_field_rate
-from sim_rig.plant.stack_machine import DRIVE_PLACE, DefinedFunctions, evaluate
 from sim_rig.plant.states import (
     ACTUATOR_COMPLIANCE,
     AMBIENT,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from sim_rig.plant import effect_variables
-from sim_rig.plant.defined_functions import make_defined_functions
+from sim_rig.plant.defined_effects.functions import make_defined_functions
+from sim_rig.plant.defined_effects.stack_machine import FORCE_PLACE, evaluate
+from sim_rig.plant.defined_effects.variables import DISPLACEMENT, VELOCITY
 from sim_rig.plant.effects import EffectFunctions
-from sim_rig.plant.stack_machine import FORCE_PLACE, evaluate
 from tests.unit.sim_rig.definitions import define
 
 LEAVES = ("displacement", "velocity", "a", "curve", "0", "2", "3", "0.5", "-1.7", "60", "1e-13")
@@ -33,7 +33,7 @@ def compile_and_bind(varied, expression, a):
     functions = make_defined_functions(effects)
 
     def compiled(x, v):
-        functions.variables[[effect_variables.DISPLACEMENT, effect_variables.VELOCITY]] = x, v
+        functions.variables[[DISPLACEMENT, VELOCITY]] = x, v
         return evaluate(functions, FORCE_PLACE)
 
     return compiled, lambda x, v: form.function({"displacement": x, "velocity": v}, *values)

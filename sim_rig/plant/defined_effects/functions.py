@@ -12,9 +12,7 @@ import numpy as np
 
 from identification.damper.definitions import CURVE, DefinedFunction, Instruction
 from identification.damper.effects import Action
-from sim_rig.plant import effect_variables
-from sim_rig.plant.effects import EffectFunctions, ParameterValues
-from sim_rig.plant.stack_machine import (
+from sim_rig.plant.defined_effects.stack_machine import (
     FIELD_PLACE,
     FORCE_PLACE,
     GAIN_PLACE,
@@ -23,6 +21,22 @@ from sim_rig.plant.stack_machine import (
     DefinedFunctions,
     evaluate,
 )
+from sim_rig.plant.defined_effects.variables import (
+    ACCELERATION,
+    DISPLACEMENT,
+    DISSIPATED_ENERGY,
+    DRIVE,
+    DRIVE_HISTORY,
+    FIELD,
+    FIELD_HISTORY,
+    MEMORY_COUNT,
+    TIME,
+    TRAVEL_SINCE_REST,
+    TRAVEL_SINCE_REVERSAL,
+    VARIABLE_COUNT,
+    VELOCITY,
+)
+from sim_rig.plant.effects import EffectFunctions, ParameterValues
 
 _ACTIONS: tuple[Action, ...] = (
     "drive_function",
@@ -33,18 +47,18 @@ _ACTIONS: tuple[Action, ...] = (
 )
 """Action at each place of the plant."""
 _VARIABLES = {
-    "displacement": effect_variables.DISPLACEMENT,
-    "velocity": effect_variables.VELOCITY,
-    "acceleration": effect_variables.ACCELERATION,
-    "travel_since_reversal": effect_variables.TRAVEL_SINCE_REVERSAL,
-    "travel_since_rest": effect_variables.TRAVEL_SINCE_REST,
-    "drive": effect_variables.DRIVE,
-    "drive_history": effect_variables.DRIVE_HISTORY,
-    "time": effect_variables.TIME,
-    "dissipated_energy": effect_variables.DISSIPATED_ENERGY,
+    "displacement": DISPLACEMENT,
+    "velocity": VELOCITY,
+    "acceleration": ACCELERATION,
+    "travel_since_reversal": TRAVEL_SINCE_REVERSAL,
+    "travel_since_rest": TRAVEL_SINCE_REST,
+    "drive": DRIVE,
+    "drive_history": DRIVE_HISTORY,
+    "time": TIME,
+    "dissipated_energy": DISSIPATED_ENERGY,
 }
 """Index of each variable by its name in an effect file."""
-_FIELD_VARIABLES = {"drive": effect_variables.FIELD, "drive_history": effect_variables.FIELD_HISTORY}
+_FIELD_VARIABLES = {"drive": FIELD, "drive_history": FIELD_HISTORY}
 """Variables that are those of the field at its place."""
 _ACCELERATION_PASSES = 3
 """Evaluations per rate if a force depends on the acceleration, and so on itself: two, and one at their secant."""
@@ -81,8 +95,8 @@ def make_defined_functions(effects: EffectFunctions) -> DefinedFunctions | None:
         ).reshape(-1, 3),
         positions=np.array([x for curve in curves for x in curve.positions], float),
         values=np.array([value for curve in curves for value in curve.values], float),
-        variables=np.zeros(effect_variables.VARIABLE_COUNT),
-        memory=np.zeros(effect_variables.MEMORY_COUNT),
+        variables=np.zeros(VARIABLE_COUNT),
+        memory=np.zeros(MEMORY_COUNT),
         stack=np.zeros(len(codes) + 1),  # an instruction pushes one value at most
         passes=_count_passes(codes, curves),
     )
@@ -92,11 +106,11 @@ def compute_steepest_slope(functions: DefinedFunctions) -> float:
     """Return the largest slope of the forces over the velocity [N s/m], near rest; the variables are reset."""
     variables, steepest = functions.variables, 0.0
     for place, drive in product((FORCE_PLACE, MOUNTING_PLACE), _SLOPE_DRIVES):
-        variables[effect_variables.DRIVE] = drive
+        variables[DRIVE] = drive
         for speed in np.geomspace(1e-5, 1.0, 60):
-            variables[effect_variables.VELOCITY] = 1.01 * speed
+            variables[VELOCITY] = 1.01 * speed
             above = evaluate(functions, place)
-            variables[effect_variables.VELOCITY] = 0.99 * speed
+            variables[VELOCITY] = 0.99 * speed
             steepest = max(steepest, abs(above - evaluate(functions, place)) / (0.02 * speed))
     variables[:] = 0.0
     return steepest
@@ -104,7 +118,7 @@ def compute_steepest_slope(functions: DefinedFunctions) -> float:
 
 def _count_passes(codes: Sequence[_Code], curves: Sequence[_Curve]) -> int:
     used = {int(operand) for code, operand in codes if code == "name"} | {curve.variable for curve in curves}
-    return _ACCELERATION_PASSES if effect_variables.ACCELERATION in used else 1
+    return _ACCELERATION_PASSES if ACCELERATION in used else 1
 
 
 def _translate_place(effects: EffectFunctions, place: int, curves: list[_Curve]) -> list[_Code]:

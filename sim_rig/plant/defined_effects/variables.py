@@ -124,6 +124,12 @@ def set_variables(functions: Any, x: float, field: float, energy: float, time: f
 
 
 @compile_function
+def set_velocity(functions: Any, velocity: float) -> None:
+    """Set the velocity [m/s] of the damper."""
+    functions.variables[VELOCITY] = velocity
+
+
+@compile_function
 def update_memory(functions: Any, x: float, field: float, lost_energy: float, time: float) -> None:
     """Update the memory at the end of an integration step in which the damper has lost an energy [J] as heat.
 

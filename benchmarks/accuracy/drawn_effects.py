@@ -188,7 +188,9 @@ def _add_unknown(damper: Coordinates, stroke: Excitation, cause: str, random: np
         time = np.linspace(-1.0, 1.0, len(plain))
         return _simulate(damper, replace(stroke, drive=stroke.drive * (1.0 + strength * shape(time))), ())
     gain = 1.0 + strength * shape(stroke.displacement / size.length)
-    return np.asarray(plain + (gain - 1.0) * (plain - damper.f0))
+    # Neither the accumulator's spring nor the preload passes through the gap with the fluid.
+    static = damper.k1 * stroke.displacement - damper.f0
+    return np.asarray(static + gain * (plain - static))
 
 
 def _draw_wave(random: np.random.Generator) -> Callable[[Array], Array]:

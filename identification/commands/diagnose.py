@@ -1,9 +1,12 @@
 """`mrbench diagnose` and `mrbench trend`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from identification.documents import Diagnosis
 
 Seed = Annotated[int, typer.Option(help="Seed of all random numbers.")]
 Out = Annotated[Path, typer.Option("--out", help="Document to write; `-` prints it.")]
@@ -40,10 +43,25 @@ def diagnose(
         float | None,
         typer.Option(min=0.05, max=0.95, help="Fraction of each stretch after which it is held out likewise."),
     ] = None,
+    discover: Annotated[
+        bool,
+        typer.Option(
+            "--discover",
+            help="Also search for a cause outside the library, where known effects do not explain the gap.",
+        ),
+    ] = False,
+    keep: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Search likewise, and write the cause as an effect file of this name for later diagnoses.",
+        ),
+    ] = None,
     witness: Annotated[bool, typer.Option("--witness", hidden=True, help="Former name of --cross-check.")] = False,
     seed: Seed = 1,
 ) -> None:
     """Find where simulation and recording differ, which effects explain it, and how far they close the gap."""
+    from identification.damper.definitions import check_new_name, load_effects
     from identification.documents import check_output_path, describe_output_path, write_document
     from identification.fitting import HoldOut, read_damper_model
     from identification.gap import diagnose as diagnose_recordings
@@ -51,6 +69,9 @@ def diagnose(
     from identification.logs import load
     from identification.progress import show_progress
 
+    library = load_effects()
+    if keep is not None:
+        check_new_name(keep)
     for path in (out, twin):
         if path is not None:
             check_output_path(path)
@@ -63,11 +84,27 @@ def diagnose(
             cross_check=cross_check or witness,
             hold_out=HoldOut.from_text(hold_out, hold_out_after),
             progress=progress,
+            library=library,
+            discover=discover or keep is not None,
         )
+    if keep is not None:
+        result = result.rename_discovery(keep)
     write_document(out, result.diagnosis)
     if twin is not None:
         write_document(twin, result.twin)
     typer.echo(f"{describe_output_path(out)}: {summarise_diagnosis(result.diagnosis)}", err=True)
+    if keep is not None:
+        typer.echo(_keep_discovery(result.diagnosis, keep), err=True)
+
+
+def _keep_discovery(diagnosis: "Diagnosis", name: str) -> str:
+    """Write the discovered effect as an effect file, and return a line for a person."""
+    from identification.damper.definitions import write_effect_file
+
+    if diagnosis.discovery is None:
+        return f"{name} was not written, because no cause outside the library was found"
+    path = write_effect_file(diagnosis.discovery.definition)
+    return f"{path}: written; diagnoses, twins and scenarios know {name} from now on"
 
 
 def trend(

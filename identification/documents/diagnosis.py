@@ -4,6 +4,7 @@ from typing import Any, Literal
 
 from pydantic import AliasChoices, Field
 
+from identification.damper.definitions import Curve, EffectFile
 from identification.damper.effects import Place, Stage, Variable
 from identification.documents.document import Document
 from identification.documents.fit import Fit, Nuisances, Provenance
@@ -151,6 +152,41 @@ class Remainder(Document):
     variables: list[Variable] = Field(description="variables that the regression needs, the strongest first")
 
 
+class Formula(Document):
+    """Formula of a discovered effect."""
+
+    expression: str = Field(description="expression over the variables and symbols")
+    symbols: dict[str, EffectValue] = Field(description="parameters of the expression by their names")
+
+
+class DiscoveredCurve(Document):
+    """An effect outside the library: where it acts, on which variables, and its curve."""
+
+    stage: Stage = Field(description="stage of the signal chain")
+    place: Place = Field(description="place in the signal chain")
+    variables: list[Variable] = Field(description="variable of the curve, then those of its factors")
+    curve: Curve = Field(description="curve over the first variable with its 95 % band, without the factors")
+    rmse_n: float = Field(description="RMSE on held-out strokes with this effect and those before it, in N")
+    log_odds: float = Field(
+        description="logarithm of the odds (natural) of this effect on held-out strokes, over the set without it"
+    )
+
+
+class Discovery(DiscoveredCurve):
+    """Result of a search for a cause outside the library."""
+
+    replaces: list[str] = Field(
+        default_factory=list, description="named effects that are not needed with the discovered one"
+    )
+    formula: Formula | None = Field(description="shortest formula that does as well; null if none does")
+    definition: EffectFile = Field(description="the effect as an effect file")
+    shrinkage: float | None = Field(description="as in `gap`, with the discovered effect")
+    shrinkage_ci95: tuple[float, float] | None = Field(description="its 95 % interval")
+    further: list[DiscoveredCurve] = Field(
+        default_factory=list, description="effects found after it in what it leaves, the first first"
+    )
+
+
 class NextStroke(Document):
     """The stroke that best separates the sets that these data cannot."""
 
@@ -194,6 +230,9 @@ class Diagnosis(Document):
     remainder: Remainder | None = Field(
         default=None, description="what is left with the named effects; null where nothing is left"
     )
+    discovery: Discovery | None = Field(
+        default=None, description="cause outside the library; null unless searched for and found"
+    )
     next_stroke: NextStroke | None = Field(description="null where nothing is left to separate")
     explanation: str = Field(description="two sentences for a person")
     cross_check: CrossCheck | None = Field(
@@ -213,6 +252,9 @@ class TwinEffect(Document):
     name: str = Field(description="name in the library of effects")
     form: str = Field(description="functional form")
     parameters: dict[str, float] = Field(description="values in SI units")
+    definition: EffectFile | None = Field(
+        default=None, description="definition of an effect outside the library; null for one of the library"
+    )
 
 
 class Twin(Document):

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from identification.arrays import Array
 from identification.damper import PARAMETER_SETS, Coordinates, Parameters, to_coordinates
+from identification.damper.definitions import EffectFile, find_effect_file, load_effects, make_effect
 from identification.damper.effects import EFFECTS, rename_parameters
 from identification.documents import Fit, Nuisances
 from identification.errors import IdentificationError
@@ -104,7 +105,12 @@ def _parse_scenario(content: dict[str, Any]) -> DamperModel:
 
 
 def _parse_effect(entry: dict[str, Any]) -> ActiveEffect:
-    effect = EFFECTS[entry["name"]]
+    """Return an effect of the library, of the entry's own definition, or of the user's effect files."""
+    definition = entry.get("definition")
+    if definition is not None:
+        effect = make_effect(EffectFile.model_validate(definition))
+    else:
+        effect = EFFECTS[entry["name"]] if entry["name"] in EFFECTS else load_effects()[entry["name"]]
     form = effect.find_form(entry.get("form"))
     parameters = rename_parameters(effect.name, entry["parameters"])
     values = tuple(float(parameters[q.symbol]) for q in form.parameters)
@@ -120,12 +126,13 @@ def _describe_error(error: Exception) -> str:
 
 
 def make_effect_entries(effects: Sequence[ActiveEffect]) -> list[dict[str, Any]]:
-    """Return effects as entries of a scenario."""
+    """Return effects as entries of a scenario; a defined effect brings its definition along."""
     return [
         {
             "name": e.effect.name,
             "form": e.form.name,
             "parameters": {q.symbol: float(v) for q, v in zip(e.form.parameters, e.values, strict=True)},
+            **({"definition": file} if (file := find_effect_file(e.effect)) else {}),
         }
         for e in effects
     ]

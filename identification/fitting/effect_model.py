@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.damper import LIBRARY_SIZE, DamperSize, Quantity, compute_scale_factor, scale_quantity
+from identification.damper.definitions import ACTIONS
 from identification.damper.effects import EFFECTS, Effect, Form
 from identification.simulate import ActiveEffect
 
@@ -25,8 +26,8 @@ class EffectModel:
     """Name of the form."""
     size: DamperSize = LIBRARY_SIZE
     """Size of the damper, by which bounds, scales and starts of the library's effects are scaled."""
-    prior_deviation: float = np.inf
-    """Standard deviation of each search coordinate about zero, before any measurement."""
+    prior_deviations: tuple[float, ...] = ()
+    """Standard deviations (P,) of the search coordinates about zero, before any measurement; empty for none."""
 
     @staticmethod
     def from_name(name: str, form_name: str | None = None) -> "EffectModel":
@@ -60,8 +61,8 @@ class EffectModel:
 
     @property
     def _is_scaled(self) -> bool:
-        """True for an effect of the library; others are defined for one damper."""
-        return EFFECTS.get(self.name) is self.effect
+        """True for a form of the library; a defined effect has the bounds of one damper."""
+        return self.form.action not in ACTIONS.values()
 
     @property
     def log_mask(self) -> BoolArray:

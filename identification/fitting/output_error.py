@@ -65,6 +65,8 @@ class OptimiserSettings:
     """Seed of the random starts."""
     budget: float | None = None
     """Processor time [s] after which no further start is tried; None for no limit."""
+    holds_shape: bool = False
+    """True to hold the shape of the loop in the first steps from a given start, as from a regression."""
 
 
 def fit_output_error(
@@ -89,7 +91,8 @@ def _search(problem: Problem, settings: OptimiserSettings, progress: Progress, s
     start_time = time.process_time()
     preview = _decimate_for_preview(problem)
     starts = make_starting_points(preview) if start is None else [start]
-    first = _approach(preview, starts[0], settings.iterations, progress) if start is None else start
+    is_distant = start is None or settings.holds_shape
+    first = _approach(preview, starts[0], settings.iterations, progress) if is_distant else starts[0]
     best = minimise(problem, first, settings.iterations, progress)
     agreeing = 0
     for other_start in itertools.islice(_generate_restarts(preview, starts, settings.seed), settings.restarts):

@@ -251,7 +251,8 @@ class Problem:
         weight[self.layout.y0] = 1.0 / _Y0_PRIOR
         weight[self.layout.per_log] = 1.0
         for effect, columns in self.iterate_effects():
-            weight[columns] = 1.0 / effect.prior_deviation
+            if effect.prior_deviations:
+                weight[columns] = 1.0 / np.array(effect.prior_deviations)
         return centre, weight
 
     def _compute_errors(self, unknowns: Array, piece: int) -> tuple[Array, Array, Array]:

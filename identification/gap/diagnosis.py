@@ -1,8 +1,9 @@
 """Diagnosis of one or several logs of one damper."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from identification.damper.effects import EFFECTS, Effect
 from identification.fitting import DELAY_LIMIT, DamperModel, Dataset, HoldOut, Piece, Problem, assemble
 from identification.gap.data import (
     EvaluationData,
@@ -39,6 +40,8 @@ def diagnose(
     hold_out: HoldOut | None = None,
     progress: Progress = ignore_progress,
     settings: SearchSettings = DEFAULT_SETTINGS,
+    library: Mapping[str, Effect] | None = None,
+    discover: bool = False,
 ) -> DiagnosisResult:
     """Diagnose the gap between the law and recordings of one damper.
 
@@ -50,6 +53,8 @@ def diagnose(
         hold_out: strokes that no fit and no choice reads; the error on them is reported.
         progress: receives the fitted effects and the force error on held-out cycles [N].
         settings: limits and thresholds of the search.
+        library: effects that the search considers, by name; those that come with the program if None.
+        discover: also search for a cause outside the library, where the named effects do not explain the gap.
 
     Raises:
         UnusableDataError: the recordings are too short, clipped, of different specimens, or do not contain force
@@ -57,7 +62,14 @@ def diagnose(
     """
     prepared = prepare_recordings(recordings, hold_out)
     return diagnose_prepared(
-        prepared, model, seed=seed, cross_check=cross_check, progress=progress, settings=settings
+        prepared,
+        model,
+        seed=seed,
+        cross_check=cross_check,
+        progress=progress,
+        settings=settings,
+        library=library,
+        discover=discover,
     )
 
 
@@ -98,16 +110,18 @@ def diagnose_prepared(
     cross_check: bool = False,
     progress: Progress = ignore_progress,
     settings: SearchSettings = DEFAULT_SETTINGS,
+    library: Mapping[str, Effect] | None = None,
+    discover: bool = False,
 ) -> DiagnosisResult:
     """Diagnose prepared recordings; the arguments are those of ``diagnose``."""
     dataset, evaluation = prepared.dataset, prepared.evaluation
-    pool = make_candidate_pool(prepared, seed=seed, progress=progress, settings=settings)
+    pool = make_candidate_pool(prepared, seed=seed, progress=progress, settings=settings, library=library)
     with use_one_thread():
         search_forward(pool)
         posterior = compute_final_posterior(pool)
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]
-        builder = ReportBuilder(dataset, evaluation, pool, posterior, partial, model, notes, seed)
+        builder = ReportBuilder(dataset, evaluation, pool, posterior, partial, model, notes, seed, discover)
         result = builder.build_result()
         return _add_cross_check(result, pool, dataset.drive_unit, seed, progress) if cross_check else result
 
@@ -132,13 +146,14 @@ def make_candidate_pool(
     seed: int = 1,
     progress: Progress = ignore_progress,
     settings: SearchSettings = DEFAULT_SETTINGS,
+    library: Mapping[str, Effect] | None = None,
 ) -> CandidatePool:
     """Make an empty candidate pool for prepared recordings."""
     dataset, evaluation = prepared.dataset, prepared.evaluation
     problem = make_diagnosis_problem(dataset, evaluation.select_fitted_pieces())
     noise_model = NoiseModel(dataset.floor, dataset.stretches, seed)
     clock_deviation = dataset.clock_deviation if dataset.clock_deviation > _CLOCK_DEVIATION else 0.0
-    return CandidatePool(problem, evaluation, noise_model, clock_deviation, progress, settings)
+    return CandidatePool(problem, evaluation, noise_model, clock_deviation, progress, settings, library or EFFECTS)
 
 
 def make_diagnosis_problem(dataset: Dataset, pieces: tuple[Piece, ...]) -> Problem:

@@ -5,6 +5,7 @@ from identification.damper.definitions.defined_effect import (
     CURVE,
     DEFINED_FORM,
     DefinedFunction,
+    find_effect_file,
     make_effect,
 )
 from identification.damper.definitions.effect_file import (
@@ -17,6 +18,7 @@ from identification.damper.definitions.effect_file import (
 )
 from identification.damper.definitions.expression import Expression, Instruction
 from identification.damper.definitions.library import (
+    check_new_name,
     find_effect_folder,
     load_effects,
     read_effect_files,
@@ -35,6 +37,8 @@ __all__ = [
     "EffectParameter",
     "Expression",
     "Instruction",
+    "check_new_name",
+    "find_effect_file",
     "find_effect_folder",
     "load_effects",
     "make_effect",

@@ -52,6 +52,8 @@ class DefinedFunction:
     """Values of that variable at which the curve is given, increasing."""
     curve_values: tuple[float, ...] = ()
     """Values of the curve there; it is constant beyond its ends."""
+    document: str = ""
+    """The effect file as JSON, from which the effect can be made again."""
 
     def __call__(self, variables: Mapping[str, Any], *values: Any) -> Any:
         """Return the value (N,) for variables (N,) each and values of the parameters."""
@@ -77,10 +79,17 @@ def make_effect(file: EffectFile) -> Effect:
         curve.variable if curve else "",
         tuple(curve.x) if curve else (),
         tuple(curve.value) if curve else (),
+        file.model_dump_json(by_alias=True),
     )
     start = tuple(p.value for p in file.parameters.values())
     form = Form(DEFINED_FORM, ACTIONS[file.place], quantities, (start,), function)
     return Effect(file.name, file.stage, file.variables[0], file.describe(), (form,))
+
+
+def find_effect_file(effect: Effect) -> EffectFile | None:
+    """Return the file that defines an effect; None for an effect of the library."""
+    function = effect.forms[0].function
+    return EffectFile.model_validate_json(function.document) if isinstance(function, DefinedFunction) else None
 
 
 def _find_scale(parameter: EffectParameter) -> float:

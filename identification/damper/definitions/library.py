@@ -4,6 +4,7 @@ The files lie in the folder that ``MRBENCH_EFFECTS`` names, else in the user's c
 """
 
 import os
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -49,6 +50,18 @@ def load_effects(folder: Path | None = None) -> Mapping[str, Effect]:
         EffectFileError: as `read_effect_files` does.
     """
     return {**EFFECTS, **{name: make_effect(file) for name, file in read_effect_files(folder).items()}}
+
+
+def check_new_name(name: str) -> None:
+    """Check that a name can be given to a new effect.
+
+    Raises:
+        EffectFileError: the name is not one of small letters and underscores, or there is an effect of this name.
+    """
+    if not re.fullmatch(r"[a-z_]{1,40}", name):
+        raise EffectFileError(f"{name!r} cannot be the name of an effect: give 1 to 40 of a-z and _")
+    if name in load_effects():
+        raise EffectFileError(f"there is an effect {name} already; choose another name")
 
 
 def write_effect_file(file: EffectFile, folder: Path | None = None) -> Path:

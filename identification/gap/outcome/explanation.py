@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from identification.damper.effects import EFFECTS
-from identification.documents import Diagnosis, EffectSet, Gap, NamedEffect, Verdict
+from identification.documents import Diagnosis, Discovery, EffectSet, Gap, NamedEffect, Verdict
 
 _LIKELY_ALTERNATIVE = 0.1
 """Smallest probability of an alternative that is mentioned."""
@@ -95,6 +95,16 @@ def describe_nearest(names: Sequence[str], before: float, after: float, floor: f
     )
 
 
+def describe_discovery(discovery: Discovery, before: float) -> str:
+    """Return the note on a cause outside the library; ``before`` is the error of the refitted law [N]."""
+    place, variables = discovery.place.replace("_", " "), " and ".join(discovery.variables).replace("_", " ")
+    function = f"the formula {discovery.formula.expression}" if discovery.formula else "an estimated curve"
+    return (
+        f"outside the library: {function} at the {place}, over {variables}, reduces the error on held-out strokes "
+        f"from {before:.3g} to {discovery.rmse_n:.3g} N"
+    )
+
+
 def _describe_effects(effects: Sequence[NamedEffect]) -> str:
     return " and ".join(f"{e.name} ({_describe_parameters(e)})" for e in effects)
 
@@ -103,7 +113,9 @@ def _describe_parameters(effect: NamedEffect) -> str:
     values = [
         f"{name} {p.value:.3g} {'' if p.unit == '1' else p.unit}".strip() for name, p in effect.parameters.items()
     ]
-    return f"{EFFECTS[effect.name].meaning}; {', '.join(values)}"
+    known = EFFECTS.get(effect.name)
+    meaning = known.meaning if known else "an effect of the user's own"
+    return "; ".join([meaning, ", ".join(values)]) if values else meaning
 
 
 def _describe_shrinkage(gap: Gap, count: int) -> str:
@@ -135,8 +147,15 @@ def summarise_diagnosis(diagnosis: Diagnosis) -> str:
     shrinkage = "" if gap.shrinkage is None else f", shrinkage {gap.shrinkage:.2f}"
     return (
         f"{diagnosis.verdict}: {names}; held-out force error {gap.before_n:.3g} to {gap.after_n:.3g} N, "
-        f"noise floor {gap.noise_floor_n:.3g} N{shrinkage}{_describe_cross_check(diagnosis)}"
+        f"noise floor {gap.noise_floor_n:.3g} N{shrinkage}{_summarise_discovery(diagnosis)}"
+        f"{_describe_cross_check(diagnosis)}"
     )
+
+
+def _summarise_discovery(diagnosis: Diagnosis) -> str:
+    if diagnosis.discovery is None:
+        return ""
+    return f"; {describe_discovery(diagnosis.discovery, diagnosis.gap.before_n)}"
 
 
 def _describe_cross_check(diagnosis: Diagnosis) -> str:

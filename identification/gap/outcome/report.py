@@ -9,7 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.damper.effects import STAGES
-from identification.documents import Diagnosis, Gap, GapLocation, NextStroke, Provenance, Remainder, Twin, Verdict
+from identification.documents import (
+    Diagnosis,
+    Discovery,
+    Gap,
+    GapLocation,
+    NextStroke,
+    Provenance,
+    Remainder,
+    Verdict,
+)
 from identification.fitting import DamperModel, Dataset
 from identification.gap.data import (
     EvaluationData,
@@ -19,9 +28,16 @@ from identification.gap.data import (
     estimate_drift,
     map_gap,
 )
+from identification.gap.discovery import DiscoveredEffect, discover_effect
 from identification.gap.fits import Candidate
+from identification.gap.outcome.diagnosis_result import DiagnosisResult
+from identification.gap.outcome.discovery_document import build_discovery
 from identification.gap.outcome.explainable_share import ResidualRegression
-from identification.gap.outcome.explanation import describe_nearest, explain_diagnosis
+from identification.gap.outcome.explanation import (
+    describe_discovery,
+    describe_nearest,
+    explain_diagnosis,
+)
 from identification.gap.outcome.held_out_strokes import measure_held_out_strokes
 from identification.gap.outcome.next_stroke import RivalModel, compute_information, find_best_segment
 from identification.gap.outcome.remainder import describe_remainder
@@ -55,14 +71,6 @@ _LOWEST_FREQUENCY_LIMIT = 0.5
 """Smallest limit on the frequency of a proposed stroke [Hz]."""
 
 
-@dataclass(frozen=True)
-class DiagnosisResult:
-    """Documents of a diagnosis."""
-
-    diagnosis: Diagnosis
-    twin: Twin
-
-
 class NamedSet(NamedTuple):
     """Set of effects that is named, with its verdict."""
 
@@ -87,6 +95,8 @@ class ReportBuilder:
     model: DamperModel | None
     notes: Sequence[str]
     seed: int
+    discovers: bool = False
+    """True to search for a cause outside the library where the named effects do not explain the gap."""
 
     @cached_property
     def regression(self) -> ResidualRegression:
@@ -104,6 +114,8 @@ class ReportBuilder:
         if verdict != "no_gap":
             remainder = describe_remainder(self.pool, named, self.regression, gap.noise_floor_n)
         provenance = self._make_provenance()
+        found = self._discover(verdict, named)
+        discovery = self._build_discovery(found, named)
         diagnosis = Diagnosis(
             verdict=verdict,
             effects=effects,
@@ -115,17 +127,44 @@ class ReportBuilder:
             where=self._locate_gap(posterior),
             next_stroke=self._propose_next_stroke(),
             remainder=remainder,
+            discovery=discovery,
             explanation=explain_diagnosis(verdict, gap, effects, alternatives, self._describe_place(remainder)),
             notes=[
                 *self.notes,
                 *self._describe_nearest(verdict),
+                *self._describe_search(verdict, discovery),
                 *describe_unobservable_effects(self.evaluation.cycles, self.dataset.floor),
             ],
             provenance=provenance,
         )
         noise = self.pool.noise_model.noise
         fit = make_baseline_fit(self.dataset, self.evaluation, self.pool.baseline, noise, provenance)
-        return DiagnosisResult(diagnosis, make_twin(self.dataset, named, fit, noise, fit.specimen, provenance))
+        candidate = named if found is None else found.candidate
+        definition = None if discovery is None else discovery.definition
+        twin = make_twin(self.dataset, candidate, definition, fit, noise, fit.specimen, provenance)
+        return DiagnosisResult(diagnosis, twin)
+
+    def _discover(self, verdict: Verdict, named: Candidate) -> DiscoveredEffect | None:
+        """Return a cause outside the library, if it is wanted and something is left to explain."""
+        wanted = self.discovers and verdict in ("partly_explained", "unexplained")
+        return discover_effect(self.pool, named) if wanted else None
+
+    def _build_discovery(self, found: DiscoveredEffect | None, named: Candidate) -> Discovery | None:
+        if found is None:
+            return None
+        shrinkage = self._estimate_shrinkage(found.candidate)
+        return build_discovery(found, named, shrinkage, self.dataset.drive_unit)
+
+    def _describe_search(self, verdict: Verdict, discovery: Discovery | None) -> list[str]:
+        """Return the note on the search for a cause outside the library: its result, or an offer."""
+        if discovery is not None:
+            return [describe_discovery(discovery, self.pool.baseline.held_out_rmse)]
+        is_open = verdict in ("partly_explained", "unexplained")
+        if not self.discovers:
+            return ["the option --discover searches for a cause outside the library"] if is_open else []
+        if not is_open:
+            return ["no cause outside the library was searched for, because nothing is left to explain"]
+        return ["no curve at any place closes part of the gap on held-out strokes, so none is reported"]
 
     def _choose_named_set(self) -> NamedSet:
         """Return the verdict and the named set; the law alone if none is named.
@@ -214,7 +253,7 @@ class ReportBuilder:
 
     def _locate_gap(self, posterior: Posterior) -> GapLocation:
         baseline, floor, cycles = self.pool.baseline, self.pool.floor, self.evaluation.cycles
-        stages = compute_stage_probabilities(posterior, STAGES)
+        stages = compute_stage_probabilities(posterior, STAGES, self.pool.library)
         no_stage = baseline.held_out_rmse <= floor or max(stages.values()) < _MIN_STAGE_PROBABILITY
         return GapLocation(
             stage=None if no_stage else sorted(STAGES, key=stages.__getitem__)[-1],

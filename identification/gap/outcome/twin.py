@@ -6,6 +6,7 @@ from typing import cast
 import numpy as np
 
 from identification.damper import to_parameters
+from identification.damper.definitions import DEFINED_FORM, EffectFile
 from identification.documents import (
     Delay,
     DriveKind,
@@ -42,20 +43,30 @@ _SMALLEST_K1 = 1e-3
 
 
 def make_twin(
-    dataset: Dataset, named: Candidate, baseline: Fit, floor: float, specimen: str, provenance: Provenance
+    dataset: Dataset,
+    named: Candidate,
+    definition: EffectFile | None,
+    baseline: Fit,
+    floor: float,
+    specimen: str,
+    provenance: Provenance,
 ) -> Twin:
     """Make the scenario of a diagnosis.
 
     Args:
         dataset: the recordings.
         named: the named set; the baseline where none is named.
+        definition: definition of the last effect of the set, where it was discovered.
         baseline: document of the fit without effects.
         floor: noise of the force [N].
         specimen: name of the damper.
         provenance: provenance of the diagnosis.
     """
     noise = float(np.median([estimate_recorded_noise(s) for s in dataset.stretches]))
-    effects = [TwinEffect.model_validate(e) for e in make_effect_entries(named.fit.active_effects)]
+    active = named.fit.active_effects if definition is None else named.fit.active_effects[:-1]
+    effects = [TwinEffect.model_validate(e) for e in make_effect_entries(active)]
+    if definition is not None:
+        effects.append(_make_discovered_effect(definition))
     effect_names = ", ".join(e.name for e in effects) or "no effect"
     coordinates = named.fit.coordinates
     if abs(coordinates.k1) < _SMALLEST_K1:
@@ -71,6 +82,11 @@ def make_twin(
         baseline=baseline,
         provenance=provenance,
     )
+
+
+def _make_discovered_effect(definition: EffectFile) -> TwinEffect:
+    values = {name: p.value for name, p in definition.parameters.items()}
+    return TwinEffect(name=definition.name, form=DEFINED_FORM, parameters=values, definition=definition)
 
 
 def make_baseline_fit(

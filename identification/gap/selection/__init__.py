@@ -1,5 +1,6 @@
 """Selection of the sets of effects that explain a recording."""
 
+from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.partial_sets import find_partial_sets
 from identification.gap.selection.plan import compute_final_posterior, search_forward
@@ -21,6 +22,7 @@ __all__ = [
     "CandidatePool",
     "Posterior",
     "SearchSettings",
+    "compute_evidence",
     "compute_expected_gain",
     "compute_final_posterior",
     "compute_stage_probabilities",

@@ -5,13 +5,14 @@ decide which sets are fitted.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from identification.arrays import Array
+from identification.damper.effects import EFFECTS, Effect
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, make_starting_points
 from identification.gap.data import EvaluationData, Residual, split_by_piece
 from identification.gap.fits import Candidate, FitOptions, JointFit, fit_jointly, refit_all_samples
@@ -49,6 +50,8 @@ class CandidatePool:
     """Standard deviation of the delay between the channels [s]; 0 where it is small enough to be ignored."""
     progress: Progress = ignore_progress
     settings: SearchSettings = DEFAULT_SETTINGS
+    library: Mapping[str, Effect] = field(default_factory=lambda: EFFECTS)
+    """Effects that the search considers, by name."""
     candidates: dict[frozenset[str], Candidate] = field(default_factory=dict)
     """Best fit of each set."""
     full_fits: set[frozenset[str]] = field(default_factory=set)
@@ -65,7 +68,7 @@ class CandidatePool:
 
     def __post_init__(self) -> None:
         """Create the cache of screenings."""
-        self._screenings = ScreeningCache(self._resolve_rate(self.settings.screening_rate))
+        self._screenings = ScreeningCache(self._resolve_rate(self.settings.screening_rate), self.library)
 
     @property
     def budget_spent(self) -> bool:
@@ -148,7 +151,7 @@ class CandidatePool:
         """
         self.fit_count += 1
         problem = self.decimated_problem.replace_effects(effects)
-        return self._keep(self._evaluate(JointFit(problem, fit_output_error(problem, _SEARCH))))
+        return self._keep(self.evaluate(JointFit(problem, fit_output_error(problem, _SEARCH))))
 
     def fit(
         self, effects: tuple[EffectModel, ...], starts: Sequence[Array] = (), options: FitOptions = QUICK_FIT
@@ -161,7 +164,7 @@ class CandidatePool:
             The best known candidate of this set, which may come from an earlier fit.
         """
         self.fit_count += 1
-        return self._keep(self._evaluate(fit_jointly(self.decimated_problem, effects, None, options, starts)))
+        return self._keep(self.evaluate(fit_jointly(self.decimated_problem, effects, None, options, starts)))
 
     def _keep(self, candidate: Candidate) -> Candidate:
         """Keep a candidate if it is the best of its names, and return the best."""
@@ -181,7 +184,7 @@ class CandidatePool:
         """Fit a set on all samples, once, starting from its best fit on decimated data."""
         if names not in self.full_fits:
             self._continue_fit(names)
-            self.candidates[names] = self._refit_all_samples(self.candidates[names])
+            self.candidates[names] = self.refit_all_samples(self.candidates[names])
             self.full_fits.add(names)
 
     def screen(self, parent: Candidate, without: frozenset[str]) -> list[ScreeningResult]:
@@ -215,7 +218,7 @@ class CandidatePool:
         """Unknowns (U,) of the law alone from the regression."""
         return make_starting_points(self.decimated_problem)[0]
 
-    def _evaluate(self, fit: JointFit) -> Candidate:
+    def evaluate(self, fit: JointFit) -> Candidate:
         """Compute the residual of a fit on all samples."""
         forces = self.full_problem.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
         residual = self.evaluation.compute_residual(forces)
@@ -231,11 +234,12 @@ class CandidatePool:
                 return
             self.fit(known.fit.effects, [known.fit.minimum.unknowns])
 
-    def _refit_all_samples(self, candidate: Candidate) -> Candidate:
+    def refit_all_samples(self, candidate: Candidate) -> Candidate:
+        """Refine a candidate on all samples; it is not kept."""
         for _ in range(self.settings.refit_rounds):
             simulated = split_by_piece(candidate.residual.simulated_force, self.full_problem.pieces)
             fit = refit_all_samples(self.full_problem, candidate.fit, simulated, self.settings.refit_iterations)
-            candidate = self._evaluate(fit)
+            candidate = self.evaluate(fit)
             if abs(candidate.train_rmse - fit.rmse) < self.settings.refit_tolerance * self.floor:
                 break
         return candidate

@@ -81,7 +81,7 @@ def _search_best_sets(pool: CandidatePool, size: int) -> None:
     for candidate in _sort_sets(pool, size)[: pool.settings.searched_sets]:
         choices: list[tuple[EffectModel, ...]] = [candidate.fit.effects]
         if size == 1:
-            choices = [(model,) for model in list_effect_models(sorted(candidate.names), scale)]
+            choices = [(model,) for model in list_effect_models(sorted(candidate.names), scale, pool.library)]
         for effects in choices:
             if pool.budget_spent or pool.is_at_floor(pool.find_best()):
                 return

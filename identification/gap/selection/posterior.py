@@ -9,14 +9,15 @@ of its gap that the correct effects hardly ever leave.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 
 from identification.arrays import Array
-from identification.damper.effects import COMMON_EFFECTS, EFFECTS, Stage
+from identification.damper.effects import COMMON_EFFECTS, EFFECTS, Effect, Stage
 
 _LIKELIHOOD_EXPONENT = 6.0
 """Exponent of the ratio of excesses in the odds. Origin: calibrated on recordings with a known effect."""
@@ -189,10 +190,12 @@ def normalise_scores(scores: Array) -> Array:
     return np.asarray(shares / shares.sum())
 
 
-def compute_stage_probabilities(posterior: Posterior, stages: Sequence[Stage]) -> dict[Stage, float]:
+def compute_stage_probabilities(
+    posterior: Posterior, stages: Sequence[Stage], library: Mapping[str, Effect] = MappingProxyType(EFFECTS)
+) -> dict[Stage, float]:
     """Return the probability of a missing effect at each stage; that of an unknown cause is spread evenly."""
     shares: dict[Stage, float] = dict.fromkeys(stages, posterior.unknown / len(stages))
     for names, probability in posterior.sets.items():
-        for stage in {EFFECTS[name].stage for name in names}:
+        for stage in {library[name].stage for name in names}:
             shares[stage] += probability
     return {stage: min(share, 1.0) for stage, share in shares.items()}

@@ -8,14 +8,15 @@ differences of two simulations. Exact sensitivities, and a step with a line sear
 effects with the largest predicted gains.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.damper import LIBRARY_SIZE, DamperSize
-from identification.damper.effects import COMMON_EFFECTS, EFFECTS
+from identification.damper.effects import COMMON_EFFECTS, EFFECTS, Effect
 from identification.fitting import EffectModel, Evaluation, Problem
 from identification.gap.fits import JointFit, insert_effect_unknowns, predict_joint_step, take_joint_step
 from identification.gap.noise import MAINS_FREQUENCY
@@ -51,10 +52,12 @@ class ScreeningResult:
 
 
 def list_effect_models(
-    names: Sequence[str] = COMMON_EFFECTS, size: DamperSize = LIBRARY_SIZE
+    names: Sequence[str] = COMMON_EFFECTS,
+    size: DamperSize = LIBRARY_SIZE,
+    library: Mapping[str, Effect] = MappingProxyType(EFFECTS),
 ) -> tuple[EffectModel, ...]:
-    """Return every form of some effects, for a damper of a size."""
-    return tuple(EffectModel(EFFECTS[name], form.name, size) for name in names for form in EFFECTS[name].forms)
+    """Return every form of some effects of a library, for a damper of a size."""
+    return tuple(EffectModel(library[name], form.name, size) for name in names for form in library[name].forms)
 
 
 def screen(

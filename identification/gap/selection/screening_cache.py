@@ -5,11 +5,11 @@ extensions at the end. A screening is valid while the excess of the set stays ne
 same.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from identification.damper.effects import EFFECTS
+from identification.damper.effects import Effect
 from identification.fitting import Problem
 from identification.gap.fits import Candidate
 from identification.gap.selection.screening import ScreeningResult, list_effect_models, screen
@@ -34,6 +34,8 @@ class ScreeningCache:
 
     rate: float
     """Sampling rate of a screening [Hz]."""
+    library: Mapping[str, Effect]
+    """Effects that are screened."""
     _entries: dict[frozenset[str], _Screening] = field(default_factory=dict)
 
     def find_gains(
@@ -53,7 +55,7 @@ class ScreeningCache:
             problem: decimated data.
             find_mains_frequency: finds the mains frequency [Hz] in the residual of a set.
         """
-        wanted = frozenset(EFFECTS) - without
+        wanted = frozenset(self.library) - without
         entry = self._entries.get(parent.names)
         if (
             entry is None
@@ -61,9 +63,8 @@ class ScreeningCache:
             or abs(excess - entry.excess) > _CACHE_TOLERANCE * entry.excess
         ):
             highest = max(p.excitation.rate for p in problem.pieces)
-            models = list_effect_models(
-                [name for name in EFFECTS if name in wanted], problem.space.scales.damper_size
-            )
+            names = [name for name in self.library if name in wanted]
+            models = list_effect_models(names, problem.space.scales.damper_size, self.library)
             decimation = max(1, round(highest / self.rate))
             gains = screen(problem, parent.fit, models, decimation, find_mains_frequency(parent))
             entry = self._entries[parent.names] = _Screening(excess, wanted, gains)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.damper.effects import STAGES
+from identification.damper.effects import EFFECTS, STAGES
 from identification.documents import GapMapEntry, Remainder
 from identification.gap.data.cycles import Cycles, StrokeCondition
 from identification.gap.data.residual_map import Residual
@@ -52,6 +52,7 @@ def make_builder(
     pool = SimpleNamespace(
         baseline=candidates[NONE],
         candidates=candidates,
+        library=EFFECTS,
         floor=FLOOR,
         no_gap_limit=1.008 * FLOOR,
         noise_model=noise_model,

@@ -82,9 +82,7 @@ def test_a_law_in_a_wrong_minimum_is_fitted_again_from_the_law_of_the_best_set()
     right = pool.fit_law()
     start = pool.regression_start.copy()
     start[pool.decimated_problem.layout.coordinates] += 1.0
-    wrong = pool._evaluate(
-        fit_jointly(pool.decimated_problem, (), None, replace(QUICK_FIT, iterations=0), [start])
-    )
+    wrong = pool.evaluate(fit_jointly(pool.decimated_problem, (), None, replace(QUICK_FIT, iterations=0), [start]))
     assert wrong.held_out_rmse > 2.0 * right.held_out_rmse
     pool.candidates[frozenset()] = wrong
     pool.fit((EffectModel.from_name("coil_crosstalk"),), [np.append(right.fit.minimum.unknowns, 0.0)])

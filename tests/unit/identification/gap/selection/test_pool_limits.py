@@ -103,7 +103,7 @@ def test_chance_is_two_deviations_of_the_variance_of_the_held_out_samples(held_o
     evaluation.compute_rmse = lambda residual: (3.0, 4.0)
     problem = SimpleNamespace(replace_effects=lambda effects: SimpleNamespace(simulate=lambda unknowns: unknowns))
     fit = SimpleNamespace(effects=(), minimum=SimpleNamespace(unknowns="forces"))
-    candidate = make_pool(problem, evaluation)._evaluate(fit)
+    candidate = make_pool(problem, evaluation).evaluate(fit)
     assert (candidate.residual, candidate.train_rmse, candidate.held_out_rmse) == ("forces", 3.0, 4.0)
     assert candidate.chance_excess == pytest.approx(chance)
 

@@ -20,7 +20,7 @@ def pool():
 @pytest.fixture(scope="module")
 def find_gains(pool):
     """Screens three effects by default, in addition to the law."""
-    cache = ScreeningCache(rate=125.0)
+    cache = ScreeningCache(125.0, EFFECTS)
 
     def find(names=frozenset(), without=OTHERS, excess=0.5):
         return cache.find_gains(pool.candidates[names], without, excess, pool.decimated_problem, lambda _: 50.0)

@@ -1,0 +1,7 @@
+"""Discovery of causes outside the library, as curves over the variables of each place and as formulas."""
+
+from identification.gap.discovery.curve_fit import FittedCurve
+from identification.gap.discovery.discover import DiscoveredEffect, discover_effect
+from identification.gap.discovery.formula_fit import make_curve_file, update_values
+
+__all__ = ["DiscoveredEffect", "FittedCurve", "discover_effect", "make_curve_file", "update_values"]

@@ -1,0 +1,195 @@
+"""Curve effects: an unknown curve at each place, over each variable that can act there.
+
+The list follows the signal chain and not any known effect. A pair is left out where the recording cannot show it:
+a curve over a drive with fewer than three levels, or over a variable that does not vary.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.damper import Quantity
+from identification.damper.definitions import ACTIONS, STAGE_OF
+from identification.damper.effects import Effect, Form, Place, Variable
+from identification.fitting import EffectModel, Piece, Problem
+from identification.gap.discovery.curve_basis import MAX_GROWTH, CurveFunction, LinearGrowth, Warp, make_basis
+from identification.simulate import DamperVariables, make_coil_variables
+
+CURVE_EFFECT = "curve"
+"""Name of every curve effect."""
+_LARGEST = 100.0
+"""Largest coefficient [1]."""
+_MIN_GROWTH = -0.95
+"""Smallest growth with the drive, over the inverse of the highest drive [1]."""
+_MIN_LEVELS = 3
+"""Smallest number of drive levels over which a curve is more than a straight line."""
+_LEVEL_STEP = 0.02
+"""Smallest difference between two levels of the drive, relative to the highest."""
+_WARPS: dict[Variable, Warp] = {
+    "velocity": "symmetric",
+    "travel_since_reversal": "logarithmic",
+    "travel_since_rest": "logarithmic",
+}
+
+
+class CurvePlace(NamedTuple):
+    """A place with the variables of a curve there."""
+
+    place: Place
+    variables: tuple[Variable, ...]
+    """The variable of the curve, then those of its factors."""
+    grows_with_drive: bool = False
+
+    @property
+    def has_direction(self) -> bool:
+        """True where the curve has the sign of the velocity."""
+        return "velocity" in self.variables[1:]
+
+    @property
+    def has_drive_factor(self) -> bool:
+        """True where the curve is proportional to the drive."""
+        return "drive" in self.variables[1:] and not self.grows_with_drive
+
+    @property
+    def label(self) -> str:
+        """Description for a person."""
+        return f"{self.place} over {' and '.join(self.variables)}".replace("_", " ")
+
+
+_PARALLEL: tuple[tuple[Variable, ...], ...] = (
+    ("velocity",),
+    ("displacement",),
+    ("displacement", "velocity"),
+    ("travel_since_reversal", "velocity"),
+    ("travel_since_rest", "velocity"),
+)
+CURVE_PLACES: tuple[CurvePlace, ...] = (
+    CurvePlace("drive", ("time", "drive")),
+    CurvePlace("field", ("drive",)),
+    CurvePlace("field", ("drive_history",)),
+    *(
+        CurvePlace("damper_gain", (variable,))
+        for variable in (
+            "displacement",
+            "velocity",
+            "travel_since_reversal",
+            "travel_since_rest",
+            "time",
+            "dissipated_energy",
+        )
+    ),
+    *(CurvePlace("parallel_force", variables) for variables in _PARALLEL),
+    *(CurvePlace("parallel_force", (*variables, "drive"), grows_with_drive=True) for variables in _PARALLEL),
+    CurvePlace("mounting", ("acceleration",)),
+    CurvePlace("force_channel", ("force",)),
+    CurvePlace("force_channel", ("time",)),
+    CurvePlace("force_channel", ("drive",)),
+    CurvePlace("displacement_channel", ("displacement",)),
+    CurvePlace("displacement_channel", ("velocity",)),
+    CurvePlace("displacement_channel", ("time",)),
+)
+"""All places and variables that are tried."""
+_PLACE_UNITS: dict[Place, str] = {
+    "drive": "{drive}",
+    "field": "{drive}",
+    "damper_gain": "1",
+    "parallel_force": "N",
+    "mounting": "N",
+    "force_channel": "N",
+    "displacement_channel": "m",
+}
+
+
+@dataclass(frozen=True)
+class CurveEffect:
+    """An unknown curve at one place."""
+
+    at: CurvePlace
+    function: CurveFunction
+    model: EffectModel
+    """Effect of a fit, with the coefficients as parameters and no prior."""
+    linear_model: EffectModel
+    """Effect of the screening; the same unless the curve grows with the drive."""
+
+    @property
+    def unit(self) -> str:
+        """Unit of the curve's values."""
+        return _PLACE_UNITS[self.at.place]
+
+
+def list_curve_effects(problem: Problem, forces: Sequence[Array]) -> list[CurveEffect]:
+    """Return the curves that a recording can show.
+
+    Args:
+        problem: fitted pieces and their scales.
+        forces: simulated force (N,) [N] of each piece.
+    """
+    values = collect_variables(problem.pieces, forces)
+    return [
+        _make_curve_effect(problem, at, values[at.variables[0]])
+        for at in CURVE_PLACES
+        if _is_visible(at, values, problem)
+    ]
+
+
+def collect_variables(pieces: Sequence[Piece], forces: Sequence[Array]) -> dict[str, Array]:
+    """Return all values (N,) of each variable."""
+    names = {name for at in CURVE_PLACES for name in at.variables}
+    tables: dict[str, list[Array]] = {name: [] for name in names}
+    for piece, force in zip(pieces, forces, strict=True):
+        stroke = piece.excitation
+        damper = DamperVariables(stroke, stroke.displacement, stroke.velocity, stroke.acceleration)
+        coil = make_coil_variables(stroke.sampled_drive, stroke.start, 1.0 / stroke.rate)
+        for name in names:
+            others = coil[name] if name == "drive_history" else damper[name] if name != "force" else force
+            tables[name].append(others)
+    return {name: np.concatenate(parts) for name, parts in tables.items()}
+
+
+def _is_visible(at: CurvePlace, values: dict[str, Array], problem: Problem) -> bool:
+    """Return True if the recording varies the variables of a curve."""
+    highest = problem.space.scales.drive
+    levels = len(np.unique(np.round(values["drive"] / (_LEVEL_STEP * highest))))
+    if at.variables[0] in ("drive", "drive_history") and levels < _MIN_LEVELS:
+        return False
+    if "drive" in at.variables and levels < 2:
+        return False
+    return bool(np.ptp(values[at.variables[0]]) > 0.0)
+
+
+def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> CurveEffect:
+    scales = problem.space.scales
+    sizes: dict[Place, float] = {
+        "drive": scales.drive if not at.has_drive_factor else 1.0,
+        "field": scales.drive,
+        "damper_gain": 1.0,
+        "displacement_channel": scales.length,
+    }
+    function = CurveFunction(
+        make_basis(values, _WARPS.get(at.variables[0], "none")),
+        at.variables,
+        sizes.get(at.place, scales.force),
+        at.has_direction,
+        at.has_drive_factor,
+        at.grows_with_drive,
+    )
+    coefficients = _list_coefficients(function.basis.size)
+    if not at.grows_with_drive:
+        model = _make_model(at, coefficients, function)
+        return CurveEffect(at, function, model, model)
+    low, high = (bound / scales.drive for bound in (_MIN_GROWTH, MAX_GROWTH))
+    growth = Quantity("growth", "1/{drive}", low, high, 1.0 / scales.drive, "growth with the drive")
+    linear = _make_model(at, _list_coefficients(2 * function.basis.size), LinearGrowth(function, scales.drive))
+    return CurveEffect(at, function, _make_model(at, (*coefficients, growth), function), linear)
+
+
+def _list_coefficients(count: int) -> tuple[Quantity, ...]:
+    return tuple(Quantity(f"c{k}", "1", -_LARGEST, _LARGEST, 1.0, "coefficient") for k in range(count))
+
+
+def _make_model(at: CurvePlace, quantities: tuple[Quantity, ...], function: Any) -> EffectModel:
+    form = Form(CURVE_EFFECT, ACTIONS[at.place], quantities, ((0.0,) * len(quantities),), function)
+    return EffectModel(Effect(CURVE_EFFECT, STAGE_OF[at.place], at.variables[0], at.label, (form,)), CURVE_EFFECT)

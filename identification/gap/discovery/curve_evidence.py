@@ -1,0 +1,85 @@
+"""Evidence for a curve: marginal likelihood of a linear model with one prior deviation (MacKay 1992).
+
+The law and the effects that are already named are projected out of the residual and of the curve's sensitivities.
+What remains is a ridge regression. The prior deviation with the largest evidence sets smoothness and amplitude.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.fitting import Evaluation, Problem
+
+_DEVIATIONS = np.geomspace(1e-4, 1e2, 43)
+"""Prior deviations of the coefficients that are tried [1]."""
+_RELATIVE_DAMPING = 1e-9
+"""Damping of the projection, relative to the curvature of each unknown."""
+
+
+class CurveEvidence(NamedTuple):
+    """Result of the linear model."""
+
+    log_odds: float
+    """Logarithm of the odds (natural) of the curve over none."""
+    deviation: float
+    """Most probable prior deviation of the coefficients [1]."""
+    step: Array
+    """(U,) step of all unknowns from the linearisation point to the most probable curve."""
+
+
+def compute_curve_evidence(joint: Problem, here: Evaluation, columns: slice, correlated: float) -> CurveEvidence:
+    """Compute the evidence for a curve from cost, gradient and curvature at a curve of zero.
+
+    Args:
+        joint: problem with the curve.
+        here: its evaluation.
+        columns: unknowns of the curve's coefficients.
+        correlated: number of neighbouring samples with the same error [1].
+    """
+    inner = np.arange(len(here.gradient))[columns]
+    outer = np.setdiff1d(np.flatnonzero(joint.free_mask), inner)
+    H, g = here.hessian, here.gradient
+    damped = H[np.ix_(outer, outer)] + np.diag(_RELATIVE_DAMPING * np.diag(H)[outer])
+    projection = np.linalg.lstsq(damped, np.column_stack([H[np.ix_(outer, inner)], g[outer]]), rcond=None)[0]
+    S = H[np.ix_(inner, inner)] - H[np.ix_(inner, outer)] @ projection[:, :-1]
+    b = g[inner] - H[np.ix_(inner, outer)] @ projection[:, -1]
+    eigenvalues, vectors = np.linalg.eigh(0.5 * (S + S.T))
+    eigenvalues, z = np.maximum(eigenvalues, 0.0), vectors.T @ b
+    law_cost = here.cost - float(g[outer] @ projection[:, -1])
+    gain = float(np.sum(z**2 / np.maximum(eigenvalues, 1e-9 * eigenvalues.max() + 1e-300)))
+    # The error that the best curve leaves counts as noise, and only independent samples count.
+    variance = max((law_cost - min(gain, law_cost)) / joint.samples, 1.0) * correlated
+    odds = [_compute_log_odds(eigenvalues, z, s**2, variance) for s in _DEVIATIONS]
+    best = int(np.argmax(odds))
+    deviation = float(_DEVIATIONS[best])
+    weights = -z / (eigenvalues + variance / deviation**2)
+    step = np.zeros(len(g))
+    step[inner] = vectors @ weights
+    step[outer] = -projection[:, -1] - projection[:, :-1] @ step[inner]
+    # In a fit, errors are over the noise of the problem: the prior is scaled to the same balance.
+    return CurveEvidence(odds[best], deviation / math.sqrt(variance), step)
+
+
+def _compute_log_odds(eigenvalues: Array, z: Array, prior: float, variance: float) -> float:
+    """Return the log odds for a prior variance and a noise variance, both over the problem's own."""
+    shrunk = prior * z**2 / (variance * (variance + prior * eigenvalues))
+    return 0.5 * float(np.sum(shrunk - np.log1p(prior * eigenvalues / variance)))
+
+
+def estimate_correlation_length(residuals: list[Array]) -> float:
+    """Return the number of neighbouring samples with the same error [1], from residuals (N,) of the pieces.
+
+    It is the integral of the autocorrelation up to its first zero.
+    """
+    longest = max(residuals, key=len)
+    centred = longest - longest.mean()
+    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
+    correlation = np.fft.irfft(spectrum)[: len(centred)]
+    if correlation[0] <= 0.0:
+        return 1.0
+    correlation = correlation / correlation[0]
+    negative = np.flatnonzero(correlation < 0.0)
+    end = int(negative[0]) if len(negative) else len(correlation)
+    return float(1.0 + 2.0 * np.sum(correlation[1:end]))

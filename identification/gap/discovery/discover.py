@@ -1,0 +1,88 @@
+"""Search for a cause outside the library: where it acts, on which variable, its curve, and the shortest formula.
+
+A curve is tried at every place and over every variable, with the law alone and with the named effects. The most
+probable one is kept if it closes part of the gap on strokes that no fit used. A formula then replaces the curve
+if it does as well. What is left is searched once more.
+"""
+
+from dataclasses import dataclass
+
+from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, screen_curves
+from identification.gap.discovery.formula_fit import FittedFormula, find_formula
+from identification.gap.fits import Candidate
+from identification.gap.selection import CandidatePool, compute_evidence
+
+_MIN_CLOSED_PART = 0.2
+"""Smallest part of the gap on held-out strokes that a discovered effect closes [1]."""
+_EFFECT_PENALTY = 6.0
+"""Log odds that one more effect has to bring: one curve is preferred to two named effects and a curve."""
+_VARIABLE_PENALTY = 3.0
+"""Log odds that one more variable has to bring."""
+_PLACES = 2
+"""Largest number of places that are found one after the other."""
+
+
+@dataclass(frozen=True)
+class DiscoveredEffect:
+    """A cause outside the library."""
+
+    fitted: FittedCurve
+    formula: FittedFormula | None
+    candidate: Candidate
+    """The set with the formula, or else the curve, fitted on all samples."""
+    further: tuple[FittedCurve, ...] = ()
+    """Curves found after it in what it leaves."""
+
+
+def discover_effect(pool: CandidatePool, named: Candidate) -> DiscoveredEffect | None:
+    """Return the cause outside the library that closes most of the gap; None if no curve closes part of it.
+
+    Args:
+        pool: the fitted sets.
+        named: the named set; the law alone if none is named.
+    """
+    parents = [pool.baseline] if not named.names else [pool.baseline, named]
+    found = [f for parent in parents for f in _find_curves(pool, parent)]
+    accepted = [f for f in found if _is_accepted(pool, f)]
+    if not accepted:
+        return None
+    best = max(accepted, key=lambda f: _score(pool, f))
+    formula = find_formula(pool, best)
+    chosen = pool.refit_all_samples(formula.candidate if formula else best.candidate)
+    return DiscoveredEffect(best, formula, chosen, _find_further(pool, best))
+
+
+def _find_curves(pool: CandidatePool, parent: Candidate) -> list[FittedCurve]:
+    return fit_best_curves(pool, parent, screen_curves(pool, parent))
+
+
+def _find_further(pool: CandidatePool, first: FittedCurve) -> tuple[FittedCurve, ...]:
+    """Return the curves that are accepted one after the other in what the first leaves."""
+    found = [first]
+    while len(found) < _PLACES and not pool.is_at_floor(found[-1].candidate):
+        parent = found[-1].candidate
+        accepted = [f for f in _find_curves(pool, parent) if _is_accepted(pool, f)]
+        if not accepted:
+            break
+        found.append(max(accepted, key=lambda f: _score(pool, f)))
+    return tuple(found[1:])
+
+
+def _score(pool: CandidatePool, fitted: FittedCurve) -> float:
+    """Return the log odds of a set with a curve over the law alone, less those that its size has to bring."""
+    evidence = compute_evidence(pool.baseline.residual, fitted.candidate.residual, pool.block_length)
+    effects, variables = len(fitted.candidate.fit.effects), len(fitted.curve.at.variables)
+    return evidence - _EFFECT_PENALTY * effects - _VARIABLE_PENALTY * variables
+
+
+def _is_accepted(pool: CandidatePool, fitted: FittedCurve) -> bool:
+    """Return True if a curve closes part of the gap on held-out strokes, beyond chance."""
+    parent, candidate, floor = fitted.parent, fitted.candidate, pool.floor
+    gap = parent.held_out_rmse**2 - floor**2
+    if gap <= 0.0 or fitted.held_out_log_odds < _VARIABLE_PENALTY * len(fitted.curve.at.variables):
+        return False
+    closed = (parent.held_out_rmse**2 - candidate.held_out_rmse**2) / gap
+    interval = pool.evaluation.estimate_shares(
+        parent.residual, candidate.residual, {"curve": parent.residual}, candidate.held_out_rmse, floor
+    )["curve"][1]
+    return closed > _MIN_CLOSED_PART and interval[0] > 0.0

@@ -1,0 +1,180 @@
+"""Fit of formulas in the place of a curve, together with the law and the named effects."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.damper.definitions import STAGE_OF, Curve, EffectFile, EffectParameter, make_effect
+from identification.damper.effects import Variable
+from identification.fitting import EffectModel, minimise
+from identification.gap.data import split_by_piece
+from identification.gap.discovery.curve_effects import CurveEffect, collect_variables
+from identification.gap.discovery.curve_evidence import estimate_correlation_length
+from identification.gap.discovery.curve_fit import FittedCurve
+from identification.gap.discovery.formulas import FormulaStart, rank_formulas
+from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
+from identification.gap.selection import CandidatePool
+from identification.progress import ignore_progress
+from identification.threads import use_one_thread
+
+DISCOVERED = "discovered_effect"
+"""Name of a discovered effect that the user has not named."""
+_FITTED_FORMULAS = 6
+"""Number of formulas nearest to the curve that are fitted."""
+_ITERATIONS = 25
+"""Largest number of iterations of a fit."""
+_SUFFICIENT_GAIN = 0.8
+"""Part of the curve's gain on held-out strokes that a formula has to keep."""
+_MAX_POINTS = 4000
+"""Samples at which a formula is compared with a curve."""
+_RANGE = 100.0
+"""Largest amplitude, relative to the start or to one of the size of the curve."""
+VARIABLE_UNITS: dict[Variable, str] = {
+    "displacement": "m",
+    "velocity": "m/s",
+    "acceleration": "m/s^2",
+    "travel_since_reversal": "m",
+    "travel_since_rest": "m",
+    "force": "N",
+    "drive": "{drive}",
+    "drive_history": "{drive}",
+    "temperature": "K",
+    "time": "s",
+    "dissipated_energy": "J",
+}
+"""SI units of the variables."""
+
+
+@dataclass(frozen=True)
+class FittedFormula:
+    """A formula fitted with the law and other effects."""
+
+    file: EffectFile
+    """Its definition, with the fitted values."""
+    candidate: Candidate
+    criterion: float
+    """Bayesian information criterion, for independent samples."""
+
+
+def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | None:
+    """Return the formula with the lowest information criterion that keeps most of the curve's gain.
+
+    None if no formula does.
+    """
+    pieces = pool.decimated_problem.pieces
+    simulated = pool.decimated_problem.replace_effects(fitted.parent.fit.effects).simulate(
+        fitted.parent.fit.minimum.unknowns
+    )
+    variable = collect_variables(pieces, simulated)[fitted.curve.at.variables[0]]
+    variable = variable[:: max(1, len(variable) // _MAX_POINTS)]
+    count = fitted.curve.function.basis.size
+    starts = rank_formulas(fitted.curve, np.array(fitted.values[:count]), variable)
+    errors = split_by_piece(fitted.candidate.residual.values, pool.full_problem.pieces)
+    samples = len(fitted.candidate.residual.values) / estimate_correlation_length(errors)
+    formulas = [_fit_formula(pool, fitted, start, variable, samples) for start in starts[:_FITTED_FORMULAS]]
+    kept = [f for f in formulas if _keeps_gain(fitted, f.candidate)]
+    return min(kept, key=lambda f: f.criterion, default=None)
+
+
+def _keeps_gain(fitted: FittedCurve, candidate: Candidate) -> bool:
+    """Return True if a formula keeps most of the gain of its curve on held-out strokes."""
+    before, curve = fitted.parent.held_out_rmse**2, fitted.candidate.held_out_rmse**2
+    return before - candidate.held_out_rmse**2 > _SUFFICIENT_GAIN * (before - curve)
+
+
+def _fit_formula(
+    pool: CandidatePool, fitted: FittedCurve, start: FormulaStart, variable: Array, samples: float
+) -> FittedFormula:
+    """Fit a formula from its start; ``samples`` is the number of independent samples."""
+    file = _make_file(fitted, start, variable)
+    model = EffectModel(make_effect(file), "defined")
+    parent = fitted.candidate.fit
+    others = parent.effects[:-1]
+    problem = pool.decimated_problem.replace_effects((*others, model))
+    columns = list(parent.problem.iterate_effects())[-1][1]
+    law = np.delete(parent.minimum.unknowns, columns)
+    unknowns = insert_effect_unknowns(
+        pool.decimated_problem.replace_effects(others), law, model.to_search(model.starts[0])
+    )
+    with use_one_thread():
+        fit = JointFit(problem, minimise(problem, unknowns, _ITERATIONS, ignore_progress))
+    criterion = samples * math.log(fit.rmse**2) + len(file.parameters) * math.log(max(samples, 2.0))
+    return FittedFormula(update_values(file, fit.active_effects[-1].values), pool.evaluate(fit), criterion)
+
+
+def update_values(file: EffectFile, values: tuple[float, ...]) -> EffectFile:
+    """Return an effect file with other values of its parameters."""
+    pairs = zip(file.parameters.items(), values, strict=True)
+    return file.model_copy(
+        update={"parameters": {name: p.model_copy(update={"value": v}) for (name, p), v in pairs}}
+    )
+
+
+def _make_file(fitted: FittedCurve, start: FormulaStart, variable: Array) -> EffectFile:
+    """Return the definition of a formula at its start."""
+    curve, at = fitted.curve, fitted.curve.at
+    parameters = {
+        name: _make_parameter(curve, start, name, value, variable) for name, value in sorted(start.values.items())
+    }
+    expression = start.formula.write(at.variables[0])
+    return make_curve_file(fitted, expression, parameters)
+
+
+def make_curve_file(
+    fitted: FittedCurve, expression: str, parameters: dict[str, EffectParameter], curve: Curve | None = None
+) -> EffectFile:
+    """Return the definition of an expression of the curve's variable, with the factors of its place."""
+    at = fitted.curve.at
+    if at.has_direction:
+        expression = f"sign(velocity)*({expression})"
+    if at.has_drive_factor:
+        expression = f"drive*({expression})"
+    if at.grows_with_drive:
+        growth = fitted.curve.model.quantities[-1]
+        expression = f"(1+growth*drive)*({expression})"
+        value = float(np.clip(fitted.values[-1], growth.low, growth.high))
+        parameters = {
+            **parameters,
+            "growth": EffectParameter(value=value, unit="1/{drive}", lo=growth.low, hi=growth.high),
+        }
+    return EffectFile(
+        name=DISCOVERED,
+        stage=STAGE_OF[at.place],
+        place=at.place,
+        variables=list(at.variables),
+        expression=expression,
+        parameters=parameters,
+        curve=curve,
+        source="found by a diagnosis",
+    )
+
+
+def _make_parameter(
+    curve: CurveEffect, start: FormulaStart, name: str, value: float, variable: Array
+) -> EffectParameter:
+    """Return a parameter with its unit and the range of its search."""
+    unit, size = VARIABLE_UNITS[curve.at.variables[0]], max(float(np.abs(variable).max()), 1e-300)
+    match start.formula.others.get(name):
+        case "scale":
+            return EffectParameter(value=value, unit=unit, lo=1e-4 * size, hi=1e2 * size)
+        case "size":
+            return EffectParameter(value=value, unit=unit, lo=value, hi=value)
+        case "power":
+            return EffectParameter(value=value, unit="1", lo=0.1, hi=6.0)
+        case "position":
+            return EffectParameter(value=value, unit=unit, lo=float(variable.min()), hi=float(variable.max()))
+    power = start.formula.amplitudes[name]
+    largest = _RANGE * max(abs(value), curve.function.scale / size**power)
+    place_unit = "1" if curve.at.has_drive_factor else curve.unit
+    unit = _divide_unit(place_unit, unit, power)
+    return EffectParameter(value=value, unit=unit, lo=-largest, hi=largest)
+
+
+def _divide_unit(unit: str, divisor: str, power: int) -> str:
+    """Return a unit divided by a power of another."""
+    if not power:
+        return unit
+    divisor = f"({divisor})" if "/" in divisor else divisor
+    return f"{unit}/{divisor}" + (f"^{power}" if power > 1 else "")

@@ -2,7 +2,7 @@
 
 A curve is a cubic spline with a penalty on its roughness. The coefficients are rotated and scaled so that the
 penalty becomes their sum of squares (Eilers and Marx 1996 for the penalty; Wood 2017, 5.4, for the rotation). One
-prior deviation then sets smoothness and amplitude together, and the number of knots does not matter.
+prior deviation then sets smoothness and amplitude together. The amplitude hardly depends on the number of knots.
 """
 
 from collections.abc import Mapping
@@ -140,5 +140,6 @@ class LinearGrowth:
         """Return the coefficients (K,) and growth [1/drive] of the nearest curve that is a product."""
         left, sizes, right = np.linalg.svd(values.reshape(2, -1), full_matrices=False)
         level, growth = left[:, 0]
-        level = np.sign(level) * max(abs(level), abs(growth) / MAX_GROWTH)
+        if abs(level) < abs(growth) / MAX_GROWTH:
+            level = growth / MAX_GROWTH
         return np.asarray(level * sizes[0] * right[0]), float(growth / level / self.highest_drive)

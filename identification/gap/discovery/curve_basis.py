@@ -25,7 +25,7 @@ _GRID_POINTS = 401
 """Points at which the basis is tabulated."""
 _LEVEL_PENALTY = 0.02
 """Penalty on the level of a curve, relative to that on its roughness."""
-_RESOLUTION = 0.01
+_RESOLUTION = 2e-3
 """Smallest value that a warped scale resolves, relative to the largest."""
 MAX_GROWTH = 30.0
 """Largest growth with the drive, over the inverse of the highest drive [1]."""

@@ -35,6 +35,10 @@ _WARPS: dict[Variable, Warp] = {
 }
 
 
+HISTORY_VARIABLES: tuple[Variable, ...] = ("drive_history", "travel_since_rest", "dissipated_energy")
+"""Variables that depend on the past of more than a stroke."""
+
+
 class CurvePlace(NamedTuple):
     """A place with the variables of a curve there."""
 

@@ -29,14 +29,13 @@ class CurveEvidence(NamedTuple):
     """(U,) step of all unknowns from the linearisation point to the most probable curve."""
 
 
-def compute_curve_evidence(joint: Problem, here: Evaluation, columns: slice, correlated: float) -> CurveEvidence:
+def compute_curve_evidence(joint: Problem, here: Evaluation, columns: slice) -> CurveEvidence:
     """Compute the evidence for a curve from cost, gradient and curvature at a curve of zero.
 
     Args:
         joint: problem with the curve.
         here: its evaluation.
         columns: unknowns of the curve's coefficients.
-        correlated: number of neighbouring samples with the same error [1].
     """
     inner = np.arange(len(here.gradient))[columns]
     outer = np.setdiff1d(np.flatnonzero(joint.free_mask), inner)
@@ -49,8 +48,9 @@ def compute_curve_evidence(joint: Problem, here: Evaluation, columns: slice, cor
     eigenvalues, z = np.maximum(eigenvalues, 0.0), vectors.T @ b
     law_cost = here.cost - float(g[outer] @ projection[:, -1])
     gain = float(np.sum(z**2 / np.maximum(eigenvalues, 1e-9 * eigenvalues.max() + 1e-300)))
-    # The error that the best curve leaves counts as noise, and only independent samples count.
-    variance = max((law_cost - min(gain, law_cost)) / joint.samples, 1.0) * correlated
+    # The error that the best curve leaves counts as noise. It is taken as independent, so the odds are far too
+    # certain: they only rank the curves, and held-out strokes decide.
+    variance = max((law_cost - min(gain, law_cost)) / joint.samples, 1.0)
     odds = [_compute_log_odds(eigenvalues, z, s**2, variance) for s in _DEVIATIONS]
     best = int(np.argmax(odds))
     deviation = float(_DEVIATIONS[best])

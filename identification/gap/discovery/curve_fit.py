@@ -1,5 +1,6 @@
 """Fit of curves together with the law and the effects that are already named."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -9,27 +10,27 @@ import numpy as np
 from identification.arrays import Array
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, minimise
 from identification.gap.discovery.curve_basis import LinearGrowth
-from identification.gap.discovery.curve_effects import CurveEffect, list_curve_effects
-from identification.gap.discovery.curve_evidence import (
-    CurveEvidence,
-    compute_curve_evidence,
-    estimate_correlation_length,
-)
+from identification.gap.discovery.curve_effects import HISTORY_VARIABLES, CurveEffect, list_curve_effects
+from identification.gap.discovery.curve_evidence import CurveEvidence, compute_curve_evidence
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
 from identification.gap.selection import CandidatePool, compute_evidence
 from identification.progress import ignore_progress
 from identification.threads import use_one_thread
 
-_FITTED_CURVES = 5
-"""Number of curves with the largest linear evidence that are fitted."""
-_ITERATIONS = 25
+_FITTED_CURVES = 7
+"""Number of curves with the largest linear evidence that are fitted, with and without growth counted once."""
+_FIRST_ITERATIONS = 8
+"""Largest number of iterations of a first fit, after which the best are continued."""
+_FINISHED_CURVES = 2
+"""Number of the best of these that are also fitted from the regression, with their prior estimated again."""
+_ITERATIONS = 20
 """Largest number of iterations of a fit."""
-_PRIOR_UPDATES = 2
-"""Number of times that the prior of a curve is estimated again after its fit."""
 _SMALLEST_DEVIATION = 1e-8
 """Smallest prior deviation [1]: a curve of zero keeps one."""
 _FRESH_FIT = OptimiserSettings(iterations=_ITERATIONS, restarts=0, holds_shape=True)
 """Fit from the regression."""
+_VARIABLE_PRICE = 0.03
+"""Relative decrease of the error that one more variable or effect has to bring."""
 _GROWTH_DEVIATION = 1.0
 """Prior deviation of the growth with the drive, over the inverse of the highest drive [1]."""
 
@@ -50,9 +51,15 @@ class FittedCurve:
     parent: Candidate
     """The set without the curve."""
     log_odds: float
-    """Block evidence for the curve over the set without it, on all strokes."""
-    held_out_log_odds: float
-    """The same on held-out strokes."""
+    """Block evidence for the curve over the set without it, on held-out strokes."""
+
+    @property
+    def loss(self) -> float:
+        """Logarithm of the error [N], on the worse of fitted and held-out strokes, with the price of its size."""
+        at = self.curve.at
+        count = len(at.variables) + any(v in HISTORY_VARIABLES for v in at.variables)
+        error = max(self.candidate.train_rmse, self.candidate.held_out_rmse)
+        return math.log(error) + _VARIABLE_PRICE * (count + len(self.candidate.fit.effects))
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -68,53 +75,102 @@ class FittedCurve:
 
 def screen_curves(pool: CandidatePool, parent: Candidate) -> list[ScreenedCurve]:
     """Return all curves that the recording can show, with their linear evidence, the largest first."""
-    problem = pool.decimated_problem.replace_effects(parent.fit.effects)
+    problem = pool.screening_problem.replace_effects(parent.fit.effects)
     unknowns = parent.fit.minimum.unknowns
     simulated = problem.simulate(unknowns)
-    residuals = [p.force - f for p, f in zip(problem.pieces, simulated, strict=True)]
-    correlated = estimate_correlation_length(residuals)
     curves = list_curve_effects(problem, simulated)
-    screened = [ScreenedCurve(c, _screen_curve(problem, unknowns, c, correlated)) for c in curves]
+    screened = [ScreenedCurve(c, _screen_curve(problem, unknowns, c)) for c in curves]
     return sorted(screened, key=lambda s: -s.evidence.log_odds)
 
 
-def _screen_curve(problem: Problem, unknowns: Array, curve: CurveEffect, correlated: float) -> CurveEvidence:
+def _screen_curve(problem: Problem, unknowns: Array, curve: CurveEffect) -> CurveEvidence:
     joint = problem.replace_effects((*problem.effects, curve.linear_model))
     count, first = len(curve.linear_model.quantities), problem.layout.per_log.start
     start = insert_effect_unknowns(problem, unknowns, np.zeros(count))
-    return compute_curve_evidence(joint, joint.evaluate(start), slice(first, first + count), correlated)
+    return compute_curve_evidence(joint, joint.evaluate(start), slice(first, first + count))
 
 
 def fit_best_curves(
     pool: CandidatePool, parent: Candidate, screened: Sequence[ScreenedCurve]
 ) -> list[FittedCurve]:
-    """Fit the curves with the largest linear evidence, and return the best on held-out strokes first."""
-    fitted = [fit_curve(pool, parent, s) for s in screened[:_FITTED_CURVES]]
-    return sorted(fitted, key=lambda f: -f.log_odds)
+    """Fit the curves with the largest linear evidence, and return the most probable first.
 
-
-def fit_curve(pool: CandidatePool, parent: Candidate, screened: ScreenedCurve) -> FittedCurve:
-    """Fit a curve with the law and the effects of a set.
-
-    The fit starts at the end of the linear model, and at the regression: without the curve, the law may have moved
-    to values that hide it.
+    All are fitted from the end of their linear model. The best of these are also fitted from the regression:
+    without the curve, the law may have moved to values that hide it.
     """
+    warm = [_continue_linear_model(pool, parent, s) for s in _drop_variants(screened)[:_FITTED_CURVES]]
+    best = sorted(warm, key=lambda f: f.loss)
+    finished = [_finish_fit(pool, f) for f in best[:_FINISHED_CURVES]]
+    simpler = _find_simpler(screened, finished)
+    if simpler is not None:
+        finished.append(_finish_fit(pool, _continue_linear_model(pool, parent, simpler)))
+    return sorted([*finished, *best[_FINISHED_CURVES:]], key=lambda f: f.loss)
+
+
+def _find_simpler(screened: Sequence[ScreenedCurve], finished: Sequence[FittedCurve]) -> ScreenedCurve | None:
+    """Return the best curve without its growth with the drive, if it has one."""
+    at = min(finished, key=lambda f: f.loss).curve.at if finished else None
+    if at is None or not at.grows_with_drive:
+        return None
+    return next((s for s in screened if s.curve.at == (at.place, at.variables[:-1], False)), None)
+
+
+def _drop_variants(screened: Sequence[ScreenedCurve]) -> list[ScreenedCurve]:
+    """Return the curves without the less probable of two that differ in their growth with the drive alone."""
+    best: dict[tuple[str, ...], ScreenedCurve] = {}
+    for s in screened:
+        at = s.curve.at
+        best.setdefault((at.place, *(at.variables[:-1] if at.grows_with_drive else at.variables)), s)
+    return list(best.values())
+
+
+def _continue_linear_model(pool: CandidatePool, parent: Candidate, screened: ScreenedCurve) -> FittedCurve:
+    """Fit a curve with the law and the effects of a set, from the end of its linear model."""
     curve, evidence = screened
     model = _give_prior(curve, evidence.deviation)
-    parent_problem = pool.decimated_problem.replace_effects(parent.fit.effects)
+    parent_problem = pool.screening_problem.replace_effects(parent.fit.effects)
     problem = parent_problem.replace_effects((*parent.fit.effects, model))
     start = insert_effect_unknowns(parent_problem, parent.fit.minimum.unknowns, np.zeros(len(model.quantities)))
     target = _find_linear_solution(parent_problem, parent.fit.minimum.unknowns, screened)
-    regression = replace_law(problem, start, pool.regression_start)
     with use_one_thread():
-        minima = [
-            minimise(problem, _search_line(problem, start, target), _ITERATIONS, ignore_progress),
-            fit_output_error(problem, _FRESH_FIT, start=regression),
-        ]
-        fit = JointFit(problem, min(minima, key=lambda m: m.evaluation.cost))
-        for _ in range(_PRIOR_UPDATES):
-            fit = _update_prior(fit, curve)
-    return judge_curve(pool, parent, curve, pool.evaluate(fit))
+        minimum = minimise(problem, _search_line(problem, start, target), _FIRST_ITERATIONS, ignore_progress)
+    return _judge_curve(pool, parent, curve, JointFit(problem, minimum))
+
+
+def _finish_fit(pool: CandidatePool, fitted: FittedCurve) -> FittedCurve:
+    """Fit a curve from the regression as well, and estimate its prior again."""
+    fit, curve = fitted.candidate.fit, fitted.curve
+    with use_one_thread():
+        if not pool.is_at_floor(fitted.candidate):
+            again = minimise(fit.problem, fit.minimum.unknowns, _ITERATIONS, ignore_progress)
+            fit = JointFit(fit.problem, again)
+            fresh = _replace_law(fit.problem, fit.minimum.unknowns, pool.regression_start)
+            other = fit_output_error(fit.problem, _FRESH_FIT, start=fresh)
+            if other.evaluation.cost < fit.minimum.evaluation.cost:
+                fit = JointFit(fit.problem, other)
+        fit = _update_prior(fit, curve)
+    return _judge_curve(pool, fitted.parent, curve, fit)
+
+
+def _replace_law(problem: Problem, unknowns: Array, law: Array) -> Array:
+    """Return unknowns (U,) with coordinates, delays and y(0) of a law alone, and the effects' values kept."""
+    moved = unknowns.copy()
+    first = problem.layout.effects.start
+    moved[:first] = law[:first]
+    return moved
+
+
+def _judge_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, fit: JointFit) -> FittedCurve:
+    """Return a fitted curve with its block evidence over the set without it."""
+    candidate = pool.evaluate(fit)
+    held_out = pool.evaluation.held_out_samples
+    unseen = [replace(c.residual, valid=c.residual.valid & held_out) for c in (parent, candidate)]
+    return FittedCurve(
+        curve,
+        candidate,
+        parent,
+        compute_evidence(unseen[0], unseen[1], pool.block_length),
+    )
 
 
 def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
@@ -125,9 +181,7 @@ def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
     problem, unknowns = fit.problem, fit.minimum.unknowns
     columns = list(problem.iterate_effects())[-1][1]
     inner = slice(columns.start, columns.start + curve.function.basis.size)
-    simulated = problem.simulate(unknowns)
-    residuals = [p.train * (p.force - f) for p, f in zip(problem.pieces, simulated, strict=True)]
-    variance = max(fit.ratio**2, 1.0) * estimate_correlation_length(residuals)
+    variance = max(fit.ratio**2, 1.0)
     # The curvature of a coefficient of which nothing is known is that of its prior alone.
     known = (
         1.0
@@ -151,13 +205,12 @@ def replace_law(problem: Problem, unknowns: Array, law: Array) -> Array:
 
 def judge_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, candidate: Candidate) -> FittedCurve:
     """Return a fitted curve with its block evidence over the set without it."""
-    before, after, held_out = parent.residual, candidate.residual, pool.evaluation.held_out_samples
-    unseen = [replace(r, valid=r.valid & held_out) for r in (before, after)]
+    held_out = pool.evaluation.held_out_samples
+    unseen = [replace(c.residual, valid=c.residual.valid & held_out) for c in (parent, candidate)]
     return FittedCurve(
         curve,
         candidate,
         parent,
-        compute_evidence(before, after, pool.block_length),
         compute_evidence(unseen[0], unseen[1], pool.block_length),
     )
 

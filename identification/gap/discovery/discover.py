@@ -10,14 +10,12 @@ from dataclasses import dataclass
 from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, screen_curves
 from identification.gap.discovery.formula_fit import FittedFormula, find_formula
 from identification.gap.fits import Candidate
-from identification.gap.selection import CandidatePool, compute_evidence
+from identification.gap.selection import CandidatePool
 
 _MIN_CLOSED_PART = 0.2
 """Smallest part of the gap on held-out strokes that a discovered effect closes [1]."""
-_EFFECT_PENALTY = 6.0
-"""Log odds that one more effect has to bring: one curve is preferred to two named effects and a curve."""
-_VARIABLE_PENALTY = 3.0
-"""Log odds that one more variable has to bring."""
+_MIN_LOG_ODDS = 3.0
+"""Smallest log odds on held-out strokes, for each variable of a curve."""
 _PLACES = 2
 """Largest number of places that are found one after the other."""
 
@@ -46,7 +44,7 @@ def discover_effect(pool: CandidatePool, named: Candidate) -> DiscoveredEffect |
     accepted = [f for f in found if _is_accepted(pool, f)]
     if not accepted:
         return None
-    best = max(accepted, key=lambda f: _score(pool, f))
+    best = min(accepted, key=lambda f: f.loss)
     formula = find_formula(pool, best)
     chosen = pool.refit_all_samples(formula.candidate if formula else best.candidate)
     return DiscoveredEffect(best, formula, chosen, _find_further(pool, best))
@@ -64,22 +62,15 @@ def _find_further(pool: CandidatePool, first: FittedCurve) -> tuple[FittedCurve,
         accepted = [f for f in _find_curves(pool, parent) if _is_accepted(pool, f)]
         if not accepted:
             break
-        found.append(max(accepted, key=lambda f: _score(pool, f)))
+        found.append(min(accepted, key=lambda f: f.loss))
     return tuple(found[1:])
-
-
-def _score(pool: CandidatePool, fitted: FittedCurve) -> float:
-    """Return the log odds of a set with a curve over the law alone, less those that its size has to bring."""
-    evidence = compute_evidence(pool.baseline.residual, fitted.candidate.residual, pool.block_length)
-    effects, variables = len(fitted.candidate.fit.effects), len(fitted.curve.at.variables)
-    return evidence - _EFFECT_PENALTY * effects - _VARIABLE_PENALTY * variables
 
 
 def _is_accepted(pool: CandidatePool, fitted: FittedCurve) -> bool:
     """Return True if a curve closes part of the gap on held-out strokes, beyond chance."""
     parent, candidate, floor = fitted.parent, fitted.candidate, pool.floor
     gap = parent.held_out_rmse**2 - floor**2
-    if gap <= 0.0 or fitted.held_out_log_odds < _VARIABLE_PENALTY * len(fitted.curve.at.variables):
+    if gap <= 0.0 or fitted.log_odds < _MIN_LOG_ODDS * len(fitted.curve.at.variables):
         return False
     closed = (parent.held_out_rmse**2 - candidate.held_out_rmse**2) / gap
     interval = pool.evaluation.estimate_shares(

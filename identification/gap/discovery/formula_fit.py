@@ -63,8 +63,8 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
 
     None if no formula does.
     """
-    pieces = pool.decimated_problem.pieces
-    simulated = pool.decimated_problem.replace_effects(fitted.parent.fit.effects).simulate(
+    pieces = pool.screening_problem.pieces
+    simulated = pool.screening_problem.replace_effects(fitted.parent.fit.effects).simulate(
         fitted.parent.fit.minimum.unknowns
     )
     variable = collect_variables(pieces, simulated)[fitted.curve.at.variables[0]]
@@ -92,11 +92,11 @@ def _fit_formula(
     model = EffectModel(make_effect(file), "defined")
     parent = fitted.candidate.fit
     others = parent.effects[:-1]
-    problem = pool.decimated_problem.replace_effects((*others, model))
+    problem = pool.screening_problem.replace_effects((*others, model))
     columns = list(parent.problem.iterate_effects())[-1][1]
     law = np.delete(parent.minimum.unknowns, columns)
     unknowns = insert_effect_unknowns(
-        pool.decimated_problem.replace_effects(others), law, model.to_search(model.starts[0])
+        pool.screening_problem.replace_effects(others), law, model.to_search(model.starts[0])
     )
     with use_one_thread():
         fit = JointFit(problem, minimise(problem, unknowns, _ITERATIONS, ignore_progress))

@@ -24,6 +24,10 @@ _SCALES = np.geomspace(0.003, 3.0, 13)
 _POWERS = (0.4, 0.7, 1.5, 2.0, 3.0)
 _POSITIONS = np.linspace(-0.8, 0.8, 9)
 """Positions that are tried, over the range of the variable about its middle [1]."""
+_CANCELLATION = 30.0
+"""Largest term of a formula, relative to the curve: larger terms cancel, and mean nothing [1]."""
+_EXTRAPOLATION = 1e3
+"""Largest amplitude of a formula, relative to the curve [1]: a larger one describes what was not recorded."""
 _STEP_WIDTH = 0.05
 """Width of the smooth sign that the law can take up, over the largest speed [1]."""
 
@@ -99,7 +103,7 @@ def rank_formulas(curve: CurveEffect, coefficients: Array, variable: Array) -> l
     others = _list_absorbed(curve, variable)
     remaining = target - _project(others, target)
     starts = [_fit_formula(f, variable, remaining, others) for f in FORMULAS]
-    return sorted(starts, key=lambda s: s.error)
+    return sorted((s for s in starts if s.values), key=lambda s: s.error)
 
 
 def _list_absorbed(curve: CurveEffect, z: Array) -> Array:
@@ -132,12 +136,22 @@ def _fit_formula(formula: Formula, z: Array, target: Array, others: Array) -> Fo
         if not np.isfinite(columns).all():
             continue
         cleaned = columns - np.stack([_project(others, c) for c in columns.T], axis=1)
-        amplitudes = np.linalg.lstsq(cleaned, target, rcond=1e-9)[0]
+        amplitudes = np.asarray(np.linalg.lstsq(cleaned, target, rcond=1e-9)[0], float)
         error = float(np.sum((target - cleaned @ amplitudes) ** 2)) / total
+        if _has_large_terms(formula, columns, amplitudes, z, target):
+            continue
         if error < best.error:
             found = {**values, **dict(zip(formula.amplitudes, map(float, amplitudes), strict=True))}
             best = FormulaStart(formula, found, error)
     return best
+
+
+def _has_large_terms(formula: Formula, columns: Array, amplitudes: Array, z: Array, target: Array) -> bool:
+    """Return True if terms cancel each other, or have their size far outside the recording."""
+    largest, size = float(np.abs(target).max()), max(float(np.abs(z).max()), 1e-300)
+    relative = np.abs(amplitudes) * size ** np.array(list(formula.amplitudes.values()), float)
+    terms = np.abs(columns * amplitudes).max()
+    return bool(terms > _CANCELLATION * largest or relative.max() > _EXTRAPOLATION * largest)
 
 
 def _iterate_grid(formula: Formula, z: Array) -> Iterator[dict[str, float]]:

@@ -54,7 +54,7 @@ def _describe_curve(fitted: FittedCurve, drive_unit: str) -> DiscoveredCurve:
         variables=list(at.variables),
         curve=_make_curve(fitted, drive_unit),
         rmse_n=fitted.candidate.held_out_rmse,
-        log_odds=fitted.held_out_log_odds,
+        log_odds=fitted.log_odds,
     )
 
 

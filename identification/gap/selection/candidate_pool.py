@@ -194,6 +194,13 @@ class CandidatePool:
         )
 
     @cached_property
+    def screening_problem(self) -> Problem:
+        """Problem of the data on which further effects are screened."""
+        highest = max(p.excitation.rate for p in self.decimated_problem.pieces)
+        rate = self._resolve_rate(self.settings.screening_rate)
+        return self.decimated_problem.decimate(max(1, round(highest / rate)))
+
+    @cached_property
     def decimated_problem(self) -> Problem:
         """Problem of the decimated data on which sets are searched, as a fast variant."""
         rate = max(p.excitation.rate for p in self.full_problem.pieces)

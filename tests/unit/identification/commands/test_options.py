@@ -68,7 +68,7 @@ def test_the_noise_of_planned_strokes_is_positive(tmp_path):
 def test_a_cross_check_is_run_under_its_present_and_its_former_name(monkeypatch, tmp_path, options, asked):
     given = []
 
-    def record(recordings, simulation, *, seed, cross_check, hold_out, progress):
+    def record(recordings, simulation, *, cross_check, hold_out, **others):
         assert hold_out == HoldOut()
         given.append((recordings, simulation, cross_check))
         raise IdentificationError("not run")

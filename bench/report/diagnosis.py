@@ -1,12 +1,21 @@
 """Diagnosis in a report: its document as far as the report needs it, and the text of its section."""
 
+import shlex
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
 from pydantic import AliasChoices, Field
 
-from bench.report.documents import DocumentPart, read_document
-from bench.report.values import format_force, format_percent, format_quantity, format_significant
+from bench.report.discovery import Discovery, make_discovery_context
+from bench.report.documents import DocumentPart, ParameterValue, read_document
+from bench.report.values import (
+    format_force,
+    format_name,
+    format_percent,
+    format_quantity,
+    format_share,
+    format_significant,
+)
 
 PropertyRows = list[tuple[str, str]]
 
@@ -17,14 +26,8 @@ VERDICTS = {
     "unexplained": "The simulation lacks an effect that no known effect explains.",
 }
 """Sentence for each verdict."""
-
-
-class ParameterValue(DocumentPart):
-    """One parameter of an effect."""
-
-    value: float = Field(description="best value, in `unit`")
-    unit: str = Field(description="SI unit")
-    ci95: tuple[float, float] | None = Field(default=None, description="95 % interval, in `unit`")
+_DOCUMENTS = ("--out", "diagnosis.json", "--twin", "twin.json")
+"""Options of a proposed command that name its documents."""
 
 
 class Effect(DocumentPart):
@@ -47,6 +50,13 @@ class EffectSet(DocumentPart):
     probability: float
 
 
+class HeldOutError(DocumentPart):
+    """Force error on the strokes that the user held out."""
+
+    rmse_n: float
+    nrmse: float
+
+
 class Gap(DocumentPart):
     """Force errors on strokes that no fit used."""
 
@@ -58,6 +68,7 @@ class Gap(DocumentPart):
     shrinkage: float | None = None
     shrinkage_ci95: tuple[float, float] | None = None
     nominal_n: float | None = None
+    held_out: HeldOutError | None = None
 
 
 class MapPoint(DocumentPart):
@@ -102,6 +113,12 @@ class CrossCheck(DocumentPart):
     message: str = Field(validation_alias=AliasChoices("message", "said"))
 
 
+class Provenance(DocumentPart):
+    """Recordings that a diagnosis was made from."""
+
+    logs: dict[str, str]
+
+
 class Diagnosis(DocumentPart):
     """Part of a diagnosis that a report shows."""
 
@@ -114,10 +131,12 @@ class Diagnosis(DocumentPart):
     gap: Gap
     where: GapLocation
     remainder: Remainder | None = None
+    discovery: Discovery | None = None
     next_stroke: NextStroke | None = None
     explanation: str
     cross_check: CrossCheck | None = Field(default=None, validation_alias=AliasChoices("cross_check", "witness"))
     notes: tuple[str, ...] = ()
+    provenance: Provenance | None = None
 
 
 class EffectRow(NamedTuple):
@@ -140,11 +159,6 @@ def read_diagnosis(path: Path) -> Diagnosis:
     return read_document(path, Diagnosis, "a diagnosis written by `mrbench diagnose`")
 
 
-def format_name(name: str) -> str:
-    """Return the name of an effect, stage or parameter without underscores."""
-    return name.replace("_", " ")
-
-
 def join_names(effects: list[str]) -> str:
     """Return the names of a set of effects as text."""
     return " and ".join(map(format_name, effects)) or "the law alone"
@@ -159,10 +173,28 @@ def make_context(diagnosis: Diagnosis, drive_unit: str) -> dict[str, Any]:
         "gap": _make_gap_rows(diagnosis),
         "effects": [_make_effect_row(effect) for effect in diagnosis.effects],
         "sets": _make_set_rows(diagnosis),
+        "discovery": _make_discovery_context(diagnosis),
+        "search_command": _make_search_command(diagnosis),
         "next": _describe_next_stroke(diagnosis.next_stroke, drive_unit),
         "cross_check": diagnosis.cross_check.message if diagnosis.cross_check else "",
         "notes": diagnosis.notes,
     }
+
+
+def _make_discovery_context(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """Return the values for the cause outside the library; None if there is none."""
+    if diagnosis.discovery is None:
+        return None
+    named = [effect.name for effect in diagnosis.effects]
+    return make_discovery_context(diagnosis.discovery, diagnosis.gap.before_n, named)
+
+
+def _make_search_command(diagnosis: Diagnosis) -> str:
+    """Return the command that searches for a cause outside the library; empty with one, or without a gap."""
+    if diagnosis.discovery is not None or diagnosis.verdict not in ("partly_explained", "unexplained"):
+        return ""
+    logs = list(diagnosis.provenance.logs) if diagnosis.provenance else ["LOG"]
+    return shlex.join(["mrbench", "diagnose", *logs, "--discover", *_DOCUMENTS])
 
 
 def _make_gap_rows(diagnosis: Diagnosis) -> PropertyRows:
@@ -175,9 +207,10 @@ def _make_gap_rows(diagnosis: Diagnosis) -> PropertyRows:
     if gap.nominal_n is not None:
         rows.insert(1, ("Force error of the given simulation", format_force(gap.nominal_n)))
     if gap.shrinkage is not None and diagnosis.effects:
-        bounds = gap.shrinkage_ci95
-        interval = f" ({format_percent(bounds[0])} to {format_percent(bounds[1])})" if bounds else ""
-        rows.append(("Part of the gap that they close", f"{format_percent(gap.shrinkage)}{interval}"))
+        rows.append(("Part of the gap that they close", format_share(gap.shrinkage, gap.shrinkage_ci95)))
+    if gap.held_out is not None:
+        errors = f"{format_force(gap.held_out.rmse_n)}, NRMSE {format_percent(gap.held_out.nrmse)}"
+        rows.append(("Force error on the strokes of --hold-out, which no fit and no choice has read", errors))
     if gap.explainable_n is not None and diagnosis.remainder is not None:
         rows.append(("Lowest force error that any model reached", format_force(gap.explainable_n)))
     return [*rows, *_make_remainder_rows(diagnosis.remainder)]
@@ -209,16 +242,10 @@ def _make_effect_row(effect: Effect) -> EffectRow:
         format_name(effect.name),
         format_name(effect.stage),
         values,
-        _format_share(effect),
+        format_share(effect.share, effect.share_ci95),
         format_percent(effect.probability),
         effect.note,
     )
-
-
-def _format_share(effect: Effect) -> str:
-    bounds = effect.share_ci95
-    interval = f" ({format_percent(bounds[0])} to {format_percent(bounds[1])})" if bounds else ""
-    return f"{format_percent(effect.share)}{interval}"
 
 
 def _make_set_rows(diagnosis: Diagnosis) -> PropertyRows:

@@ -1,4 +1,4 @@
-"""Plots of a diagnosis: force errors, probabilities of the stages, gap map."""
+"""Plots of a diagnosis: force errors, probabilities of the stages, gap map, curves outside the library."""
 
 from collections.abc import Sequence
 
@@ -8,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from bench.report.diagnosis import Diagnosis, MapPoint, format_name, join_names
+from bench.report.diagnosis import Diagnosis, MapPoint, join_names
+from bench.report.discovery import DiscoveredCurve, get_quantity, get_variable_unit
 from bench.report.drawing import INK_COLOUR, draw_bars, draw_colour_bar, make_figure, style_axes
-from bench.report.values import format_significant
+from bench.report.values import format_name, format_significant, format_unit
 
 _GAP_COLOUR, _REMAINDER_COLOUR, _PALE_COLOUR = "#b5473c", "#3f7d58", "#c9ced4"
 _LABEL_BOX = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
@@ -52,6 +53,45 @@ def plot_gap_map(diagnosis: Diagnosis, drive_unit: str) -> Figure | None:
     return figure
 
 
+def plot_discovery(diagnosis: Diagnosis, drive_unit: str) -> Figure | None:
+    """Plot the curves of the effects outside the library with their 95 % bands; None without any.
+
+    Args:
+        diagnosis: content of a diagnosis.
+        drive_unit: V or A.
+    """
+    if diagnosis.discovery is None:
+        return None
+    curves = diagnosis.discovery.all_curves
+    figure = make_figure(9.0, 3.1)
+    for axes, found in zip(figure.subplots(1, len(curves), squeeze=False)[0], curves, strict=True):
+        _draw_curve(axes, found, drive_unit)
+    return figure
+
+
+def _draw_curve(axes: Axes, found: DiscoveredCurve, drive_unit: str) -> None:
+    curve = found.curve
+    x_scale, x_unit = _scale_length(get_variable_unit(curve.variable, drive_unit))
+    y_scale, y_unit = _scale_length(format_unit(curve.unit.replace("{drive}", drive_unit)))
+    x = x_scale * np.array(curve.x)
+    if curve.lo is not None and curve.hi is not None:
+        low, high = y_scale * np.array(curve.lo), y_scale * np.array(curve.hi)
+        axes.fill_between(x, low, high, color=_PALE_COLOUR, alpha=0.6, linewidth=0)
+    axes.plot(x, y_scale * np.array(curve.value), color=_GAP_COLOUR, linewidth=1.6)
+    style_axes(
+        axes,
+        f"{format_name(curve.variable)} [{x_unit}]",
+        f"{get_quantity(found, drive_unit)} [{y_unit}]",
+        found.label.replace(" over ", "\nover ", 1),
+    )
+    axes.locator_params(axis="x", nbins=6)
+
+
+def _scale_length(unit: str) -> tuple[float, str]:
+    """Return the factor and the unit in which values are plotted; lengths in millimetres as in all plots."""
+    return (1e3, "mm") if unit == "m" else (1.0, unit)
+
+
 def _draw_gap_map(axes: Axes, rows: Sequence[str], grid: Numbers) -> AxesImage:
     image = axes.imshow(grid, aspect="auto", cmap="OrRd", vmin=0.0, interpolation="nearest")
     axes.set_yticks(range(len(rows)), rows)
@@ -72,6 +112,8 @@ def _list_errors(diagnosis: Diagnosis) -> list[tuple[str, float, str]]:
     if diagnosis.effects:
         named = join_names([effect.name for effect in diagnosis.effects]).replace(" and ", "\nand ")
         errors.append((f"with {named}", gap.after_n, _REMAINDER_COLOUR))
+    if diagnosis.discovery is not None:
+        errors.append(("with the effect\noutside the library", diagnosis.discovery.rmse_n, _REMAINDER_COLOUR))
     return errors
 
 

@@ -29,6 +29,14 @@ class Estimate(DocumentPart):
     note: str = Field(default="", description="note for a person")
 
 
+class ParameterValue(DocumentPart):
+    """One parameter of an effect or symbol of a formula."""
+
+    value: float = Field(description="best value, in `unit`")
+    unit: str = Field(description="SI unit")
+    ci95: tuple[float, float] | None = Field(default=None, description="95 % interval, in `unit`")
+
+
 class DelayEstimate(DocumentPart):
     """Estimate of a residual delay."""
 

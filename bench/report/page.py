@@ -41,6 +41,11 @@ CAPTIONS = {
         "Gap map",
         "Error of the refitted law beyond the noise, by condition and phase of the stroke.",
     ),
+    "discovery": (
+        "Curve of the effect outside the library",
+        "Estimate with its 95 % band, without the factors of further variables."
+        " A part that the law can take up, such as a straight line over displacement, is not determined.",
+    ),
     "recording": (
         "The whole recording",
         "Displacement, drive and force; colours by drive as in the other plots.",
@@ -104,6 +109,9 @@ def make_figures(report: Report) -> dict[str, Figure]:
         figures["gap"] = diagnosis_plots.plot_shrinkage(report.diagnosis)
         if (where := diagnosis_plots.plot_gap_map(report.diagnosis, report.recording.drive_unit)) is not None:
             figures["where"] = where
+        curves = diagnosis_plots.plot_discovery(report.diagnosis, report.recording.drive_unit)
+        if curves is not None:
+            figures["discovery"] = curves
     return {**figures, "recording": plots.plot_recording(report.recording)}
 
 

@@ -1,6 +1,7 @@
 """Formatting of numbers, rounded to their uncertainty and with their unit."""
 
 import math
+import re
 from typing import NamedTuple
 
 _PREFIXES = ((1.0, ""), (1e-3, "m"), (1e-6, "µ"))
@@ -51,6 +52,12 @@ def format_percent(share: float) -> str:
     return f"{format_significant(100 * share, 2)} %"
 
 
+def format_share(share: float, interval: tuple[float, float] | None) -> str:
+    """Format a share in percent with its interval."""
+    bounds = f" ({format_percent(interval[0])} to {format_percent(interval[1])})" if interval else ""
+    return f"{format_percent(share)}{bounds}"
+
+
 def format_drive(drive: float, span: float) -> str:
     """Format a drive [V or A], rounded to a five-hundredth of the drives' span."""
     quantum = 10.0 ** math.floor(math.log10(span / 500)) if span > 0 else 1e-4
@@ -60,7 +67,13 @@ def format_drive(drive: float, span: float) -> str:
 
 def format_unit(unit: str) -> str:
     """Return the typeset unit."""
-    return unit.replace("^n", "ⁿ").replace(" ", "·")
+    powers = re.sub(r"\^(-?\d+)", lambda match: match[1].translate(_SUPERSCRIPT), unit)
+    return powers.replace("^n", "ⁿ").replace(" ", "·")
+
+
+def format_name(name: str) -> str:
+    """Return the name of an effect, stage, place, variable or parameter without underscores."""
+    return name.replace("_", " ")
 
 
 def format_quantity(value: float, interval: tuple[float, float] | None, unit: str) -> FormattedQuantity:

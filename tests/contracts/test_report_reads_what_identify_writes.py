@@ -5,7 +5,8 @@ import typing
 import pytest
 from pydantic import BaseModel
 
-from bench.report import diagnosis, documents
+from bench.report import diagnosis, discovery, documents
+from identification.damper.effects import Place, Variable
 from identification.documents import diagnosis as gap_documents
 from identification.documents import fit
 
@@ -30,3 +31,8 @@ def test_every_key_that_a_report_reads_is_written(name):
 
 def test_every_key_of_a_diagnosis_that_a_report_reads_is_written():
     assert_within(diagnosis.Diagnosis, gap_documents.Diagnosis)
+
+
+def test_a_report_has_a_label_for_every_place_and_a_unit_for_every_variable():
+    assert set(discovery.PLACE_QUANTITIES) == set(typing.get_args(Place))
+    assert set(discovery.VARIABLE_UNITS) == set(typing.get_args(Variable))

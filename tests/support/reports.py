@@ -135,3 +135,25 @@ def fit_document(sha256="", **changes):
 def write_fit(path, sha256="", **changes):
     path.write_text(json.dumps(fit_document(sha256, **changes)))
     return path
+
+
+def discovery_document(**changes):
+    """Return a cause outside the library: a friction that grows with the square of the displacement."""
+    curve = {
+        "variable": "displacement", "unit": "N", "x": [-0.01, 0.0, 0.01], "value": [4.0, 0.0, 4.0],
+        "lo": [3.0, -1.0, 3.0], "hi": [5.0, 1.0, 5.0],
+    }  # fmt: skip
+    found = {
+        "stage": "damper", "place": "parallel_force", "variables": ["displacement", "velocity"], "curve": curve,
+        "rmse_n": 3.1, "log_odds": 40.0, "replaces": ["force_delay"],
+        "formula": {
+            "expression": "sign(velocity)*(a*displacement**2)",
+            "symbols": {"a": {"value": 40000.0, "unit": "N/m^2", "ci95": [39000.0, 41000.0]}},
+        },
+        "definition": {}, "shrinkage": 0.92, "shrinkage_ci95": [0.88, 0.95],
+        "further": [{
+            "stage": "mounting", "place": "mounting", "variables": ["acceleration"],
+            "curve": curve | {"variable": "acceleration", "lo": None, "hi": None}, "rmse_n": 2.8, "log_odds": 9.0,
+        }],
+    }  # fmt: skip
+    return found | changes

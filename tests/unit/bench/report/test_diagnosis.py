@@ -7,7 +7,7 @@ import pytest
 from bench.errors import ReportError
 from bench.report import diagnosis_plots, page
 from bench.report.diagnosis import make_context, read_diagnosis
-from tests.support.reports import write_log
+from tests.support.reports import discovery_document, write_log
 
 STAGES = ("coil", "damper", "mounting", "force_channel", "displacement_channel")
 
@@ -54,6 +54,11 @@ def written(tmp_path):
         return path
 
     return write
+
+
+@pytest.fixture
+def discovery():
+    return discovery_document()
 
 
 def test_the_page_names_the_effect_its_size_and_the_alternatives(written, tmp_path):
@@ -131,3 +136,56 @@ def test_the_map_omits_motions_without_a_frequency(written):
 def test_no_gap_is_closed_without_a_named_effect(written):
     labels = dict(make_context(read_diagnosis(written(effects=[])), "V")["gap"])
     assert "Part of the gap that they close" not in labels
+
+
+def test_strokes_that_the_user_held_out_have_their_own_row(written):
+    gap = document()["gap"] | {"held_out": {"rmse_n": 2.71, "nrmse": 0.034}}
+    rows = dict(make_context(read_diagnosis(written(gap=gap)), "V")["gap"])
+    assert "2.71 N, NRMSE 3.4 %" in rows.values()
+
+
+@pytest.mark.parametrize("verdict", ["partly_explained", "unexplained"])
+def test_a_gap_that_is_not_explained_offers_the_search_outside_the_library(verdict, written, tmp_path):
+    changes = {"verdict": verdict, "provenance": {"logs": {"two strokes.mcap": "", "b.mcap": ""}}}
+    command = "mrbench diagnose 'two strokes.mcap' b.mcap --discover --out diagnosis.json --twin twin.json"
+    path = written(**changes)
+    assert make_context(read_diagnosis(path), "V")["search_command"] == command
+    report = page.gather(write_log(tmp_path / "strokes.mcap"), None, path)
+    text = page.render(report, page.make_figures(report), "mrbench report", datetime(2026, 5, 4, tzinfo=UTC))
+    assert "b.mcap --discover" in text
+    assert "This command searches for one" in text
+
+
+def test_no_search_is_offered_where_the_gap_is_explained_or_a_cause_was_found(written, discovery):
+    assert make_context(read_diagnosis(written()), "V")["search_command"] == ""
+    found = read_diagnosis(written(verdict="unexplained", effects=[], discovery=discovery))
+    assert make_context(found, "V")["search_command"] == ""
+
+
+def test_an_older_document_offers_the_search_without_the_name_of_a_log(written):
+    command = make_context(read_diagnosis(written(verdict="unexplained", effects=[])), "V")["search_command"]
+    assert command.startswith("mrbench diagnose LOG --discover")
+
+
+def test_the_page_shows_a_cause_outside_the_library(written, tmp_path, discovery):
+    report = page.gather(write_log(tmp_path / "strokes.mcap"), None, written(discovery=discovery))
+    figures = page.make_figures(report)
+    assert "discovery" in figures
+    text = page.render(report, figures, "mrbench report", datetime(2026, 5, 4, tzinfo=UTC))
+    for words in (
+        "Cause outside the library",
+        "acts at the place “parallel force”",
+        "falls from 13.2 N to 3.10 N",
+        "added force = sign(velocity)*(a*displacement**2)",
+        "N/m²",
+        "mounting over acceleration",
+        "2.80 N",
+        "95 % band",
+    ):
+        assert words in text, words
+    assert "This command searches for one" not in text
+
+
+def test_the_errors_include_that_with_a_cause_outside_the_library(written, discovery):
+    left = diagnosis_plots.plot_shrinkage(read_diagnosis(written(discovery=discovery))).axes[0]
+    assert [round(bar.get_width(), 3) for bar in left.patches] == [31.0, 13.2, 2.6, 3.1]

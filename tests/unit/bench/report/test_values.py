@@ -46,6 +46,7 @@ def test_forces_shares_and_units_are_written_out():
     assert format_force(2.5331) == "2.53 N"
     assert format_percent(0.00743) == "0.74 %"
     assert format_unit("N s/(m V)") == "N·s/(m·V)"
+    assert format_unit("N/(m/s)^2") == "N/(m/s)²"
     assert format_rounded(-0.2341, 0.036) == "−0.23"
 
 

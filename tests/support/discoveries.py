@@ -43,6 +43,8 @@ GROWING = define(
     "parallel_force", f"(1+g*drive)*a*(displacement/{LENGTH})**2", ("displacement", "drive"), g=6.0, a=30.0
 )
 """Force over the displacement that grows with the drive."""
+SPRING = define("parallel_force", f"a*(displacement/{LENGTH})**2", ("displacement",), a=40.0)
+"""Force over the displacement that does not grow with the drive."""
 MOUNTING = define("mounting", "a*acceleration*abs(acceleration)", ("acceleration",), a=5.0)
 """Force of the mounting, proportional to the square of the acceleration."""
 

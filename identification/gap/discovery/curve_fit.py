@@ -96,20 +96,22 @@ def fit_best_curves(
     """Fit the curves with the largest linear evidence, and return the most probable first.
 
     All are fitted from the end of their linear model. The best of these are also fitted from the regression:
-    without the curve, the law may have moved to values that hide it.
+    without the curve, the law may have moved to values that hide it. So is the curve with the largest linear
+    evidence, because a first fit of a large curve may not leave such values.
     """
     warm = [_continue_linear_model(pool, parent, s) for s in _drop_variants(screened)[:_FITTED_CURVES]]
-    best = sorted(warm, key=lambda f: f.loss)
-    finished = [_finish_fit(pool, f) for f in best[:_FINISHED_CURVES]]
-    simpler = _find_simpler(screened, finished)
+    best = sorted(range(len(warm)), key=lambda i: warm[i].loss)
+    chosen = {0, *best[:_FINISHED_CURVES]}
+    fitted = [_finish_fit(pool, f) if i in chosen else f for i, f in enumerate(warm)]
+    simpler = _find_simpler(screened, fitted)
     if simpler is not None:
-        finished.append(_finish_fit(pool, _continue_linear_model(pool, parent, simpler)))
-    return sorted([*finished, *best[_FINISHED_CURVES:]], key=lambda f: f.loss)
+        fitted.append(_finish_fit(pool, _continue_linear_model(pool, parent, simpler)))
+    return sorted(fitted, key=lambda f: f.loss)
 
 
-def _find_simpler(screened: Sequence[ScreenedCurve], finished: Sequence[FittedCurve]) -> ScreenedCurve | None:
+def _find_simpler(screened: Sequence[ScreenedCurve], fitted: Sequence[FittedCurve]) -> ScreenedCurve | None:
     """Return the best curve without its growth with the drive, if it has one."""
-    at = min(finished, key=lambda f: f.loss).curve.at if finished else None
+    at = min(fitted, key=lambda f: f.loss).curve.at if fitted else None
     if at is None or not at.grows_with_drive:
         return None
     return next((s for s in screened if s.curve.at == (at.place, at.variables[:-1], False)), None)
@@ -193,26 +195,6 @@ def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
     model = _give_prior(curve, max(deviation, _SMALLEST_DEVIATION))
     again = problem.replace_effects((*problem.effects[:-1], model))
     return JointFit(again, minimise(again, unknowns, _ITERATIONS, ignore_progress))
-
-
-def replace_law(problem: Problem, unknowns: Array, law: Array) -> Array:
-    """Return unknowns (U,) with coordinates, delays and y(0) of a law alone, and the effects' values kept."""
-    moved = unknowns.copy()
-    first = problem.layout.effects.start
-    moved[:first] = law[:first]
-    return moved
-
-
-def judge_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, candidate: Candidate) -> FittedCurve:
-    """Return a fitted curve with its block evidence over the set without it."""
-    held_out = pool.evaluation.held_out_samples
-    unseen = [replace(c.residual, valid=c.residual.valid & held_out) for c in (parent, candidate)]
-    return FittedCurve(
-        curve,
-        candidate,
-        parent,
-        compute_evidence(unseen[0], unseen[1], pool.block_length),
-    )
 
 
 def _give_prior(curve: CurveEffect, deviation: float) -> EffectModel:

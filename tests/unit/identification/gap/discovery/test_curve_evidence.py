@@ -28,11 +28,11 @@ def make_model(seed, coefficients=0.0, noise=1.0):
     return J, J[:, LAW] @ random.standard_normal(4) + J[:, CURVE] @ truth + noise * random.standard_normal(SAMPLES)
 
 
-def compute(J, error, correlated=1.0, free=None):
+def compute(J, error, free=None):
     """Return the evidence, from the cost of an error (N,) whose negative is the residual."""
     here = Evaluation(float(error @ error), J.T @ J, -J.T @ error)
     mask = np.ones(J.shape[1], bool) if free is None else free
-    return compute_curve_evidence(SimpleNamespace(free_mask=mask, samples=len(error)), here, CURVE, correlated)
+    return compute_curve_evidence(SimpleNamespace(free_mask=mask, samples=len(error)), here, CURVE)
 
 
 def estimate_variance(J, error):
@@ -81,7 +81,7 @@ def test_an_unknown_that_is_not_free_stays_and_takes_nothing_up():
     without = np.delete(J, 1, axis=1)
     here = Evaluation(float(error @ error), without.T @ without, -without.T @ error)
     problem = SimpleNamespace(free_mask=np.ones(9, bool), samples=SAMPLES)
-    assert found.log_odds == pytest.approx(compute_curve_evidence(problem, here, slice(3, 9), 1.0).log_odds)
+    assert found.log_odds == pytest.approx(compute_curve_evidence(problem, here, slice(3, 9)).log_odds)
 
 
 def test_noise_is_no_evidence():
@@ -100,13 +100,14 @@ def test_what_the_law_takes_up_is_no_evidence(size):
     assert np.abs(J @ found.step - J @ np.linalg.lstsq(J, error + size * J[:, 6], rcond=None)[0]).max() < 1e-3
 
 
-def test_only_independent_samples_count():
-    J, error = make_model(6, 0.5, noise=1.5)
+def test_the_noise_is_what_the_curve_leaves_and_no_less_than_that_of_the_problem():
+    J, error = make_model(6, 2.0, noise=4.0)
     once = compute(J, error)
-    repeated = compute(np.repeat(J, 5, axis=0), np.repeat(error, 5), correlated=5.0)
-    assert repeated.log_odds == pytest.approx(once.log_odds)
-    np.testing.assert_allclose(repeated.step, once.step, rtol=1e-6, atol=1e-9)
-    assert compute(J, error, correlated=5.0).log_odds < 0.5 * once.log_odds
+    # In other units of the noise, odds and curve are the same, as long as more than the noise is left.
+    finer = compute(8.0 * J, 8.0 * error)
+    assert finer.log_odds == pytest.approx(once.log_odds, rel=1e-6)
+    np.testing.assert_allclose(finer.step, once.step, rtol=1e-6, atol=1e-9)
+    assert compute(J / 40.0, error / 40.0).log_odds < 0.5 * once.log_odds
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.9, 0.97])

@@ -1,0 +1,113 @@
+"""Search for a cause outside the library: found at its place, or not at all."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from identification.gap.discovery import curve_fit, discover
+from identification.gap.discovery.curve_effects import CurvePlace
+from identification.gap.discovery.discover import _find_further, _is_accepted, discover_effect
+from tests.support.candidate_pools import NOISE
+from tests.support.discoveries import GAIN, GROWING, MOUNTING, discovered_with, pool_with
+
+OVER_DISPLACEMENT = CurvePlace("damper_gain", ("displacement",))
+
+
+def test_without_an_effect_nothing_is_found():
+    assert discovered_with() is None
+
+
+def test_a_gain_is_found_at_its_place_and_nothing_more():
+    found = discovered_with(GAIN)
+    assert found.fitted.curve.at == OVER_DISPLACEMENT
+    assert found.formula.file.expression == "a*displacement**2+b*displacement**3"
+    assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
+    assert found.further == ()
+
+
+def test_the_reported_set_is_fitted_on_all_samples():
+    found, pool = discovered_with(GAIN), pool_with(GAIN)
+    assert found.candidate.fit.problem.samples == pool.full_problem.samples
+    assert found.formula.candidate.fit.problem.samples < pool.full_problem.samples
+    assert found.candidate.names == {found.formula.file.name}
+
+
+def test_a_search_leaves_the_candidates_of_the_pool_as_they_are():
+    pool = pool_with(GAIN)
+    assert discovered_with(GAIN) is not None
+    assert list(pool.candidates) == [frozenset()]
+
+
+def test_without_a_formula_the_curve_is_reported(monkeypatch):
+    monkeypatch.setattr(discover, "find_formula", lambda pool, fitted: None)
+    monkeypatch.setattr(curve_fit, "_FITTED_CURVES", 1)
+    pool = pool_with(GAIN)
+    found = discover_effect(pool, pool.baseline)
+    assert found.formula is None
+    assert found.candidate.names == {"curve"}
+    assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
+
+
+def test_a_further_place_is_found_in_what_the_first_leaves(monkeypatch):
+    monkeypatch.setattr(curve_fit, "_FITTED_CURVES", 1)
+    pool = pool_with(GROWING, MOUNTING)
+    first = curve_fit.fit_best_curves(pool, pool.baseline, curve_fit.screen_curves(pool, pool.baseline))[0]
+    assert first.curve.at == CurvePlace("parallel_force", ("displacement", "drive"), grows_with_drive=True)
+    (further,) = _find_further(pool, first)
+    assert further.curve.at == CurvePlace("mounting", ("acceleration",))
+    assert further.parent is first.candidate
+    assert first.candidate.held_out_rmse > 2.0 * NOISE
+    assert further.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.06)
+
+
+def test_named_effects_that_are_not_needed_are_left_out(monkeypatch):
+    monkeypatch.setattr(curve_fit, "_FITTED_CURVES", 1)
+    pool = pool_with(GROWING).copy()
+    named = pool.candidates[pool.extend("gas_spring")]
+    found = discover_effect(pool, named)
+    assert named.held_out_rmse < pool.baseline.held_out_rmse
+    assert found.candidate.names == {"discovered_effect"}
+    assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
+
+
+def test_named_effects_that_are_needed_stay(monkeypatch):
+    monkeypatch.setattr(curve_fit, "_FITTED_CURVES", 1)
+    pool = pool_with(GROWING, "moving_mass").copy()
+    named = pool.candidates[pool.extend("moving_mass")]
+    found = discover_effect(pool, named)
+    assert found.candidate.names == {"moving_mass", "discovered_effect"}
+    assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
+
+
+def make_fitted(*, before=4.0, after=2.0, log_odds=20.0, variables=("displacement",)):
+    return SimpleNamespace(
+        parent=SimpleNamespace(held_out_rmse=before, residual=None),
+        candidate=SimpleNamespace(held_out_rmse=after, residual=None),
+        curve=SimpleNamespace(at=CurvePlace("damper_gain", variables)),
+        log_odds=log_odds,
+    )
+
+
+def make_pool(low=0.1, floor=2.0):
+    evaluation = SimpleNamespace(estimate_shares=lambda *arguments: {"curve": (0.5, (low, 0.9))})
+    return SimpleNamespace(floor=floor, evaluation=evaluation)
+
+
+@pytest.mark.parametrize(
+    ("fitted", "pool", "accepted"),
+    [
+        ({}, {}, True),
+        ({"before": 1.9, "after": 1.0}, {}, False),  # no gap
+        ({"log_odds": 2.9}, {}, False),
+        ({"log_odds": 3.1}, {}, True),
+        ({"log_odds": 3.1, "variables": ("displacement", "velocity")}, {}, False),
+        ({"log_odds": 6.1, "variables": ("displacement", "velocity")}, {}, True),
+        ({"after": np.sqrt(16.0 - 0.21 * 12.0)}, {}, True),
+        ({"after": np.sqrt(16.0 - 0.19 * 12.0)}, {}, False),
+        ({}, {"low": 0.0}, False),
+        ({}, {"low": -0.1}, False),
+    ],
+)
+def test_a_curve_is_accepted_if_it_closes_a_fifth_of_the_gap_beyond_chance(fitted, pool, accepted):
+    assert _is_accepted(make_pool(**pool), make_fitted(**fitted)) == accepted

@@ -176,5 +176,9 @@ def _divide_unit(unit: str, divisor: str, power: int) -> str:
     """Return a unit divided by a power of another."""
     if not power:
         return unit
+    if divisor == unit:
+        unit, power = "1", power - 1
+    if not power:
+        return unit
     divisor = f"({divisor})" if "/" in divisor else divisor
     return f"{unit}/{divisor}" + (f"^{power}" if power > 1 else "")

@@ -16,7 +16,7 @@ from identification.gap.discovery.curve_evidence import (
 )
 
 LAW, CURVE = slice(0, 4), slice(4, 10)
-SAMPLES = 120
+SAMPLES = 40
 
 
 def make_model(seed, coefficients=0.0, noise=1.0):

@@ -5,7 +5,7 @@ probable one is kept if it closes part of the gap on strokes that no fit used. A
 if it does as well. What is left is searched once more.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, screen_curves
 from identification.gap.discovery.formula_fit import FittedFormula, find_formula
@@ -47,7 +47,9 @@ def discover_effect(pool: CandidatePool, named: Candidate) -> DiscoveredEffect |
     best = min(accepted, key=lambda f: f.loss)
     formula = find_formula(pool, best)
     chosen = pool.refit_all_samples(formula.candidate if formula else best.candidate)
-    return DiscoveredEffect(best, formula, chosen, _find_further(pool, best))
+    # The curve that is reported belongs to the law that is reported.
+    reported = best if formula else replace(best, candidate=chosen)
+    return DiscoveredEffect(reported, formula, chosen, _find_further(pool, best))
 
 
 def _find_curves(pool: CandidatePool, parent: Candidate) -> list[FittedCurve]:

@@ -11,11 +11,13 @@ from identification.documents.diagnosis import EffectSet, EffectValue, NamedEffe
 from identification.errors import IdentificationError
 from identification.fitting.damper_model import make_effect_entries, read_damper_model
 from identification.gap.outcome.explanation import (
+    describe_discovery,
     describe_nearest,
     explain_diagnosis,
     suggest_check,
     summarise_diagnosis,
 )
+from tests.support.discovery_documents import make_discovery
 from tests.support.gaps import GAP
 
 MASS = NamedEffect(
@@ -122,5 +124,32 @@ def test_a_gap_of_noise_needs_nothing():
 )
 def test_a_summary_has_effects_errors_and_cross_check_in_one_line(effects, gap, message, summary):
     check = message and SimpleNamespace(message=message)
-    diagnosis = SimpleNamespace(verdict="explained", effects=effects, gap=gap, cross_check=check)
+    diagnosis = SimpleNamespace(verdict="explained", effects=effects, gap=gap, cross_check=check, discovery=None)
     assert summarise_diagnosis(diagnosis) == f"explained: {summary}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({}, "the formula a*displacement**2 at the damper gain, over displacement,"),
+        ({"formula": None}, "an estimated curve at the damper gain, over displacement,"),
+        (
+            {"formula": None, "place": "parallel_force", "variables": ["travel_since_rest", "velocity", "drive"]},
+            "an estimated curve at the parallel force, over travel since rest and velocity and drive,",
+        ),
+    ],
+)
+def test_a_cause_outside_the_library_is_described_with_its_place_and_errors(changes, text):
+    note = describe_discovery(make_discovery(**changes), 12.0)
+    assert note == f"outside the library: {text} reduces the error on held-out strokes from 12 to 2.75 N"
+
+
+def test_a_summary_has_the_cause_outside_the_library_before_the_cross_check():
+    diagnosis = SimpleNamespace(
+        verdict="unexplained", effects=[], gap=GAP, cross_check=SimpleNamespace(message="Checked."),
+        discovery=make_discovery(),
+    )  # fmt: skip
+    summary = summarise_diagnosis(diagnosis)
+    assert f"shrinkage 0.98; {describe_discovery(make_discovery(), 12.0)}. Checked" in summary
+    diagnosis.discovery = None
+    assert "outside the library" not in summarise_diagnosis(diagnosis)

@@ -1,5 +1,6 @@
 """Decisions of the report, from stand-ins of candidates, posterior and recording."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,10 +12,12 @@ from identification.gap.data.cycles import Cycles, StrokeCondition
 from identification.gap.data.residual_map import Residual
 from identification.gap.data.shrinkage import Shrinkage
 from identification.gap.fits.candidate import Candidate
+from identification.gap.outcome import report
 from identification.gap.outcome.explainable_share import Explained
 from identification.gap.outcome.report import ReportBuilder
 from identification.gap.selection.posterior import Posterior
 from identification.noise.noise_floor import NoiseFloorEstimate
+from tests.support.discovery_documents import make_discovery
 
 FLOOR = 2.0
 NONE, SPRING = frozenset(), frozenset({"gas_spring"})
@@ -218,3 +221,49 @@ def test_the_limits_are_those_of_the_recording(recorded, frequency):
     assert (limits.frequency, limits.drives) == (frequency, (0.1, 0.6))
     # Three of two thousand samples are faster than the quantile of 99.9 %.
     assert limits.velocity == pytest.approx(9.0)
+
+
+VERDICTS = ("no_gap", "explained", "partly_explained", "unexplained")
+OFFER = "the option --discover searches for a cause outside the library"
+NEEDLESS = "no cause outside the library was searched for, because nothing is left to explain"
+NO_CURVE = "no curve at any place closes part of the gap on held-out strokes, so none is reported"
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+@pytest.mark.parametrize("discovers", [False, True])
+def test_a_note_offers_the_search_or_has_its_result(verdict, discovers):
+    builder = replace(make_builder(), discovers=discovers)
+    is_open = verdict in ("partly_explained", "unexplained")
+    expected = {(False, False): [], (False, True): [OFFER], (True, False): [NEEDLESS], (True, True): [NO_CURVE]}
+    assert builder._describe_search(verdict, None) == expected[discovers, is_open]
+    if discovers and is_open:
+        (note,) = builder._describe_search(verdict, make_discovery())
+        assert "the formula a*displacement**2 at the damper gain" in note
+        assert "from 6 to 2.75 N" in note
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+@pytest.mark.parametrize("discovers", [False, True])
+def test_a_cause_is_searched_for_if_it_is_wanted_and_something_is_left(monkeypatch, verdict, discovers):
+    builder, asked = replace(make_builder(), discovers=discovers), []
+    monkeypatch.setattr(report, "discover_effect", lambda *arguments: asked.append(arguments) or "found")
+    named = builder.pool.baseline
+    found = builder._discover(verdict, named)
+    if discovers and verdict in ("partly_explained", "unexplained"):
+        assert (found, asked) == ("found", [(builder.pool, named)])
+    else:
+        assert (found, asked) == (None, [])
+
+
+def test_without_a_cause_there_is_no_document():
+    assert make_builder()._build_discovery(None, None) is None
+
+
+def test_the_shrinkage_of_a_cause_is_that_of_its_own_set(monkeypatch):
+    builder = make_builder()
+    found = SimpleNamespace(candidate=builder.pool.candidates[SPRING])
+    monkeypatch.setattr(report, "build_discovery", lambda *arguments: arguments)
+    given, named, shrinkage, unit = builder._build_discovery(found, builder.pool.baseline)
+    assert (given, named, unit) == (found, builder.pool.baseline, "V")
+    # The input noise of the set counts, which the law alone does not have.
+    assert shrinkage.after == 1.0

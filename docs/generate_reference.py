@@ -35,6 +35,7 @@ from identification.documents import (
     Twin,
 )
 from identification.pinn.common import DenseSettings, ElementSettings
+from sim_rig.hidden_effect import Truth
 from sim_rig.scenario import Scenario
 from sim_rig.trial.cases import Seal, SealedTruth
 from sim_rig.trial.scoring import TrialReport
@@ -54,6 +55,7 @@ DOCUMENTS: dict[str, type[BaseModel]] = {
     "scenario": Scenario,
     "trend": Trend,
     "trial": TrialReport,
+    "truth": Truth,
 }
 """Type of each document by the name of its schema file."""
 

@@ -5,6 +5,7 @@ SimRigError
 ├── CommandsError   the commands to play are not a uniform record of displacement and drive
 ├── PlantError      the specimen of the scenario has no finite motion under these commands
 ├── WireError       a wire of the rig cannot be opened, or its address cannot be published
+├── TruthError      a truth file cannot be written, or would replace another file
 └── TrialError      a blind trial cannot continue: its seal is broken, or a recording failed
 
 ``exit_code`` tells the command line that the message is for a person and needs no traceback.
@@ -31,6 +32,10 @@ class PlantError(SimRigError):
 
 class WireError(SimRigError):
     """A wire of the rig cannot be opened, or its address cannot be published."""
+
+
+class TruthError(SimRigError):
+    """A truth file cannot be written, or would replace another file."""
 
 
 class TrialError(SimRigError):

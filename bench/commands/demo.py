@@ -8,21 +8,25 @@ import typer
 
 def demo(
     quick: Annotated[
-        bool, typer.Option("--quick", help="Use a shorter method, and record no validation strokes.")
+        bool, typer.Option("--quick", help="Use a shorter method, and record no second run for the twin.")
     ] = False,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for all results.")] = Path("runs/demo"),
     serve: Annotated[
         bool, typer.Option("--serve", help="Keep the bench and its page running afterwards.")
     ] = False,
+    seed: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Seed of the hidden effect; the same seed hides the same one.")
+    ] = 1,
 ) -> None:
-    """Start a simulated bench and demonstrate a complete test.
+    """Start a simulated bench whose damper has a hidden effect, and find it.
 
-    Records strokes at six drives over the instruments' wires, identifies the damper, predicts validation strokes,
-    diagnoses the sim-to-real gap, and writes a report.
+    Records strokes at six drives over the instruments' wires, identifies the damper, diagnoses the sim-to-real
+    gap, and plays the twin on a second recording. Only then it opens the truth, and states whether the name was
+    right.
     """
     from rich.console import Console
 
     from bench.demo import Demo, DemoFolder
 
-    folder = DemoFolder(out, "quick", None) if quick else DemoFolder(out, "six_voltages", "validation")
+    folder = DemoFolder(out, "quick", None, seed) if quick else DemoFolder(out, "six_voltages", "validation", seed)
     Demo(folder, Console(stderr=True)).run(Console(), serve=serve)

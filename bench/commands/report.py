@@ -17,6 +17,14 @@ def report(
         Path | None,
         typer.Option(metavar="DIAGNOSIS", help="Diagnosis of the sim-to-real gap, written by `diagnose`."),
     ] = None,
+    truth: Annotated[
+        Path | None,
+        typer.Option(metavar="TRUTH", help="Truth file of `sim --draw`, to be compared with the diagnosis."),
+    ] = None,
+    unseen: Annotated[
+        Path | None,
+        typer.Option(metavar="PREDICTION", help="With --truth: prediction of another recording by the twin."),
+    ] = None,
     plots: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the plots to this folder, as SVG and PNG.")
     ] = None,
@@ -33,10 +41,15 @@ def report(
 
     if str(out) == "-":
         raise typer.BadParameter("a page cannot be printed; give a file: --out report.html")
-    command = ["mrbench", "report", str(log), *(["--fit", str(fit)] if fit else [])]
-    command += [*(["--diagnosis", str(diagnosis)] if diagnosis else []), "--out", str(out)]
-    command += ["--plots", str(plots)] if plots else []
-    content = gather(log, fit, diagnosis)
+    if truth is not None and diagnosis is None:
+        raise typer.BadParameter("--truth is compared with a diagnosis; add --diagnosis FILE")
+    if unseen is not None and truth is None:
+        raise typer.BadParameter("--unseen is shown next to the truth; add --truth FILE")
+    documents = {"--fit": fit, "--diagnosis": diagnosis, "--truth": truth, "--unseen": unseen}
+    command = ["mrbench", "report", str(log)]
+    for option, path in {**documents, "--out": out, "--plots": plots}.items():
+        command += [option, str(path)] if path else []
+    content = gather(log, fit, diagnosis, truth, unseen)
     figures = make_figures(content)
     page = render(content, figures, shlex.join(command), datetime.now(UTC))
     if plots is not None:

@@ -11,7 +11,7 @@ from bench.demo.api_client import ApiClient
 from bench.demo.folder import DemoFolder
 from bench.demo.processes import start_processes
 from bench.demo.recording import await_fit, record
-from bench.demo.summary import summarise
+from bench.demo.summary import print_answer, print_files, print_truth
 from bench.errors import ReportError, RunError
 from bench.processes import MRBENCH_COMMAND
 from bench.progress import show_progress
@@ -27,10 +27,10 @@ class Demo:
 
     def __init__(self, folder: DemoFolder, progress_console: Console) -> None:
         self._folder, self._progress_console = folder, progress_console
-        self._step, self._steps = 0, 4 if folder.validation_method is None else 7
+        self._step, self._steps = 0, 6 if folder.validation_method is None else 8
 
     def run(self, console: Console, *, serve: bool) -> None:
-        """Execute all steps and print a summary.
+        """Execute all steps and print the answer, then the truth. Only then is the truth file opened.
 
         Args:
             console: console for the results.
@@ -41,35 +41,38 @@ class Demo:
             RunError: a process, a run or a command failed; the message names it and the reason.
         """
         self._make_folder()
-        self._announce("start simulated rig, agent, service and worker")
+        self._announce(
+            f"start simulated rig with a hidden effect (seed {self._folder.seed}), agent, service, worker"
+        )
         with _handle_termination(), start_processes(self._folder) as page:
-            api = ApiClient(page)
-            self._record_and_fit(api)
-            if self._folder.diagnosis is not None:
-                self._announce("diagnose the sim-to-real gap")
-                _run_mrbench("diagnose", self._folder.log, "--out", self._folder.diagnosis)
+            self._find_effect(ApiClient(page))
+            print_answer(self._folder, console)
+            self._announce("open the truth")
+            print_truth(self._folder, console)
             self._announce("write the report")
             self._write_report()
-            summarise(self._folder, console)
+            print_files(self._folder, console)
             if serve:
                 console.print(
                     f"\nthe bench keeps running: {page}\nCtrl-C stops it", soft_wrap=True, highlight=False
                 )
                 _wait_for_interrupt()
 
-    def _record_and_fit(self, api: ApiClient) -> None:
-        """Record and identify; then record validation strokes and predict them."""
+    def _find_effect(self, api: ApiClient) -> None:
+        """Record, identify and diagnose; then record validation strokes and play the twin on them."""
         folder = self._folder
         run = self._record(api, folder.method)
         api.download(f"/runs/{run}/log", folder.log)
         self._announce("identify the damper")
         await_fit(api, run)
         api.download(f"/runs/{run}/fit", folder.fit)
+        self._announce("diagnose the sim-to-real gap")
+        _run_mrbench("diagnose", folder.log, "--out", folder.diagnosis, "--twin", folder.twin)
         if folder.validation_method is not None and folder.validation_log is not None:
             run = self._record(api, folder.validation_method)
             api.download(f"/runs/{run}/log", folder.validation_log)
-            self._announce("predict the validation strokes")
-            _run_mrbench("predict", folder.fit, folder.validation_log, "--out", folder.prediction)
+            self._announce("play the twin on the validation strokes")
+            _run_mrbench("predict", folder.twin, folder.validation_log, "--out", folder.prediction)
 
     def _record(self, api: ApiClient, method: str) -> str:
         self._announce(f"record {method} over the wires")
@@ -78,10 +81,9 @@ class Demo:
 
     def _write_report(self) -> None:
         folder = self._folder
-        diagnosis = () if folder.diagnosis is None else ("--diagnosis", folder.diagnosis)
-        _run_mrbench(
-            "report", folder.log, "--fit", folder.fit, *diagnosis, "--out", folder.report, "--plots", folder.plots
-        )
+        unseen = () if folder.prediction is None else ("--unseen", folder.prediction)
+        answer = ("--fit", folder.fit, "--diagnosis", folder.diagnosis, "--truth", folder.truth, *unseen)
+        _run_mrbench("report", folder.log, *answer, "--out", folder.report, "--plots", folder.plots)
 
     def _make_folder(self) -> None:
         try:

@@ -13,6 +13,8 @@ class DemoFolder:
     """Method of the recording for the fit."""
     validation_method: str | None
     """Method of the validation strokes; None to record none."""
+    seed: int
+    """Seed of the hidden effect."""
 
     @property
     def log(self) -> Path:
@@ -30,14 +32,24 @@ class DemoFolder:
         return self.path / "fit.json"
 
     @property
-    def prediction(self) -> Path:
-        """Prediction of the validation strokes."""
-        return self.path / "prediction.json"
+    def prediction(self) -> Path | None:
+        """Prediction of the validation strokes by the twin."""
+        return None if self.validation_method is None else self.path / "prediction.json"
 
     @property
-    def diagnosis(self) -> Path | None:
-        """Diagnosis document; None in the short demo, because a diagnosis may take a minute."""
-        return None if self.validation_method is None else self.path / "diagnosis.json"
+    def diagnosis(self) -> Path:
+        """Diagnosis document."""
+        return self.path / "diagnosis.json"
+
+    @property
+    def twin(self) -> Path:
+        """Scenario of the damper with the named effects."""
+        return self.path / "twin.json"
+
+    @property
+    def truth(self) -> Path:
+        """Truth file of the simulated rig, which the demo opens last."""
+        return self.path / "truth.json"
 
     @property
     def report(self) -> Path:

@@ -25,7 +25,7 @@ _POLL_PERIOD = 0.1
 
 @contextlib.contextmanager
 def start_processes(folder: DemoFolder) -> Iterator[str]:
-    """Run simulated rig, agent, service and worker while the context lasts.
+    """Run simulated rig with a hidden effect, agent, service and worker while the context lasts.
 
     Args:
         folder: folder for their files and output.
@@ -40,7 +40,8 @@ def start_processes(folder: DemoFolder) -> Iterator[str]:
         # The file of an earlier demo contains closed ports. If it cannot be deleted, the rig reports that itself.
         with contextlib.suppress(OSError):
             folder.rig.unlink(missing_ok=True)
-        rig = stack.enter_context(_start_process(["sim", "--out", str(folder.rig)], folder.path / "rig.log"))
+        sim = ["sim", "--draw", str(folder.seed), "--truth", str(folder.truth), "--out", str(folder.rig)]
+        rig = stack.enter_context(_start_process(sim, folder.path / "rig.log"))
         _wait_until_ready(rig, folder.path / "rig.log", folder.rig.is_file)
         _configure(folder)
         stack.callback(_shut_down_agent, folder.config)

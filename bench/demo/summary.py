@@ -11,36 +11,66 @@ from rich.table import Table
 from bench.demo.folder import DemoFolder
 from bench.log import read_log
 from bench.report import (
-    VERDICTS,
     Fit,
     Prediction,
     format_force,
     format_quantity,
     format_ratio,
+    judge,
+    make_answer_rows,
+    make_truth_rows,
     read_diagnosis,
     read_fit,
     read_prediction,
+    read_truth,
 )
 
 
-def summarise(demo: DemoFolder, console: Console) -> None:
-    """Print errors, parameters, diagnosis and files.
+def print_answer(demo: DemoFolder, console: Console) -> None:
+    """Print errors, parameters, and the answer of the diagnosis.
 
     Raises:
         ReportError: a file is not a valid document.
     """
-    fit = read_fit(demo.fit)
-    prediction = read_prediction(demo.prediction) if demo.validation_method is not None else None
-    for table in (_make_error_table(fit, prediction), _make_parameter_table(fit)):
+    fit, unseen = read_fit(demo.fit), _read_unseen(demo)
+    for table in (_make_error_table(fit, unseen), _make_parameter_table(fit)):
         console.print(table)
-    if demo.diagnosis is not None:
-        diagnosis = read_diagnosis(demo.diagnosis)
-        console.print(f"{VERDICTS[diagnosis.verdict]} {diagnosis.explanation}\n", highlight=False)
     for path in filter(None, (demo.log, demo.validation_log)):
         if message := describe_late_setpoints(read_log(path).events):
             console.print(f"{path.name}: {message}\n", highlight=False)
+    diagnosis = read_diagnosis(demo.diagnosis)
+    console.print(f"{diagnosis.explanation}\n", highlight=False)
+    _print_rows("Answer of the diagnosis", make_answer_rows(diagnosis, unseen), console)
+
+
+def print_truth(demo: DemoFolder, console: Console) -> None:
+    """Open the truth file; print the true effect, and whether the diagnosis named it.
+
+    Raises:
+        ReportError: a file is not a valid document.
+    """
+    truth = read_truth(demo.truth)
+    _print_rows("Truth, opened only now", make_truth_rows(truth), console)
+    console.print(judge(read_diagnosis(demo.diagnosis), truth).text, style="bold", highlight=False)
+    console.print(f"Another hidden effect: mrbench demo --seed {demo.seed + 1}\n", highlight=False)
+
+
+def print_files(demo: DemoFolder, console: Console) -> None:
+    """Print the files of a demonstration."""
     for name, path, note in _list_files(demo):
         console.print(f"  {name:<15} {path}  {note}".rstrip(), highlight=False, soft_wrap=True)
+
+
+def _read_unseen(demo: DemoFolder) -> Prediction | None:
+    return None if demo.prediction is None else read_prediction(demo.prediction)
+
+
+def _print_rows(title: str, rows: Sequence[tuple[str, str]], console: Console) -> None:
+    """Print a title and one line for each row, unbroken, so that a script can read them."""
+    console.print(title, style="bold", highlight=False)
+    for name, text in rows:
+        console.print(f"  {name}: {text}", highlight=False, soft_wrap=True)
+    console.print()
 
 
 def describe_late_setpoints(events: Sequence[Mapping[str, Any]]) -> str:
@@ -55,10 +85,12 @@ def describe_late_setpoints(events: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _make_error_table(fit: Fit, prediction: Prediction | None) -> Table:
-    rows = [("fitted", fit.rmse_n.train, fit.noise_floor_n)]
-    if prediction is not None:
-        rows.append(("validation", prediction.rmse_n, prediction.noise_floor_n))
+def _make_error_table(fit: Fit, unseen: Prediction | None) -> Table:
+    rows = [("fitted, law alone", fit.rmse_n.train, fit.noise_floor_n)]
+    if unseen is not None:
+        if unseen.before_n is not None:
+            rows.append(("validation, law alone", unseen.before_n, unseen.noise_floor_n))
+        rows.append(("validation, twin", unseen.rmse_n, unseen.noise_floor_n))
     table = _make_table(f"Force error of {fit.specimen}", ["strokes", "RMSE", "noise floor", "RMSE over floor"])
     for strokes, rmse, floor in rows:
         table.add_row(strokes, format_force(rmse), format_force(floor), format_ratio(rmse / floor))
@@ -88,8 +120,7 @@ def _list_files(demo: DemoFolder) -> list[tuple[str, Path, str]]:
         ("fit", demo.fit, "(also contains the paper's fourteen parameters)"),
         ("recording", demo.log, "(open in Foxglove, Lichtblick or PlotJuggler; plot /bench/sample)"),
     ]
-    if demo.diagnosis is not None:
-        files.append(("diagnosis", demo.diagnosis, ""))
-    if demo.validation_log is not None:
+    files += [("diagnosis", demo.diagnosis, ""), ("twin", demo.twin, "(mrbench sim --scenario plays it)")]
+    if demo.validation_log is not None and demo.prediction is not None:
         files += [("validation", demo.validation_log, ""), ("prediction", demo.prediction, "")]
-    return files
+    return [*files, ("truth", demo.truth, "(the hidden effect)")]

@@ -138,6 +138,7 @@ class Prediction(DocumentPart):
     per_drive: list[DriveError]
     samples: int = Field(description="number of samples")
     freed: list[str] = Field(description="quantities that were estimated on this log")
+    before_n: float | None = Field(default=None, description="of a twin: force error without its effects, in N")
 
 
 DocumentT = TypeVar("DocumentT", bound=DocumentPart)

@@ -15,10 +15,11 @@ from bench.errors import ReportError
 from bench.log import Log, read_log
 from bench.report import content, diagnosis, diagnosis_plots, plots
 from bench.report.diagnosis import Diagnosis, read_diagnosis
-from bench.report.documents import Fit, Prediction, read_fit
+from bench.report.documents import Fit, Prediction, read_fit, read_prediction
 from bench.report.recording import Recording, make_recording
 from bench.report.series import predict
 from bench.report.summary import make_findings
+from bench.report.truth import Truth, judge, make_answer_rows, make_truth_rows, read_truth
 from bench.report.values import format_force, format_percent, format_rounded
 
 CAPTIONS = {
@@ -74,6 +75,9 @@ class Report:
     prediction: Prediction | None
     recording: Recording
     diagnosis: Diagnosis | None = None
+    truth: Truth | None = None
+    unseen: Prediction | None = None
+    """The twin on a recording that no fit has read."""
 
     @property
     def is_fitted_log(self) -> bool:
@@ -81,11 +85,24 @@ class Report:
         return self.fit is not None and self.fit.has_fitted(self.sha256)
 
 
-def gather(log: Path, fit: Path | None, diagnosis_path: Path | None = None) -> Report:
-    """Read a log, a fit and a diagnosis, and simulate the fit on the log.
+def gather(
+    log: Path,
+    fit: Path | None,
+    diagnosis_path: Path | None = None,
+    truth: Path | None = None,
+    unseen: Path | None = None,
+) -> Report:
+    """Read a log and the documents on it, and simulate the fit on the log.
+
+    Args:
+        log: recording.
+        fit: fit document.
+        diagnosis_path: diagnosis document.
+        truth: truth file of a drawn damper, which is compared with the diagnosis.
+        unseen: prediction document of the diagnosed twin on another recording.
 
     Raises:
-        ReportError: the fit or the diagnosis is invalid, or the fit cannot be simulated on this log.
+        ReportError: a document is invalid, or the fit cannot be simulated on this log.
         LogError: the log cannot be read.
     """
     fit_document = None if fit is None else read_fit(fit)
@@ -95,7 +112,16 @@ def gather(log: Path, fit: Path | None, diagnosis_path: Path | None = None) -> R
     with log.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     recording = make_recording(content_of_log, series)
-    return Report(content_of_log, sha256, fit_document, prediction, recording, diagnosis_document)
+    return Report(
+        content_of_log,
+        sha256,
+        fit_document,
+        prediction,
+        recording,
+        diagnosis_document,
+        None if truth is None else read_truth(truth),
+        None if unseen is None else read_prediction(unseen),
+    )
 
 
 def make_figures(report: Report) -> dict[str, Figure]:
@@ -144,6 +170,7 @@ def render(report: Report, figures: dict[str, Figure], command: str, created_at:
         outcome=content.make_outcome_rows(report.log),
         channels=content.make_channel_rows(report.log),
         diagnosis=None if found is None else diagnosis.make_context(found, report.recording.drive_unit),
+        truth=_make_truth_context(report),
         fit=None if report.fit is None else _make_fit_context(report),
         created_at=f"{created_at:%Y-%m-%d %H:%M} UTC",
         version=version("mrbench"),
@@ -154,6 +181,14 @@ def render(report: Report, figures: dict[str, Figure], command: str, created_at:
 def _make_title(log: Log) -> str:
     specimen = log.metadata["run"].get("specimen", "")
     return log.path.stem if specimen in ("", "unknown") else specimen
+
+
+def _make_truth_context(report: Report) -> dict[str, object] | None:
+    """Return the truth of a drawn damper next to the answer; None where one of the two is missing."""
+    if report.truth is None or report.diagnosis is None:
+        return None
+    rows = [*make_answer_rows(report.diagnosis, report.unseen), *make_truth_rows(report.truth)]
+    return {"rows": rows, "judgement": judge(report.diagnosis, report.truth)}
 
 
 def _make_fit_figures(prediction: Prediction, is_fitted_log: bool) -> list[tuple[str, str]]:

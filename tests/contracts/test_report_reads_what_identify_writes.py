@@ -5,10 +5,11 @@ import typing
 import pytest
 from pydantic import BaseModel
 
-from bench.report import diagnosis, discovery, documents
+from bench.report import diagnosis, discovery, documents, truth
 from identification.damper.effects import Place, Variable
 from identification.documents import diagnosis as gap_documents
 from identification.documents import fit
+from sim_rig import hidden_effect
 
 
 def find_document_type(annotation):
@@ -31,6 +32,10 @@ def test_every_key_that_a_report_reads_is_written(name):
 
 def test_every_key_of_a_diagnosis_that_a_report_reads_is_written():
     assert_within(diagnosis.Diagnosis, gap_documents.Diagnosis)
+
+
+def test_every_key_of_a_truth_that_a_report_reads_is_written():
+    assert_within(truth.Truth, hidden_effect.Truth)
 
 
 def test_a_report_has_a_label_for_every_place_and_a_unit_for_every_variable():

@@ -72,7 +72,7 @@ def series(error=2.0, held_out=False):
     return ForceSeries({**arrays, "stretch": np.zeros(len(held), np.int64)})
 
 
-def prediction(rmse=2.0, floor=1.9):
+def prediction(rmse=2.0, floor=1.9, before_n=None):
     drives = [
         {"drive": 0.10003, "unit": "V", "rmse_n": rmse, "nrmse": 0.021, "samples": 1500},
         {"drive": 0.29998, "unit": "V", "rmse_n": 1.1 * rmse, "nrmse": 0.012, "samples": 1500},
@@ -87,6 +87,7 @@ def prediction(rmse=2.0, floor=1.9):
             "per_drive": drives,
             "samples": 3000,
             "freed": ["y0 of each stretch"],
+            "before_n": before_n,
         }
     )
 

@@ -14,6 +14,7 @@ from sim_rig.trial.cases.truth import (
     read_sealed_truth,
     write_sealed_truth,
 )
+from sim_rig.trial.cases.values import ValueRange, compute_measures, draw_value, draw_values
 
 __all__ = [
     "GRID_RATIOS",
@@ -30,9 +31,13 @@ __all__ = [
     "TrialFolder",
     "TrialKind",
     "TrueCase",
+    "ValueRange",
+    "compute_measures",
     "compute_noise_floor",
     "draw_cases",
     "draw_grid",
+    "draw_value",
+    "draw_values",
     "make_method_document",
     "make_strokes",
     "read_sealed_truth",

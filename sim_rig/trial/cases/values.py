@@ -74,11 +74,12 @@ def draw_values(form: str, random: np.random.Generator, measures: Mapping[str, f
     ranges = RANGES.get(form, {})
     for quantity in FORMS[form].parameters:
         span = ranges.get(quantity.symbol)
-        value = quantity.scale if span is None else _draw_value(span, random) * measures[span.measure]
+        value = quantity.scale if span is None else draw_value(span, random) * measures[span.measure]
         values[quantity.symbol] = float(min(max(value, quantity.low), quantity.high))
     return values
 
 
-def _draw_value(span: ValueRange, random: np.random.Generator) -> float:
+def draw_value(span: ValueRange, random: np.random.Generator) -> float:
+    """Draw a value of a range, in units of its measure."""
     size = float(np.exp(random.uniform(np.log(span.low), np.log(span.high))))
     return size * float(random.choice([-1.0, 1.0])) if span.signed else size

@@ -24,7 +24,14 @@ def test_a_recording_without_alarms_on_late_setpoints_has_no_description():
 
 def test_errors_are_listed_for_fit_and_validation_as_a_multiple_of_their_floor():
     fit = Fit.model_validate(fit_document())
-    table = _make_error_table(fit, prediction(rmse=4.0, floor=2.0))
+    table = _make_error_table(fit, prediction(rmse=4.0, floor=2.0, before_n=8.0))
     rows = list(zip(*(column.cells for column in table.columns), strict=True))
-    assert rows == [("fitted", "1.98 N", "1.90 N", "1.04 times"), ("validation", "4.00 N", "2.00 N", "2.00 times")]
+    fitted = ("fitted, law alone", "1.98 N", "1.90 N", "1.04 times")
+    twin = ("validation, twin", "4.00 N", "2.00 N", "2.00 times")
+    assert rows == [fitted, ("validation, law alone", "8.00 N", "2.00 N", "4.00 times"), twin]
     assert _make_error_table(fit, None).row_count == 1
+
+
+def test_a_twin_without_effects_has_one_row():
+    table = _make_error_table(Fit.model_validate(fit_document()), prediction())
+    assert table.row_count == 2

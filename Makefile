@@ -10,7 +10,7 @@ TEST_OPTIONS ?=
 .PHONY: help install demo test unit wire check coverage faults bench clean
 
 help:
-	@echo "make demo      records six voltages on the simulated rig, identifies the damper, writes the report"
+	@echo "make demo      hides an effect in the simulated damper, finds it from a recording, discloses the truth"
 	@echo "make test      style, types, import contracts, all tests and the wire tests, one closing line"
 	@echo "make unit      all tests but those on wires"
 	@echo "make wire      the drivers against the simulated instruments over their real protocols"

@@ -5,7 +5,7 @@ from bench.report.documents import Fit, Prediction, read_fit, read_prediction
 from bench.report.page import gather, make_figures, render
 from bench.report.plots import save_figures
 from bench.report.truth import Truth, judge, make_answer_rows, make_truth_rows, read_truth
-from bench.report.values import format_force, format_quantity, format_ratio
+from bench.report.values import format_force, format_percent, format_quantity, format_ratio
 
 __all__ = [
     "VERDICTS",
@@ -13,6 +13,7 @@ __all__ = [
     "Prediction",
     "Truth",
     "format_force",
+    "format_percent",
     "format_quantity",
     "format_ratio",
     "gather",

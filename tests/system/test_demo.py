@@ -12,13 +12,17 @@ from bench.agent_protocol.messages import StatusCommand
 from bench.config import load_config
 from bench.errors import AgentUnreachableError
 from bench.log.reader import read_log
+from bench.report import format_force, format_percent, format_ratio
+from sim_rig.hidden_effect import draw_scenario, make_truth
 
 pytestmark = pytest.mark.wire
 COMMAND = Path(sys.executable).parent / "mrbench"
+SEED = 1
+"""Default seed of the demo."""
 
 
 def mrbench(*arguments):
-    return subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=280)
+    return subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=500)
 
 
 @pytest.fixture(scope="module")
@@ -27,22 +31,23 @@ def demo(tmp_path_factory):
     return mrbench("demo", "--quick", "--out", folder), folder
 
 
-def test_the_demo_writes_log_fit_report_and_plots(demo):
+def test_the_demo_writes_log_fit_diagnosis_twin_truth_report_and_plots(demo):
     result, folder = demo
     assert result.returncode == 0, result.stderr
-    assert {"quick.mcap", "fit.json", "report.html", "plots", "bench.toml"} <= {
-        path.name for path in folder.iterdir()
-    }
-    assert len(list((folder / "plots").glob("*.svg"))) == 5
+    names = {"quick.mcap", "fit.json", "diagnosis.json", "twin.json", "truth.json", "report.html", "bench.toml"}
+    assert names <= {path.name for path in folder.iterdir()}
+    assert len(list((folder / "plots").glob("*.svg"))) >= 5
 
 
 def test_each_step_is_announced_on_standard_error(demo):
-    steps = [line for line in demo[0].stderr.splitlines() if line[1:3] == "/4"]
+    steps = [line for line in demo[0].stderr.splitlines() if line[1:3] == "/6"]
     assert steps == [
-        "1/4 start simulated rig, agent, service and worker",
-        "2/4 record quick over the wires",
-        "3/4 identify the damper",
-        "4/4 write the report",
+        f"1/6 start simulated rig with a hidden effect (seed {SEED}), agent, service, worker",
+        "2/6 record quick over the wires",
+        "3/6 identify the damper",
+        "4/6 diagnose the sim-to-real gap",
+        "5/6 open the truth",
+        "6/6 write the report",
     ]
 
 
@@ -63,17 +68,61 @@ def test_the_printed_numbers_equal_those_of_the_fit(demo):
     fit = json.loads((folder / "fit.json").read_text())
     rmse, floor = fit["rmse_n"]["train"], fit["noise_floor_n"]
     lines = [line.split() for line in result.stdout.splitlines()]
-    assert ["fitted", f"{rmse:.2f}", "N", f"{floor:.2f}", "N", f"{rmse / floor:.2f}", "times"] in lines
-    rows = {line[0]: line[1:] for line in lines if line}
+    errors = [format_force(rmse), format_force(floor), format_ratio(rmse / floor)]
+    assert ["fitted,", "law", "alone", *" ".join(errors).split()] in lines
+    rows = {line[0]: line[1:] for line in lines if len(line) > 1}
     for name, estimate in fit["coordinates"].items():
         value = float(rows[name][0].lstrip("([").replace("−", "-")) * (1e-6 if "µm" in rows[name] else 1.0)
         assert value == pytest.approx(estimate["value"], rel=0.05)
 
 
+def read_statements(result):
+    """Return the statements at the end of the demo by their name."""
+    lines = (line.strip().partition(": ") for line in result.stdout.splitlines())
+    return {name: text for name, separator, text in lines if separator}
+
+
+def test_the_end_states_what_was_named_and_how_far_the_gap_shrinks(demo):
+    result, folder = demo
+    diagnosis, said = json.loads((folder / "diagnosis.json").read_text()), read_statements(result)
+    for effect in diagnosis["effects"]:
+        assert effect["name"].replace("_", " ") in said["Named effect"]
+        assert format_percent(diagnosis["probability"]) in said["Named effect"]
+        assert format_force(diagnosis["gap"]["before_n"]) in said["Held-out strokes, as expected"]
+        assert format_force(diagnosis["gap"]["after_n"]) in said["Held-out strokes, as expected"]
+
+
+def test_the_end_discloses_the_truth_of_the_seed_and_judges_the_name_by_it(demo):
+    result, folder = demo
+    truth, said = json.loads((folder / "truth.json").read_text()), read_statements(result)
+    named = [effect["name"] for effect in json.loads((folder / "diagnosis.json").read_text())["effects"]]
+    assert truth == json.loads(make_truth(draw_scenario(SEED)).model_dump_json(by_alias=True))
+    assert said["True effect"].startswith(truth["effect"].replace("_", " "))
+    assert said["Drawn by seed"] == str(SEED)
+    is_right = "The named effect is the true one" in said
+    assert is_right == (named == [truth["effect"]])
+    assert is_right or "Wrong" in said or "Partly right" in said
+    assert "The hidden effect, disclosed" in (folder / "report.html").read_text()
+
+
+def test_no_file_but_the_truth_contains_it_and_the_truth_is_opened_last(demo):
+    result, folder = demo
+    truth = json.loads((folder / "truth.json").read_text())
+    log = read_log(folder / "quick.mcap")
+    recorded = json.dumps([log.metadata, log.events], default=str) + repr(log.attachments)
+    for name in ("rig.log", "rig.toml", "bench.toml", "service.log", "fit.json"):
+        recorded += (folder / name).read_text()
+    hidden = [truth["form"], *(repr(parameter["value"]) for parameter in truth["parameters"].values())]
+    assert not [word for word in [truth["effect"], *hidden] if word in recorded]
+    answer, _, disclosed = result.stdout.partition("Truth, opened only now")
+    assert truth["form"].replace("_", " ") in disclosed
+    assert truth["meaning"] not in answer
+
+
 def test_the_printed_files_exist(demo):
     result, folder = demo
     named = [Path(word) for word in result.stdout.split() if word.startswith(str(folder))]
-    assert len(named) == 4
+    assert len(named) == 7
     assert all(path.exists() for path in named)
 
 
@@ -81,6 +130,7 @@ def test_the_report_of_the_demo_states_that_its_recording_was_fitted(demo):
     html = (demo[1] / "report.html").read_text()
     assert "fitted to another recording" not in html
     assert "The law reproduces the recorded force" in html
+    assert "Diagnosis of the sim-to-real gap" in html
 
 
 def test_a_failing_process_ends_the_demo_with_its_own_message(tmp_path):
@@ -92,6 +142,14 @@ def test_a_failing_process_ends_the_demo_with_its_own_message(tmp_path):
     assert message.startswith("mrbench: a process of the demo ended at once: ")
     assert "rig.toml: cannot be replaced" in message
     assert result.stdout == ""
+
+
+def test_a_truth_file_of_a_person_is_not_replaced(tmp_path):
+    (tmp_path / "truth.json").write_text("mine")
+    result = mrbench("demo", "--quick", "--out", tmp_path)
+    assert result.returncode == 1
+    assert "exists and is not a truth file" in result.stderr
+    assert (tmp_path / "truth.json").read_text() == "mine"
 
 
 def test_a_folder_that_cannot_be_created_gives_a_one_line_message(tmp_path):

@@ -10,6 +10,7 @@ from identification.gap.data import (
     check_cycle_count,
     check_sliding_recorded,
 )
+from identification.gap.discovery import compare_with_curves
 from identification.gap.noise import NoiseModel
 from identification.gap.outcome import DiagnosisResult, ReportBuilder, cross_check_effects
 from identification.gap.selection import (
@@ -118,7 +119,7 @@ def diagnose_prepared(
     pool = make_candidate_pool(prepared, seed=seed, progress=progress, settings=settings, library=library)
     with use_one_thread():
         search_forward(pool)
-        posterior = compute_final_posterior(pool)
+        posterior = compare_with_curves(pool, compute_final_posterior(pool))
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]
         builder = ReportBuilder(dataset, evaluation, pool, posterior, partial, model, notes, seed, discover)

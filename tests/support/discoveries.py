@@ -45,6 +45,14 @@ GROWING = define(
 """Force over the displacement that grows with the drive."""
 SPRING = define("parallel_force", f"a*(displacement/{LENGTH})**2", ("displacement",), a=40.0)
 """Force over the displacement that does not grow with the drive."""
+FILM = define(
+    "parallel_force",
+    "velocity*a*exp(-travel_since_reversal/s)",
+    ("travel_since_reversal", "velocity"),
+    a=600.0,
+    s=0.002,
+)
+"""Film that damps the first millimetres after a reversal."""
 MOUNTING = define("mounting", "a*acceleration*abs(acceleration)", ("acceleration",), a=5.0)
 """Force of the mounting, proportional to the square of the acceleration."""
 

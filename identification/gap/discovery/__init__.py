@@ -3,5 +3,13 @@
 from identification.gap.discovery.curve_fit import FittedCurve
 from identification.gap.discovery.discover import DiscoveredEffect, discover_effect
 from identification.gap.discovery.formula_fit import make_curve_file, update_values
+from identification.gap.discovery.unlisted_cause import compare_with_curves
 
-__all__ = ["DiscoveredEffect", "FittedCurve", "discover_effect", "make_curve_file", "update_values"]
+__all__ = [
+    "DiscoveredEffect",
+    "FittedCurve",
+    "compare_with_curves",
+    "discover_effect",
+    "make_curve_file",
+    "update_values",
+]

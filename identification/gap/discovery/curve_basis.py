@@ -14,6 +14,8 @@ from scipy.interpolate import BSpline
 
 from identification.arrays import Array
 
+Direction = Literal["none", "sign", "velocity"]
+"""Factor of a curve: none, the sign of the velocity as in dry friction, or the velocity as in a viscous force."""
 Warp = Literal["none", "symmetric", "logarithmic"]
 """Scale on which the knots are even.
 
@@ -101,9 +103,8 @@ class CurveFunction:
     variables: tuple[str, ...]
     """The variable of the curve, then those of its factors."""
     scale: float
-    """Value of a curve of size one, in the unit of the place."""
-    has_direction: bool = False
-    """True where the curve has the sign of the velocity."""
+    """Value of a curve of size one, in the unit of the place over that of the factors."""
+    direction: Direction = "none"
     drive_factor: bool = False
     """True where the curve is proportional to the drive."""
     grows_with_drive: bool = False
@@ -117,8 +118,11 @@ class CurveFunction:
     def evaluate(self, variables: Mapping[str, Array], coefficients: Array) -> Array:
         """Return the value (N,) with some coefficients (K,), without growth."""
         curve = self.scale * self.basis.evaluate(variables[self.variables[0]], coefficients)
-        if self.has_direction:
-            curve = curve * np.sign(variables["velocity"])
+        match self.direction:
+            case "sign":
+                curve = curve * np.sign(variables["velocity"])
+            case "velocity":
+                curve = curve * variables["velocity"]
         return curve * variables["drive"] if self.drive_factor else curve
 
 

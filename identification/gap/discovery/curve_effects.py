@@ -15,7 +15,14 @@ from identification.damper import Quantity
 from identification.damper.definitions import ACTIONS, STAGE_OF
 from identification.damper.effects import Effect, Form, Place, Variable
 from identification.fitting import EffectModel, Piece, Problem
-from identification.gap.discovery.curve_basis import MAX_GROWTH, CurveFunction, LinearGrowth, Warp, make_basis
+from identification.gap.discovery.curve_basis import (
+    MAX_GROWTH,
+    CurveFunction,
+    Direction,
+    LinearGrowth,
+    Warp,
+    make_basis,
+)
 from identification.simulate import DamperVariables, make_coil_variables
 
 CURVE_EFFECT = "curve"
@@ -46,11 +53,15 @@ class CurvePlace(NamedTuple):
     variables: tuple[Variable, ...]
     """The variable of the curve, then those of its factors."""
     grows_with_drive: bool = False
+    is_viscous: bool = False
+    """True where the curve is proportional to the velocity; else it has its sign."""
 
     @property
-    def has_direction(self) -> bool:
-        """True where the curve has the sign of the velocity."""
-        return "velocity" in self.variables[1:]
+    def direction(self) -> Direction:
+        """Factor of the curve that depends on the velocity."""
+        if "velocity" not in self.variables[1:]:
+            return "none"
+        return "velocity" if self.is_viscous else "sign"
 
     @property
     def has_drive_factor(self) -> bool:
@@ -60,15 +71,16 @@ class CurvePlace(NamedTuple):
     @property
     def label(self) -> str:
         """Description for a person."""
-        return f"{self.place} over {' and '.join(self.variables)}".replace("_", " ")
+        kind = "viscous " if self.is_viscous else ""
+        return f"{kind}{self.place} over {' and '.join(self.variables)}".replace("_", " ")
 
 
-_PARALLEL: tuple[tuple[Variable, ...], ...] = (
-    ("velocity",),
-    ("displacement",),
-    ("displacement", "velocity"),
-    ("travel_since_reversal", "velocity"),
-    ("travel_since_rest", "velocity"),
+_POSITIONS: tuple[Variable, ...] = ("displacement", "travel_since_reversal", "travel_since_rest")
+_PARALLEL = (
+    CurvePlace("parallel_force", ("velocity",)),
+    CurvePlace("parallel_force", ("displacement",)),
+    *(CurvePlace("parallel_force", (variable, "velocity")) for variable in _POSITIONS),
+    *(CurvePlace("parallel_force", (variable, "velocity"), is_viscous=True) for variable in _POSITIONS),
 )
 CURVE_PLACES: tuple[CurvePlace, ...] = (
     CurvePlace("drive", ("time", "drive")),
@@ -85,8 +97,8 @@ CURVE_PLACES: tuple[CurvePlace, ...] = (
             "dissipated_energy",
         )
     ),
-    *(CurvePlace("parallel_force", variables) for variables in _PARALLEL),
-    *(CurvePlace("parallel_force", (*variables, "drive"), grows_with_drive=True) for variables in _PARALLEL),
+    *_PARALLEL,
+    *(at._replace(variables=(*at.variables, "drive"), grows_with_drive=True) for at in _PARALLEL),
     CurvePlace("mounting", ("acceleration",)),
     CurvePlace("force_channel", ("force",)),
     CurvePlace("force_channel", ("time",)),
@@ -121,7 +133,9 @@ class CurveEffect:
     @property
     def unit(self) -> str:
         """Unit of the curve's values."""
-        return _PLACE_UNITS[self.at.place]
+        if self.at.has_drive_factor:
+            return "1"
+        return "N s/m" if self.at.is_viscous else _PLACE_UNITS[self.at.place]
 
 
 def list_curve_effects(problem: Problem, forces: Sequence[Array]) -> list[CurveEffect]:
@@ -170,13 +184,14 @@ def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> Curve
         "drive": scales.drive if not at.has_drive_factor else 1.0,
         "field": scales.drive,
         "damper_gain": 1.0,
+        "parallel_force": scales.damping if at.is_viscous else scales.force,
         "displacement_channel": scales.length,
     }
     function = CurveFunction(
         make_basis(values, _WARPS.get(at.variables[0], "none")),
         at.variables,
         sizes.get(at.place, scales.force),
-        at.has_direction,
+        at.direction,
         at.has_drive_factor,
         at.grows_with_drive,
     )

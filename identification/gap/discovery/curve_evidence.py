@@ -11,6 +11,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import Evaluation, Problem
+from identification.gap.data import Indices
 
 _DEVIATIONS = np.geomspace(1e-4, 1e2, 43)
 """Prior deviations of the coefficients that are tried [1]."""
@@ -29,16 +30,33 @@ class CurveEvidence(NamedTuple):
     """(U,) step of all unknowns from the linearisation point to the most probable curve."""
 
 
-def compute_curve_evidence(joint: Problem, here: Evaluation, columns: slice) -> CurveEvidence:
+def compute_curve_evidence(joint: Problem, here: Evaluation, unknowns: Array, columns: slice) -> CurveEvidence:
     """Compute the evidence for a curve from cost, gradient and curvature at a curve of zero.
+
+    An unknown of the law at a bound is held if its step would leave the bound, because it takes nothing up there.
 
     Args:
         joint: problem with the curve.
         here: its evaluation.
+        unknowns: (U,) unknowns of this evaluation.
         columns: unknowns of the curve's coefficients.
     """
-    inner = np.arange(len(here.gradient))[columns]
-    outer = np.setdiff1d(np.flatnonzero(joint.free_mask), inner)
+    low, high = joint.get_bounds()
+    inner = np.arange(len(unknowns))[columns]
+    free = joint.free_mask.copy()
+    free[inner] = False
+    for _ in range(len(unknowns)):
+        evidence = _compute_evidence(joint, here, np.flatnonzero(free), inner)
+        below, above = np.isclose(unknowns, low) & (evidence.step < 0.0), evidence.step > 0.0
+        beyond = below | (np.isclose(unknowns, high) & above)
+        if not (free & beyond).any():
+            break
+        free &= ~beyond
+    return evidence
+
+
+def _compute_evidence(joint: Problem, here: Evaluation, outer: Indices, inner: Indices) -> CurveEvidence:
+    """Compute the evidence with some unknowns projected out (their indices) and the others held."""
     H, g = here.hessian, here.gradient
     damped = H[np.ix_(outer, outer)] + np.diag(_RELATIVE_DAMPING * np.diag(H)[outer])
     projection = np.linalg.lstsq(damped, np.column_stack([H[np.ix_(outer, inner)], g[outer]]), rcond=None)[0]

@@ -10,7 +10,12 @@ import numpy as np
 from identification.arrays import Array
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, minimise
 from identification.gap.discovery.curve_basis import LinearGrowth
-from identification.gap.discovery.curve_effects import HISTORY_VARIABLES, CurveEffect, list_curve_effects
+from identification.gap.discovery.curve_effects import (
+    HISTORY_VARIABLES,
+    CurveEffect,
+    CurvePlace,
+    list_curve_effects,
+)
 from identification.gap.discovery.curve_evidence import CurveEvidence, compute_curve_evidence
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
 from identification.gap.selection import CandidatePool, compute_evidence
@@ -87,7 +92,7 @@ def _screen_curve(problem: Problem, unknowns: Array, curve: CurveEffect) -> Curv
     joint = problem.replace_effects((*problem.effects, curve.linear_model))
     count, first = len(curve.linear_model.quantities), problem.layout.per_log.start
     start = insert_effect_unknowns(problem, unknowns, np.zeros(count))
-    return compute_curve_evidence(joint, joint.evaluate(start), slice(first, first + count))
+    return compute_curve_evidence(joint, joint.evaluate(start), start, slice(first, first + count))
 
 
 def fit_best_curves(
@@ -114,15 +119,17 @@ def _find_simpler(screened: Sequence[ScreenedCurve], fitted: Sequence[FittedCurv
     at = min(fitted, key=lambda f: f.loss).curve.at if fitted else None
     if at is None or not at.grows_with_drive:
         return None
-    return next((s for s in screened if s.curve.at == (at.place, at.variables[:-1], False)), None)
+    simpler = at._replace(variables=at.variables[:-1], grows_with_drive=False)
+    return next((s for s in screened if s.curve.at == simpler), None)
 
 
 def _drop_variants(screened: Sequence[ScreenedCurve]) -> list[ScreenedCurve]:
     """Return the curves without the less probable of two that differ in their growth with the drive alone."""
-    best: dict[tuple[str, ...], ScreenedCurve] = {}
+    best: dict[CurvePlace, ScreenedCurve] = {}
     for s in screened:
         at = s.curve.at
-        best.setdefault((at.place, *(at.variables[:-1] if at.grows_with_drive else at.variables)), s)
+        variables = at.variables[:-1] if at.grows_with_drive else at.variables
+        best.setdefault(at._replace(variables=variables, grows_with_drive=False), s)
     return list(best.values())
 
 

@@ -127,8 +127,11 @@ def make_curve_file(
 ) -> EffectFile:
     """Return the definition of an expression of the curve's variable, with the factors of its place."""
     at = fitted.curve.at
-    if at.has_direction:
-        expression = f"sign(velocity)*({expression})"
+    match at.direction:
+        case "sign":
+            expression = f"sign(velocity)*({expression})"
+        case "velocity":
+            expression = f"velocity*({expression})"
     if at.has_drive_factor:
         expression = f"drive*({expression})"
     if at.grows_with_drive:
@@ -167,8 +170,7 @@ def _make_parameter(
             return EffectParameter(value=value, unit=unit, lo=float(variable.min()), hi=float(variable.max()))
     power = start.formula.amplitudes[name]
     largest = _RANGE * max(abs(value), curve.function.scale / size**power)
-    place_unit = "1" if curve.at.has_drive_factor else curve.unit
-    unit = _divide_unit(place_unit, unit, power)
+    unit = _divide_unit(curve.unit, unit, power)
     return EffectParameter(value=value, unit=unit, lo=-largest, hi=largest)
 
 

@@ -116,7 +116,7 @@ def _list_absorbed(curve: CurveEffect, z: Array) -> Array:
         "displacement_channel": ("displacement", "velocity"),
         "force_channel": ("force", "drive"),
     }
-    if curve.at.variables[0] in straight.get(curve.at.place, ()) and not curve.at.has_direction:
+    if curve.at.variables[0] in straight.get(curve.at.place, ()) and curve.at.direction == "none":
         columns.append(z / size)
         if curve.at.variables[0] == "velocity":
             columns.append(np.tanh(z / (_STEP_WIDTH * size)))

@@ -1,6 +1,6 @@
 """Joint fits of the law and a set of effects."""
 
-from identification.gap.fits.candidate import NO_GAP_RATIO, Candidate
+from identification.gap.fits.candidate import EXPLAINED_RATIO, NO_GAP_RATIO, Candidate
 from identification.gap.fits.effect_unknowns import (
     insert_effect_unknowns,
     remove_effect_unknowns,
@@ -11,6 +11,7 @@ from identification.gap.fits.joint_fit import JointFit, fit_jointly, refit_all_s
 from identification.gap.fits.joint_step import predict_joint_step, take_joint_step
 
 __all__ = [
+    "EXPLAINED_RATIO",
     "NO_GAP_RATIO",
     "Candidate",
     "FitOptions",

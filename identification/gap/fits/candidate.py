@@ -7,6 +7,8 @@ from identification.gap.fits.joint_fit import JointFit
 
 NO_GAP_RATIO = 1.008
 """Threshold on the RMSE relative to the noise floor: below it, there is no gap."""
+EXPLAINED_RATIO = 1.05
+"""Threshold on the RMSE with effects relative to the noise floor: below it, they explain the gap."""
 _MIN_GAP_RATIO = 1.1
 """Threshold on the baseline's RMSE relative to the noise floor: above it, shares of the gap are meaningful."""
 

@@ -67,7 +67,7 @@ def _make_curve(fitted: FittedCurve, drive_unit: str) -> Curve:
     values = np.array(fitted.values[:count]) @ table
     covariance = fitted.covariance[:count, :count]
     deviation = np.sqrt(np.maximum(np.einsum("kn,kl,ln->n", table, covariance, table), 0.0))
-    unit = "1" if fitted.curve.at.has_drive_factor else fitted.curve.unit
+    unit = fitted.curve.unit
     return Curve(
         variable=fitted.curve.at.variables[0],
         unit=unit.format(drive=drive_unit) if drive_unit else unit,

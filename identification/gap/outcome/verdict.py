@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
-from identification.gap.fits import Candidate
+from identification.gap.fits import EXPLAINED_RATIO, Candidate
 from identification.gap.outcome.interval import compute_interval
 from identification.gap.selection import UNKNOWN_THRESHOLD, Posterior
 
@@ -13,8 +13,6 @@ _EXPLAINED_SHARE = 0.95
 """Part of the gap above which it counts as explained, unless an unknown cause is more probable than the set."""
 _FLOOR_RATIO = 1.03
 """Threshold on the RMSE of the law relative to the noise floor: below it, nothing is left to explain."""
-_EXPLAINED_RATIO = 1.05
-"""Threshold on the RMSE with effects relative to the noise floor: below it, they explain the gap."""
 _AMBIGUOUS_RATIO = 0.5
 """Threshold on the probability of an alternative over that of the named set: above it, the answer is ambiguous."""
 _MAX_ALTERNATIVES = 3
@@ -52,7 +50,7 @@ def decide_verdict(
     unseen = _compute_closed_part(baseline, named, floor)
     if not named.names or max(closed, unseen) < _MIN_NAMED_SHARE:
         return "unexplained"
-    reaches_floor = max(named.train_rmse, named.held_out_rmse) < _EXPLAINED_RATIO * floor
+    reaches_floor = max(named.train_rmse, named.held_out_rmse) < EXPLAINED_RATIO * floor
     if reaches_floor or (closed > _EXPLAINED_SHARE and not unknown):
         return "explained"
     return "partly_explained"

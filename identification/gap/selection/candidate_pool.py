@@ -15,7 +15,14 @@ from identification.arrays import Array
 from identification.damper.effects import EFFECTS, Effect
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, make_starting_points
 from identification.gap.data import EvaluationData, Residual, split_by_piece
-from identification.gap.fits import Candidate, FitOptions, JointFit, fit_jointly, refit_all_samples
+from identification.gap.fits import (
+    EXPLAINED_RATIO,
+    Candidate,
+    FitOptions,
+    JointFit,
+    fit_jointly,
+    refit_all_samples,
+)
 from identification.gap.noise import NoiseModel, find_mains_frequency
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
 from identification.gap.selection.screening import ScreeningResult
@@ -60,6 +67,8 @@ class CandidatePool:
     """Block evidence of the sets for which it was computed."""
     held_out_evidence: dict[frozenset[str], tuple[BlockEvidence, ...]] = field(default_factory=dict)
     """Block evidence on the held-out samples over sets with one effect less, where it was computed."""
+    unlisted: Candidate | None = None
+    """The law with the best curve outside the library, where curves were fitted."""
     fit_count: int = 0
     """Number of fits."""
     notes: list[str] = field(default_factory=list)
@@ -113,13 +122,13 @@ class CandidatePool:
         """Return the candidate with the smallest excess."""
         return min(self.candidates.values(), key=self.compute_excess)
 
+    def reaches_floor(self, candidate: Candidate) -> bool:
+        """Return True if the error on fitted and on held-out samples is nearly the noise floor."""
+        return max(candidate.train_rmse, candidate.held_out_rmse) < EXPLAINED_RATIO * self.floor
+
     def collect_evidence(self) -> list[SetEvidence]:
-        """Return the evidence of every set, with a floor that lies below the residual of every candidate."""
-        part = float(np.mean(self.evaluation.held_out_samples[self.evaluation.usable]))
-        lowest = min(
-            math.sqrt((1.0 - part) * c.train_rmse**2 + part * c.held_out_rmse**2) for c in self.candidates.values()
-        )
-        floor = min(self.floor, lowest)
+        """Return the evidence of every set."""
+        floor = self._find_lowest_floor()
         x = np.concatenate([p.excitation.displacement for p in self.full_problem.pieces])
         size = self.full_problem.space.scales.damper_size
         return [
@@ -135,9 +144,21 @@ class CandidatePool:
 
     def compute_posterior(self) -> Posterior:
         """Compute the posterior of all fitted sets."""
+        floor = self._find_lowest_floor()
         return compute_posterior(
-            self.collect_evidence(), self.full_problem.samples, self.noise_model.estimate.coloured_share
+            self.collect_evidence(),
+            self.full_problem.samples,
+            self.noise_model.estimate.coloured_share,
+            None if self.unlisted is None else self.unlisted.compute_relative_excess(self.baseline, floor),
         )
+
+    def _find_lowest_floor(self) -> float:
+        """Return a floor [N] that lies below the residual of every candidate."""
+        part = float(np.mean(self.evaluation.held_out_samples[self.evaluation.usable]))
+        lowest = min(
+            math.sqrt((1.0 - part) * c.train_rmse**2 + part * c.held_out_rmse**2) for c in self.candidates.values()
+        )
+        return min(self.floor, lowest)
 
     def fit_law(self) -> Candidate:
         """Fit the law alone, which is the baseline."""

@@ -102,13 +102,16 @@ class Posterior:
         return sorted(self.sets.items(), key=lambda item: -item[1])
 
 
-def compute_posterior(sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0) -> Posterior:
+def compute_posterior(
+    sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0, unlisted_excess: float | None = None
+) -> Posterior:
     """Compute the probabilities of sets of effects and of an unknown cause.
 
     Args:
         sets: evidence of every fitted set, the empty one included.
         samples: number of fitted samples.
         coloured_share: part of the variance of the noise [1] that is not white; slow noise varies more by chance.
+        unlisted_excess: excess [1] that a curve outside the library leaves, where one was fitted.
     """
     gap = max(next(s.excess for s in sets if not s.names), 0.0)
     resolution = (
@@ -125,7 +128,10 @@ def compute_posterior(sets: Sequence[SetEvidence], samples: int, coloured_share:
     unknown -= _penalise_incomplete(best, gap)
     # An unknown cause is only an alternative where known effects leave an excess that the floor cannot explain.
     weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
-    shares = normalise_scores(np.array([*scores.values(), unknown + math.log(max(weight, 1e-9))]))
+    unknown += math.log(max(weight, 1e-9))
+    if unlisted_excess is not None:
+        unknown = float(np.logaddexp(unknown, _score_unlisted(unlisted_excess, resolution)))
+    shares = normalise_scores(np.array([*scores.values(), unknown]))
     remaining = (max(best.excess, 0.0) + resolution) / (gap + resolution)
     any_effect = 1.0 - float(shares[list(scores).index(frozenset())])
     misattributed = compute_misattribution(remaining) * any_effect
@@ -152,6 +158,12 @@ def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) 
             if log_odds < 0.0:
                 scores[s.names] = min(scores[s.names], scores[parent] + log_odds)
     return scores
+
+
+def _score_unlisted(excess: float, resolution: float) -> float:
+    """Return the log odds of a curve outside the library: those of one rare effect that leaves an excess [1]."""
+    prior = math.log(_COUNT_PRIOR[1] / len(COMMON_EFFECTS) * _COMPLEXITY_FACTOR * _RARE_WEIGHT)
+    return prior - _LIKELIHOOD_EXPONENT * math.log(max(excess, 0.0) + resolution)
 
 
 def _penalise_incomplete(evidence: SetEvidence, gap: float) -> float:

@@ -111,10 +111,10 @@ CURVE = BASIS.evaluate(VARIABLES["displacement"], COEFFICIENTS)
     ("options", "values", "factor"),
     [
         ({}, (), [1.0, 1.0, 1.0, 1.0]),
-        ({"has_direction": True}, (), [-1.0, 0.0, 1.0, -1.0]),
+        ({"direction": "sign"}, (), [-1.0, 0.0, 1.0, -1.0]),
         ({"drive_factor": True}, (), [0.0, 0.5, 1.5, 2.0]),
         ({"grows_with_drive": True}, (3.0,), [1.0, 2.5, 5.5, 7.0]),
-        ({"has_direction": True, "grows_with_drive": True}, (-0.5,), [-1.0, 0.0, 0.25, 0.0]),
+        ({"direction": "sign", "grows_with_drive": True}, (-0.5,), [-1.0, 0.0, 0.25, 0.0]),
     ],
 )
 def test_a_curve_function_has_the_factors_of_its_place(options, values, factor):
@@ -125,7 +125,7 @@ def test_a_curve_function_has_the_factors_of_its_place(options, values, factor):
 @pytest.mark.parametrize(("growth", "sign"), [(0.8, 1.0), (0.8, -1.0), (-0.4, 1.0), (0.0, -1.0)])
 def test_a_product_is_separated_into_its_curve_and_growth(growth, sign):
     highest = 2.0
-    function = CurveFunction(BASIS, NAMES, 40.0, has_direction=True, grows_with_drive=True)
+    function = CurveFunction(BASIS, NAMES, 40.0, direction="sign", grows_with_drive=True)
     linear = LinearGrowth(function, highest)
     values = np.concatenate([sign * COEFFICIENTS, sign * growth * highest * COEFFICIENTS])
     level, found = linear.separate(values)

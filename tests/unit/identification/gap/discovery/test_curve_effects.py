@@ -53,13 +53,14 @@ def test_a_variable_that_does_not_vary_has_no_curve():
 
 def test_factors_of_a_curve_follow_from_its_variables():
     friction = CurvePlace("parallel_force", ("displacement", "velocity", "drive"), grows_with_drive=True)
-    assert (friction.has_direction, friction.has_drive_factor) == (True, False)
+    assert (friction.direction, friction.has_drive_factor) == ("sign", False)
+    assert friction._replace(is_viscous=True).direction == "velocity"
     assert friction.label == "parallel force over displacement and velocity and drive"
     assert CurvePlace("drive", ("time", "drive")).has_drive_factor
-    assert not CurvePlace("parallel_force", ("velocity",)).has_direction
+    assert CurvePlace("parallel_force", ("velocity",)).direction == "none"
     for at, curve in all_curves().items():
-        flags = (curve.function.has_direction, curve.function.drive_factor, curve.function.grows_with_drive)
-        assert flags == (at.has_direction, at.has_drive_factor, at.grows_with_drive)
+        flags = (curve.function.direction, curve.function.drive_factor, curve.function.grows_with_drive)
+        assert flags == (at.direction, at.has_drive_factor, at.grows_with_drive)
 
 
 @pytest.mark.parametrize(
@@ -76,7 +77,9 @@ def test_factors_of_a_curve_follow_from_its_variables():
 )
 def test_a_curve_has_unit_and_stage_of_its_place(place, unit, stage):
     curves = [c for at, c in all_curves().items() if at.place == place]
-    assert {c.unit for c in curves} == {unit}
+    assert {c.unit for c in curves if not (c.at.is_viscous or c.at.has_drive_factor)} <= {unit}
+    assert {c.unit for c in curves if c.at.has_drive_factor} <= {"1"}
+    assert {c.unit for c in curves if c.at.is_viscous} <= {"N s/m"}
     assert {m.effect.stage for c in curves for m in (c.model, c.linear_model)} == {stage}
     assert {c.model.effect.variable for c in curves} == {c.at.variables[0] for c in curves}
 
@@ -97,12 +100,18 @@ def test_a_curve_of_unit_size_is_as_large_as_the_damper(place, factor):
         SCALES, force=100.0 * SCALES.force, length=7.0 * SCALES.length, drive=3.0 * SCALES.drive, velocity=1.0
     )
     for at, curve in make_curves(make_stroke(), scales=large).items():
-        if at.place == place:
+        if at.place == place and not at.is_viscous:
             assert curve.function.scale == pytest.approx(factor * all_curves()[at].function.scale), at
     sizes = {"field": 0.5, "damper_gain": 1.0, "displacement_channel": 0.01}
     assert all_curves()[next(at for at in all_curves() if at.place == place)].function.scale == sizes.get(
         place, 200.0
     )
+
+
+def test_a_viscous_curve_of_unit_size_is_as_large_as_the_damping():
+    viscous = {at: c for at, c in all_curves().items() if at.is_viscous}
+    assert viscous
+    assert {c.function.scale for c in viscous.values()} == {SCALES.damping}
 
 
 def test_a_curve_that_is_proportional_to_the_drive_is_relative_to_it():

@@ -28,11 +28,13 @@ def make_model(seed, coefficients=0.0, noise=1.0):
     return J, J[:, LAW] @ random.standard_normal(4) + J[:, CURVE] @ truth + noise * random.standard_normal(SAMPLES)
 
 
-def compute(J, error, free=None):
+def compute(J, error, free=None, low=-np.inf):
     """Return the evidence, from the cost of an error (N,) whose negative is the residual."""
     here = Evaluation(float(error @ error), J.T @ J, -J.T @ error)
     mask = np.ones(J.shape[1], bool) if free is None else free
-    return compute_curve_evidence(SimpleNamespace(free_mask=mask, samples=len(error)), here, CURVE)
+    bounds = np.broadcast_to(low, J.shape[1]), np.full(J.shape[1], np.inf)
+    problem = SimpleNamespace(free_mask=mask, samples=len(error), get_bounds=lambda: bounds)
+    return compute_curve_evidence(problem, here, np.zeros(J.shape[1]), CURVE)
 
 
 def estimate_variance(J, error):
@@ -72,6 +74,26 @@ def test_the_step_is_that_of_the_most_probable_curve():
     assert variance < 1.5
 
 
+def test_an_unknown_whose_step_would_leave_its_bound_is_held():
+    J, error = make_model(3, 0.5)
+    outside = int(np.argmin(compute(J, error).step[LAW]))
+    low, free = np.full(J.shape[1], -np.inf), np.ones(J.shape[1], bool)
+    low[outside] = 0.0
+    found = compute(J, error, low=low)
+    assert compute(J, error).step[outside] < 0.0
+    assert found.step[outside] == 0.0
+    free[outside] = False
+    assert found.log_odds == pytest.approx(compute(J, error, free=free).log_odds)
+
+
+def test_a_bound_does_not_hold_an_unknown_that_moves_inside():
+    J, error = make_model(3, 0.5)
+    inside = int(np.argmax(compute(J, error).step[LAW]))
+    low = np.full(J.shape[1], -np.inf)
+    low[inside] = 0.0
+    np.testing.assert_allclose(compute(J, error, low=low).step, compute(J, error).step)
+
+
 def test_an_unknown_that_is_not_free_stays_and_takes_nothing_up():
     J, error = make_model(3, 0.5)
     free = np.ones(J.shape[1], bool)
@@ -80,8 +102,10 @@ def test_an_unknown_that_is_not_free_stays_and_takes_nothing_up():
     assert found.step[1] == 0.0
     without = np.delete(J, 1, axis=1)
     here = Evaluation(float(error @ error), without.T @ without, -without.T @ error)
-    problem = SimpleNamespace(free_mask=np.ones(9, bool), samples=SAMPLES)
-    assert found.log_odds == pytest.approx(compute_curve_evidence(problem, here, slice(3, 9)).log_odds)
+    bounds = np.full(9, -np.inf), np.full(9, np.inf)
+    problem = SimpleNamespace(free_mask=np.ones(9, bool), samples=SAMPLES, get_bounds=lambda: bounds)
+    other = compute_curve_evidence(problem, here, np.zeros(9), slice(3, 9))
+    assert found.log_odds == pytest.approx(other.log_odds)
 
 
 def test_noise_is_no_evidence():

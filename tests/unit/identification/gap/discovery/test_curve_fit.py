@@ -26,7 +26,7 @@ from identification.gap.fits import JointFit, insert_effect_unknowns
 from identification.gap.selection import compute_evidence
 from identification.progress import ignore_progress
 from tests.support.candidate_pools import NOISE
-from tests.support.discoveries import GAIN, GROWING, LENGTH, SPRING, fitted_with, pool_with
+from tests.support.discoveries import FILM, GAIN, GROWING, LENGTH, SPRING, fitted_with, pool_with
 
 OVER_DISPLACEMENT = CurvePlace("parallel_force", ("displacement",))
 GROWING_OVER_DISPLACEMENT = CurvePlace("parallel_force", ("displacement", "drive"), grows_with_drive=True)
@@ -56,9 +56,16 @@ def test_the_right_place_and_variable_come_first(effect, place, variables):
     first, second, *others = screen(effect)
     assert (first.curve.at.place, first.curve.at.variables) == (place, variables)
     assert first.evidence.log_odds > 100.0
-    assert first.evidence.log_odds > 5.0 * second.evidence.log_odds
+    # A viscous force over the same variables is nearly the same; every other curve is far less probable.
+    rival = next(s for s in (second, *others) if s.curve.at.variables[0] != variables[0])
+    assert first.evidence.log_odds > 5.0 * rival.evidence.log_odds
     odds = [s.evidence.log_odds for s in (second, *others)]
     assert odds == sorted(odds, reverse=True)
+
+
+def test_a_film_is_viscous_and_no_friction():
+    first = _drop_variants(screen(FILM))[0].curve
+    assert (first.at.is_viscous, first.at.variables[0], first.unit) == (True, "travel_since_reversal", "N s/m")
 
 
 def test_without_an_effect_no_curve_is_probable():
@@ -159,8 +166,9 @@ def test_of_two_curves_that_differ_in_growth_alone_the_more_probable_is_fitted()
 
 
 def find_pair(at):
-    """Return place and variables without the growth with the drive."""
-    return at.place, at.variables[:-1] if at.grows_with_drive else at.variables
+    """Return a place without the growth with the drive."""
+    variables = at.variables[:-1] if at.grows_with_drive else at.variables
+    return at._replace(variables=variables, grows_with_drive=False)
 
 
 def test_without_growth_a_curve_that_needs_none_has_the_smaller_loss():

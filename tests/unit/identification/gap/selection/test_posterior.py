@@ -205,3 +205,27 @@ def test_a_set_that_harms_held_out_samples_is_less_probable_than_the_one_without
     sets = [*make_sets(none=30.0, end_stop=4.0), SetEvidence(both, 0.1, held_out_evidence=evidence)]
     posterior = compute_posterior(sets, SAMPLES)
     assert posterior.sets[both] / posterior.sets[first] == pytest.approx(math.exp(-2.0))
+
+
+SEVERAL = "end_stop__gas_spring__displacement_nonlinearity"
+
+
+def test_a_curve_outside_the_library_that_leaves_less_is_more_probable_than_several_effects():
+    sets = make_sets(none=100.0, **{SEVERAL: 1.6})
+    assert compute_posterior(sets, SAMPLES).rank_sets()[0][1] > 0.5
+    posterior = compute_posterior(sets, SAMPLES, unlisted_excess=0.02)
+    assert posterior.unknown > 0.95
+    assert posterior.compute_effect_probability("end_stop") < 0.05
+
+
+def test_a_curve_outside_the_library_that_leaves_more_changes_nothing():
+    sets = make_sets(none=100.0, gas_spring=0.3)
+    posterior = compute_posterior(sets, SAMPLES, unlisted_excess=20.0)
+    assert posterior.unknown == pytest.approx(compute_posterior(sets, SAMPLES).unknown, abs=1e-3)
+
+
+def test_of_two_causes_that_leave_as_much_the_one_in_the_library_is_more_probable():
+    sets = make_sets(none=100.0, gas_spring=0.3)
+    posterior = compute_posterior(sets, SAMPLES, unlisted_excess=0.3)
+    assert posterior.compute_effect_probability("gas_spring") > 0.7
+    assert posterior.unknown > compute_posterior(sets, SAMPLES).unknown

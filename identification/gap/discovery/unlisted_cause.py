@@ -1,0 +1,74 @@
+"""Excess that a curve outside the library leaves, as evidence against named effects that leave more.
+
+Effects of the library can together resemble a cause that none of them is. A curve at the place of that cause,
+over its variable, then leaves less than they do. Curves where the library has an effect are fitted as well. Where
+one of them leaves least, the cause may be that effect in another form, which is no evidence against the library.
+"""
+
+from collections.abc import Mapping
+
+from identification.damper.effects import Action, Effect, Place, Variable
+from identification.gap.discovery.curve_effects import CurvePlace
+from identification.gap.discovery.curve_fit import fit_best_curves, screen_curves
+from identification.gap.fits import Candidate
+from identification.gap.selection import CandidatePool, Posterior
+
+_STATIC_ACTIONS: frozenset[Action] = frozenset(
+    {
+        "field",
+        "field_memory",
+        "scaling",
+        "softening",
+        "parallel_force",
+        "hysteretic_force",
+        "inertia",
+        "additive_force",
+        "displacement_map",
+        "displacement_shift",
+        "drive_function",
+        "field_function",
+        "gain_function",
+        "force_function",
+        "mount_function",
+        "channel_function",
+        "displacement_function",
+    }
+)
+"""Actions that a curve over one variable can represent; delays, lags and connections have a state of their own."""
+
+
+def is_unlisted(at: CurvePlace, library: Mapping[str, Effect]) -> bool:
+    """Return True if no effect of a library acts at the place of a curve over its variable."""
+    return (at.place, at.variables[0]) not in list_pairs(library)
+
+
+def list_pairs(library: Mapping[str, Effect]) -> set[tuple[Place, Variable]]:
+    """Return the places of a library's effects with the variable over which each is a curve."""
+    pairs: set[tuple[Place, Variable]] = set()
+    for effect in library.values():
+        for form in effect.forms:
+            if form.action in _STATIC_ACTIONS:
+                pairs.add((form.place, effect.variable))
+            if form.action == "hysteretic_force":
+                pairs.add((form.place, "travel_since_reversal"))
+    return pairs
+
+
+def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
+    """Return the posterior with the best curve outside the library as one of the alternatives.
+
+    Curves are only fitted where the most probable set leaves more than the noise floor; else nothing changes.
+    """
+    names = posterior.rank_sets()[0][0]
+    if not names or pool.reaches_floor(pool.candidates[names]):
+        return posterior
+    pool.unlisted = find_unlisted_cause(pool)
+    return pool.compute_posterior()
+
+
+def find_unlisted_cause(pool: CandidatePool) -> Candidate | None:
+    """Return the law with the best curve, if the library has no effect there; else None."""
+    curves = fit_best_curves(pool, pool.baseline, screen_curves(pool, pool.baseline))
+    if not curves or not is_unlisted(curves[0].curve.at, pool.library):
+        return None
+    return curves[0].candidate

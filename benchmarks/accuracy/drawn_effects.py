@@ -1,6 +1,6 @@
 """Diagnoses of dampers of any size with drawn forms of effects, causes outside the library, or none.
 
-    python -m benchmarks.accuracy.drawn_effects [--recordings 60] [--seed 1] [--out PAGE.md]
+    python -m benchmarks.accuracy.drawn_effects [--recordings 60] [--seed 1] [--kinds one,unknown] [--out PAGE.md]
 
 Each recording has a random damper from 10 N to 400 kN, a noise spectrum, and one of: no effect, one effect, two
 effects, or an unknown cause whose place and variable no effect of the library has. Forms are drawn from the class
@@ -75,10 +75,9 @@ class Outcome(NamedTuple):
         return self.named == self.truth
 
 
-def try_case(job: tuple[int, int]) -> Outcome:
-    """Draw, record and diagnose one case."""
-    seed, number = job
-    case = draw_case(seed, KINDS[number % len(KINDS)])
+def try_case(job: tuple[int, str]) -> Outcome:
+    """Draw, record and diagnose one case of a kind."""
+    case = draw_case(*job)
     return judge(case, diagnose([case.recording]).diagnosis)
 
 
@@ -236,13 +235,17 @@ def format_row(o: Outcome) -> str:
 
 def main() -> None:
     """Print every case and the summary; also write them to a page."""
-    options = make_parser(__doc__, "recordings", 60).parse_args()
+    parser = make_parser(__doc__, "recordings", 60)
+    parser.add_argument("--kinds", default=",".join(KINDS), help="kinds of cases, in turn")
+    options = parser.parse_args()
+    kinds = options.kinds.split(",")
+    jobs = [(seed, kinds[n % len(kinds)]) for n, seed in enumerate(list_seeds(options))]
     lines = ["| case | error of the law over the floor | verdict | named | with them | right |"]
     lines.append("| --- | --- | --- | --- | --- | --- |")
     print("\n".join(lines), flush=True)
     outcomes = []
     with ProcessPoolExecutor(options.jobs) as pool:
-        for outcome in pool.map(try_case, [(s, n) for n, s in enumerate(list_seeds(options))]):
+        for outcome in pool.map(try_case, jobs):
             outcomes.append(outcome)
             lines.append(format_row(outcome))
             print(lines[-1], flush=True)

@@ -15,7 +15,7 @@ from bench.log.reader import read_log
 from bench.report import format_force, format_percent, format_ratio
 from sim_rig.hidden_effect import draw_scenario, make_truth
 
-pytestmark = pytest.mark.wire
+pytestmark = [pytest.mark.wire, pytest.mark.timeout(600)]
 COMMAND = Path(sys.executable).parent / "mrbench"
 SEED = 1
 """Default seed of the demo."""

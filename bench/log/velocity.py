@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import savgol_coeffs
 
 SMOOTHING_WINDOW = 0.020
 """Length [s] of the window; at low sampling rates it is five samples."""
@@ -47,5 +46,8 @@ def _compute_slope_weights(window: int, order: int) -> npt.NDArray[np.float64]:
 
     They are cached because live views need them ten times a second.
     """
+    # Most commands read logs and compute no velocity; the package takes a second to load.
+    from scipy.signal import savgol_coeffs
+
     weights = [savgol_coeffs(window, order, deriv=1, pos=position, use="dot") for position in range(window)]
     return np.asarray(weights, dtype=np.float64)

@@ -37,9 +37,13 @@ class LowPass:
         numerator, denominator = self._coefficients
         # Settled at the first force: starting from zero, the filter would ring at the start of every stretch.
         settled = signal.lfilter_zi(numerator, denominator)
-        start = settled if values.ndim == 1 else settled[:, None]
-        filtered: Array = signal.lfilter(numerator, denominator, values, axis=0, zi=start * values[:1])[0]
-        return filtered[:: self.oversampling]
+        series = values.reshape(len(values), -1)
+        recorded = np.empty((1 + (len(values) - 1) // self.oversampling, series.shape[1]))
+        # Series by series: all together would need their memory once more at the oversampled rate.
+        for column, one in zip(recorded.T, series.T, strict=True):
+            filtered = signal.lfilter(numerator, denominator, one, zi=settled * one[0])[0]
+            column[:] = filtered[:: self.oversampling]
+        return recorded.reshape(-1, *values.shape[1:])
 
     @cached_property
     def _coefficients(self) -> tuple[Array, Array]:

@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -53,3 +56,9 @@ def test_window_in_a_short_recording_is_its_largest_odd_number_of_samples(sample
     cube = (np.arange(samples) - (samples - 1) // 2.0) ** 3
 
     assert smooth_velocity(cube, 1000.0)[(samples - 1) // 2] == pytest.approx(slope * 1000)
+
+
+def test_reading_logs_loads_no_signal_processing():
+    code = "import sys, bench.log; print([m for m in ('scipy.signal', 'scipy.stats') if m in sys.modules])"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "[]"

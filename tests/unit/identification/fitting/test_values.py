@@ -319,6 +319,15 @@ def test_a_butterworth_filter_delays_slow_signals(order, cutoff, delay):
     assert both[:, 1] == pytest.approx(both[:, 0] + 5.0)
 
 
+@pytest.mark.parametrize("samples", [40, 41])
+def test_a_filter_treats_every_series_of_a_table_as_if_it_were_alone(samples):
+    low_pass = LowPass(ChannelFilter("butterworth", 2, 100.0), 1000.0, oversampling=4)
+    table = np.random.default_rng(3).standard_normal((samples, 3))
+    alone = np.stack([low_pass.apply(table[:, k]) for k in range(3)], axis=1)
+    assert alone.shape == table[::4].shape
+    np.testing.assert_array_equal(low_pass.apply(table), alone)
+
+
 @pytest.mark.parametrize(("rate", "oversampling"), [(1000.0, 4), (4000.0, 1), (8000.0, 1), (500.0, 8)])
 def test_a_filtered_force_is_simulated_at_four_kilohertz(rate, oversampling):
     given = stretch(np.zeros(10), rate=rate)

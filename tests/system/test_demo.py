@@ -138,7 +138,7 @@ def test_a_failing_process_ends_the_demo_with_its_own_message(tmp_path):
     result = mrbench("demo", "--quick", "--out", tmp_path / "demo")
     assert result.returncode == 1
     step, message = result.stderr.splitlines()
-    assert step.startswith("1/4 ")
+    assert step.startswith("1/6 start simulated rig")
     assert message.startswith("mrbench: a process of the demo ended at once: ")
     assert "rig.toml: cannot be replaced" in message
     assert result.stdout == ""

@@ -213,7 +213,8 @@ class Problem:
     def compute_residuals(self, unknowns: Array, piece: int) -> tuple[Array, Array]:
         """Return residuals (N,) of a piece and their derivatives over its columns; zero where not fitted."""
         weight, r, J = self._compute_errors(unknowns, piece)
-        return r * weight, (J * weight[:, None]) @ self._differentiate_unknowns(unknowns, piece)
+        J *= weight[:, None]
+        return r * weight, J @ self._differentiate_unknowns(unknowns, piece)
 
     def evaluate(self, unknowns: Array) -> Evaluation:
         """Return cost, J'J and J'r; an unstable point has infinite cost."""

@@ -52,6 +52,8 @@ class FitResult:
     """Reason why the result is not accepted; empty where the minimum itself states it."""
     notes: tuple[str, ...] = ()
     """Notes for a person."""
+    errors: tuple[Array, ...] | None = None
+    """Simulated less recorded force (N,) [N] of each stretch at the minimum; None if not computed yet."""
 
 
 def make_fit_document(dataset: Dataset, result: FitResult, provenance: Provenance) -> Fit:
@@ -64,7 +66,8 @@ def make_fit_document(dataset: Dataset, result: FitResult, provenance: Provenanc
     coordinates = make_coordinate_estimates(point, covariance, unobservable, at_bound, unit)
     nuisances = _make_nuisances(problem, minimum, result.covariance)
     per_log = _make_per_log(problem, minimum, result.covariance, [r.path.name for r in dataset.recordings])
-    errors = compute_force_errors(dataset, point, (nuisances.force_delay.value, nuisances.drive_delay.value))
+    delays = (nuisances.force_delay.value, nuisances.drive_delay.value)
+    errors = result.errors or compute_force_errors(dataset, point, delays)
     train = select_samples(dataset, errors, held_out=False)
     held_out = select_samples(dataset, errors, held_out=True)
     floor = dataset.floor

@@ -135,11 +135,11 @@ def _fit_output_error(
         notes = describe_clock_drift(drift)
     covariance = estimate_covariance(problem, minimum, scatter)
     seconds = time.process_time() - start_time
-    error = _compute_train_error(
-        apply_corrections(dataset, problem, minimum.unknowns[problem.shared_columns]), problem, minimum
-    )
+    corrected = apply_corrections(dataset, problem, minimum.unknowns[problem.shared_columns])
+    errors = _compute_errors(corrected, problem, minimum)
+    error = compute_rmse(select_samples(dataset, errors, held_out=False)[0])
     stage = FitStage(name="refine", seconds=round(seconds, 3), rmse_n=error, iterations=minimum.iterations)
-    return FitResult(problem, minimum, covariance, (stage,), notes=notes)
+    return FitResult(problem, minimum, covariance, (stage,), notes=notes, errors=tuple(errors))
 
 
 def _take_network_fit(dataset: Dataset, problem: Problem, network: NetworkResult | None) -> FitResult:
@@ -180,11 +180,10 @@ def _describe_network(
     return make_stage_entry(network, unobservable, rmse, dataset.drive_unit)
 
 
-def _compute_train_error(dataset: Dataset, problem: Problem, minimum: Minimum) -> float:
-    """Return the force error [N] on the fitted samples at a minimum."""
+def _compute_errors(dataset: Dataset, problem: Problem, minimum: Minimum) -> list[Array]:
+    """Return the force errors (N,) [N] of all stretches at a minimum."""
     point = problem.space.to_coordinates(minimum.unknowns[problem.layout.coordinates])
-    errors = compute_force_errors(dataset, point, problem.compute_residual_delays(minimum.unknowns))
-    return compute_rmse(select_samples(dataset, errors, held_out=False)[0])
+    return compute_force_errors(dataset, point, problem.compute_residual_delays(minimum.unknowns))
 
 
 def apply_corrections(dataset: Dataset, problem: Problem, shared: Array) -> Dataset:

@@ -41,7 +41,7 @@ def smooth_signal(
         twicing: whether the remainder is smoothed and added.
     """
     known = np.where(weights > 0, values, 0.0)
-    bands = np.ones((4, len(values) + 3))
+    bands = np.empty((4, len(values) + 3))
     _factorise(bands, weights, penalty)
     once = _solve(bands, weights * known, penalty * expected)
     return np.asarray(once + _solve(bands, weights * (known - once), np.zeros(len(penalty))) if twicing else once)
@@ -61,6 +61,7 @@ def _factorise(bands: Array, weights: Array, penalty: Array) -> None:
     # With three zeros below the matrix all rows are treated alike.
     first[:], second[:], third[:] = 0.0, 0.0, 0.0
     main[:count] = weights
+    main[count:] = 1.0
     for j in range(count - 3):
         q = penalty[j]
         main[j] += q

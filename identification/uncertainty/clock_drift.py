@@ -7,11 +7,13 @@ largest likelihood of the residuals, with the knots integrated out (empirical Ba
 follow by one Gauss-Newton step from which the knots are eliminated, and their intervals widen accordingly.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.interpolate import BSpline
 from scipy.linalg import block_diag
 
 from identification.arrays import Array, BoolArray
@@ -53,7 +55,8 @@ def correct_clock_drift(problem: Problem, minimum: Minimum) -> tuple[Minimum, fl
         problem: minimised problem.
         minimum: its minimum.
     """
-    terms = _make_drift_terms(problem, minimum.unknowns, _compute_residuals(problem, minimum.unknowns))
+    residuals = (problem.compute_residuals(minimum.unknowns, i) for i in range(len(problem.pieces)))
+    terms = _make_drift_terms(problem, minimum.unknowns, residuals)
     H, gradient = minimum.evaluation.hessian, minimum.evaluation.gradient
     interior = problem.find_interior(minimum.unknowns)
     free = np.ix_(interior, interior)
@@ -78,7 +81,8 @@ def compute_drift_correction(
     Returns:
         Change (N,) of each piece's residuals in units of the noise; root mean square of the drift [s].
     """
-    residuals, evaluation = _compute_residuals(problem, unknowns), problem.evaluate(unknowns)
+    residuals = [problem.compute_residuals(unknowns, i) for i in range(len(problem.pieces))]
+    evaluation = problem.evaluate(unknowns)
     terms = _make_drift_terms(problem, unknowns, residuals)
     interior = problem.find_interior(unknowns)
     _, step = _solve_step(terms, evaluation.hessian, evaluation.gradient, interior, clock_deviation)
@@ -122,31 +126,32 @@ def describe_clock_drift(drift: float) -> tuple[str, ...]:
     )
 
 
-def _compute_residuals(problem: Problem, unknowns: Array) -> list[tuple[Array, Array]]:
-    """Return residuals (N,) and their derivatives (N, C) of each piece, in units of the noise."""
-    return [problem.compute_residuals(unknowns, i) for i in range(len(problem.pieces))]
+def _make_drift_terms(problem: Problem, unknowns: Array, residuals: Iterable[tuple[Array, Array]]) -> _DriftTerms:
+    """Return the terms of all pieces.
 
-
-def _make_drift_terms(problem: Problem, unknowns: Array, residuals: Sequence[tuple[Array, Array]]) -> _DriftTerms:
+    Args:
+        problem: problem with one drift in each piece.
+        unknowns: (U,) at which the residuals were computed.
+        residuals: residuals (N,) and their derivatives (N, C) of each piece, in units of the noise.
+    """
     information, cross_information, gradients = [], [], []
     for i, (piece, (r, J)) in enumerate(zip(problem.pieces, residuals, strict=True)):
         # The fit counts its delay in deviations of the prior, a knot counts in seconds.
-        derivatives = (
-            _make_knot_weights(len(r), piece.excitation.rate) * (J[:, _FORCE_DELAY] / problem.delay_prior)[:, None]
-        )
+        over_delay = sp.diags_array(J[:, _FORCE_DELAY] / problem.delay_prior)
+        derivatives = sp.csr_array(over_delay @ _make_knot_weights(len(r), piece.excitation.rate))
         rows = np.zeros((len(unknowns), derivatives.shape[1]))
-        rows[problem.find_columns(i)] = J.T @ derivatives
-        information.append(derivatives.T @ derivatives)
+        rows[problem.find_columns(i)] = (derivatives.T @ J).T
+        information.append((derivatives.T @ derivatives).toarray())
         cross_information.append(rows)
         gradients.append(derivatives.T @ r)
     return _DriftTerms(block_diag(*information), np.hstack(cross_information), np.concatenate(gradients))
 
 
-def _make_knot_weights(count: int, rate: float) -> Array:
-    """Return the weights (count, knots) of the knots in each sample."""
+def _make_knot_weights(count: int, rate: float) -> sp.csr_array:
+    """Return the weights (count, knots) of the knots in each sample, of which at most two are not zero."""
     time = np.arange(count) / rate
     knots = np.linspace(0.0, time[-1], max(round(time[-1] / _KNOT_SPACING), 1) + 1)
-    return np.stack([np.interp(time, knots, unit) for unit in np.eye(len(knots))], axis=1)
+    return sp.csr_array(BSpline.design_matrix(time, np.pad(knots, 1, "edge"), 1))
 
 
 def _find_likeliest_drift(

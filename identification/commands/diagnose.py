@@ -57,6 +57,13 @@ def diagnose(
             help="Search likewise, and write the cause as an effect file of this name for later diagnoses.",
         ),
     ] = None,
+    residual: Annotated[
+        bool,
+        typer.Option(
+            "--residual",
+            help="Also learn what law and effects leave; predictions with the twin add it, and show it apart.",
+        ),
+    ] = False,
     witness: Annotated[bool, typer.Option("--witness", hidden=True, help="Former name of --cross-check.")] = False,
     seed: Seed = 1,
 ) -> None:
@@ -86,6 +93,7 @@ def diagnose(
             progress=progress,
             library=library,
             discover=discover or keep is not None,
+            learn_residual=residual,
         )
     if keep is not None:
         result = result.rename_discovery(keep)

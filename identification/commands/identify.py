@@ -187,6 +187,8 @@ def predict(
             f"; {100 * prediction.band.coverage:.1f} % inside the 95 % band of "
             f"{prediction.band.half_width_n:.3g} N"
         )
+    if prediction.physics is not None:
+        result += f"; without the learned residual {prediction.physics.rmse_n:.3g} N"
     _report(out, prediction.rmse_n, prediction.nrmse, prediction.noise_floor_n, result)
     return None
 

@@ -31,6 +31,7 @@ from identification.documents.fit import (
     Estimate,
     Fit,
     FitStage,
+    ForceError,
     Forecast,
     NoiseFloor,
     Nuisances,
@@ -40,6 +41,7 @@ from identification.documents.fit import (
     read_fit,
 )
 from identification.documents.force_series import ForceSeries, write_force_series
+from identification.documents.learned_residual import ResidualUnits, TwinResidual
 from identification.documents.trend import QuantityTrend, Trend, TrendDirection, TrendRun, TrendValue
 
 __all__ = [
@@ -59,6 +61,7 @@ __all__ = [
     "ExpectedPrecision",
     "Fit",
     "FitStage",
+    "ForceError",
     "ForceSeries",
     "Forecast",
     "Formula",
@@ -76,6 +79,7 @@ __all__ = [
     "QuantityTrend",
     "Remainder",
     "ResidualHarmonic",
+    "ResidualUnits",
     "SplitErrors",
     "StrokeProposal",
     "Trend",
@@ -84,6 +88,7 @@ __all__ = [
     "TrendValue",
     "Twin",
     "TwinEffect",
+    "TwinResidual",
     "Verdict",
     "check_output_path",
     "describe_output_path",

@@ -7,7 +7,8 @@ from pydantic import AliasChoices, Field
 from identification.damper.definitions import Curve, EffectFile
 from identification.damper.effects import Place, Stage, Variable
 from identification.documents.document import Document
-from identification.documents.fit import Fit, Nuisances, Provenance
+from identification.documents.fit import Fit, ForceError, Nuisances, Provenance
+from identification.documents.learned_residual import TwinResidual
 
 DriveKind = Literal["driver_command_v", "coil_v", "coil_a"]
 Verdict = Literal["no_gap", "explained", "partly_explained", "unexplained"]
@@ -55,6 +56,13 @@ class HeldOutError(Document):
 
     rmse_n: float = Field(description="RMSE with the named effects, in N; y(0) is estimated for unread stretches")
     nrmse: float = Field(description="the same over the standard deviation of the recorded force")
+    with_residual: ForceError | None = Field(
+        default=None, description="the same with the learned residual of the twin; null without `--residual`"
+    )
+
+    def to_force_error(self) -> ForceError:
+        """Return the error without that of the learned residual."""
+        return ForceError(rmse_n=self.rmse_n, nrmse=self.nrmse)
 
 
 class Gap(Document):
@@ -269,4 +277,7 @@ class Twin(Document):
     sensors: dict[str, dict[str, Any]] = Field(description="estimated noise of the channels")
     nuisances: Nuisances = Field(description="quantities estimated together with the damper: delays, y(0)")
     baseline: Fit = Field(description="the fit without effects")
+    residual: TwinResidual | None = Field(
+        default=None, description="learned residual, which only predictions use; null without `--residual`"
+    )
     provenance: Provenance

@@ -175,6 +175,13 @@ class Band(Document):
     note: str = Field(description="limitations of the band; empty where none are known")
 
 
+class ForceError(Document):
+    """Force error of one model."""
+
+    rmse_n: float = Field(description="root mean square force error, in N")
+    nrmse: float = Field(description="`rmse_n` over the standard deviation of the recorded force")
+
+
 class Prediction(Document):
     """A model simulated on a log that was not fitted."""
 
@@ -189,6 +196,9 @@ class Prediction(Document):
     before_n: float | None = Field(default=None, description="twin: RMSE of its fit without effects, in N")
     shrinkage: float | None = Field(
         default=None, description="twin: 1 - (after² - floor²)/(before² - floor²); null near the floor"
+    )
+    physics: ForceError | None = Field(
+        default=None, description="the same without the learned residual of a twin; null where it has none"
     )
     band: Band | None = Field(
         default=None, description="95 % band of the force; null for a model without intervals"

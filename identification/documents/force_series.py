@@ -35,6 +35,8 @@ class ForceSeries:
     drive_unit: str
     band: tuple[Array, Array] | None = None
     """Lower and upper end of the 95 % band of the recorded force [N]; None if unknown."""
+    physics: Array | None = None
+    """Simulated force without the learned residual of a twin [N]; None where it has none."""
 
 
 _COLUMNS = {
@@ -69,6 +71,8 @@ def _write_arrays(path: Path, series: ForceSeries) -> None:
     arrays = {name: getattr(series, name) for name in names}
     if series.band is not None:
         arrays |= {"lower": series.band[0], "upper": series.band[1]}
+    if series.physics is not None:
+        arrays |= {"physics": series.physics}
     np.savez_compressed(path, info=np.array(info), **arrays)
 
 
@@ -77,6 +81,8 @@ def _write_table(path: Path, series: ForceSeries) -> None:
     columns = {header: getattr(series, name) for name, header in _COLUMNS.items()} | {drive: series.drive}
     if series.band is not None:
         columns |= {"lower_force_n": series.band[0], "upper_force_n": series.band[1]}
+    if series.physics is not None:
+        columns |= {"physics_force_n": series.physics}
     np.savetxt(
         path,
         np.column_stack(list(columns.values())),

@@ -12,10 +12,11 @@ from identification.arrays import Array
 from identification.damper import PARAMETER_SETS, Coordinates, Parameters, to_coordinates
 from identification.damper.definitions import EffectFile, find_effect_file, load_effects, make_effect
 from identification.damper.effects import EFFECTS, rename_parameters
-from identification.documents import Fit, Nuisances
+from identification.documents import Fit, Nuisances, TwinResidual
 from identification.errors import IdentificationError
 from identification.fitting.piece import Piece
 from identification.fitting.prediction import PiecePrediction, predict_piece
+from identification.residual import LearnedResidual
 from identification.simulate import ActiveEffect
 from identification.validation import describe_validation_error
 
@@ -32,6 +33,8 @@ class DamperModel:
     """Residual delays of force and drive channel in the fit or twin [s]."""
     baseline: Fit | None = None
     """Fit without effects of a twin."""
+    residual: LearnedResidual | None = None
+    """Learned residual of a twin; `predict` and `simulate_force` do not include it."""
 
     def simulate_force(self, piece: Piece) -> Array:
         """Return the simulated force (N,) [N] of a piece, with y(0) fitted to it."""
@@ -92,7 +95,7 @@ def _parse_scenario(content: dict[str, Any]) -> DamperModel:
     damper = content.get("damper", "laboratory")
     parameters = PARAMETER_SETS[damper].parameters if isinstance(damper, str) else Parameters(**damper)
     effects = tuple(_parse_effect(entry) for entry in content.get("effects", ()))
-    baseline = content.get("baseline")
+    baseline, residual = content.get("baseline"), content.get("residual")
     # A scenario has no residual delays, because the devices of a simulated rig report theirs in every log. The
     # parameters of a twin were fitted together with the delays of its bench, and fit worse without them.
     nuisances = content.get("nuisances")
@@ -101,6 +104,7 @@ def _parse_scenario(content: dict[str, Any]) -> DamperModel:
         effects,
         (0.0, 0.0) if nuisances is None else _get_delays(Nuisances.model_validate(nuisances)),
         None if baseline is None else Fit.model_validate(baseline),
+        None if residual is None else LearnedResidual(TwinResidual.model_validate(residual)),
     )
 
 

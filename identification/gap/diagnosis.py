@@ -43,6 +43,7 @@ def diagnose(
     settings: SearchSettings = DEFAULT_SETTINGS,
     library: Mapping[str, Effect] | None = None,
     discover: bool = False,
+    learn_residual: bool = False,
 ) -> DiagnosisResult:
     """Diagnose the gap between the law and recordings of one damper.
 
@@ -56,6 +57,7 @@ def diagnose(
         settings: limits and thresholds of the search.
         library: effects that the search considers, by name; those that come with the program if None.
         discover: also search for a cause outside the library, where the named effects do not explain the gap.
+        learn_residual: learn what law and effects leave, for predictions with the twin.
 
     Raises:
         UnusableDataError: the recordings are too short, clipped, of different specimens, or do not contain force
@@ -71,6 +73,7 @@ def diagnose(
         settings=settings,
         library=library,
         discover=discover,
+        learn_residual=learn_residual,
     )
 
 
@@ -113,6 +116,7 @@ def diagnose_prepared(
     settings: SearchSettings = DEFAULT_SETTINGS,
     library: Mapping[str, Effect] | None = None,
     discover: bool = False,
+    learn_residual: bool = False,
 ) -> DiagnosisResult:
     """Diagnose prepared recordings; the arguments are those of ``diagnose``."""
     dataset, evaluation = prepared.dataset, prepared.evaluation
@@ -122,7 +126,9 @@ def diagnose_prepared(
         posterior = compare_with_curves(pool, compute_final_posterior(pool))
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]
-        builder = ReportBuilder(dataset, evaluation, pool, posterior, partial, model, notes, seed, discover)
+        builder = ReportBuilder(
+            dataset, evaluation, pool, posterior, partial, model, notes, seed, discover, learn_residual
+        )
         result = builder.build_result()
         return _add_cross_check(result, pool, dataset.drive_unit, seed, progress) if cross_check else result
 

@@ -113,6 +113,27 @@ def make_band(
     )
 
 
+def make_residual_band(deviations: Sequence[Array], rest: float, errors: Sequence[Array]) -> Band:
+    """Summarise the band of a twin with a learned residual.
+
+    Args:
+        deviations: standard deviation (N,) [N] of the residual of each stretch.
+        rest: standard deviation of what the residual does not predict, noise included [N].
+        errors: force error (N,) [N] of each stretch.
+    """
+    residual, error = np.concatenate(deviations), np.concatenate(errors)
+    total = np.hypot(residual, rest)
+    return Band(
+        level=CONFIDENCE_LEVEL,
+        half_width_n=float(Z95 * np.median(total)),
+        widest_n=float(Z95 * total.max()),
+        noise_n=rest,
+        parameters_n=float(np.sqrt(np.mean(residual**2))),
+        coverage=float(np.mean(np.abs(error) <= Z95 * total)),
+        note="estimated from the errors on stroke conditions that the learned residual had not read",
+    )
+
+
 def find_unobserved_active(
     fit: Fit, model: "DamperModel", piece: Piece, prediction: PiecePrediction, noise: float
 ) -> set[str]:

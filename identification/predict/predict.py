@@ -7,7 +7,7 @@ from importlib.metadata import version
 import numpy as np
 
 from identification.arrays import Array
-from identification.documents import Band, Fit, ForceSeries, Prediction, Provenance
+from identification.documents import Band, Fit, ForceError, ForceSeries, Prediction, Provenance
 from identification.fitting import (
     DamperModel,
     Dataset,
@@ -27,7 +27,9 @@ from identification.predict.bands import (
     estimate_record_noise,
     find_unobserved_active,
     make_band,
+    make_residual_band,
 )
+from identification.residual import ResidualForce
 
 _NEAR_FLOOR = 1.02
 """Threshold on the RMSE over the noise floor [1]: below it, there is no gap that could shrink."""
@@ -39,16 +41,26 @@ class _LogPrediction:
 
     dataset: Dataset
     pieces: Sequence[PiecePrediction]
+    """Law and effects."""
+    residuals: Sequence[ResidualForce] = ()
+    """Learned residual of each stretch; empty where the model has none."""
+
+    @property
+    def simulated(self) -> list[Array]:
+        """Simulated force (N,) [N] of each stretch, with the learned residual."""
+        if not self.residuals:
+            return [p.force for p in self.pieces]
+        return [p.force + r.force for p, r in zip(self.pieces, self.residuals, strict=True)]
 
     @property
     def errors(self) -> list[Array]:
         """Simulated less recorded force [N] at the valid samples of each stretch."""
-        return [
-            (prediction.force - piece.force)[stretch.valid_mask]
-            for prediction, piece, stretch in zip(
-                self.pieces, self.dataset.pieces, self.dataset.stretches, strict=True
-            )
-        ]
+        return self._compare(self.simulated)
+
+    @property
+    def physics_errors(self) -> list[Array]:
+        """The same without the learned residual."""
+        return self._compare([p.force for p in self.pieces])
 
     @property
     def forces(self) -> list[Array]:
@@ -59,6 +71,10 @@ class _LogPrediction:
     def drives(self) -> list[Array]:
         """Drive [V or A] at the valid samples of each stretch."""
         return self.select_valid([p.excitation.drive for p in self.dataset.pieces])
+
+    def _compare(self, forces: Sequence[Array]) -> list[Array]:
+        pairs = zip(forces, self.dataset.pieces, strict=True)
+        return self.select_valid([force - piece.force for force, piece in pairs])
 
     def select_valid(self, channels: Sequence[Array]) -> list[Array]:
         """Return the valid samples of a channel of each stretch."""
@@ -82,9 +98,8 @@ def predict_log(
     # Logs are compared by content, so a copied or renamed log is recognised.
     seen = isinstance(fit, Fit) and recording.sha256 in fit.provenance.logs.values()
     dataset = assemble([recording], _read_hold_out(fit) if seen and isinstance(fit, Fit) else HoldOut())
-    log = _LogPrediction(dataset, [model.predict(p, free_offset=free_offset) for p in dataset.pieces])
-    uncertainties = _estimate_uncertainties(fit, model, log) if isinstance(fit, Fit) else None
-    band = _make_band(fit, model, log, uncertainties) if isinstance(fit, Fit) and uncertainties else None
+    log = _simulate(model, dataset, free_offset)
+    band, limits = _estimate_band(fit, model, log)
     provenance = Provenance(
         logs={recording.path.name: recording.sha256},
         version=version("mrbench"),
@@ -94,8 +109,32 @@ def predict_log(
     before = _compute_baseline_error(model, dataset, free_offset)
     return (
         _make_prediction(log, before, free_offset, band, provenance),
-        _make_series(log, seen, _compute_limits(log, uncertainties) if uncertainties else None),
+        _make_series(log, seen, limits),
     )
+
+
+def _simulate(model: DamperModel, dataset: Dataset, free_offset: bool) -> _LogPrediction:
+    """Simulate law and effects, then the learned residual on the result."""
+    pieces = [model.predict(p, free_offset=free_offset) for p in dataset.pieces]
+    if model.residual is None:
+        return _LogPrediction(dataset, pieces)
+    pairs = zip(dataset.pieces, pieces, strict=True)
+    return _LogPrediction(dataset, pieces, [model.residual.predict(p.excitation, s.force) for p, s in pairs])
+
+
+def _estimate_band(
+    fit: Fit | DamperModel, model: DamperModel, log: _LogPrediction
+) -> tuple[Band | None, tuple[Array, Array] | None]:
+    """Return the 95 % band and its limits (N,) [N]; None for a model without intervals."""
+    if isinstance(fit, Fit):
+        uncertainties = _estimate_uncertainties(fit, model, log)
+        return _make_band(fit, model, log, uncertainties), _compute_limits(log, uncertainties)
+    if model.residual is None:
+        return None, None
+    rest = model.residual.document.rest_n
+    uncertainties = [ForceUncertainty(r.deviation, rest) for r in log.residuals]
+    deviations = log.select_valid([r.deviation for r in log.residuals])
+    return make_residual_band(deviations, rest, log.errors), _compute_limits(log, uncertainties)
 
 
 def _make_prediction(
@@ -103,7 +142,7 @@ def _make_prediction(
 ) -> Prediction:
     errors, forces, floor = log.errors, log.forces, log.dataset.floor.noise
     error, force = np.concatenate(errors), np.concatenate(forces)
-    rmse = compute_rmse(error)
+    rmse, physics = compute_rmse(error), np.concatenate(log.physics_errors)
     return Prediction(
         rmse_n=rmse,
         nrmse=compute_nrmse(error, force),
@@ -114,6 +153,9 @@ def _make_prediction(
         freed=["y0 of each stretch"] + (["force offset of each stretch"] if free_offset else []),
         before_n=before,
         shrinkage=None if before is None else _compute_shrinkage(before, rmse, floor),
+        physics=ForceError(rmse_n=compute_rmse(physics), nrmse=compute_nrmse(physics, force))
+        if log.residuals
+        else None,
         band=band,
         provenance=provenance,
     )
@@ -128,12 +170,13 @@ def _make_series(log: _LogPrediction, seen: bool, limits: tuple[Array, Array] | 
         velocity=np.concatenate([p.excitation.velocity for p in dataset.pieces]),
         drive=np.concatenate([p.excitation.drive for p in dataset.pieces]),
         force=np.concatenate([p.force for p in dataset.pieces]),
-        simulated=np.concatenate([p.force for p in log.pieces]),
+        simulated=np.concatenate(log.simulated),
         stretch=np.repeat(np.arange(len(log.pieces)), [len(p.force) for p in dataset.pieces]),
         held_out=np.concatenate(held_out),
         names=tuple(p.name for p in dataset.pieces),
         drive_unit=dataset.drive_unit,
         band=limits,
+        physics=np.concatenate([p.force for p in log.pieces]) if log.residuals else None,
     )
 
 
@@ -161,7 +204,7 @@ def _make_band(
 
 
 def _compute_limits(log: _LogPrediction, uncertainties: Sequence[ForceUncertainty]) -> tuple[Array, Array]:
-    limits = [compute_limits(p.force, u) for p, u in zip(log.pieces, uncertainties, strict=True)]
+    limits = [compute_limits(force, u) for force, u in zip(log.simulated, uncertainties, strict=True)]
     return np.concatenate([low for low, _ in limits]), np.concatenate([high for _, high in limits])
 
 

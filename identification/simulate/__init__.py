@@ -17,7 +17,12 @@ from identification.simulate.simulation_model import (
     Response,
     SimulationModel,
 )
-from identification.simulate.variables import DamperVariables, make_coil_variables
+from identification.simulate.variables import (
+    DamperVariables,
+    apply_deadband,
+    make_coil_variables,
+    trace_last_reversal,
+)
 
 __all__ = [
     "COIL_ACTIONS",
@@ -30,6 +35,7 @@ __all__ = [
     "Response",
     "SimulationModel",
     "StepCounts",
+    "apply_deadband",
     "apply_force_channel",
     "compute_damper_field",
     "compute_damper_motion",
@@ -38,4 +44,5 @@ __all__ = [
     "differentiate_parallel_force",
     "make_coil_variables",
     "simulate",
+    "trace_last_reversal",
 ]

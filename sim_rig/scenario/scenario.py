@@ -66,6 +66,10 @@ class Scenario(FrozenModel):
         default=None, description="of a twin: residual channel delays of its fit; the rig does not play them"
     )
     baseline: dict[str, Any] | None = Field(default=None, description="of a twin: the fit without its effects")
+    residual: dict[str, Any] | None = Field(
+        default=None,
+        description="of a twin: its learned residual, which predictions add; the rig does not play it",
+    )
     provenance: dict[str, Any] | None = Field(default=None, description="of a twin: where it comes from")
 
     @property

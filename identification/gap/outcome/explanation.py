@@ -148,8 +148,18 @@ def summarise_diagnosis(diagnosis: Diagnosis) -> str:
     return (
         f"{diagnosis.verdict}: {names}; held-out force error {gap.before_n:.3g} to {gap.after_n:.3g} N, "
         f"noise floor {gap.noise_floor_n:.3g} N{shrinkage}{_summarise_discovery(diagnosis)}"
-        f"{_describe_cross_check(diagnosis)}"
+        f"{_summarise_held_out(diagnosis.gap)}{_describe_cross_check(diagnosis)}"
     )
+
+
+def _summarise_held_out(gap: Gap) -> str:
+    """Return the errors on the strokes that the user held out, with and without the learned residual."""
+    if gap.held_out is None:
+        return ""
+    text = f"; on the strokes held out {gap.held_out.rmse_n:.3g} N"
+    if gap.held_out.with_residual is None:
+        return text
+    return f"{text}, with the learned residual {gap.held_out.with_residual.rmse_n:.3g} N"
 
 
 def _summarise_discovery(diagnosis: Diagnosis) -> str:

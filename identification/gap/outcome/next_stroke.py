@@ -16,11 +16,17 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper import Coordinates
+from identification.documents import NextStroke
 from identification.fitting import COORDINATE_COUNT, compute_rmse
 from identification.gap.fits import JointFit
 from identification.gap.outcome.trial_segments import StrokeLimits, generate_trial_segments
+from identification.gap.selection import MAX_TIED_SETS, MIN_TIED_PROBABILITY, CandidatePool, Posterior
 from identification.simulate import SENSITIVITY_COLUMNS, ActiveEffect, Excitation, SimulationModel, simulate
 
+_SPEED_QUANTILE = 0.999
+"""Quantile of the speed that counts as the largest recorded one."""
+_LOWEST_FREQUENCY_LIMIT = 0.5
+"""Smallest limit on the frequency of a proposed stroke [Hz]."""
 _MIN_PAIR_WEIGHT = 1e-12
 """Smallest weight of a pair of rivals; it prevents a sum of zero."""
 
@@ -50,6 +56,50 @@ class ProposedSegment:
     """Root mean square difference of the rivals' forces [N]."""
     detectability: float
     """Difference that no refit removes, over noise and form error, times the root of the number of samples [1]."""
+
+
+def propose_next_stroke(pool: CandidatePool, posterior: Posterior) -> NextStroke | None:
+    """Return the stroke that best separates the most probable sets; None where nothing is open."""
+    tied = [(names, p) for names, p in posterior.rank_sets() if p > MIN_TIED_PROBABILITY][:MAX_TIED_SETS]
+    rivals = [_make_rival_model(pool, names, p) for names, p in tied]
+    chosen = find_best_segment(rivals, pool.baseline.fit.coordinates, _find_limits(pool), pool.floor)
+    if chosen is None:
+        return None
+    return NextStroke(
+        segment=chosen.segment,
+        separates=chosen.separated_sets,
+        expected_n=chosen.difference,
+        detectability=chosen.detectability,
+    )
+
+
+def _make_rival_model(pool: CandidatePool, names: frozenset[str], probability: float) -> RivalModel:
+    candidate = pool.candidates[names]
+    form_error = max(pool.compute_excess(candidate), 0.0) / max(pool.baseline_excess, 1e-3)
+    fit = candidate.fit
+    return RivalModel(
+        tuple(sorted(names)),
+        fit.coordinates,
+        fit.active_effects,
+        probability,
+        min(form_error, 1.0),
+        compute_information(fit),
+    )
+
+
+def _find_limits(pool: CandidatePool) -> StrokeLimits:
+    """Return the limits of motion and drive that the recording reached."""
+    strokes = [p.excitation for p in pool.evaluation.pieces]
+    low = min(float(s.displacement.min()) for s in strokes)
+    high = max(float(s.displacement.max()) for s in strokes)
+    space = pool.full_problem.space
+    return StrokeLimits(
+        amplitude=0.5 * (high - low),
+        centre=0.5 * (high + low),
+        velocity=max(float(np.quantile(np.abs(s.velocity), _SPEED_QUANTILE)) for s in strokes),
+        frequency=max([c.frequency for c in pool.evaluation.cycles.conditions] + [_LOWEST_FREQUENCY_LIMIT]),
+        drives=(space.lowest_drive, space.highest_drive),
+    )
 
 
 def find_best_segment(

@@ -14,9 +14,10 @@ from identification.documents import (
     Discovery,
     Gap,
     GapLocation,
-    NextStroke,
+    HeldOutError,
     Provenance,
     Remainder,
+    TwinResidual,
     Verdict,
 )
 from identification.fitting import DamperModel, Dataset
@@ -39,10 +40,10 @@ from identification.gap.outcome.explanation import (
     explain_diagnosis,
 )
 from identification.gap.outcome.held_out_strokes import measure_held_out_strokes
-from identification.gap.outcome.next_stroke import RivalModel, compute_information, find_best_segment
+from identification.gap.outcome.next_stroke import propose_next_stroke
 from identification.gap.outcome.remainder import describe_remainder
-from identification.gap.outcome.trial_segments import StrokeLimits
 from identification.gap.outcome.twin import make_baseline_fit, make_twin
+from identification.gap.outcome.twin_residual import learn_twin_residual
 from identification.gap.outcome.verdict import (
     Share,
     build_named_effects,
@@ -52,12 +53,11 @@ from identification.gap.outcome.verdict import (
     list_alternatives,
 )
 from identification.gap.selection import (
-    MAX_TIED_SETS,
-    MIN_TIED_PROBABILITY,
     CandidatePool,
     Posterior,
     compute_stage_probabilities,
 )
+from identification.residual import LearnedResidual
 
 _NEAREST_SHARE = 0.95
 """Largest error that unnamed effects may leave to be mentioned, relative to that of the baseline."""
@@ -65,10 +65,6 @@ _MIN_STAGE_PROBABILITY = 0.05
 """Smallest probability of a stage that is reported as the most probable one."""
 _EXPLAINABLE_THRESHOLD = 0.3
 """Explainable share above which the remainder counts as explainable."""
-_SPEED_QUANTILE = 0.999
-"""Quantile of the speed that counts as the largest recorded one."""
-_LOWEST_FREQUENCY_LIMIT = 0.5
-"""Smallest limit on the frequency of a proposed stroke [Hz]."""
 
 
 class NamedSet(NamedTuple):
@@ -97,6 +93,8 @@ class ReportBuilder:
     seed: int
     discovers: bool = False
     """True to search for a cause outside the library where the named effects do not explain the gap."""
+    learns_residual: bool = False
+    """True to learn what law and effects leave, for predictions with the twin."""
 
     @cached_property
     def regression(self) -> ResidualRegression:
@@ -106,7 +104,10 @@ class ReportBuilder:
     def build_result(self) -> DiagnosisResult:
         """Build the documents."""
         verdict, named, shrinkage, posterior = self._choose_named_set()
-        gap = self._build_gap(verdict, named, shrinkage)
+        found = self._discover(verdict, named)
+        modelled = named if found is None else found.candidate
+        residual = self._learn_residual(verdict, modelled)
+        gap = self._build_gap(verdict, named, shrinkage, self._measure_held_out(named, modelled, residual))
         shares = self._estimate_shares(named, shrinkage)
         effects = build_named_effects(named, posterior, shares, self.dataset.drive_unit)
         alternatives = list_alternatives(self.posterior, named.names)
@@ -114,7 +115,6 @@ class ReportBuilder:
         if verdict != "no_gap":
             remainder = describe_remainder(self.pool, named, self.regression, gap.noise_floor_n)
         provenance = self._make_provenance()
-        found = self._discover(verdict, named)
         discovery = self._build_discovery(found, named)
         diagnosis = Diagnosis(
             verdict=verdict,
@@ -125,7 +125,7 @@ class ReportBuilder:
             unknown_probability=self.posterior.unknown,
             gap=gap,
             where=self._locate_gap(posterior),
-            next_stroke=self._propose_next_stroke(),
+            next_stroke=propose_next_stroke(self.pool, self.posterior),
             remainder=remainder,
             discovery=discovery,
             explanation=explain_diagnosis(verdict, gap, effects, alternatives, self._describe_place(remainder)),
@@ -133,21 +133,37 @@ class ReportBuilder:
                 *self.notes,
                 *self._describe_nearest(verdict),
                 *self._describe_search(verdict, discovery),
+                *self._describe_residual(residual),
                 *describe_unobservable_effects(self.evaluation.cycles, self.dataset.floor),
             ],
             provenance=provenance,
         )
         noise = self.pool.noise_model.noise
         fit = make_baseline_fit(self.dataset, self.evaluation, self.pool.baseline, noise, provenance)
-        candidate = named if found is None else found.candidate
         definition = None if discovery is None else discovery.definition
-        twin = make_twin(self.dataset, candidate, definition, fit, noise, fit.specimen, provenance)
-        return DiagnosisResult(diagnosis, twin)
+        twin = make_twin(self.dataset, modelled, definition, fit, noise, fit.specimen, provenance)
+        return DiagnosisResult(diagnosis, twin.model_copy(update={"residual": residual}))
 
     def _discover(self, verdict: Verdict, named: Candidate) -> DiscoveredEffect | None:
         """Return a cause outside the library, if it is wanted and something is left to explain."""
         wanted = self.discovers and verdict in ("partly_explained", "unexplained")
         return discover_effect(self.pool, named) if wanted else None
+
+    def _learn_residual(self, verdict: Verdict, modelled: Candidate) -> TwinResidual | None:
+        """Return the learned residual of the twin's effects, if it is wanted and something is left."""
+        wanted = self.learns_residual and verdict != "no_gap"
+        return learn_twin_residual(self.evaluation, modelled, self.seed) if wanted else None
+
+    def _describe_residual(self, residual: TwinResidual | None) -> list[str]:
+        """Return the note on the learned residual, if it is wanted."""
+        if not self.learns_residual:
+            return []
+        if residual is None:
+            return ["no residual is learned: what is left does not predict stroke conditions that were left out"]
+        return [
+            f"learned residual: {residual.before_n:.3g} N without and {residual.after_n:.3g} N with it, each of "
+            f"{residual.conditions} stroke conditions predicted from the others"
+        ]
 
     def _build_discovery(self, found: DiscoveredEffect | None, named: Candidate) -> Discovery | None:
         if found is None:
@@ -225,14 +241,27 @@ class ReportBuilder:
         noise = self.pool.noise_model.estimate_noise(named)
         return self.evaluation.estimate_shares(baseline.residual, named.residual, without, shrinkage.after, noise)
 
-    def _build_gap(self, verdict: Verdict, named: Candidate, shrinkage: Shrinkage) -> Gap:
+    def _measure_held_out(
+        self, named: Candidate, modelled: Candidate, residual: TwinResidual | None
+    ) -> HeldOutError | None:
+        """Return the error of the named set on the user's held-out strokes, and of the twin with its residual."""
+        problem = self.pool.full_problem
+        error = measure_held_out_strokes(self.dataset, problem, named)
+        if error is None or residual is None:
+            return error
+        twin = measure_held_out_strokes(self.dataset, problem, modelled, LearnedResidual(residual))
+        return error if twin is None else error.model_copy(update={"with_residual": twin.to_force_error()})
+
+    def _build_gap(
+        self, verdict: Verdict, named: Candidate, shrinkage: Shrinkage, held_out: HeldOutError | None
+    ) -> Gap:
         no_gap = verdict == "no_gap"
         noise = self.pool.noise_model.estimate_noise(named)
         low, high = self.dataset.floor.get_interval(shrinkage.after)
         return Gap(
             before_n=shrinkage.before,
             after_n=shrinkage.after,
-            held_out=measure_held_out_strokes(self.dataset, self.pool.full_problem, named),
+            held_out=held_out,
             explainable_n=self._find_explainable_rmse(named, noise),
             noise_floor_n=noise,
             noise_floor_ci95=(min(low, noise), max(high, noise)),
@@ -285,47 +314,6 @@ class ReportBuilder:
             f"The remainder is largest at {largest.drive:.3g} {self.dataset.drive_unit}, "
             f"{1e3 * largest.amplitude_m:.3g} mm and {largest.frequency_hz:.3g} Hz ({largest.gap_n:.3g} N), and "
             f"{dependence}."
-        )
-
-    def _propose_next_stroke(self) -> NextStroke | None:
-        tied = [(names, p) for names, p in self.posterior.rank_sets() if p > MIN_TIED_PROBABILITY][:MAX_TIED_SETS]
-        rivals = [self._make_rival_model(names, p) for names, p in tied]
-        law = self.pool.baseline.fit.coordinates
-        chosen = find_best_segment(rivals, law, self._find_limits(), self.pool.floor)
-        if chosen is None:
-            return None
-        return NextStroke(
-            segment=chosen.segment,
-            separates=chosen.separated_sets,
-            expected_n=chosen.difference,
-            detectability=chosen.detectability,
-        )
-
-    def _make_rival_model(self, names: frozenset[str], probability: float) -> RivalModel:
-        candidate = self.pool.candidates[names]
-        form_error = max(self.pool.compute_excess(candidate), 0.0) / max(self.pool.baseline_excess, 1e-3)
-        fit = candidate.fit
-        return RivalModel(
-            tuple(sorted(names)),
-            fit.coordinates,
-            fit.active_effects,
-            probability,
-            min(form_error, 1.0),
-            compute_information(fit),
-        )
-
-    def _find_limits(self) -> StrokeLimits:
-        """Return the limits of motion and drive that the recording reached."""
-        strokes = [p.excitation for p in self.evaluation.pieces]
-        low = min(float(s.displacement.min()) for s in strokes)
-        high = max(float(s.displacement.max()) for s in strokes)
-        space = self.pool.full_problem.space
-        return StrokeLimits(
-            amplitude=0.5 * (high - low),
-            centre=0.5 * (high + low),
-            velocity=max(float(np.quantile(np.abs(s.velocity), _SPEED_QUANTILE)) for s in strokes),
-            frequency=max([c.frequency for c in self.evaluation.cycles.conditions] + [_LOWEST_FREQUENCY_LIMIT]),
-            drives=(space.lowest_drive, space.highest_drive),
         )
 
     def _make_provenance(self) -> Provenance:

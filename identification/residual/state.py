@@ -1,0 +1,67 @@
+"""State of a damper on which its residual may depend, without units.
+
+Velocity, acceleration and travel since the last reversal are compressed: a residual changes fastest near a
+reversal, where all three are small or change their sign.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.simulate import Excitation, apply_deadband, trace_last_reversal
+
+_TRAVEL, _VELOCITY, _ACCELERATION = 0.01, 0.03, 0.1
+"""Travel over half the stroke, velocity and acceleration over their peaks [1], from which each is compressed."""
+_DEADBAND = 1e-3
+"""Half width, over half the stroke [1], of the deadband within which a change of direction is no reversal."""
+VARIABLES = ("travel_since_reversal", "velocity", "drive", "law_force", "displacement", "acceleration")
+"""Names of the variables of a state, the likeliest first."""
+
+State = Mapping[str, Array]
+"""Variables (N,) by name, each without unit and of the order of one."""
+
+
+class StateUnits(NamedTuple):
+    """Units of a recording in which the state is expressed."""
+
+    force: float
+    """Standard deviation of the force [N]."""
+    length: float
+    """Half of the largest stroke [m]."""
+    centre: float
+    """Middle of the largest stroke [m]."""
+    velocity: float
+    """Peak speed [m/s]."""
+    lowest_drive: float
+    """Lowest drive [V or A]."""
+    highest_drive: float
+    """Highest drive [V or A]; one above the lowest where the drive is constant."""
+
+
+def compute_state(excitation: Excitation, law_force: Array, units: StateUnits) -> State:
+    """Return the state along an excitation.
+
+    Args:
+        excitation: motion and drive, N samples.
+        law_force: (N,) force of law and effects [N].
+        units: units of the recordings from which the residual is learned.
+    """
+    x, v, a = excitation.displacement, excitation.velocity, excitation.acceleration
+    steady = apply_deadband(x, _DEADBAND * units.length)
+    travel = steady - trace_last_reversal(steady)
+    drive = (excitation.sampled_drive - units.lowest_drive) / (units.highest_drive - units.lowest_drive)
+    return {
+        "travel_since_reversal": _compress(travel / units.length, _TRAVEL),
+        "velocity": _compress(v / units.velocity, _VELOCITY),
+        "drive": 2.0 * drive,
+        "law_force": law_force / units.force,
+        "displacement": 2.0 * (x - units.centre) / units.length,
+        "acceleration": _compress(a * units.length / units.velocity**2, _ACCELERATION),
+    }
+
+
+def _compress(values: Array, threshold: float) -> Array:
+    """Return values (N,) on a scale that is linear below a threshold and logarithmic above it."""
+    return np.asarray(np.arcsinh(values / threshold))

@@ -7,9 +7,10 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 import orjson
-from mcap.reader import McapReader, make_reader
+from mcap.reader import make_reader
 
 from bench.errors import LogError
+from bench.log.chunks import read_chunks
 from bench.log.mcap_file import DAMAGE_ERRORS, MAGIC, convert_file_errors, is_closed
 from bench.log.messages import (
     EVENT,
@@ -79,7 +80,7 @@ def read_log(path: Path | str) -> Log:
     with convert_file_errors(path), path.open("rb") as file:
         check_complete(path, file)
         try:
-            return _read(path, make_reader(file, validate_crcs=True))
+            return _read(path, file)
         except DAMAGE_ERRORS as error:
             raise LogError(f"{path}: the log is damaged ({error}); run `mrbench salvage {path}`") from error
 
@@ -108,21 +109,29 @@ def check_profile(path: Path, profile: str) -> None:
         )
 
 
-def _read(path: Path, reader: McapReader) -> Log:
+def _read(path: Path, file: IO[bytes]) -> Log:
+    reader = make_reader(file, validate_crcs=True)
     check_profile(path, reader.get_header().profile)
-    messages: dict[str, list[bytes]] = {SAMPLE: [], SEGMENT: [], EVENT: []}
+    file.seek(0)
+    blocks: list[dict[str, Array]] = []
+    marks: list[dict[str, Any]] = []
+    events: list[dict[str, Any]] = []
     # The order of the file is that of the samples, so that nothing has to be sorted.
-    for _, channel, message in reader.iter_messages(topics=list(messages), log_time_order=False):
-        messages[channel.topic].append(message.data)
-    if not messages[SAMPLE]:
+    for messages in read_chunks(file, (SAMPLE, SEGMENT, EVENT)):
+        # Chunk by chunk: the parsed messages of a long log need ten times the memory of its columns.
+        if bodies := messages.get(SAMPLE):
+            blocks.append(_make_columns(_parse_messages(bodies)))
+        marks += _parse_messages(messages.get(SEGMENT, []))
+        events += _parse_messages(messages.get(EVENT, []))
+    if not blocks:
         raise LogError(f"{path}: the log contains no sample; its run ended before the first one")
-    samples = _make_arrays(_parse_messages(messages[SAMPLE]))
+    samples = _join_columns(blocks)
     return Log(
         path=path,
         samples=samples,
-        segments=_make_segments(_parse_messages(messages[SEGMENT]), samples["time_ns"]),
+        segments=_make_segments(marks, samples["time_ns"]),
         metadata={record.name: record.metadata for record in reader.iter_metadata()},
-        events=_parse_messages(messages[EVENT]),
+        events=events,
         attachments={attachment.name: attachment.data for attachment in reader.iter_attachments()},
     )
 
@@ -133,22 +142,33 @@ def _parse_messages(messages: list[bytes]) -> list[dict[str, Any]]:
     return parsed
 
 
-def _make_arrays(messages: list[dict[str, Any]]) -> dict[str, Array]:
-    time_ns = np.array([parse_timestamp(message) for message in messages], dtype=np.int64)
-    arrays: dict[str, Array] = {"time_ns": time_ns, "time": (time_ns - time_ns[0]) / NS_PER_SECOND}
+def _make_columns(messages: list[dict[str, Any]]) -> dict[str, Array]:
+    """Return `time_ns` and one column for each field of some samples."""
+    columns: dict[str, Array] = {"time_ns": np.array([parse_timestamp(m) for m in messages], dtype=np.int64)}
     present = {name for message in messages for name in message}
     for name in SAMPLE_FIELDS:
-        if name == "segment" and name in present:
-            arrays[name] = np.array([message.get(name, -1) for message in messages], dtype=np.int64)
+        if name in REQUIRED_FIELDS:
+            columns[name] = np.array([message[name] for message in messages], dtype=np.float64)
         elif name in present:
-            arrays[name] = _make_column(messages, name)
-    return arrays
+            kind, missing = _describe_column(name)
+            columns[name] = np.array([message.get(name, missing) for message in messages], dtype=kind)
+    return columns
 
 
-def _make_column(messages: list[dict[str, Any]], name: str) -> Array:
-    if name in REQUIRED_FIELDS:
-        return np.array([message[name] for message in messages], dtype=np.float64)
-    return np.array([message.get(name, np.nan) for message in messages], dtype=np.float64)
+def _describe_column(name: str) -> tuple[np.dtype[Any], float]:
+    """Return the type of an optional field's column, and the value of a sample that lacks the field."""
+    return (np.dtype(np.int64), -1) if name == "segment" else (np.dtype(np.float64), np.nan)
+
+
+def _join_columns(blocks: list[dict[str, Array]]) -> dict[str, Array]:
+    """Return `time_ns`, `time` and one column for each field that any sample has."""
+    time_ns = np.concatenate([block["time_ns"] for block in blocks])
+    samples: dict[str, Array] = {"time_ns": time_ns, "time": (time_ns - time_ns[0]) / NS_PER_SECOND}
+    for name in (name for name in SAMPLE_FIELDS if any(name in block for block in blocks)):
+        kind, missing = _describe_column(name)
+        parts = [block.get(name, np.full(len(block["time_ns"]), missing, kind)) for block in blocks]
+        samples[name] = np.concatenate(parts).astype(kind, copy=False)
+    return samples
 
 
 def _make_segments(marks: list[dict[str, Any]], time_ns: Array) -> list[LoggedSegment]:

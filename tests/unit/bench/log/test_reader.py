@@ -3,9 +3,10 @@ import json
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.writer import Writer
+from mcap.writer import CompressionType, Writer
 
 from bench.errors import LogError
+from bench.log.chunks import read_chunks
 from bench.log.reader import read_log
 from bench.log.salvage import salvage_log
 from bench.log.writer import LogWriter
@@ -77,6 +78,42 @@ def test_missing_value_of_a_channel_is_nan(tmp_path):
         log.write_samples(times(3), values(3, temperature=[20.0, np.nan, 21.0]))
 
     np.testing.assert_array_equal(read_log(tmp_path / "run.mcap").samples["temperature"], [20.0, np.nan, 21.0])
+
+
+def test_field_that_only_later_chunks_contain_is_missing_before(tmp_path):
+    count = 5000  # samples that need several chunks
+    instants = times(count + 3)
+    with LogWriter(tmp_path / "run.mcap", header()) as log:
+        log.write_samples(instants[:count], values(count))
+        log.write_samples(instants[count:], values(3, temperature=[20.0, 21.0, 22.0], segment=[0, 0, 1]))
+
+    samples = read_log(tmp_path / "run.mcap").samples
+
+    np.testing.assert_array_equal(samples["temperature"], [np.nan] * count + [20.0, 21.0, 22.0])
+    np.testing.assert_array_equal(samples["segment"], [-1] * count + [0, 0, 1])
+    assert samples["segment"].dtype == np.int64
+
+
+@pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD])
+@pytest.mark.parametrize("is_chunked", [True, False])
+def test_chunks_contain_the_messages_that_the_library_reads(tmp_path, compression, is_chunked):
+    path = tmp_path / "other.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=200, compression=compression, use_chunking=is_chunked)
+        writer.start("mrbench")
+        channels = {name: writer.register_channel(name, "json", 0) for name in ("a", "b", "c")}
+        for number in range(60):
+            topic = "abc"[number % 3]
+            writer.add_message(channels[topic], number, f"{topic}{number}".encode(), number)
+        writer.finish()
+    with path.open("rb") as file:
+        expected = [(c.topic, m.data) for _, c, m in make_reader(file).iter_messages(topics=["a", "c"])]
+    with path.open("rb") as file:
+        chunks = list(read_chunks(file, ("a", "c")))
+    assert len(chunks) > 1
+    for topic in "ac":
+        found = [body for chunk in chunks for body in chunk.get(topic, [])]
+        assert found == [body for name, body in expected if name == topic]
 
 
 def test_metadata_describe_the_run(logged):

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 from pydantic import AliasChoices, Field
 
 from bench.report.discovery import Discovery, make_discovery_context
-from bench.report.documents import DocumentPart, ParameterValue, read_document
+from bench.report.documents import DocumentPart, ForceError, ParameterValue, read_document
 from bench.report.values import (
     format_force,
     format_name,
@@ -55,6 +55,7 @@ class HeldOutError(DocumentPart):
 
     rmse_n: float
     nrmse: float
+    with_residual: ForceError | None = None
 
 
 class Gap(DocumentPart):
@@ -211,6 +212,10 @@ def _make_gap_rows(diagnosis: Diagnosis) -> PropertyRows:
     if gap.held_out is not None:
         errors = f"{format_force(gap.held_out.rmse_n)}, NRMSE {format_percent(gap.held_out.nrmse)}"
         rows.append(("Force error on the strokes of --hold-out, which no fit and no choice has read", errors))
+        learned = gap.held_out.with_residual
+        if learned is not None:
+            errors = f"{format_force(learned.rmse_n)}, NRMSE {format_percent(learned.nrmse)}"
+            rows.append(("The same with the learned residual, which names no cause", errors))
     if gap.explainable_n is not None and diagnosis.remainder is not None:
         rows.append(("Lowest force error that any model reached", format_force(gap.explainable_n)))
     return [*rows, *_make_remainder_rows(diagnosis.remainder)]

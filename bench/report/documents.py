@@ -127,6 +127,13 @@ class Fit(DocumentPart):
         return sha256 in self.provenance.logs.values()
 
 
+class ForceError(DocumentPart):
+    """Force error of one model."""
+
+    rmse_n: float = Field(description="root mean square force error in N")
+    nrmse: float = Field(description="RMSE over the standard deviation of the recorded force")
+
+
 class Prediction(DocumentPart):
     """A fit simulated on one log."""
 
@@ -139,6 +146,7 @@ class Prediction(DocumentPart):
     samples: int = Field(description="number of samples")
     freed: list[str] = Field(description="quantities that were estimated on this log")
     before_n: float | None = Field(default=None, description="of a twin: force error without its effects, in N")
+    physics: ForceError | None = Field(default=None, description="of a twin: without its learned residual")
 
 
 DocumentT = TypeVar("DocumentT", bound=DocumentPart)

@@ -102,16 +102,15 @@ def _describe_names(diagnosis: Diagnosis) -> str:
 
 
 def _describe_unseen(unseen: Prediction) -> str:
-    """Describe the errors of the law alone and of the twin on one recording."""
+    """Describe the errors of the law alone and of the twin on one recording, without a learned residual."""
     floor = unseen.noise_floor_n
+    twin = unseen.rmse_n if unseen.physics is None else unseen.physics.rmse_n
     if unseen.before_n is None:
-        return (
-            f"law alone {format_force(unseen.rmse_n)}, noise floor {format_force(floor)}; the twin has no effect"
-        )
+        return f"law alone {format_force(twin)}, noise floor {format_force(floor)}; the twin has no effect"
     if unseen.before_n < _NEAR_FLOOR_RATIO * floor:
-        return f"{_describe_errors(unseen.before_n, unseen.rmse_n, floor)}; the law alone has no gap there"
-    closed = 1.0 - (unseen.rmse_n**2 - floor**2) / (unseen.before_n**2 - floor**2)
-    return _describe_errors(unseen.before_n, unseen.rmse_n, floor, format_percent(closed))
+        return f"{_describe_errors(unseen.before_n, twin, floor)}; the law alone has no gap there"
+    closed = 1.0 - (twin**2 - floor**2) / (unseen.before_n**2 - floor**2)
+    return _describe_errors(unseen.before_n, twin, floor, format_percent(closed))
 
 
 def _describe_errors(before: float, after: float, floor: float, closed: str | None = None) -> str:

@@ -195,7 +195,8 @@ class Prediction(Document):
     freed: list[str] = Field(description="quantities estimated on this log")
     before_n: float | None = Field(default=None, description="twin: RMSE of its fit without effects, in N")
     shrinkage: float | None = Field(
-        default=None, description="twin: 1 - (after² - floor²)/(before² - floor²); null near the floor"
+        default=None,
+        description="twin: 1 - (after² - floor²)/(before² - floor²) of the physics; null near the floor",
     )
     physics: ForceError | None = Field(
         default=None, description="the same without the learned residual of a twin; null where it has none"

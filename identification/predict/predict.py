@@ -142,9 +142,9 @@ def _make_prediction(
 ) -> Prediction:
     errors, forces, floor = log.errors, log.forces, log.dataset.floor.noise
     error, force = np.concatenate(errors), np.concatenate(forces)
-    rmse, physics = compute_rmse(error), np.concatenate(log.physics_errors)
+    physics = np.concatenate(log.physics_errors)
     return Prediction(
-        rmse_n=rmse,
+        rmse_n=compute_rmse(error),
         nrmse=compute_nrmse(error, force),
         bias_n=float(error.mean()),
         noise_floor_n=floor,
@@ -152,7 +152,7 @@ def _make_prediction(
         samples=len(error),
         freed=["y0 of each stretch"] + (["force offset of each stretch"] if free_offset else []),
         before_n=before,
-        shrinkage=None if before is None else _compute_shrinkage(before, rmse, floor),
+        shrinkage=None if before is None else _compute_shrinkage(before, compute_rmse(physics), floor),
         physics=ForceError(rmse_n=compute_rmse(physics), nrmse=compute_nrmse(physics, force))
         if log.residuals
         else None,

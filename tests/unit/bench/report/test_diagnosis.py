@@ -142,6 +142,15 @@ def test_strokes_that_the_user_held_out_have_their_own_row(written):
     gap = document()["gap"] | {"held_out": {"rmse_n": 2.71, "nrmse": 0.034}}
     rows = dict(make_context(read_diagnosis(written(gap=gap)), "V")["gap"])
     assert "2.71 N, NRMSE 3.4 %" in rows.values()
+    assert not any("residual" in label for label in rows)
+
+
+def test_a_learned_residual_has_a_row_apart_from_the_physics(written):
+    learned = {"rmse_n": 2.51, "nrmse": 0.031}
+    gap = document()["gap"] | {"held_out": {"rmse_n": 2.71, "nrmse": 0.034, "with_residual": learned}}
+    rows = dict(make_context(read_diagnosis(written(gap=gap)), "V")["gap"])
+    assert "2.71 N, NRMSE 3.4 %" in rows.values()
+    assert rows["The same with the learned residual, which names no cause"] == "2.51 N, NRMSE 3.1 %"
 
 
 @pytest.mark.parametrize("verdict", ["partly_explained", "unexplained"])

@@ -60,6 +60,12 @@ def test_a_cause_outside_the_library_is_searched_for_on_request(bench, tmp_path,
     assert [call["discover"] for call in bench.calls] == [searched]
 
 
+@pytest.mark.parametrize(("options", "learned"), [((), False), (("--residual",), True)])
+def test_a_residual_is_learned_on_request(bench, tmp_path, options, learned):
+    assert run(tmp_path, *options).exit_code == 0
+    assert [call["learn_residual"] for call in bench.calls] == [learned]
+
+
 def test_a_diagnosis_knows_the_effects_of_the_user(bench, folder, tmp_path):
     folder.mkdir()
     text = DEFINITION.model_copy(update={"name": "my_gain"}).model_dump_json(by_alias=True)

@@ -110,11 +110,20 @@ def test_per_log_parameters_are_those_of_a_log():
 
 
 @pytest.mark.parametrize(
-    ("coverage", "text"), [(0.953, "; 95.3 % inside the 95 % band of 4.9 N"), (None, ""), ("no band", "")]
+    ("coverage", "physics", "text"),
+    [
+        (0.953, None, "; 95.3 % inside the 95 % band of 4.9 N"),
+        (None, None, ""),
+        ("no band", None, ""),
+        (0.95, 3.1, "; 95.0 % inside the 95 % band of 4.9 N; without the learned residual 3.1 N"),
+    ],
 )
-def test_a_prediction_reports_its_error_and_its_band(monkeypatch, tmp_path, capsys, coverage, text):
+def test_a_prediction_reports_its_error_and_its_band(monkeypatch, tmp_path, capsys, coverage, physics, text):
+    alone = None if physics is None else SimpleNamespace(rmse_n=physics)
     band = None if coverage == "no band" else SimpleNamespace(coverage=coverage, half_width_n=4.9)
-    prediction = SimpleNamespace(band=band, freed=["y0"], rmse_n=2.5, nrmse=0.0125, noise_floor_n=2.4)
+    prediction = SimpleNamespace(
+        band=band, physics=alone, freed=["y0"], rmse_n=2.5, nrmse=0.0125, noise_floor_n=2.4
+    )
     monkeypatch.setattr("identification.predict.predict_log", lambda *a, **k: (prediction, None))
     monkeypatch.setattr("identification.documents.write_document", lambda *a: None)
     monkeypatch.setattr("identification.fitting.read_fit_or_model", lambda path: None)

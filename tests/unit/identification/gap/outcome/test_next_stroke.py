@@ -1,6 +1,7 @@
 """The proposed stroke separates rival models by a difference that no refit removes."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ import pytest
 from bench.methods.compile import compile_method
 from bench.methods.document import Method, MethodSegment
 from identification.damper.effects import EFFECTS
+from identification.gap.data.cycles import StrokeCondition
 from identification.gap.outcome.next_stroke import (
     RivalModel,
     _compute_detectability,
     _compute_irreducible_norm,
+    _find_limits,
     _PredictedForce,
     compute_information,
     find_best_segment,
@@ -144,3 +147,26 @@ def test_the_rival_that_imitates_the_other_better_and_the_larger_error_count():
     # Refits leave 8 N and 6 N: 6 N over an error of 4 N.
     assert _compute_detectability(a, b, 2.0) == pytest.approx(1.5)
     assert _compute_detectability(b, a, 2.0) == pytest.approx(1.5)
+
+
+def make_piece(low, high, speed):
+    velocity = np.full(2000, 0.1)
+    velocity[:3] = speed
+    return SimpleNamespace(excitation=SimpleNamespace(displacement=np.array([low, 0.0, high]), velocity=-velocity))
+
+
+@pytest.mark.parametrize(("recorded", "frequency"), [(0.4, 0.5), (1.5, 1.5)])
+def test_the_limits_are_those_of_the_recording(recorded, frequency):
+    conditions = (StrokeCondition(0.0, 0.01, recorded), StrokeCondition(0.0, 0.01, 0.0))
+    pool = SimpleNamespace(
+        evaluation=SimpleNamespace(
+            pieces=(make_piece(-0.02, 0.01, 9.0), make_piece(-0.01, 0.03, 0.2)),
+            cycles=SimpleNamespace(conditions=conditions),
+        ),
+        full_problem=SimpleNamespace(space=SimpleNamespace(lowest_drive=0.1, highest_drive=0.6)),
+    )
+    limits = _find_limits(pool)
+    assert (limits.amplitude, limits.centre) == pytest.approx((0.025, 0.005))
+    assert (limits.frequency, limits.drives) == (frequency, (0.1, 0.6))
+    # Three of two thousand samples are faster than the quantile of 99.9 %.
+    assert limits.velocity == pytest.approx(9.0)

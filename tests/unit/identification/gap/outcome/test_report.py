@@ -41,9 +41,6 @@ def make_builder(
     unknown=0.05,
     partial=None,
     low=0.8,
-    conditions=(),
-    pieces=(),
-    drives=None,
 ):
     candidates = {
         NONE: make_candidate((), baseline, baseline, baseline * FLOOR),
@@ -59,7 +56,7 @@ def make_builder(
         floor=FLOOR,
         no_gap_limit=1.008 * FLOOR,
         noise_model=noise_model,
-        full_problem=SimpleNamespace(space=drives),
+        full_problem=SimpleNamespace(),
         baseline_excess=8.0,
         compute_excess=lambda candidate: candidate.compute_excess(FLOOR),
     )
@@ -67,9 +64,8 @@ def make_builder(
     def estimate_shrinkage(before, after, noise, input_noise):
         return Shrinkage(6.0, float(np.mean(input_noise)), 0.9, (0.8, 0.95), benefit)
 
-    cycles = Cycles(CYCLES.cycle, CYCLES.phase, CYCLES.segment, conditions) if conditions else CYCLES
     evaluation = SimpleNamespace(
-        force=np.zeros(8), estimate_shrinkage=estimate_shrinkage, cycles=cycles, pieces=pieces,
+        force=np.zeros(8), estimate_shrinkage=estimate_shrinkage, cycles=CYCLES, pieces=(),
         select_fitted_pieces=lambda: (1.0, 2.0), compute_residual=lambda forces: forces,
         estimate_shares=lambda before, after, without, rmse, noise: {"all": (0.5, (low, 0.9))},
         compute_rmse=lambda forces: (sum(forces), 10 * sum(forces)),
@@ -124,13 +120,13 @@ def test_the_gap_of_noise_has_no_shrinkage():
     builder = make_builder()
     named, shrinkage = builder.pool.candidates[SPRING], Shrinkage(6.0, 2.0, 0.9, (0.8, 0.95))
     object.__setattr__(builder, "regression", SimpleNamespace(find_explainable_rmse=lambda sets, noise: 1.9))
-    gap = builder._build_gap("explained", named, shrinkage)
+    gap = builder._build_gap("explained", named, shrinkage, None)
     assert (gap.shrinkage, gap.shrinkage_ci95, gap.noise_floor_n, gap.nominal_n) == (0.9, (0.8, 0.95), 1.9, None)
     assert (gap.before_n, gap.after_n, gap.train_before_n, gap.train_after_n) == (6.0, 2.0, 6.0, 2.0)
     assert (gap.explainable_n, gap.held_out) == (1.9, None)
     # The noise that a named set leaves may lie below the interval from the recording.
     assert (gap.noise_floor_ci95, gap.floor_known) == (pytest.approx((1.9, 2.098)), True)
-    gap = builder._build_gap("no_gap", named, shrinkage)
+    gap = builder._build_gap("no_gap", named, shrinkage, None)
     assert (gap.shrinkage, gap.shrinkage_ci95) == (None, None)
 
 
@@ -201,26 +197,6 @@ def test_the_remainder_is_located_in_millimetres(share, variables, dependence):
     text = make_builder()._describe_place(remainder)
     assert text.startswith(f"The remainder is largest at 0.25 V, 12 mm and 1.5 Hz (5.66 N), and {dependence}")
     assert make_builder()._describe_place(None) == ""
-
-
-def make_piece(low, high, speed):
-    velocity = np.full(2000, 0.1)
-    velocity[:3] = speed
-    return SimpleNamespace(excitation=SimpleNamespace(displacement=np.array([low, 0.0, high]), velocity=-velocity))
-
-
-@pytest.mark.parametrize(("recorded", "frequency"), [(0.4, 0.5), (1.5, 1.5)])
-def test_the_limits_are_those_of_the_recording(recorded, frequency):
-    builder = make_builder(
-        pieces=(make_piece(-0.02, 0.01, 9.0), make_piece(-0.01, 0.03, 0.2)),
-        conditions=(StrokeCondition(0.0, 0.01, recorded), StrokeCondition(0.0, 0.01, 0.0)),
-        drives=SimpleNamespace(lowest_drive=0.1, highest_drive=0.6),
-    )
-    limits = builder._find_limits()
-    assert (limits.amplitude, limits.centre) == pytest.approx((0.025, 0.005))
-    assert (limits.frequency, limits.drives) == (frequency, (0.1, 0.6))
-    # Three of two thousand samples are faster than the quantile of 99.9 %.
-    assert limits.velocity == pytest.approx(9.0)
 
 
 VERDICTS = ("no_gap", "explained", "partly_explained", "unexplained")

@@ -5,15 +5,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identification.documents import HeldOutError
 from identification.fitting import DamperModel, HoldOut
 from identification.gap.data import Cycles
 from identification.gap.data.cycles import StrokeCondition
 from identification.gap.diagnosis import make_candidate_pool, prepare_recordings
+from identification.gap.outcome.explanation import _summarise_held_out
 from identification.gap.outcome.held_out_strokes import measure_held_out_strokes
 from identification.gap.outcome.twin_residual import learn_twin_residual, number_conditions
 from identification.predict import predict_log
 from identification.residual import LearnedResidual
 from tests.support.candidate_pools import NOISE, fit_baseline, record
+from tests.support.gaps import GAP
 
 
 @pytest.fixture(scope="module")
@@ -106,3 +109,19 @@ def test_a_prediction_keeps_physics_and_residual_apart(pool, residual):
     lower, upper = series.band
     assert np.all(lower < series.simulated)
     assert np.mean((lower < other.stretches[0].force) & (other.stretches[0].force < upper)) > 0.85
+
+
+@pytest.mark.parametrize(
+    ("held_out", "text"),
+    [
+        (None, ""),
+        ({"rmse_n": 3.0, "nrmse": 0.1}, "; on the strokes held out 3 N"),
+        (
+            {"rmse_n": 3.0, "nrmse": 0.1, "with_residual": {"rmse_n": 2.5, "nrmse": 0.08}},
+            "; on the strokes held out 3 N, with the learned residual 2.5 N",
+        ),
+    ],
+)
+def test_the_summary_states_both_errors(held_out, text):
+    error = None if held_out is None else HeldOutError.model_validate(held_out)
+    assert _summarise_held_out(GAP.model_copy(update={"held_out": error})) == text

@@ -9,6 +9,7 @@ MODULES = {
     "simulation": "speed.simulation",
     "fitting": "speed.fitting",
     "logs": "speed.logs",
+    "commands": "speed.commands",
     "interval_coverage": "accuracy.interval_coverage",
     "soak": "speed.soak",
     "choices": "accuracy.design_choices",

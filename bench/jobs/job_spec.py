@@ -38,7 +38,7 @@ class IdentifySettings(FrozenModel):
         if self.hold_out_after is not None:
             arguments.append(f"--hold-out-after={self.hold_out_after}")
         if self.budget_s is not None:
-            arguments.append(f"--budget={self.budget_s}")
+            arguments.append(f"--budget={self.budget_s}s")
         return arguments
 
 

@@ -51,8 +51,13 @@ def identify(
         ),
     ] = None,
     budget: Annotated[
-        float | None, typer.Option(metavar="SECONDS", min=0.1, help="Processor time, shared by the stages.")
-    ] = None,
+        str,
+        typer.Option(
+            metavar="STEPS|SECONDSs",
+            help="Limit on the effort: steps of each stage such as `500`, or processor time of all such as `60s`, "
+            "which makes the result depend on the machine.",
+        ),
+    ] = "",
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     free: Annotated[
         str,
@@ -79,7 +84,7 @@ def identify(
     # Imported inside the command, as in all commands: `--help` must not wait for numba and scipy (decision 0006).
     from identification.documents import check_output_path, write_document
     from identification.errors import IdentificationError
-    from identification.fitting import HoldOut, OptimiserSettings
+    from identification.fitting import Budget, HoldOut, OptimiserSettings
     from identification.logs import load
     from identification.pipeline import FitRequest
     from identification.pipeline import identify as identify_damper
@@ -93,7 +98,7 @@ def identify(
     request = FitRequest(
         HoldOut.from_text(hold_out, hold_out_after),
         delay_prior,
-        OptimiserSettings(seed=seed, budget=budget),
+        OptimiserSettings(seed=seed, budget=Budget.from_text(budget)),
         names,
         preset,
         _parse_free(free),

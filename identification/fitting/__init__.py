@@ -1,5 +1,6 @@
 """Output-error fit of the damper model to recordings."""
 
+from identification.fitting.budget import Budget, EffortMeter
 from identification.fitting.damper_model import (
     DamperModel,
     make_damper_model,
@@ -53,9 +54,11 @@ __all__ = [
     "START_FIELD_RATE",
     "START_N",
     "START_RHO",
+    "Budget",
     "DamperModel",
     "Dataset",
     "EffectModel",
+    "EffortMeter",
     "Evaluation",
     "HoldOut",
     "LowPass",

@@ -5,13 +5,13 @@ again. If the best minimum is above the noise floor or at a bound, further start
 """
 
 import itertools
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.fitting.budget import Budget, EffortMeter
 from identification.fitting.initial_guess import draw_random_start, make_starting_points
 from identification.fitting.problem import Evaluation, Problem
 from identification.progress import Progress, ignore_progress
@@ -63,8 +63,8 @@ class OptimiserSettings:
     """Largest number of further starts after the first."""
     seed: int = 1
     """Seed of the random starts."""
-    budget: float | None = None
-    """Processor time [s] after which no further start is tried; None for no limit."""
+    budget: Budget = field(default_factory=Budget)
+    """Steps or processor time after which no further start is tried."""
     holds_shape: bool = False
     """True to hold the shape of the loop in the first steps from a given start, as from a regression."""
 
@@ -88,19 +88,18 @@ def fit_output_error(
 
 
 def _search(problem: Problem, settings: OptimiserSettings, progress: Progress, start: Array | None) -> Minimum:
-    start_time = time.process_time()
+    meter = EffortMeter(settings.budget, progress)
     preview = _decimate_for_preview(problem)
     starts = make_starting_points(preview) if start is None else [start]
     is_distant = start is None or settings.holds_shape
-    first = _approach(preview, starts[0], settings.iterations, progress) if is_distant else starts[0]
-    best = minimise(problem, first, settings.iterations, progress)
+    first = _approach(preview, starts[0], settings.iterations, meter.report) if is_distant else starts[0]
+    best = minimise(problem, first, settings.iterations, meter.report)
     agreeing = 0
     for other_start in itertools.islice(_generate_restarts(preview, starts, settings.seed), settings.restarts):
-        is_late = settings.budget is not None and time.process_time() - start_time > settings.budget
-        if is_late or _is_conclusive(problem, best) or agreeing >= _MIN_AGREEING:
+        if meter.is_spent or _is_conclusive(problem, best) or agreeing >= _MIN_AGREEING:
             break
-        approached = _approach(preview, other_start, settings.iterations, progress)
-        other = minimise(problem, approached, settings.iterations, progress)
+        approached = _approach(preview, other_start, settings.iterations, meter.report)
+        other = minimise(problem, approached, settings.iterations, meter.report)
         change = other.evaluation.cost / best.evaluation.cost - 1.0
         agreeing += abs(change) < _SAME_COST
         if change < 0.0:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from identification.fitting import HoldOut, OptimiserSettings
+from identification.fitting import Budget, HoldOut, OptimiserSettings
 
 
 @dataclass(frozen=True)
@@ -23,14 +23,11 @@ class FitRequest:
     """True to compute intervals by profile likelihood as well."""
 
     @property
-    def network_budget(self) -> float | None:
-        """Processor time for the network [s]: half of the budget if an output-error fit follows."""
-        budget = self.settings.budget
-        return 0.5 * budget if budget is not None and "refine" in self.stages else budget
+    def network_budget(self) -> Budget:
+        """Budget of the network: half of the processor time if an output-error fit follows."""
+        return self.settings.budget.scale(0.5 if "refine" in self.stages else 1.0)
 
     @property
-    def output_error_budget(self) -> float | None:
-        """Processor time for the output-error fit [s]: half of the budget if a network is trained as well."""
-        budget = self.settings.budget
-        share = 0.5 if "pinn" in self.stages else 1.0
-        return None if budget is None else share * budget
+    def output_error_budget(self) -> Budget:
+        """Budget of the output-error fit: half of the processor time if a network is trained as well."""
+        return self.settings.budget.scale(0.5 if "pinn" in self.stages else 1.0)

@@ -213,6 +213,8 @@ def _make_provenance(dataset: Dataset, request: FitRequest, problem: Problem) ->
             "delay_prior_s": problem.delay_prior,
             "free": ",".join(request.per_log) or None,
             "restarts": request.settings.restarts,
+            "budget": str(request.settings.budget) or None,
+            "reproducible": request.settings.budget.seconds is None,
         },
     )
 

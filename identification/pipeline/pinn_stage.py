@@ -14,7 +14,7 @@ import numpy as np
 from identification.damper import Coordinates
 from identification.documents import FitStage, SplitErrors
 from identification.errors import IdentificationError
-from identification.fitting import COORDINATE_COUNT, Minimum, Problem, predict_piece
+from identification.fitting import COORDINATE_COUNT, Budget, Minimum, Problem, predict_piece
 from identification.logs import Stretch
 from identification.progress import Progress
 from identification.uncertainty import (
@@ -45,7 +45,7 @@ def train_network(
     stretches: Sequence[Stretch],
     preset: str,
     seed: int,
-    budget: float | None,
+    budget: Budget,
     progress: Progress,
 ) -> NetworkResult:
     """Train the network of a preset.
@@ -55,7 +55,7 @@ def train_network(
         stretches: recordings of its pieces.
         preset: name of a preset, or path of a settings file.
         seed: seed of all random numbers.
-        budget: processor time [s]; None for no limit.
+        budget: limit on steps or processor time.
         progress: receives every step.
 
     Raises:
@@ -74,7 +74,7 @@ def train_network(
 
 
 def train_networks(
-    problems: Sequence[Problem], preset: str, seed: int, budget: float | None, progress: Progress
+    problems: Sequence[Problem], preset: str, seed: int, budget: Budget, progress: Progress
 ) -> Iterator[tuple[int, NetworkResult | None]]:
     """Train the network of a preset on many dampers, as many at once as possible.
 
@@ -82,7 +82,7 @@ def train_networks(
         problems: problems to fit, one per damper.
         preset: name of a preset, or path of a settings file.
         seed: seed of all random numbers.
-        budget: processor time per damper [s]; None for no limit.
+        budget: limit on steps, or on processor time per damper.
         progress: receives every step.
 
     Yields:
@@ -105,12 +105,12 @@ def train_networks(
 
 
 def _train_batch(
-    problems: Sequence[Problem], settings: "DenseSettings", budget: float | None, progress: Progress
+    problems: Sequence[Problem], settings: "DenseSettings", budget: Budget, progress: Progress
 ) -> list[NetworkResult]:
     from identification.pinn import train_batch
     from identification.pinn.common import TrainingMonitor, TrainingStopped
 
-    monitor = TrainingMonitor(progress, budget=None if budget is None else budget * len(problems))
+    monitor = TrainingMonitor(progress, budget=budget.scale(len(problems)))
     try:
         return [NetworkResult(result, "") for result in train_batch(problems, settings, monitor)]
     except TrainingStopped as stopped:

@@ -22,7 +22,7 @@ import optuna
 from optuna.trial import FrozenTrial, TrialState
 
 from identification.errors import IdentificationError
-from identification.fitting import Problem, assemble
+from identification.fitting import Budget, Problem, assemble
 from identification.logs import load
 from identification.pinn import train
 from identification.pinn.common import (
@@ -153,7 +153,7 @@ def run_worker(request: StudyRequest, progress: Callable[[str], None] | None = N
 def _run_trial(
     problem: Problem, settings: PinnSettings, trial_monitor: "_TrialMonitor", budget: float
 ) -> TrialResult:
-    monitor = TrainingMonitor(trial_monitor.report, trial_monitor.should_stop, budget)
+    monitor = TrainingMonitor(trial_monitor.report, trial_monitor.should_stop, Budget(seconds=budget))
     # Trials are compared at the same processor time, because the cost of a step depends on the settings.
     trial_monitor.clock = lambda: monitor.seconds
     # Without the stretches, the motion is that of the fit from which the offset is counted.

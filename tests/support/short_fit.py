@@ -7,6 +7,7 @@ import numpy as np
 from identification.damper.coordinates import to_coordinates
 from identification.damper.parameter_sets import find_parameter_set
 from identification.documents.fit import Fit
+from identification.fitting.budget import Budget
 from identification.fitting.output_error import OptimiserSettings
 from identification.logs.recording import Recording, Segment
 from identification.pipeline import FitRequest, identify
@@ -38,7 +39,7 @@ def recording() -> Recording:
     return Recording(Path("made-up.mcap"), "0" * 64, "coil_v", "V", (made,), metadata)
 
 
-def fitted(*stages: str, budget: float | None = None, preset: str = "elements") -> Fit:
+def fitted(*stages: str, budget: str = "", preset: str = "elements") -> Fit:
     return identify(
-        [recording()], FitRequest(settings=OptimiserSettings(budget=budget), stages=stages, preset=preset)
+        [recording()], FitRequest(settings=OptimiserSettings(budget=Budget.from_text(budget)), stages=stages, preset=preset)
     )

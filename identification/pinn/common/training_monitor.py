@@ -1,9 +1,9 @@
-"""Monitor of a training: progress reports, stop requests and a budget of processor time."""
+"""Monitor of a training: progress reports, stop requests and a budget."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from identification.fitting import Budget, EffortMeter
 from identification.progress import Progress, ignore_progress
 
 
@@ -18,14 +18,17 @@ class TrainingMonitor:
     progress: Progress = ignore_progress
     should_stop: Callable[[], bool] = lambda: False
     """Returns True once the training shall end."""
-    budget: float | None = None
-    """Limit of the processor time [s]; None for no limit."""
-    start_time: float = field(default_factory=time.process_time)
+    budget: Budget = field(default_factory=Budget)
+    _meter: EffortMeter = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Start the meter."""
+        object.__setattr__(self, "_meter", EffortMeter(self.budget, self.progress))
 
     @property
     def seconds(self) -> float:
         """Processor time [s] since the start."""
-        return time.process_time() - self.start_time
+        return self._meter.seconds
 
     def report(self, message: str, error: float) -> None:
         """Report a step of the training and the force error so far [N].
@@ -33,8 +36,8 @@ class TrainingMonitor:
         Raises:
             TrainingStopped: a stop was requested, or the budget is spent.
         """
-        self.progress(message, error)
+        self._meter.report(message, error)
         if self.should_stop():
             raise TrainingStopped("stopped on request")
-        if self.budget is not None and self.seconds > self.budget:
-            raise TrainingStopped(f"its budget of {self.budget:.3g} s of processor time ended")
+        if self._meter.is_spent:
+            raise TrainingStopped(f"its budget of {self.budget.describe()} ended")

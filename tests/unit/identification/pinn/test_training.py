@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.fitting.budget import Budget
 from identification.fitting.output_error import fit_output_error
 from identification.fitting.unknown_layout import COORDINATE_COUNT
 from identification.pinn.common.settings import read_settings
@@ -108,7 +109,8 @@ def test_a_training_that_is_stopped_before_its_first_result_raises(preset):
 
 def test_a_training_ends_with_its_budget_and_its_message_states_it():
     messages = []
-    monitor = TrainingMonitor(progress=lambda message, error: messages.append(message), budget=0.0)
+    spent = Budget(seconds=0.0)
+    monitor = TrainingMonitor(progress=lambda message, error: messages.append(message), budget=spent)
     with pytest.raises(TrainingStopped, match="budget of 0 s"):
         train(make_problem((0.0, 0.4), 0.5), read_settings("elements"), monitor)
     assert len(messages) == 1

@@ -10,6 +10,7 @@ from identification import pinn
 from identification.commands import identify as identify_command
 from identification.documents.fit import read_fit
 from identification.errors import IdentificationError
+from identification.fitting.budget import Budget
 from identification.fitting.output_error import OptimiserSettings
 from identification.logs.recording import Recording
 from identification.pinn import training
@@ -79,7 +80,9 @@ def test_the_dense_network_is_trained_on_all_of_them_at_once(logs, small, monkey
 
 
 def test_the_budget_of_a_batch_is_that_of_each_log(logs, small):
-    request = FitRequest(settings=OptimiserSettings(budget=1e-3), stages=("pinn", "refine"), preset=small)
+    request = FitRequest(
+        settings=OptimiserSettings(budget=Budget(seconds=1e-3)), stages=("pinn", "refine"), preset=small
+    )
     assert fits(batch.identify_batch(logs, request))[0].agreement.startswith(
         "not compared: pinn found nothing, its budget of 0.001 s"
     )
@@ -89,7 +92,7 @@ def test_the_budget_of_a_batch_is_that_of_each_log(logs, small):
 
 def run_command(logs, out, **more):
     given = {"stages": "refine", "preset": "elements", "hold_out": "", "hold_out_after": None, "delay_prior": None}
-    rest = {"budget": None, "seed": 1, "free": "", "profile": False, "each": True}
+    rest = {"budget": "", "seed": 1, "free": "", "profile": False, "each": True}
     return identify_command.identify(logs, out, **(given | rest | more))
 
 

@@ -59,12 +59,12 @@ def test_its_network_and_settings_are_in_the_provenance(both):
 
 
 def test_a_network_without_budget_is_noted_in_a_fit_with_both_stages_and_refused_alone():
-    found = fitted("pinn", "refine", budget=0.2)
+    found = fitted("pinn", "refine", budget="0.2s")
     assert found.agreement.startswith("not compared: pinn found nothing, its budget of 0.1 s")
     assert [stage.name for stage in found.stages] == ["refine"]
     assert found.rmse_n.train == pytest.approx(NOISE, rel=0.03)
     with pytest.raises(IdentificationError, match=r"pinn found nothing: its budget.*raise --budget"):
-        fitted("pinn", budget=0.1)
+        fitted("pinn", budget="0.1s")
 
 
 def test_an_unknown_preset_is_refused():

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identification.fitting.budget import Budget
 from identification.fitting.output_error import (
     OptimiserSettings,
 )
@@ -41,11 +42,12 @@ def test_a_stated_prior_of_the_delays_is_binding(stated, prior, limit):
     ("stages", "network", "output_error"),
     [(("pinn", "refine"), 5.0, 5.0), (("pinn",), 10.0, 5.0), (("refine",), 5.0, 10.0)],
 )
-def test_a_budget_is_shared_by_the_stages(stages, network, output_error):
-    request = FitRequest(settings=OptimiserSettings(budget=10.0), stages=stages)
-    assert (request.network_budget, request.output_error_budget) == (network, output_error)
-    unlimited = FitRequest(stages=stages)
-    assert (unlimited.network_budget, unlimited.output_error_budget) == (None, None)
+def test_a_processor_time_is_shared_by_the_stages_and_steps_are_not(stages, network, output_error):
+    request = FitRequest(settings=OptimiserSettings(budget=Budget(seconds=10.0)), stages=stages)
+    assert (request.network_budget.seconds, request.output_error_budget.seconds) == (network, output_error)
+    for budget in (Budget(), Budget(steps=7)):
+        request = FitRequest(settings=OptimiserSettings(budget=budget), stages=stages)
+        assert (request.network_budget, request.output_error_budget) == (budget, budget)
 
 
 def delay(value, outside=True):

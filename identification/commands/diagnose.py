@@ -6,7 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from identification.documents import Diagnosis
+    from identification.gap.outcome import DiagnosisResult
 
 Seed = Annotated[int, typer.Option(help="Seed of all random numbers.")]
 Out = Annotated[Path, typer.Option("--out", help="Document to write; `-` prints it.")]
@@ -64,6 +67,14 @@ def diagnose(
             help="Also learn what law and effects leave; predictions with the twin add it, and show it apart.",
         ),
     ] = False,
+    each: Annotated[
+        bool,
+        typer.Option(
+            "--each",
+            help="Diagnose every log by itself and print one table: documents named as the log, in the folder "
+            "`--out`, and twins in the folder `--twin`.",
+        ),
+    ] = False,
     witness: Annotated[bool, typer.Option("--witness", hidden=True, help="Former name of --cross-check.")] = False,
     seed: Seed = 1,
 ) -> None:
@@ -83,18 +94,25 @@ def diagnose(
         if path is not None:
             check_output_path(path)
     simulation = None if model is None else read_damper_model(model)
-    with show_progress("diagnose") as progress:
-        result = diagnose_recordings(
-            [load(log) for log in logs],
-            simulation,
-            seed=seed,
-            cross_check=cross_check or witness,
-            hold_out=HoldOut.from_text(hold_out, hold_out_after),
-            progress=progress,
-            library=library,
-            discover=discover or keep is not None,
-            learn_residual=residual,
-        )
+
+    def diagnose_logs(logs: "Sequence[Path]") -> "DiagnosisResult":
+        with show_progress("diagnose") as progress:
+            return diagnose_recordings(
+                [load(log) for log in logs],
+                simulation,
+                seed=seed,
+                cross_check=cross_check or witness,
+                hold_out=HoldOut.from_text(hold_out, hold_out_after),
+                progress=progress,
+                library=library,
+                discover=discover or keep is not None,
+                learn_residual=residual,
+            )
+
+    if each:
+        _diagnose_each(logs, out, twin, keep, diagnose_logs)
+        return
+    result = diagnose_logs(logs)
     if keep is not None:
         result = result.rename_discovery(keep)
     write_document(out, result.diagnosis)
@@ -103,6 +121,42 @@ def diagnose(
     typer.echo(f"{describe_output_path(out)}: {summarise_diagnosis(result.diagnosis)}", err=True)
     if keep is not None:
         typer.echo(_keep_discovery(result.diagnosis, keep), err=True)
+
+
+def _diagnose_each(
+    logs: "Sequence[Path]",
+    out: Path,
+    twin: Path | None,
+    keep: str | None,
+    diagnose_logs: "Callable[[Sequence[Path]], DiagnosisResult]",
+) -> None:
+    """Diagnose every log by itself, print a table, and name the logs that cannot be diagnosed."""
+    from identification.documents import write_document
+    from identification.errors import IdentificationError
+    from identification.gap.outcome import tabulate_diagnoses
+    from identification.pipeline import make_output_paths
+
+    if keep is not None:
+        raise IdentificationError(f"--keep {keep}: several causes cannot have one name; diagnose that log alone")
+    if "-" in (str(out), str(twin)):
+        raise IdentificationError("--out and --twin: --each writes several documents; name folders instead of `-`")
+    folders = [folder for folder in (out, twin) if folder is not None]
+    paths = [make_output_paths(logs, folder) for folder in folders]
+    for folder in folders:
+        folder.mkdir(exist_ok=True)
+    rows, failed = [], []
+    for log, *targets in zip(logs, *paths, strict=True):
+        try:
+            result = diagnose_logs([log])
+        except IdentificationError as error:
+            failed.append(f"{log.name}: {error}")
+            continue
+        for target, document in zip(targets, (result.diagnosis, result.twin), strict=False):
+            write_document(target, document)
+        rows.append((log.stem, result.diagnosis))
+    typer.echo(tabulate_diagnoses(rows))
+    if failed:
+        raise IdentificationError(f"{len(failed)} of {len(logs)} logs could not be diagnosed: {'; '.join(failed)}")
 
 
 def _keep_discovery(diagnosis: "Diagnosis", name: str) -> str:

@@ -40,6 +40,5 @@ def recording() -> Recording:
 
 
 def fitted(*stages: str, budget: str = "", preset: str = "elements") -> Fit:
-    return identify(
-        [recording()], FitRequest(settings=OptimiserSettings(budget=Budget.from_text(budget)), stages=stages, preset=preset)
-    )
+    settings = OptimiserSettings(budget=Budget.from_text(budget))
+    return identify([recording()], FitRequest(settings=settings, stages=stages, preset=preset))

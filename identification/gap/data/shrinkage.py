@@ -134,8 +134,9 @@ def estimate_shares(
     sums = np.stack([held_out.before, held_out.after, *(held_out.without[name] for name in names)])
     measured = sums.sum(axis=1) / held_out.counts.sum()
     drawn = _resample_cycles(sums, held_out.counts, held_out.segment, random)
-    # The error expected of another run replaces the measured one in the value and in every draw.
-    expected = after**2 - measured[1]
+    # Another run adds its input noise to the error of every set with effects. The law alone is compared as it was
+    # measured, as in the shrinkage.
+    expected = after**2 - measured[1] if len(names) == 1 else 0.0
     gap = max(measured[0] - noise**2, _MIN_GAP_SHARE * noise**2)
     gaps = np.maximum(drawn[0] - noise**2, _MIN_GAP_SHARE * noise**2)
     shares = {}

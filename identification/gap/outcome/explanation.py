@@ -152,6 +152,21 @@ def summarise_diagnosis(diagnosis: Diagnosis) -> str:
     )
 
 
+def tabulate_diagnoses(diagnoses: Sequence[tuple[str, Diagnosis]]) -> str:
+    """Return a table of several diagnoses, one row for each, from their names and documents."""
+    width = max([len(name) for name, _ in diagnoses] + [len("log")])
+    rows = [f"{'log':<{width}}  verdict           before N  after N  floor N  shrinkage  effects (probability)"]
+    for name, diagnosis in diagnoses:
+        gap = diagnosis.gap
+        shrinkage = "-" if gap.shrinkage is None else f"{gap.shrinkage:.2f}"
+        effects = ", ".join(f"{e.name} ({e.probability:.0%})" for e in diagnosis.effects) or "-"
+        rows.append(
+            f"{name:<{width}}  {diagnosis.verdict:<16}  {gap.before_n:>8.3g}  {gap.after_n:>7.3g}  "
+            f"{gap.noise_floor_n:>7.3g}  {shrinkage:>9}  {effects}"
+        )
+    return "\n".join(rows)
+
+
 def _summarise_held_out(gap: Gap) -> str:
     """Return the errors on the strokes that the user held out, with and without the learned residual."""
     if gap.held_out is None:

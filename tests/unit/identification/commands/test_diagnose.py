@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from identification.commands.diagnose import diagnose
 from identification.damper.definitions import load_effects
 from identification.damper.effects import EFFECTS
-from identification.errors import EffectFileError
+from identification.errors import EffectFileError, UnusableDataError
 from tests.support.discovery_documents import DEFINITION, make_discovery, make_result
 
 
@@ -64,6 +64,58 @@ def test_a_cause_outside_the_library_is_searched_for_on_request(bench, tmp_path,
 def test_a_residual_is_learned_on_request(bench, tmp_path, options, learned):
     assert run(tmp_path, *options).exit_code == 0
     assert [call["learn_residual"] for call in bench.calls] == [learned]
+
+
+def run_each(tmp_path, *options, logs=("a.mcap", "b.mcap")):
+    app = typer.Typer()
+    app.command()(diagnose)
+    return CliRunner().invoke(app, [*logs, "--each", "--out", str(tmp_path / "d"), *options])
+
+
+def test_every_log_is_diagnosed_by_itself_and_has_a_row(bench, tmp_path, monkeypatch):
+    recordings = []
+    inner = bench.result
+
+    def record(given, simulation, **options):
+        recordings.append([p.name for p in given])
+        return inner
+
+    monkeypatch.setattr("identification.gap.diagnose", record)
+    result = run_each(tmp_path, "--twin", str(tmp_path / "t"))
+    assert result.exit_code == 0
+    assert recordings == [["a.mcap"], ["b.mcap"]]
+    assert sorted(bench.written) == ["a.json", "b.json"]
+    head, *rows = result.stdout.splitlines()
+    assert head.split()[:2] == ["log", "verdict"]
+    assert [row.split()[:2] for row in rows] == [[name, inner.diagnosis.verdict] for name in "ab"]
+    assert (tmp_path / "d").is_dir()
+    assert (tmp_path / "t").is_dir()
+
+
+def test_a_log_that_cannot_be_diagnosed_does_not_stop_the_others(bench, tmp_path, monkeypatch):
+    def record(given, simulation, **options):
+        if given[0].name == "a.mcap":
+            raise UnusableDataError("too short")
+        return bench.result
+
+    monkeypatch.setattr("identification.gap.diagnose", record)
+    result = run_each(tmp_path)
+    assert str(result.exception) == "1 of 2 logs could not be diagnosed: a.mcap: too short"
+    assert list(bench.written) == ["b.json"]
+    assert [row.split()[0] for row in result.stdout.splitlines()] == ["log", "b"]
+
+
+@pytest.mark.parametrize(
+    ("options", "logs", "reason"),
+    [
+        (("--keep", "my_gain"), ("a.mcap", "b.mcap"), "several causes cannot have one name"),
+        (("--twin", "-"), ("a.mcap", "b.mcap"), "name folders instead"),
+        ((), ("a.mcap", "other/a.mcap"), "would both be written to"),
+    ],
+)
+def test_what_several_diagnoses_cannot_share_is_refused_first(bench, tmp_path, options, logs, reason):
+    assert reason in str(run_each(tmp_path, *options, logs=logs).exception)
+    assert bench.calls == []
 
 
 def test_a_diagnosis_knows_the_effects_of_the_user(bench, folder, tmp_path):

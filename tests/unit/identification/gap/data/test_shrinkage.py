@@ -195,3 +195,10 @@ def test_a_share_counts_from_the_error_that_is_expected_of_another_run():
     # The measured error is the noise; 0.9 N² more are expected, a tenth of the gap.
     shares = estimate_shares(make_held_out({"a": 10.0}), np.sqrt(1.9), 1.0)
     assert shares["a"][0] == pytest.approx(0.9, abs=0.02)
+
+
+def test_the_input_noise_of_another_run_is_no_part_of_one_effect_of_several():
+    # 0.9 N² more are expected of another run, of the set without one of the effects as well.
+    shares = estimate_shares(make_held_out({"a": 10.0, "b": 1.0}), np.sqrt(1.9), 1.0)
+    assert shares["a"][0] == pytest.approx(1.0, abs=0.02)
+    assert shares["b"][0] == pytest.approx(0.0, abs=1e-9)

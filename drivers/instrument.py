@@ -79,8 +79,12 @@ class Instrument(Protocol):
             OutOfRangeError: nothing was sent.
         """
 
-    def make_safe(self) -> None:
-        """Bring the instrument to rest within its own deadline. Raises nothing, even if the wire is gone."""
+    def make_safe(self) -> str:
+        """Bring the instrument to rest within its own deadline. Raises nothing, even if the wire is gone.
+
+        Returns:
+            The reason why the instrument did not confirm its rest; empty if it did.
+        """
 
     def get_health(self) -> Health:
         """Return counts and state."""

@@ -1,6 +1,6 @@
 """Limits, interlocks and the stop of the bench."""
 
-from bench.safety.interlocks import Interlocks, compute_following_error
+from bench.safety.interlocks import Interlocks, Trip, compute_following_error
 from bench.safety.limits import Action, LimitMatrix, LimitViolation, Quantity, make_specimen_matrix
 from bench.safety.trip import STOP_DEADLINE, bring_to_rest
 
@@ -11,6 +11,7 @@ __all__ = [
     "LimitMatrix",
     "LimitViolation",
     "Quantity",
+    "Trip",
     "bring_to_rest",
     "compute_following_error",
     "make_specimen_matrix",

@@ -31,6 +31,14 @@ _NEVER_NS = -(2**62)
 """[ns] Instant before all others."""
 
 
+class Trip(NamedTuple):
+    """Trip that is latched."""
+
+    reason: str
+    by_person: bool = False
+    """True after an abort by a person, False after an interlock."""
+
+
 class _LimitScope(NamedTuple):
     """Change of the limits for the duration of one `Interlocks.use_limits` block."""
 
@@ -54,7 +62,7 @@ class Interlocks:
         self._lock = threading.Lock()
         self._scopes: list[_LimitScope] = []
         self._limits: LimitMatrix = self._fixture
-        self._trip_reason = ""
+        self._trip: Trip | None = None
         self._force_watchers = 0
         self._force_ns: int | None = None
         self._reported_ns: dict[tuple[Quantity, Action], int] = {}
@@ -62,20 +70,31 @@ class Interlocks:
     @property
     def trip_reason(self) -> str:
         """Reason of the trip that is latched; empty without a trip."""
-        with self._lock:
-            return self._trip_reason
+        trip = self.trip
+        return "" if trip is None else trip.reason
 
-    def latch(self, reason: str) -> bool:
-        """Refuse all commands until a reset; return False if a trip was latched before."""
+    @property
+    def trip(self) -> Trip | None:
+        """Trip that is latched."""
         with self._lock:
-            is_first = not self._trip_reason
-            self._trip_reason = self._trip_reason or reason
+            return self._trip
+
+    def latch(self, reason: str, by_person: bool = False) -> bool:
+        """Refuse all commands until a reset; return False if a trip was latched before.
+
+        Args:
+            reason: for a person; the first one is kept.
+            by_person: whether a person aborted, instead of an interlock.
+        """
+        with self._lock:
+            is_first = self._trip is None
+            self._trip = self._trip or Trip(reason, by_person)
             return is_first
 
     def reset(self) -> None:
         """Release the latch, and report the next violation without the repeat delay."""
         with self._lock:
-            self._trip_reason = ""
+            self._trip = None
             self._reported_ns.clear()
 
     @contextlib.contextmanager
@@ -158,9 +177,9 @@ class Interlocks:
             InterlockError: a trip is latched, or the value exceeds a limit that would end a run.
         """
         with self._lock:
-            trip_reason, limits = self._trip_reason, self._limits
-        if trip_reason:
-            raise InterlockError(f"nothing is sent after a trip ({trip_reason}); find the cause, then reset")
+            trip, limits = self._trip, self._limits
+        if trip is not None:
+            raise InterlockError(f"nothing is sent after a trip ({trip.reason}); find the cause, then reset")
         commands: list[tuple[Quantity, float | None]] = [("displacement", position), (self._drive, drive)]
         for quantity, value in commands:
             if value is not None:

@@ -22,22 +22,23 @@ class StoppableInstrument(Protocol):
     def name(self) -> str:
         """Name in configuration and logs."""
 
-    def make_safe(self) -> None:
-        """Stop by the instrument's own safest procedure."""
+    def make_safe(self) -> str:
+        """Stop by the instrument's safest procedure; return why its rest is not confirmed, or an empty text."""
 
 
 class StopResult(NamedTuple):
     """Result of a stop, by the names of the instruments."""
 
     seconds: dict[str, float]
-    """[s] Time until each instrument confirmed the stop; missing if it did not."""
+    """[s] Time until each instrument confirmed that it is at rest; missing if it did not."""
     failures: dict[str, str]
-    """Reason why an instrument did not confirm the stop."""
+    """Reason why an instrument did not confirm that it is at rest."""
 
     def __str__(self) -> str:
-        """Return times and failures in one line."""
-        stopped = [f"{name} after {seconds * 1e3:.0f} ms" for name, seconds in self.seconds.items()]
-        return "; ".join([*stopped, *(f"{name}: {reason}" for name, reason in self.failures.items())])
+        """Return in one line what each instrument has confirmed."""
+        confirmed = [f"{name}: rest confirmed after {1e3 * time:.0f} ms" for name, time in self.seconds.items()]
+        unconfirmed = [f"{name}: rest not confirmed: {reason}" for name, reason in self.failures.items()]
+        return "; ".join([*confirmed, *unconfirmed])
 
 
 def bring_to_rest(
@@ -58,8 +59,11 @@ def bring_to_rest(
 
     def stop(instrument: StoppableInstrument) -> None:
         try:
-            instrument.make_safe()
-            seconds[instrument.name] = clock() - begin
+            reason = instrument.make_safe()
+            if reason:
+                failures[instrument.name] = reason
+            else:
+                seconds[instrument.name] = clock() - begin
         except DriverError as error:
             failures[instrument.name] = str(error)
         except Exception as error:  # an unreported failure would look like an instrument at rest
@@ -72,6 +76,6 @@ def bring_to_rest(
     for name, thread in threads.items():
         thread.join(max(0.0, begin + timeout - clock()))
         if thread.is_alive():
-            failures[name] = f"not at rest after {timeout:g} s; its own watchdog has to stop it"
+            failures[name] = f"no answer within {timeout:g} s; its own watchdog has to stop it"
     # Copies, because an abandoned thread may still write to the originals.
     return StopResult(dict(seconds), dict(failures))

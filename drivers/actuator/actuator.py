@@ -220,14 +220,20 @@ class Actuator:
         self._setpoints.disarm()
         self._drive.switch_off()
 
-    def make_safe(self) -> None:
-        """Stop quickly by the drive's own ramp, and wait until the rod is at rest or the deadline is over."""
+    def make_safe(self) -> str:
+        """Stop quickly by the drive's own ramp, and wait until the rod is at rest or the deadline is over.
+
+        Returns:
+            The reason why the drive did not confirm that the rod is at rest; empty if it did.
+        """
         self._setpoints.disarm()
         try:
             self._drive.stop(self.settings.stop_timeout)
             self._message = ""
         except DriverError as error:
             self._message = f"quick stop not confirmed: {error}"
+            return str(error)
+        return ""
 
     def reset(self) -> None:
         """Clear the faults; the drive stays without voltage and nothing moves.

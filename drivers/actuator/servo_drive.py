@@ -133,9 +133,8 @@ class ServoDrive:
         state = self.read_state()
         if state in (DriveState.ENABLED, DriveState.QUICK_STOP):
             self._node.download(0x6040, cia402.QUICK_STOP)
-        # In its fault reaction the drive already brakes by itself, so it is only waited for.
-        if state in (DriveState.ENABLED, DriveState.QUICK_STOP, DriveState.FAULT_REACTION):
-            self._wait_until(self._is_at_rest, timeout, "the rod to come to rest")
+        # In every state: in its fault reaction the drive brakes by itself, and without voltage the rod may coast.
+        self._wait_until(self._is_at_rest, timeout, "the rod to come to rest")
         # The master falls silent now, on purpose.
         self._node.download(0x1016, 0, 1)
 

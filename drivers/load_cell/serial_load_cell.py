@@ -49,8 +49,9 @@ class SerialLoadCell(ABC, Generic[_Decoder]):
             f"{self.name}: {channel} is measured and cannot be set to {value:.6g} N; nothing was sent"
         )
 
-    def make_safe(self) -> None:
+    def make_safe(self) -> str:
         """Do nothing: the load cell does not move, and the stop sequence still needs its samples."""
+        return ""
 
     def snapshot_decoder(self) -> dict[str, Any]:
         """Return the decoder's state, from which a replay decodes the frames to come, see `drivers.replay`."""

@@ -23,6 +23,8 @@ DriveMode = Literal["voltage", "current"]
 DRIVE_UNITS: dict[DriveMode, str] = {"voltage": "V", "current": "A"}
 _RAMP_TIMEOUT = 3.0
 """Time that `CoilAmplifier.connect` waits for an output that another host has left on [s]."""
+_SAFE_TIMEOUT = 0.5
+"""Time that `CoilAmplifier.make_safe` waits for zero output [s]."""
 
 
 class CoilMode(IntEnum):
@@ -245,8 +247,29 @@ class CoilAmplifier(ModbusInstrument):
         """
         return self._table.read_progress(self._reader.unwrap_clock)
 
-    def make_safe(self) -> None:
-        """Bring the output to zero by its ramp. If the line is dead, the amplifier's watchdog does it."""
+    def make_safe(self) -> str:
+        """Bring the output to zero by its ramp, and wait until it is zero or the deadline is over.
+
+        If the line is dead, the amplifier's watchdog does it.
+
+        Returns:
+            The reason why the amplifier did not confirm zero output; empty if it did.
+        """
+        reason = self.ramp_down()
+        try:
+            # Also after a refused command, because a fault or the watchdog has switched the output off.
+            self._wait_for_zero(_SAFE_TIMEOUT)
+        except DriverError as error:
+            return self._note_safe_state(reason or str(error))
+        return self._note_safe_state("")
+
+    def ramp_down(self) -> str:
+        """Command zero output without waiting for it; raises nothing, even if the wire is gone.
+
+        Returns:
+            The reason why the amplifier did not accept the command; empty if it did.
+        """
+        reason = ""
         # Twice: after a lost reply, the next request reopens or synchronises the line.
         for _ in range(2):
             try:
@@ -254,11 +277,11 @@ class CoilAmplifier(ModbusInstrument):
                 with contextlib.suppress(RefusedError):
                     self.abort_table()
                 self._registers.write("setpoint", 0.0)
-            except DriverError as error:  # if refused after a fault or the watchdog, the output goes to zero
-                self._safe_state_message = f"zero output not confirmed: {error}"
+            except DriverError as error:
+                reason = str(error)
                 continue
-            self._safe_state_message = ""
-            return
+            return self._note_safe_state("")
+        return self._note_safe_state(reason)
 
     def get_health(self) -> Health:
         """Return counts and state, faults included."""
@@ -266,13 +289,18 @@ class CoilAmplifier(ModbusInstrument):
         message = health.message or AmplifierStatus(self.faults, self.state, 0.0).message
         return replace(health, message="; ".join(filter(None, [self._safe_state_message, message])))
 
-    def _wait_for_zero(self) -> None:
-        deadline = time.monotonic() + _RAMP_TIMEOUT
+    def _note_safe_state(self, reason: str) -> str:
+        """Keep the reason why zero output is not confirmed for `get_health`, and return it."""
+        self._safe_state_message = f"zero output not confirmed: {reason}" if reason else ""
+        return reason
+
+    def _wait_for_zero(self, timeout: float) -> None:
+        deadline = time.monotonic() + timeout
         while (output := self.read_status().output) != 0.0:
             if time.monotonic() > deadline:
                 raise RefusedError(
                     f"{self.name}: the output is still at {output:.4g} {self._drive.unit} after "
-                    f"{_RAMP_TIMEOUT:.0f} s of waiting for zero; set a steeper ramp"
+                    f"{timeout:g} s of waiting for zero; set a steeper ramp"
                 )
             time.sleep(0.01)
 
@@ -282,7 +310,7 @@ class CoilAmplifier(ModbusInstrument):
         self.abort_table()
         self.reset()
         registers.write("setpoint", 0.0)
-        self._wait_for_zero()
+        self._wait_for_zero(_RAMP_TIMEOUT)
         for name, value in self._settings.items():
             registers.write(name, value)
         mode = CoilMode[self._mode.upper()]

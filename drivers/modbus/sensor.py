@@ -35,5 +35,6 @@ class ModbusSensor(ModbusInstrument):
             f"{self.name}: {channel} cannot be set to {value:.6g}: {self.display_name} only measures"
         )
 
-    def make_safe(self) -> None:
+    def make_safe(self) -> str:
         """Do nothing: a sensor moves nothing."""
+        return ""

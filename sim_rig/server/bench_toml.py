@@ -71,13 +71,34 @@ def write_bench_toml(path: Path, wires: list[Wire], scenario: Scenario) -> None:
         WireError: it cannot be written, or would replace a file written by a person.
     """
     try:
-        if path.exists() and _GENERATED_MARK not in path.read_text("utf-8", errors="replace"):
+        if path.exists() and not _is_generated(path):
             raise WireError(f"{path}: was written by hand and is not replaced; choose another file with --out")
         draft = path.with_name(f".{path.name}.draft")
         draft.write_text(make_bench_toml(wires, scenario), "utf-8")
         draft.replace(path)
     except OSError as error:
         raise WireError(f"{path}: cannot be written ({error.strerror}); choose another file with --out") from error
+
+
+def remove_bench_toml(path: Path) -> None:
+    """Remove the configuration that a rig wrote; a file written by a person stays.
+
+    A process that waits for the file would connect to closed ports otherwise.
+
+    Raises:
+        WireError: it cannot be removed.
+    """
+    try:
+        if path.exists() and _is_generated(path):
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        raise WireError(
+            f"{path}: cannot be replaced ({error.strerror}); choose another file with --out"
+        ) from error
+
+
+def _is_generated(path: Path) -> bool:
+    return _GENERATED_MARK in path.read_text("utf-8", errors="replace")
 
 
 def format_table(wires: list[Wire]) -> str:

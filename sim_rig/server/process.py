@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import typer
 
-from sim_rig.errors import SimRigError, WireError
+from sim_rig.errors import SimRigError
 from sim_rig.live import RunningClock
 from sim_rig.scenario import Scenario
-from sim_rig.server.bench_toml import format_table, write_bench_toml
+from sim_rig.server.bench_toml import format_table, remove_bench_toml, write_bench_toml
 from sim_rig.server.server import RigServer, TransportOptions, WireFaults
 
 _BATCH_SAMPLES = 4
@@ -46,15 +46,17 @@ def run_until_stopped(scenario: Scenario, out: Path, settings: ServerSettings) -
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stopping.set())
     thread_errors = _stop_on_thread_failure(stopping)
-    _remove_stale_config(out)
+    remove_bench_toml(out)
     # In proportion to the speed, so that the batches per second of real time stay the same.
     batch = max(_BATCH_SAMPLES, round(_BATCH_SAMPLES * settings.speed))
     clock = RunningClock(settings.speed)
     rig = RigServer(scenario, clock, settings.transports, settings.faults, batch)
     _set_realtime_priority()
-    with rig as served:
+    with rig as served, contextlib.ExitStack() as written:
         # Written only now, as a waiting process connects as soon as the file exists.
         write_bench_toml(out, served.wires, scenario)
+        # Before the wires close, as its addresses are void then.
+        written.callback(remove_bench_toml, out)
         _reduce_latency()
         typer.echo(f"{format_table(served.wires)}\n{out} reaches them all; Ctrl-C ends the rig")
         sys.stdout.flush()
@@ -79,14 +81,6 @@ def _stop_on_thread_failure(stopping: threading.Event) -> list[BaseException]:
 
     threading.excepthook = end
     return thread_errors
-
-
-def _remove_stale_config(out: Path) -> None:
-    """Remove the file of an earlier rig, as a waiting process would connect to its closed ports."""
-    try:
-        out.unlink(missing_ok=True)
-    except OSError as error:
-        raise WireError(f"{out}: cannot be replaced ({error.strerror}); choose another file with --out") from error
 
 
 def _set_realtime_priority() -> None:

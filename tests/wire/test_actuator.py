@@ -186,7 +186,7 @@ def test_made_safe_during_strokes_the_rod_is_at_rest(rig):
     with connected(rig) as actuator:
         with SetpointThread(actuator, sine):
             collect_positions(actuator, 20)
-            actuator.make_safe()
+            assert actuator.make_safe() == ""
         assert rig.drive.state is DriveState.QUICK_STOP
         assert rig.drive.generator.velocity == 0
         assert actuator.get_health().message == ""

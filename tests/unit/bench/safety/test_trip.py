@@ -18,12 +18,17 @@ def test_no_instrument_waits_for_another_and_every_failure_is_named():
     def refuse():
         raise NoReplyError("no reply")
 
+    def stop():
+        stopped.set()
+        return ""
+
     begin = time.monotonic()
     result = bring_to_rest(
         [
             instrument("hanging", lambda: release.wait(30)),
-            instrument("quick", stopped.set),
+            instrument("quick", stop),
             instrument("dead", refuse),
+            instrument("unconfirmed", lambda: "Broken pipe"),
             instrument("defect", lambda: 1 / 0),
         ],
         timeout=0.2,
@@ -32,17 +37,18 @@ def test_no_instrument_waits_for_another_and_every_failure_is_named():
     release.set()
     assert stopped.is_set()
     assert list(result.seconds) == ["quick"]
-    assert "not at rest after 0.2 s" in result.failures["hanging"]
+    assert "no answer within 0.2 s" in result.failures["hanging"]
     assert result.failures["dead"] == "no reply"
     assert "division by zero" in result.failures["defect"]
-    assert "defect: ZeroDivisionError" in str(result)
+    assert result.failures["unconfirmed"] == "Broken pipe"
+    assert "defect: rest not confirmed: ZeroDivisionError" in str(result)
 
 
 def test_stop_times_are_measured_from_the_begin():
     ticks = iter([100.0, 100.25, 100.5])
-    result = bring_to_rest([instrument("rod", lambda: None)], timeout=10.0, clock=lambda: next(ticks))
+    result = bring_to_rest([instrument("rod", lambda: "")], timeout=10.0, clock=lambda: next(ticks))
     assert result.seconds == {"rod": 0.25}
-    assert str(result) == "rod after 250 ms"
+    assert str(result) == "rod: rest confirmed after 250 ms"
 
 
 def test_instruments_share_one_deadline():

@@ -8,7 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from sim_rig.errors import PlantError, WireError
+from sim_rig.scenario import load_scenario
 from sim_rig.server import process
+from sim_rig.server.bench_toml import write_bench_toml
 from sim_rig.server.process import ServerSettings, run_until_stopped
 from sim_rig.server.server import TransportOptions
 
@@ -59,7 +61,22 @@ def stop(served):
 def test_a_signal_ends_it_after_it_published_its_addresses(run, tmp_path, capsys):
     assert run(stop).closed
     assert "reaches them all" in capsys.readouterr().out
-    assert "[rig]" in (tmp_path / "bench.toml").read_text()
+
+
+def test_its_file_exists_exactly_as_long_as_its_wires_are_open(run, tmp_path, monkeypatch):
+    file, seen = tmp_path / "bench.toml", []
+    monkeypatch.setattr(process, "_reduce_latency", lambda: seen.append("[rig]" in file.read_text()))
+    monkeypatch.setattr(FakeServer, "__exit__", lambda served, *_: seen.append(file.exists()))
+    run(stop)
+    assert seen == [True, False]
+
+
+def test_a_file_written_by_a_person_stays(run, tmp_path):
+    file = tmp_path / "bench.toml"
+    file.write_text("[rig]")
+    with pytest.raises(WireError, match="was written by hand"):
+        run(stop)
+    assert file.read_text() == "[rig]"
 
 
 def test_a_diverging_specimen_ends_it_with_the_reason(run):
@@ -89,7 +106,7 @@ def test_a_file_that_cannot_be_written_is_reported_before_the_wires_open(run, tm
 
 
 def test_the_file_of_an_earlier_rig_is_removed_before_the_wires_open(run, tmp_path):
-    (tmp_path / "bench.toml").write_text("ports that are closed")
+    write_bench_toml(tmp_path / "bench.toml", [], load_scenario("default"))
     existed = []
 
     def look(served):

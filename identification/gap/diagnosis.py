@@ -24,12 +24,14 @@ from identification.gap.selection import (
 )
 from identification.logs import Recording
 from identification.pipeline import make_problem
-from identification.progress import Progress, ignore_progress
+from identification.progress import Progress, enter_stage, ignore_progress
 from identification.signals import check_recordings, check_single_specimen, mask_clipping
 from identification.threads import use_one_thread
 
 _CLOCK_DEVIATION = 5e-5
 """Standard deviation of the delay between channels that clocks and filters usually leave [s]."""
+_STAGE_COUNT = 4
+"""Number of stages that report their progress: read, search, compare, conclude."""
 
 
 def diagnose(
@@ -122,10 +124,13 @@ def diagnose_prepared(
     dataset, evaluation = prepared.dataset, prepared.evaluation
     pool = make_candidate_pool(prepared, seed=seed, progress=progress, settings=settings, library=library)
     with use_one_thread():
+        pool.progress = enter_stage(progress, "search", 1, _STAGE_COUNT)
         search_forward(pool)
+        pool.progress = enter_stage(progress, "compare", 2, _STAGE_COUNT)
         posterior = compare_with_curves(pool, compute_final_posterior(pool))
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]
+        progress = pool.progress = enter_stage(progress, "conclude", 3, _STAGE_COUNT)
         builder = ReportBuilder(
             dataset, evaluation, pool, posterior, partial, model, notes, seed, discover, learn_residual
         )

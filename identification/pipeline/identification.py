@@ -30,7 +30,7 @@ from identification.pipeline.pinn_stage import (
     make_stage_entry,
     train_network,
 )
-from identification.progress import Progress, ignore_progress
+from identification.progress import Progress, enter_stage, ignore_progress
 from identification.signals import describe_outlier_logs
 from identification.uncertainty import (
     Covariance,
@@ -74,10 +74,13 @@ def fit_damper(
 ) -> Fit:
     """Fit usable recordings; the network is trained here unless its result is given."""
     dataset, problem, stretches = prepared.dataset, prepared.problem, prepared.stretches
+    stages = ("read", *request.stages, *(("profile",) if request.profile else ()))
     if network is None and "pinn" in request.stages:
+        progress = enter_stage(progress, "pinn", stages.index("pinn"), len(stages))
         preset, seed = request.preset, request.settings.seed
         network = train_network(problem, stretches, preset, seed, request.network_budget, progress)
     if "refine" in request.stages:
+        progress = enter_stage(progress, "refine", stages.index("refine"), len(stages))
         # Without the network's result as a start, so that the comparison is one of two independent estimates.
         result = _fit_output_error(dataset, problem, stretches, request, progress)
         result = _compare_stages(dataset, result, network) if network else result
@@ -86,6 +89,7 @@ def fit_damper(
     dataset = apply_corrections(dataset, problem, result.minimum.unknowns[problem.shared_columns])
     fit = make_fit_document(dataset, result, _make_provenance(dataset, request, problem))
     if request.profile:
+        progress = enter_stage(progress, "profile", stages.index("profile"), len(stages))
         fit = _add_profile_intervals(fit, result, progress)
     return fit.model_copy(update={"notes": [*prepared.notes, *result.notes, *_describe_outliers(dataset, fit)]})
 

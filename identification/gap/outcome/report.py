@@ -51,6 +51,7 @@ from identification.gap.outcome.verdict import (
     decide_verdict,
     is_ambiguous,
     list_alternatives,
+    list_likely_sets,
 )
 from identification.gap.selection import (
     CandidatePool,
@@ -185,19 +186,21 @@ class ReportBuilder:
     def _choose_named_set(self) -> NamedSet:
         """Return the verdict and the named set; the law alone if none is named.
 
-        Where no set explains the gap, one that reduces it on unseen strokes is named as a part of the cause.
+        Where no set explains the gap, the most probable one that closes enough of it on unseen strokes is named as
+        a part of the cause.
         """
-        chosen = self._judge_set(self.posterior)
+        chosen = self._judge_set(self.posterior, self.posterior.rank_sets()[0][0])
         if self.partial is not None and chosen.verdict in ("unexplained", "partly_explained"):
-            partial = self._judge_set(self.partial)
-            if partial.candidate.names:
+            judged = (self._judge_set(self.partial, names) for names in list_likely_sets(self.partial))
+            partial = next((part for part in judged if part.candidate.names), None)
+            if partial is not None:
                 return partial._replace(verdict="partly_explained")
         return chosen
 
-    def _judge_set(self, posterior: Posterior) -> NamedSet:
-        """Return the verdict with the most probable set of a posterior."""
+    def _judge_set(self, posterior: Posterior, names: frozenset[str]) -> NamedSet:
+        """Return the verdict with one set of a posterior."""
         baseline, floor = self.pool.baseline, self.pool.floor
-        named = self.pool.candidates[posterior.rank_sets()[0][0]]
+        named = self.pool.candidates[names]
         verdict = decide_verdict(baseline, named, floor, self.pool.no_gap_limit, posterior)
         shrinkage = self._estimate_shrinkage(named)
         benefit = shrinkage.expected_benefit

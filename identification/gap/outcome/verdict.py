@@ -116,6 +116,12 @@ def list_alternatives(posterior: Posterior, named: frozenset[str]) -> list[Effec
     return [EffectSet(effects=sorted(names), probability=p) for names, p in others[:_MAX_ALTERNATIVES]]
 
 
+def list_likely_sets(posterior: Posterior) -> list[frozenset[str]]:
+    """Return the most probable set and those that the data can hardly tell from it, the most probable first."""
+    ranked = posterior.rank_sets()
+    return [names for names, p in ranked if p >= _AMBIGUOUS_RATIO * ranked[0][1]]
+
+
 def is_ambiguous(alternatives: Sequence[EffectSet], probability: float) -> bool:
     """Return True if an alternative is nearly as probable as the named set of a probability [1]."""
     return any(a.probability > _AMBIGUOUS_RATIO * probability for a in alternatives)

@@ -29,7 +29,7 @@ from identification.gap.selection.screening import ScreeningResult
 from identification.gap.selection.screening_cache import ScreeningCache
 from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
 from identification.gap.selection.size_prior import compute_size_weight
-from identification.progress import Progress, ignore_progress
+from identification.progress import Progress, advance, ignore_progress
 
 _CHANCE_DEVIATIONS = 2.0
 """Standard deviations of a sample variance that count as chance."""
@@ -190,7 +190,8 @@ class CandidatePool:
     def _keep(self, candidate: Candidate) -> Candidate:
         """Keep a candidate if it is the best of its names, and return the best."""
         effects = candidate.fit.effects
-        self.progress(" and ".join(model.name for model in effects) or "law alone", candidate.held_out_rmse)
+        progress = advance(self.progress, self.fit_count / self.settings.fit_budget)
+        progress(" and ".join(model.name for model in effects) or "law alone", candidate.held_out_rmse)
         known = self.candidates.get(candidate.names)
         if known is None or self.compute_excess(candidate) < self.compute_excess(known):
             self.candidates[candidate.names] = candidate

@@ -1,8 +1,8 @@
 """Cache of screenings.
 
 The gains of further effects are needed several times for the same set: when it grows, in exchanges, and in
-extensions at the end. A screening is valid while the excess of the set stays nearly the
-same.
+extensions at the end. A screening contains unknowns of the joint problem of its set. So it is valid while the
+forms and the order of the set's effects stay the same, and while the excess of the set stays nearly the same.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from identification.damper.effects import Effect
-from identification.fitting import Problem
+from identification.fitting import EffectModel, Problem
 from identification.gap.fits import Candidate
 from identification.gap.selection.screening import ScreeningResult, list_effect_models, screen
 
@@ -21,6 +21,8 @@ _CACHE_TOLERANCE = 0.05
 class _Screening(NamedTuple):
     """Gains in addition to one set."""
 
+    effects: tuple[EffectModel, ...]
+    """Effects of the set at the time, in their order."""
     excess: float
     """Excess of the set at the time [1]."""
     names: frozenset[str]
@@ -59,6 +61,7 @@ class ScreeningCache:
         entry = self._entries.get(parent.names)
         if (
             entry is None
+            or entry.effects != parent.fit.effects
             or not wanted <= entry.names
             or abs(excess - entry.excess) > _CACHE_TOLERANCE * entry.excess
         ):
@@ -67,5 +70,5 @@ class ScreeningCache:
             models = list_effect_models(names, problem.space.scales.damper_size, self.library)
             decimation = max(1, round(highest / self.rate))
             gains = screen(problem, parent.fit, models, decimation, find_mains_frequency(parent))
-            entry = self._entries[parent.names] = _Screening(excess, wanted, gains)
+            entry = self._entries[parent.names] = _Screening(parent.fit.effects, excess, wanted, gains)
         return [gain for gain in entry.gains if gain.effect_model.name in wanted]

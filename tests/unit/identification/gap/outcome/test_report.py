@@ -116,6 +116,21 @@ def test_a_set_is_named_if_it_explains_the_gap_and_benefits_another_run(changes,
     assert (chosen, named.names, shrinkage.after) == (verdict, names, input_noise)
 
 
+@pytest.mark.parametrize(
+    ("probability", "verdict", "names"),
+    [(0.3, "partly_explained", SPRING), (0.2, "unexplained", NONE)],
+    ids=["the next set is nearly as probable", "the next set is much less probable"],
+)
+def test_the_next_set_is_a_part_where_the_most_probable_one_closes_too_little(probability, verdict, names):
+    stop = frozenset({"end_stop"})
+    builder = make_builder(
+        named=2.0, sets={NONE: 0.1, SPRING: 0.05}, unknown=0.8, partial={stop: 0.5, SPRING: probability}
+    )
+    builder.pool.candidates[stop] = make_candidate(stop, 2.9, 2.9, 2.9 * FLOOR)
+    chosen, named, _, _ = builder._choose_named_set()
+    assert (chosen, named.names) == (verdict, names)
+
+
 def test_the_gap_of_noise_has_no_shrinkage():
     builder = make_builder()
     named, shrinkage = builder.pool.candidates[SPRING], Shrinkage(6.0, 2.0, 0.9, (0.8, 0.95))

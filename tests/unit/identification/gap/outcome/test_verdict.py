@@ -13,6 +13,7 @@ from identification.gap.outcome.verdict import (
     decide_verdict,
     is_ambiguous,
     list_alternatives,
+    list_likely_sets,
 )
 from identification.gap.selection.posterior import Posterior
 
@@ -81,6 +82,11 @@ def test_alternatives_are_the_most_probable_other_sets():
     sets = {frozenset({name}): p for name, p in zip("abcdef", (0.5, 0.2, 0.1, 0.05, 0.03, 0.001), strict=True)}
     alternatives = list_alternatives(Posterior(sets, 0.1), frozenset({"a"}))
     assert [(a.effects, a.probability) for a in alternatives] == [(["b"], 0.2), (["c"], 0.1), (["d"], 0.05)]
+
+
+def test_likely_sets_have_at_least_half_of_the_largest_probability():
+    sets = {frozenset({name}): p for name, p in zip("abcd", (0.1, 0.4, 0.2, 0.19), strict=True)}
+    assert list_likely_sets(Posterior(sets, 0.1)) == [frozenset({"b"}), frozenset({"c"})]
 
 
 @pytest.mark.parametrize(("probabilities", "expected"), [((0.3, 0.4), 0.7), ((0.6, 0.41), 1.0)])

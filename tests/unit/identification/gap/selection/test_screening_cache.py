@@ -1,8 +1,11 @@
-"""A screening is reused while the excess of its set stays nearly the same."""
+"""A screening is reused while effects and excess of its set stay nearly the same."""
+
+from dataclasses import replace
 
 import pytest
 
 from identification.damper.effects import EFFECTS
+from identification.gap.fits import JointFit
 from identification.gap.selection.screening_cache import ScreeningCache
 from tests.support.candidate_pools import fit_baseline
 
@@ -50,3 +53,16 @@ def test_fewer_effects_are_taken_from_a_screening_of_more(find_gains):
 def test_a_different_question_is_screened_again(find_gains, change):
     first = find_gains()
     assert not any(g is known for known in first for g in find_gains(**change))
+
+
+def test_a_set_whose_effects_are_in_another_order_is_screened_again(pool):
+    cache = ScreeningCache(125.0, EFFECTS)
+    known = pool.candidates[pool.extend("moving_mass", "gas_spring")]
+    reversed_problem = known.fit.problem.replace_effects(known.fit.effects[::-1])
+    other = replace(known, fit=JointFit(reversed_problem, known.fit.minimum))
+
+    def find(candidate):
+        return cache.find_gains(candidate, OTHERS | {"gas_spring"}, 0.5, pool.decimated_problem, lambda _: 50.0)
+
+    assert find(known)[0] is find(known)[0]
+    assert find(other)[0] is not find(known)[0]

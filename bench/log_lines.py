@@ -25,6 +25,34 @@ class KeyValueFormatter(logging.Formatter):
         return f"{time:%Y-%m-%dT%H:%M:%S.%f}Z {record.levelname.lower()} {event}{pairs}"
 
 
+class RepeatedFailure:
+    """Failure of a repeated action, logged once when it begins and once when it ends.
+
+    Args:
+        log: receives the lines.
+        began: name of the log line when the failure begins, or its cause changes.
+        ended: name of the log line when the action succeeds again.
+    """
+
+    def __init__(self, log: logging.Logger, began: str, ended: str) -> None:
+        self._log, self._began, self._ended = log, began, ended
+        self._cause = ""
+        self._count = 0
+
+    def note(self, error: Exception) -> None:
+        """Note one failure."""
+        self._count += 1
+        if (cause := repr(error)) != self._cause:
+            self._cause = cause
+            self._log.error(self._began, extra={"why": cause})
+
+    def clear(self) -> None:
+        """Note a success."""
+        if self._cause:
+            self._log.warning(self._ended, extra={"failures": self._count})
+        self._cause, self._count = "", 0
+
+
 def _format_value(value: object) -> str:
     text = str(value)
     return text if set(text) <= _UNQUOTED_CHARACTERS else json.dumps(text, ensure_ascii=False)

@@ -1,13 +1,15 @@
 """Child processes: their output lines and their end; signals as events."""
 
 import contextlib
+import os
 import queue
 import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from typing import Any, TypeAlias
+from pathlib import Path
+from typing import IO, Any, TypeAlias
 
 LineQueue: TypeAlias = "queue.Queue[str | None]"
 """Lines of a process's standard error, then None at its end."""
@@ -32,6 +34,13 @@ def _read_lines(process: "subprocess.Popen[str]", lines: LineQueue) -> None:
         for line in process.stderr:
             lines.put(line)
     lines.put(None)
+
+
+def open_privately(path: Path) -> IO[bytes]:
+    """Open a file for appending that only its owner can read, also if others could before."""
+    file = os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600), "ab")
+    os.fchmod(file.fileno(), 0o600)
+    return file
 
 
 def terminate(process: "subprocess.Popen[bytes]", timeout: float) -> None:

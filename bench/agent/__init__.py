@@ -2,10 +2,11 @@
 
 from bench.agent.agent import Agent
 from bench.agent.ownership import acquire_agent_lock
-from bench.agent.server import serve_agent
+from bench.agent.server import handle_command, serve_agent
 
 __all__ = [
     "Agent",
     "acquire_agent_lock",
+    "handle_command",
     "serve_agent",
 ]

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from bench.agent.bench_clock import BenchClock
-from bench.agent.run_executor import RunExecutor
+from bench.agent.run_executor import RunExecutor, find_log_folder
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
 from bench.agent.state_machine import StateMachine
@@ -32,7 +32,9 @@ from bench.agent_protocol import (
     RunStatus,
     Samples,
 )
-from bench.config import BenchConfig
+from bench.config import BenchConfig, compute_identity
+from bench.disk import SpaceMonitor
+from bench.endings import SHUT_DOWN_REASON, STOP_REASON, RunEnding
 from bench.errors import BenchError, LogError
 from bench.methods import NO_SEGMENT
 from bench.recorder import RecordingThread, find_force_rate
@@ -85,6 +87,7 @@ class Agent:
             DriverError: a driver refuses a setting.
         """
         self._config, self._publish = config, publish
+        self._config_identity = compute_identity(config)
         self._clock = BenchClock()
         self._priority_warning = check_priority()
         self._rig = build_rig(config, self._clock, realtime=not self._priority_warning)
@@ -101,7 +104,7 @@ class Agent:
         )
         aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
         self._recording_thread = RecordingThread(
-            aligner, find_force_rate(config), publish, self._on_cycle, self._on_log_failed
+            aligner, find_force_rate(config), self._clock, publish, self._on_cycle, self._on_log_failed
         )
         self._executor = RunExecutor(
             config, source, self._rig, self._interlocks, self._supervisor, self._acquisition,
@@ -112,6 +115,7 @@ class Agent:
             self._rig, self._interlocks, self._clock, self._move, self._report_event, self._on_setup_ended, timing
         )
         self._run_slot = RunSlot(self._states.lock, self._executor.execute, self._on_run_ended)
+        self._space_monitor = SpaceMonitor(find_log_folder(config, source))
         self._published_content: tuple[AgentState, str] | None = None
         self._published_at = 0.0
         self._open_resources = contextlib.ExitStack()
@@ -155,6 +159,7 @@ class Agent:
             state, finished = self._states.current, self._run_slot.finished
         return AgentStatus(
             state=state,
+            utc_s=time.time(),
             trip=self._interlocks.trip_reason,
             reference_state=self._rig.actuator.reference_state.value,
             step=self._setup.status,
@@ -162,10 +167,14 @@ class Agent:
             finished=finished,
             instruments=make_instrument_statuses(self._rig.instruments, self._acquisition, self._clock),
             warnings=collect_warnings(
-                self._acquisition, self._priority_warning, self._rig.actuator.settings.setpoint_timeout
+                self._acquisition,
+                self._priority_warning,
+                self._rig.actuator.settings.setpoint_timeout,
+                self._space_monitor.describe(),
             ),
             drive_kind=self._rig.drive_kind,
             drive_unit=self._rig.drive_unit,
+            config_identity=self._config_identity,
         )
 
     def get_run_status(self) -> RunStatus | None:
@@ -197,7 +206,22 @@ class Agent:
     def stop(self) -> Reply:
         """Stop a run or a setup step softly; harmless if nothing is in progress."""
         self._report_event("command", "stop")
-        self._stop_moving("stopped on request", False)
+        self._stop_moving(STOP_REASON, False, "stopped")
+        return Reply(ok=True, status=self.get_status())
+
+    def pause(self) -> Reply:
+        """End the run at its next checkpoint, with everything at rest; the status says when that is."""
+        run = self._run_slot.current
+        if run is None:
+            return Reply(ok=False, error="no run is in progress; nothing was paused", status=self.get_status())
+        self._report_event("command", "pause")
+        run.pause()
+        return Reply(ok=True, status=self.get_status())
+
+    def abort(self) -> Reply:
+        """Trip at once, by a person; latches, also if nothing is in progress."""
+        self._report_event("command", "abort")
+        self._supervisor.trip("aborted by a person", by_person=True)
         return Reply(ok=True, status=self.get_status())
 
     def reset(self) -> Reply:
@@ -209,7 +233,7 @@ class Agent:
 
     def shut_down(self) -> None:
         """Stop a run or setup step softly and bring everything to rest; harmless if repeated."""
-        self._stop_moving("the agent was shut down", False)
+        self._stop_moving(SHUT_DOWN_REASON, False, "stopped")
         self._setup.wait(_SHUTDOWN_TIMEOUT)
         self._run_slot.wait(_SHUTDOWN_TIMEOUT)
 
@@ -219,11 +243,17 @@ class Agent:
 
     # Motion
 
-    def _stop_moving(self, reason: str, hold: bool) -> None:
-        """Stop a run or setup step softly; from any thread, harmless if nothing is in progress."""
+    def _stop_moving(self, reason: str, hold: bool, ending: RunEnding = "tripped") -> None:
+        """Stop a run or setup step softly; from any thread, harmless if nothing is in progress.
+
+        Args:
+            reason: for a person.
+            hold: keep the rod at its position until the next stop.
+            ending: ending of the run; without a request by a person, the bench itself has ended it.
+        """
         run = self._run_slot.current
         if run is not None:
-            run.sequencer.stop(reason, hold)
+            run.stop(reason, hold, ending)
         if self._interlocks.trip_reason:
             self._states.change("tripped")
         elif run is not None:

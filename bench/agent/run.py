@@ -8,11 +8,13 @@ from datetime import UTC, datetime
 from bench.agent.run_request import RunRequest
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import RunOutcome, RunStatus
+from bench.endings import RunEnding
 from bench.errors import BenchError
 from bench.methods import NO_SEGMENT
 from bench.recorder import EventReporter, LiveRecorder, LogMetadata, RecordingThread, RunRecorder
 from bench.rig import ClockMap
-from bench.sequencer import CommandHistory, Sequencer
+from bench.safety import Trip
+from bench.sequencer import CommandHistory, Sequencer, find_checkpoint_samples
 from drivers import Clock, DriverError
 
 _POST_RUN_TIME = 0.2
@@ -49,6 +51,9 @@ class Run:
         self._timing = timing
         self._log: LiveRecorder | None = None
         self._reason = ""
+        self._pause_requested = False
+        self._stop_ending: RunEnding = "tripped"
+        self._ending: RunEnding | None = None
         self._outcome: RunOutcome | None = None
         self._lost: dict[str, int] = {}
         self._started = datetime.now(UTC)
@@ -58,14 +63,34 @@ class Run:
         """Log of the run while it is open."""
         return self._log
 
+    def stop(self, reason: str, hold: bool, ending: RunEnding) -> None:
+        """Stop the run softly; from any thread, harmless if repeated.
+
+        Args:
+            reason: for a person; the first one is kept.
+            hold: keep the rod at its position until the next stop without it.
+            ending: ending of the run; the first one is kept.
+        """
+        if not self.sequencer.stop_reason:
+            self._stop_ending = ending
+        self.sequencer.stop(reason, hold)
+
+    def pause(self) -> None:
+        """End the run at its next checkpoint; from any thread, without effect if none follows."""
+        self._pause_requested = True
+        self.sequencer.pause()
+
     def execute(
-        self, metadata: LogMetadata, wait_until_stopped: Callable[[], str], maps: Mapping[str, ClockMap]
+        self,
+        metadata: LogMetadata,
+        wait_until_stopped: Callable[[], Trip | None],
+        maps: Mapping[str, ClockMap],
     ) -> None:
         """Play and record the run; return when everything is at rest and the log is closed.
 
         Args:
             metadata: content of the log apart from samples, marks and events.
-            wait_until_stopped: waits for the end of a trip; returns its reason, empty without a trip.
+            wait_until_stopped: waits for the end of a trip; returns the trip, None without one.
             maps: clock maps of the instruments by name.
         """
         try:
@@ -74,8 +99,7 @@ class Run:
             self.fail(str(error))
             return
         failure = self._try_play(metadata, self._log)
-        # A trip also makes the setpoints fail, so its reason comes first.
-        self._reason = wait_until_stopped() or failure or self.sequencer.stop_reason
+        self._reason, self._ending = self._conclude(wait_until_stopped(), failure)
         self._await_samples(self._clock() + round(_POST_RUN_TIME * 1e9))
         try:
             self._close(self._log, metadata.describe_clocks)
@@ -89,13 +113,13 @@ class Run:
         """End the run as incomplete and close its log; without effect if the run has an outcome."""
         if self._outcome is not None:
             return
-        self._reason = reason
+        self._reason, self._ending = reason, "tripped"
         log, self._log = self._log, None
         if log is not None:
             with contextlib.suppress(Exception):
                 self._lost = self._recording_thread.finish_recording()
             with contextlib.suppress(Exception):
-                log.close("incomplete", reason)
+                log.close("incomplete", reason, "tripped")
         self._outcome = "incomplete"
 
     def get_status(self) -> RunStatus:
@@ -114,9 +138,33 @@ class Run:
             elapsed_s=elapsed,
             segment="" if is_over or segment == NO_SEGMENT else request.programme.segments[segment].name,
             outcome=self._outcome,
+            ending=self._ending if is_over else None,
             reason=self._reason if is_over else "",
+            continues=request.continues,
+            pause="" if is_over else self._describe_pause(elapsed),
             lost=self._lost if is_over else self._recording_thread.count_lost(),
         )
+
+    def _describe_pause(self, elapsed: float) -> str:
+        """Return when a requested pause takes effect, from the completed time of the plan [s]."""
+        if not self._pause_requested:
+            return ""
+        programme = self.request.programme
+        samples = find_checkpoint_samples(programme)
+        name = next((name for sample, name in sorted(samples.items()) if programme.time[sample] > elapsed), "")
+        return f"at checkpoint {name}" if name else "after the run, because no checkpoint follows"
+
+    def _conclude(self, trip: Trip | None, failure: str) -> tuple[str, RunEnding]:
+        """Return reason and ending of the run; a trip comes first, because it also makes the setpoints fail."""
+        if trip is not None:
+            return trip.reason, "aborted" if trip.by_person else "tripped"
+        if failure:
+            return failure, "tripped"
+        if reason := self.sequencer.stop_reason:
+            return reason, self._stop_ending
+        if name := self.sequencer.paused_after:
+            return f"paused at checkpoint {name}", "stopped"
+        return "", "completed"
 
     def _try_play(self, metadata: LogMetadata, log: LiveRecorder) -> str:
         """Play the run; return the reason of a failure, empty without one."""
@@ -131,13 +179,13 @@ class Run:
     def _play(self, metadata: LogMetadata, log: LiveRecorder) -> None:
         for attachment in [*metadata.attachments, metadata.describe_decoders()]:
             log.attach(attachment.name, attachment.media_type, attachment.data)
-        programme, first = self.request.programme, self.request.first_sample
+        programme = self.request.programme
         self._recording_thread.start_recording(
             RunRecorder(log, programme, self.history, self._report_event, self._clock())
         )
-        resumed = f" from {programme.time[first]:.1f} s on" if first else ""
+        resumed = f", resumed after segment {self.request.resumed_after}" if self.request.resumed_after else ""
         self._report_event("state", f"run of method {self.request.method.name} started{resumed}")
-        self.sequencer.run(programme, first)
+        self.sequencer.run(programme)
 
     def _await_samples(self, until_ns: int) -> None:
         """Wait for samples up to an instant [ns]; if a channel has failed, until the timeout."""
@@ -154,7 +202,7 @@ class Run:
         outcome: RunOutcome = "incomplete"
         try:
             log.write_clocks(describe_clocks())
-            closed = log.close("incomplete" if self._reason else None, self._reason)
+            closed = log.close("incomplete" if self._reason else None, self._reason, self._ending)
             outcome = "incomplete" if closed == "truncated" else closed
         except BenchError as error:
             self._reason = str(error)

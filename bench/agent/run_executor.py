@@ -6,12 +6,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bench.agent.run import Run
-from bench.agent.run_request import validate_request
+from bench.agent.run_request import RunRequest, validate_request
 from bench.agent.run_supervision import RunSupervision
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import RunCommand
 from bench.config import BenchConfig
+from bench.disk import check_space, estimate_log_size, find_free_space
+from bench.log import RunHeader
 from bench.recorder import (
     EventReporter,
     LogMetadata,
@@ -81,7 +83,7 @@ class RunExecutor:
         """Prepare the run of a command; nothing moves.
 
         Raises:
-            MethodError, RunError: it cannot be executed.
+            MethodError, RunError: it cannot be executed, or the disk has no room for its log.
         """
         request = validate_request(command, self._rig, self._config.rig.specimen, self._find_log_folder())
         method, history = request.method, CommandHistory()
@@ -101,8 +103,12 @@ class RunExecutor:
             request, history, sequencer, self._recording_thread, self._clock, self._report_event, self._timing
         )
         maps = self._acquisition.maps
+        header = make_run_header(
+            method, request.identity, self._config, self._rig, maps, self._clock()
+        ).model_copy(update={"continues": request.continues, "resumed_after": request.resumed_after})
+        check_space(find_free_space(request.path.parent), _estimate_log_size(request, header))
         metadata = LogMetadata(
-            make_run_header(method, request.identity, self._config, self._rig, maps, self._clock()),
+            header,
             # Read before anything moves, so that a missing certificate is reported in time.
             make_attachments(method, self._config, self._rig, self._source),
             partial(describe_decoders, self._rig),
@@ -128,5 +134,21 @@ class RunExecutor:
         return self._acquisition.maps[self._rig.amplifier.name].estimate_rate() if is_known else 0.0
 
     def _find_log_folder(self) -> Path:
-        base = Path() if self._source is None else self._source.parent
-        return base / self._config.rig.folder
+        return find_log_folder(self._config, self._source)
+
+
+def find_log_folder(config: BenchConfig, source: Path | None) -> Path:
+    """Return the folder of the logs.
+
+    Args:
+        config: configuration of the bench.
+        source: file of the configuration; None without one.
+    """
+    return (Path() if source is None else source.parent) / config.rig.folder
+
+
+def _estimate_log_size(request: RunRequest, header: RunHeader) -> int:
+    """Return the largest expected size of the log [byte]."""
+    # The drive repeats the channel that measures it.
+    rates = (channel.rate_hz for name, channel in header.channels.items() if name != "coil_drive")
+    return estimate_log_size(request.programme.duration, rates)

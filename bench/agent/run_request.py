@@ -7,26 +7,26 @@ from pathlib import Path
 from bench.agent_protocol import RunCommand
 from bench.errors import RunError
 from bench.log import Identity
-from bench.methods import Method, Programme, compile_method, parse_method
+from bench.methods import Method, Programme, compile_method, make_remaining_method, parse_method
 from bench.rig import Rig
-from bench.sequencer import find_resume_sample, split_into_sections
+from bench.sequencer import split_into_sections
 
 
 @dataclass(frozen=True)
 class RunRequest:
     """Run that passed all checks that are possible before anything moves."""
 
+    method: Method
+    """Whole method, also if the run continues another one."""
     programme: Programme
-    first_sample: int
-    """Sample of the programme to begin with."""
+    """Programme to play; of a continued run, that of the part after its checkpoint."""
     identity: Identity
     path: Path
     """File of the log."""
-
-    @property
-    def method(self) -> Method:
-        """Method of the run."""
-        return self.programme.method
+    resumed_after: str = ""
+    """Checkpoint after which the run begins; empty for a whole run."""
+    continues: str = ""
+    """Identifier of the run that it continues; empty without one."""
 
 
 def validate_request(command: RunCommand, rig: Rig, specimen: str, folder: Path) -> RunRequest:
@@ -42,15 +42,15 @@ def validate_request(command: RunCommand, rig: Rig, specimen: str, folder: Path)
         MethodError: the method is not valid, or cannot be compiled within its limits.
         RunError: this bench cannot execute it, or the log has no folder.
     """
-    programme = compile_method(parse_method(command.method, "the method of the command"))
-    method = programme.method
+    method = parse_method(command.method, "the method of the command")
+    after = command.resume_after
+    programme = compile_method(make_remaining_method(method, after) if after else method)
     if method.drive_kind != rig.drive_kind:
         raise RunError(
             f"method {method.name} drives by {method.drive_kind}, this bench by {rig.drive_kind}; use another "
             "method, or set the mode of the coil amplifier in bench.toml"
         )
-    first = find_resume_sample(programme, command.resume_after) if command.resume_after else 0
-    split_into_sections(programme, rig.amplifier.table_capacity, first)
+    split_into_sections(programme, rig.amplifier.table_capacity)
     identity = Identity(command.specimen or specimen, command.operator, datetime.now(UTC))
     path = Path(command.log) if command.log else folder / f"{identity.make_run_id(method.name)}.mcap"
     try:
@@ -59,4 +59,4 @@ def validate_request(command: RunCommand, rig: Rig, specimen: str, folder: Path)
         raise RunError(
             f"{path.parent}: the folder of the log cannot be created ({error.strerror}); choose another folder"
         ) from None
-    return RunRequest(programme, first, identity, path)
+    return RunRequest(method, programme, identity, path, after, command.continues)

@@ -8,8 +8,10 @@ from pathlib import Path
 from bench.agent.agent import Agent
 from bench.agent.ownership import acquire_agent_lock
 from bench.agent_protocol import (
+    AbortCommand,
     Command,
     CommandServer,
+    PauseCommand,
     PrepareCommand,
     Publisher,
     Reply,
@@ -18,6 +20,7 @@ from bench.agent_protocol import (
     ShutDownCommand,
     StatusCommand,
     StopCommand,
+    make_endpoint,
 )
 from bench.config import load_config
 from bench.errors import RunError
@@ -37,7 +40,7 @@ def serve_agent(
     Args:
         path: ``bench.toml``.
         commands: address for commands, instead of the configured one.
-        samples: publishing address, instead of the configured one.
+        samples: publishing address, instead of the one that belongs to the address for commands.
         on_ready: receives the addresses in one line when the agent is ready.
         on_warning: receives each privilege that the system did not grant.
 
@@ -46,12 +49,13 @@ def serve_agent(
         RunError: the bench belongs to another agent, an address is not available, or an instrument does not reply.
     """
     config = load_config(path)
+    endpoint = make_endpoint(config.agent, path, commands, samples)
     stopping = threading.Event()
     with (
         set_on_signals(stopping),
         acquire_agent_lock(path),
-        CommandServer(commands or config.agent.commands) as server,
-        Publisher(samples or config.agent.samples) as publisher,
+        CommandServer(endpoint.commands, endpoint.key) as server,
+        Publisher(endpoint.samples, endpoint.key) as publisher,
     ):
         try:
             with Agent(config, path, publisher.publish) as agent:
@@ -73,6 +77,10 @@ def handle_command(agent: Agent, command: Command, stopping: threading.Event) ->
             return agent.run(command)
         case StopCommand():
             return agent.stop()
+        case PauseCommand():
+            return agent.pause()
+        case AbortCommand():
+            return agent.abort()
         case ResetCommand():
             return agent.reset()
         case PrepareCommand():

@@ -38,13 +38,16 @@ def _make_status(registered: RegisteredInstrument, acquisition: Acquisition, clo
     )
 
 
-def collect_warnings(acquisition: Acquisition, priority_warning: str, setpoint_timeout: float) -> tuple[str, ...]:
+def collect_warnings(
+    acquisition: Acquisition, priority_warning: str, setpoint_timeout: float, space_warning: str
+) -> tuple[str, ...]:
     """Return the warnings of the agent and of the threads that read the instruments.
 
     Args:
         acquisition: reads the instruments.
         priority_warning: warning that real-time priority is not permitted; empty if it is.
         setpoint_timeout: time without a setpoint after which the drive stops by itself [s].
+        space_warning: warning that the disk of the logs is nearly full; empty if it is not.
     """
     # Every thread reports the same missing priority, so it is listed once, with its consequence.
     warnings = [warning for warning in acquisition.warnings if warning != priority_warning]
@@ -52,4 +55,4 @@ def collect_warnings(acquisition: Acquisition, priority_warning: str, setpoint_t
         warnings.append(
             f"{priority_warning}; the drive stops by itself {setpoint_timeout:g} s after the last setpoint"
         )
-    return tuple(warnings)
+    return tuple([*warnings, space_warning] if space_warning else warnings)

@@ -12,7 +12,15 @@ from typing import Any
 
 from bench.recorder import EventReporter
 from bench.rig import Batch, ClockMap, Rig
-from bench.safety import STOP_DEADLINE, Action, Interlocks, LimitViolation, bring_to_rest, compute_following_error
+from bench.safety import (
+    STOP_DEADLINE,
+    Action,
+    Interlocks,
+    LimitViolation,
+    Trip,
+    bring_to_rest,
+    compute_following_error,
+)
 from bench.sequencer import CommandHistory
 from drivers import Clock, SampleBlock
 
@@ -91,9 +99,15 @@ class SafetySupervisor:
             if action is not Action.INDICATE:
                 self._stop(reason, action is Action.HOLD)
 
-    def trip(self, reason: str, **details: Any) -> None:
-        """Stop coil and actuator at once, each in a thread of its own; latches."""
-        if not self._interlocks.latch(reason):
+    def trip(self, reason: str, by_person: bool = False, **details: Any) -> None:
+        """Stop coil and actuator at once, each in a thread of its own; latches.
+
+        Args:
+            reason: for a person.
+            by_person: whether a person aborted, instead of an interlock.
+            details: further fields of the event in the log.
+        """
+        if not self._interlocks.latch(reason, by_person):
             return
         # Before the report, which may wait for a lock.
         self._stop_thread = threading.Thread(target=self._bring_to_rest, name="trip", daemon=True)
@@ -101,11 +115,11 @@ class SafetySupervisor:
         self._report_event("trip", reason, **details)
         self._stop(reason, False)
 
-    def wait_until_stopped(self) -> str:
-        """Wait for the end of a trip; return its reason, empty without a trip."""
+    def wait_until_stopped(self) -> Trip | None:
+        """Wait for the end of a trip; return the trip that is latched, None without one."""
         if self._stop_thread is not None:
             self._stop_thread.join(2 * STOP_DEADLINE)
-        return self._interlocks.trip_reason
+        return self._interlocks.trip
 
     def _apply_violations(self, violations: list[LimitViolation]) -> None:
         for one in violations:
@@ -113,7 +127,13 @@ class SafetySupervisor:
 
     def _bring_to_rest(self) -> None:
         result = bring_to_rest([self._rig.amplifier, self._rig.actuator])
-        self._report_event("state", f"brought to rest: {result}")
+        self._report_event(
+            # An output whose rest nobody has confirmed may still move or heat.
+            "alarm" if result.failures else "state",
+            f"outputs after the trip: {result}",
+            confirmed_after_s=result.seconds,
+            not_confirmed=result.failures,
+        )
 
     def _find_following_error(self, batch: Batch, history: CommandHistory) -> float:
         """Return the largest following error [m] of a batch; sample numbers give the distances of its samples."""

@@ -1,13 +1,16 @@
 """Messages between the rig agent and its clients, and the sockets that carry them."""
 
+from bench.agent_protocol.endpoint import AgentEndpoint, derive_samples_address, find_agent, make_endpoint
 from bench.agent_protocol.link import AgentClient, CommandServer, Publisher
 from bench.agent_protocol.messages import (
+    AbortCommand,
     AgentEvent,
     AgentState,
     AgentStatus,
     Command,
     InstrumentStatus,
     Message,
+    PauseCommand,
     PrepareCommand,
     Reply,
     ResetCommand,
@@ -21,9 +24,12 @@ from bench.agent_protocol.messages import (
     StopCommand,
 )
 from bench.agent_protocol.setup_client import request_setup_step
+from bench.agent_protocol.stop_client import request_end, request_stop
 
 __all__ = [
+    "AbortCommand",
     "AgentClient",
+    "AgentEndpoint",
     "AgentEvent",
     "AgentState",
     "AgentStatus",
@@ -31,6 +37,7 @@ __all__ = [
     "CommandServer",
     "InstrumentStatus",
     "Message",
+    "PauseCommand",
     "PrepareCommand",
     "Publisher",
     "Reply",
@@ -43,5 +50,10 @@ __all__ = [
     "ShutDownCommand",
     "StatusCommand",
     "StopCommand",
+    "derive_samples_address",
+    "find_agent",
+    "make_endpoint",
+    "request_end",
     "request_setup_step",
+    "request_stop",
 ]

@@ -1,16 +1,23 @@
 """ZeroMQ sockets of the rig agent: requests with replies, and publications.
 
-The agent binds two sockets. The first answers each command with one reply. The second publishes and never waits:
-a slow subscriber loses messages, but the rig loses nothing. `bench.agent_protocol.messages` defines the messages.
+The agent binds two sockets. Both are files in a private folder, or TCP with a key, because a message moves the rod
+(`bench.agent_protocol.endpoint`, `bench.agent_protocol.curve`). The first answers each command with one reply.
+The second publishes and never waits: a slow subscriber loses messages, but the rig loses nothing.
+`bench.agent_protocol.messages` defines the messages.
 """
 
+import contextlib
+import socket as unix_socket
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Final, Self, TypeAlias
 
 import zmq
 from pydantic import TypeAdapter, ValidationError
 
+from bench.agent_protocol.curve import authenticate_clients, authenticate_server, create_key
+from bench.agent_protocol.endpoint import check_socket_path
 from bench.agent_protocol.messages import (
     EVENT,
     SAMPLES,
@@ -22,7 +29,7 @@ from bench.agent_protocol.messages import (
     Reply,
     Samples,
 )
-from bench.errors import AgentUnreachableError, RunError
+from bench.errors import AgentUnreachableError, ConfigError, RunError, SecretFileError
 from bench.validation import describe_validation_error
 
 CommandHandler = Callable[[Command], Reply]
@@ -45,31 +52,41 @@ _QUEUE_LENGTH = 64
 class _SocketOwner:
     """Context manager of one bound socket."""
 
-    def __init__(self, kind: int, address: str) -> None:
+    def __init__(self, kind: int, address: str, key: Path | None = None) -> None:
         """Bind the socket.
 
         Args:
             kind: type of the ZeroMQ socket.
-            address: such as ``tcp://127.0.0.1:5570``, or ``tcp://127.0.0.1:*`` for any free port.
+            address: such as ``ipc:///run/bench/agent``, or ``tcp://127.0.0.1:*`` for any free port.
+            key: key file for TCP, created unless it exists.
 
         Raises:
-            RunError: the address is not available.
+            RunError: the address is not available, or TCP without a key file.
+            ConfigError: other users could reach the socket.
+            SecretFileError: the key file cannot be created, or other users may read it.
         """
-        self._socket, self.address = _bind_socket(kind, address)
+        with contextlib.ExitStack() as opening:
+            # A context of its own, because it answers for all its sockets which clients are accepted.
+            context: zmq.Context[zmq.Socket[bytes]] = opening.enter_context(zmq.Context())
+            self._socket = opening.enter_context(_open_socket(kind, context))
+            if address.startswith("tcp://"):
+                opening.enter_context(_require_key(self._socket, address, key))
+            self.address = _bind_socket(self._socket, address)
+            self._resources = opening.pop_all()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._socket.close()
+        self._resources.close()
 
 
 class CommandServer(_SocketOwner):
     """Server that answers commands in the order of arrival, in the thread that calls `serve`."""
 
-    def __init__(self, address: str) -> None:
-        """Listen for commands; raises RunError if the address is not available."""
-        super().__init__(zmq.REP, address)
+    def __init__(self, address: str, key: Path | None = None) -> None:
+        """Listen for commands; arguments and errors as those of every bound socket."""
+        super().__init__(zmq.REP, address, key)
 
     def serve(self, handle: CommandHandler, stopping: threading.Event) -> None:
         """Answer until ``stopping`` is set; an invalid command is answered with its error."""
@@ -81,9 +98,9 @@ class CommandServer(_SocketOwner):
 class Publisher(_SocketOwner):
     """Publisher of the agent's messages, from any thread, without waiting."""
 
-    def __init__(self, address: str) -> None:
-        """Listen for subscribers; raises RunError if the address is not available."""
-        super().__init__(zmq.PUB, address)
+    def __init__(self, address: str, key: Path | None = None) -> None:
+        """Listen for subscribers; arguments and errors as those of every bound socket."""
+        super().__init__(zmq.PUB, address, key)
         # A ZeroMQ socket must not be used by two threads at once.
         self._lock = threading.Lock()
 
@@ -102,14 +119,15 @@ class Publisher(_SocketOwner):
 class AgentClient:
     """Client of the agent; may be used from any thread, and created before the agent is running."""
 
-    def __init__(self, commands: str, samples: str) -> None:
+    def __init__(self, commands: str, samples: str, key: Path | None = None) -> None:
         """Store the addresses; nothing is sent.
 
         Args:
             commands: address of the agent's request socket.
             samples: address of the agent's publishing socket.
+            key: file with the agent's key, needed for TCP; it is read for each connection.
         """
-        self._commands, self._samples = commands, samples
+        self._commands, self._samples, self._key = commands, samples, key
 
     def send(self, command: Message, timeout: float = 5.0) -> Reply:
         """Send one command and wait for its reply.
@@ -119,15 +137,16 @@ class AgentClient:
             timeout: [s]
 
         Raises:
-            AgentUnreachableError: the address is invalid, or no valid reply came in time.
+            AgentUnreachableError: address or key is invalid, or no valid reply came in time.
         """
         # One socket per command, because a request socket without its reply cannot be used again.
         with _open_socket(zmq.REQ) as socket:
-            _connect(socket, self._commands)
+            _connect(socket, self._commands, self._key)
             socket.send(command.model_dump_json().encode())
             if not socket.poll(round(timeout * 1e3)):
+                key = f", or check that {self._key} is its key" if self._commands.startswith("tcp://") else ""
                 raise AgentUnreachableError(
-                    f"no rig agent replied at {self._commands} within {timeout:g} s; start one: mrbench rig"
+                    f"no rig agent replied at {self._commands} within {timeout:g} s; start one: mrbench rig{key}"
                 )
             try:
                 return Reply.model_validate_json(socket.recv())
@@ -141,11 +160,11 @@ class AgentClient:
         """Yield the agent's publications until ``stopping`` is set, and None after each 0.1 s of silence.
 
         Raises:
-            AgentUnreachableError: the address is invalid.
+            AgentUnreachableError: address or key is invalid.
         """
         with _open_socket(zmq.SUB) as socket:
             socket.subscribe(b"")
-            _connect(socket, self._samples)
+            _connect(socket, self._samples, self._key)
             while not stopping.is_set():
                 if not socket.poll(_POLL_PERIOD):
                     yield None
@@ -154,40 +173,68 @@ class AgentClient:
                 yield _MESSAGE_TYPES[topic].model_validate_json(content)
 
 
-def _open_socket(kind: int) -> "zmq.Socket[bytes]":
+def _open_socket(kind: int, context: "zmq.Context[zmq.Socket[bytes]] | None" = None) -> "zmq.Socket[bytes]":
     """Open a socket that drops messages instead of waiting, and discards unsent ones when it is closed."""
-    context: zmq.Context[zmq.Socket[bytes]] = zmq.Context.instance()
-    socket = context.socket(kind)
+    shared: zmq.Context[zmq.Socket[bytes]] = zmq.Context.instance() if context is None else context
+    socket = shared.socket(kind)
     # High-water marks apply only to addresses that are bound or connected afterwards.
     socket.linger, socket.sndhwm, socket.rcvhwm = 0, _QUEUE_LENGTH, _QUEUE_LENGTH
     return socket
 
 
-def _bind_socket(kind: int, address: str) -> tuple["zmq.Socket[bytes]", str]:
-    """Return a bound socket and its address, with the port that replaces ``*``.
+def _require_key(
+    socket: "zmq.Socket[bytes]", address: str, key: Path | None
+) -> contextlib.AbstractContextManager[None]:
+    if key is None:
+        raise RunError(f"{address}: a TCP address needs a key file, because others can reach it; give one")
+    create_key(key)
+    return authenticate_clients(socket, key)
+
+
+def _bind_socket(socket: "zmq.Socket[bytes]", address: str) -> str:
+    """Bind a socket, and return its address, with the port that replaces ``*``.
 
     Raises:
         RunError: the address is not available.
+        ConfigError: other users could reach the socket.
     """
-    socket = _open_socket(kind)
+    path = check_socket_path(address) if address.startswith("ipc://") else None
+    advice = "end another agent there, or use another address"
+    # ZeroMQ would take the file from another process without a word.
+    if path is not None and _is_listening(path):
+        raise RunError(f"the agent cannot listen at {address}: another process does; {advice}")
     try:
         socket.bind(address)
     except zmq.ZMQError as error:
-        socket.close()
-        raise RunError(
-            f"the agent cannot listen at {address}: {error}; end another agent there, or use another address"
-        ) from error
-    return socket, socket.getsockopt_string(zmq.LAST_ENDPOINT)
+        raise RunError(f"the agent cannot listen at {address}: {error}; {advice}") from error
+    if path is not None:
+        path.chmod(0o600)
+    return socket.getsockopt_string(zmq.LAST_ENDPOINT)
 
 
-def _connect(socket: "zmq.Socket[bytes]", address: str) -> None:
+def _is_listening(path: Path) -> bool:
+    """Return whether a process listens at a socket file; a killed one leaves its file."""
+    with unix_socket.socket(unix_socket.AF_UNIX) as probe:
+        return probe.connect_ex(str(path)) == 0
+
+
+def _connect(socket: "zmq.Socket[bytes]", address: str, key: Path | None) -> None:
     """Connect a socket; a missing agent shows only when a reply is awaited.
 
     Raises:
-        AgentUnreachableError: the address is invalid.
+        AgentUnreachableError: the address is invalid, the key of a TCP address is missing, or another user could
+            have taken the agent's place.
     """
     try:
+        if address.startswith("ipc://"):
+            check_socket_path(address)
+        elif address.startswith("tcp://"):
+            if key is None:
+                raise AgentUnreachableError(f"{address}: a TCP address needs the agent's key file; give one")
+            authenticate_server(socket, key)
         socket.connect(address)
+    except (ConfigError, SecretFileError) as error:
+        raise AgentUnreachableError(str(error)) from error
     except zmq.ZMQError as error:
         raise AgentUnreachableError(
             f"{address!r} is not an address of a rig agent ({error}); give one such as tcp://127.0.0.1:5570"

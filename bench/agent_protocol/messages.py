@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from bench.endings import RunEnding
 from bench.setup_steps import SetupStep
 
 STATUS, SAMPLES, EVENT = b"status", b"samples", b"event"
@@ -42,6 +43,7 @@ class RunCommand(Message):
     resume_after: str = Field(
         default="", description="checkpoint of the method (segment) after which an interrupted run continues"
     )
+    continues: str = Field(default="", description="id of the run that this one continues; empty without one")
     log: str | None = Field(
         default=None, description="file of the log; by default named by the run's id, in the agent's folder"
     )
@@ -51,6 +53,21 @@ class StopCommand(Message):
     """Controlled stop of the run: the motion fades out, the coil goes to zero. Harmless without a run."""
 
     command: Literal["stop"] = "stop"
+
+
+class PauseCommand(Message):
+    """End of the run at its next checkpoint, at rest. Without a later checkpoint the run is played to its end."""
+
+    command: Literal["pause"] = "pause"
+
+
+class AbortCommand(Message):
+    """Trip by a person: coil and actuator are stopped at once, each in its fastest way.
+
+    It latches until a reset, also while nothing moves. Needs no lease.
+    """
+
+    command: Literal["abort"] = "abort"
 
 
 class ResetCommand(Message):
@@ -91,7 +108,14 @@ class ShutDownCommand(Message):
 
 
 Command: TypeAlias = Annotated[
-    StatusCommand | RunCommand | StopCommand | ResetCommand | PrepareCommand | ShutDownCommand,
+    StatusCommand
+    | RunCommand
+    | StopCommand
+    | PauseCommand
+    | AbortCommand
+    | ResetCommand
+    | PrepareCommand
+    | ShutDownCommand,
     Field(discriminator="command"),
 ]
 
@@ -109,7 +133,16 @@ class RunStatus(Message):
     elapsed_s: float = Field(default=0.0, description="completed time of the plan [s]")
     segment: str = Field(default="", description="name of the current segment; empty between segments")
     outcome: RunOutcome | None = Field(default=None, description="null while the run is in progress")
+    ending: RunEnding | None = Field(
+        default=None,
+        description="completed, stopped (controlled, on request), aborted (at once, by a person) or tripped (by "
+        "the bench itself); null while the run is in progress",
+    )
     reason: str = Field(default="", description="reason why the outcome is not clean, for a person")
+    continues: str = Field(default="", description="id of the run that this one continues; empty without one")
+    pause: str = Field(
+        default="", description="when a requested pause takes effect, for a person; empty without a request"
+    )
     lost: dict[str, int] = Field(default_factory=dict, description="number of lost samples by channel")
 
 
@@ -143,6 +176,10 @@ class AgentStatus(Message):
     """State of the agent."""
 
     state: AgentState
+    utc_s: float = Field(
+        default=0.0,
+        description="UTC at which the agent made this status [s since 1970]; a status is true at this moment only",
+    )
     trip: str = Field(default="", description="reason of the trip; empty without a trip")
     reference_state: str = Field(default="", description="unreferenced, homed, mounted, centred or reference_lost")
     step: SetupStatus | None = Field(default=None, description="the latest setup step; null before the first")
@@ -154,6 +191,10 @@ class AgentStatus(Message):
     warnings: tuple[str, ...] = Field(default=(), description="such as: no real-time priority, with the reason")
     drive_kind: str = Field(default="", description="coil_v or coil_a")
     drive_unit: str = Field(default="", description="V or A")
+    config_identity: str = Field(default="", description="differs for another content of bench.toml")
+    notice: str = Field(
+        default="", description="what a person has to do so that the agent has the present bench.toml; else empty"
+    )
 
 
 class Samples(Message):
@@ -164,6 +205,7 @@ class Samples(Message):
         description="by field of `/bench/sample`; null for a missing value"
     )
     segment: str = Field(default="", description="segment of the newest sample; empty between segments")
+    utc_s: float = Field(default=0.0, description="UTC of the newest sample [s since 1970]")
 
 
 class AgentEvent(Message):

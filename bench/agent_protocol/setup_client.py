@@ -3,9 +3,9 @@
 import time
 from pathlib import Path
 
+from bench.agent_protocol.endpoint import find_agent
 from bench.agent_protocol.link import AgentClient
 from bench.agent_protocol.messages import AgentStatus, PrepareCommand, StatusCommand, StopCommand
-from bench.config import load_config
 from bench.errors import RunError
 from bench.setup_steps import SetupStep
 
@@ -32,8 +32,7 @@ def request_setup_step(
         AgentUnreachableError: no agent replies.
         RunError: the agent refuses the step, or the step fails.
     """
-    agent = load_config(config).agent
-    client = AgentClient(agent.commands, agent.samples)
+    client = AgentClient(*find_agent(config))
     try:
         status = _await_end(client, PrepareCommand(step=step, position_m=position), poll_period)
     except KeyboardInterrupt:

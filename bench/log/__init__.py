@@ -6,6 +6,7 @@ from bench.log.header import ChannelInfo, Identity, RunHeader, serialise_values,
 from bench.log.log_context import LogContext
 from bench.log.mcap_file import DAMAGE_ERRORS, MAGIC, convert_file_errors, is_closed
 from bench.log.messages import (
+    EVENT,
     INSTRUMENT,
     MESSAGES,
     NS_PER_SECOND,
@@ -33,6 +34,7 @@ from bench.log.writer import LogWriter, SegmentMark
 __all__ = [
     "DAMAGE_ERRORS",
     "DECODERS_FILE",
+    "EVENT",
     "FORMATS",
     "INSTRUMENT",
     "MAGIC",

@@ -74,6 +74,10 @@ class RunHeader(BaseModel):
     )
     seed: int | None = Field(default=None, description="seed of all random values in the run")
     utc_offset: str = Field(default="", description="UTC time at zero of the bench clock, ISO 8601, if known")
+    continues: str = Field(default="", description="id of the run that this one continues; empty without one")
+    resumed_after: str = Field(
+        default="", description="checkpoint of the method after which the run begins; empty for a whole run"
+    )
     velocity_from: Literal["smoothed displacement", "measured"] = Field(
         default="smoothed displacement", description="origin of the velocity in the samples"
     )

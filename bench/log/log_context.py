@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from types import TracebackType
 from typing import Self
 
+from bench.endings import RunEnding
 from bench.log.messages import Outcome
 
 
@@ -13,7 +14,7 @@ class LogContext(ABC):
     _closed = False
 
     @abstractmethod
-    def close(self, outcome: Outcome | None = None, reason: str = "") -> object:
+    def close(self, outcome: Outcome | None = None, reason: str = "", ending: RunEnding | None = None) -> object:
         """Close the log with an outcome; by default with the one that its counts imply."""
 
     def __enter__(self) -> Self:

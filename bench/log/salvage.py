@@ -33,6 +33,8 @@ class SalvageResult:
     """Samples in the log."""
     bytes_dropped: int = 0
     """Bytes of the truncated log outside of intact records."""
+    duration: float = 0.0
+    """Time [s] from the first to the last sample kept; the bench clock may have started weeks before."""
     last_time: float = 0.0
     """Bench clock [s] of the last sample kept."""
     known_until: float = 0.0
@@ -47,8 +49,8 @@ class SalvageResult:
         lost = max(0.0, self.known_until - self.last_time)
         backup = f"; the truncated log is kept as {self.backup}" if self.backup else ""
         return (
-            f"{self.path}: {self.samples} samples kept, up to {self.last_time:.3f} s; {self.bytes_dropped} bytes"
-            f" dropped, {lost:.3f} s after that are known to be lost; a killed recorder loses up to 0.5 s more"
+            f"{self.path}: {self.samples} samples kept, {self.duration:.1f} s; {self.bytes_dropped} bytes dropped,"
+            f" {lost:.3f} s after them are known to be lost; a killed recorder loses up to 0.5 s more"
             f" than its file shows{backup}"
         )
 
@@ -63,6 +65,9 @@ class _SalvageState:
     """Position after the last intact record [byte]."""
     damaged_bytes: int = 0
     """Bytes of chunks that are complete but damaged."""
+    first_sample_ns: int = -1
+    """Bench clock of the first sample [ns]; negative without one."""
+    last_sample_ns: int = -1
     last_time_ns: int = 0
     known_until_ns: int = 0
 
@@ -98,6 +103,7 @@ def salvage_log(path: Path | str, out: Path | str | None = None) -> SalvageResul
         was_complete=False,
         samples=state.counts[SAMPLE],
         bytes_dropped=_count_dropped_bytes(state, size),
+        duration=(state.last_sample_ns - state.first_sample_ns) / NS_PER_SECOND,
         last_time=state.last_time_ns / NS_PER_SECOND,
         known_until=state.known_until_ns / NS_PER_SECOND,
         backup=backup,
@@ -186,12 +192,19 @@ def _copy_record(
         case Message() if record.channel_id in channels:
             channel = channels[record.channel_id]
             writer.add_message(channel, record.log_time, record.data, record.publish_time, record.sequence)
-            state.counts[state.topics[record.channel_id]] += 1
+            _note_sample(state, state.topics[record.channel_id], record.log_time)
             state.last_time_ns = max(state.last_time_ns, record.log_time)
         case Metadata() if record.name != "outcome":
             writer.add_metadata(record.name, record.metadata)
         case Attachment():
             writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
+
+
+def _note_sample(state: _SalvageState, topic: str, time_ns: int) -> None:
+    state.counts[topic] += 1
+    if topic == SAMPLE:
+        state.last_sample_ns = time_ns
+        state.first_sample_ns = time_ns if state.first_sample_ns < 0 else state.first_sample_ns
 
 
 def _read_cut_chunk(file: IO[bytes], state: _SalvageState) -> None:

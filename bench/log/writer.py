@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import orjson
 
+from bench.endings import RunEnding, derive_ending
 from bench.errors import LogError
 from bench.log.chunked_writer import ChunkedMcapWriter
 from bench.log.columns import (
@@ -200,12 +201,13 @@ class LogWriter(LogContext):
         """True if samples were lost."""
         return bool(self._lost)
 
-    def close(self, outcome: Outcome | None = None, reason: str = "") -> None:
+    def close(self, outcome: Outcome | None = None, reason: str = "", ending: RunEnding | None = None) -> None:
         """Write the outcome and the index, and sync the file to the disk.
 
         Args:
             outcome: end of the recording; by default ``clean``, or ``lossy`` if samples were lost.
             reason: reason of the outcome for a person.
+            ending: ending of the run; by default ``completed`` for a clean or lossy log, else unknown.
 
         Raises:
             LogError: the file cannot be written, or the log is already closed.
@@ -216,7 +218,7 @@ class LogWriter(LogContext):
         final = outcome or ("lossy" if self._lost else "clean")
         with convert_file_errors(self.path):
             with self._abandon_on_error():
-                self._file.write_metadata("outcome", self._make_outcome(final, reason))
+                self._file.write_metadata("outcome", self._make_outcome(final, reason, ending))
             self._file.close()
 
     @contextlib.contextmanager
@@ -228,10 +230,11 @@ class LogWriter(LogContext):
             self._file.abandon()
             raise
 
-    def _make_outcome(self, outcome: Outcome, reason: str) -> dict[str, str]:
+    def _make_outcome(self, outcome: Outcome, reason: str, ending: RunEnding | None) -> dict[str, str]:
+        end = {"outcome": outcome, "reason": reason, "ending": ending or derive_ending(outcome, "")}
         counts = {topic: self._file.message_counts[topic] for topic in self._file.topics}
         last = {"last_time_ns": self._last_ns}
-        return serialise_values({"outcome": outcome, "reason": reason, **counts, "lost": dict(self._lost), **last})
+        return serialise_values({**end, **counts, "lost": dict(self._lost), **last})
 
     def _write_sample_message(self, time_ns: int, message: bytes) -> None:
         if time_ns <= self._last_ns:

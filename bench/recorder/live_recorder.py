@@ -15,6 +15,7 @@ from typing import Any, Literal, TypeAlias, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from bench.endings import RunEnding
 from bench.errors import LogError
 from bench.log import (
     INSTRUMENT,
@@ -135,7 +136,7 @@ class LiveRecorder(LogContext):
         values = dict(descriptions)
         self._enqueue(lambda log: log.write_metadata(CLOCKS_RECORD, values))
 
-    def close(self, outcome: Outcome | None = None, reason: str = "") -> Outcome:
+    def close(self, outcome: Outcome | None = None, reason: str = "", ending: RunEnding | None = None) -> Outcome:
         """Write the rest of the queue, the outcome and the index; return the outcome of the log.
 
         Args:
@@ -158,12 +159,12 @@ class LiveRecorder(LogContext):
         if self._error is not None:
             # The part on the disk can be salvaged; an outcome makes this easier, if the disk has room for it.
             with contextlib.suppress(LogError):
-                self._log.close("incomplete", str(self._error))
+                self._log.close("incomplete", str(self._error), ending)
             raise self._error
         for content, count in self.dropped_counts.items():
             self._log.count_lost(content, count)
         result: Outcome = outcome if outcome not in (None, "clean") else "lossy" if self._log.is_lossy else "clean"
-        self._log.close(result, reason)
+        self._log.close(result, reason, ending)
         return result
 
     def _has_room(self, kind: ContentKind, content: str, count: int) -> bool:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from bench.agent_protocol import Samples
 from bench.errors import LogError
+from bench.log import NS_PER_SECOND
 from bench.recorder.run_recorder import Columns, RunRecorder
 from bench.rig import AlignedSamples, Aligner, Batch
 
@@ -33,6 +34,7 @@ class RecordingThread:
     Args:
         aligner: aligns the channels.
         rate: rate of bench samples [Hz].
+        clock: bench clock [ns].
         publish: receives samples for live views.
         on_cycle: is called in every turn.
         on_failed: receives the error if the log cannot be written.
@@ -42,6 +44,7 @@ class RecordingThread:
         self,
         aligner: Aligner,
         rate: float,
+        clock: Callable[[], int],
         publish: Callable[[Samples], None],
         on_cycle: Callable[[], None],
         on_failed: Callable[[LogError], None],
@@ -49,6 +52,7 @@ class RecordingThread:
         self.newest_ns = -1
         """Bench clock of the newest bench sample [ns]."""
         self._aligner, self._publish, self._on_cycle, self._on_failed = aligner, publish, on_cycle, on_failed
+        self._clock = clock
         self._decimation = max(1, round(rate / LIVE_RATE))
         self._lock = threading.Lock()
         self._recording: RunRecorder | None = None
@@ -152,6 +156,7 @@ class RecordingThread:
                     for name in names
                 },
                 segment="" if recording is None else recording.segment,
+                utc_s=time.time() - (self._clock() - int(live[-1][0].time_ns[-1])) / NS_PER_SECOND,
             )
         )
 

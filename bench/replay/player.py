@@ -53,25 +53,29 @@ def _make_list(column: list[float]) -> list[float | None]:
     return [value if value == value else None for value in column]
 
 
-def play_log(path: Path, speed: float, address: str, wait: Callable[[float], None] = time.sleep) -> int:
+def play_log(path: Path, speed: float, address: str, key: Path, wait: Callable[[float], None] = time.sleep) -> int:
     """Publish the samples of a log and return their number.
 
     Args:
         path: file of the log.
         speed: multiple of real time.
         address: ZeroMQ address to which subscribers connect.
+        key: key file of a TCP address, created unless it exists.
         wait: waits for a time [s].
 
     Raises:
         LogError: the log cannot be read.
         RunError: the address is not available.
+        ConfigError: other users could reach the socket.
+        SecretFileError: the key file cannot be created, or other users may read it.
     """
     log = read_log(path)
     count = 0
-    with Publisher(address) as publisher:
+    with Publisher(address, key) as publisher:
         began = time.monotonic()
         for due, message in make_messages(log):
             wait(max(began + due / speed - time.monotonic(), 0.0))
-            publisher.publish(message)
+            # A live view judges the age of samples by their stamp, and these are played now.
+            publisher.publish(message.model_copy(update={"utc_s": time.time()}))
             count += len(message.time_ns)
     return count

@@ -1,12 +1,12 @@
-"""Single run on the instruments of a bench, with an agent in this process: no sockets, no service."""
+"""Single run on the instruments of a bench, with an agent in this process and no service."""
 
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from bench.agent import Agent, acquire_agent_lock
-from bench.agent_protocol import RunCommand, RunStatus
+from bench.agent import Agent, acquire_agent_lock, handle_command
+from bench.agent_protocol import CommandServer, RunCommand, RunStatus, make_endpoint
 from bench.config import load_config
 from bench.errors import RunError
 from bench.methods import Method
@@ -29,7 +29,8 @@ def run_on_rig(
 ) -> RunStatus:
     """Record a method on the instruments of a configuration.
 
-    Ctrl-C and SIGTERM stop it softly: the motion fades out, the coil goes to zero, the log is closed.
+    Ctrl-C, SIGTERM and `mrbench stop` stop it softly: the motion fades out, the coil goes to zero, the log is
+    closed.
 
     Args:
         method: the method to run.
@@ -50,10 +51,12 @@ def run_on_rig(
             recorded part is in the log.
     """
     bench_config = load_config(config)
+    endpoint = make_endpoint(bench_config.agent, config)
     stopping = threading.Event()
     # Signals first: one that comes while the wires are opened must not interrupt half-way.
     with set_on_signals(stopping), acquire_agent_lock(config), contextlib.ExitStack() as opened:
         try:
+            server = opened.enter_context(CommandServer(endpoint.commands, endpoint.key))
             agent = opened.enter_context(Agent(bench_config, config))
         except DriverError as error:
             raise RunError(str(error)) from error
@@ -63,7 +66,23 @@ def run_on_rig(
         reply = agent.run(RunCommand(method=document, specimen=specimen, operator=operator, log=str(out)))
         if not reply.ok:
             raise RunError(reply.error)
+        opened.enter_context(_serve_commands(server, agent, stopping))
         return _follow_run(agent, stopping, progress)
+
+
+@contextlib.contextmanager
+def _serve_commands(server: CommandServer, agent: Agent, stopping: threading.Event) -> Iterator[None]:
+    """Answer commands of other processes for the duration of a block; the end of the agent stops the run."""
+    ended = threading.Event()
+    thread = threading.Thread(
+        target=server.serve, args=(lambda command: handle_command(agent, command, stopping), ended), daemon=True
+    )
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
 
 
 def _follow_run(agent: Agent, stopping: threading.Event, progress: Progress) -> RunStatus:

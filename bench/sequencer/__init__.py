@@ -1,7 +1,7 @@
 """Sequencer: plays a compiled method on actuator and coil amplifier."""
 
 from bench.sequencer.command_history import CommandHistory
-from bench.sequencer.playback import find_resume_sample, split_into_sections
+from bench.sequencer.playback import find_checkpoint_samples, split_into_sections
 from bench.sequencer.rod_motion import move_rod
 from bench.sequencer.run_observer import RunObserver
 from bench.sequencer.sequencer import Sequencer
@@ -12,7 +12,7 @@ __all__ = [
     "RunObserver",
     "Sequencer",
     "Times",
-    "find_resume_sample",
+    "find_checkpoint_samples",
     "move_rod",
     "split_into_sections",
 ]

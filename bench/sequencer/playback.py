@@ -53,22 +53,25 @@ class PlaybackSection:
         return self.start + np.clip(index, 0, self.stop - self.start)
 
 
-def split_into_sections(programme: Programme, capacity: int, first: int = 0) -> tuple[PlaybackSection, ...]:
-    """Split a programme into as few sections as its drive steps allow.
+def split_into_sections(programme: Programme, capacity: int) -> tuple[PlaybackSection, ...]:
+    """Split a programme at its checkpoints, and further into as few sections as its drive steps allow.
 
     Args:
         programme: compiled method.
         capacity: number of steps in the amplifier's table.
-        first: sample to begin with, at rest.
 
     Raises:
         RunError: between two rests the drive has more steps than the table.
     """
     step_counts = np.concatenate([[0], np.cumsum(np.diff(programme.drive) != 0)])
-    rests = [int(sample) for sample in find_rest_samples(programme) if sample > first]
-    sections, start = [], first
-    while start < len(programme.time) - 1:
-        later = [rest for rest in rests if rest > start]
+    rests = [int(sample) for sample in find_rest_samples(programme)]
+    last = len(programme.time) - 1
+    checkpoints = sorted(find_checkpoint_samples(programme))
+    sections, start = [], 0
+    while start < last:
+        # A run can be paused only between two sections, so none extends beyond a checkpoint.
+        end = next((sample for sample in checkpoints if sample > start), last)
+        later = [rest for rest in rests if start < rest <= end]
         # The level at the begin takes one entry of the table, so the number of changes must be below its capacity.
         fitting = [rest for rest in later if step_counts[rest] - step_counts[start] < capacity]
         if not fitting:
@@ -91,23 +94,14 @@ def find_rest_samples(programme: Programme) -> Times:
     return np.flatnonzero(may_wait)
 
 
-def find_resume_sample(programme: Programme, name: str) -> int:
-    """Return the sample from which an interrupted run continues after a segment.
-
-    Raises:
-        RunError: the segment does not exist, is not a checkpoint, or is the last one.
-    """
-    checkpoints = {segment.name: segment for segment in programme.segments if segment.checkpoint}
-    if name not in checkpoints:
-        names = ", ".join(checkpoints) or "none"
-        raise RunError(f"method {programme.method.name} has no checkpoint after {name}; its checkpoints: {names}")
-    segment = checkpoints[name]
-    later = [int(sample) for sample in find_rest_samples(programme) if sample >= segment.stop]
-    if later[0] >= len(programme.time) - 1 or segment is programme.segments[-1]:
-        raise RunError(
-            f"method {programme.method.name} has no segment after {name}; the run was complete, start a new one"
-        )
-    return later[0]
+def find_checkpoint_samples(programme: Programme) -> dict[int, str]:
+    """Return the names of the checkpoints by the sample at rest where a run can be paused; none after the last."""
+    rests = find_rest_samples(programme)
+    return {
+        int(rests[np.searchsorted(rests, segment.stop)]): segment.name
+        for segment in programme.segments[:-1]
+        if segment.checkpoint
+    }
 
 
 def _make_capacity_error(programme: Programme, counts: Indices, start: int, stop: int, capacity: int) -> RunError:

@@ -61,11 +61,21 @@ def move_rod(
     finally:
         on_setpoints_active(False)
         # The drive brakes a rod that may still move; without voltage the rod would coast.
-        actuator.disable() if is_at_rest else actuator.make_safe()
+        unconfirmed = _switch_off(actuator, is_at_rest)
+    if unconfirmed:
+        raise RunError(f"the move has ended, but the rod's rest is not confirmed: {unconfirmed}")
     if thread.failure is not None:
         raise thread.failure
     if stop_requested.is_set():
         raise RunError("the move was stopped; the rod rests before its target")
+
+
+def _switch_off(actuator: Actuator, is_at_rest: bool) -> str:
+    """Remove the voltage at rest, else stop the rod; return why its rest is not confirmed, or an empty text."""
+    if not is_at_rest:
+        return actuator.make_safe()
+    actuator.disable()
+    return ""
 
 
 def _await_rest(

@@ -14,7 +14,7 @@ import numpy as np
 from bench.errors import RunError
 from bench.methods import Programme
 from bench.sequencer.command_history import CommandHistory
-from bench.sequencer.playback import PlaybackSection, split_into_sections
+from bench.sequencer.playback import PlaybackSection, find_checkpoint_samples, split_into_sections
 from bench.sequencer.run_observer import RunObserver
 from bench.sequencer.setpoint_thread import PAUSE_SHARE, SetpointGenerator, SetpointThread
 from bench.sequencer.trajectory import STOP_TIMES, plan_approach
@@ -93,11 +93,18 @@ class Sequencer:
         self._hold_released = threading.Event()
         self._acceleration = 0.0
         self._stop_reason = ""
+        self._pause_requested = threading.Event()
+        self._paused_after = ""
 
     @property
     def stop_reason(self) -> str:
         """Reason why the run ended early; empty if it did not."""
         return self._stop_reason
+
+    @property
+    def paused_after(self) -> str:
+        """Name of the checkpoint at which the run was paused; empty if it was not."""
+        return self._paused_after
 
     @property
     def late_cycles(self) -> int:
@@ -119,18 +126,21 @@ class Sequencer:
         self._generator.stop(self._clock(), self._acceleration)
         self._stop_requested.set()
 
-    def run(self, programme: Programme, first: int = 0) -> None:
-        """Play a programme; return when everything is at rest, early after a `stop`.
+    def pause(self) -> None:
+        """End the run at the next checkpoint; from any thread, without effect if none follows."""
+        self._pause_requested.set()
+
+    def run(self, programme: Programme) -> None:
+        """Play a programme; return when everything is at rest, early after a `stop` or a `pause`.
 
         Args:
             programme: compiled method.
-            first: sample to begin with, at rest.
 
         Raises:
             RunError: the drive cannot be played exactly, a wait timed out, or a command was forbidden.
             DriverError: an instrument refuses or does not reply.
         """
-        sections = split_into_sections(programme, self._amplifier.table_capacity, first)
+        sections = split_into_sections(programme, self._amplifier.table_capacity)
         self._check_programme(programme)
         self._acceleration = programme.method.limits.acceleration_mps2
         if self._stop_requested.is_set():  # nothing was switched on yet
@@ -161,8 +171,12 @@ class Sequencer:
         self._generator.start(approach)
         self._await_rest(approach.duration, "the rod to reach its first position")
         self._observer.on_arrived()
+        checkpoints = find_checkpoint_samples(sections[0].programme)
         for section in sections:
             if self._stop_requested.is_set():
+                return
+            if self._pause_requested.is_set() and section.start in checkpoints:
+                self._paused_after = checkpoints[section.start]
                 return
             self._upload_drive(section)
             # A stop may have been requested during the upload, which takes several exchanges.
@@ -268,7 +282,7 @@ class Sequencer:
             return
         self._generator.stop(self._clock(), programme.method.limits.acceleration_mps2)
         # Before the motion has ended, because without its field the damper resists least.
-        self._amplifier.make_safe()
+        self._amplifier.ramp_down()
         timeout = STOP_TIMES[-1] + _TIME_MARGIN
         deadline = time.monotonic() + timeout
         while not self._generator.is_done(self._clock()) and self._thread.failure is None:
@@ -289,10 +303,11 @@ class Sequencer:
         """Remove the voltage from coil and drive; use the drive's quick stop if the rod may still move."""
         if self._guard.trip_reason:  # the supervisor stops both
             return None
-        # It does not wait for zero, so the coil ramps down while the drive is switched off.
-        self._amplifier.make_safe()
+        # Without waiting for zero, so that the coil ramps down while the drive is switched off.
+        self._amplifier.ramp_down()
         if self._thread.failure is not None:
-            return self._actuator.make_safe()
+            self._actuator.make_safe()
+            return None
         try:
             self._actuator.disable()
         except DriverError:

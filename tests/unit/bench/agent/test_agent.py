@@ -104,6 +104,26 @@ def test_trip_cannot_be_reset_before_the_tripped_step_has_ended(agent):
     assert agent.get_status().state == "idle"
 
 
+def test_abort_stops_both_outputs_and_latches_also_at_rest(agent, messages, monkeypatch):
+    stopped = []
+    for one in (agent._rig.actuator, agent._rig.amplifier):
+        monkeypatch.setattr(one, "make_safe", lambda name=one.name: stopped.append(name) or "")
+    reply = agent.abort()
+    assert (reply.ok, reply.status.state, reply.status.trip) == (True, "tripped", "aborted by a person")
+    agent._supervisor.wait_until_stopped()
+    assert sorted(stopped) == ["coil", "drive"]
+    refused = agent.run(RunCommand(method={}))
+    assert "the agent is tripped (aborted by a person)" in refused.error
+    commands = [one.text for one in messages if isinstance(one, AgentEvent) and one.kind == "command"]
+    assert commands == ["abort"]
+    assert agent.reset().ok
+
+
+def test_pause_without_a_run_is_refused(agent):
+    reply = agent.pause()
+    assert (reply.ok, reply.error) == (False, "no run is in progress; nothing was paused")
+
+
 def test_status_is_available_while_instruments_reset(agent, monkeypatch):
     requested, free = threading.Event(), threading.Event()
 
@@ -163,7 +183,7 @@ class TestRunsInSuccession:
         def prepare_with_double(command):
             prepared = prepare(command)
             sequencer = prepared.run.sequencer
-            sequencer.run = lambda programme, first: play(prepared.supervision, sequencer)
+            sequencer.run = lambda programme: play(prepared.supervision, sequencer)
             return prepared
 
         agent._executor.prepare = prepare_with_double

@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import shutil
 import time
 import tomllib
 from types import SimpleNamespace
@@ -11,6 +12,7 @@ import pytest
 from bench.agent.timing import AgentTiming
 from bench.agent_protocol.messages import RunCommand
 from bench.config import BenchConfig
+from bench.disk import RESERVE
 from bench.errors import LogError, RunError
 from bench.recorder import make_attachments
 from tests.support.fake_rig import BENCH_TOML
@@ -268,3 +270,14 @@ class TestClocks:
         bench.acquisition.maps[bench.rig.amplifier.name].estimate_rate = lambda: 5e-5
         now[0] += elapsed_ns
         assert bench.executor._estimate_amplifier_rate() == rate
+
+
+def test_a_run_whose_log_does_not_fit_is_refused_before_anything_moves(tmp_path, monkeypatch):
+    monkeypatch.setattr(shutil, "disk_usage", lambda path: SimpleNamespace(free=RESERVE))
+    bench = RunBench(tmp_path, time.monotonic_ns)
+    with pytest.raises(
+        RunError, match=r"needs up to 0\.00\d GB and 0\.100 GB stay in reserve; nothing was started"
+    ):
+        bench.prepare(lambda supervision: None, tmp_path / "a.mcap")
+    assert not (tmp_path / "a.mcap").exists()
+    assert bench.doubles.calls == []

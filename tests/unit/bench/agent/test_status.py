@@ -52,4 +52,9 @@ def test_instrument_whose_reading_failed_is_not_connected(connected, message, fa
 )
 def test_missing_priority_is_listed_once_with_its_consequence(priority, expected):
     acquisition = SimpleNamespace(warnings=["no priority", "slow disk"])
-    assert collect_warnings(acquisition, priority, 0.05) == expected
+    assert collect_warnings(acquisition, priority, 0.05, "") == expected
+
+
+def test_little_space_is_a_warning():
+    warnings = collect_warnings(SimpleNamespace(warnings=["slow disk"]), "", 0.05, "the disk has 0.4 GB free")
+    assert warnings == ("slow disk", "the disk has 0.4 GB free")

@@ -8,7 +8,7 @@ import pytest
 from bench.agent.supervisor import SafetySupervisor
 from bench.rig.acquisition import Batch
 from bench.rig.clock_map import ClockMap
-from bench.safety.interlocks import Interlocks
+from bench.safety.interlocks import Interlocks, Trip
 from bench.safety.limits import Action, LimitViolation
 from drivers.channel import ClockReading, SampleBlock
 from tests.support.fake_rig import EventLog, FakeActuator, FakeAmplifier
@@ -127,11 +127,37 @@ def test_trip_stops_coil_and_actuator_once(events):
     supervisor = make_supervisor(Interlocks({}, "coil_voltage"), events, stops)
     supervisor.trip("force 1600 N")
     supervisor.trip("another reason")
-    assert supervisor.wait_until_stopped() == "force 1600 N"
+    assert supervisor.wait_until_stopped() == Trip("force 1600 N")
     assert supervisor._rig.actuator.calls == ["actuator safe"]
     assert supervisor._rig.amplifier.calls == ["coil safe"]
     assert events.list_texts("trip") == ["force 1600 N"]
     assert stops == [("force 1600 N", False)]
+
+
+@pytest.mark.parametrize(
+    ("unconfirmed", "kind", "text"),
+    [
+        ("", "state", "actuator: rest confirmed after"),
+        ("Broken pipe", "alarm", "actuator: rest not confirmed: Broken pipe"),
+    ],
+)
+def test_trip_reports_rest_only_for_what_a_driver_confirmed(events, unconfirmed, kind, text):
+    supervisor = make_supervisor(Interlocks({}, "coil_voltage"), events)
+    supervisor._rig.actuator.unconfirmed = unconfirmed
+    supervisor.trip("the wire is gone")
+    supervisor.wait_until_stopped()
+    (report,) = [one for one in events.events if one[1].startswith("outputs after the trip")]
+    assert report[0] == kind
+    assert text in report[1]
+    assert "amplifier: rest confirmed after" in report[1]
+    assert report[2]["not_confirmed"] == ({"actuator": unconfirmed} if unconfirmed else {})
+
+
+def test_abort_after_a_trip_does_not_take_its_place():
+    supervisor = make_supervisor(Interlocks({}, "coil_voltage"), EventLog())
+    supervisor.trip("force 1600 N")
+    supervisor.trip("aborted by a person", by_person=True)
+    assert supervisor.wait_until_stopped() == Trip("force 1600 N", by_person=False)
 
 
 @pytest.mark.parametrize(("delay", "is_event"), [(0.008, False), (0.008_001, True)])

@@ -1,7 +1,9 @@
 """Commands and publications over real sockets on loopback."""
 
+import socket
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 import zmq
@@ -14,6 +16,14 @@ ANY_PORT = "tcp://127.0.0.1:*"
 
 
 @pytest.fixture
+def address(tmp_path) -> str:
+    """Return the address of a socket in a private folder."""
+    folder = tmp_path / "sockets"
+    folder.mkdir(mode=0o700)
+    return f"ipc://{folder}/agent"
+
+
+@pytest.fixture
 def stopping() -> Iterator[threading.Event]:
     event = threading.Event()
     yield event
@@ -21,13 +31,13 @@ def stopping() -> Iterator[threading.Event]:
 
 
 @pytest.fixture
-def server(stopping: threading.Event) -> Iterator[CommandServer]:
+def server(stopping: threading.Event, address: str) -> Iterator[CommandServer]:
     def handle(command):
         if isinstance(command, RunCommand):
             return Reply(ok=False, error=f"no {command.method['name']} today")
         return Reply(ok=True, status=AgentStatus(state="idle"))
 
-    with CommandServer(ANY_PORT) as server:
+    with CommandServer(address) as server:
         thread = threading.Thread(target=server.serve, args=(handle, stopping))
         thread.start()
         yield server
@@ -52,31 +62,43 @@ def test_every_command_gets_its_own_reply(server):
     ],
 )
 def test_invalid_command_is_answered_with_its_error_and_the_next_one_works(server, request_):
-    with zmq.Context.instance().socket(zmq.REQ) as socket:
-        socket.linger = 0
-        socket.connect(server.address)
-        socket.send(request_)
-        assert socket.poll(5000)
-        reply = Reply.model_validate_json(socket.recv())
+    with zmq.Context.instance().socket(zmq.REQ) as client:
+        client.linger = 0
+        client.connect(server.address)
+        client.send(request_)
+        assert client.poll(5000)
+        reply = Reply.model_validate_json(client.recv())
     assert not reply.ok
     assert "invalid command" in reply.error
     assert AgentClient(server.address, "").send(StopCommand()).ok
 
 
-def test_missing_agent_is_reported_in_time():
-    with CommandServer(ANY_PORT) as bound:
-        address = bound.address
+def test_missing_agent_is_reported_in_time(address):
     with pytest.raises(AgentUnreachableError, match=r"within 0\.2 s; start one: mrbench rig"):
         AgentClient(address, "").send(StatusCommand(), timeout=0.2)
 
 
-def test_address_in_use_is_refused():
-    with CommandServer(ANY_PORT) as first, pytest.raises(RunError, match="cannot listen at"):
-        CommandServer(first.address)
+@pytest.mark.parametrize("scheme", ["ipc", "tcp"])
+def test_address_in_use_is_refused(scheme, address, tmp_path):
+    key = tmp_path / "agent.key"
+    with (
+        CommandServer(address if scheme == "ipc" else ANY_PORT, key) as first,
+        pytest.raises(RunError, match="cannot listen at"),
+    ):
+        CommandServer(first.address, key)
 
 
-def test_publications_arrive_with_their_types(stopping):
-    with Publisher(ANY_PORT) as publisher:
+def test_the_file_of_a_killed_agent_is_replaced(address):
+    left = address.removeprefix("ipc://")
+    with socket.socket(socket.AF_UNIX) as killed:
+        killed.bind(left)
+        killed.listen()
+    with CommandServer(address):
+        assert Path(left).stat().st_mode & 0o777 == 0o600
+
+
+def test_publications_arrive_with_their_types(stopping, address):
+    with Publisher(address) as publisher:
         messages = AgentClient("", publisher.address).subscribe(stopping)
         event = AgentEvent(time_ns=7, kind="alarm", text="warm")
         received = None
@@ -89,19 +111,19 @@ def test_publications_arrive_with_their_types(stopping):
         assert received == event
 
 
-def test_closed_publisher_drops_messages():
-    with Publisher(ANY_PORT) as publisher:
+def test_closed_publisher_drops_messages(address):
+    with Publisher(address) as publisher:
         pass
     publisher.publish(AgentStatus(state="idle"))
 
 
-def test_internal_error_is_a_reply_and_the_next_command_works(stopping):
+def test_internal_error_is_a_reply_and_the_next_command_works(stopping, address):
     def handle(command):
         if isinstance(command, RunCommand):
             raise ZeroDivisionError("division by zero")
         return Reply(ok=True)
 
-    with CommandServer(ANY_PORT) as server:
+    with CommandServer(address) as server:
         thread = threading.Thread(target=server.serve, args=(handle, stopping))
         thread.start()
         client = AgentClient(server.address, "")
@@ -121,9 +143,9 @@ def test_invalid_address_is_reported(stopping):
         next(client.subscribe(stopping))
 
 
-def test_reply_of_another_version_is_reported(stopping):
+def test_reply_of_another_version_is_reported(address):
     with zmq.Context.instance().socket(zmq.REP) as other:
-        port = other.bind_to_random_port("tcp://127.0.0.1")
+        other.bind(address)
 
         def reply():
             other.recv()
@@ -132,5 +154,5 @@ def test_reply_of_another_version_is_reported(stopping):
         thread = threading.Thread(target=reply)
         thread.start()
         with pytest.raises(AgentUnreachableError, match=r"not a rig agent of this version \(ok: is missing"):
-            AgentClient(f"tcp://127.0.0.1:{port}", "").send(StatusCommand())
+            AgentClient(address, "").send(StatusCommand())
         thread.join()

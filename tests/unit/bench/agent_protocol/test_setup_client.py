@@ -45,7 +45,7 @@ def request_step(tmp_path, monkeypatch):
     config.write_text(BENCH_TOML)
 
     def request(agent):
-        monkeypatch.setattr(module, "AgentClient", lambda commands, samples: agent)
+        monkeypatch.setattr(module, "AgentClient", lambda *endpoint: agent)
         return request_setup_step(config, "home", poll_period=0.0)
 
     return request

@@ -11,6 +11,7 @@ from bench.log.reader import read_log
 from bench.log.salvage import SalvageResult, salvage_log
 from bench.log.writer import LogWriter
 from tests.support.logs import header, write_log
+from tests.support.service_logs import write_complete_log
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +72,16 @@ def test_salvage_reports_the_losses(complete, killed):
     final = read_log(killed).metadata["outcome"]
     assert final["outcome"] == "truncated"
     assert float(final["seconds_lost"]) == pytest.approx(result.known_until - result.last_time)
+
+
+def test_length_is_that_of_the_recording_although_the_bench_clock_started_long_before(tmp_path):
+    path = write_complete_log(tmp_path / "run.mcap", first_s=3_000_000.0)
+    path.write_bytes(path.read_bytes()[: path.stat().st_size * 2 // 3])
+    result = salvage_log(path)
+    samples = read_log(path).samples["time"]
+    assert 1.0 < result.duration < 2.0
+    assert result.duration == pytest.approx(samples[-1])
+    assert f"{len(samples)} samples kept, {samples[-1]:.1f} s;" in str(result)
 
 
 def test_truncated_log_is_kept_as_a_backup(killed):
@@ -174,9 +185,10 @@ def test_command_prints_the_losses(killed):
 
 
 @pytest.mark.parametrize(
-    ("known_until", "lost"), [(2.75, "0.250 s after"), (2.5, "0.000 s after"), (1.0, "0.000 s after")]
+    ("known_until", "lost"),
+    [(2.75, "0.250 s after them"), (2.5, "0.000 s after them"), (1.0, "0.000 s after them")],
 )
 def test_description_of_a_repair_gives_the_time_lost_after_the_last_sample(tmp_path, known_until, lost):
-    result = SalvageResult(tmp_path, False, 3, last_time=2.5, known_until=known_until)
+    result = SalvageResult(tmp_path, False, 3, duration=2.0, last_time=2.5, known_until=known_until)
 
-    assert f"up to 2.500 s; 0 bytes dropped, {lost}" in str(result)
+    assert f"3 samples kept, 2.0 s; 0 bytes dropped, {lost}" in str(result)

@@ -1,6 +1,7 @@
 """Recording thread whose parts fail."""
 
 import threading
+import time
 from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,11 @@ from bench.errors import LogError
 from bench.recorder.recording_thread import RecordingThread
 
 TIMEOUT = 10.0
+
+
+def read_clock():
+    """Bench clock of the tests, 2.5 s after the first sample [ns]."""
+    return 2_500_000_000
 
 
 class IdleAligner:
@@ -49,7 +55,7 @@ def test_internal_error_ends_the_run_but_not_the_thread(aligner, on_cycle, messa
             later.set()
         on_cycle()
 
-    with RecordingThread(aligner, 1000.0, lambda samples: None, run_cycle, failures.append):
+    with RecordingThread(aligner, 1000.0, read_clock, lambda samples: None, run_cycle, failures.append):
         assert later.wait(TIMEOUT)
     assert len(failures) == 1
     assert message in str(failures[0])
@@ -57,7 +63,7 @@ def test_internal_error_ends_the_run_but_not_the_thread(aligner, on_cycle, messa
 
 def test_live_samples_name_their_segment():
     published = []
-    thread = RecordingThread(IdleAligner(), 1000.0, published.append, succeed, published.append)
+    thread = RecordingThread(IdleAligner(), 1000.0, read_clock, published.append, succeed, published.append)
     for recording in (SimpleNamespace(segment="5mm_3Hz"), None):
         thread._recording = recording
         thread._live.append((SimpleNamespace(time_ns=np.arange(4)), {"force": np.ones(4)}))
@@ -67,6 +73,15 @@ def test_live_samples_name_their_segment():
         ("5mm_3Hz", {"force": [1.0]}),
         ("", {"force": [1.0]}),
     ]
+
+
+def test_live_samples_carry_the_utc_of_the_newest_one():
+    published = []
+    thread = RecordingThread(IdleAligner(), 100.0, read_clock, published.append, succeed, published.append)
+    time_ns = np.arange(0, 1_000_000_000, 10_000_000)
+    thread._live.append((SimpleNamespace(time_ns=time_ns), {"force": np.ones(100)}))
+    thread._publish_live()
+    assert published[0].utc_s == pytest.approx(time.time() - (2.5 - 0.99), abs=1.0)
 
 
 class FullDiskRecording:
@@ -89,6 +104,7 @@ def test_receiver_of_a_full_disk_can_count_the_lost_samples():
     thread = RecordingThread(
         ReadyAligner(),
         1000.0,
+        read_clock,
         lambda samples: None,
         succeed,
         lambda error: failures.append((str(error), thread.count_lost())),
@@ -103,7 +119,7 @@ def test_receiver_of_a_full_disk_can_count_the_lost_samples():
 def test_only_losses_during_the_recording_are_counted():
     aligner = IdleAligner()
     aligner.lost = {"force": 5}
-    thread = RecordingThread(aligner, 1000.0, lambda samples: None, succeed, lambda error: None)
+    thread = RecordingThread(aligner, 1000.0, read_clock, lambda samples: None, succeed, lambda error: None)
     thread.start_recording(SimpleNamespace(finish=succeed))
     aligner.lost = {"force": 7, "temperature": 1}
     assert thread.count_lost() == {"force": 2, "temperature": 1}

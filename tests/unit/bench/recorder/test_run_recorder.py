@@ -7,7 +7,7 @@ import pytest
 
 from bench.recorder.run_recorder import RunRecorder
 from bench.sequencer.command_history import CommandEntry, CommandHistory
-from bench.sequencer.playback import split_into_sections
+from bench.sequencer.playback import PlaybackSection
 from bench.sequencer.trajectory import ScheduledTrajectory
 from tests.support.fake_rig import EventLog
 from tests.support.methods import constant, programme, sine
@@ -15,7 +15,7 @@ from tests.support.methods import constant, programme, sine
 MS = 1_000_000
 BEGIN = 1_000 * MS
 TWO_SEGMENTS = programme(sine("a", 0.01, 2.0, constant(0.2)), sine("b", 0.005, 4.0, constant(0.4)))
-(SECTION,) = split_into_sections(TWO_SEGMENTS, 1024)
+SECTION = PlaybackSection(TWO_SEGMENTS, 0, len(TWO_SEGMENTS.time) - 1)
 
 
 class FakeLog:

@@ -7,14 +7,14 @@ import pytest
 
 from bench.methods.compile import NO_SEGMENT
 from bench.sequencer.command_history import CommandEntry, CommandHistory
-from bench.sequencer.playback import split_into_sections
+from bench.sequencer.playback import PlaybackSection
 from bench.sequencer.setpoint_thread import SetpointGenerator
 from bench.sequencer.trajectory import ScheduledTrajectory, make_standstill, plan_approach
 from tests.support.fake_rig import CYCLE, FakeActuator, step_cycles
 from tests.support.methods import constant, programme, sine
 
 TWO_SEGMENTS = programme(sine("a", 0.01, 2.0, constant(0.2)), sine("b", 0.005, 4.0, constant(0.4)))
-(SECTION,) = split_into_sections(TWO_SEGMENTS, 1024)
+SECTION = PlaybackSection(TWO_SEGMENTS, 0, len(TWO_SEGMENTS.time) - 1)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Split of a programme into sections, and the sample from which an interrupted run continues."""
+"""Split of a programme into sections, and the samples at which a run can be paused."""
 
 import itertools
 from types import SimpleNamespace
@@ -10,8 +10,8 @@ from bench.errors import RunError
 from bench.methods import Programme
 from bench.sequencer.playback import (
     PlaybackSection,
+    find_checkpoint_samples,
     find_rest_samples,
-    find_resume_sample,
     split_into_sections,
 )
 from tests.support.methods import constant, programme, sine
@@ -52,15 +52,15 @@ def test_drive_with_too_many_steps_is_refused():
         split_into_sections(ramp, 1024)
 
 
-def test_interrupted_run_continues_at_rest_after_a_checkpoint():
-    first = find_resume_sample(TWO_SEGMENTS, "a")
-    assert TWO_SEGMENTS.segments[0].stop <= first <= TWO_SEGMENTS.segments[1].start
-    assert abs(TWO_SEGMENTS.velocity[first]) < 1e-6
-    assert split_into_sections(TWO_SEGMENTS, 1024, first)[0].start == first
-    with pytest.raises(RunError, match="its checkpoints: a, b"):
-        find_resume_sample(TWO_SEGMENTS, "c")
-    with pytest.raises(RunError, match="has no segment after b; the run was complete"):
-        find_resume_sample(TWO_SEGMENTS, "b")
+def test_programme_can_be_paused_at_rest_after_each_checkpoint_but_the_last():
+    ((sample, name),) = find_checkpoint_samples(TWO_SEGMENTS).items()
+    assert name == "a"
+    assert TWO_SEGMENTS.segments[0].stop <= sample <= TWO_SEGMENTS.segments[1].start
+    assert abs(TWO_SEGMENTS.velocity[sample]) < 1e-6
+    assert [section.stop for section in split_into_sections(TWO_SEGMENTS, 1024)] == [
+        sample,
+        len(TWO_SEGMENTS.time) - 1,
+    ]
 
 
 def make_programme(rate=10.0, velocity=None, segment=None, segments=()):
@@ -91,9 +91,8 @@ def test_section_lasts_a_minute_at_most_if_the_programme_rests(interval_s, stops
     assert [section.stop for section in split_into_sections(make_programme(1 / interval_s), 9)] == stops
 
 
-def test_split_begins_after_the_first_sample():
-    (section,) = split_into_sections(make_programme(), 9, 4)
-    assert (section.start, section.stop) == (4, 12)
+def test_section_has_its_own_time_and_drive_steps():
+    section = PlaybackSection(make_programme(), 4, 12)
     assert section.trajectory.duration == pytest.approx(0.8)
     times, levels = section.list_drive_steps()
     assert (times.tolist(), levels.tolist()) == ([0.0, 0.1, 0.5], [1.0, 2.0, 3.0])

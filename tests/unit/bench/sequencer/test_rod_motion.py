@@ -82,3 +82,10 @@ def test_drive_that_cannot_be_armed_receives_no_setpoint():
     with pytest.raises(NoReplyError, match="no reply"):
         move(actuator)
     assert actuator.positions == []
+
+
+def test_rest_that_the_drive_does_not_confirm_is_not_reported_as_rest():
+    actuator = FakeActuator(refuses_at=3)
+    actuator.unconfirmed = "actuator: no reply"
+    with pytest.raises(RunError, match="the rod's rest is not confirmed: actuator: no reply"):
+        move(actuator)

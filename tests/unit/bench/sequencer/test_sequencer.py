@@ -84,6 +84,27 @@ def test_stop_ends_the_motion_softly_and_is_not_an_error():
     assert steps.max() <= 0.126 * 0.004 * 1.05
 
 
+def test_paused_run_ends_at_rest_at_its_next_checkpoint():
+    bench = Bench()
+    segments = (sine(name, 0.002, 10.0, constant(0.2), fade_s=0.05, cycles=30) for name in ("a", "b"))
+    two = programme(*segments, **LIMITS)
+    pausing = bench.while_moving(bench.sequencer.pause)
+    bench.sequencer.run(two)
+    pausing.join()
+    assert (bench.sequencer.paused_after, bench.sequencer.stop_reason) == ("a", "")
+    assert bench.calls.count("table uploaded") == 1
+    assert bench.calls[-2:] == ["coil safe", "actuator disabled"]
+    assert abs(bench.actuator.positions[-1]) < 1e-5
+
+
+def test_pause_after_the_last_checkpoint_lets_the_run_end():
+    bench = Bench()
+    bench.sequencer.pause()
+    bench.sequencer.run(SHORT)
+    assert bench.sequencer.paused_after == ""
+    assert max(bench.actuator.positions) == pytest.approx(0.002, rel=0.05)
+
+
 def test_first_reason_of_a_stop_is_kept():
     bench = Bench()
 

@@ -9,7 +9,7 @@ import pytest
 
 from bench.errors import InterlockError, RunError
 from bench.sequencer.command_history import CommandHistory
-from bench.sequencer.playback import split_into_sections
+from bench.sequencer.playback import PlaybackSection
 from bench.sequencer.setpoint_thread import SetpointGenerator, SetpointThread
 from bench.sequencer.trajectory import STOP_TIMES, ScheduledTrajectory
 from tests.support.fake_rig import CYCLE, FakeActuator, step_cycles
@@ -17,7 +17,7 @@ from tests.support.methods import constant, programme, sine
 
 TIMEOUT = 0.05
 TWO_SEGMENTS = programme(sine("a", 0.01, 2.0, constant(0.2)), sine("b", 0.005, 4.0, constant(0.4)))
-(SECTION,) = split_into_sections(TWO_SEGMENTS, 1024)
+SECTION = PlaybackSection(TWO_SEGMENTS, 0, len(TWO_SEGMENTS.time) - 1)
 
 
 @pytest.fixture

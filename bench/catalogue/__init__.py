@@ -1,22 +1,45 @@
-"""The catalogue: runs, their logs, and their identification jobs, in a database."""
+"""The catalogue: runs, their logs, and the jobs on them, in a database."""
 
 from bench.catalogue.catalogue import Catalogue
-from bench.catalogue.database import make_sqlite_url, open_database
+from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
+from bench.catalogue.integrity import check_all, check_integrity
+from bench.catalogue.job_queue import REPEATABLE_STATES, JobFilter, JobQueue
 from bench.catalogue.log_summary import is_complete
-from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunOutcome, RunRow, RunState
+from bench.catalogue.models import (
+    UNFINISHED_STATES,
+    BatchRow,
+    JobRow,
+    JobState,
+    LogIntegrity,
+    RunOutcome,
+    RunRow,
+    RunState,
+)
+from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
 
 __all__ = [
+    "CATALOGUE_FILE",
+    "REPEATABLE_STATES",
     "UNFINISHED_STATES",
+    "BatchRow",
     "Catalogue",
+    "JobFilter",
+    "JobQueue",
     "JobRow",
     "JobState",
+    "LogIntegrity",
     "RunOutcome",
+    "RunPlan",
     "RunRow",
     "RunState",
     "catalogue_log",
+    "check_all",
+    "check_integrity",
+    "find_catalogue",
     "is_complete",
     "make_sqlite_url",
     "open_database",
+    "read_plan",
     "scan_logs",
 ]

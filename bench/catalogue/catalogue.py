@@ -4,9 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Engine, select, tuple_, update
-from sqlalchemy.orm import Session, sessionmaker
+from sqlalchemy import Engine, func, select, tuple_, update
+from sqlalchemy.orm import sessionmaker
 
+from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
 
 
@@ -21,9 +22,11 @@ class Catalogue:
             folder: the data folder, absolute.
         """
         self.folder = folder
+        self.job_queue = JobQueue(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.
         self._sessions = sessionmaker(engine, expire_on_commit=False)
+        self._skipped: dict[Path, str] = {}
 
     def close(self) -> None:
         """Close all connections."""
@@ -69,10 +72,29 @@ class Catalogue:
         with self._sessions() as session:
             return session.scalar(select(RunRow).where(RunRow.log == self.make_name(path)))
 
+    def note_skipped(self, path: Path, why: str) -> bool:
+        """Note why a file is not catalogued, and return whether the reason is new."""
+        is_new = self._skipped.get(path) != why
+        self._skipped[path] = why
+        return is_new
+
     def list_running(self) -> Sequence[RunRow]:
         """Return the runs in state `running`."""
         with self._sessions() as session:
             return session.scalars(select(RunRow).where(RunRow.state == "running")).all()
+
+    def list_hashed(self) -> Sequence[RunRow]:
+        """Return the runs with a stored hash of their log, oldest first."""
+        query = select(RunRow).where(RunRow.log_sha256.is_not(None)).order_by(RunRow.started, RunRow.id)
+        with self._sessions() as session:
+            return session.scalars(query).all()
+
+    def list_present_logs(self) -> Sequence[tuple[str, str]]:
+        """Return id and log name of the runs with a stored hash whose log is not known to be missing."""
+        is_missing = func.coalesce(RunRow.integrity, "intact") == "missing"
+        query = select(RunRow.id, RunRow.log).where(RunRow.log_sha256.is_not(None), ~is_missing)
+        with self._sessions() as session:
+            return [(run_id, log) for run_id, log in session.execute(query)]
 
     def update_run(self, run_id: str, **values: Any) -> RunRow:
         """Set columns of a run and return the changed run."""
@@ -100,32 +122,24 @@ class Catalogue:
         with self._sessions() as session:
             return session.scalars(query).all()
 
-    def list_unfinished_jobs(self) -> Sequence[JobRow]:
-        """Return queued and running jobs, oldest first."""
-        query = select(JobRow).where(JobRow.state.in_(UNFINISHED_STATES)).order_by(JobRow.created)
-        with self._sessions() as session:
-            return session.scalars(query).all()
+    def list_jobs_of_runs(self, run_ids: Sequence[str], limit: int) -> Sequence[JobRow]:
+        """Return the newest jobs of each run, newest first, and the newest done job of each kind, however old.
 
-    def add_job_once(self, job: JobRow) -> tuple[JobRow, bool]:
-        """Add a job unless one with the same key is queued, running or done.
-
-        Returns:
-            The job with this key, and whether it was added now.
+        Args:
+            run_ids: ids of the runs.
+            limit: largest number of newest jobs of one run.
         """
-        same_key = select(JobRow).where(JobRow.key == job.key, JobRow.state.in_((*UNFINISHED_STATES, "done")))
-        with self._begin_write() as session:
-            existing = session.scalars(same_key.order_by(JobRow.created.desc())).first()
-            if existing is None:
-                session.add(job)
-            session.commit()
-            return (job, True) if existing is None else (existing, False)
-
-    def _begin_write(self) -> Session:
-        """Return a session that locks the database for writing at once, so that reading and adding are atomic."""
-        session = self._sessions()
-        if self._engine.dialect.name == "sqlite":
-            session.connection().exec_driver_sql("BEGIN IMMEDIATE")
-        return session
+        order = (JobRow.created.desc(), JobRow.id)
+        age = func.row_number().over(partition_by=JobRow.run_id, order_by=order)
+        age_in_state = func.row_number().over(
+            partition_by=(JobRow.run_id, JobRow.kind, JobRow.state), order_by=order
+        )
+        ranked = select(JobRow.id, JobRow.state, age.label("age"), age_in_state.label("age_in_state"))
+        ranks = ranked.where(JobRow.run_id.in_(run_ids)).subquery()
+        is_newest_done = (ranks.c.state == "done") & (ranks.c.age_in_state == 1)
+        query = select(JobRow).join(ranks, JobRow.id == ranks.c.id).where((ranks.c.age <= limit) | is_newest_done)
+        with self._sessions() as session:
+            return session.scalars(query.order_by(*order)).all()
 
     def update_job(
         self, job_id: str, states: Sequence[JobState] = UNFINISHED_STATES, **values: Any

@@ -12,6 +12,8 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bench.catalogue.errors import CatalogueError
 
+CATALOGUE_FILE = "catalogue.db"
+"""File of the catalogue in a data folder."""
 _PRAGMAS = ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON", "busy_timeout=5000")
 """SQLite settings. With a write-ahead log readers never wait for a writer, and a kill loses no committed data."""
 
@@ -19,6 +21,18 @@ _PRAGMAS = ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON", "busy_t
 def make_sqlite_url(path: Path) -> str:
     """Return the address of an SQLite file."""
     return f"sqlite:///{path}"
+
+
+def find_catalogue(folder: Path) -> str:
+    """Return the address of the SQLite catalogue in a data folder.
+
+    Raises:
+        CatalogueError: the folder contains none.
+    """
+    path = folder / CATALOGUE_FILE
+    if not path.is_file():
+        raise CatalogueError(f"{path}: there is no catalogue; give the data folder of `mrbench serve`")
+    return make_sqlite_url(path)
 
 
 def open_database(url: str) -> Engine:

@@ -12,6 +12,7 @@ from mcap.records import Header, Message, Metadata
 from mcap.stream_reader import StreamReader
 
 from bench.catalogue.models import RunOutcome
+from bench.endings import RunEnding, read_ending
 from bench.errors import LogError
 from bench.log import (
     DAMAGE_ERRORS,
@@ -41,6 +42,10 @@ class LogSummary:
     outcome: RunOutcome | None
     """None for a truncated log: its recorder is still writing or was killed."""
     reason: str
+    continues: str
+    """Id of the run that it continues; empty without one."""
+    ending: RunEnding | None
+    """None if the log neither contains nor determines it."""
 
 
 def read_log_summary(path: Path) -> LogSummary:
@@ -126,4 +131,6 @@ def _make_summary(
         duration_s=None if first_ns is None or last_ns is None else (last_ns - first_ns) / NS_PER_SECOND,
         outcome=cast(RunOutcome, outcome) if outcome in get_args(RunOutcome) else None,
         reason=end.get("reason", ""),
+        continues=run.get("continues", ""),
+        ending=read_ending(end),
     )

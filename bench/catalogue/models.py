@@ -7,8 +7,12 @@ from sqlalchemy import JSON, BigInteger, DateTime, Dialect, Enum, ForeignKey, In
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 from sqlalchemy.types import TypeDecorator
 
+from bench.endings import RunEnding
+
 RunState: TypeAlias = Literal["running", "ended", "truncated"]
 """truncated: the log has no end and is no longer being written."""
+LogIntegrity: TypeAlias = Literal["intact", "changed", "missing"]
+"""Comparison of a log with its stored hash; missing: the file does not exist."""
 RunOutcome: TypeAlias = Literal["clean", "lossy", "truncated", "incomplete"]
 JobState: TypeAlias = Literal["queued", "running", "done", "failed", "cancelled"]
 UNFINISHED_STATES: tuple[JobState, ...] = ("queued", "running")
@@ -57,18 +61,28 @@ class RunRow(Base):
     """Recorded time [s]; while the run is in progress, the planned time."""
     state: Mapped[RunState] = mapped_column(_make_enum_column(RunState), index=True)
     outcome: Mapped[RunOutcome | None] = mapped_column(_make_enum_column(RunOutcome), default=None)
+    ending: Mapped[RunEnding | None] = mapped_column(_make_enum_column(RunEnding), default=None)
+    """Ending of the run; None while it is in progress, and if it is not known."""
     reason: Mapped[str] = mapped_column(Text, default="")
-    """Reason of an outcome other than `clean`."""
+    """Reason of an outcome other than `clean`; the agent's, if it has reported one."""
+    continues: Mapped[str | None] = mapped_column(Text, default=None)
+    """Id of the run that this one continues after a checkpoint; that run may be missing."""
     log: Mapped[str] = mapped_column(Text, unique=True)
     """Path of the log relative to the data folder, or absolute if it is outside."""
     log_bytes: Mapped[int | None] = mapped_column(BigInteger, default=None)
     log_modified_ns: Mapped[int | None] = mapped_column(BigInteger, default=None)
     log_sha256: Mapped[str | None] = mapped_column(Text, default=None)
-    """Hash of the complete log, once the run has ended."""
+    """Hash of the complete log, once the run has ended; never replaced, because fits refer to it."""
+    integrity: Mapped[LogIntegrity | None] = mapped_column(_make_enum_column(LogIntegrity), default=None)
+    """Result of the latest check; None before the first."""
+    found_sha256: Mapped[str | None] = mapped_column(Text, default=None)
+    """Hash that the latest check found in a changed log."""
+    checked: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
+    """UTC of the latest check."""
 
 
 class JobRow(Base):
-    """One identification of a run by a worker."""
+    """One identification or diagnosis of a run by a worker; a job that is tried again keeps its row."""
 
     __tablename__ = "jobs"
 
@@ -76,19 +90,48 @@ class JobRow(Base):
     run_id: Mapped[str] = mapped_column(ForeignKey("runs.id"), index=True)
     kind: Mapped[str] = mapped_column(Text, default="identify")
     key: Mapped[str] = mapped_column(Text, index=True)
-    """Hash of log and settings: equal jobs have equal keys."""
+    """Hash of log, settings, inputs and version: equal jobs have equal keys."""
     settings: Mapped[dict[str, Any]] = mapped_column(JSON)
     state: Mapped[JobState] = mapped_column(_make_enum_column(JobState), index=True)
+    inputs: Mapped[dict[str, str]] = mapped_column(JSON, default=dict)
+    """Ids of the jobs whose results it reads: `fit` for the report, `model` for its own gap."""
+    version: Mapped[str] = mapped_column(Text, default="")
+    """Version of mrbench at the request; empty for jobs of versions that did not record it."""
     attempts: Mapped[int] = mapped_column(default=0)
-    """Number of times that a worker started the job."""
+    """Number of times that a worker started the job, over all submissions."""
+    submissions: Mapped[int] = mapped_column(default=1)
+    """Number of times that the job was queued: at its request, and for each retry."""
+    earlier_attempts: Mapped[int] = mapped_column(default=0)
+    """Number of attempts of the earlier submissions."""
+    retries: Mapped[list[dict[str, str]]] = mapped_column(JSON, default=list)
+    """Reason of each retry, with its time, and the state and error that it followed."""
     created: Mapped[datetime] = mapped_column(UtcTime)
+    queued: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
+    """Time of the latest submission; null in jobs of older versions, whose only one is their creation."""
     started: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     finished: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     activity: Mapped[str] = mapped_column("doing", Text, default="")
     """Present activity of the running job. The column keeps the name `doing` of older versions."""
+    stage: Mapped[str] = mapped_column(Text, default="")
+    """Present or last stage of the job."""
+    fraction: Mapped[float | None] = mapped_column(default=None)
+    """Completed share of the job, 0 to 1; null before its first start."""
     error: Mapped[str] = mapped_column(Text, default="")
     """Reason of a failure."""
     result: Mapped[str | None] = mapped_column(Text, default=None)
-    """Folder of fit and report, relative to the data folder or absolute."""
+    """Folder of the results, relative to the data folder or absolute."""
     summary: Mapped[dict[str, Any] | None] = mapped_column(JSON, default=None)
-    """Result, force error and noise floor of the fit."""
+    """Errors of a fit; verdict, effects and shrinkage of a diagnosis."""
+
+
+class BatchRow(Base):
+    """One request of the same job for several runs."""
+
+    __tablename__ = "batches"
+
+    id: Mapped[str] = mapped_column(Text, primary_key=True)
+    kind: Mapped[str] = mapped_column(Text)
+    settings: Mapped[dict[str, Any]] = mapped_column(JSON)
+    created: Mapped[datetime] = mapped_column(UtcTime)
+    items: Mapped[list[dict[str, str]]] = mapped_column(JSON)
+    """For each run its id, and the id of its job or the reason why there is none."""

@@ -6,6 +6,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from bench.catalogue.catalogue import Catalogue
+from bench.catalogue.integrity import check_integrity, find_missing
 from bench.catalogue.log_summary import LogSummary, compute_sha256, read_log_summary
 from bench.catalogue.models import RunRow
 from bench.errors import LogError
@@ -21,7 +22,7 @@ WriteCheck = Callable[[Path], bool]
 
 
 def scan_logs(catalogue: Catalogue, is_being_written: WriteCheck) -> list[RunRow]:
-    """Catalogue every log that is new or has changed.
+    """Catalogue every log that is new or has changed, and mark the runs whose log was deleted.
 
     Args:
         catalogue: the catalogue of the data folder.
@@ -30,9 +31,11 @@ def scan_logs(catalogue: Catalogue, is_being_written: WriteCheck) -> list[RunRow
     Returns:
         New and changed runs.
     """
-    rows = (_scan_log(catalogue, path, is_being_written) for path in _list_logs(catalogue.folder))
+    paths = list(_list_logs(catalogue.folder))
+    rows = (_scan_log(catalogue, path, is_being_written) for path in paths)
     changed = [row for row in rows if row]
-    return [*changed, *_end_runs_without_log(catalogue, is_being_written)]
+    missing = find_missing(catalogue, set(paths))
+    return [*changed, *missing, *_end_runs_without_log(catalogue, is_being_written)]
 
 
 def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
@@ -41,13 +44,17 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
     Returns:
         Its run, or None if the file is not an mrbench log or duplicates a catalogued one.
     """
+    known = catalogue.find_run_by_log(path)
+    if known is not None and known.log_sha256 is not None:
+        # A complete log does not change; if it has, its fits remain those of the recorded content.
+        return check_integrity(catalogue, known)
     # Taken before the file is read: anything written meanwhile is then a change at the next scan.
     stat = path.stat()
     try:
         summary = read_log_summary(path)
         sha256 = compute_sha256(path) if summary.outcome is not None else None
     except LogError as error:
-        _LOG.warning("log_skipped", extra={"log": str(path), "why": str(error)})
+        _log_skipped(catalogue, path, str(error))
         return None
     values = {
         **_make_end_values(summary),
@@ -55,11 +62,10 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
         "log_modified_ns": stat.st_mtime_ns,
         "log_sha256": sha256,
     }
-    known = catalogue.find_run_by_log(path)
     if known is not None:
-        return catalogue.update_run(known.id, **values)
+        return catalogue.update_run(known.id, **{**values, **_keep_report(known, summary)})
     if catalogue.get_run(summary.id) is not None:
-        _LOG.warning("log_skipped", extra={"log": str(path), "why": f"run {summary.id} has another log"})
+        _log_skipped(catalogue, path, f"run {summary.id} has another log")
         return None
     row = RunRow(
         id=summary.id,
@@ -67,6 +73,7 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
         specimen=summary.specimen,
         operator=summary.operator,
         source=summary.source,
+        continues=summary.continues or None,
         started=summary.started or datetime.fromtimestamp(stat.st_mtime, UTC),
         log=catalogue.make_name(path),
         **values,
@@ -75,16 +82,36 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
     return row
 
 
+def _log_skipped(catalogue: Catalogue, path: Path, why: str) -> None:
+    """Log that a file is not catalogued; once for each reason, because every scan finds it again."""
+    if catalogue.note_skipped(path, why):
+        _LOG.warning("log_skipped", extra={"log": str(path), "why": why})
+
+
 def _make_end_values(summary: LogSummary) -> dict[str, object]:
     """Return the columns that depend on the end of the log."""
     if summary.outcome is None:
-        return {"state": "truncated", "outcome": None, "reason": TRUNCATED_MESSAGE, "duration_s": None}
+        return {
+            "state": "truncated",
+            "outcome": None,
+            "ending": None,
+            "reason": TRUNCATED_MESSAGE,
+            "duration_s": None,
+        }
     return {
         "state": "ended",
         "outcome": summary.outcome,
+        "ending": summary.ending,
         "reason": summary.reason,
         "duration_s": summary.duration_s,
     }
+
+
+def _keep_report(known: RunRow, summary: LogSummary) -> dict[str, object]:
+    """Return ending and reason that the agent has reported, if the log itself has no ending."""
+    if summary.ending is not None or known.ending is None:
+        return {}
+    return {"ending": known.ending, "reason": known.reason or summary.reason}
 
 
 def _list_logs(folder: Path) -> Iterator[Path]:
@@ -95,7 +122,11 @@ def _scan_log(catalogue: Catalogue, path: Path, is_being_written: WriteCheck) ->
     try:
         stat = path.stat()
         known = catalogue.find_run_by_log(path)
-        same = known is not None and (known.log_bytes, known.log_modified_ns) == (stat.st_size, stat.st_mtime_ns)
+        same = (
+            known is not None
+            and (known.log_bytes, known.log_modified_ns) == (stat.st_size, stat.st_mtime_ns)
+            and known.integrity != "missing"
+        )
         return None if same or is_being_written(path) else catalogue_log(catalogue, path)
     # Deleted after the folder was listed.
     except FileNotFoundError:

@@ -1,18 +1,51 @@
-"""Identification jobs: created by the service, kept in the catalogue, executed by workers."""
+"""Jobs on runs, identification and diagnosis: created by the service, executed by workers."""
 
-from bench.jobs.engine import DaskEngine, JobEngine, start_local_scheduler
-from bench.jobs.job_spec import FIT_FILE, REPORT_FILE, IdentifySettings
+from bench.jobs.engine import DaskEngine, JobEngine
+from bench.jobs.errors import JobError
+from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE
+from bench.jobs.job_view import (
+    BatchRequest,
+    DiagnosisSummary,
+    Job,
+    JobPage,
+    RetryRequest,
+    find_newest_done,
+    make_diagnosis_summary,
+    make_job_view,
+)
 from bench.jobs.manager import JobManager
-from bench.jobs.worker import find_scheduler, run_worker
+from bench.jobs.scheduler import find_scheduler, run_scheduler, start_scheduler
+from bench.jobs.settings import DiagnoseSettings, IdentifySettings, JobKind, JobSettings, parse_settings
+from bench.jobs.tls import SchedulerLocation, get_tls_file, locate_scheduler
+from bench.jobs.worker import run_worker
 
 __all__ = [
+    "DIAGNOSIS_FILE",
     "FIT_FILE",
     "REPORT_FILE",
+    "TWIN_FILE",
+    "BatchRequest",
     "DaskEngine",
+    "DiagnoseSettings",
+    "DiagnosisSummary",
     "IdentifySettings",
+    "Job",
     "JobEngine",
+    "JobError",
+    "JobKind",
     "JobManager",
+    "JobPage",
+    "JobSettings",
+    "RetryRequest",
+    "SchedulerLocation",
+    "find_newest_done",
     "find_scheduler",
+    "get_tls_file",
+    "locate_scheduler",
+    "make_diagnosis_summary",
+    "make_job_view",
+    "parse_settings",
+    "run_scheduler",
     "run_worker",
-    "start_local_scheduler",
+    "start_scheduler",
 ]

@@ -6,23 +6,27 @@ from typing import Any
 
 from distributed import Event, get_worker
 
-from bench.jobs.job_spec import FitSummary, JobSpec
+from bench.jobs.job_spec import JobSpec, ResultSummary
+from bench.jobs.progress import JobProgress
 from bench.jobs.work import JobCallbacks, execute_job
 
 TOPIC = "mrbench-jobs"
-"""Topic for progress: `{"job": id, "activity": message}`; the message is empty when a worker starts a job."""
+"""Topic for progress: `{"job": id, "progress": document}`; the progress is null when a worker starts a job."""
 
 
 _EVENT: Any = Event
 """Untyped in dask."""
 
 
-def make_cancel_flag(job_id: str) -> str:
-    """Return the name of the flag that cancels a job; dask forgets a cancelled task but does not stop it."""
-    return f"mrbench-cancel-{job_id}"
+def make_cancel_flag(spec: JobSpec) -> str:
+    """Return the name of the flag that cancels a job; dask forgets a cancelled task but does not stop it.
+
+    Each submission has its own flag, so that a job that is tried again is not cancelled with its predecessor.
+    """
+    return f"mrbench-cancel-{spec.job_id}-{spec.submission}"
 
 
-def run_dask_task(spec: JobSpec) -> FitSummary:
+def run_dask_task(spec: JobSpec) -> ResultSummary:
     """Execute a job in a worker.
 
     Raises:
@@ -30,11 +34,12 @@ def run_dask_task(spec: JobSpec) -> FitSummary:
         JobCancelledError: the cancel flag was set.
     """
     worker = get_worker()
-    flag: Any = _EVENT(make_cancel_flag(spec.job_id))
+    flag: Any = _EVENT(make_cancel_flag(spec))
 
-    def report(message: str) -> None:
-        content = {"job": spec.job_id, "activity": message, "worker": os.getpid(), "at": time.time()}
+    def report(progress: JobProgress | None) -> None:
+        document = progress.to_document() if progress else None
+        content = {"job": spec.job_id, "progress": document, "worker": os.getpid(), "at": time.time()}
         worker.log_event(TOPIC, content)
 
-    report("")
+    report(None)
     return execute_job(spec, JobCallbacks(report, flag.is_set))

@@ -3,25 +3,29 @@
 import asyncio
 import contextlib
 import logging
-from collections.abc import AsyncIterator, Awaitable, Callable
-from pathlib import Path
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from typing import Any, Protocol
 
-import dask
-from distributed import Client, Event, KilledWorker, Scheduler
+from distributed import Client, Event, KilledWorker
 from distributed.client import FutureCancelledError
+from sqlalchemy.exc import SQLAlchemyError
 
 from bench.jobs.dask_task import TOPIC, make_cancel_flag, run_dask_task
-from bench.jobs.errors import JobCancelledError, JobError, WorkerError
-from bench.jobs.job_spec import FitSummary, JobSpec
+from bench.jobs.errors import JobCancelledError, JobError
+from bench.jobs.job_spec import JobSpec, ResultSummary
+from bench.jobs.progress import JobProgress
+from bench.jobs.scheduler import MAX_ATTEMPTS
+from bench.jobs.tls import SchedulerLocation
 
-LOOPBACK = "127.0.0.1"
-MAX_ATTEMPTS = 3
-"""Number of times that a job is started before it counts as failed."""
 _CONNECT_TIMEOUT = 10.0
 """Time [s] within which a scheduler must reply."""
 _POLL_PERIOD = 2.0
 """Time [s] between two checks of the connection to the scheduler."""
+_RELEASE_TIMEOUT = 10.0
+"""Time [s] within which a cancelled job must have stopped."""
+_REPORT_PAUSE = 5.0
+"""Time [s] before the end of a job is reported again, if the catalogue could not be written."""
 _LOG = logging.getLogger(__name__)
 _CLIENT: Any = Client
 _EVENT: Any = Event
@@ -34,10 +38,10 @@ class JobListener(Protocol):
     async def on_started(self, job_id: str) -> None:
         """Handle the start of a job by a worker."""
 
-    async def on_progress(self, job_id: str, message: str) -> None:
-        """Handle a progress message."""
+    async def on_progress(self, job_id: str, progress: JobProgress) -> None:
+        """Handle the progress of a job."""
 
-    async def on_done(self, job_id: str, summary: FitSummary) -> None:
+    async def on_done(self, job_id: str, summary: ResultSummary) -> None:
         """Handle the result of a job."""
 
     async def on_failed(self, job_id: str, reason: str) -> None:
@@ -62,6 +66,13 @@ class JobEngine(Protocol):
     async def cancel(self, job_id: str, *, started: bool) -> None:
         """Cancel a job, also one that a worker has started."""
 
+    async def release(self, job_id: str) -> None:
+        """Wait until the end of a finished job has been reported, so that it can be submitted again.
+
+        Raises:
+            JobError: its worker has not stopped it in time.
+        """
+
     async def describe_state(self) -> str:
         """Return ``ok`` or what is missing."""
 
@@ -69,50 +80,25 @@ class JobEngine(Protocol):
         """Disconnect; the listener is not called any more."""
 
 
-@contextlib.asynccontextmanager
-async def start_local_scheduler(data: Path) -> AsyncIterator[str]:
-    """Run a scheduler on the loopback interface, and write its address to the data folder meanwhile.
+@dataclass(eq=False)
+class _Submission:
+    """A job at the scheduler."""
 
-    Raises:
-        WorkerError: it cannot listen.
-    """
-    settings = {
-        # The scheduler's own web pages would give access to its data without a token.
-        "distributed.scheduler.http.routes": [],
-        # Dask counts tolerated failures, not attempts.
-        "distributed.scheduler.allowed-failures": MAX_ATTEMPTS - 1,
-    }
-    with dask.config.set(settings):
-        # The scheduler opens a port for web pages in any case; port 0 avoids the well-known default.
-        pages = f"{LOOPBACK}:0"
-        scheduler = Scheduler(host=LOOPBACK, port=0, protocol="tcp", dashboard_address=pages, dashboard=False)
-    try:
-        await scheduler
-    except OSError as error:
-        raise WorkerError(f"the job scheduler cannot listen at {LOOPBACK}: {error}") from error
-    address_file = get_scheduler_file(data)
-    try:
-        address_file.write_text(scheduler.address, encoding="utf-8")
-        yield scheduler.address
-    finally:
-        address_file.unlink(missing_ok=True)
-        await scheduler.close()
-
-
-def get_scheduler_file(data: Path) -> Path:
-    """Return the file with the scheduler's address in a data folder."""
-    return data / "scheduler.address"
+    spec: JobSpec
+    future: Any
+    task: asyncio.Task[None] | None = None
+    """Follows the job to its end."""
 
 
 class DaskEngine:
     """Engine that runs jobs as dask tasks under the key of their content."""
 
-    def __init__(self, address: str) -> None:
-        """Set the scheduler's address; `start` connects."""
-        self._address = address
+    def __init__(self, location: SchedulerLocation) -> None:
+        """Set the scheduler's address and credentials; `start` connects."""
+        self._address, self._security = location
         self._client: Any = None
         self._listener: JobListener | None = None
-        self._futures: dict[str, Any] = {}
+        self._submissions: dict[str, _Submission] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
     async def start(self, listener: JobListener) -> None:
@@ -124,20 +110,33 @@ class DaskEngine:
     async def submit(self, spec: JobSpec) -> None:
         """Submit a job to the scheduler and follow it."""
         # Without a scheduler nothing is lost: `on_connected` submits the job again.
-        if self._client is None or spec.job_id in self._futures:
+        if self._client is None or spec.job_id in self._submissions:
             return
         future = self._client.submit(run_dask_task, spec, key=spec.key, pure=True)
-        self._futures[spec.job_id] = future
-        self._start_task(self._follow_job(spec.job_id, future))
+        submission = self._submissions[spec.job_id] = _Submission(spec, future)
+        submission.task = self._start_task(self._follow_job(submission))
 
     async def cancel(self, job_id: str, *, started: bool) -> None:
         """Set the cancel flag; a task that was not started is removed at once."""
-        future = self._futures.get(job_id)
-        if self._client is None or future is None:
+        submission = self._submissions.get(job_id)
+        if self._client is None or submission is None:
             return
-        await self._get_cancel_event(job_id).set()
+        await _EVENT(make_cancel_flag(submission.spec), client=self._client).set()
         if not started:
-            await self._client.cancel(future)
+            await self._client.cancel(submission.future)
+
+    async def release(self, job_id: str) -> None:
+        """Wait until a job is no longer followed.
+
+        Raises:
+            JobError: its worker has not stopped it in time.
+        """
+        submission = self._submissions.get(job_id)
+        if submission is None or submission.task is None:
+            return
+        await asyncio.wait([submission.task], timeout=_RELEASE_TIMEOUT)
+        if not submission.task.done():
+            raise JobError(f"job {job_id} has not stopped within {_RELEASE_TIMEOUT:g} s; try again later")
 
     async def describe_state(self) -> str:
         """Return ``ok`` if a worker is connected, otherwise what is missing."""
@@ -161,7 +160,11 @@ class DaskEngine:
     async def _connect(self) -> None:
         try:
             client = await _CLIENT(
-                self._address, asynchronous=True, timeout=_CONNECT_TIMEOUT, set_as_default=False
+                self._address,
+                security=self._security,
+                asynchronous=True,
+                timeout=_CONNECT_TIMEOUT,
+                set_as_default=False,
             )
         except (OSError, TimeoutError, ValueError) as error:
             _LOG.warning("scheduler_absent", extra={"address": self._address, "why": str(error)})
@@ -175,28 +178,27 @@ class DaskEngine:
         while True:
             await asyncio.sleep(_POLL_PERIOD)
             if self._client is None or self._client.status in ("closed", "closing"):
-                self._client, self._futures = None, {}
+                self._client, self._submissions = None, {}
                 await self._connect()
 
     async def _on_event(self, event: tuple[float, dict[str, Any]]) -> None:
         _, content = event
-        if self._listener is None or content["job"] not in self._futures:
+        if self._listener is None or content["job"] not in self._submissions:
             return
-        if content["activity"]:
-            await self._listener.on_progress(content["job"], content["activity"])
+        if content["progress"]:
+            await self._listener.on_progress(content["job"], JobProgress(**content["progress"]))
         else:
             await self._listener.on_started(content["job"])
 
-    async def _follow_job(self, job_id: str, future: Any) -> None:
-        report = await self._await_outcome(job_id, future)
-        # After a lost connection the job may already have another future.
-        if self._futures.get(job_id) is future:
-            del self._futures[job_id]
-            if self._client is not None:
-                await self._get_cancel_event(job_id).clear()
-        future.release()
+    async def _follow_job(self, submission: _Submission) -> None:
+        job_id = submission.spec.job_id
+        report = await self._await_outcome(job_id, submission.future)
+        submission.future.release()
         if report is not None:
-            await report()
+            await _report_end(report, job_id)
+        # After a lost connection the job may already have been submitted again.
+        if self._submissions.get(job_id) is submission:
+            del self._submissions[job_id]
 
     async def _await_outcome(self, job_id: str, future: Any) -> Callable[[], Awaitable[None]] | None:
         """Wait for the end of a job and return the call that reports it.
@@ -226,10 +228,18 @@ class DaskEngine:
             return lambda: listener.on_done(job_id, summary)
         return lambda: listener.on_failed(job_id, reason)
 
-    def _get_cancel_event(self, job_id: str) -> Any:
-        return _EVENT(make_cancel_flag(job_id), client=self._client)
-
-    def _start_task(self, work: Any) -> None:
-        task = asyncio.create_task(work)
+    def _start_task(self, work: Any) -> asyncio.Task[None]:
+        task: asyncio.Task[None] = asyncio.create_task(work)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+        return task
+
+
+async def _report_end(report: Callable[[], Awaitable[None]], job_id: str) -> None:
+    """Report the end of a job, again and again while the catalogue cannot be written, such as on a full disk."""
+    while True:
+        try:
+            return await report()
+        except (OSError, SQLAlchemyError) as error:
+            _LOG.warning("job_end_not_recorded", extra={"job": job_id, "why": str(error).splitlines()[0]})
+        await asyncio.sleep(_REPORT_PAUSE)

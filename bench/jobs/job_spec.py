@@ -1,45 +1,23 @@
-"""Job specification: settings, content key and result folder."""
+"""Job specification: what a worker receives, the content key, and the folder of the results."""
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from pydantic import Field
-
-from bench.validation import FrozenModel
+from bench.jobs.settings import JobSettings, get_kind
 
 FIT_FILE, REPORT_FILE = "fit.json", "report.html"
-"""Files in a result folder."""
+"""Files in the result folder of an identification."""
+DIAGNOSIS_FILE, TWIN_FILE = "diagnosis.json", "twin.json"
+"""Further files in the result folder of a diagnosis, whose report contains the fit as well."""
 
-FitSummary = dict[str, Any]
-"""Result, force error and noise floor of a fit, as kept in the catalogue."""
+ResultSummary = dict[str, Any]
+"""Part of a result that the catalogue keeps: errors of a fit; verdict, effects and shrinkage of a diagnosis."""
 
-
-class IdentifySettings(FrozenModel):
-    """Settings of an identification."""
-
-    stages: tuple[Literal["pinn", "refine"], ...] = Field(
-        default=("pinn", "refine"), min_length=1, description="stages of the fit"
-    )
-    hold_out: tuple[str, ...] = Field(default=(), description="stretches or segments to hold out: `5mm_4Hz*`")
-    hold_out_after: float | None = Field(
-        default=None, ge=0.05, le=0.95, description="fraction of each stretch after which samples are held out"
-    )
-    budget_s: float | None = Field(default=None, ge=0.1, description="[s] after which no further start is tried")
-    time_limit_s: float = Field(default=3600.0, gt=0, description="[s] after which the job fails")
-
-    def make_cli_arguments(self) -> list[str]:
-        """Return the options of `mrbench identify`."""
-        arguments = [f"--stages={','.join(self.stages)}"]
-        if self.hold_out:
-            arguments.append(f"--hold-out={','.join(self.hold_out)}")
-        if self.hold_out_after is not None:
-            arguments.append(f"--hold-out-after={self.hold_out_after}")
-        if self.budget_s is not None:
-            arguments.append(f"--budget={self.budget_s}s")
-        return arguments
+_FOLDER_WORDS = {"identify": "fit", "diagnose": "diagnosis"}
 
 
 @dataclass(frozen=True)
@@ -52,15 +30,29 @@ class JobSpec:
     """Path of the log; a worker on another machine needs the data folder at the same path."""
     result: str
     """Result folder; it appears complete when the job is done."""
-    settings: IdentifySettings
+    settings: JobSettings
+    submission: int = 1
+    """Number of times that the job was queued; a request to cancel is meant for one of them."""
+    fit: str = ""
+    """Fit that the report of a diagnosis shows as well; empty without one."""
+    model: str = ""
+    """Fit or twin whose own gap a diagnosis reports; empty without one."""
 
 
-def compute_content_key(log_sha256: str, settings: IdentifySettings) -> str:
-    """Return the key of a job: equal for equal log, settings and version of mrbench."""
-    content = f"identify {log_sha256} {settings.model_dump_json()} {version('mrbench')}"
-    return hashlib.sha256(content.encode()).hexdigest()
+def compute_content_key(log_sha256: str, settings: JobSettings, inputs: Sequence[str] = ()) -> str:
+    """Return the key of a job: equal for equal log, settings, inputs and version of mrbench.
+
+    Args:
+        log_sha256: hash of the log.
+        settings: of the job.
+        inputs: keys of the jobs whose results it reads.
+    """
+    # The id of a model differs between catalogues; its key, among the inputs, does not.
+    text = settings.model_dump_json(exclude={"model"})
+    content = f"{get_kind(settings)} {log_sha256} {text} {version('mrbench')}"
+    return hashlib.sha256(" ".join([content, *inputs]).encode()).hexdigest()
 
 
-def get_result_folder(log: Path, key: str) -> Path:
-    """Return the folder for fit and report: next to the log, one for each key."""
-    return log.with_name(f"{log.stem}.fit-{key[:12]}")
+def get_result_folder(log: Path, kind: str, key: str) -> Path:
+    """Return the folder of the results: next to the log, one for each key."""
+    return log.with_name(f"{log.stem}.{_FOLDER_WORDS[kind]}-{key[:12]}")

@@ -5,12 +5,28 @@ import logging
 import uuid
 from collections.abc import Callable
 from datetime import UTC, datetime
+from importlib.metadata import version
 from typing import Any
 
 from bench.catalogue import UNFINISHED_STATES, Catalogue, JobRow, RunRow
-from bench.jobs.engine import MAX_ATTEMPTS, JobEngine
-from bench.jobs.job_spec import FitSummary, IdentifySettings, JobSpec, compute_content_key, get_result_folder
+from bench.jobs.engine import JobEngine
+from bench.jobs.errors import JobError
+from bench.jobs.job_spec import (
+    FIT_FILE,
+    TWIN_FILE,
+    JobSpec,
+    ResultSummary,
+    compute_content_key,
+    get_result_folder,
+)
+from bench.jobs.progress import JobProgress
+from bench.jobs.scheduler import MAX_ATTEMPTS
+from bench.jobs.settings import DiagnoseSettings, IdentifySettings, JobSettings, get_kind, parse_settings
 
+ANALYSED_OUTCOMES = ("clean", "lossy")
+"""Outcomes of a run after which its identification is followed by a diagnosis."""
+_MODEL_FILES = {"identify": FIT_FILE, "diagnose": TWIN_FILE}
+"""File that stands for a job as a model."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -22,64 +38,68 @@ class JobManager:
 
     def __init__(self, catalogue: Catalogue, engine: JobEngine, on_changed: Callable[[JobRow], None]) -> None:
         """Use a catalogue and an engine; ``on_changed`` receives every changed job, in the event loop."""
-        self._catalogue = catalogue
+        self._catalogue, self._queue = catalogue, catalogue.job_queue
         self._engine = engine
         self._on_changed = on_changed
+        # A job that is being cancelled must not be submitted at the same moment.
+        self._submission_lock = asyncio.Lock()
 
-    async def identify(self, run: RunRow, settings: IdentifySettings) -> tuple[JobRow, bool]:
-        """Create and submit the identification of a run, unless an equal job is unfinished or done.
+    async def request(self, run: RunRow, settings: JobSettings) -> tuple[JobRow, bool]:
+        """Queue a job on a run, unless an equal job is unfinished or done.
+
+        An equal job that failed or was cancelled is queued again, and its attempts are counted on.
 
         Args:
             run: an ended run with a complete log.
-            settings: of the identification.
+            settings: of an identification or a diagnosis.
 
         Returns:
-            The job, and whether it is new.
+            The job, and whether it was queued now.
+
+        Raises:
+            JobError: the model of a diagnosis does not exist, or an equal job is still being stopped.
         """
-        job = JobRow(
-            id=uuid.uuid4().hex,
-            run_id=run.id,
-            key=compute_content_key(run.log_sha256 or "", settings),
-            settings=settings.model_dump(mode="json"),
-            state="queued",
-            created=datetime.now(UTC),
-            attempts=0,
-        )
-        row, is_new = await asyncio.to_thread(self._catalogue.add_job_once, job)
-        if is_new:
-            _LOG.info("job_queued", extra={"job": row.id, "run": run.id})
-            self._on_changed(row)
-            await self._submit(row)
-        return row, is_new
+        wanted = await asyncio.to_thread(self._make_job, run, settings)
+        for job in await asyncio.to_thread(self._queue.find_repeatable, wanted.key):
+            await self._engine.release(job.id)
+        row, is_queued = await asyncio.to_thread(self._queue.request, wanted, self._has_files)
+        if is_queued:
+            await self._announce_queued(row)
+        return row, is_queued
+
+    async def identify(self, run: RunRow, settings: IdentifySettings) -> tuple[JobRow, bool]:
+        """Queue the identification of a run, as `request` does."""
+        return await self.request(run, settings)
+
+    async def retry(self, job: JobRow, reason: str) -> JobRow | None:
+        """Queue a failed or cancelled job again.
+
+        Returns:
+            The job, or None if it is in another state.
+
+        Raises:
+            JobError: it is still being stopped.
+        """
+        await self._engine.release(job.id)
+        row = await asyncio.to_thread(self._queue.retry, job.id, reason)
+        if row is not None:
+            await self._announce_queued(row)
+        return row
 
     async def on_connected(self) -> None:
-        """Submit all unfinished jobs."""
-        for job in await asyncio.to_thread(self._catalogue.list_unfinished_jobs):
+        """Submit all unfinished jobs, in the order of the queue."""
+        for job in await asyncio.to_thread(self._queue.list_unfinished):
             _LOG.info("job_submitted_again", extra={"job": job.id, "run": job.run_id, "attempts": job.attempts})
             await self._submit(job)
 
-    async def _submit(self, job: JobRow) -> None:
-        run = await asyncio.to_thread(self._catalogue.get_run, job.run_id)
-        if run is None:
-            await self.on_failed(job.id, f"run {job.run_id} is no longer in the catalogue")
-            return
-        log = self._catalogue.resolve_path(run.log)
-        spec = JobSpec(
-            job_id=job.id,
-            key=job.key,
-            log=str(log),
-            result=str(get_result_folder(log, job.key)),
-            settings=IdentifySettings.model_validate(job.settings),
-        )
-        await self._engine.submit(spec)
-
     async def cancel(self, job: JobRow) -> JobRow:
         """Cancel a job: a queued one at once, a running one as soon as its worker has stopped it."""
-        started = job.state == "running"
-        if not started:
-            # Recorded before the engine is called: a worker that starts it now no longer changes its state.
-            await self.on_cancelled(job.id)
-        await self._engine.cancel(job.id, started=started)
+        async with self._submission_lock:
+            started = job.state == "running"
+            if not started:
+                # Recorded before the engine is called: a worker that starts it now no longer changes its state.
+                await self.on_cancelled(job.id)
+            await self._engine.cancel(job.id, started=started)
         return await asyncio.to_thread(self._catalogue.get_job, job.id) or job
 
     async def on_started(self, job_id: str) -> None:
@@ -87,27 +107,30 @@ class JobManager:
         job = await asyncio.to_thread(self._catalogue.get_job, job_id)
         if job is None or job.state not in UNFINISHED_STATES:
             return
-        if job.attempts >= MAX_ATTEMPTS:
+        if job.attempts - job.earlier_attempts >= MAX_ATTEMPTS:
             await self.on_failed(job_id, f"it was started {MAX_ATTEMPTS} times and never finished")
             await self._engine.cancel(job_id, started=True)
             return
-        await self._update_job(
-            job_id, state="running", attempts=job.attempts + 1, started=datetime.now(UTC), activity=""
-        )
+        start = {"state": "running", "attempts": job.attempts + 1, "started": datetime.now(UTC)}
+        await self._update_job(job_id, **start, stage="", fraction=0.0, activity="")
 
-    async def on_progress(self, job_id: str, message: str) -> None:
-        """Record the present activity of a job."""
-        await self._update_job(job_id, activity=message)
+    async def on_progress(self, job_id: str, progress: JobProgress) -> None:
+        """Record the progress of a job."""
+        await self._update_job(job_id, **progress.to_document())
 
-    async def on_done(self, job_id: str, summary: FitSummary) -> None:
-        """Record the result of a job; its files are next to the log."""
+    async def on_done(self, job_id: str, summary: ResultSummary) -> None:
+        """Record the result of a job; queue the diagnosis of a run that was identified for the first time."""
         job = await asyncio.to_thread(self._catalogue.get_job, job_id)
         run = await asyncio.to_thread(self._catalogue.get_run, job.run_id) if job else None
         if job is None or run is None:
             return
-        folder = get_result_folder(self._catalogue.resolve_path(run.log), job.key)
+        folder = get_result_folder(self._catalogue.resolve_path(run.log), job.kind, job.key)
         result = self._catalogue.make_name(folder)
-        await self._finish_job(job_id, state="done", activity="", summary=summary, result=result)
+        is_followed = job.kind == "identify" and run.outcome in ANALYSED_OUTCOMES
+        follow_up = self._make_row(run, DiagnoseSettings(), {"fit": job}) if is_followed else None
+        await self._finish_job(
+            job_id, follow_up, state="done", activity="", fraction=1.0, summary=summary, result=result
+        )
 
     async def on_failed(self, job_id: str, reason: str) -> None:
         """Record the failure of a job."""
@@ -117,13 +140,102 @@ class JobManager:
         """Record that a job was cancelled."""
         await self._finish_job(job_id, state="cancelled", activity="")
 
-    async def _finish_job(self, job_id: str, **values: Any) -> None:
-        await self._update_job(job_id, finished=datetime.now(UTC), **values)
+    def _make_job(self, run: RunRow, settings: JobSettings) -> JobRow:
+        """Return a new row for a job, which reads the newest fit of its run if it is a diagnosis."""
+        if not isinstance(settings, DiagnoseSettings):
+            return self._make_row(run, settings, {})
+        inputs = {"fit": self._queue.find_newest_done(run.id, "identify")}
+        if settings.model is not None:
+            inputs["model"] = self._catalogue.get_job(settings.model)
+            if inputs["model"] is None or inputs["model"].result is None:
+                raise JobError(f"there is no fit or diagnosis {settings.model}; give the id of a job that is done")
+        return self._make_row(run, settings, {name: job for name, job in inputs.items() if job is not None})
+
+    def _make_row(self, run: RunRow, settings: JobSettings, inputs: dict[str, JobRow]) -> JobRow:
+        keys = [f"{name}:{job.key}" for name, job in sorted(inputs.items())]
+        now = datetime.now(UTC)
+        return JobRow(
+            id=uuid.uuid4().hex,
+            run_id=run.id,
+            kind=get_kind(settings),
+            key=compute_content_key(run.log_sha256 or "", settings, keys),
+            settings=settings.model_dump(mode="json"),
+            inputs={name: job.id for name, job in inputs.items()},
+            version=version("mrbench"),
+            state="queued",
+            created=now,
+            queued=now,
+            attempts=0,
+        )
+
+    async def _announce_queued(self, row: JobRow) -> None:
+        _LOG.info("job_queued", extra={"job": row.id, "run": row.run_id, "kind": row.kind})
+        self._on_changed(row)
+        await self._submit(row)
+
+    async def _submit(self, job: JobRow) -> None:
+        try:
+            spec = await asyncio.to_thread(self._make_spec, job)
+        except JobError as error:
+            await self.on_failed(job.id, str(error))
+            return
+        async with self._submission_lock:
+            present = await asyncio.to_thread(self._catalogue.get_job, job.id)
+            if present is not None and present.state in UNFINISHED_STATES:
+                await self._engine.submit(spec)
+
+    def _make_spec(self, job: JobRow) -> JobSpec:
+        """Return a job as it is sent to a worker.
+
+        Raises:
+            JobError: its run or its model no longer exists.
+        """
+        run = self._catalogue.get_run(job.run_id)
+        if run is None:
+            raise JobError(f"run {job.run_id} is no longer in the catalogue")
+        log = self._catalogue.resolve_path(run.log)
+        paths = {name: self._find_file(self._catalogue.get_job(source)) for name, source in job.inputs.items()}
+        if paths.get("model") == "":
+            raise JobError(f"the result of job {job.inputs['model']}, its model, was removed; give another model")
+        return JobSpec(
+            job_id=job.id,
+            key=job.key,
+            log=str(log),
+            result=str(get_result_folder(log, job.kind, job.key)),
+            settings=parse_settings(job.kind, job.settings),
+            submission=job.submissions,
+            fit=paths.get("fit", ""),
+            model=paths.get("model", ""),
+        )
+
+    def _has_files(self, job: JobRow) -> bool:
+        return job.result is not None and self._catalogue.resolve_path(job.result).is_dir()
+
+    def _find_file(self, source: JobRow | None) -> str:
+        """Return the path of the fit or twin of a job; empty without a job or file."""
+        if source is None or source.result is None:
+            return ""
+        path = self._catalogue.resolve_path(source.result) / _MODEL_FILES[source.kind]
+        return str(path) if path.is_file() else ""
+
+    async def _finish_job(self, job_id: str, follow_up: JobRow | None = None, **values: Any) -> None:
+        values["finished"] = datetime.now(UTC)
+        job, following = await asyncio.to_thread(lambda: self._queue.finish(job_id, follow_up, **values))
+        if job is not None:
+            self._announce_state(job)
+        if following is not None:
+            await self._announce_queued(following)
 
     async def _update_job(self, job_id: str, **values: Any) -> None:
         job = await asyncio.to_thread(lambda: self._catalogue.update_job(job_id, **values))
-        if job is not None:
-            if "state" in values:
-                details = {"job": job_id, "run": job.run_id, "attempts": job.attempts, "error": job.error}
-                _LOG.info(f"job_{job.state}", extra=details)
+        if job is None:
+            return
+        if "state" in values:
+            self._announce_state(job)
+        else:
             self._on_changed(job)
+
+    def _announce_state(self, job: JobRow) -> None:
+        details = {"job": job.id, "run": job.run_id, "attempts": job.attempts, "error": job.error}
+        _LOG.info(f"job_{job.state}", extra=details)
+        self._on_changed(job)

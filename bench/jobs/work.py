@@ -1,7 +1,6 @@
-"""Execution of a job: runs `mrbench identify` and `mrbench report`, with progress, time limit and cancellation."""
+"""Execution of a job: runs its commands as processes, with progress, time limit and cancellation."""
 
 import contextlib
-import json
 import os
 import queue
 import shutil
@@ -13,11 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
-from bench.errors import BenchError
 from bench.jobs.errors import JobCancelledError, JobError
-from bench.jobs.job_spec import FIT_FILE, REPORT_FILE, FitSummary, JobSpec
+from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE, JobSpec, ResultSummary
+from bench.jobs.progress import PROGRESS_ENVIRONMENT, CommandStep, JobProgress, is_report
+from bench.jobs.settings import DiagnoseSettings
+from bench.jobs.summaries import read_diagnosis_summary, read_fit_summary
 from bench.processes import MRBENCH_COMMAND, LineQueue, start_line_reader
-from bench.report import read_fit
 
 POLL_PERIOD = 0.25
 """Time [s] between two checks for cancellation."""
@@ -25,18 +25,22 @@ SINGLE_THREAD_ENVIRONMENT = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THRE
 """Environment that keeps a job on one core, so that the rig agent has the others."""
 WATCHDOG_COMMAND = (sys.executable, "-m", "bench.jobs.parent_watchdog")
 """Command that ends a job's processes when the worker ends."""
+_ANALYSIS_SHARE = 0.95
+"""Completed share of a job when only its report is missing."""
 
 
 @dataclass(frozen=True)
 class JobCallbacks:
     """Functions by which a job reports progress and asks whether it was cancelled."""
 
-    on_progress: Callable[[str], None]
+    on_progress: Callable[[JobProgress], None]
     is_cancelled: Callable[[], bool]
 
 
-def execute_job(spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...] = MRBENCH_COMMAND) -> FitSummary:
-    """Identify a log and write a report; the files of both appear together, or not at all.
+def execute_job(
+    spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...] = MRBENCH_COMMAND
+) -> ResultSummary:
+    """Identify or diagnose a log and write a report; the files appear together, or not at all.
 
     Args:
         spec: the job; if its result exists, it is only read.
@@ -44,7 +48,7 @@ def execute_job(spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...]
         mrbench: the command line to call.
 
     Returns:
-        Summary of the fit.
+        Summary of the fit or of the diagnosis.
 
     Raises:
         JobError: a command failed, or the time limit was reached.
@@ -56,48 +60,56 @@ def execute_job(spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...]
     deadline = time.monotonic() + spec.settings.time_limit_s
     if not result.is_dir():
         with _make_work_folder(result) as folder:
-            fit, report = folder / FIT_FILE, folder / REPORT_FILE
-            identify = ["identify", str(log), "--out", str(fit), *spec.settings.make_cli_arguments()]
-            _run_command([*mrbench, *identify], "identify", callbacks, deadline)
-            page = ["report", str(log), "--fit", str(fit), "--out", str(report)]
-            _run_command([*mrbench, *page], "report", callbacks, deadline)
+            for step, arguments in _list_commands(spec, folder):
+                _run_command([*mrbench, *arguments], step, callbacks, deadline)
             _publish_result(folder, result)
+    if isinstance(spec.settings, DiagnoseSettings):
+        return read_diagnosis_summary(result / DIAGNOSIS_FILE)
     return read_fit_summary(result / FIT_FILE)
 
 
-def read_fit_summary(path: Path) -> FitSummary:
-    """Read the summary of a fit.
-
-    Raises:
-        JobError: the file is not a fit.
-    """
-    try:
-        fit = read_fit(path)
-        document = json.loads(path.read_text("utf-8"))
-    except (BenchError, OSError, ValueError) as error:
-        raise JobError(f"{path} cannot be read: {error}") from None
-    return {
-        "result": document.get("result", ""),
-        "rmse_n": fit.rmse_n.train,
-        "held_out_rmse_n": fit.rmse_n.held_out,
-        "noise_floor_n": fit.noise_floor_n,
-    }
+def _list_commands(spec: JobSpec, folder: Path) -> list[tuple[CommandStep, list[str]]]:
+    """Return the arguments of the commands of a job, which write to a folder."""
+    fit, diagnosis = folder / FIT_FILE, folder / DIAGNOSIS_FILE
+    options = spec.settings.make_cli_arguments()
+    if isinstance(spec.settings, DiagnoseSettings):
+        name = "diagnose"
+        options += ["--model", spec.model] if spec.model else []
+        analyse = [name, spec.log, "--out", str(diagnosis), "--twin", str(folder / TWIN_FILE), *options]
+        documents = [*(["--fit", spec.fit] if spec.fit else []), "--diagnosis", str(diagnosis)]
+    else:
+        name = "identify"
+        analyse = [name, spec.log, "--out", str(fit), *options]
+        documents = ["--fit", str(fit)]
+    report = ["report", spec.log, *documents, "--out", str(folder / REPORT_FILE)]
+    return [
+        (CommandStep(name, 0.0, _ANALYSIS_SHARE), analyse),
+        (CommandStep("report", _ANALYSIS_SHARE, 1.0), report),
+    ]
 
 
 @contextlib.contextmanager
 def _make_work_folder(result: Path) -> Iterator[Path]:
     """Provide an empty folder next to the result, after deleting those of killed attempts."""
-    prefix = f".{result.name}."
-    for leftover in result.parent.glob(f"{prefix}*"):
-        shutil.rmtree(leftover, ignore_errors=True)
+    remove_work_folders(result)
     try:
-        folder = Path(mkdtemp(prefix=prefix, dir=result.parent))
+        folder = Path(mkdtemp(prefix=_make_prefix(result), dir=result.parent))
     except OSError as error:
         raise JobError(f"{result.parent} cannot be written to: {error.strerror}") from None
     try:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_work_folders(result: Path) -> None:
+    """Delete the work folders of killed attempts at a result."""
+    for leftover in result.parent.glob(f"{_make_prefix(result)}*"):
+        shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _make_prefix(result: Path) -> str:
+    return f".{result.name}."
 
 
 def _publish_result(folder: Path, result: Path) -> None:
@@ -110,9 +122,9 @@ def _publish_result(folder: Path, result: Path) -> None:
             raise JobError(f"{result} cannot be written: {error.strerror}") from None
 
 
-def _run_command(command: list[str], name: str, callbacks: JobCallbacks, deadline: float) -> None:
+def _run_command(command: list[str], step: CommandStep, callbacks: JobCallbacks, deadline: float) -> None:
     """Run one command; its last output line is the reason of a failure."""
-    callbacks.on_progress(name)
+    callbacks.on_progress(step.begin())
     process = subprocess.Popen(
         [*WATCHDOG_COMMAND, *command],
         stdin=subprocess.PIPE,
@@ -120,11 +132,11 @@ def _run_command(command: list[str], name: str, callbacks: JobCallbacks, deadlin
         stderr=subprocess.PIPE,
         text=True,
         errors="replace",
-        env=os.environ | SINGLE_THREAD_ENVIRONMENT,
+        env=os.environ | SINGLE_THREAD_ENVIRONMENT | PROGRESS_ENVIRONMENT,
     )
     lines, reader = start_line_reader(process)
     try:
-        last = _follow_output(lines, name, callbacks, deadline)
+        last = _follow_output(lines, step, callbacks, deadline)
     finally:
         # When its input ends, the watchdog kills the command if it is still running.
         if process.stdin is not None:
@@ -134,23 +146,24 @@ def _run_command(command: list[str], name: str, callbacks: JobCallbacks, deadlin
         if process.stderr is not None:
             process.stderr.close()
     if process.returncode != 0:
-        raise JobError(f"{name}: {last.removeprefix('mrbench: ') or f'exit status {process.returncode}'}")
+        raise JobError(f"{step.name}: {last.removeprefix('mrbench: ') or f'exit status {process.returncode}'}")
 
 
-def _follow_output(lines: LineQueue, name: str, callbacks: JobCallbacks, deadline: float) -> str:
-    """Report the output of a command until it ends, and return its last line."""
-    last = ""
+def _follow_output(lines: LineQueue, step: CommandStep, callbacks: JobCallbacks, deadline: float) -> str:
+    """Report the output of a command until it ends, and return its last line that is not a report of progress."""
+    last, latest = "", step.begin()
     while True:
         if callbacks.is_cancelled():
             raise JobCancelledError("cancelled")
         if time.monotonic() > deadline:
-            raise JobError(f"{name}: stopped at its time limit; give the job a larger time_limit_s")
+            raise JobError(f"{step.name}: stopped at its time limit; give the job a larger time_limit_s")
         try:
             line = lines.get(timeout=POLL_PERIOD)
         except queue.Empty:
             continue
         if line is None:
             return last
-        if line.strip():
-            last = line.strip()
-            callbacks.on_progress(f"{name}: {last}")
+        if text := line.strip():
+            last = last if is_report(text) else text
+            latest = step.read_line(text, latest)
+            callbacks.on_progress(latest)

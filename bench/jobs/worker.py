@@ -5,52 +5,33 @@ import logging
 import os
 import signal
 from collections.abc import Callable
-from pathlib import Path
 
 import dask
 from distributed import Worker
 from distributed.comm.addressing import get_address_host_port
 from distributed.utils import get_ip, get_ipv6
 
-from bench.jobs.engine import get_scheduler_file
 from bench.jobs.errors import WorkerError
+from bench.jobs.tls import SchedulerLocation
 
 _LOG = logging.getLogger(__name__)
 _CONNECT_TIMEOUT = "10 s"
 
 
-def run_worker(scheduler: str, nice: int) -> None:
+def run_worker(scheduler: SchedulerLocation, nice: int) -> None:
     """Execute jobs until the scheduler ends or the process receives a signal.
 
     Args:
-        scheduler: address, such as ``tcp://127.0.0.1:8786``.
+        scheduler: address and credentials.
         nice: niceness of the process, 0 to 19.
 
     Raises:
         WorkerError: no scheduler replies.
     """
-    try:
-        get_address_host_port(scheduler)
-    except ValueError:
-        raise WorkerError(f"--scheduler {scheduler}: not of the form tcp://HOST:PORT") from None
     os.nice(nice)
     asyncio.run(_run(scheduler))
     # The thread of a job cannot be joined; its commands end when the pipe from this process closes.
     os._exit(0)
-
-
-def find_scheduler(data: Path) -> str:
-    """Return the address of the scheduler of the service that uses a data folder.
-
-    Raises:
-        WorkerError: no service uses it.
-    """
-    try:
-        return get_scheduler_file(data).read_text("utf-8")
-    except OSError:
-        raise WorkerError(
-            f"no service uses {data}: start one (mrbench serve), or give the scheduler: --scheduler tcp://…"
-        ) from None
 
 
 def _find_worker_address(scheduler: str) -> str:
@@ -60,7 +41,7 @@ def _find_worker_address(scheduler: str) -> str:
     return find_ip(host, port)
 
 
-async def _run(scheduler: str) -> None:
+async def _run(scheduler: SchedulerLocation) -> None:
     dask.config.set(
         {
             "distributed.worker.http.routes": [],
@@ -71,9 +52,10 @@ async def _run(scheduler: str) -> None:
     )
     try:
         # Without a host a worker listens on all interfaces, and it executes any code that it receives.
-        host = _find_worker_address(scheduler)
+        host = _find_worker_address(scheduler.address)
         worker = await Worker(
-            scheduler,
+            scheduler.address,
+            security=scheduler.security,
             nthreads=1,
             memory_limit=0,
             host=host,
@@ -83,10 +65,10 @@ async def _run(scheduler: str) -> None:
         )
     except (OSError, TimeoutError, ValueError, RuntimeError) as error:  # dask wraps some in a RuntimeError
         raise WorkerError(
-            f"no scheduler replied at {scheduler} within {_CONNECT_TIMEOUT}; "
-            "check the address and that the service is running (mrbench serve)"
+            f"no scheduler replied at {scheduler.address} within {_CONNECT_TIMEOUT}; "
+            "check the address, that the service is running (mrbench serve), and that --scheduler-tls is its file"
         ) from error
-    _LOG.info("worker_ready", extra={"scheduler": scheduler})
+    _LOG.info("worker_ready", extra={"scheduler": scheduler.address})
     stop_requested = asyncio.Event()
     for number in (signal.SIGTERM, signal.SIGINT):
         asyncio.get_running_loop().add_signal_handler(number, stop_requested.set)

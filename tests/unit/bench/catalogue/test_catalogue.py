@@ -43,11 +43,6 @@ def run(number, **changes):
     return RunRow(**{**values, **changes})
 
 
-def job(number, **changes):
-    values = {"id": f"job-{number}", "run_id": "run-1", "key": "k", "settings": {}, "state": "queued"}
-    return JobRow(**{**values, "created": datetime(2026, 3, 1, 11, number, tzinfo=UTC), **changes})
-
-
 def test_migrations_create_the_tables_of_the_models(tmp_path):
     engine = open_database(make_sqlite_url(tmp_path / "catalogue.db"))
     with engine.connect() as connection:
@@ -81,9 +76,43 @@ def test_a_catalogue_of_revision_0001_is_opened_and_its_state_renamed(tmp_path):
     engine.dispose()
     catalogue = Catalogue(open_database(url), tmp_path)
     assert {row.id: row.state for row in catalogue.list_runs(10)} == {"a": "truncated", "b": "ended"}
-    assert catalogue.get_job("j").activity == "identify"
+    job = catalogue.get_job("j")
+    assert (job.activity, job.submissions, job.retries, job.inputs) == ("identify", 1, [], {})
     assert catalogue.update_job("j", activity="report").activity == "report"
     catalogue.close()
+
+
+@pytest.mark.parametrize(
+    ("outcome", "reason", "ending"),
+    [
+        ("clean", "", "completed"),
+        ("lossy", "", "completed"),
+        ("incomplete", "stopped on request", "stopped"),
+        ("incomplete", "the agent was shut down", "stopped"),
+        ("incomplete", "force 1600 N exceeds the limit of 1500 N", "tripped"),
+        ("incomplete", "the rig agent ended before it wrote a log", None),
+        ("truncated", "the recorder was killed; repaired by salvage", None),
+        (None, "", None),
+    ],
+)
+def test_the_ending_of_an_older_run_is_derived_where_it_is_determined(tmp_path, outcome, reason, ending):
+    url = make_sqlite_url(tmp_path / "catalogue.db")
+    engine = migrate_to(url, "0002")
+    values = ["a", "quick", "", "", "run", "2026-03-01 10:00:00.000000", "ended", outcome, reason, "a.mcap"]
+    columns = "id, method, specimen, operator, source, started, state, outcome, reason, log"
+    with engine.begin() as connection:
+        connection.exec_driver_sql(f"INSERT INTO runs ({columns}) VALUES (?,?,?,?,?,?,?,?,?,?)", tuple(values))
+    engine.dispose()
+    catalogue = Catalogue(open_database(url), tmp_path)
+    assert catalogue.get_run("a").ending == ending
+    catalogue.close()
+
+
+@pytest.mark.parametrize("ending", ["stopped", "aborted", "tripped"])
+def test_the_ending_in_a_log_is_that_of_its_run(catalogue, ending):
+    write_complete_log(catalogue.folder / "a.mcap", "a", outcome="incomplete", ending=ending)
+    (row,) = scan_logs(catalogue, not_being_written)
+    assert (row.outcome, row.ending) == ("incomplete", ending)
 
 
 def test_a_catalogue_keeps_its_rows_when_it_is_opened_again(tmp_path):
@@ -138,15 +167,6 @@ def test_runs_of_the_same_instant_are_all_found_page_by_page(catalogue):
     assert ids == [f"run-{number}" for number in (4, 3, 2, 1, 0)]
 
 
-def test_a_job_is_added_once_unless_the_last_one_failed(catalogue):
-    catalogue.add(run(1))
-    assert catalogue.add_job_once(job(1))[1]
-    assert catalogue.add_job_once(job(2))[0].id == "job-1"
-    catalogue.update_job("job-1", state="failed")
-    assert catalogue.add_job_once(job(3))[1]
-    assert catalogue.update_job("job-1", state="running") is None
-
-
 def test_the_summary_of_a_log_is_read_complete_or_truncated(tmp_path):
     complete = read_log_summary(write_complete_log(tmp_path / "a.mcap", "a", "lossy", first_s=2.5))
     identity = (complete.id, complete.specimen, complete.operator, complete.outcome)
@@ -193,3 +213,36 @@ def test_a_copy_of_a_log_is_not_a_second_run(catalogue):
     write_complete_log(catalogue.folder / "a.mcap", "a")
     write_complete_log(catalogue.folder / "b.mcap", "a")
     assert [row.log for row in scan_logs(catalogue, not_being_written)] == ["a.mcap"]
+
+
+def test_the_newest_done_job_of_each_kind_is_found_behind_any_number_of_others(catalogue):
+    for number in (1, 2):
+        catalogue.add(run(number))
+        for kind in ("identify", "diagnose"):
+            for age, state in enumerate(["done", "done", *["cancelled"] * 50]):
+                name = f"{number}-{kind}-{age}"
+                created = datetime(2026, 3, 1, 11, age, tzinfo=UTC)
+                values = {"key": "k", "settings": {}, "state": state, "created": created}
+                catalogue.add(JobRow(id=name, run_id=f"run-{number}", kind=kind, **values))
+    found = catalogue.list_jobs_of_runs(["run-1", "run-2"], 3)
+    for number in (1, 2):
+        jobs = [one for one in found if one.run_id == f"run-{number}"]
+        assert len(jobs) == 5
+        assert {one.id for one in jobs if one.state == "done"} == {
+            f"{number}-{k}-1" for k in ("identify", "diagnose")
+        }
+        assert [one.created for one in jobs] == sorted((one.created for one in jobs), reverse=True)
+
+
+def test_a_file_that_is_skipped_is_logged_once_for_each_reason(catalogue, caplog):
+    foreign = catalogue.folder / "foreign.mcap"
+    foreign.write_bytes(b"not a log")
+    write_complete_log(catalogue.folder / "a.mcap", "a")
+    write_complete_log(catalogue.folder / "b.mcap", "a")
+    for _ in range(3):
+        scan_logs(catalogue, not_being_written)
+    skipped = [record.log for record in caplog.records if record.message == "log_skipped"]
+    assert skipped == [str(catalogue.folder / "b.mcap"), str(foreign)]
+    write_complete_log(foreign, "a")
+    scan_logs(catalogue, not_being_written)
+    assert [record.log for record in caplog.records if record.message == "log_skipped"][2:] == [str(foreign)]

@@ -13,15 +13,17 @@ import pytest
 
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.job_spec import (
+    DIAGNOSIS_FILE,
     FIT_FILE,
     REPORT_FILE,
-    IdentifySettings,
+    TWIN_FILE,
     JobSpec,
     compute_content_key,
     get_result_folder,
 )
+from bench.jobs.settings import DiagnoseSettings, IdentifySettings
 from bench.jobs.work import WATCHDOG_COMMAND, JobCallbacks, execute_job
-from tests.support.reports import fit_document
+from tests.support.reports import diagnosis_document, fit_document
 
 COMMAND = """
 import json, os, pathlib, sys, time
@@ -32,7 +34,11 @@ with (folder / "calls").open("a") as calls:
 print("half way", file=sys.stderr, flush=True)
 {act}
 out = pathlib.Path(arguments[arguments.index("--out") + 1])
-out.write_text((folder / "fit.json").read_text() if arguments[0] == "identify" else "<title>page</title>")
+texts = {{"identify": "fit.json", "diagnose": "diagnosis.json"}}
+name = texts.get(arguments[0])
+out.write_text((folder / name).read_text() if name else "<title>page</title>")
+if "--twin" in arguments:
+    pathlib.Path(arguments[arguments.index("--twin") + 1]).write_text("{{}}")
 """
 HANG = "time.sleep(600)"
 FAIL = "sys.exit('mrbench: too little is left to fit')"
@@ -44,12 +50,13 @@ class Bench:
     def __init__(self, folder, fit):
         self.folder = folder
         (folder / "fit.json").write_text(json.dumps(fit))
+        (folder / "diagnosis.json").write_text(json.dumps(diagnosis_document()))
         log = folder / "run.mcap"
         log.write_bytes(b"log")
         settings = IdentifySettings()
         key = compute_content_key("ab" * 32, settings)
-        self.spec = JobSpec("job", key, str(log), str(get_result_folder(log, key)), settings)
-        self.messages = []
+        self.spec = JobSpec("job", key, str(log), str(get_result_folder(log, "identify", key)), settings)
+        self.progress = []
 
     def command(self, act="pass"):
         script = self.folder / "command.py"
@@ -58,7 +65,7 @@ class Bench:
 
     def execute(self, act="pass", cancelled=lambda: False, **changes):
         spec = replace(self.spec, **changes)
-        return execute_job(spec, JobCallbacks(self.messages.append, cancelled), self.command(act))
+        return execute_job(spec, JobCallbacks(self.progress.append, cancelled), self.command(act))
 
     def calls(self):
         try:
@@ -100,8 +107,48 @@ def test_fit_and_report_appear_together_next_to_the_log(bench):
     assert summary["rmse_n"] == json.loads((result / FIT_FILE).read_text())["rmse_n"]["train"]
     assert [call[1] for call in bench.calls()] == ["identify", "report"]
     assert bench.calls()[0][-1] == "--stages=pinn,refine"
-    assert bench.messages == ["identify", "identify: half way", "report", "report: half way"]
+    assert [progress.activity for progress in bench.progress] == [
+        "identify", "identify: half way", "report", "report: half way",
+    ]  # fmt: skip
     assert bench.results == [result.name]
+
+
+def test_a_diagnosis_writes_its_document_its_twin_and_a_report_with_the_fit(bench):
+    settings = DiagnoseSettings(hold_out=("5mm*",), discover=True)
+    key = compute_content_key("ab" * 32, settings)
+    result = get_result_folder(Path(bench.spec.log), "diagnose", key)
+    summary = bench.execute(
+        settings=settings, key=key, result=str(result), fit="/data/fit.json", model="/data/twin.json"
+    )
+    assert sorted(path.name for path in result.iterdir()) == [DIAGNOSIS_FILE, REPORT_FILE, TWIN_FILE]
+    assert summary["verdict"] == "explained"
+    assert summary["effects"] == ["force_delay"]
+    (_, _, *analysis), (_, _, *report) = bench.calls()
+    assert analysis[-4:] == ["--hold-out=5mm*", "--discover", "--model", "/data/twin.json"]
+    assert report[report.index("--fit") + 1] == "/data/fit.json"
+    assert report[report.index("--diagnosis") + 1].endswith(DIAGNOSIS_FILE)
+
+
+REPORTS = """
+for stage, fraction in (("read", 0.0), ("refine", 0.5), ("refine", 0.25)):
+    print(json.dumps({{"stage": stage, "fraction": fraction, "message": "3.1 N"}}), file=sys.stderr, flush=True)
+assert os.environ["MRBENCH_PROGRESS"] == "json"
+"""
+
+
+def test_stage_and_fraction_are_those_that_the_command_reports_and_never_fall(bench):
+    bench.execute(REPORTS.format())
+    found = [(one.stage, one.fraction) for one in bench.progress]
+    analysis = ("identify", 0.0), ("identify", 0.0), ("read", 0.0), ("refine", 0.475), ("refine", 0.475)
+    assert found[:5] == list(analysis)
+    assert found[5] == ("report", 0.95)
+    assert found[-1] == ("refine", pytest.approx(0.975))
+    assert bench.progress[3].activity == "identify: refine, 3.1 N"
+
+
+def test_a_report_of_progress_is_not_the_reason_of_a_failure(bench):
+    with pytest.raises(JobError, match=r"^identify: half way$"):
+        bench.execute(REPORTS.format() + "sys.exit(1)")
 
 
 def test_an_existing_result_is_not_computed_again(bench):

@@ -1,0 +1,52 @@
+"""Summaries of results, as the catalogue keeps them: enough for a list of runs, without opening a document."""
+
+import json
+from pathlib import Path
+
+from bench.errors import BenchError
+from bench.jobs.errors import JobError
+from bench.jobs.job_spec import ResultSummary
+from bench.report import read_diagnosis, read_fit
+
+
+def read_fit_summary(path: Path) -> ResultSummary:
+    """Read the summary of a fit.
+
+    Raises:
+        JobError: the file is not a fit.
+    """
+    try:
+        fit = read_fit(path)
+        document = json.loads(path.read_text("utf-8"))
+    except (BenchError, OSError, ValueError) as error:
+        raise JobError(f"{path} cannot be read: {error}") from None
+    return {
+        "result": document.get("result", ""),
+        "rmse_n": fit.rmse_n.train,
+        "held_out_rmse_n": fit.rmse_n.held_out,
+        "noise_floor_n": fit.noise_floor_n,
+    }
+
+
+def read_diagnosis_summary(path: Path) -> ResultSummary:
+    """Read the summary of a diagnosis.
+
+    Raises:
+        JobError: the file is not a diagnosis.
+    """
+    try:
+        diagnosis = read_diagnosis(path)
+    except BenchError as error:
+        raise JobError(f"{path} cannot be read: {error}") from None
+    gap = diagnosis.gap
+    return {
+        "verdict": diagnosis.verdict,
+        "effects": [effect.name for effect in diagnosis.effects],
+        "probability": diagnosis.probability,
+        "before_n": gap.before_n,
+        "after_n": gap.after_n,
+        "noise_floor_n": gap.noise_floor_n,
+        "shrinkage": gap.shrinkage,
+        "shrinkage_ci95": gap.shrinkage_ci95,
+        "explanation": diagnosis.explanation,
+    }

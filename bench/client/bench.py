@@ -1,0 +1,94 @@
+"""A bench, as its service shows it."""
+
+import uuid
+from collections.abc import Iterator, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from bench.client.run import Run, RunState, parse_run_state
+from bench.client.session import Session
+
+_PAGE_SIZE = 50
+"""Number of runs requested at a time."""
+
+
+class Bench:
+    """Bench behind a service.
+
+    Args:
+        url: address of the service, such as ``http://127.0.0.1:8600``; it may contain ``#token=...``.
+        token: token of the service; by default that of the address.
+        certificate: file with the certificate that an ``https`` service must have; by default those of the system.
+
+    Raises:
+        ClientError: there is no token, or the file with the certificate cannot be read.
+    """
+
+    def __init__(self, url: str, token: str | None = None, certificate: Path | None = None) -> None:
+        self._session = Session(url, token, certificate)
+
+    def get_state(self) -> str:
+        """Return the state of the rig agent: idle, preparing, running, stopping or tripped.
+
+        Raises:
+            ClientError: the service or its agent cannot be reached.
+        """
+        return str(self._session.get("/agent")["state"])
+
+    def list_methods(self) -> list[dict[str, Any]]:
+        """Return the methods that come with mrbench: name, title, duration and kind of drive.
+
+        Raises:
+            ClientError: the service cannot be reached.
+        """
+        return list(self._session.get("/methods"))
+
+    def run(self, run_id: str) -> Run:
+        """Return a run by its id; nothing is requested yet."""
+        return Run(self._session, run_id)
+
+    def list_runs(self, limit: int = _PAGE_SIZE) -> list[RunState]:
+        """Return the newest runs, the newest first.
+
+        Args:
+            limit: largest number of runs.
+
+        Raises:
+            ClientError: the service cannot be reached.
+        """
+        return list(islice(self._iterate_runs(min(limit, _PAGE_SIZE)), limit))
+
+    def start(
+        self, method: str | Mapping[str, Any], specimen: str, operator: str = "", resume_after: str = ""
+    ) -> Run:
+        """Start a run and return it; the bench continues and records it if the script ends.
+
+        Args:
+            method: name of a method, or a document `mrbench.method/1`.
+            specimen: serial number of the damper.
+            operator: name of the person.
+            resume_after: checkpoint of the method after which the run starts; empty for its beginning.
+
+        Raises:
+            ClientError: the method or the start is refused, or the service or its agent cannot be reached.
+        """
+        request = {"method": method, "specimen": specimen, "operator": operator, "resume_after": resume_after}
+        return self.run(str(self._session.post("/runs", request, key=uuid.uuid4().hex)["id"]))
+
+    def stop(self) -> None:
+        """Stop a run or a setup step in a controlled way; harmless when nothing moves.
+
+        Raises:
+            ClientError: the service or its agent cannot be reached.
+        """
+        self._session.post("/agent/stop")
+
+    def _iterate_runs(self, page_size: int) -> Iterator[RunState]:
+        before = None
+        while True:
+            page = self._session.get("/runs", limit=page_size, before=before)
+            yield from map(parse_run_state, page["items"])
+            before = page["next"]
+            if before is None:
+                return

@@ -1,0 +1,127 @@
+"""HTTP session with the service, by the standard library only."""
+
+import json
+import shutil
+import ssl
+from collections.abc import Mapping
+from http.client import HTTPException
+from pathlib import Path
+from typing import Any
+from urllib.error import HTTPError, URLError
+from urllib.parse import quote, urldefrag, urlencode
+from urllib.request import Request, urlopen
+
+from bench.client.errors import ClientError
+from bench.log import write_atomically
+
+_TIMEOUT = 30.0
+"""Longest time [s] for one reply."""
+_TOKEN_FIELD = "token="
+"""Name of the token in the address that the service prints."""
+
+
+class Session:
+    """Requests to one service, each with the token.
+
+    Args:
+        url: address of the service, such as ``http://127.0.0.1:8600``; it may contain ``#token=...``.
+        token: token of the service; by default that of the address.
+        certificate: file with the certificate that an ``https`` service must have; by default those of the system.
+
+    Raises:
+        ClientError: there is no token, or the file with the certificate cannot be read.
+    """
+
+    def __init__(self, url: str, token: str | None = None, certificate: Path | None = None) -> None:
+        base, fragment = urldefrag(url)
+        self._base = f"{base.rstrip('/')}/api/v1"
+        self._token = token or fragment.removeprefix(_TOKEN_FIELD)
+        if not self._token:
+            raise ClientError(f"{base}: the token is missing; `mrbench serve` prints it at its first start")
+        self._tls = None if certificate is None else _make_tls_context(certificate)
+
+    def get(self, path: str, **query: object) -> Any:
+        """Return the reply to GET, decoded from JSON; parts of the query that are None are left out.
+
+        Raises:
+            ClientError: the service refuses or cannot be reached.
+        """
+        given = {name: value for name, value in query.items() if value is not None}
+        with self._request("GET", f"{path}?{urlencode(given)}" if given else path) as reply:
+            return _decode(path, reply.read())
+
+    def post(self, path: str, content: Mapping[str, Any] | None = None, key: str | None = None) -> Any:
+        """Return the reply to POST, decoded from JSON.
+
+        Args:
+            path: path below ``/api/v1``.
+            content: body of the request.
+            key: idempotency key; a repeated request with the same key has no further effect.
+
+        Raises:
+            ClientError: the service refuses or cannot be reached.
+        """
+        headers = {} if key is None else {"Idempotency-Key": key}
+        body = b"" if content is None else json.dumps(content).encode()
+        with self._request("POST", path, body, headers) as reply:
+            return _decode(path, reply.read())
+
+    def download(self, path: str, to: Path) -> Path:
+        """Download a file, which appears complete or not at all, and return its path.
+
+        Raises:
+            ClientError: the service refuses or cannot be reached, or the download breaks off.
+            LogError: the file cannot be written.
+        """
+        with write_atomically(to) as partial, self._request("GET", path) as reply:
+            try:
+                with partial.open("wb") as file:
+                    shutil.copyfileobj(reply, file)
+            except (OSError, HTTPException) as error:
+                raise ClientError(f"{to}: the download of {path} failed ({error}); repeat it") from error
+            received, announced = partial.stat().st_size, reply.headers["Content-Length"]
+            if announced is not None and received != int(announced):
+                raise ClientError(f"{to}: {received} of {announced} bytes of {path} arrived; repeat the download")
+        return to
+
+    def _request(
+        self, method: str, path: str, content: bytes | None = None, headers: Mapping[str, str] | None = None
+    ) -> Any:
+        given = {"Authorization": f"Bearer {self._token}", "Content-Type": "application/json", **(headers or {})}
+        request = Request(self._base + path, content, given, method=method)
+        try:
+            return urlopen(request, timeout=_TIMEOUT, context=self._tls)
+        except HTTPError as error:
+            with error:
+                raise _make_refusal(path, error) from None
+        except (URLError, OSError, HTTPException) as error:
+            raise ClientError(f"the service at {self._base} does not reply to {path}: {error}") from error
+
+
+def quote_name(name: str) -> str:
+    """Return a name as one component of a path."""
+    return quote(name, safe="")
+
+
+def _make_tls_context(certificate: Path) -> ssl.SSLContext:
+    try:
+        return ssl.create_default_context(cafile=certificate)
+    except (OSError, ssl.SSLError) as error:
+        raise ClientError(f"{certificate}: not a readable certificate ({error}); give a PEM file") from error
+
+
+def _decode(path: str, reply: bytes) -> Any:
+    try:
+        return json.loads(reply)
+    except ValueError as error:
+        raise ClientError(f"the reply to {path} is not JSON; check that the service listens there") from error
+
+
+def _make_refusal(path: str, error: HTTPError) -> ClientError:
+    """Return the error for a refusal: its problem, or its status if the reply is not from the service."""
+    try:
+        problem = json.load(error)
+        return ClientError(f"the service refused {path}: {problem['detail']}", error.code, problem["type"])
+    except (ValueError, KeyError, TypeError):
+        hint = "check that the service listens at this address"
+        return ClientError(f"the service refused {path}: HTTP {error.code}; {hint}", error.code)

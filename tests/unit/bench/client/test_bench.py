@@ -1,0 +1,111 @@
+"""Client of the service, against the service itself."""
+
+import time
+
+import numpy as np
+import pytest
+
+from bench.client import Bench, ClientError
+from tests.support.service_logs import write_complete_log, write_truncated_log
+
+TIMEOUT = 20.0
+
+
+def await_run(bench, run_id):
+    """Wait until the service has found a log in its data folder."""
+    deadline = time.monotonic() + TIMEOUT
+    while run_id not in {run.id for run in bench.list_runs()}:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return bench.run(run_id)
+
+
+def test_three_lines_return_a_run_as_arrays_with_units(service, bench):
+    write_complete_log(service.data / "one.mcap", run="one")
+    await_run(bench, "one")
+    arrays = Bench(service.url, service.token).run("one").arrays()
+    assert np.max(arrays["force"]) == pytest.approx(50.0, rel=1e-3)
+    assert arrays["time"][-1] == pytest.approx(1.998)
+    assert [arrays.units[name] for name in ("time", "force", "displacement", "velocity", "coil_drive")] == [
+        "s", "N", "m", "m/s", "V",
+    ]  # fmt: skip
+    assert set(arrays) == set(arrays.units)
+    assert len({len(values) for values in arrays.values()}) == 1
+    assert "1000 samples: time [s]" in repr(arrays)
+
+
+def test_a_run_is_started_watched_and_stopped(service, bench):
+    run = bench.start("quick", "damper 7", operator="M. Curie")
+    state = run.get_state()
+    assert (state.specimen, state.operator, state.method, state.state) == (
+        "damper 7",
+        "M. Curie",
+        "quick",
+        "running",
+    )
+    assert bench.get_state() == "running"
+    run.stop()
+    assert bench.get_state() == "stopping"
+    service.agent.finish("incomplete", "stopped on request")
+    ended = run.wait(TIMEOUT)
+    assert (ended.state, ended.outcome, ended.reason) == ("ended", "incomplete", "stopped on request")
+
+
+def test_the_bench_is_stopped_without_the_id_of_a_run(bench):
+    bench.start("quick", "damper 7")
+    bench.stop()
+    assert bench.get_state() == "stopping"
+
+
+def test_waiting_ends_after_the_given_time(bench):
+    run = bench.start("quick", "damper 7")
+    with pytest.raises(ClientError, match=rf"run {run.id} has not ended within 0 s; its state is running"):
+        run.wait(0.0)
+
+
+def test_jobs_are_waited_for(service, bench):
+    write_complete_log(service.data / "one.mcap", run="one")
+    run = await_run(bench, "one")
+    with pytest.raises(ClientError, match="has not been evaluated"):
+        run.wait_for_jobs(0.0)
+    bench._session.post(f"/jobs/{run.get_state().jobs[0].id}/cancel")
+    assert "cancelled" in {job.state for job in run.wait_for_jobs(TIMEOUT).jobs}
+
+
+def test_runs_are_listed_over_several_pages(service, bench, monkeypatch):
+    for number in range(5):
+        write_complete_log(service.data / f"{number}.mcap", run=f"run-{number}")
+    await_run(bench, "run-4")
+    monkeypatch.setattr("bench.client.bench._PAGE_SIZE", 2)
+    assert sorted(run.id for run in bench.list_runs(50)) == [f"run-{number}" for number in range(5)]
+    assert len(bench.list_runs(3)) == 3
+
+
+def test_methods_are_listed(bench):
+    assert "quick" in {method["name"] for method in bench.list_methods()}
+
+
+def test_a_refusal_has_the_message_status_and_kind_of_the_problem(bench):
+    with pytest.raises(ClientError, match="there is no run nothing") as error:
+        bench.run("nothing").get_state()
+    assert (error.value.status, error.value.kind) == (404, "urn:mrbench:problem:not-found")
+
+
+def test_a_truncated_log_has_no_arrays(service, bench):
+    write_truncated_log(service.data / "one.mcap", run="one")
+    deadline = time.monotonic() + TIMEOUT
+    while not (runs := bench.list_runs()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    with pytest.raises(Exception, match=r"run\.mcap"):
+        bench.run(runs[0].id).arrays()
+
+
+def test_files_are_downloaded(service, bench, tmp_path):
+    log = write_complete_log(service.data / "one.mcap", run="one")
+    target = tmp_path / "copies"
+    target.mkdir()
+    copy = await_run(bench, "one").download_log(target / "copy.mcap")
+    assert copy.read_bytes() == log.read_bytes()
+    with pytest.raises(ClientError, match="there is no fit of run one"):
+        bench.run("one").download_report(target / "report.html")

@@ -23,7 +23,7 @@ export class Problem extends Error {
   }
 }
 
-/** Moves a token from the address into this tab's storage, so that no bookmark or screenshot contains it. */
+/** Moves a token from the address into the storage of this tab, so that no bookmark or screenshot contains it. */
 export function takeToken() {
   const given = new URLSearchParams(location.hash.slice(1)).get("token");
   if (given) {
@@ -33,15 +33,19 @@ export function takeToken() {
   return token();
 }
 
-export const token = () => sessionStorage.getItem(TOKEN_KEY);
-export const keepToken = (value) => sessionStorage.setItem(TOKEN_KEY, value);
-export const forgetToken = () => sessionStorage.removeItem(TOKEN_KEY);
+export const token = () => sessionStorage.getItem(TOKEN_KEY) ?? localStorage.getItem(TOKEN_KEY);
 
-/** Address of the live websocket. Browsers cannot send headers there, so the token is in the query. */
+/** Keeps a token in this tab, or in this browser until another is given. */
+export function keepToken(value, inBrowser = false) {
+  localStorage.removeItem(TOKEN_KEY);
+  sessionStorage.setItem(TOKEN_KEY, value);
+  if (inBrowser) localStorage.setItem(TOKEN_KEY, value);
+}
+
+/** Address of the live websocket. */
 export function liveAddress() {
   const address = new URL("live", BASE);
   address.protocol = address.protocol.replace("http", "ws");
-  address.searchParams.set("token", token() ?? "");
   return address.href;
 }
 
@@ -82,6 +86,10 @@ function describeFailure(error, timeout) {
 }
 
 async function readProblem(response) {
+  if (response.status === 401) {
+    document.dispatchEvent(new Event("unauthorised")); // one place asks for another token
+    return new Problem(401, "Not signed in", "The service does not accept this token.");
+  }
   const { title, detail } = await response.json().catch(() => ({}));
   const text = typeof detail === "string" ? detail : "";
   return new Problem(response.status, title ?? `${response.status} ${response.statusText}`, text);

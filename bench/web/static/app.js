@@ -1,15 +1,25 @@
 // Entry point: creates the parts of the page and distributes the messages of the service to them.
 
-import { forgetToken, get, keepToken, takeToken } from "./api.js";
+import { get, keepToken, takeToken } from "./api.js";
+import { openDialog } from "./dialogs.js";
+import { EventList } from "./events.js";
 import { byId, fixed, write } from "./format.js";
-import { showEvent, showInstruments, showWarnings } from "./instruments.js";
-import { FIELDS, LiveLink, QUANTITIES, Readings, fillCoilChannel } from "./live.js";
+import { HealthStrip } from "./health.js";
+import { greyInstruments, showInstruments, showWarnings } from "./instruments.js";
+import { LiveLink, fillCoilChannel } from "./live.js";
+import { PlanView } from "./plan.js";
 import { LivePlots, STRIP_SECONDS } from "./plots.js";
-import { SetupPanel } from "./prepare.js";
+import { Preparation } from "./prepare.js";
+import { FIELDS, QUANTITIES } from "./quantities.js";
+import { Readings } from "./readings.js";
 import { SampleRing } from "./ring.js";
+import { Router } from "./router.js";
+import { RunView } from "./run.js";
 import { RunList } from "./runs.js";
+import { ServiceClock } from "./service_clock.js";
 import { StartForm } from "./start.js";
 import { TopBar } from "./topbar.js";
+import { offerUnits } from "./units.js";
 
 /** Silence [s] after which the status is requested by REST; the agent publishes it four times a second. */
 const REQUEST_AFTER = 0.9;
@@ -17,38 +27,70 @@ const REQUEST_AFTER = 0.9;
 const REQUEST_EVERY = { fresh: 400, stale: 3_000 };
 
 const ring = new SampleRing(FIELDS);
-const runs = new RunList({ onSpecimens: (names) => form.suggestSpecimens(names) });
+const runView = new RunView();
+const runs = new RunList({
+  onSpecimens: (names) => form.suggestSpecimens(names),
+  onRun: (run) => runView.update(run),
+});
 const form = new StartForm({
   onStarted: (run) => {
     runs.update(run);
     byId("stop").focus(); // the next key can stop a run that was started here
   },
 });
-const bar = new TopBar({ onState: (state) => form.show({ state }) });
-const setup = new SetupPanel();
+const clock = new ServiceClock();
+const bar = new TopBar({
+  clock,
+  onState: (state) => {
+    form.show({ state });
+    if (state === "unknown") greyInstruments();
+  },
+});
+const preparation = new Preparation();
+const health = new HealthStrip();
+const events = new EventList();
+const plan = new PlanView();
 new Readings(ring, byId("readings"), STRIP_SECONDS);
-const plots = new LivePlots(ring, QUANTITIES, { loop: byId("plot-loop"), strips: byId("strips") });
+const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: byId("strips") });
+
+const router = new Router({
+  bench: ({ query }) => query.has("method") && form.choose(query.get("method")),
+  plan: (address) => plan.show(address),
+  run: (address) => runView.show(address),
+});
+
+offerUnits(() => {
+  plots.relabel();
+  plan.relabel();
+});
 
 let requesting = false;
 let requestedAt = -Infinity;
 let driveKind = "";
-let sampledAt = -Infinity;
+let sampledUtc = null;
 
 const HANDLERS = {
+  clock: ({ utc_s: utc }) => clock.update(utc),
   status(status) {
     bar.update(status);
     driveKind = status.drive_kind;
-    if (status.drive_unit) plots.nameDrive(`Drive [${status.drive_unit}]`);
-    showInstruments(status.instruments);
+    if (status.drive_unit && status.drive_unit !== QUANTITIES.drive.unit) {
+      QUANTITIES.drive.unit = status.drive_unit;
+      plots.relabel();
+    }
+    if (!bar.stale) showInstruments(status.instruments);
     showWarnings(status.warnings);
-    setup.update(status);
+    form.showDrive(status.drive_kind);
+    health.showStatus(status);
+    preparation.update(status);
   },
   samples(samples) {
     if (!samples.time_ns.length) return;
-    sampledAt = performance.now();
+    clock.update(samples.utc_s);
+    sampledUtc = samples.utc_s;
     ring.push(fillCoilChannel(samples, driveKind));
   },
-  event: showEvent,
+  event: (event) => events.add(event),
   run: (run) => runs.update(run),
   job: (job) => runs.updateJob(job),
 };
@@ -67,39 +109,39 @@ async function requestStatus() {
   try {
     HANDLERS.status(await get("agent"));
   } catch (problem) {
-    if (problem.unauthorised) askForToken("The service does not accept this token.");
-    else bar.showFailure(problem.after("Trying again"));
+    if (!problem.unauthorised) bar.showFailure(problem.after("Trying again"));
   } finally {
     requesting = false;
   }
 }
 
-/** Greys live values older than a second, and shows their age. */
+/** Greys live values older than a second, and shows the time since the newest was taken. */
 function showAge() {
-  const age = (performance.now() - sampledAt) / 1000;
+  const age = sampledUtc === null ? Infinity : clock.age(sampledUtc);
   const live = byId("live");
   live.classList.toggle("stale", age > 1);
   const text = age < 1 ? "" : Number.isFinite(age) ? `no samples for ${fixed(age, 0)} s` : "no samples yet";
   write(byId("live-age"), text);
 }
 
+/** Asks for the token. The refused one stays until another is given, so that Stop is still attempted with it. */
 function askForToken(reason) {
   link.close();
-  forgetToken();
   write(byId("token-reason"), reason);
-  if (!byId("token-dialog").open) byId("token-dialog").showModal();
+  openDialog("token-dialog");
 }
 
 function begin() {
   form.load();
   runs.load();
+  health.open();
   link.open();
   requestStatus();
+  router.go();
 }
 
-byId("token-dialog").addEventListener("cancel", (event) => event.preventDefault());
 byId("token-form").addEventListener("submit", () => {
-  keepToken(byId("token").value.trim());
+  keepToken(byId("token").value.trim(), byId("remember").checked);
   byId("token").value = "";
   begin();
 });
@@ -108,7 +150,8 @@ setInterval(() => {
   const due = performance.now() - requestedAt > (bar.stale ? REQUEST_EVERY.stale : REQUEST_EVERY.fresh);
   if (due && bar.age > REQUEST_AFTER && !byId("token-dialog").open) requestStatus();
 }, 200);
-addEventListener("hashchange", () => location.hash && takeToken() && begin());
+document.addEventListener("unauthorised", () => askForToken("The service does not accept this token."));
+addEventListener("hashchange", () => location.hash.startsWith("#token=") && takeToken() && begin());
 
 if (takeToken()) begin();
 else askForToken("");

@@ -25,11 +25,25 @@ export function shortTime(seconds) {
   return size < 60 ? `${fixed(seconds, 1)} s` : duration(seconds);
 }
 
-/** Formats an ISO 8601 instant as local date and time. */
+/** Formats an ISO 8601 instant as local date and time with its zone: `2025-03-04 10:13:30 UTC+01:00`. */
 export function instant(text) {
+  const date = new Date(text);
+  return localTime(text) === "–" ? "–" : `${localTime(text)} ${zone(date)}`;
+}
+
+/** Formats an ISO 8601 instant as local date and time, for a place that names the zone elsewhere. */
+export function localTime(text) {
   const date = new Date(text);
   if (!text || Number.isNaN(date.getTime())) return "–";
   return `${date.getFullYear()}-${pad(date.getMonth() + 1)}-${pad(date.getDate())} ${clock(date)}`;
+}
+
+/** Offset of local time from UTC at a date: `UTC+01:00`, or `UTC`. */
+export function zone(date = new Date()) {
+  const minutes = -date.getTimezoneOffset();
+  if (!minutes) return "UTC";
+  const size = Math.abs(minutes);
+  return `UTC${minutes > 0 ? "+" : "−"}${pad(Math.floor(size / 60))}:${pad(size % 60)}`;
 }
 
 export const clock = (date) => [date.getHours(), date.getMinutes(), date.getSeconds()].map(pad).join(":");

@@ -1,8 +1,7 @@
-// Table of the instruments and their wires, warnings of the agent, and list of events.
+// Table of the instruments and their wires, and warnings of the agent.
 
-import { byId, clock, element, fixed, shortTime, write } from "./format.js";
+import { byId, element, fixed, shortTime, write } from "./format.js";
 
-const EVENTS_KEPT = 12;
 const rows = new Map();
 
 /** Updates the table; rows keep their places, and only changed cells are written. */
@@ -21,6 +20,16 @@ export function showInstruments(instruments) {
       body.append(rows.get(instrument.name));
     }
     fill(rows.get(instrument.name), instrument);
+  }
+}
+
+/** Shows that nothing is known about the instruments at present. */
+export function greyInstruments() {
+  for (const row of rows.values()) {
+    const [mark, message] = row.children[1].children;
+    mark.className = "mark";
+    write(mark, "no data");
+    write(message, "");
   }
 }
 
@@ -55,14 +64,4 @@ export function showWarnings(warnings) {
   if (list.dataset.shown === JSON.stringify(warnings)) return;
   list.dataset.shown = JSON.stringify(warnings);
   list.replaceChildren(...warnings.map((text) => element("li", {}, text)));
-}
-
-/** Adds an event, newest first. */
-export function showEvent({ kind, text }) {
-  const list = byId("events");
-  if (!list.dataset.used) list.replaceChildren();
-  list.dataset.used = "yes";
-  list.prepend(element("li", { className: kind === "trip" || kind === "alarm" ? "attention" : "" },
-    element("time", { className: "number" }, clock(new Date())), ` ${kind.replaceAll("_", " ")}: ${text}`));
-  while (list.children.length > EVENTS_KEPT) list.lastChild.remove();
 }

@@ -1,7 +1,7 @@
 // Live plots with uPlot: traces of the last ten seconds, and force against displacement.
 
 import uPlot from "./vendor/uPlot.esm.js";
-import { element } from "./format.js";
+import { element, write } from "./format.js";
 import { envelope } from "./ring.js";
 
 export const STRIP_SECONDS = 10;
@@ -12,14 +12,25 @@ const MARGIN = 0.03; // share of an axis that stays free at each end
 
 /** Bounds of an axis that grow at once and shrink late, so that a moving plot stays readable. */
 class AxisRange {
-  constructor(least) {
-    this.least = least;
-    this.held = [-least / 2, least / 2];
+  constructor(quantity) {
+    this.quantity = quantity;
+    this.reset();
+  }
+
+  /** Smallest span, in the unit of the quantity. */
+  get least() {
+    return this.quantity.least * this.quantity.scale;
+  }
+
+  reset() {
+    this.held = [-this.least / 2, this.least / 2];
     this.filledAt = 0;
+    this.unit = this.quantity.unit;
   }
 
   /** Returns the bounds for values from `low` to `high`. */
   hold(low, high) {
+    if (this.unit !== this.quantity.unit) this.reset();
     if (!Number.isFinite(low) || !Number.isFinite(high)) return this.held;
     const [bottom, top] = this.held;
     const now = performance.now();
@@ -47,20 +58,20 @@ function roundStep(size) {
   return power * [1, 2, 5, 10].find((digit) => digit * power >= size * (1 - 1e-9));
 }
 
-const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const FONT = "11px system-ui, 'Segoe UI', Roboto, sans-serif";
 
-function axis(more) {
+export function axis(more) {
   return {
     stroke: () => colour("--soft"), font: FONT, gap: 4,
     grid: { stroke: () => colour("--line"), width: 1 }, ticks: { show: false }, ...more,
   };
 }
 
-const signed = (u, splits) => splits.map((value) => String(value).replace("-", "−"));
+export const signed = (u, splits) => splits.map((value) => String(value).replace("-", "−"));
 const secondsAgo = (u, splits) => splits.map((s) => (s === -STRIP_SECONDS ? "" : `${s} s`.replace("-", "−")));
 const unlabelled = (u, splits) => splits.map(() => "");
-const QUIET = { cursor: { show: false }, legend: { show: false }, select: { show: false } };
+export const QUIET = { cursor: { show: false }, legend: { show: false }, select: { show: false } };
 
 /** Creates a uPlot that fills its container and follows its size. */
 function fitted(place, options, data, afterwards) {
@@ -78,7 +89,8 @@ class Strip {
   constructor(ring, quantity, { place, caption, last, redraw }) {
     Object.assign(this, { ring, quantity, caption });
     this.data = [[], []];
-    const range = new AxisRange(quantity.least);
+    write(caption, this.label());
+    const range = new AxisRange(quantity);
     this.plot = fitted(place, {
       padding: [8, 12, last ? 0 : 8, 0],
       scales: { x: { time: false, range: () => [-STRIP_SECONDS, 0] }, y: { range: (u, low, high) => range.hold(low, high) } },
@@ -90,17 +102,22 @@ class Strip {
     }, this.data, redraw);
   }
 
+  label() {
+    return named(this.quantity);
+  }
+
   draw() {
     const bins = Math.max(100, Math.round(this.plot.width));
     this.plot.setData(envelope(this.ring, this.quantity, STRIP_SECONDS, bins, this.data));
   }
 }
 
-/** Force against displacement, with older parts fading. uPlot draws only the axes: the loop is no function of x. */
+/** One quantity against another, with older parts fading. uPlot draws only the axes: the loop is no function of x. */
 class Loop {
-  constructor(ring, across, up, place, redraw) {
-    Object.assign(this, { ring, across, up });
-    const ranges = [new AxisRange(across.least), new AxisRange(up.least)];
+  constructor(ring, across, up, { place, caption, redraw }) {
+    Object.assign(this, { ring, across, up, caption });
+    write(caption, this.label());
+    const ranges = [new AxisRange(across), new AxisRange(up)];
     const scale = (range) => ({ time: false, range: (u, low, high) => range.hold(low, high) });
     this.plot = fitted(place, {
       padding: [10, 14, 0, 0],
@@ -108,7 +125,11 @@ class Loop {
       axes: [axis({ size: 24, space: 50, values: signed }), axis({ size: 52, space: 34, values: signed })],
       series: [{}, { paths: () => null, points: { show: false } }],
       hooks: { draw: [(u) => this.trace(u)] },
-    }, [[-across.least / 2, across.least / 2], [null, null]], redraw);
+    }, [ranges[0].held, [null, null]], redraw);
+  }
+
+  label() {
+    return `${named(this.up)} against ${named(this.across).replace(/^./, (first) => first.toLowerCase())}`;
   }
 
   draw() {
@@ -164,13 +185,14 @@ class Loop {
 
 /** All live plots; they are drawn with the frames of the browser, and only after new samples. */
 export class LivePlots {
-  constructor(ring, quantities, { loop, strips }) {
+  constructor(ring, quantities, { loops, strips }) {
     this.ring = ring;
     this.drawn = -1;
     const redraw = () => { this.drawn = -1; };
-    this.plots = [new Loop(ring, quantities.displacement, quantities.force, loop, redraw)];
-    const shown = [quantities.force, quantities.displacement, quantities.drive, quantities.temperature];
-    shown.forEach((quantity, k) => this.plots.push(strip(ring, quantity, strips, k === shown.length - 1, redraw)));
+    const { force, displacement, velocity, drive, temperature } = quantities;
+    const crossed = [displacement, velocity].map((across) => loop(ring, across, force, loops, redraw));
+    const traced = [force, displacement, drive, temperature];
+    this.plots = [...crossed, ...traced.map((one, k) => strip(ring, one, strips, k === traced.length - 1, redraw))];
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
       for (const { plot } of this.plots) plot.redraw(false, true);
     });
@@ -187,16 +209,27 @@ export class LivePlots {
     for (const plot of this.plots) plot.draw();
   }
 
-  /** Sets the caption of the drive, whose unit is known only from the agent. */
-  nameDrive(text) {
-    for (const { caption, quantity } of this.plots) if (quantity?.field === "coil_drive") caption.textContent = text;
+  /** Writes the captions again, after a unit has changed. */
+  relabel() {
+    this.drawn = -1;
+    for (const plot of this.plots) write(plot.caption, plot.label());
   }
 }
 
+const named = (quantity) => `${quantity.label} [${quantity.unit}]`;
+
+function loop(ring, across, up, loops, redraw) {
+  const caption = element("figcaption");
+  const label = `${up.label} against ${across.label.toLowerCase()}, last ${LOOP_SECONDS} seconds`;
+  const place = element("div", { className: "plot", role: "img", "aria-label": label });
+  loops.append(element("figure", { className: "loop" }, caption, place));
+  return new Loop(ring, across, up, { place, caption, redraw });
+}
+
 function strip(ring, quantity, strips, last, redraw) {
-  const label = `${quantity.label} [${quantity.unit}]`;
-  const caption = element("figcaption", {}, label);
-  const place = element("div", { className: "plot", role: "img", "aria-label": `${label}, last ${STRIP_SECONDS} seconds` });
+  const caption = element("figcaption");
+  const label = `${quantity.label}, last ${STRIP_SECONDS} seconds`;
+  const place = element("div", { className: "plot", role: "img", "aria-label": label });
   strips.append(element("figure", { className: last ? "strip last" : "strip" }, caption, place));
   return new Strip(ring, quantity, { place, caption, last, redraw });
 }

@@ -1,18 +1,20 @@
-// List of the runs with outcome, fit, files and jobs.
+// Table of the runs with outcome, fit, jobs and actions.
 
-import { file, get, post } from "./api.js";
-import { byId, duration, element, fixed, instant, write } from "./format.js";
+import { get } from "./api.js";
+import { byId, duration, element, localTime, write, zone } from "./format.js";
+import { RunActions } from "./run_actions.js";
+import { describeFit, describeJob, describeOutcome, describeVerdict, isUnfinished } from "./run_facts.js";
+import { runAddress } from "./router.js";
 
 const PAGE = 20;
-const OUTCOMES = { clean: "good", lossy: "fair", truncated: "fair", incomplete: "bad" };
-const UNFINISHED = ["queued", "running"];
 
 export class RunList {
-  constructor({ onSpecimens }) {
-    this.onSpecimens = onSpecimens;
+  /** Takes functions that receive the known specimens, and every changed run. */
+  constructor({ onSpecimens, onRun }) {
+    Object.assign(this, { onSpecimens, onRun });
     this.runs = new Map();
-    this.notes = new Map();
     this.next = null;
+    this.actions = new RunActions({ onRun: (run) => this.update(run), onNote: () => this.show() });
     byId("older").addEventListener("click", () => this.load(this.next));
   }
 
@@ -34,6 +36,7 @@ export class RunList {
   update(run) {
     this.runs.set(run.id, run);
     this.show();
+    this.onRun(run);
   }
 
   /** Shows a changed job. */
@@ -42,14 +45,14 @@ export class RunList {
     if (!run) return;
     const others = run.jobs.filter(({ id }) => id !== job.id);
     this.update({ ...run, jobs: [...others, job] });
-    if (!UNFINISHED.includes(job.state)) this.refresh(run.id);
+    if (!isUnfinished(job)) this.refresh(run);
   }
 
-  async refresh(id) {
+  async refresh(run) {
     try {
-      this.update(await get(`runs/${encodeURIComponent(id)}`));
+      this.update(await get(`runs/${encodeURIComponent(run.id)}`));
     } catch (problem) {
-      this.note(id, problem.message);
+      this.actions.note(run, problem.message);
     }
   }
 
@@ -58,103 +61,21 @@ export class RunList {
     const focused = document.activeElement?.dataset?.key;
     byId("runs").replaceChildren(...runs.map((run) => this.row(run)));
     if (focused) byId("runs").querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+    write(byId("runs-zone"), `(${zone()})`);
     write(byId("runs-note"), runs.length ? "" : "No runs yet.");
     byId("older").hidden = !this.next;
     this.onSpecimens([...new Set(runs.map(({ specimen }) => specimen).filter(Boolean))]);
   }
 
   row(run) {
+    const link = element("a", { href: runAddress(run.id) }, localTime(run.started));
+    link.dataset.key = `${run.id}/open`;
     return element("tr", {},
-      element("th", { scope: "row" }, ...instant(run.started).split(" ").map(whole), element("small", {}, run.operator)),
+      element("th", { scope: "row", className: "number" }, link, element("small", {}, run.operator)),
       element("td", {}, run.specimen || "unnamed", element("small", {}, `${run.method}, ${duration(run.duration_s)}`)),
-      outcome(run), fit(run), this.files(run), this.identification(run));
+      element("td", {}, ...describeOutcome(run)),
+      element("td", {}, ...describeFit(run), run.diagnosis ? element("small", {}, `Gap ${describeVerdict(run.diagnosis)}`) : null),
+      element("td", {}, ...run.jobs.toReversed().map((job) => element("small", { className: "job" }, describeJob(job)))),
+      element("td", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), this.actions.answer(run)));
   }
-
-  files(run) {
-    const cell = element("td", { className: "actions files" });
-    for (const [name, exists] of [["log", true], ["fit", fitted(run)], ["report", fitted(run)]]) {
-      const label = `${name[0].toUpperCase()}${name.slice(1)} of the run of ${instant(run.started)}`;
-      cell.append(this.button(run, name, name, exists, () => this.open(run, name), label));
-    }
-    return cell;
-  }
-
-  identification(run) {
-    const job = run.jobs.at(-1);
-    const id = encodeURIComponent(run.id);
-    let button = this.button(run, "job", "Identify", ended(run), () => this.attempt(run, "Not requested", `runs/${id}/identify`));
-    if (job && UNFINISHED.includes(job.state)) {
-      const path = `jobs/${encodeURIComponent(job.id)}/cancel`;
-      button = this.button(run, "job", "Cancel", true, () => this.attempt(run, "Not cancelled", path));
-    } else if (run.state === "truncated") {
-      button = this.button(run, "job", "Salvage", true, () => this.attempt(run, "Not salvaged", `runs/${id}/salvage`));
-    }
-    return element("td", { className: "actions" },
-      button, job ? describeJob(job) : "",
-      element("small", { className: "problem", role: "status" }, this.notes.get(run.id) ?? ""));
-  }
-
-  button(run, key, text, enabled, act, label = `${text}: run of ${instant(run.started)}`) {
-    const button = element("button", { type: "button", disabled: !enabled, "aria-label": label }, text);
-    button.dataset.key = `${run.id}/${key}`;
-    button.addEventListener("click", act);
-    return button;
-  }
-
-  note(id, text) {
-    this.notes.set(id, text);
-    this.show();
-  }
-
-  /** Opens the report in a new tab; saves logs and fits. */
-  async open(run, name) {
-    // The tab is opened now, because browsers allow it only during a click and the file arrives later.
-    const tab = name === "report" ? window.open("", "_blank") : null;
-    try {
-      const { blob, name: fileName } = await file(`runs/${encodeURIComponent(run.id)}/${name}`);
-      const address = URL.createObjectURL(blob);
-      if (tab) tab.location.replace(address);
-      else element("a", { href: address, download: fileName }).click();
-      setTimeout(() => URL.revokeObjectURL(address), 60_000);
-      this.note(run.id, "");
-    } catch (problem) {
-      tab?.close();
-      this.note(run.id, problem.after(`No ${name}`));
-    }
-  }
-
-  async attempt(run, failure, path) {
-    this.notes.delete(run.id);
-    try {
-      await post(path);
-      await this.refresh(run.id);
-    } catch (problem) {
-      this.note(run.id, problem.after(failure));
-    }
-  }
-}
-
-const ended = (run) => Boolean(run.outcome);
-const fitted = (run) => run.jobs.some((job) => job.state === "done");
-
-function outcome(run) {
-  const text = (run.outcome ?? run.state).replaceAll("_", " ");
-  const kind = OUTCOMES[run.outcome ?? run.state] ?? "plain";
-  return element("td", {}, element("span", { className: `mark ${kind}` }, text), element("small", {}, run.reason ?? ""));
-}
-
-function fit(run) {
-  const { rmse_n: rmse, noise_floor_n: floor } = run;
-  if (!fitted(run)) return element("td", {}, "–");
-  const ratio = floor > 0 ? `${fixed(rmse / floor, 2)} times the noise floor` : "noise floor not known";
-  return element("td", {}, element("span", { className: "number" }, `${newtons(rmse)} / ${newtons(floor)}`),
-    element("small", {}, run.result === "converged" ? ratio : `${ratio}; ${run.result}`));
-}
-
-const newtons = (force) => (force === null ? "–" : `${fixed(force, 2)}\u00a0N`);
-/** A date or time without line break, followed by a space for one. */
-const whole = (text) => element("span", { className: "number whole" }, `${text} `);
-
-function describeJob(job) {
-  return [job.state, job.state === "running" ? job.activity : "", job.error].filter(Boolean).join(": ");
 }

@@ -9,6 +9,7 @@ const OPERATOR = "mrbench.operator";
 const OBSTACLES = {
   idle: "",
   unknown: "The bench does not answer.",
+  absent: "This service has no rig.",
   preparing: "A run or a setup step is being prepared.",
   running: "A run is in progress.",
   stopping: "The run is being stopped.",
@@ -29,15 +30,42 @@ export class StartForm {
     byId("start-form").addEventListener("input", () => this.show({ problem: "" }));
   }
 
-  /** Loads the methods; the selection is kept. */
+  /** Loads the methods, the shortest first; the selection is kept. */
   async load() {
     try {
       const methods = await get("methods");
-      const chosen = this.method() ?? methods[0]?.name;
-      byId("methods").replaceChildren(...methods.map((method) => choice(method, method.name === chosen)));
+      const chosen = this.method() ?? this.wanted;
+      this.methods = methods.sort((a, b) => a.duration_s - b.duration_s);
+      this.list(chosen);
     } catch (problem) {
       byId("methods").replaceChildren(element("p", { className: "problem" }, problem.after("The methods cannot be listed")));
     }
+  }
+
+  /** Shows the drive of the bench, which decides the methods that it can run. */
+  showDrive(kind) {
+    if (!kind || kind === this.driveKind) return;
+    this.driveKind = kind;
+    this.list(this.method());
+  }
+
+  /** Lists the methods; those for another drive are named apart, because this bench cannot run them. */
+  list(chosen) {
+    if (!this.methods) return;
+    const fits = ({ drive_kind: kind }) => !this.driveKind || kind === this.driveKind;
+    const possible = this.methods.filter(fits);
+    const selected = possible.find(({ name }) => name === chosen)?.name ?? possible[0]?.name;
+    const others = this.methods.filter((method) => !fits(method)).map(({ name }) => name);
+    byId("methods").replaceChildren(...possible.map((method) => choice(method, method.name === selected)));
+    if (!others.length) return;
+    const drive = describeDriveKind(this.driveKind);
+    byId("methods").append(element("p", { className: "soft" }, `Not on this bench, which commands the ${drive}: ${others.join(", ")}.`));
+  }
+
+  /** Selects a method by name, if it is listed, now or once the list is loaded. */
+  choose(name) {
+    this.wanted = name;
+    this.list(name);
   }
 
   method() {
@@ -81,6 +109,6 @@ function choice(method, checked) {
   const facts = [duration(method.duration_s), describeDriveKind(method.drive_kind)].filter(Boolean).join(", ");
   return element("label", { className: "choice" },
     element("input", { type: "radio", name: "method", value: method.name, checked, required: true }),
-    element("span", {}, element("strong", {}, method.title || method.name),
-      element("span", { className: "soft" }, `${method.name}, ${facts}`)));
+    element("span", {}, element("strong", {}, method.name), ` ${facts}`,
+      element("span", { className: "soft title" }, method.title)));
 }

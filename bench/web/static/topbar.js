@@ -1,7 +1,9 @@
 // Bar that is always visible: state of the bench, current run, Stop, and Reset after a trip.
 
+import { TripAlarm } from "./alarm.js";
 import { get, post } from "./api.js";
-import { byId, clock, duration, fixed, write } from "./format.js";
+import { leaveDialogs, onAnswer, openDialog } from "./dialogs.js";
+import { byId, clock, duration, fixed, write, zone } from "./format.js";
 
 const STATE_NAMES = {
   unknown: "No connection",
@@ -14,19 +16,25 @@ const STATE_NAMES = {
 const MOVING = ["preparing", "running", "stopping"];
 const STALE_S = 1.5;
 const STOP_TIMEOUT_MS = 3_000;
-/** Elements on which Space has another function. Stop itself is a button, so that Space on it stops as well. */
-const USES_SPACE = "input, select, textarea, button, a[href], summary, [contenteditable]";
+/**
+ * Elements on which Space has another function. Stop itself is a button, so that Space on it stops as well. The
+ * buttons of a dialog are not among them: while something moves, no question is as urgent as Stop.
+ */
+const USES_SPACE = "input, select, textarea, button:not(dialog button), a[href], summary, [contenteditable]";
 
 export class TopBar {
-  constructor({ onState }) {
+  /** `clock` is the clock of the service, on which the age of a status is judged. */
+  constructor({ onState, clock }) {
     this.onState = onState;
+    this.clock = clock;
     this.status = null;
     this.failure = "";
-    this.updatedAt = performance.now();
+    this.openedAt = performance.now();
     this.state = null;
+    this.alarm = new TripAlarm();
     byId("stop").addEventListener("click", () => this.stop());
     byId("reset").addEventListener("click", () => this.askForReset());
-    byId("reset-dialog").addEventListener("close", () => byId("reset-dialog").returnValue === "reset" && this.reset());
+    onAnswer("reset-dialog", "reset", () => this.reset());
     document.addEventListener("keydown", (event) => this.onKey(event), { capture: true });
     setInterval(() => this.show(), 100);
   }
@@ -35,7 +43,7 @@ export class TopBar {
   update(status) {
     this.status = status;
     this.failure = "";
-    this.updatedAt = performance.now();
+    this.clock.update(status.utc_s);
     this.show();
   }
 
@@ -44,9 +52,10 @@ export class TopBar {
     this.failure = reason;
   }
 
-  /** Age [s] of the latest status. */
+  /** Time [s] since the agent made the latest status, whenever it arrived; since the page was opened without one. */
   get age() {
-    return (performance.now() - this.updatedAt) / 1000;
+    if (this.status) return this.clock.age(this.status.utc_s);
+    return (performance.now() - this.openedAt) / 1000;
   }
 
   get stale() {
@@ -69,8 +78,10 @@ export class TopBar {
     if (state !== this.state) this.enter(state);
     const word = this.status || this.stale ? STATE_NAMES[state] : "Connecting";
     write(byId("state-word"), word);
-    document.title = `${word} – mrbench`;
+    document.title = `${word} – ${document.body.dataset.title} – mrbench`;
     write(byId("bar-line"), this.line(state));
+    // Without news of the bench, its last trip still stands.
+    this.alarm.show(this.status?.state === "tripped" ? this.status.trip || "no reason given" : "");
     this.showProgress(state);
   }
 
@@ -92,7 +103,7 @@ export class TopBar {
     const description = `${run.method} on ${run.specimen || "an unnamed specimen"}`;
     if (state === "idle") return `Last run: ${description}: ${[run.outcome, run.reason].filter(Boolean).join(", ")}.`;
     const by = run.operator ? ` by ${run.operator}` : "";
-    return `${description}, started ${clock(new Date(run.started))}${by}`;
+    return `${description}, started ${clock(new Date(run.started))} ${zone(new Date(run.started))}${by}`;
   }
 
   showProgress(state) {
@@ -110,14 +121,16 @@ export class TopBar {
     byId("bar-detail").classList.toggle("problem", problem);
   }
 
-  /** Stops on Escape, and on Space where it has no other function; both only while something may move. */
+  /**
+   * Stops on Escape, and on Space where it has no other function; both only while something may move, and also while
+   * a dialog is open. Otherwise Escape leaves the dialog.
+   */
   onKey(event) {
-    const isPlain = !event.repeat && !event.ctrlKey && !event.altKey && !event.metaKey;
-    if (!isPlain || !this.moving || document.querySelector("dialog[open]")) return;
-    const stops = event.key === "Escape" || (event.key === " " && !event.target.closest?.(USES_SPACE));
-    if (!stops) return;
-    event.preventDefault();
-    this.stop();
+    if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) return;
+    const escape = event.key === "Escape";
+    const stops = this.moving && (escape || (event.key === " " && !event.target.closest?.(USES_SPACE)));
+    if (stops) this.stop();
+    if (stops || (escape && leaveDialogs())) event.preventDefault();
   }
 
   async stop() {
@@ -136,8 +149,7 @@ export class TopBar {
 
   askForReset() {
     write(byId("reset-reason"), this.status?.trip ?? "");
-    byId("reset-dialog").returnValue = "";
-    byId("reset-dialog").showModal();
+    openDialog("reset-dialog");
   }
 
   async reset() {

@@ -1,0 +1,103 @@
+// Plan: choose a method, see its strokes and limits, and preview motion and drive over time.
+
+import { get } from "./api.js";
+import { significant } from "./fit_tables.js";
+import { byId, describeDriveKind, duration, element, fixed, write } from "./format.js";
+import { PlanPlot } from "./plan_plot.js";
+import { QUANTITIES } from "./quantities.js";
+
+export class PlanView {
+  constructor() {
+    this.name = "";
+    this.plots = [];
+  }
+
+  /** Shows the method of an address; without one, only the list. */
+  async show({ id }) {
+    this.name = id;
+    try {
+      await this.list();
+      if (id) await this.load(id);
+    } catch (problem) {
+      write(byId("plan-note"), problem.after("The method cannot be shown"));
+    }
+  }
+
+  async list() {
+    const methods = (await get("methods")).sort((a, b) => a.duration_s - b.duration_s);
+    byId("plan-methods").replaceChildren(...methods.map(({ name, title, duration_s: length }) => {
+      const link = element("a", { href: `#/plan/${encodeURIComponent(name)}` }, element("strong", {}, name), ` ${duration(length)}`);
+      if (name === this.name) link.setAttribute("aria-current", "page");
+      return element("li", {}, link, element("small", {}, title));
+    }));
+  }
+
+  async load(name) {
+    write(byId("plan-note"), "Loading …");
+    const path = `methods/${encodeURIComponent(name)}`;
+    const [method, preview] = await Promise.all([get(path), get(`${path}/preview`)]);
+    if (name !== this.name) return; // another method was chosen meanwhile
+    write(byId("plan-title"), method.title);
+    write(byId("plan-note"), "");
+    this.build(method, preview);
+  }
+
+  build(method, preview) {
+    const use = element("a", { className: "button primary", href: `#/bench?method=${encodeURIComponent(method.name)}` }, "Use on the bench");
+    const places = element("div", { className: "previews" });
+    byId("plan").replaceChildren(
+      element("p", {}, method.description), facts(method, preview), element("p", { className: "actions" }, use),
+      element("h3", {}, "Preview"), places, element("h3", {}, "Segments"), segmentTable(method, preview));
+    const drive = { ...QUANTITIES.drive, unit: preview.drive_unit };
+    for (const plot of this.plots) plot.destroy();
+    this.plots = [
+      new PlanPlot(QUANTITIES.displacement, preview.displacement_m, preview, places),
+      new PlanPlot(drive, preview.drive, preview, places),
+    ];
+  }
+
+  /** Shows the method again, in changed units. */
+  relabel() {
+    if (this.name) this.load(this.name).catch((problem) => write(byId("plan-note"), problem.message));
+  }
+}
+
+function facts(method, preview) {
+  const { limits } = method;
+  const [length, speed, force] = [QUANTITIES.displacement, QUANTITIES.velocity, QUANTITIES.force];
+  const shown = (value, quantity) => `${significant(value * quantity.scale)} ${quantity.unit}`;
+  const checkpoints = preview.segments.filter((segment) => segment.checkpoint).map(({ name }) => name);
+  const rows = {
+    Duration: duration(preview.duration_s),
+    Drive: describeDriveKind(method.drive_kind),
+    "Sampling rate": `${method.rate_hz} Hz`,
+    "Limit of displacement": `± ${shown(limits.stroke_m, length)}`,
+    "Limit of velocity": shown(limits.velocity_mps, speed),
+    "Limit of acceleration": `${limits.acceleration_mps2} m/s²`,
+    "Limit of force": shown(limits.force_n, force),
+    "Limit of drive": `${limits.drive} ${preview.drive_unit}`,
+    Checkpoints: checkpoints.join(", ") || "none",
+  };
+  return element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, text]) =>
+    element("div", {}, element("dt", {}, name), element("dd", {}, text))));
+}
+
+/** Segments as they will be logged: a staircase of drives becomes one segment for each level. */
+function segmentTable(method, preview) {
+  const planned = (name) => method.segments.find((one) => name === one.name || name.startsWith(`${one.name}_`));
+  const rows = preview.segments.map(({ name, start_s: start, end_s: end }) => element("tr", {},
+    element("th", { scope: "row" }, name), element("td", {}, describeMotion(planned(name))),
+    element("td", { className: "number right" }, `${fixed(start, 1)} s`), element("td", { className: "number right" }, `${fixed(end - start, 1)} s`)));
+  const heads = ["Segment", "Motion", "Starts", "Lasts"].map((text, k) =>
+    element("th", { scope: "col", className: k > 1 ? "right" : "" }, text));
+  return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": "Segments" },
+    element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
+}
+
+function describeMotion(segment) {
+  if (!segment) return "–";
+  const { kind, amplitude_m: amplitude, frequency_hz: frequency } = segment.motion;
+  const { scale, unit } = QUANTITIES.displacement;
+  const size = amplitude ? `${significant(amplitude * scale)} ${unit}` : "";
+  return [kind, size, frequency ? `${frequency} Hz` : ""].filter(Boolean).join(", ");
+}

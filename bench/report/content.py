@@ -5,6 +5,7 @@ from typing import NamedTuple
 import orjson
 from markupsafe import Markup, escape
 
+from bench.endings import read_ending
 from bench.log import Log, utc_at
 from bench.report.documents import DelayEstimate, DriveError, Estimate, Fit
 from bench.report.summary import is_gauge
@@ -150,12 +151,22 @@ def make_header_rows(log: Log, sha256: str) -> PropertyRows:
         ("Recorded", _format_start_time(run.get("utc_offset", ""), int(log.samples["time_ns"][0]))),
         ("Operator", run.get("operator", "")),
         ("Length", f"{len(time)} samples, {format_significant(float(time[-1]), 4)} s"),
+        ("Ending", _describe_ending(log)),
+        ("Continues", _shorten(run.get("continues", ""))),
         ("Drive", f"{run.get('drive_kind', '')} [{run.get('drive_unit', '')}]"),
         ("Recorded with", _format_pairs(run.get("versions", ""))),
         ("Log", log.path.name),
         ("SHA-256", sha256),
     ]
     return [(name, value) for name, value in rows if value]
+
+
+def _describe_ending(log: Log) -> str:
+    """Return the ending of the run with its reason; empty for an import, and if it is not known."""
+    if log.metadata.get("run", {}).get("source") != "run":
+        return ""
+    record = log.metadata.get("outcome", {})
+    return ": ".join(filter(None, [read_ending(record), record.get("reason", "")]))
 
 
 def _format_start_time(utc_offset: str, first_ns: int) -> str:

@@ -1,4 +1,4 @@
-"""Access to the service by a token, which is printed once."""
+"""Access to the service by a token, which is shown once on a terminal, or kept in a file of its owner."""
 
 import hashlib
 import hmac
@@ -8,6 +8,8 @@ from pathlib import Path
 
 TOKEN_FILE = "token.sha256"
 """File in the data folder with the hash of the token, not the token itself."""
+PLAIN_TOKEN_FILE = "token"
+"""File in the data folder with the token, for a service without a terminal; only its owner can read it."""
 
 
 class Access:
@@ -38,8 +40,16 @@ def open_access(data: Path, *, new: bool = False) -> tuple[Access, str | None]:
     if path.exists() and not new:
         return Access(path.read_text("ascii").strip()), None
     token = secrets.token_urlsafe(32)
+    (data / PLAIN_TOKEN_FILE).unlink(missing_ok=True)  # it contains the old one
     _write_privately(path, _compute_sha256(token))
     return Access(_compute_sha256(token)), token
+
+
+def save_token(data: Path, token: str) -> Path:
+    """Write the token into a file that only its owner can read, and return its path."""
+    path = data / PLAIN_TOKEN_FILE
+    _write_privately(path, token)
+    return path
 
 
 def _compute_sha256(token: str) -> str:

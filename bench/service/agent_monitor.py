@@ -91,8 +91,12 @@ class AgentMonitor:
 
     @property
     def latest_status(self) -> AgentStatus | None:
-        """Latest status, or None if it is older than `STATUS_LIFETIME`."""
-        return self._status if time.monotonic() - self._status_at < STATUS_LIFETIME else None
+        """Latest status, or None if it was made or has arrived longer ago than `STATUS_LIFETIME`."""
+        status = self._status
+        if status is None or time.monotonic() - self._status_at > STATUS_LIFETIME:
+            return None
+        # A message may have waited in a queue, for example while the agent was suspended.
+        return status if time.time() - status.utc_s < STATUS_LIFETIME else None
 
     def get_status(self, timeout: float = 1.0) -> AgentStatus:
         """Return the current status; request it if the latest one is too old.
@@ -172,4 +176,5 @@ def join_batches(batches: list[Samples]) -> Samples:
             for name in names
         },
         segment=batches[-1].segment,
+        utc_s=batches[-1].utc_s,
     )

@@ -1,35 +1,40 @@
 """Web application: routes, access check, errors, static page, and the objects with the same lifetime."""
 
 import asyncio
-import logging
 from collections.abc import AsyncIterator, Callable
-from concurrent.futures import Future
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from fastapi import Depends, FastAPI
-from fastapi.security import HTTPAuthorizationCredentials, HTTPBearer
+from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from bench.agent_protocol import AgentStatus
-from bench.catalogue import Catalogue, JobRow, RunRow, make_sqlite_url, open_database
-from bench.jobs import JobEngine, JobManager
+from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
+from bench.disk import SpaceMonitor
+from bench.jobs import JobEngine, JobManager, make_job_view
 from bench.service import problems
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentLink, AgentMonitor
-from bench.service.context import Context, ServiceContext
+from bench.service.context import ServiceContext
 from bench.service.live import LiveBroadcaster, serialise_message
-from bench.service.request_log import RequestLogMiddleware
+from bench.service.middleware import (
+    BodyLimitMiddleware,
+    RequestLogMiddleware,
+    SecurityHeadersMiddleware,
+    TokenCheckMiddleware,
+)
+from bench.service.query_check import refuse_unknown_parameters
 from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS
 from bench.service.run_registry import RunRegistry
-from bench.service.views import make_job_view
 
-_LOG = logging.getLogger(__name__)
 API = "/api/v1"
+PUBLIC_PATHS = (f"{API}/health", f"{API}/openapi.json")
+"""Paths below `/api/` that need no token."""
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]", "::1")
 PAGE_FOLDER = Path(__file__).parent.parent / "web" / "static"
 """Files of the web page."""
@@ -69,32 +74,35 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     )
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
+    # The middleware that is added last sees a request first.
+    app.add_middleware(BodyLimitMiddleware)
+    app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)
     app.add_middleware(RequestLogMiddleware)
+    app.add_middleware(SecurityHeadersMiddleware, api="/api/")
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(settings.hosts if settings else ("*",)))
     for router in PUBLIC_ROUTERS:
         app.include_router(router, prefix=API)
     for router in PROTECTED_ROUTERS:
-        app.include_router(router, prefix=API, dependencies=[Depends(_check_token)], responses=problems.RESPONSES)
+        app.include_router(
+            router,
+            prefix=API,
+            dependencies=[Depends(_BEARER), Depends(refuse_unknown_parameters)],
+            responses=problems.RESPONSES,
+        )
     if PAGE_FOLDER.is_dir():
         app.mount("/", StaticFiles(directory=PAGE_FOLDER, html=True), name="page")
     return app
 
 
 _BEARER = HTTPBearer(auto_error=False, description="token that `mrbench serve` prints at its first start")
-
-
-def _check_token(
-    context: Context, credentials: Annotated[HTTPAuthorizationCredentials | None, Depends(_BEARER)]
-) -> None:
-    if credentials is None or not context.access.is_allowed(credentials.credentials):
-        raise problems.make_unauthorised()
+"""Description of the token for OpenAPI; `TokenCheckMiddleware` checks it."""
 
 
 @asynccontextmanager
 async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[None]:
     """Run catalogue, engine, agent monitor and scans; they end in reverse order, also after an error."""
     database = await asyncio.to_thread(
-        open_database, settings.database or make_sqlite_url(settings.data / "catalogue.db")
+        open_database, settings.database or make_sqlite_url(settings.data / CATALOGUE_FILE)
     )
     async with AsyncExitStack() as stack:
         catalogue = Catalogue(database, settings.data)
@@ -105,6 +113,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         await engine.start(context.job_manager)
         stack.enter_context(context.monitor)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
+        stack.push_async_callback(_cancel_task, asyncio.create_task(context.live.publish_clock()))
         yield
 
 
@@ -121,21 +130,23 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
 
     def on_status(status: AgentStatus) -> None:
         if not loop.is_closed():
-            asyncio.run_coroutine_threadsafe(registry.observe(status), loop).add_done_callback(_log_failure)
+            asyncio.run_coroutine_threadsafe(registry.observe(status), loop)
 
     job_manager = JobManager(catalogue, engine, on_job_changed)
     monitor = AgentMonitor(settings.link, broadcaster.make_publisher(loop), on_status)
     registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
-        settings.access, catalogue, monitor, broadcaster, engine, job_manager, registry, settings.has_local_logs
+        settings.access,
+        catalogue,
+        monitor,
+        broadcaster,
+        engine,
+        job_manager,
+        registry,
+        settings.has_local_logs,
+        SpaceMonitor(settings.data),
     )
     return context
-
-
-def _log_failure(task: "Future[None]") -> None:
-    """Log the error of a task that has no other receiver."""
-    if not task.cancelled() and (error := task.exception()) is not None:
-        _LOG.error("status_unused", extra={"why": repr(error)})
 
 
 async def _cancel_task(task: "asyncio.Task[None]") -> None:

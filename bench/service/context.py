@@ -8,6 +8,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from bench.catalogue import Catalogue, JobRow, RunRow
+from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentMonitor
@@ -16,8 +17,8 @@ from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
 from bench.service.views import Run, make_run_view
 
-MAX_JOBS = 200
-"""Largest number of jobs read for a page of runs."""
+MAX_JOBS = 50
+"""Largest number of newest jobs in the view of a run; its newest results are shown however old they are."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,7 @@ class ServiceContext:
     registry: RunRegistry
     has_local_logs: bool
     """True if the agent writes into the service's data folder."""
+    space_monitor: SpaceMonitor
 
     @property
     def data(self) -> Path:
@@ -63,7 +65,7 @@ class ServiceContext:
 
     def make_run_views(self, *rows: RunRow) -> list[Run]:
         """Return the views of runs, each with its jobs."""
-        jobs = self.catalogue.list_jobs(MAX_JOBS, [row.id for row in rows])
+        jobs = self.catalogue.list_jobs_of_runs([row.id for row in rows], MAX_JOBS)
         return [
             make_run_view(row, [job for job in jobs if job.run_id == row.id], self.monitor.latest_status)
             for row in rows

@@ -1,6 +1,11 @@
-"""Live messages to all websocket clients; a slow client gets only the newest and does not delay the others."""
+"""Live messages to all websocket clients; a slow client gets only the newest and does not delay the others.
+
+Statuses and samples carry the UTC at which they were true. The service sends its own UTC twice a second, so that a
+client judges their age independently of its own clock and of the time of arrival.
+"""
 
 import asyncio
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +15,8 @@ from pydantic import BaseModel
 
 MAX_QUEUED_EVENTS = 64
 """Largest number of events that wait for a slow client."""
+CLOCK_PERIOD = 0.5
+"""Time between two messages with the UTC of the service [s]."""
 MAX_QUEUED_BATCHES = 4
 """Largest number of sample batches that wait for a slow client."""
 
@@ -54,8 +61,9 @@ class LiveBroadcaster:
 
     @contextmanager
     def subscribe(self) -> Iterator[SubscriberQueue]:
-        """Return a queue that is filled while the context lasts; it begins with the latest status."""
+        """Return a queue that is filled while the context lasts; it begins with the UTC and the latest status."""
         queue = SubscriberQueue()
+        queue.put("clock", "", _make_clock_message())
         if self._last_status is not None:
             queue.put("status", "", self._last_status)
         self._queues.add(queue)
@@ -71,6 +79,12 @@ class LiveBroadcaster:
         for queue in self._queues:
             queue.put(topic, key, text)
 
+    async def publish_clock(self) -> None:
+        """Publish the UTC of the service periodically."""
+        while True:
+            self.publish("clock", _make_clock_message())
+            await asyncio.sleep(CLOCK_PERIOD)
+
     def make_publisher(self, loop: asyncio.AbstractEventLoop) -> Callable[[str, BaseModel], None]:
         """Return a function that publishes from other threads, and does nothing once the loop is closed."""
 
@@ -80,6 +94,10 @@ class LiveBroadcaster:
                 loop.call_soon_threadsafe(self.publish, topic, text)
 
         return publish
+
+
+def _make_clock_message() -> str:
+    return orjson.dumps({"topic": "clock", "data": {"utc_s": time.time()}}).decode()
 
 
 def serialise_message(topic: str, data: BaseModel) -> str:

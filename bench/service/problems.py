@@ -1,6 +1,7 @@
 """Errors as `application/problem+json` (RFC 9457), with a stable type for each kind and without traceback."""
 
 import logging
+from collections.abc import Mapping
 from http import HTTPStatus
 from typing import Any
 
@@ -16,6 +17,14 @@ MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
 
 
+CLOSE = {"Connection": "close"}
+"""Header that ends a connection on which an unread body may follow."""
+MAX_QUOTE = 80
+"""Largest number of characters that an error quotes from a name in a request."""
+MAX_DETAIL = 2000
+"""Largest number of characters of an error's text; errors of other packages may quote a request, too."""
+
+
 class Problem(BaseModel):
     """Error of a request."""
 
@@ -29,13 +38,33 @@ class ProblemError(Exception):
     """Error raised by a route and returned as a problem."""
 
     def __init__(self, status: HTTPStatus, name: str, title: str, detail: str) -> None:
+        detail = shorten(detail, MAX_DETAIL)
         super().__init__(detail)
         self.problem = Problem(type=f"urn:mrbench:problem:{name}", title=title, status=status, detail=detail)
 
 
+class BodyTooLargeError(HTTPException):
+    """Error raised while a body is read; the framework passes only errors of this base class on."""
+
+    def __init__(self, limit: int) -> None:
+        super().__init__(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+        self.limit = limit
+
+
+def shorten(text: str, length: int = MAX_QUOTE) -> str:
+    """Return a text, or its beginning with its number of characters if it is too long."""
+    return text if len(text) <= length else f"{text[:length]}… ({len(text)} characters)"
+
+
 def make_not_found(what: str, name: str) -> ProblemError:
-    """Return the error for an object that does not exist."""
-    return ProblemError(HTTPStatus.NOT_FOUND, "not-found", "Not found", f"there is no {what} {name}")
+    """Return the error for an object that does not exist; a long name is quoted in part."""
+    return ProblemError(HTTPStatus.NOT_FOUND, "not-found", "Not found", f"there is no {what} {shorten(name)}")
+
+
+def make_too_large(limit: int) -> ProblemError:
+    """Return the error for a body above a limit [bytes]."""
+    detail = f"the body exceeds {limit} bytes, the largest size of this request; send a shorter one"
+    return ProblemError(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, "too-large", "The request is too large", detail)
 
 
 def make_unauthorised() -> ProblemError:
@@ -58,11 +87,20 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         (401, "The token is missing or wrong"),
         (404, "The object does not exist"),
         (409, "Not possible in the present state"),
+        (413, "The body is too large"),
         (422, "The request is invalid"),
         (503, "The rig agent does not answer"),
     )
 }
 """Error responses of every route."""
+
+_HTTP_NAMES = {
+    HTTPStatus.BAD_REQUEST: "bad-request",
+    HTTPStatus.NOT_FOUND: "not-found",
+    HTTPStatus.METHOD_NOT_ALLOWED: "method-not-allowed",
+    HTTPStatus.REQUESTED_RANGE_NOT_SATISFIABLE: "range-not-satisfiable",
+}
+"""Names of the errors that the framework raises; its own phrases differ between versions of Python."""
 
 # The first matching class applies, so that the base class is last.
 _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
@@ -78,41 +116,48 @@ def install_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(ProblemError)
     async def _handle_problem(request: Request, error: ProblemError) -> JSONResponse:
-        return _make_response(error.problem)
+        return make_response(error)
 
     @app.exception_handler(BenchError)
     async def _handle_bench_error(request: Request, error: BenchError) -> JSONResponse:
         status, name, title = next(kind[1:] for kind in _BENCH_PROBLEMS if isinstance(error, kind[0]))
-        return _make_response(ProblemError(status, name, title, str(error)).problem)
+        return make_response(ProblemError(status, name, title, str(error)))
 
     @app.exception_handler(RequestValidationError)
     async def _handle_invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:
-        return _make_response(_make_validation_problem(error))
+        return make_response(_make_validation_problem(error))
+
+    @app.exception_handler(BodyTooLargeError)
+    async def _handle_large_body(request: Request, error: BodyTooLargeError) -> JSONResponse:
+        return make_response(make_too_large(error.limit), CLOSE)
 
     # Starlette's class, not FastAPI's: it is also raised for an unknown path.
     @app.exception_handler(HTTPException)
     async def _handle_http_error(request: Request, error: HTTPException) -> JSONResponse:
         status = HTTPStatus(error.status_code)
-        name = status.phrase.lower().replace(" ", "-")
-        problem = ProblemError(status, name, status.phrase, f"{request.method} {request.url.path}: {error.detail}")
-        return _make_response(problem.problem, error.headers)
+        name = _HTTP_NAMES.get(status, "http-error")
+        path = shorten(request.url.path)
+        problem = ProblemError(status, name, status.phrase, f"{request.method} {path}: {error.detail}")
+        return make_response(problem, error.headers)
 
     @app.exception_handler(Exception)
     async def _handle_internal_error(request: Request, error: Exception) -> JSONResponse:
         _LOG.error("defect", exc_info=error, extra={"path": request.url.path})
         detail = "internal error of the service; its log contains the details, please report it"
         internal = ProblemError(HTTPStatus.INTERNAL_SERVER_ERROR, "defect", "Internal error", detail)
-        return _make_response(internal.problem)
+        return make_response(internal)
 
 
-def _make_validation_problem(error: RequestValidationError) -> Problem:
+def _make_validation_problem(error: RequestValidationError) -> ProblemError:
     first = error.errors()[0]
-    place = ".".join(str(step) for step in first["loc"])
+    place = shorten(".".join(str(step) for step in first["loc"]))
     others = len(error.errors()) - 1
     more = f" (and {others} more)" if others else ""
     detail = f"{place}: {first['msg'].removeprefix('Value error, ')}{more}"
-    return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "Invalid request", detail).problem
+    return ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "Invalid request", detail)
 
 
-def _make_response(problem: Problem, headers: Any = None) -> JSONResponse:
+def make_response(error: ProblemError, headers: Mapping[str, str] | None = None) -> JSONResponse:
+    """Return the response for an error."""
+    problem = error.problem
     return JSONResponse(problem.model_dump(), problem.status, headers=headers, media_type=MEDIA_TYPE)

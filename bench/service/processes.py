@@ -10,9 +10,10 @@ from pathlib import Path
 
 from bench.agent_protocol import ShutDownCommand, StatusCommand
 from bench.errors import AgentUnreachableError
-from bench.jobs import DaskEngine, start_local_scheduler
-from bench.processes import MRBENCH_COMMAND, terminate
+from bench.jobs import DaskEngine, SchedulerLocation, start_scheduler
+from bench.processes import MRBENCH_COMMAND, open_privately, terminate
 from bench.service.agent_monitor import AgentLink
+from bench.service.agent_supervisor import describe_end
 from bench.service.errors import ServiceError
 
 AGENT_TIMEOUT = 90.0
@@ -29,14 +30,14 @@ async def start_local_engine(data: Path, mrbench: Sequence[str] = MRBENCH_COMMAN
     """Start a scheduler in this process and one worker process, which is restarted whenever it ends.
 
     Args:
-        data: data folder; it receives the scheduler's address and the worker's output.
+        data: data folder; it receives address and credentials of the scheduler, and the worker's output.
         mrbench: command that starts mrbench.
     """
-    async with start_local_scheduler(data) as address:
-        command = [*mrbench, "worker", "--scheduler", address]
+    async with start_scheduler(data) as location:
+        command = [*mrbench, "worker", "--scheduler", location.address, "--data", str(data)]
         worker_task = asyncio.create_task(_keep_alive(command, data / "worker.log"))
         try:
-            yield DaskEngine(address)
+            yield DaskEngine(location)
         finally:
             worker_task.cancel()
             with contextlib.suppress(asyncio.CancelledError):
@@ -44,9 +45,9 @@ async def start_local_engine(data: Path, mrbench: Sequence[str] = MRBENCH_COMMAN
 
 
 @contextlib.asynccontextmanager
-async def connect_engine(address: str) -> AsyncIterator[DaskEngine]:
+async def connect_engine(location: SchedulerLocation) -> AsyncIterator[DaskEngine]:
     """Connect to an engine whose scheduler and workers were started separately."""
-    yield DaskEngine(address)
+    yield DaskEngine(location)
 
 
 async def _keep_alive(command: Sequence[str], log: Path) -> None:
@@ -67,7 +68,7 @@ async def _keep_alive(command: Sequence[str], log: Path) -> None:
 
 def _start_process(command: Sequence[str], log: Path) -> "subprocess.Popen[bytes]":
     """Start a process in a new session, so that it does not receive a Ctrl-C meant for the service."""
-    with log.open("ab") as output:
+    with open_privately(log) as output:
         return subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=output, stderr=output, start_new_session=True
         )
@@ -86,28 +87,40 @@ def is_answering(link: AgentLink, timeout: float = 1.0) -> bool:
         return False
 
 
-def start_agent(config: Path, link: AgentLink, data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> None:
-    """Start a rig agent that continues when the service ends, and wait until it answers.
+def launch_agent(config: Path, data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> "subprocess.Popen[bytes]":
+    """Start a rig agent that continues when the service ends; ``agent.log`` in the data folder has its output."""
+    return _start_process([*mrbench, "rig", "--config", str(config)], get_agent_log(data))
+
+
+def get_agent_log(data: Path) -> Path:
+    """Return the file with the agent's output in a data folder."""
+    return data / "agent.log"
+
+
+def start_agent(
+    config: Path, link: AgentLink, data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND
+) -> "subprocess.Popen[bytes]":
+    """Start a rig agent as `launch_agent` does, and wait until it answers.
 
     Args:
         config: ``bench.toml``.
         link: connection to the agent.
-        data: data folder; ``agent.log`` there receives the agent's output.
+        data: data folder.
         mrbench: command that starts mrbench.
 
     Raises:
         ServiceError: the agent ends, or does not answer within `AGENT_TIMEOUT`.
     """
-    log = data / "agent.log"
-    process = _start_process([*mrbench, "rig", "--config", str(config)], log)
+    process, log = launch_agent(config, data, mrbench), get_agent_log(data)
     deadline = time.monotonic() + AGENT_TIMEOUT
     while not is_answering(link):
         if process.poll() is not None:
-            raise ServiceError(f"the rig agent ended at once: {_read_last_line(log)}")
+            raise ServiceError(f"the rig agent ended at once: {describe_end(process, log)}")
         if time.monotonic() > deadline:
             terminate(process, _TERMINATE_TIMEOUT)
             raise ServiceError(f"the rig agent did not answer within {AGENT_TIMEOUT:g} s; see {log}")
     _LOG.info("agent_started", extra={"pid": process.pid, "log": str(log)})
+    return process
 
 
 def shut_down_idle_agent(link: AgentLink) -> str:
@@ -125,8 +138,3 @@ def shut_down_idle_agent(link: AgentLink) -> str:
     except AgentUnreachableError as error:
         return f"the rig agent does not answer: {error}"
     return "the rig agent was idle and was shut down"
-
-
-def _read_last_line(log: Path) -> str:
-    lines = log.read_text("utf-8", errors="replace").strip().splitlines()
-    return lines[-1].removeprefix("mrbench: ") if lines else f"see {log}"

@@ -8,13 +8,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from bench.agent_protocol import AgentStatus, RunStatus
-from bench.catalogue import Catalogue, RunRow, catalogue_log, is_complete, scan_logs
+from bench.catalogue import Catalogue, LogIntegrity, RunRow, catalogue_log, is_complete, scan_logs
 from bench.jobs import IdentifySettings, JobManager
+from bench.log_lines import RepeatedFailure
 
 SCAN_PERIOD = 5.0
 """Period of the scans of the data folder [s]."""
 SETTLING_TIME = 10.0
 """Time without growth after which a log counts as no longer written, if the agent does not report it [s]."""
+DAMAGED: tuple[LogIntegrity, ...] = ("changed", "missing")
+"""Results of an integrity check after which a log is not identified."""
 IDENTIFIED_OUTCOMES = ("clean", "lossy")
 """Outcomes after which a run is identified automatically."""
 _LOG = logging.getLogger(__name__)
@@ -42,9 +45,21 @@ class RunRegistry:
         self._get_status, self._on_changed = status, notify
         self._known_states: set[tuple[str, bool]] = set()
         self._lock = asyncio.Lock()
+        self._failures = RepeatedFailure(_LOG, "runs_not_recorded", "runs_recorded_again")
 
     async def observe(self, status: AgentStatus) -> None:
-        """Record the runs in a status; runs without a change are skipped."""
+        """Record the runs in a status; runs without a change are skipped.
+
+        A failure, such as a full disk, is logged when it begins and when it ends. The next status tries again.
+        """
+        try:
+            await self._record_runs(status)
+        except Exception as error:  # the agent's runs go on, whatever prevents their record
+            self._failures.note(error)
+        else:
+            self._failures.clear()
+
+    async def _record_runs(self, status: AgentStatus) -> None:
         runs = {run.id: run for run in (*status.finished, *([status.run] if status.run else []))}
         for run in runs.values():
             key = (run.id, run.outcome is not None)  # a run is recorded when it starts and when it ends
@@ -62,17 +77,20 @@ class RunRegistry:
 
     async def scan_periodically(self) -> None:
         """Scan the data folder periodically."""
+        failures = RepeatedFailure(_LOG, "scan_failed", "scan_succeeded_again")
         while True:
             try:
                 await self.scan()
             except Exception as error:  # the task must not end, or later logs would not be found
-                _LOG.warning("scan_failed", extra={"why": repr(error)})
+                failures.note(error)
+            else:
+                failures.clear()
             await asyncio.sleep(SCAN_PERIOD)
 
     async def _add_run(self, run: RunStatus) -> RunRow:
         row = await asyncio.to_thread(self._catalogue.get_run, run.id)
         if row is None:
-            row = _make_row(run, self._catalogue)
+            row = make_run_row(run, self._catalogue)
             await asyncio.to_thread(self._catalogue.add, row)
             _LOG.info("run_began", extra={"run": row.id, "method": row.method, "specimen": row.specimen})
             await self._on_changed(row)
@@ -80,23 +98,28 @@ class RunRegistry:
 
     async def _finish_run(self, run: RunStatus) -> None:
         row = await self._add_run(run)
-        if row.state != "running":
-            return
-        ended = await asyncio.to_thread(self._catalogue_log, Path(run.log))
-        if ended is None:
-            # The log is on the agent's machine or was never started, so that the agent's report is used.
-            values = {"state": "ended", "outcome": run.outcome, "reason": run.reason}
-            ended = await asyncio.to_thread(lambda: self._catalogue.update_run(row.id, **values))
-        await self._handle_change(ended)
+        # A scan may have found the log first; if it has no end, only the agent knows how the run ended.
+        if row.state == "running" or (row.ending is None and run.ending is not None):
+            await self._handle_change(await asyncio.to_thread(self._record_end, run))
 
-    def _catalogue_log(self, path: Path) -> RunRow | None:
-        return catalogue_log(self._catalogue, path) if path.is_file() else None
+    def _record_end(self, run: RunStatus) -> RunRow:
+        """Record the agent's report, and what the log contains beyond it."""
+        # Before the log is read, because a log without end contains no reason and no ending.
+        self._catalogue.update_run(run.id, ending=run.ending, reason=run.reason)
+        path = Path(run.log)
+        ended = catalogue_log(self._catalogue, path) if path.is_file() else None
+        # Without a usable log, or with one on the agent's machine, the report is everything.
+        return ended or self._catalogue.update_run(run.id, state="ended", outcome=run.outcome)
 
     async def _handle_change(self, row: RunRow) -> None:
         _LOG.info("run_" + row.state, extra={"run": row.id, "outcome": row.outcome, "reason": row.reason})
         await self._on_changed(row)
-        is_identifiable = row.source == "run" and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
-        if is_identifiable and not await asyncio.to_thread(self._catalogue.list_jobs, 1, [row.id]):
+        is_complete_run = row.source == "run" and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
+        if (
+            is_complete_run
+            and row.integrity not in DAMAGED
+            and not await asyncio.to_thread(self._catalogue.list_jobs, 1, [row.id])
+        ):
             await self._job_manager.identify(row, IdentifySettings())
 
     def _is_being_written(self, path: Path) -> bool:
@@ -111,16 +134,19 @@ class RunRegistry:
         return path.exists() and time.time() - path.stat().st_mtime < SETTLING_TIME and not is_complete(path)
 
 
-def _make_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
+def make_run_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
+    """Return the row of a run that has begun, as the agent describes it; it is not added."""
     return RunRow(
         id=run.id,
         method=run.method,
         specimen=run.specimen,
         operator=run.operator,
         source="run",
+        continues=run.continues or None,
         started=_parse_utc(run.started),
         duration_s=run.duration_s,
         state="running",
+        reason="",  # the column's default applies only when the row is added
         log=catalogue.make_name(Path(run.log)),
     )
 

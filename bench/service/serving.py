@@ -5,24 +5,27 @@ import logging
 import signal
 import socket
 from collections.abc import Callable, Iterator
-from contextlib import AbstractAsyncContextManager, contextmanager
+from contextlib import AbstractAsyncContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import uvicorn
 
-from bench.agent_protocol import AgentClient
-from bench.config import load_config
-from bench.jobs import JobEngine
+from bench.agent_protocol import AgentClient, AgentEndpoint, derive_samples_address, find_agent
+from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr
-from bench.service.access import open_access
+from bench.processes import open_privately
+from bench.service.access import PLAIN_TOKEN_FILE, open_access, save_token
 from bench.service.agent_monitor import AgentLink, NoAgent
+from bench.service.agent_supervisor import SupervisedAgent
 from bench.service.application import LOOPBACK_NAMES, AppSettings, create_app
 from bench.service.errors import ServiceError
 from bench.service.processes import (
     connect_engine,
+    get_agent_log,
     is_answering,
+    launch_agent,
     shut_down_idle_agent,
     start_agent,
     start_local_engine,
@@ -42,11 +45,21 @@ class ServeOptions:
     port: int = 8600
     """Port; 0 for any free one."""
     config: Path | None = None
-    """``bench.toml``; an agent is started with it if none answers."""
+    """``bench.toml`` of the rig."""
     agent: str | None = None
-    """Address of the agent's command socket; the agent publishes at the next port."""
+    """Address of the agent's command socket; the agent publishes at the next port, or at NAME.samples."""
+    start_agent: bool = True
+    """Start an agent if none answers, and again when it dies."""
+    agent_key: Path | None = None
+    """Key file of an agent at a TCP address."""
     scheduler: str | None = None
     new_token: bool = False
+    scheduler_tls: Path | None = None
+    """TLS file of the scheduler; by default that in the data folder."""
+    allow_plain_scheduler: bool = False
+    """Accept a scheduler without TLS beyond the loopback interface."""
+    is_terminal: bool = False
+    """True if the printed lines are shown on a terminal and kept nowhere: only then is the token printed."""
 
 
 def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
@@ -58,39 +71,48 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
 
     Raises:
         ServiceError: the data folder, the port or the agent is not available.
-        ConfigError: ``bench.toml`` is invalid.
+        WorkerError: the address of the scheduler is not valid, or is refused because it has no TLS.
+        SecretFileError: the TLS file of the scheduler is missing, or other users may read it.
+        ConfigError: ``bench.toml`` or the address of the agent is invalid.
         CatalogueError: the catalogue cannot be opened.
     """
     log_to_stderr()
     data = options.data.resolve()
     link, commands = _make_agent_link(options)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
-        started = _start_missing_agent(options, link, data)
+        supervisor = _supervise_agent(options, link, data)
         access, token = open_access(data, new=options.new_token)
         loopback = options.host in LOOPBACK_NAMES
         app = create_app(
             AppSettings(
                 data=data,
                 access=access,
-                link=link,
+                link=supervisor or link,
                 engine=_choose_engine(options, data),
                 has_local_logs=commands is None or _is_local(commands),
                 hosts=LOOPBACK_NAMES if loopback else ("*",),
             )
         )
         host, port = listener.getsockname()[:2]
-        print_line(_format_address(f"http://{f'[{host}]' if ':' in host else host}:{port}/", token))
+        page = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+        print_line(_format_address(page, token, data, is_terminal=options.is_terminal))
         if not loopback:
             print_line("this address is open to the network and not encrypted; put a TLS proxy in front of it")
-        _run_server(app, listener)
-        if started:
+        with supervisor or nullcontext():
+            _run_server(app, listener)
+        if supervisor is not None and supervisor.has_started:
             print_line(shut_down_idle_agent(link))
 
 
-def _format_address(page: str, token: str | None) -> str:
-    if token is None:
-        return f"{page} (the token is unchanged; --new-token creates a new one)"
-    return f"{page}#token={token}"
+def _format_address(page: str, token: str | None, data: Path, *, is_terminal: bool) -> str:
+    """Return the line with the address of the page; a new token without a terminal is written to a file."""
+    if token is not None and is_terminal:
+        return f"{page}#token={token}"
+    # What is printed without a terminal ends in log files, which others may read.
+    path = data / PLAIN_TOKEN_FILE if token is None else save_token(data, token)
+    place = f"; it is in {path}" if path.is_file() else ""
+    state = "unchanged; --new-token creates a new one" if token is None else "new"
+    return f"{page} (the token is {state}{place})"
 
 
 @contextmanager
@@ -99,7 +121,7 @@ def _lock_data_folder(data: Path) -> Iterator[None]:
     # The operating system holds the lock, so that it is released when a service is killed.
     try:
         data.mkdir(parents=True, exist_ok=True)
-        lock = (data / "service.lock").open("w")
+        lock = open_privately(data / "service.lock")
     except OSError as error:
         raise ServiceError(f"{data}: cannot be written to ({error.strerror}); use another --data") from error
     with lock:
@@ -125,43 +147,39 @@ def _open_listener(host: str, port: int) -> Iterator[socket.socket]:
 def _make_agent_link(options: ServeOptions) -> tuple[AgentLink, str | None]:
     """Return the connection to the agent and its address; the address is None without an agent."""
     if options.agent is not None:
-        return AgentClient(options.agent, _make_sample_address(options.agent)), options.agent
-    if options.config is not None:
-        agent = load_config(options.config).agent
-        return AgentClient(agent.commands, agent.samples), agent.commands
-    return NoAgent(), None
-
-
-def _make_sample_address(address: str) -> str:
-    try:
-        parts = urlsplit(address)
-        if parts.scheme != "tcp" or parts.hostname is None or parts.port is None:
-            raise ValueError(address)
-    except ValueError:
-        raise ServiceError(f"--agent {address}: not of the form tcp://HOST:PORT") from None
-    return f"tcp://{parts.hostname}:{parts.port + 1}"
+        endpoint = AgentEndpoint(options.agent, derive_samples_address(options.agent), options.agent_key)
+    elif options.config is not None:
+        endpoint = find_agent(options.config)
+    else:
+        return NoAgent(), None
+    return AgentClient(*endpoint), endpoint.commands
 
 
 def _is_local(address: str) -> bool:
     return not address.startswith("tcp://") or urlsplit(address).hostname in LOOPBACK_NAMES
 
 
-def _start_missing_agent(options: ServeOptions, link: AgentLink, data: Path) -> bool:
-    """Start an agent if one is configured and none answers; return whether it was started."""
-    if options.config is None or options.agent is not None:
-        return False
+def _supervise_agent(options: ServeOptions, link: AgentLink, data: Path) -> SupervisedAgent | None:
+    """Return the supervision of the agent of a ``bench.toml``; start a missing one if this is wanted."""
+    config = options.config
+    if config is None or options.agent is not None:
+        return None
+    if not options.start_agent:
+        return SupervisedAgent(config, link, get_agent_log(data), None)
+    process = None
     if is_answering(link):
-        _LOG.info("agent_found", extra={"config": str(options.config)})
-        return False
-    start_agent(options.config, link, data)
-    return True
+        _LOG.info("agent_found", extra={"config": str(config)})
+    else:
+        process = start_agent(config, link, data)
+    return SupervisedAgent(config, link, get_agent_log(data), lambda: launch_agent(config, data), process)
 
 
 def _choose_engine(options: ServeOptions, data: Path) -> Callable[[], AbstractAsyncContextManager[JobEngine]]:
     if options.scheduler is None:
         return lambda: start_local_engine(data)
-    address = options.scheduler
-    return lambda: connect_engine(address)
+    tls_file = options.scheduler_tls or get_tls_file(data)
+    location = locate_scheduler(options.scheduler, tls_file, allow_plain=options.allow_plain_scheduler)
+    return lambda: connect_engine(location)
 
 
 class _Server(uvicorn.Server):

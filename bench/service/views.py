@@ -6,7 +6,9 @@ from typing import Any, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bench.agent_protocol import AgentStatus
-from bench.catalogue import JobRow, JobState, RunOutcome, RunRow, RunState
+from bench.catalogue import JobRow, LogIntegrity, RunOutcome, RunRow, RunState
+from bench.endings import RunEnding
+from bench.jobs import DiagnosisSummary, Job, find_newest_done, make_diagnosis_summary, make_job_view
 from bench.methods import DriveKind
 from bench.setup_steps import SetupStep
 
@@ -18,11 +20,12 @@ class View(BaseModel):
 
 
 class Health(View):
-    """Availability of agent and worker."""
+    """Availability of agent and worker, and space for recordings."""
 
     version: str
     agent: str = Field(description="`ok`, or the reason why it is not available")
     worker: str = Field(description="`ok`, or the reason why it is not available")
+    disk: str = Field(description="`ok`, or the free space of the data folder where it is little")
 
 
 class SetupRequest(View):
@@ -48,6 +51,36 @@ class MethodSummary(View):
     title: str
     duration_s: float = Field(description="duration with conditioning, fades and moves [s]")
     drive_kind: DriveKind = Field(description="quantity that drives the damper")
+    checkpoints: tuple[str, ...] = Field(
+        description="segments after which a run can be paused, and resumed (`resume_after`)"
+    )
+
+
+class PreviewSeries(View):
+    """Planned quantity over time, reduced to the lowest and the highest value of short intervals."""
+
+    time_s: list[float] = Field(description="time from the start of the plan [s]")
+    values: list[float] = Field(description="value at each time")
+
+
+class PreviewSegment(View):
+    """Time of a segment in the plan."""
+
+    name: str
+    start_s: float = Field(description="[s]")
+    end_s: float = Field(description="[s]")
+    checkpoint: bool = Field(description="true if an interrupted run can be resumed after this segment")
+
+
+class MethodPreview(View):
+    """Motion and drive of a method as they will be commanded."""
+
+    name: str
+    duration_s: float = Field(description="duration with conditioning, fades and moves [s]")
+    drive_unit: str = Field(description="V or A")
+    displacement_m: PreviewSeries = Field(description="commanded displacement [m]")
+    drive: PreviewSeries = Field(description="commanded drive [V or A]")
+    segments: tuple[PreviewSegment, ...] = Field(description="in order")
 
 
 class RunProgress(View):
@@ -56,25 +89,6 @@ class RunProgress(View):
     elapsed_s: float = Field(description="completed time of the plan [s]")
     duration_s: float = Field(description="planned duration [s]")
     segment: str = Field(description="name of the current segment; empty between segments")
-
-
-class Job(View):
-    """One identification of a run."""
-
-    id: str
-    run: str = Field(description="id of the run")
-    kind: str = Field(description="`identify`")
-    state: JobState
-    activity: str = Field(description="present activity of a running job")
-    attempts: int = Field(description="number of starts by a worker")
-    error: str = Field(description="reason of the failure")
-    settings: dict[str, Any] = Field(description="requested settings")
-    created: datetime = Field(description="UTC")
-    started: datetime | None = Field(description="UTC of the last start by a worker")
-    finished: datetime | None = Field(description="UTC")
-    rmse_n: float | None = Field(description="force error on the fitted samples [N]; null until done")
-    noise_floor_n: float | None = Field(description="noise floor of the recorded force [N]; null until done")
-    result: str = Field(description="`converged`, or the reason why not; empty until done")
 
 
 class Run(View):
@@ -93,15 +107,36 @@ class Run(View):
         description="truncated: the log has no end and is no longer being written; repair it with `salvage`"
     )
     outcome: RunOutcome | None = Field(description="null while the run is in progress")
+    ending: RunEnding | None = Field(
+        description="completed, stopped (controlled, on request), aborted (at once, by a person) or tripped (by "
+        "the bench itself); null while the run is in progress, and if it is not known"
+    )
     reason: str = Field(description="reason why the outcome is not clean")
+    continues: str | None = Field(description="id of the run that this one continues after a checkpoint")
     log: str = Field(description="file of the log, relative to the data folder or absolute")
+    log_sha256: str | None = Field(description="hash of the log as it was recorded; null without a complete log")
+    integrity: LogIntegrity | None = Field(
+        description="latest comparison of the log with its hash: intact, changed or missing; null before the first"
+    )
     progress: RunProgress | None = Field(description="null unless the run is in progress")
     rmse_n: float | None = Field(description="force error of the newest fit [N]; null without a fit")
     noise_floor_n: float | None = Field(description="noise floor of the recorded force [N]; null without a fit")
     result: str = Field(
         description="result of the newest fit: `converged`, or the reason why not; empty without a fit"
     )
+    diagnosis: DiagnosisSummary | None = Field(description="answer of the newest diagnosis; null without one")
     jobs: tuple[Job, ...] = Field(description="oldest first")
+
+
+class Integrity(View):
+    """Comparison of a log with the hash that was stored when it was recorded."""
+
+    integrity: LogIntegrity | None = Field(
+        description="intact, changed or missing; null before the first comparison"
+    )
+    recorded_sha256: str | None = Field(description="hash of the log as it was recorded; fits refer to it")
+    found_sha256: str | None = Field(description="hash at the latest comparison; null if the log was missing")
+    checked: datetime | None = Field(description="UTC of the latest comparison")
 
 
 class RunPage(View):
@@ -109,12 +144,6 @@ class RunPage(View):
 
     items: tuple[Run, ...]
     next: str | None = Field(description="value of `before` for the next page; null on the last page")
-
-
-class JobList(View):
-    """List of jobs, newest first."""
-
-    items: tuple[Job, ...]
 
 
 class StartRunRequest(View):
@@ -130,25 +159,10 @@ class StartRunRequest(View):
     )
 
 
-def make_job_view(row: JobRow) -> Job:
-    """Return the view of a job."""
-    summary = row.summary or {}
-    return Job(
-        id=row.id,
-        run=row.run_id,
-        kind=row.kind,
-        state=row.state,
-        activity=row.activity,
-        attempts=row.attempts,
-        error=row.error,
-        settings=row.settings,
-        created=row.created,
-        started=row.started,
-        finished=row.finished,
-        rmse_n=summary.get("rmse_n"),
-        noise_floor_n=summary.get("noise_floor_n"),
-        result=summary.get("result", ""),
-    )
+class ResumeRunRequest(View):
+    """Request to continue a run."""
+
+    after: str = Field(default="", description="checkpoint to continue after; by default the last one passed")
 
 
 def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run:
@@ -159,8 +173,8 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         jobs: jobs of the run, newest first.
         status: status of the agent, for the progress; None if it is not known.
     """
-    job_views = [make_job_view(job) for job in jobs]
-    fit = next((job for job in job_views if job.state == "done"), None)
+    newest_fit, newest_diagnosis = (find_newest_done(jobs, kind) for kind in ("identify", "diagnose"))
+    fit = make_job_view(newest_fit) if newest_fit else None
     return Run(
         id=row.id,
         method=row.method,
@@ -171,13 +185,18 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         duration_s=row.duration_s,
         state=row.state,
         outcome=row.outcome,
+        ending=row.ending,
         reason=row.reason,
+        continues=row.continues,
         log=row.log,
+        log_sha256=row.log_sha256,
+        integrity=row.integrity,
         progress=_find_progress(row, status),
         rmse_n=fit.rmse_n if fit else None,
         noise_floor_n=fit.noise_floor_n if fit else None,
         result=fit.result if fit else "",
-        jobs=tuple(reversed(job_views)),
+        diagnosis=make_diagnosis_summary(newest_diagnosis) if newest_diagnosis else None,
+        jobs=tuple(make_job_view(job) for job in reversed(jobs)),
     )
 
 

@@ -1,10 +1,33 @@
 """REST routes, one module for each resource."""
 
-from bench.service.routes import jobs, live, methods, rig, runs
+from bench.service.routes import (
+    batches,
+    continuation,
+    integrity,
+    jobs,
+    live,
+    methods,
+    previews,
+    results,
+    rig,
+    run_files,
+    runs,
+)
 
 PUBLIC_ROUTERS = (rig.public_router, live.router)
 """Routers that need no token in the header; `live` checks its own."""
-PROTECTED_ROUTERS = (rig.router, methods.router, runs.router, jobs.router)
+PROTECTED_ROUTERS = (
+    rig.router,
+    methods.router,
+    previews.router,
+    runs.router,
+    continuation.router,
+    integrity.router,
+    run_files.router,
+    results.router,
+    jobs.router,
+    batches.router,
+)
 """Routers that need the token."""
 
 __all__ = ["PROTECTED_ROUTERS", "PUBLIC_ROUTERS"]

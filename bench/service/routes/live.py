@@ -3,6 +3,7 @@
 import asyncio
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from pydantic import BaseModel, ValidationError
 
 from bench.service.context import Context
 from bench.service.live import SubscriberQueue
@@ -10,15 +11,26 @@ from bench.service.live import SubscriberQueue
 router = APIRouter()
 _CLOSE_UNAUTHORISED = 4401
 """Close code for a token that is missing or wrong."""
+_SIGN_IN_TIMEOUT = 10.0
+"""Longest time until the first message, which carries the token [s]."""
+
+
+class SignIn(BaseModel):
+    """First message of a client."""
+
+    token: str
 
 
 @router.websocket("/live")
-async def stream_live(websocket: WebSocket, context: Context, token: str = "") -> None:
-    """Send messages `{"topic": ..., "data": ...}` with the topics status, samples, event, job and run."""
+async def stream_live(websocket: WebSocket, context: Context) -> None:
+    """Send messages `{"topic": ..., "data": ...}`: clock, status, samples, event, job and run.
+
+    The first message of the client is `{"token": ...}`. An address would appear in the logs of proxies.
+    """
     # Accepted before the token is checked: a browser receives the close code only of an open connection.
     await websocket.accept()
-    if not context.access.is_allowed(token):
-        await websocket.close(_CLOSE_UNAUTHORISED, "the token is missing or wrong")
+    if not context.access.is_allowed(await _receive_token(websocket)):
+        await websocket.close(_CLOSE_UNAUTHORISED, "the first message has no valid token")
         return
     with context.live.subscribe() as queue:
         sender = asyncio.create_task(_send(websocket, queue))
@@ -30,6 +42,15 @@ async def stream_live(websocket: WebSocket, context: Context, token: str = "") -
             pass
         finally:
             sender.cancel()
+
+
+async def _receive_token(websocket: WebSocket) -> str:
+    """Return the token in the first message; empty without one."""
+    try:
+        async with asyncio.timeout(_SIGN_IN_TIMEOUT):
+            return SignIn.model_validate_json(await websocket.receive_text()).token
+    except (TimeoutError, ValidationError, WebSocketDisconnect, KeyError):
+        return ""
 
 
 async def _send(websocket: WebSocket, queue: SubscriberQueue) -> None:

@@ -4,7 +4,7 @@ from functools import cache
 
 from fastapi import APIRouter
 
-from bench.methods import Method, compile_method, list_shipped_methods, load_method
+from bench.methods import Method, compile_method, list_checkpoints, list_shipped_methods, load_method
 from bench.service.problems import make_not_found
 from bench.service.views import MethodSummary
 
@@ -23,10 +23,12 @@ def _list_summaries() -> tuple[MethodSummary, ...]:
 
 
 def _make_summary(method: Method) -> MethodSummary:
+    programme = compile_method(method)
     return MethodSummary(
         name=method.name,
         title=method.title,
-        duration_s=compile_method(method).duration,
+        duration_s=programme.duration,
+        checkpoints=list_checkpoints(programme),
         drive_kind=method.drive_kind,
     )
 

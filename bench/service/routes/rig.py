@@ -5,7 +5,7 @@ from importlib.metadata import version
 
 from fastapi import APIRouter
 
-from bench.agent_protocol import AgentStatus, InstrumentStatus, PrepareCommand, StopCommand
+from bench.agent_protocol import AbortCommand, AgentStatus, InstrumentStatus, PrepareCommand, StopCommand
 from bench.errors import BenchError
 from bench.service.context import Context
 from bench.service.views import Health, SetupRequest
@@ -16,19 +16,21 @@ router = APIRouter(tags=["rig"])
 
 @public_router.get("/health")
 async def get_health(context: Context) -> Health:
-    """Return whether agent and worker are available; needs no token."""
+    """Return whether agent and worker are available, and whether the disk has space; needs no token."""
     agent, worker = await asyncio.gather(
         asyncio.to_thread(_describe_agent, context), context.engine.describe_state()
     )
-    return Health(version=version("mrbench"), agent=agent, worker=worker)
+    disk = await asyncio.to_thread(context.space_monitor.describe)
+    return Health(version=version("mrbench"), agent=agent, worker=worker, disk=disk or "ok")
 
 
 def _describe_agent(context: Context) -> str:
     try:
-        context.monitor.get_status()
+        status = context.monitor.get_status()
     except BenchError as error:
         return str(error)
-    return "ok"
+    trip = f"tripped: {status.trip}" if status.state == "tripped" else ""
+    return "; ".join(filter(None, (trip, status.notice))) or "ok"
 
 
 @router.get("/agent")
@@ -47,6 +49,12 @@ def reset_agent(context: Context) -> AgentStatus:
 def stop_agent(context: Context) -> AgentStatus:
     """Stop a run or a setup step in a controlled way. Harmless when nothing moves."""
     return context.monitor.send_command(StopCommand())
+
+
+@router.post("/bench/abort")
+def abort_bench(context: Context) -> AgentStatus:
+    """Stop coil and actuator at once by the path of a trip; it latches until a reset, also if nothing moves."""
+    return context.monitor.send_command(AbortCommand())
 
 
 @router.post("/agent/prepare")

@@ -1,4 +1,4 @@
-"""Routes that start, stop, list, repair and identify runs and return their files."""
+"""Routes that start, stop, list and repair runs."""
 
 import asyncio
 import time
@@ -6,36 +6,55 @@ from datetime import UTC, datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
-from fastapi.responses import FileResponse
+from sqlalchemy.exc import SQLAlchemyError
 
-from bench.agent_protocol import AgentStatus, RunCommand, StatusCommand, StopCommand
+from bench.agent_protocol import AbortCommand, AgentStatus, RunCommand, RunStatus, StatusCommand, StopCommand
 from bench.catalogue import RunRow, catalogue_log
 from bench.errors import RunError
-from bench.jobs import FIT_FILE, REPORT_FILE, IdentifySettings
 from bench.log import salvage_log
 from bench.methods import Method, compile_method, parse_method
 from bench.service.context import Context, ServiceContext
-from bench.service.problems import ProblemError, make_conflict, make_not_found
+from bench.service.problems import ProblemError, make_conflict
 from bench.service.routes.methods import load_shipped_method
-from bench.service.views import Job, Run, RunPage, StartRunRequest, make_job_view
+from bench.service.run_registry import make_run_row
+from bench.service.views import Run, RunPage, StartRunRequest, make_run_view
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 _START_TIMEOUT = 5.0
 """Time limit from an accepted command to the id of the run [s]."""
 
 
-def _describe_file(media_type: str) -> dict[int | str, dict[str, Any]]:
-    return {200: {"description": "the file", "content": {media_type: {}}}}
-
-
 @router.post("", status_code=201)
 async def start_run(request: StartRunRequest, context: Context, response: Response) -> Run:
     """Start a run; the agent executes and records it even if the service ends."""
     method = await asyncio.to_thread(_check_method, request.method)
-    run_id, status = await asyncio.to_thread(_request_start, context, method, request)
+    return await begin_run(context, response, method, request)
+
+
+async def begin_run(
+    context: ServiceContext, response: Response, method: Method, request: StartRunRequest, continues: str = ""
+) -> Run:
+    """Start a run, and return its view with its address in the header; ``continues`` is the run that it continues.
+
+    Raises:
+        RunError: the agent refuses it.
+        AgentUnreachableError: the agent does not answer.
+    """
+    run, status = await asyncio.to_thread(_request_start, context, method, request, continues)
     await context.registry.observe(status)
-    response.headers["Location"] = f"/api/v1/runs/{run_id}"
-    return await asyncio.to_thread(_make_view, context, run_id)
+    response.headers["Location"] = f"/api/v1/runs/{run.id}"
+    return await asyncio.to_thread(_make_started_view, context, run, status)
+
+
+def _make_started_view(context: ServiceContext, run: RunStatus, status: AgentStatus) -> Run:
+    """Return the view of a run that the agent has begun; as the agent describes it if the catalogue fails.
+
+    An error here would be a lie: the rig moves already, and a second request would only be refused.
+    """
+    try:
+        return _make_view(context, run.id)
+    except (ProblemError, SQLAlchemyError):
+        return make_run_view(make_run_row(run, context.catalogue), [], status)
 
 
 def _make_view(context: ServiceContext, run_id: str) -> Run:
@@ -56,7 +75,9 @@ def _check_method(method: str | dict[str, Any]) -> Method:
     return parsed
 
 
-def _request_start(context: ServiceContext, method: Method, request: StartRunRequest) -> tuple[str, AgentStatus]:
+def _request_start(
+    context: ServiceContext, method: Method, request: StartRunRequest, continues: str
+) -> tuple[RunStatus, AgentStatus]:
     """Send the command, and wait until the agent reports the id of the new run."""
     # Until the new run has an id, the agent reports the previous run.
     before = context.monitor.get_status().run
@@ -66,6 +87,7 @@ def _request_start(context: ServiceContext, method: Method, request: StartRunReq
         specimen=request.specimen,
         operator=request.operator,
         resume_after=request.resume_after,
+        continues=continues,
         log=str(context.data / f"{stamp}-{method.name}.mcap") if context.has_local_logs else None,
     )
     status = context.monitor.send_command(command)
@@ -74,7 +96,7 @@ def _request_start(context: ServiceContext, method: Method, request: StartRunReq
         if time.monotonic() > deadline:
             raise RunError(f"the rig agent accepted the run but did not start it within {_START_TIMEOUT:g} s")
         status = context.monitor.send_command(StatusCommand())
-    return status.run.id, status
+    return status.run, status
 
 
 @router.get("")
@@ -98,17 +120,41 @@ def get_run(run_id: str, context: Context) -> Run:
 
 @router.post("/{run_id}/stop")
 def stop_run(run_id: str, context: Context) -> AgentStatus:
-    """Stop a run in a controlled way: the motion fades out, the coil goes to zero. Harmless without a run.
+    """Stop a run in a controlled way: the motion fades out, the coil goes to zero. Harmless if it has ended.
 
-    Refused only while another run is in progress; the run need not be in the catalogue.
+    Refused while another run is in progress. A run in progress need not be in the catalogue.
     """
-    status = context.monitor.latest_status
-    other = status.run if status else None
-    if other is not None and other.id != run_id and other.outcome is None:
-        raise make_conflict(
-            "another-run", "Another run is in progress", f"run {other.id} is in progress; stop that one"
-        )
+    is_in_progress(context, run_id)
+    # Also after the end of the run, because a stop is harmless then and the latest status may be old.
     return context.monitor.send_command(StopCommand())
+
+
+@router.post("/{run_id}/abort")
+def abort_run(run_id: str, context: Context) -> AgentStatus:
+    """Stop a run at once by the path of a trip, which latches until a reset. Harmless if the run has ended.
+
+    Refused while another run is in progress; `POST /bench/abort` aborts whatever moves.
+    """
+    command = AbortCommand() if is_in_progress(context, run_id) else StatusCommand()
+    return context.monitor.send_command(command)
+
+
+def is_in_progress(context: ServiceContext, run_id: str) -> bool:
+    """Return whether a run is in progress; False for one that has ended.
+
+    Raises:
+        ProblemError: another run is in progress, or there is no such run.
+    """
+    run = context.monitor.send_command(StatusCommand()).run
+    if run is None or run.outcome is not None:
+        # The catalogue is asked only now, so that nothing delays the end of a run in progress.
+        context.get_run(run_id)
+        return False
+    if run.id != run_id:
+        raise make_conflict(
+            "another-run", "Another run is in progress", f"run {run.id} is in progress; end that one"
+        )
+    return True
 
 
 @router.post("/{run_id}/salvage")
@@ -130,65 +176,3 @@ def _repair_log(context: ServiceContext, row: RunRow) -> None:
     path = context.catalogue.resolve_path(row.log)
     salvage_log(path)
     catalogue_log(context.catalogue, path)
-
-
-@router.post("/{run_id}/identify", status_code=201)
-async def identify_run(
-    run_id: str, context: Context, response: Response, settings: IdentifySettings | None = None
-) -> Job:
-    """Create an identification job; if an equal one is unfinished or done, return that one with status 200."""
-    row = await asyncio.to_thread(context.get_run, run_id)
-    if row.log_sha256 is None:
-        raise make_conflict(
-            "run-not-ended",
-            "No complete log",
-            f"run {run_id} is {row.state}; only a complete log can be identified",
-        )
-    job, new = await context.job_manager.identify(row, settings or IdentifySettings())
-    if not new:
-        response.status_code = 200
-    return make_job_view(job)
-
-
-@router.get("/{run_id}/log", response_class=FileResponse, responses=_describe_file("application/octet-stream"))
-def get_log(run_id: str, context: Context) -> FileResponse:
-    """Return the log as MCAP; during the run, the part written so far."""
-    path = context.catalogue.resolve_path(context.get_run(run_id).log)
-    if not path.is_file():
-        raise make_not_found("log of run", f"{run_id} on this machine: {path}")
-    return FileResponse(path, media_type="application/octet-stream", filename=path.name)
-
-
-@router.get("/{run_id}/fit", response_class=FileResponse, responses=_describe_file("application/json"))
-def get_fit(run_id: str, context: Context) -> FileResponse:
-    """Return the newest fit, `mrbench.fit/1`."""
-    return _make_result_response(context, run_id, FIT_FILE, "application/json")
-
-
-@router.get("/{run_id}/report", response_class=FileResponse, responses=_describe_file("text/html"))
-def get_report(run_id: str, context: Context) -> FileResponse:
-    """Return the report on the newest fit, one self-contained page."""
-    return _make_result_response(context, run_id, REPORT_FILE, "text/html")
-
-
-def _make_result_response(context: ServiceContext, run_id: str, name: str, media_type: str) -> FileResponse:
-    row = context.get_run(run_id)
-    done = next(
-        (job for job in context.catalogue.list_jobs(50, [row.id]) if job.state == "done" and job.result), None
-    )
-    if done is None or done.result is None:
-        raise _make_not_identified(context, row)
-    path = context.catalogue.resolve_path(done.result) / name
-    if not path.is_file():
-        raise make_not_found(f"{name} of run", f"{run_id}: {path} was removed")
-    return FileResponse(
-        path, media_type=media_type, filename=f"{row.id}.{name}", content_disposition_type="inline"
-    )
-
-
-def _make_not_identified(context: ServiceContext, row: RunRow) -> ProblemError:
-    newest = next(iter(context.catalogue.list_jobs(1, [row.id])), None)
-    if newest is None:
-        return make_not_found("fit of run", f"{row.id}; request one: POST /api/v1/runs/{row.id}/identify")
-    reason = f": {newest.error}" if newest.error else ""
-    return make_not_found("fit of run", f"{row.id}; its newest job is {newest.state}{reason}")

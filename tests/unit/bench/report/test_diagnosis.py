@@ -7,50 +7,14 @@ import pytest
 from bench.errors import ReportError
 from bench.report import diagnosis_plots, page
 from bench.report.diagnosis import make_context, read_diagnosis
-from tests.support.reports import discovery_document, write_log
-
-STAGES = ("coil", "damper", "mounting", "force_channel", "displacement_channel")
-
-
-def document(**changes):
-    """A diagnosis that names a late force, as `mrbench diagnose` writes it."""
-    late = {
-        "name": "force_delay", "stage": "force_channel", "form": "pure_delay",
-        "parameters": {"delay": {"value": 0.0041, "unit": "s", "ci95": [0.004, 0.0042]}},
-        "share": 1.0, "probability": 0.91, "note": "",
-    }  # fmt: skip
-    place = {"drive": 0.5, "amplitude_m": 0.01, "frequency_hz": 2.0, "phase": 0.3125, "gap_n": 12.0}
-    found = {
-        "schema": "mrbench.diagnosis/1", "verdict": "explained", "effects": [late],
-        "alternatives": [{"effects": ["coil_lag", "gas_spring"], "probability": 0.05}],
-        "probability": 0.9, "unknown_probability": 0.04,
-        "gap": {
-            "before_n": 13.2, "after_n": 2.6, "noise_floor_n": 2.5, "shrinkage": 0.97,
-            "shrinkage_ci95": [0.95, 0.99], "nominal_n": 31.0, "train_before_n": 13.0, "train_after_n": 2.5,
-        },
-        "where": {
-            "stage": "force_channel", "stages": dict.fromkeys(STAGES, 0.01) | {"force_channel": 0.96},
-            "map": [place, place | {"drive": 0.0, "phase": 0.0625, "gap_n": 3.0}], "harmonics": [],
-            "drift": {}, "explainable": 0.9,
-        },
-        "next_stroke": {
-            "segment": {
-                "name": "next", "motion": {"kind": "sine", "amplitude_m": 0.0036, "frequency_hz": 7.86},
-                "drive": {"kind": "constant", "value": 1.5},
-            },
-            "separates": [["force_delay"], ["coil_lag", "gas_spring"]], "expected_n": 2.0, "detectability": 40.0,
-        },
-        "explanation": "The force lags by 4.1 ms; check the load cell's filter.",
-        "notes": ["a gain is visible to calibration only"],
-    }  # fmt: skip
-    return found | changes
+from tests.support.reports import STAGES, diagnosis_document, discovery_document, write_log
 
 
 @pytest.fixture
 def written(tmp_path):
     def write(**changes):
         path = tmp_path / "diagnosis.json"
-        path.write_text(json.dumps(document(**changes)))
+        path.write_text(json.dumps(diagnosis_document(**changes)))
         return path
 
     return write
@@ -120,13 +84,13 @@ def test_bars_show_the_errors_in_order_and_stages_that_are_more_likely_than_not(
 
 
 def test_a_single_error_has_the_bar_of_one_of_two(written):
-    gap = document()["gap"] | {"nominal_n": None}
+    gap = diagnosis_document()["gap"] | {"nominal_n": None}
     left = diagnosis_plots.plot_shrinkage(read_diagnosis(written(effects=[], gap=gap))).axes[0]
     assert (len(left.patches), left.get_ylim()) == (1, (1.5, -0.5))
 
 
 def test_the_map_omits_motions_without_a_frequency(written):
-    where = document()["where"]
+    where = diagnosis_document()["where"]
     slow, still = (where["map"][0] | {"frequency_hz": value} for value in (0.5, 0.0))
     figure = diagnosis_plots.plot_gap_map(read_diagnosis(written(where=where | {"map": [slow, still]})), "V")
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["10.0 mm, 0.500 Hz, 0.500 V"]
@@ -139,7 +103,7 @@ def test_no_gap_is_closed_without_a_named_effect(written):
 
 
 def test_strokes_that_the_user_held_out_have_their_own_row(written):
-    gap = document()["gap"] | {"held_out": {"rmse_n": 2.71, "nrmse": 0.034}}
+    gap = diagnosis_document()["gap"] | {"held_out": {"rmse_n": 2.71, "nrmse": 0.034}}
     rows = dict(make_context(read_diagnosis(written(gap=gap)), "V")["gap"])
     assert "2.71 N, NRMSE 3.4 %" in rows.values()
     assert not any("residual" in label for label in rows)
@@ -147,7 +111,7 @@ def test_strokes_that_the_user_held_out_have_their_own_row(written):
 
 def test_a_learned_residual_has_a_row_apart_from_the_physics(written):
     learned = {"rmse_n": 2.51, "nrmse": 0.031}
-    gap = document()["gap"] | {"held_out": {"rmse_n": 2.71, "nrmse": 0.034, "with_residual": learned}}
+    gap = diagnosis_document()["gap"] | {"held_out": {"rmse_n": 2.71, "nrmse": 0.034, "with_residual": learned}}
     rows = dict(make_context(read_diagnosis(written(gap=gap)), "V")["gap"])
     assert "2.71 N, NRMSE 3.4 %" in rows.values()
     assert rows["The same with the learned residual, which names no cause"] == "2.51 N, NRMSE 3.1 %"

@@ -217,6 +217,20 @@ def test_the_recording_begins_at_its_first_sample_not_when_the_agent_was_started
 
 
 @pytest.mark.parametrize(
+    ("record", "ending"),
+    [
+        ({"outcome": "clean", "reason": "", "ending": "completed"}, "completed"),
+        ({"outcome": "incomplete", "reason": "paused at a", "ending": "stopped"}, "stopped: paused at a"),
+        ({"outcome": "incomplete", "reason": "stopped on request"}, "stopped: stopped on request"),
+        ({"outcome": "truncated", "reason": "the recorder was killed"}, "the recorder was killed"),
+    ],
+)
+def test_the_ending_of_the_run_is_named_with_its_reason(made, record, ending):
+    log = dataclasses.replace(made.log, metadata={**made.log.metadata, "outcome": record})
+    assert dict(make_header_rows(log, ""))["Ending"] == ending
+
+
+@pytest.mark.parametrize(
     ("drive", "fitted", "is_warned"),
     [
         ((0.1, 0.3), (0.1039, 0.3), False),  # 2 % of the fitted span: 3.9 mV

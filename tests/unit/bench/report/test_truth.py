@@ -11,10 +11,9 @@ from bench.errors import ReportError
 from bench.report import page
 from bench.report.diagnosis import Diagnosis
 from bench.report.truth import Truth, judge, make_answer_rows, make_truth_rows, read_truth
-from tests.support.reports import prediction, write_log
-from tests.unit.bench.report.test_diagnosis import document
+from tests.support.reports import diagnosis_document, prediction, write_log
 
-LATE = document()["effects"][0]
+LATE = diagnosis_document()["effects"][0]
 
 
 def truth_document(effect="force_delay"):
@@ -26,7 +25,7 @@ def truth_document(effect="force_delay"):
 
 
 def make(effect="force_delay", **changes):
-    return Diagnosis.model_validate(document(**changes)), Truth.model_validate(truth_document(effect))
+    return Diagnosis.model_validate(diagnosis_document(**changes)), Truth.model_validate(truth_document(effect))
 
 
 def test_the_right_name_is_called_right():
@@ -101,7 +100,7 @@ def test_the_truth_has_values_with_their_units():
 def files(tmp_path):
     """Return log, diagnosis, truth and prediction as files."""
     documents = {
-        "diagnosis": document(),
+        "diagnosis": diagnosis_document(),
         "truth": truth_document(),
         "unseen": prediction(rmse=2.6, floor=2.5, before_n=10.0).model_dump(by_alias=True),
     }

@@ -59,13 +59,20 @@ def test_health_and_description_are_open(client):
     assert all(client.get(path).status_code == 200 for path in OPEN)
 
 
-@pytest.mark.parametrize("token", ["", "wrong"])
-def test_the_websocket_is_closed_without_the_token(client, token):
-    with (
-        client.websocket_connect(f"ws://127.0.0.1:8600/api/v1/live?token={token}") as socket,
-        pytest.raises(WebSocketDisconnect) as closed,
-    ):
-        socket.receive_text()
+@pytest.mark.parametrize("first", ['{"token": ""}', '{"token": "wrong"}', "{}", "wrong"])
+def test_the_websocket_is_closed_without_the_token_in_the_first_message(client, first):
+    with client.websocket_connect("ws://127.0.0.1:8600/api/v1/live") as socket:
+        socket.send_text(first)
+        with pytest.raises(WebSocketDisconnect) as closed:
+            socket.receive_text()
+    assert closed.value.code == 4401
+
+
+def test_a_token_in_the_address_of_the_websocket_has_no_effect(service, client):
+    with client.websocket_connect(f"ws://127.0.0.1:8600/api/v1/live?token={service.token}") as socket:
+        socket.send_text("{}")
+        with pytest.raises(WebSocketDisconnect) as closed:
+            socket.receive_text()
     assert closed.value.code == 4401
 
 

@@ -2,14 +2,19 @@
 
 import asyncio
 import time
+from contextlib import contextmanager
 
 import orjson
+import pytest
 
 from bench.agent_protocol.messages import AgentEvent, RunCommand, Samples
+from bench.jobs.progress import JobProgress
 from bench.service import run_registry
 from bench.service.agent_monitor import join_batches
 from bench.service.live import MAX_QUEUED_BATCHES, MAX_QUEUED_EVENTS, SubscriberQueue
 from tests.support.service_logs import write_complete_log
+
+LIVE = "ws://127.0.0.1:8600/api/v1/live"
 
 
 def samples(*time_ns, **values):
@@ -31,8 +36,11 @@ def wait_until(condition):
         time.sleep(0.001)
 
 
+@contextmanager
 def subscribe(service):
-    return service.client.websocket_connect(f"ws://127.0.0.1:8600/api/v1/live?token={service.token}")
+    with service.client.websocket_connect(LIVE) as socket:
+        socket.send_json({"token": service.token})
+        yield socket
 
 
 def test_messages_of_the_agent_arrive_on_the_websocket(service):
@@ -72,8 +80,9 @@ def test_changes_of_runs_and_jobs_are_published(service):
         job = next(messages(socket, "job"))
         assert (job["run"], job["state"]) == (run["id"], "queued")
         service.report("on_started", job["id"])
-        service.report("on_progress", job["id"], "identify")
-        assert next(found for found in messages(socket, "job") if found["activity"])["activity"] == "identify"
+        service.report("on_progress", job["id"], JobProgress("refine", 0.4, "identify: refine"))
+        found = next(found for found in messages(socket, "job") if found["activity"])
+        assert (found["activity"], found["stage"], found["fraction"]) == ("identify: refine", "refine", 0.4)
 
 
 def test_a_new_client_gets_the_status_at_once(service):
@@ -84,6 +93,37 @@ def test_a_new_client_gets_the_status_at_once(service):
         next(messages(socket, "status"))
     with subscribe(service) as socket:
         assert next(messages(socket, "status"))["state"] == "idle"
+
+
+def test_a_status_keeps_the_time_at_which_it_was_true_for_a_late_client(service):
+    made = time.time() - 33.0
+    service.agent.publish(service.agent.status.model_copy(update={"utc_s": made}))
+    with subscribe(service) as socket:
+        wait_until(lambda: service.client.app.state.context.live._last_status is not None)
+    with subscribe(service) as socket:
+        assert next(messages(socket, "status"))["utc_s"] == pytest.approx(made)
+
+
+def test_a_status_that_waited_in_a_queue_is_not_the_present_one(service):
+    monitor = service.client.app.state.context.monitor
+    service.agent.publish()
+    wait_until(lambda: monitor.latest_status is not None)
+    service.agent.publish(service.agent.status.model_copy(update={"utc_s": time.time() - 3.0}))
+    wait_until(lambda: monitor.latest_status is None)
+    service.agent.reachable = False
+    assert service.client.get("/api/v1/agent").status_code == 503
+
+
+def test_the_service_sends_its_clock_at_once_and_repeatedly(service):
+    with subscribe(service) as socket:
+        clock = messages(socket, "clock")
+        first, second = next(clock)["utc_s"], next(clock)["utc_s"]
+        assert first < second <= time.time()
+
+
+def test_joined_batches_have_the_stamp_of_the_newest():
+    batches = [samples(k, force=[1.0]).model_copy(update={"utc_s": 100.0 + k}) for k in range(3)]
+    assert join_batches(batches).utc_s == 102.0
 
 
 def test_a_slow_client_gets_a_limited_number_of_the_newest_messages():
@@ -114,6 +154,9 @@ def test_joined_batches_have_null_for_a_missing_field():
 def test_health_reports_a_missing_worker(service):
     assert service.get("/health")["agent"] == "ok"
     assert service.get("/health")["worker"] == "ok"
+    assert service.get("/health")["disk"] == "ok"
+    service.client.app.state.context.space_monitor._warning = "the disk of runs has 0.4 GB free"
+    assert service.get("/health")["disk"] == "the disk of runs has 0.4 GB free"
     service.engine.state = "no worker; start one: mrbench worker"
     assert service.get("/health")["worker"].startswith("no worker")
 
@@ -146,7 +189,7 @@ def test_a_status_that_cannot_be_recorded_is_logged_and_tried_again(service, cap
     monkeypatch.setattr(registry, "_add_run", fail_once)
     service.agent.send(RunCommand(method={"name": "quick"}))
     service.agent.publish()
-    wait_until(lambda: "status_unused" in caplog.text)
+    wait_until(lambda: "runs_not_recorded" in caplog.text)
     service.agent.publish()
     service.wait_for("/runs", lambda found: [run["id"] for run in found["items"]] == ["run-1"])
 

@@ -92,3 +92,11 @@ def test_an_internal_error_shows_no_internals(service, client):
     detail = problem(client.get("/api/v1/agent"), 500, "defect")
     assert "secret" not in detail
     assert "Zero" not in detail
+
+
+def test_an_unknown_query_parameter_is_refused_and_the_known_ones_are_named(client):
+    detail = problem(client.get("/api/v1/runs?specimen_name=damper"), 422, "invalid-request")
+    assert "specimen_name" in detail
+    assert "before, " in detail
+    assert "limit" in detail
+    assert "has none" in problem(client.get("/api/v1/instruments?limit=1"), 422, "invalid-request")

@@ -9,13 +9,14 @@ import sys
 import pytest
 
 from bench.agent_protocol.messages import AgentStatus, Reply, ShutDownCommand
-from bench.errors import AgentUnreachableError
+from bench.errors import AgentUnreachableError, ConfigError
 from bench.log_lines import KeyValueFormatter
 from bench.processes import terminate
 from bench.service import processes, serving
+from bench.service.access import open_access, save_token
 from bench.service.errors import ServiceError
+from bench.service.middleware.request_log import RequestLogMiddleware
 from bench.service.processes import is_answering, shut_down_idle_agent, start_agent
-from bench.service.request_log import RequestLogMiddleware
 from bench.service.serving import ServeOptions
 
 
@@ -72,7 +73,7 @@ class TestRequestLog:
 
     @pytest.fixture
     def lines(self, caplog):
-        caplog.set_level(logging.INFO, "bench.service.request_log")
+        caplog.set_level(logging.INFO, "bench.service.middleware.request_log")
         return caplog
 
     @pytest.mark.parametrize(("method", "status", "written"), [("GET", 200, 0), ("GET", 404, 1), ("POST", 201, 1)])
@@ -125,11 +126,8 @@ class TestServing:
 
     @pytest.mark.parametrize("address", ["5570", "tcp://host", "http://host:1", "tcp://host:port"])
     def test_an_invalid_address_of_the_agent_is_refused(self, address, tmp_path):
-        with pytest.raises(ServiceError, match="not of the form tcp://HOST:PORT"):
+        with pytest.raises(ConfigError, match="not an address of a rig agent; give tcp://HOST:PORT"):
             serving._make_agent_link(ServeOptions(tmp_path, agent=address))
-
-    def test_an_agent_publishes_at_the_next_port(self):
-        assert serving._make_sample_address("tcp://rig:5570") == "tcp://rig:5571"
 
     @pytest.mark.parametrize(
         ("address", "here"),
@@ -143,9 +141,31 @@ class TestServing:
     def test_a_local_agent_is_recognised(self, address, here):
         assert serving._is_local(address) is here
 
-    def test_a_new_token_is_in_the_address(self):
-        assert serving._format_address("http://h:1/", "abc") == "http://h:1/#token=abc"
-        assert "unchanged" in serving._format_address("http://h:1/", None)
+    def test_a_new_token_is_printed_on_a_terminal_only(self, tmp_path):
+        shown = serving._format_address("http://h:1/", "abc", tmp_path, is_terminal=True)
+        assert shown == "http://h:1/#token=abc"
+        assert list(tmp_path.iterdir()) == []
+
+    def test_a_new_token_without_a_terminal_is_in_a_file_of_its_owner(self, tmp_path):
+        file = tmp_path / "token"
+        printed = serving._format_address("http://h:1/", "abc", tmp_path, is_terminal=False)
+        assert printed == f"http://h:1/ (the token is new; it is in {file})"
+        assert (file.read_text(), file.stat().st_mode & 0o777) == ("abc", 0o600)
+        again = serving._format_address("http://h:1/", None, tmp_path, is_terminal=False)
+        assert "unchanged" in again
+        assert str(file) in again
+
+    def test_the_file_of_an_old_token_is_removed(self, tmp_path):
+        save_token(tmp_path, open_access(tmp_path)[1])
+        open_access(tmp_path, new=True)
+        assert not (tmp_path / "token").exists()
+
+    def test_output_of_processes_can_be_read_by_their_owner_only(self, tmp_path):
+        log = tmp_path / "worker.log"
+        log.write_text("of an earlier version\n")
+        processes._start_process([sys.executable, "-c", "print('ready')"], log).wait()
+        assert log.read_text() == "of an earlier version\nready\n"
+        assert log.stat().st_mode & 0o777 == 0o600
 
 
 class FakeLink:

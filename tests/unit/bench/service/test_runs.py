@@ -1,12 +1,18 @@
 """Run from its start to its fit, by the REST interface."""
 
-from pathlib import Path
+import os
+from datetime import timedelta
 
 import pytest
+from sqlalchemy.exc import OperationalError
 
+from bench.catalogue import JobRow, RunRow
+from bench.catalogue.catalogue import Catalogue
+from bench.catalogue.scan import catalogue_log
 from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
 from tests.support.service_logs import STARTED, write_complete_log, write_truncated_log
 
+PAGE = "<!doctype html><title>report</title>"
 SUMMARY = {"result": "converged", "rmse_n": 2.5, "held_out_rmse_n": None, "noise_floor_n": 2.4}
 
 
@@ -21,13 +27,7 @@ def get_last_job(service, run):
 
 
 def complete(service, job):
-    spec = service.engine.specs[job["id"]]
-    service.report("on_started", job["id"])
-    result = Path(spec.result)
-    result.mkdir()
-    (result / FIT_FILE).write_text('{"schema": "mrbench.fit/1"}')
-    (result / REPORT_FILE).write_text("<!doctype html><title>report</title>")
-    service.report("on_done", job["id"], SUMMARY)
+    service.complete(job, SUMMARY, {FIT_FILE: '{"schema": "mrbench.fit/1"}', REPORT_FILE: PAGE})
 
 
 def start(service, **more):
@@ -111,7 +111,7 @@ def test_a_failed_job_has_a_reason_and_can_be_requested_again(service):
     detail = service.client.get(f"/api/v1/runs/{run['id']}/fit").json()["detail"]
     assert "too little is left to fit" in detail
     again = service.post(f"/runs/{run['id']}/identify", status=201)
-    assert again["id"] != job["id"]
+    assert (again["id"], again["state"], again["attempts"]) == (job["id"], "queued", 1)
 
 
 def test_a_queued_job_is_cancelled_at_once_and_a_running_one_when_it_has_stopped(service):
@@ -119,7 +119,7 @@ def test_a_queued_job_is_cancelled_at_once_and_a_running_one_when_it_has_stopped
     finish(service, run)
     waiting = get_last_job(service, run["id"])
     assert service.post(f"/jobs/{waiting['id']}/cancel")["state"] == "cancelled"
-    running = service.post(f"/runs/{run['id']}/identify", status=201)
+    running = service.post(f"/runs/{run['id']}/identify", {"budget_s": 5}, 201)
     service.report("on_started", running["id"])
     assert service.post(f"/jobs/{running['id']}/cancel")["state"] == "running"
     service.report("on_cancelled", running["id"])
@@ -156,9 +156,157 @@ def test_stop_is_sent_to_the_agent_unless_another_run_is_in_progress(service):
     run = start(service)
     assert service.post(f"/runs/{run['id']}/stop")["state"] == "stopping"
     assert service.agent.commands[-1].command == "stop"
-    commands = len(service.agent.commands)
     assert service.client.post("/api/v1/runs/another/stop").status_code == 409
-    assert len(service.agent.commands) == commands
+    assert [command.command for command in service.agent.commands].count("stop") == 1
+
+
+def test_an_unknown_run_cannot_be_stopped_and_an_ended_one_needs_no_stop(service):
+    for verb in ("stop", "abort"):
+        assert service.client.post(f"/api/v1/runs/NONSENSE/{verb}").status_code == 404
+    run = start(service)
+    finish(service, run)
+    assert service.post(f"/runs/{run['id']}/abort")["state"] == "idle"
+    assert not {"stop", "abort"} & {command.command for command in service.agent.commands}
+    assert service.client.post(f"/api/v1/runs/{run['id']}/stop").status_code == 200
+
+
+def test_a_run_and_the_bench_are_aborted_by_the_path_of_a_trip(service):
+    run = start(service)
+    assert service.post(f"/runs/{run['id']}/abort")["state"] == "tripped"
+    assert service.client.post("/api/v1/runs/another/abort").status_code == 409
+    assert service.post("/bench/abort")["trip"] == "aborted by a person"
+    assert [one.command for one in service.agent.commands if one.command == "abort"] == ["abort", "abort"]
+
+
+@pytest.mark.parametrize(
+    ("outcome", "ending"),
+    [("clean", "completed"), ("incomplete", "stopped"), ("incomplete", "aborted"), ("incomplete", "tripped")],
+)
+def test_a_run_has_an_ending_apart_from_its_outcome(service, outcome, ending):
+    run = start(service)
+    assert run["ending"] is None
+    write_complete_log(service.data / run["log"], run["id"], outcome, ending=ending)
+    service.agent.finish(outcome, "a reason" if ending != "completed" else "", ending)
+    found = service.wait_for(f"/runs/{run['id']}", lambda found: found["outcome"])
+    assert (found["outcome"], found["ending"]) == (outcome, ending)
+
+
+def test_a_run_that_the_catalogue_cannot_record_is_started_nevertheless(service, monkeypatch, caplog):
+    """A catalogue on a full disk: the rig moves, so the request has succeeded, and the catalogue catches up."""
+    full = OperationalError("INSERT", {}, Exception("database or disk is full"))
+    add = Catalogue.add
+
+    def fail(catalogue, row):
+        raise full
+
+    monkeypatch.setattr(Catalogue, "add", fail)
+    run = start(service)
+    assert (run["id"], run["state"], run["progress"]["elapsed_s"]) == ("run-1", "running", 0.0)
+    for _ in range(20):
+        service.agent.publish()
+    assert service.get("/runs")["items"] == []
+    monkeypatch.setattr(Catalogue, "add", add)
+    service.agent.publish()
+    assert service.wait_for("/runs", lambda found: found["items"])["items"][0]["id"] == "run-1"
+    assert sum("runs_not_recorded" in record.message for record in caplog.records) == 1
+    assert sum("runs_recorded_again" in record.message for record in caplog.records) == 1
+
+
+def test_the_agents_reason_is_kept_although_the_log_has_no_end(service):
+    """The disk was full, so the recorder could not write the end of the log."""
+    run = start(service)
+    log = write_truncated_log(service.data / run["log"], run["id"])
+    service.agent.finish("incomplete", "no space left on device", "tripped")
+    found = service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "truncated")
+    assert (found["reason"], found["ending"]) == ("no space left on device", "tripped")
+    os.utime(log, (1.0, 1.0))
+    service.client.portal.call(service.client.app.state.context.registry.scan)
+    assert service.get(f"/runs/{run['id']}")["reason"] == "no space left on device"
+    repaired = service.post(f"/runs/{run['id']}/salvage")
+    assert (repaired["outcome"], repaired["ending"]) == ("truncated", "tripped")
+    assert repaired["reason"] == "no space left on device"
+
+
+def test_a_reason_that_the_agent_reports_after_a_scan_replaces_that_of_the_scan(service):
+    run = start(service)
+    write_truncated_log(service.data / run["log"], run["id"])
+    catalogue = service.client.app.state.context.catalogue
+    catalogue_log(catalogue, service.data / run["log"])
+    assert "its recorder was killed" in service.get(f"/runs/{run['id']}")["reason"]
+    service.agent.finish("incomplete", "no space left on device", "tripped")
+    found = service.wait_for(f"/runs/{run['id']}", lambda found: found["ending"])
+    assert found["reason"] == "no space left on device"
+
+
+def pause(service, checkpoint="10mm_1Hz_0.2V"):
+    """Start a run and end it at a checkpoint, as a pause does."""
+    run = start(service)
+    answer = service.post(f"/runs/{run['id']}/pause")
+    assert answer["run"]["pause"] == f"at checkpoint {checkpoint}"
+    path = service.data / run["log"]
+    write_complete_log(path, run["id"], "incomplete", ending="stopped", method="quick", checkpoint=checkpoint)
+    service.agent.finish("incomplete", f"paused at checkpoint {checkpoint}", "stopped")
+    return service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
+
+
+def test_a_paused_run_is_resumed_after_its_checkpoint_by_a_linked_run(service):
+    first = pause(service)
+    assert (first["ending"], first["continues"]) == ("stopped", None)
+    second = service.post(f"/runs/{first['id']}/resume", status=201)
+    assert (second["continues"], second["specimen"]) == (first["id"], first["specimen"])
+    command = [one for one in service.agent.commands if one.command == "run"][-1]
+    assert (command.resume_after, command.continues) == ("10mm_1Hz_0.2V", first["id"])
+    assert command.method["name"] == "quick"
+
+
+def test_a_run_is_resumed_after_another_checkpoint_on_request(service):
+    first = pause(service)
+    service.post(f"/runs/{first['id']}/resume", {"after": "5mm_2.5Hz_0.3V"}, 201)
+    assert service.agent.commands[-1].command in ("run", "status")
+    command = [one for one in service.agent.commands if one.command == "run"][-1]
+    assert command.resume_after == "5mm_2.5Hz_0.3V"
+
+
+def test_what_cannot_be_paused_or_resumed_is_refused(service):
+    run = start(service)
+    assert service.client.post(f"/api/v1/runs/{run['id']}/resume").status_code == 409
+    finish(service, run)
+    for verb in ("pause", "resume"):
+        assert service.client.post(f"/api/v1/runs/{run['id']}/{verb}").status_code == 409
+        assert service.client.post(f"/api/v1/runs/NONSENSE/{verb}").status_code == 404
+
+
+def test_the_checkpoints_of_methods_are_listed(service):
+    methods = {method["name"]: method["checkpoints"] for method in service.get("/methods")}
+    assert methods["quick"] == ["10mm_1Hz_0.2V", "5mm_2.5Hz_0.3V"]
+    assert all(methods.values())
+
+
+def test_a_changed_or_deleted_log_is_shown_and_not_identified_again(service):
+    run = start(service)
+    recorded = finish(service, run)["log_sha256"]
+    assert service.post(f"/runs/{run['id']}/integrity")["integrity"] == "intact"
+    path = service.data / run["log"]
+    path.write_bytes(path.read_bytes() + b"x")
+    found = service.post(f"/runs/{run['id']}/integrity")
+    assert (found["integrity"], found["recorded_sha256"]) == ("changed", recorded)
+    assert found["found_sha256"] not in (None, recorded)
+    refused = service.client.post(f"/api/v1/runs/{run['id']}/identify", json={"budget_s": 5})
+    assert (refused.status_code, refused.json()["type"]) == (409, "urn:mrbench:problem:log-damaged")
+    path.unlink()
+    service.client.portal.call(service.client.app.state.context.registry.scan)
+    assert service.get(f"/runs/{run['id']}")["integrity"] == "missing"
+    assert service.get(f"/runs/{run['id']}/integrity") == {
+        **found, "integrity": "missing", "found_sha256": None,
+        "checked": service.get(f"/runs/{run['id']}/integrity")["checked"],
+    }  # fmt: skip
+    assert service.get(f"/runs/{run['id']}")["log_sha256"] == recorded
+
+
+def test_a_run_in_progress_has_no_hash_to_compare(service):
+    run = start(service)
+    assert service.client.post(f"/api/v1/runs/{run['id']}/integrity").status_code == 409
+    assert service.get(f"/runs/{run['id']}/integrity")["recorded_sha256"] is None
 
 
 def test_runs_are_listed_newest_first_page_by_page(service):
@@ -267,3 +415,20 @@ def test_a_move_without_a_target_is_refused_and_not_sent(service):
     service.post("/agent/prepare", {"step": "move", "position_m": 0.0})
     service.post("/agent/prepare", {"step": "tare"})
     assert [(one.step, one.position_m) for one in service.agent.commands] == [("move", 0.0), ("tare", None)]
+
+
+def test_every_run_of_a_long_page_shows_its_fit(service):
+    """Each page read at most 200 jobs of all its runs together before."""
+    catalogue = service.client.app.state.context.catalogue
+    for number in range(101):
+        started = STARTED + timedelta(minutes=number)
+        values = {"method": "quick", "started": started, "state": "ended", "log": f"{number}.mcap"}
+        catalogue.add(RunRow(id=f"old-{number}", **values))
+        for k, state in enumerate(["done", "cancelled", "cancelled"]):
+            created = started + timedelta(seconds=k)
+            job = JobRow(id=f"{number}-{k}", run_id=f"old-{number}", kind="identify", key=f"{number}", settings={})
+            job.state, job.created, job.summary = state, created, SUMMARY if state == "done" else None
+            catalogue.add(job)
+    items = service.get("/runs?limit=101")["items"]
+    assert [run["rmse_n"] for run in items] == [2.5] * 101
+    assert {len(run["jobs"]) for run in items} == {3}

@@ -1,0 +1,168 @@
+"""Routes that diagnose runs, and return fits, diagnoses, twins and reports as files."""
+
+import asyncio
+from typing import Any
+
+from fastapi import APIRouter, Response
+from fastapi.responses import FileResponse
+
+from bench.catalogue import JobFilter, JobRow, RunRow
+from bench.jobs import (
+    DIAGNOSIS_FILE,
+    FIT_FILE,
+    REPORT_FILE,
+    TWIN_FILE,
+    DiagnoseSettings,
+    IdentifySettings,
+    Job,
+    JobKind,
+    make_job_view,
+)
+from bench.service.context import Context, ServiceContext
+from bench.service.files import SnapshotResponse
+from bench.service.problems import ProblemError, make_conflict, make_not_found
+from bench.service.run_registry import DAMAGED
+
+router = APIRouter(tags=["results"])
+_MEDIA_TYPES = {".json": "application/json", ".html": "text/html"}
+_VERBS: dict[JobKind, str] = {"identify": "identified", "diagnose": "diagnosed"}
+_NOUNS: dict[JobKind, str] = {"identify": "fit", "diagnose": "diagnosis"}
+
+
+def _describe_file(media_type: str) -> dict[int | str, dict[str, Any]]:
+    return {200: {"description": "the file", "content": {media_type: {}}}}
+
+
+_JSON_FILE, _PAGE = _describe_file("application/json"), _describe_file("text/html")
+_SAME_JOB: dict[int | str, dict[str, Any]] = {
+    200: {"description": "an equal job is unfinished or done, and is returned; nothing was queued", "model": Job}
+}
+
+
+@router.post("/runs/{run_id}/identify", status_code=201, responses=_SAME_JOB)
+async def identify_run(
+    run_id: str, context: Context, response: Response, settings: IdentifySettings | None = None
+) -> Job:
+    """Queue an identification, which is followed by a diagnosis if the run has none.
+
+    201: queued, also if an equal job had failed or was cancelled. 200: an equal job is unfinished or done.
+    """
+    return await _request(context, run_id, settings or IdentifySettings(), response)
+
+
+@router.post("/runs/{run_id}/diagnose", status_code=201, responses=_SAME_JOB)
+async def diagnose_run(
+    run_id: str, context: Context, response: Response, settings: DiagnoseSettings | None = None
+) -> Job:
+    """Queue a diagnosis of the sim-to-real gap. Its report also shows the newest fit of the run.
+
+    201: queued, also if an equal job had failed or was cancelled. 200: an equal job is unfinished or done.
+    """
+    return await _request(context, run_id, settings or DiagnoseSettings(), response)
+
+
+async def _request(
+    context: ServiceContext, run_id: str, settings: IdentifySettings | DiagnoseSettings, response: Response
+) -> Job:
+    row = await asyncio.to_thread(context.get_run, run_id)
+    check_complete(row, _VERBS["diagnose" if isinstance(settings, DiagnoseSettings) else "identify"])
+    job, is_queued = await context.job_manager.request(row, settings)
+    if not is_queued:
+        response.status_code = 200
+    response.headers["Location"] = f"/api/v1/jobs/{job.id}"
+    return make_job_view(job)
+
+
+def check_complete(row: RunRow, verb: str) -> None:
+    """Refuse a run without a complete log, or with another one than was recorded.
+
+    Raises:
+        ProblemError: its log has no end, was changed or is missing.
+    """
+    if row.log_sha256 is None:
+        raise make_conflict(
+            "run-not-ended", "No complete log", f"run {row.id} is {row.state}; only a complete log can be {verb}"
+        )
+    if row.integrity in DAMAGED:
+        raise make_conflict(
+            "log-damaged",
+            "The log is not the recorded one",
+            f"the log of run {row.id} is {row.integrity}; its fits are those of the recorded log "
+            f"(SHA-256 {row.log_sha256}); restore it from a backup",
+        )
+
+
+@router.get("/runs/{run_id}/fit", response_class=FileResponse, responses=_JSON_FILE)
+def get_newest_fit(run_id: str, context: Context) -> SnapshotResponse:
+    """Return the newest fit of a run, `mrbench.fit/1`."""
+    return _make_response(context, _find_newest(context, run_id, "identify"), FIT_FILE)
+
+
+@router.get("/runs/{run_id}/diagnosis", response_class=FileResponse, responses=_JSON_FILE)
+def get_newest_diagnosis(run_id: str, context: Context) -> SnapshotResponse:
+    """Return the newest diagnosis of a run, `mrbench.diagnosis/1`."""
+    return _make_response(context, _find_newest(context, run_id, "diagnose"), DIAGNOSIS_FILE)
+
+
+@router.get("/runs/{run_id}/report", response_class=FileResponse, responses=_PAGE)
+def get_newest_report(run_id: str, context: Context) -> SnapshotResponse:
+    """Return the report of the newest diagnosis with its fit, or of a fit that is newer, as one page."""
+    queue = context.catalogue.job_queue
+    found = [job for kind in _NOUNS if (job := queue.find_newest_done(run_id, kind))]
+    newest = max(found, key=lambda job: job.finished or job.created, default=None)
+    return _make_response(context, newest or _find_newest(context, run_id, "identify"), REPORT_FILE)
+
+
+@router.get("/fits/{fit_id}", response_class=FileResponse, responses=_JSON_FILE)
+def get_fit(fit_id: str, context: Context) -> SnapshotResponse:
+    """Return a fit, `mrbench.fit/1`; its id is that of its job."""
+    return _make_response(context, _get_done(context, fit_id, "identify", "fit"), FIT_FILE)
+
+
+@router.get("/diagnoses/{diagnosis_id}", response_class=FileResponse, responses=_JSON_FILE)
+def get_diagnosis(diagnosis_id: str, context: Context) -> SnapshotResponse:
+    """Return a diagnosis, `mrbench.diagnosis/1`; its id is that of its job."""
+    return _make_response(context, _get_done(context, diagnosis_id, "diagnose", "diagnosis"), DIAGNOSIS_FILE)
+
+
+@router.get("/twins/{diagnosis_id}", response_class=FileResponse, responses=_JSON_FILE)
+def get_twin(diagnosis_id: str, context: Context) -> SnapshotResponse:
+    """Return the twin of a diagnosis, `mrbench.scenario/1`; it has the id of the diagnosis."""
+    return _make_response(context, _get_done(context, diagnosis_id, "diagnose", "twin"), TWIN_FILE)
+
+
+def _get_done(context: ServiceContext, job_id: str, kind: JobKind, noun: str) -> JobRow:
+    job = context.catalogue.get_job(job_id)
+    if job is None or job.kind != kind:
+        raise make_not_found(noun, job_id)
+    if job.result is None:
+        raise make_not_found(noun, f"{job_id} yet; {_describe_state(job)}")
+    return job
+
+
+def _find_newest(context: ServiceContext, run_id: str, kind: JobKind) -> JobRow:
+    row, queue = context.get_run(run_id), context.catalogue.job_queue
+    done = queue.find_newest_done(row.id, kind)
+    if done is None:
+        raise _make_missing(row, kind, next(iter(queue.list_jobs(JobFilter(kind=kind, run_id=row.id), 1)), None))
+    return done
+
+
+def _make_missing(row: RunRow, kind: JobKind, newest: JobRow | None) -> ProblemError:
+    what = f"{_NOUNS[kind]} of run"
+    if newest is None:
+        return make_not_found(what, f"{row.id}; request one: POST /api/v1/runs/{row.id}/{kind}")
+    return make_not_found(what, f"{row.id}; {_describe_state(newest)}")
+
+
+def _describe_state(job: JobRow) -> str:
+    return f"its newest job is {job.state}{f': {job.error}' if job.error else ''}"
+
+
+def _make_response(context: ServiceContext, job: JobRow, name: str) -> SnapshotResponse:
+    path = context.catalogue.resolve_path(job.result or "") / name
+    try:
+        return SnapshotResponse(path, _MEDIA_TYPES[path.suffix], f"{job.run_id}.{name}", inline=True)
+    except FileNotFoundError:
+        what = f"{name} of run"
+        raise make_not_found(what, f"{job.run_id}: {path} was removed; request the job again") from None

@@ -41,6 +41,8 @@ def test_a_former_log_can_be_identified():
 def test_a_former_catalogue_keeps_runs_and_jobs(catalogue):
     states = {row.log: row.state for row in catalogue.list_runs(10)}
     assert states == {"run.mcap": "ended", "killed.mcap": "truncated"}
+    endings = {row.log: row.ending for row in catalogue.list_runs(10)}
+    assert endings == {"run.mcap": "completed", "killed.mcap": None}
     job = catalogue.get_job("job1")
     assert (job.kind, job.state, job.activity, job.attempts) == ("identify", "queued", "pinn", 1)
 

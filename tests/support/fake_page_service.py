@@ -12,10 +12,15 @@ from typing import Any
 
 import uvicorn
 from fastapi import APIRouter, FastAPI, Request, WebSocket, WebSocketDisconnect
-from fastapi.responses import JSONResponse
+from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
+from bench.methods import load_method
+from bench.service.routes.previews import preview_method
+
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
+FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
+REPORT = "<!doctype html><html lang='en'><title>Report</title><h1>Damper report</h1><p>Simulated.</p></html>"
 TOKEN = "a-token"
 SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
 REFUSAL = "lvdt: not connected for 3.2 s; plug it in and start again"
@@ -24,7 +29,7 @@ RATE = 1000
 BATCH = 40
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
 METHODS = [
-    {"name": name, "title": title, "duration_s": duration, "drive_kind": "coil_v"}
+    {"name": name, "title": title, "duration_s": duration, "drive_kind": "coil_v", "checkpoints": []}
     for name, title, duration in (
         ("identification", "Strokes for an identification", 162.0),
         ("paper_sines", "Six voltages on a 10 mm sine at 1 Hz", 602.5),
@@ -57,7 +62,8 @@ def fit_job(run_id: str, state: str, **more: Any) -> dict[str, Any]:
     return {
         "id": f"job-{run_id}", "run": run_id, "kind": "identify", "state": state, "activity": "", "attempts": 1,
         "error": "", "settings": {}, "created": "2025-03-04T09:20:00Z", "started": None, "finished": None,
-        "rmse_n": None, "noise_floor_n": None, "result": "",
+        "rmse_n": None, "noise_floor_n": None, "result": "", "stage": "", "fraction": None, "position": None,
+        "retries": [], "version": "", "diagnosis": None,
     } | more  # fmt: skip
 
 
@@ -66,8 +72,9 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
     return {
         "id": f"run-{number}", "method": "quick", "specimen": "MR-0042", "operator": "A. Meyer",
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
-        "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None, "noise_floor_n": None,
-        "result": "", "jobs": [],
+        "ending": None, "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None,
+        "noise_floor_n": None, "result": "", "jobs": [], "continues": None, "log_sha256": None, "integrity": None,
+        "diagnosis": None,
     } | more  # fmt: skip
 
 
@@ -83,6 +90,7 @@ class FakeBench:
         self.step: dict[str, Any] | None = None
         self.refusals = 1
         self.silent = False
+        self.last_status: dict[str, Any] | None = None
         self.over = False
         found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
         activity = "identify: refine, start 3 of 8"
@@ -97,7 +105,8 @@ class FakeBench:
     def status(self) -> dict[str, Any]:
         """Return the status of the agent as it is published."""
         return {
-            "state": self.state, "trip": self.trip, "run": self.run, "finished": [], "instruments": INSTRUMENTS,
+            "state": self.state, "utc_s": time.time(), "trip": self.trip, "run": self.run, "finished": [],
+            "instruments": INSTRUMENTS,
             "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
             "drive_kind": "coil_v", "drive_unit": "V", "reference_state": self.reference_state, "step": self.step,
         }  # fmt: skip
@@ -128,7 +137,10 @@ class FakeBench:
         values["coil_current"] = [u / 5 for u in drive]
         # A slow instrument has values only in some samples.
         values["temperature"] = [24 + 0.05 * t if not k % BATCH else None for k, t in enumerate(times)]
-        return {"time_ns": [round(t * 1e9) for t in times], "values": values, "segment": "sine_10mm_1Hz"}
+        return {
+            "time_ns": [round(t * 1e9) for t in times], "values": values, "segment": "sine_10mm_1Hz",
+            "utc_s": time.time(),
+        }  # fmt: skip
 
 
 def problem(status: int, title: str, detail: str) -> JSONResponse:
@@ -151,7 +163,7 @@ def application(bench: FakeBench) -> FastAPI:
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
 
-    for routes in (rig_routes, run_routes, live_routes):
+    for routes in (rig_routes, method_routes, run_routes, result_routes, live_routes):
         app.include_router(routes(bench), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
@@ -165,13 +177,18 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     async def agent() -> Any:
         return problem(503, "The rig agent does not answer", SILENCE) if bench.silent else bench.status()
 
-    @router.get("/methods")
-    async def methods() -> Any:
-        return METHODS
+    @router.get("/health")
+    async def health() -> Any:
+        return {"version": "0.1.0", "agent": SILENCE if bench.silent else "ok", "worker": "ok"}
 
     @router.post("/agent/reset")
     async def reset() -> Any:
         bench.state, bench.trip = "idle", ""
+        return bench.status()
+
+    @router.post("/agent/stop")
+    async def stop() -> Any:
+        bench.state, bench.trip, bench.run = "tripped", TRIP, None
         return bench.status()
 
     @router.post("/agent/prepare")
@@ -185,6 +202,25 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     @router.post("/silence")
     async def disconnect_agent() -> Any:
         bench.silent = True
+
+    return router
+
+
+def method_routes(bench: FakeBench) -> APIRouter:
+    """Create the routes of methods; documents and previews are those of the service."""
+    router = APIRouter(prefix="/methods")
+
+    @router.get("")
+    async def methods() -> Any:
+        return METHODS
+
+    @router.get("/{name}")
+    async def method(name: str) -> Any:
+        return load_method(name).model_dump(mode="json", by_alias=True, exclude_defaults=True)
+
+    @router.get("/{name}/preview")
+    async def preview(name: str) -> Any:
+        return preview_method(name)
 
     return router
 
@@ -223,14 +259,37 @@ def run_routes(bench: FakeBench) -> APIRouter:
     return router
 
 
+def result_routes(bench: FakeBench) -> APIRouter:
+    """Create the routes of jobs and results; every run has the same fit and report."""
+    router = APIRouter()
+
+    @router.get("/jobs")
+    async def jobs() -> Any:
+        return {"items": [job for one in bench.runs.values() for job in one["jobs"]]}
+
+    @router.get("/runs/{run_id}/fit")
+    async def fit(run_id: str) -> Any:
+        return FileResponse(FIT, filename=f"{run_id}.fit.json")
+
+    @router.get("/runs/{run_id}/report")
+    async def report(run_id: str) -> Any:
+        return HTMLResponse(REPORT)
+
+    @router.post("/runs/{run_id}/identify")
+    async def identify(run_id: str) -> Any:
+        return bench.runs[run_id]["jobs"][-1]
+
+    return router
+
+
 def live_routes(bench: FakeBench) -> APIRouter:
     """Create the route of the websocket."""
     router = APIRouter()
 
     @router.websocket("/live")
-    async def live(websocket: WebSocket, token: str = "") -> None:
+    async def live(websocket: WebSocket) -> None:
         await websocket.accept()
-        if token != TOKEN:
+        if await websocket.receive_json() != {"token": TOKEN}:
             await websocket.close(4401)
             return
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
@@ -244,16 +303,22 @@ async def publish(socket: WebSocket, bench: FakeBench) -> None:
     await socket.send_json(
         {"topic": "event", "data": {"time_ns": 0, "kind": "state", "text": "the agent is ready"}}
     )
+    await socket.send_json({"topic": "clock", "data": {"utc_s": time.time()}})
+    if bench.last_status is not None:
+        await socket.send_json({"topic": "status", "data": bench.last_status})
     sent = round((time.monotonic() - bench.began) * RATE)
     turn = 0
     while not bench.over:
         turn += 1
+        if turn % 10 == 0:
+            await socket.send_json({"topic": "clock", "data": {"utc_s": time.time()}})
         if not bench.silent:
             while sent + BATCH < (time.monotonic() - bench.began) * RATE:
                 await socket.send_json({"topic": "samples", "data": bench.samples(sent)})
                 sent += BATCH
             if turn % 3 == 0:
-                await socket.send_json({"topic": "status", "data": bench.status()})
+                bench.last_status = bench.status()
+                await socket.send_json({"topic": "status", "data": bench.last_status})
         await asyncio.sleep(BATCH / RATE)
 
 

@@ -28,6 +28,8 @@ class FakeActuator:
     """Actuator that keeps its setpoints and the instants at which they are due."""
 
     name = "actuator"
+    unconfirmed = ""
+    """Reason why the rest is not confirmed."""
 
     def __init__(self, calls=None, setpoint_timeout=0.2, refuses_at=None):
         self.settings = SimpleNamespace(cycle=CYCLE, setpoint_timeout=setpoint_timeout, max_speed=1.0)
@@ -56,6 +58,7 @@ class FakeActuator:
 
     def make_safe(self):
         self.calls.append("actuator safe")
+        return self.unconfirmed
 
     def reset(self):
         self.calls.append("actuator reset")
@@ -64,7 +67,7 @@ class FakeActuator:
 class FakeAmplifier:
     """Coil amplifier with a table in a given state; arming takes a given time [s]."""
 
-    name, table_capacity = "amplifier", 500
+    name, table_capacity, unconfirmed = "amplifier", 500, ""
 
     def __init__(self, calls=None, state=TableState.RUNNING, output=0.0, arming_time=0.0):
         self.calls = [] if calls is None else calls
@@ -86,7 +89,11 @@ class FakeAmplifier:
         return TableProgress(self.state, None)
 
     def make_safe(self):
+        return self.ramp_down()
+
+    def ramp_down(self):
         self.calls.append("coil safe")
+        return self.unconfirmed
 
     def read_status(self):
         return SimpleNamespace(output=self.output)

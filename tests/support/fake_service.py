@@ -1,9 +1,12 @@
 """A rig agent and an engine under the control of a test."""
 
 import queue
+import time
 
 from bench.agent_protocol.messages import (
+    AbortCommand,
     AgentStatus,
+    PauseCommand,
     Reply,
     ResetCommand,
     RunCommand,
@@ -39,9 +42,14 @@ class FakeAgent:
                 self._begin(command)
             case StopCommand():
                 self._set(state="stopping")
+            case PauseCommand():
+                run = self.status.run.model_copy(update={"pause": "at checkpoint 10mm_1Hz_0.2V"})
+                self._set(run=run)
+            case AbortCommand():
+                self._set(state="tripped", trip="aborted by a person")
             case ResetCommand():
                 self._set(state="idle", trip="")
-        return Reply(ok=True, status=self.status)
+        return Reply(ok=True, status=self._stamped_status())
 
     def subscribe(self, stopping):
         while not stopping.is_set():
@@ -51,14 +59,17 @@ class FakeAgent:
                 yield None
 
     def publish(self, message=None):
-        self.published.put(message or self.status)
+        self.published.put(message or self._stamped_status())
+
+    def _stamped_status(self):
+        return self.status.model_copy(update={"utc_s": time.time()})
 
     def progress(self, elapsed_s, segment):
         self._set(run=self.status.run.model_copy(update={"elapsed_s": elapsed_s, "segment": segment}))
         self.publish()
 
-    def finish(self, outcome="clean", reason=""):
-        ended = self.status.run.model_copy(update={"outcome": outcome, "reason": reason})
+    def finish(self, outcome="clean", reason="", ending="completed"):
+        ended = self.status.run.model_copy(update={"outcome": outcome, "reason": reason, "ending": ending})
         self._set(state="idle", run=ended, finished=(*self.status.finished, ended))
         self.publish()
 
@@ -72,6 +83,7 @@ class FakeAgent:
             id=f"run-{number}",
             method=command.method["name"],
             specimen=command.specimen,
+            continues=command.continues,
             operator=command.operator,
             log=command.log or f"/elsewhere/run-{number}.mcap",
             started=f"2026-03-0{number}T10:00:00+00:00",
@@ -101,6 +113,9 @@ class FakeEngine:
 
     async def cancel(self, job_id, *, started):
         self.cancelled.append((job_id, started))
+
+    async def release(self, job_id):
+        """Nothing is followed, so that nothing is waited for."""
 
     async def describe_state(self):
         return self.state

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.agent_protocol.endpoint import find_agent
 from bench.agent_protocol.link import AgentClient
 from bench.agent_protocol.messages import ShutDownCommand, StatusCommand
 from bench.rig.priority import raise_priority
@@ -136,11 +137,11 @@ def served_agent(bench):
     The agent has a process of its own, as in use: together with the simulated rig it would share one interpreter
     lock, and a slow machine could not keep the instruments' time limits.
     """
-    words = ("rig", "--config", bench.toml, "--commands", "tcp://127.0.0.1:*", "--samples", "tcp://127.0.0.1:*")
-    process = subprocess.Popen([COMMAND, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    words = [COMMAND, "rig", "--config", bench.toml]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     with ended(process):
-        line = process.stdout.readline()
-        agent = AgentClient(*(word.rstrip(",") for word in line.split() if word.startswith("tcp://")))
+        assert "commands ipc://" in process.stdout.readline()
+        agent = AgentClient(*find_agent(bench.toml))
         yield agent
         agent.send(ShutDownCommand())
         assert process.wait(DEADLINE) == 0

@@ -138,6 +138,43 @@ def write_fit(path, sha256="", **changes):
     return path
 
 
+STAGES = ("coil", "damper", "mounting", "force_channel", "displacement_channel")
+
+
+def diagnosis_document(**changes):
+    """A diagnosis that names a late force, as `mrbench diagnose` writes it."""
+    late = {
+        "name": "force_delay", "stage": "force_channel", "form": "pure_delay",
+        "parameters": {"delay": {"value": 0.0041, "unit": "s", "ci95": [0.004, 0.0042]}},
+        "share": 1.0, "probability": 0.91, "note": "",
+    }  # fmt: skip
+    place = {"drive": 0.5, "amplitude_m": 0.01, "frequency_hz": 2.0, "phase": 0.3125, "gap_n": 12.0}
+    found = {
+        "schema": "mrbench.diagnosis/1", "verdict": "explained", "effects": [late],
+        "alternatives": [{"effects": ["coil_lag", "gas_spring"], "probability": 0.05}],
+        "probability": 0.9, "unknown_probability": 0.04,
+        "gap": {
+            "before_n": 13.2, "after_n": 2.6, "noise_floor_n": 2.5, "shrinkage": 0.97,
+            "shrinkage_ci95": [0.95, 0.99], "nominal_n": 31.0, "train_before_n": 13.0, "train_after_n": 2.5,
+        },
+        "where": {
+            "stage": "force_channel", "stages": dict.fromkeys(STAGES, 0.01) | {"force_channel": 0.96},
+            "map": [place, place | {"drive": 0.0, "phase": 0.0625, "gap_n": 3.0}], "harmonics": [],
+            "drift": {}, "explainable": 0.9,
+        },
+        "next_stroke": {
+            "segment": {
+                "name": "next", "motion": {"kind": "sine", "amplitude_m": 0.0036, "frequency_hz": 7.86},
+                "drive": {"kind": "constant", "value": 1.5},
+            },
+            "separates": [["force_delay"], ["coil_lag", "gas_spring"]], "expected_n": 2.0, "detectability": 40.0,
+        },
+        "explanation": "The force lags by 4.1 ms; check the load cell's filter.",
+        "notes": ["a gain is visible to calibration only"],
+    }  # fmt: skip
+    return found | changes
+
+
 def discovery_document(**changes):
     """Return a cause outside the library: a friction that grows with the square of the displacement."""
     curve = {

@@ -69,7 +69,7 @@ class RunBench:
     def prepare(self, play, log):
         """Prepare a run whose sequencer calls a function with the run's supervision instead of playing."""
         prepared = self.executor.prepare(RunCommand(method=METHOD, log=str(log)))
-        prepared.run.sequencer.run = lambda programme, first: play(prepared.supervision)
+        prepared.run.sequencer.run = lambda programme: play(prepared.supervision)
         self.run = prepared.run
         return prepared
 

@@ -7,11 +7,22 @@ import numpy as np
 from bench.log.header import RunHeader
 from bench.log.mcap_file import MAGIC
 from bench.log.writer import LogWriter
+from bench.methods import load_method
 
 STARTED = datetime(2026, 3, 1, 10, 0, tzinfo=UTC)
 
 
-def write_complete_log(path, run="run-1", outcome="clean", source="run", first_s=0.0, started=STARTED):
+def write_complete_log(
+    path,
+    run="run-1",
+    outcome="clean",
+    source="run",
+    first_s=0.0,
+    started=STARTED,
+    ending=None,
+    method=None,
+    checkpoint="",
+):
     """Write two seconds of a sine; the first sample is at `first_s` [s] of the bench clock."""
     time = np.arange(1000) / 500.0
     header = RunHeader(
@@ -32,7 +43,11 @@ def write_complete_log(path, run="run-1", outcome="clean", source="run", first_s
             "coil_drive": np.full(1000, 0.2),
         }
         log.write_samples(np.round((first_s + time) * 1e9).astype(np.int64), columns)
-        log.close(outcome, "" if outcome == "clean" else "stopped by the test")
+        if method:
+            log.attach("method.json", "application/json", load_method(method).to_json().encode())
+        if checkpoint:
+            log.write_event(2_000_000_000, "checkpoint", f"after segment {checkpoint}")
+        log.close(outcome, "" if outcome == "clean" else "stopped by the test", ending)
     return path
 
 

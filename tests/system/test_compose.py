@@ -1,9 +1,9 @@
 """``docker-compose.yml``: the file itself, and its processes on this machine without containers."""
 
-import contextlib
 import json
 import re
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -14,14 +14,14 @@ import pytest
 import yaml
 
 from tests.support.live_bench import until
-from tests.system.test_page import CHROMIUM, FOLDER, NODE, browser_test
+from tests.support.page_in_browser import CHROMIUM, FOLDER, NODE, browser_test
 from tests.system.test_service import DEADLINE, ENVIRONMENT, TINY
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docker-compose.yml"
 PROGRAMS = Path(sys.executable).parent
 COMPOSE = shutil.which("docker-compose")
-ORDER = ("sim", "rig", "scheduler", "worker", "service")
+ORDER = ("scheduler", "sim", "rig", "worker", "service")
 
 
 def services():
@@ -37,20 +37,19 @@ def dockerfile(word):
     COMPOSE is None, reason="docker-compose is not installed; run `apt-get install docker-compose`"
 )
 def test_docker_compose_reads_the_file():
-    words = [COMPOSE, "-f", FILE, "config", "--services"]
+    words = [COMPOSE, "-f", FILE, "--profile", "simulated", "config", "--services"]
     read = subprocess.run(words, capture_output=True, text=True, check=False)
     assert read.returncode == 0, read.stderr
     assert set(read.stdout.split()) == set(ORDER)
 
 
-def test_every_container_waits_for_its_dependencies():
-    waits = {name: set(service.get("depends_on", ())) for name, service in services().items()}
-    assert waits == {
-        "sim": set(), "rig": {"sim"}, "scheduler": {"sim"}, "worker": {"scheduler"},
-        "service": {"rig", "scheduler", "worker"},
-    }  # fmt: skip
-    networks = {name: service.get("network_mode") for name, service in services().items()}
-    assert networks == {name: "service:sim" if name != "sim" else None for name in networks}
+def test_every_container_is_started_again_and_has_a_health_check_and_the_network_of_the_scheduler():
+    for name, service in services().items():
+        assert service["restart"] == "unless-stopped"
+        assert service["healthcheck"]["test"][:3] == ["CMD", "mrbench", "health"]
+        assert service.get("network_mode") == (None if name == "scheduler" else "service:scheduler")
+    assert [name for name, service in services().items() if "profiles" in service] == ["sim"]
+    assert {"mem_limit", "cpus"} <= services()["worker"].keys()
 
 
 def test_the_image_contains_all_packages():
@@ -58,7 +57,7 @@ def test_the_image_contains_all_packages():
     copied = re.findall(r"^COPY (\w+) \1$", (ROOT / "Dockerfile").read_text(), re.MULTILINE)
     assert set(copied) == packages
     project = (ROOT / "pyproject.toml").read_text()
-    extras = re.search(r"\[(.*)\]", dockerfile("RUN"))[1].split(",")
+    extras = re.search(r"pip install .*\[(.*)\]", (ROOT / "Dockerfile").read_text())[1].split(",")
     assert all(re.search(rf"^{extra} = \[", project, re.MULTILINE) for extra in extras)
     assert json.loads(dockerfile("ENTRYPOINT")) == ["mrbench"]
 
@@ -69,63 +68,114 @@ def free_port():
         return taken.getsockname()[1]
 
 
-def words(service, data, scheduler):
-    """Return the command line of a container, with its volume in a folder and its network on loopback."""
-    line = [*service.get("entrypoint", ["mrbench"]), *service["command"]]
-    here = [word.replace("/data", str(data)).replace("0.0.0.0", "127.0.0.1").replace("8786", str(scheduler))
-            for word in line]  # fmt: skip
-    if here[1] == "serve":
-        here += ["--port", "0"]
-    return [PROGRAMS / here[0], *here[1:]]
+class Containers:
+    """Processes of the file on this machine, with its volume in a folder and its network on loopback."""
 
+    def __init__(self, folder):
+        self.folder, self.scheduler, self.page = folder, free_port(), free_port()
+        self.processes, self.token = {}, ""
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    return tmp_path_factory.mktemp("data")
+    def make_words(self, words):
+        """Return a command line of the file for this machine."""
+        places = {"/data": str(self.folder), "0.0.0.0": "127.0.0.1", "8786": str(self.scheduler)}
+        for former, here in places.items():
+            words = [word.replace(former, here) for word in words]
+        more = {"serve": ["--port", str(self.page)], "scheduler": ["--port", str(self.scheduler)]}
+        return [PROGRAMS / "mrbench", *words, *more.get(words[0], ())]
 
+    def start(self, name):
+        with (self.folder / f"{name}.log").open("a") as log:
+            words = self.make_words(services()[name]["command"])
+            self.processes[name] = subprocess.Popen(
+                words, stdout=log, stderr=subprocess.STDOUT, cwd=self.folder, env=ENVIRONMENT
+            )
 
-@pytest.fixture(scope="module")
-def address(folder):
-    """Return the address and token of the service as soon as every process of the file runs."""
-    scheduler = free_port()
-    with contextlib.ExitStack() as stack:
+    def is_healthy(self, name):
+        """Execute the health check of a container; start its process again if it has ended."""
+        if self.processes[name].poll() is not None:
+            self.start(name)
+        words = self.make_words(services()[name]["healthcheck"]["test"][2:])
+        words += ["--url", self.url] if words[2] in ("service", "worker") else []
+        return subprocess.run(words, capture_output=True, timeout=DEADLINE, check=False).returncode == 0
+
+    def start_all(self):
+        """Start every container; those that wait for the scheduler wait for its health."""
         for name in ORDER:
-            log = stack.enter_context((folder / f"{name}.log").open("w"))
-            line = words(services()[name], folder, scheduler)
-            process = subprocess.Popen(line, stdout=log, stderr=subprocess.STDOUT, cwd=folder, env=ENVIRONMENT)
-            stack.callback(process.wait, DEADLINE)
-            stack.callback(process.terminate)
-            if name == "sim":
-                until(lambda: (folder / "bench.toml").is_file(), DEADLINE)
-        text = folder / "service.log"
-        until(lambda: "#token=" in text.read_text(), DEADLINE)
-        yield re.search(r"(http://127\.0\.0\.1:\d+/)#token=(\S+)", text.read_text()).groups()
+            self.start(name)
+            if name == "scheduler":
+                until(lambda: self.is_healthy("scheduler"), DEADLINE)
+        # Every one is asked each time, so that every process that has ended is started again.
+        until(lambda: not [name for name in ORDER if not self.is_healthy(name)], DEADLINE)
+        self.token = (self.folder / "runs" / "token").read_text().strip()
+
+    def end_all(self, number):
+        for process in self.processes.values():
+            process.send_signal(number)
+        for process in self.processes.values():
+            process.wait(DEADLINE)
+
+    @property
+    def url(self):
+        return f"http://127.0.0.1:{self.page}/"
+
+    def call(self, path, body=None):
+        headers = {"Authorization": f"Bearer {self.token}", "Content-Type": "application/json"}
+        with urlopen(Request(f"{self.url}api/v1/{path}", body, headers), timeout=30) as reply:
+            return json.load(reply)
+
+    def record(self):
+        """Record a run and wait for its fit."""
+        until(lambda: self.call("agent")["state"] == "idle", DEADLINE)
+        run_id = self.call("runs", json.dumps({"method": TINY}).encode())["id"]
+        until(lambda: self.call(f"runs/{run_id}")["jobs"][:1] != [], DEADLINE)
+        until(lambda: any(job["state"] == "done" for job in self.call(f"runs/{run_id}")["jobs"]), DEADLINE)
+        return run_id
+
+
+@pytest.fixture(scope="module")
+def containers(tmp_path_factory):
+    """Start every process of the file on a new volume."""
+    containers = Containers(tmp_path_factory.mktemp("data"))
+    try:
+        containers.start_all()
+        yield containers
+    finally:
+        containers.end_all(signal.SIGTERM)
 
 
 @pytest.mark.wire
-def test_processes_of_the_file_record_and_identify(address, folder):
-    def call(path, body=None):
-        headers = {"Authorization": f"Bearer {address[1]}", "Content-Type": "application/json"}
-        with urlopen(Request(f"{address[0]}api/v1/{path}", body, headers), timeout=30) as reply:
-            return json.load(reply)
-
-    until(lambda: call("agent")["state"] == "idle", DEADLINE)
-    run_id = call("runs", json.dumps({"method": TINY}).encode())["id"]
-    until(lambda: [job["state"] for job in call(f"runs/{run_id}")["jobs"]] == ["done"], DEADLINE)
-    assert call(f"runs/{run_id}")["outcome"] == "clean"
-    assert call(f"runs/{run_id}/fit")["schema"] == "mrbench.fit/1"
+@pytest.mark.timeout(600)
+def test_the_processes_come_up_again_after_a_stop_and_after_a_kill_twice(containers):
+    recorded = [containers.record()]
+    for number in (signal.SIGTERM, signal.SIGKILL, signal.SIGTERM, signal.SIGKILL):
+        containers.end_all(number)
+        # A stopped simulated rig takes its file with it, a killed one cannot.
+        assert (containers.folder / "bench.toml").exists() is (number == signal.SIGKILL)
+        containers.start_all()
+    recorded.append(containers.record())
+    assert len(set(recorded)) == 2
+    for run_id in recorded:
+        assert containers.call(f"runs/{run_id}")["outcome"] == "clean"
+        assert containers.call(f"runs/{run_id}/fit")["schema"] == "mrbench.fit/1"
 
 
 @pytest.mark.wire
 @browser_test
-def test_the_page_of_a_real_bench_starts_and_shows_a_run(address, folder):
-    picture = folder / "page.png"
-    command = [str(NODE), str(FOLDER / "watch_run.mjs"), *address, str(CHROMIUM), str(picture)]
+def test_the_page_of_a_real_bench_starts_and_shows_a_run(containers):
+    picture = containers.folder / "page.png"
+    command = [
+        str(NODE),
+        str(FOLDER / "watch_run.mjs"),
+        containers.url,
+        containers.token,
+        str(CHROMIUM),
+        str(picture),
+    ]
     result = subprocess.run(command, capture_output=True, text=True, timeout=2 * DEADLINE, check=False)
     assert result.returncode == 0, result.stderr
     seen = json.loads(result.stdout)
     assert seen["errors"] == []
-    assert (seen["moved"], seen["movedAgain"]) == (5, 5)
+    assert (seen["moved"], seen["movedAgain"]) == (6, 6)
     assert "clean" in seen["runs"][0]
     assert "MR-0042" in seen["runs"][0]
     assert picture.stat().st_size > 10_000

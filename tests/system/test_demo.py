@@ -7,9 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from bench.agent_protocol.endpoint import make_endpoint
 from bench.agent_protocol.link import AgentClient
 from bench.agent_protocol.messages import StatusCommand
-from bench.config import load_config
+from bench.catalogue import Catalogue, make_sqlite_url, open_database
+from bench.config import AgentSection
 from bench.errors import AgentUnreachableError
 from bench.log.reader import read_log
 from bench.report import format_force, format_percent, format_ratio
@@ -34,7 +36,7 @@ def demo(tmp_path_factory):
 def test_the_demo_writes_log_fit_diagnosis_twin_truth_report_and_plots(demo):
     result, folder = demo
     assert result.returncode == 0, result.stderr
-    names = {"quick.mcap", "fit.json", "diagnosis.json", "twin.json", "truth.json", "report.html", "bench.toml"}
+    names = {"quick.mcap", "fit.json", "diagnosis.json", "twin.json", "truth.json", "report.html"}
     assert names <= {path.name for path in folder.iterdir()}
     assert len(list((folder / "plots").glob("*.svg"))) >= 5
 
@@ -58,9 +60,17 @@ def test_the_log_was_recorded_over_the_wires_and_is_clean(demo):
 
 
 def test_the_agent_is_shut_down_at_the_end(demo):
-    agent = load_config(demo[1] / "bench.toml").agent
     with pytest.raises(AgentUnreachableError):
-        AgentClient(agent.commands, agent.samples).send(StatusCommand(), timeout=0.5)
+        AgentClient(*make_endpoint(AgentSection(), demo[1] / "bench.toml")).send(StatusCommand(), timeout=0.5)
+
+
+def test_no_job_is_left_unfinished_and_no_folder_half_written(demo):
+    data = demo[1] / "service"
+    catalogue = Catalogue(open_database(make_sqlite_url(data / "catalogue.db")), data)
+    jobs = {job.kind: job.state for job in catalogue.list_jobs(10)}
+    catalogue.close()
+    assert jobs == {"identify": "done", "diagnose": "done"}
+    assert [path.name for path in data.iterdir() if path.is_dir() and path.name.startswith(".")] == []
 
 
 def test_the_printed_numbers_equal_those_of_the_fit(demo):
@@ -110,7 +120,7 @@ def test_no_file_but_the_truth_contains_it_and_the_truth_is_opened_last(demo):
     truth = json.loads((folder / "truth.json").read_text())
     log = read_log(folder / "quick.mcap")
     recorded = json.dumps([log.metadata, log.events], default=str) + repr(log.attachments)
-    for name in ("rig.log", "rig.toml", "bench.toml", "service.log", "fit.json"):
+    for name in ("rig.log", "service.log", "fit.json"):
         recorded += (folder / name).read_text()
     hidden = [truth["form"], *(repr(parameter["value"]) for parameter in truth["parameters"].values())]
     assert not [word for word in [truth["effect"], *hidden] if word in recorded]

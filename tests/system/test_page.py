@@ -2,10 +2,7 @@
 
 import json
 import re
-import shutil
-import subprocess
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
@@ -17,26 +14,10 @@ from tests.support.fake_page_service import (
     REFUSAL,
     SILENCE,
     STATIC,
-    TOKEN,
     TRIP,
     FakeBench,
-    served,
 )
-
-FOLDER = Path(__file__).with_name("javascript")
-NODE = shutil.which("node")
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-
-needs_browser = [
-    pytest.mark.skipif(NODE is None, reason="Node is not installed; it controls the browser"),
-    pytest.mark.skipif(
-        CHROMIUM is None, reason="chromium is not installed; `apt-get install chromium` installs it"
-    ),
-    pytest.mark.skipif(
-        not (FOLDER / "node_modules" / "playwright-core").is_dir(),
-        reason="playwright-core is not installed; run `npm ci --prefix tests/system/javascript`",
-    ),
-]
+from tests.support.page_in_browser import browser_test, operate_page
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +28,7 @@ def bench():
 @pytest.fixture(scope="module")
 def seen(bench):
     """Return what the page shows while a user signs in, starts, stops, resets, and loses the agent."""
-    with served(bench) as address:
-        command = [str(NODE), str(FOLDER / "look_at_page.mjs"), address, TOKEN, str(CHROMIUM)]
-        result = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
-    assert result.returncode == 0, result.stderr
-    return json.loads(result.stdout)
+    return operate_page(bench, "look_at_page.mjs")
 
 
 def test_the_fake_service_replies_with_the_types_of_the_service():
@@ -64,12 +41,6 @@ def test_the_fake_service_replies_with_the_types_of_the_service():
         MethodSummary.model_validate(method)
 
 
-def browser_test(function):
-    for mark in needs_browser:
-        function = mark(function)
-    return function
-
-
 @browser_test
 def test_the_token_is_requested_and_removed_from_the_address(seen):
     assert "token" not in seen["address"]
@@ -78,7 +49,7 @@ def test_the_token_is_requested_and_removed_from_the_address(seen):
 
 @browser_test
 def test_all_plots_move_and_all_readings_have_units(seen):
-    assert seen["canvases"] == 5
+    assert seen["canvases"] == 6
     units = {"Force": "N", "Displacement": "mm", "Velocity": "mm/s", "Coil voltage": "V", "Coil current": "A",
              "Temperature": "°C"}  # fmt: skip
     lines = [reading.splitlines() for reading in seen["readings"]]
@@ -93,7 +64,7 @@ def test_runs_and_instruments_show_their_errors(seen):
     assert "refine, start 3 of 8" in identified
     assert "1.31\u00a0N / 1.26\u00a0N" in done
     assert "1.04 times the noise floor" in done
-    assert "the log has no end" in truncated
+    assert "The recording was cut off. Repair keeps what was recorded." in truncated
     assert "no reply for 83 s" in seen["instruments"][-1]
     assert "1 min 23 s" in seen["instruments"][-1]
 
@@ -125,7 +96,13 @@ def test_in_a_text_field_escape_stops_and_space_types(seen, bench):
 def test_reset_needs_confirmation(seen, bench):
     assert seen["stateAfterKeeping"] == "Tripped"
     assert [path for path, _ in bench.posted].count("agent/reset") == 1
+
+
+@browser_test
+def test_a_cancelled_job_stays_in_the_list_and_the_answer_is_shown(seen, bench):
     assert ("jobs/job-run-2/cancel", "") in bench.posted
+    assert "identify cancelled" in seen["cancelled"]
+    assert "The job was cancelled." in seen["cancelled"]
 
 
 @browser_test
@@ -138,6 +115,7 @@ def test_setup_steps_are_sent_to_the_agent_and_homing_needs_confirmation(seen, b
     ]
     assert seen["homing"] == f"Nothing was done: {CLAMPED}."
     assert seen["prepareWhileRunning"]
+    assert seen["nextStep"].startswith("Move the rod to the specimen's middle")
 
 
 @browser_test

@@ -4,9 +4,9 @@ import subprocess
 
 import pytest
 
+from bench.agent_protocol.endpoint import find_agent
 from bench.agent_protocol.link import AgentClient
 from bench.agent_protocol.messages import PrepareCommand, RunCommand, StatusCommand, StopCommand
-from bench.config import load_config
 from bench.errors import AgentUnreachableError
 from tests.support.live_bench import COMMAND, DEADLINE, ended, live_bench, method, until
 
@@ -29,8 +29,7 @@ def bench(tmp_path_factory):
 
 
 def client(bench):
-    agent = load_config(bench.toml).agent
-    return AgentClient(agent.commands, agent.samples)
+    return AgentClient(*find_agent(bench.toml))
 
 
 def is_answering(bench):

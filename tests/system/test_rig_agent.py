@@ -12,11 +12,13 @@ import pytest
 from bench.agent_protocol.messages import (
     AgentEvent,
     AgentStatus,
+    PauseCommand,
     ResetCommand,
     RunCommand,
     Samples,
     StopCommand,
 )
+from bench.catalogue.run_plan import read_plan
 from bench.log.reader import read_log
 from sim_rig.protocols.fault_proxy import WireFault
 from tests.support.live_bench import (
@@ -45,6 +47,13 @@ def finished(process):
     """Return exit status and error output of a run."""
     _, output = process.communicate(timeout=DEADLINE)
     return process.returncode, output
+
+
+def mrbench_stop(bench, *words):
+    """Return exit status and output of ``mrbench stop``."""
+    command = [COMMAND, "stop", *words, "--config", bench.toml]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    return done.returncode, (done.stdout + done.stderr).strip()
 
 
 def find_correlation(recorded, command):
@@ -135,12 +144,28 @@ def test_stopped_run_can_be_resumed_after_its_checkpoint(bench):
         assert not list_event_texts(stopped, "trip")
         samples = stopped.samples
         assert np.nanmax(np.abs(np.diff(samples["displacement_command"], 2))) * 1e6 <= 9.0
-        again = RunCommand(method=method(), log=str(bench.log), resume_after="a")
+        again = RunCommand(method=method(), log=str(bench.log), resume_after="a", continues=status.run.id)
         assert agent.send(again).ok
         status = until_ended(agent)
         assert status.run.outcome == "clean", status.run
         assert len(status.finished) == 2
-    assert [segment.name for segment in read_log(bench.log).segments] == ["b"]
+    log = read_log(bench.log)
+    assert [segment.name for segment in log.segments] == ["b"]
+    assert (log.metadata["run"]["continues"], log.metadata["run"]["resumed_after"]) == (again.continues, "a")
+
+
+def test_pause_ends_a_run_at_rest_at_its_next_checkpoint(bench):
+    with served_agent(bench) as agent:
+        assert agent.send(RunCommand(method=method(), log=str(bench.log))).ok
+        until_segment(agent, "a")
+        assert agent.send(PauseCommand()).status.run.pause == "at checkpoint a"
+        run = until_ended(agent).run
+        assert (run.outcome, run.ending, run.reason) == ("incomplete", "stopped", "paused at checkpoint a")
+        until(bench.rests)
+    log = read_log(bench.log)
+    assert [segment.name for segment in log.segments] == ["a"]
+    assert list_event_texts(log, "checkpoint") == ["after segment a"]
+    assert (read_plan(bench.log).checkpoint, read_plan(bench.log).method["name"]) == ("a", "short")
 
 
 def test_ctrl_c_stops_a_run_softly(bench):
@@ -153,6 +178,30 @@ def test_ctrl_c_stops_a_run_softly(bench):
     assert "stopped on request" in output
     assert read_log(bench.log).outcome == "incomplete"
     assert bench.rests()
+
+
+def test_mrbench_stop_ends_a_run_of_the_command_line(bench):
+    with ended(bench.run()) as process:
+        until(bench.strokes)
+        code, output = mrbench_stop(bench)
+        assert (code, str(bench.log) in output) == (0, True), output
+        code, output = finished(process)
+    assert (code, "stopped on request" in output) == (1, True), output
+    assert read_log(bench.log).outcome == "incomplete"
+    assert bench.rests()
+
+
+def test_mrbench_stop_abort_trips_a_run_of_an_agent(bench):
+    with served_agent(bench) as agent:
+        assert agent.send(RunCommand(method=method(), log=str(bench.log))).ok
+        until_segment(agent, "b")
+        code, output = mrbench_stop(bench, "--abort")
+        status = fetch_status(agent)
+        assert (code, output.startswith("tripped: ")) == (0, True), output
+        assert (status.state, status.run.ending) == ("tripped", "aborted")
+        until(bench.rests)
+        assert agent.send(ResetCommand()).ok
+        assert mrbench_stop(bench) == (0, "nothing was in progress; the rig agent is idle")
 
 
 def test_killed_agent_leaves_all_at_rest_and_its_log_can_be_salvaged(bench):
@@ -182,6 +231,21 @@ def test_silent_load_cell_trips_and_the_log_is_closed(tmp_path):
     log = read_log(bench.log)
     assert log.outcome == "incomplete"
     assert "force age" in log.metadata["outcome"]["reason"]
+
+
+def test_output_on_a_dead_wire_is_not_reported_as_at_rest(tmp_path):
+    cut = WireFault(kind="stuck", start=8.0, duration=100.0)
+    with live_bench(tmp_path, faults={"coil_amplifier": (cut,)}) as bench:
+        cycles = [{**segment, "cycles": 40} for segment in method()["segments"]]
+        with ended(bench.run(segments=cycles)) as process:
+            code, output = finished(process)
+        until(bench.rests)
+    assert code == 1, output
+    (report,) = [one for one in read_log(bench.log).events if one["text"].startswith("outputs after the trip")]
+    assert report["kind"] == "alarm"
+    assert list(report["confirmed_after_s"]) == ["actuator"]
+    assert list(report["not_confirmed"]) == ["coil_amplifier"]
+    assert "coil_amplifier: rest not confirmed" in report["text"]
 
 
 def test_agent_publishes_samples_and_the_end_of_a_run(bench):

@@ -41,32 +41,32 @@ TINY = {
 class ServiceProcess:
     """A service process on a data folder."""
 
-    def __init__(self, data, token=None):
+    def __init__(self, data, token=None, command=MRBENCH):
         self.log = data.parent / "service.log"
         self.log.unlink(missing_ok=True)
-        command = [*MRBENCH, "serve", "--port", "0", "--data", str(data)]
+        command = [*command, "serve", "--port", "0", "--data", str(data)]
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=log, text=True, env=ENVIRONMENT
             )
         line = self.process.stdout.readline()
-        found = re.match(r"(http://127\.0\.0\.1:\d+/)(?:#token=(\S+))?", line)
+        found = re.match(r"(http://127\.0\.0\.1:\d+/) \(the token is (new|unchanged)", line)
         if not found:
             self.kill()
             pytest.fail(f"no address, got {line!r}: {self.log.read_text()}")
-        self.address, self.token = found[1], found[2] or token
+        self.address, self.token = found[1], token or (data / "token").read_text()
 
     def call(self, path, method="GET"):
         headers = {"Authorization": f"Bearer {self.token}"}
         with urlopen(Request(f"{self.address}api/v1/{path}", method=method, headers=headers), timeout=30) as reply:
             return json.load(reply)
 
-    def wait_for_job(self, condition):
-        """Return the only job as soon as it fulfils a condition."""
+    def wait_for_job(self, condition, kind="identify"):
+        """Return the only job of a kind as soon as it fulfils a condition."""
         deadline = time.monotonic() + DEADLINE
         while True:
             with contextlib.suppress(OSError):
-                jobs = self.call("jobs")["items"]
+                jobs = self.call(f"jobs?kind={kind}")["items"]
                 if jobs and condition(jobs[0]):
                     assert len(jobs) == 1
                     return jobs[0]
@@ -103,7 +103,7 @@ def find_job_processes(data):
     for process in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
             words = (process / "cmdline").read_bytes().split(b"\0")
-            if any(word.startswith(bytes(data)) for word in words) and b"serve" not in words:
+            if any(word.startswith(bytes(data)) for word in words) and not {b"serve", b"worker"} & set(words):
                 found.append(int(process.name))
     return [pid for pid in found if is_running(pid)]
 
@@ -116,7 +116,7 @@ def wait_until_false(condition, message):
 
 
 def is_identifying(job):
-    return job["state"] == "running" and job["activity"] == "identify"
+    return job["state"] == "running" and job["activity"].startswith("identify")
 
 
 def has_ended(job):
@@ -159,7 +159,19 @@ def check_results(service, data):
     assert not list(data.glob(".*.fit-*")), "the folder of an attempt still exists"
 
 
-def test_a_job_succeeds_after_its_worker_was_killed(served, data):
+def check_diagnosis(service, data):
+    (run,) = service.call("runs")["items"]
+    diagnosis = run["diagnosis"]
+    assert diagnosis["verdict"] == service.call(f"runs/{run['id']}/diagnosis")["verdict"]
+    assert service.call(f"twins/{diagnosis['id']}")["schema"] == "mrbench.scenario/1"
+    (results,) = data.glob("*.diagnosis-*")
+    assert sorted(path.name for path in results.iterdir()) == ["diagnosis.json", "report.html", "twin.json"]
+    report = (results / "report.html").read_text()
+    assert "Diagnosis of the sim-to-real gap" in report
+    assert "noise floor" in report
+
+
+def test_a_job_succeeds_after_its_worker_was_killed_and_its_run_is_diagnosed(served, data):
     served.wait_for_job(is_identifying)
     worker, commands = served.find_worker(), find_job_processes(data)
     assert commands
@@ -169,6 +181,9 @@ def test_a_job_succeeds_after_its_worker_was_killed(served, data):
     assert (job["state"], job["attempts"]) == ("done", 2), job["error"]
     assert served.find_worker() != worker
     check_results(served, data)
+    diagnosis = served.wait_for_job(has_ended, "diagnose")
+    assert (diagnosis["state"], diagnosis["fraction"]) == ("done", 1.0), diagnosis["error"]
+    check_diagnosis(served, data)
 
 
 def test_a_job_succeeds_after_the_service_was_killed(served, data):

@@ -22,6 +22,10 @@ const text = (selector) => page.locator(selector).innerText();
 const until = (check, argument) => page.waitForFunction(check, argument);
 const hasText = (selector, words) =>
   until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const openView = async (name) => {
+  await page.click(`.views a[data-view=${name}]`);
+  await page.locator(`#view-${name}`).waitFor();
+};
 const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas")].map((canvas) => canvas.toDataURL()));
 const posted = (path) => page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith(path));
 
@@ -31,6 +35,7 @@ async function letIn() {
   await page.fill("#token", token);
   await page.keyboard.press("Enter");
   await hasText("#state-word", "Idle");
+  await hasText("#methods", "quick");
   seen.address = page.url();
 }
 
@@ -42,8 +47,10 @@ async function watch() {
   seen.canvases = before.length;
   seen.readings = await page.locator("#readings > div").allInnerTexts();
   seen.instruments = await page.locator("#instruments tr").allInnerTexts();
-  seen.runs = await page.locator("#runs tr").allInnerTexts();
   seen.shifts = await page.evaluate(() => window.shifts);
+  await openView("runs");
+  seen.runs = await page.locator("#runs tr").allInnerTexts();
+  await openView("bench");
 }
 
 async function start() {
@@ -85,6 +92,7 @@ async function reset() {
 }
 
 async function prepare() {
+  await page.click("#preparation summary");
   await page.fill("#move-to", "");
   await page.click("#prepare button[data-step=move]");
   await hasText("#prepare-note", "enter a target");
@@ -92,7 +100,8 @@ async function prepare() {
   await page.click("#prepare button[data-step=move]");
   await hasText("#prepare-note", "move is done");
   await page.click("#prepare button[data-step=mount]");
-  await hasText("#reference-state", "mounted");
+  await hasText("#reference-state", "a specimen is clamped");
+  seen.nextStep = await text("#prepare [aria-current=step] h3");
   await page.click("#prepare button[data-step=home]");
   await page.click("#home-dialog button[value=cancel]");
   await page.click("#prepare button[data-step=home]");
@@ -102,9 +111,12 @@ async function prepare() {
 }
 
 async function cancelJob() {
-  const row = page.locator("#runs tr", { hasText: "start 3 of 8" });
+  await openView("runs");
+  const row = page.locator("#runs tr").nth(2);
   await row.getByRole("button", { name: /Cancel/ }).click();
-  await hasText("#runs", "cancelled");
+  await hasText("#runs", "The job was cancelled");
+  seen.cancelled = await row.innerText();
+  await openView("bench");
 }
 
 async function loseConnection() {

@@ -1,6 +1,6 @@
 import pytest
 
-from bench.demo.recording import record
+from bench.demo.recording import await_job, cancel_jobs, record
 from bench.errors import RunError
 
 
@@ -42,3 +42,41 @@ def test_the_third_unclean_run_is_the_last():
     with pytest.raises(RunError, match="quick is incomplete"):
         record(service, "quick", lambda share: None)
     assert service.posted.count("/runs") == 3
+
+
+class Jobs:
+    """Service with jobs that stop some requests after they were cancelled; one has just ended."""
+
+    def __init__(self, **states):
+        self.states, self.asked = states, []
+
+    def get(self, path):
+        items = [
+            {"id": name, "kind": name, "state": state, "error": "lost"} for name, state in self.states.items()
+        ]
+        if path.startswith("/runs/"):
+            return {"jobs": items}
+        unfinished = [job for job in items if job["state"] in ("queued", "running")]
+        self.states |= dict.fromkeys(self.asked, "cancelled")
+        return {"items": unfinished}
+
+    def post(self, path, content):
+        name = path.split("/")[2]
+        assert name not in self.asked
+        self.asked.append(name)
+        if name == "ended":
+            raise RunError("the service refused: the job has ended")
+
+
+def test_all_unfinished_jobs_are_cancelled_once_and_waited_for():
+    service = Jobs(identify="running", diagnose="queued", ended="running", done="done")
+    cancel_jobs(service)
+    assert service.asked == ["identify", "diagnose", "ended"]
+    assert set(service.states.values()) == {"cancelled", "done"}
+
+
+def test_the_job_of_the_wanted_kind_is_awaited_and_its_failure_is_told():
+    service = Jobs(identify="done", diagnose="failed")
+    assert await_job(service, "run1", "identify")["id"] == "identify"
+    with pytest.raises(RunError, match="the job diagnose of run1 failed: lost"):
+        await_job(service, "run1", "diagnose")

@@ -1,0 +1,43 @@
+"""Scripts that operate the web page in a real browser, on the fake service of the tests."""
+
+import json
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.fake_page_service import TOKEN, FakeBench, served
+
+FOLDER = Path(__file__).parents[1] / "system" / "javascript"
+NODE = shutil.which("node")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+_NEEDED = [
+    pytest.mark.skipif(NODE is None, reason="Node is not installed; it controls the browser"),
+    pytest.mark.skipif(
+        CHROMIUM is None, reason="chromium is not installed; `apt-get install chromium` installs it"
+    ),
+    pytest.mark.skipif(
+        not (FOLDER / "node_modules" / "axe-core").is_dir(),
+        reason="a package is not installed; run `npm ci --prefix tests/system/javascript`",
+    ),
+]
+
+
+def browser_test(function: Callable[..., None]) -> Callable[..., None]:
+    """Mark a test that needs Node, chromium and the packages of the scripts."""
+    for mark in _NEEDED:
+        function = mark(function)
+    return function
+
+
+def operate_page(bench: FakeBench, script: str) -> dict[str, Any]:
+    """Run a script of `tests/system/javascript` on the page of a fake bench; return what it has seen."""
+    with served(bench) as address:
+        command = [str(NODE), str(FOLDER / script), address, TOKEN, str(CHROMIUM)]
+        result = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
+    assert result.returncode == 0, result.stderr
+    seen: dict[str, Any] = json.loads(result.stdout)
+    return seen

@@ -1,0 +1,149 @@
+// Opens each view of the page by its address, like a person with bookmarks, and prints the observations as JSON:
+//   node open_views.mjs URL TOKEN CHROMIUM
+
+import { createRequire } from "node:module";
+import { openPage } from "./browser.mjs";
+
+const [url, token, chromium] = process.argv.slice(2);
+const AXE = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
+const VIEWS = ["#/bench", "#/plan/quick", "#/runs", "#/runs/run-1", "#/runs/run-1/report"];
+const seen = { errors: [], titles: {}, violations: {}, small: {}, overflow: {} };
+const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
+page.on("pageerror", (error) => seen.errors.push(String(error)));
+
+const until = (check, argument) => page.waitForFunction(check, argument);
+const hasText = (selector, words) =>
+  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const shownTitle = () => page.evaluate(() => [...document.querySelectorAll("h1")].find((one) => one.checkVisibility()).innerText);
+const READY = {
+  "#/bench": ["#readings", "−10.00 … 10.00"], "#/plan/quick": ["#plan", "Preview"], "#/runs": ["#runs", "MR-0042"],
+  "#/runs/run-1": ["#run", "Provenance"], "#/runs/run-1/report": ["#run", "Report: measured over simulated"],
+};
+
+/** Counts what axe-core finds on the page as it is. */
+async function audit() {
+  if (!(await page.evaluate(() => "axe" in window))) await page.addScriptTag({ path: AXE });
+  const { violations } = await page.evaluate(() => window.axe.run(document, { iframes: false }));
+  return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(", ")}`);
+}
+
+/** Lists visible controls that are lower than a gloved thumb needs. */
+const findSmall = () => page.evaluate(() =>
+  [...document.querySelectorAll("button, select, nav a, a.button, input:not([type=radio], [type=checkbox]), label.choice, label.check")]
+    .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < 44)
+    .map((one) => one.id || one.innerText));
+
+async function openDirectly(hash) {
+  await page.goto("about:blank");
+  await page.goto(`${url}/${hash}`); // a new document each time, as from a bookmark
+  await hasText(...READY[hash]);
+  await hasText("#state-word", "Idle");
+  seen.titles[hash] = await shownTitle();
+  for (const width of [1400, 820]) {
+    await page.setViewportSize({ width, height: 1180 });
+    seen.violations[`${hash} ${width}`] = await audit();
+    seen.small[`${hash} ${width}`] = await findSmall();
+    seen.overflow[`${hash} ${width}`] = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+  }
+  await page.emulateMedia({ colorScheme: "dark" });
+  seen.violations[`${hash} dark`] = await audit();
+  await page.emulateMedia({ colorScheme: "light" });
+}
+
+async function signIn() {
+  await page.goto(`${url}/#/runs/run-1/report`);
+  await page.locator("#token-dialog").waitFor();
+  seen.violations.token = await audit();
+  seen.small.token = await findSmall();
+  await page.fill("#token", token);
+  await page.keyboard.press("Enter");
+  await hasText(...READY["#/runs/run-1/report"]);
+  seen.addressAfterSignIn = new URL(page.url()).hash;
+}
+
+async function readReport() {
+  const report = page.frameLocator("iframe.report");
+  await report.locator("h1").waitFor();
+  await page.reload();
+  await report.locator("h1").waitFor();
+  seen.report = await report.locator("body").innerText();
+}
+
+async function readRun() {
+  await page.goto(`${url}/#/runs/run-1`);
+  await hasText("#run", "Provenance");
+  seen.facts = await page.locator("#run .facts").innerText();
+  seen.tables = await page.locator("#run caption").allInnerTexts();
+  seen.drives = await page.locator("#run table").first().locator("tbody th").allInnerTexts();
+  await page.getByRole("button", { name: /^Identify/ }).click();
+  await hasText("#run", "nothing was computed again");
+}
+
+async function plan() {
+  await page.goto(`${url}/#/plan/identification`);
+  await hasText("#plan", "Preview");
+  seen.planFacts = await page.locator("#plan .facts").innerText();
+  await page.getByRole("link", { name: "Use on the bench" }).click();
+  await until(() => document.querySelector("input[value=identification]")?.checked);
+  seen.focused = await page.evaluate(() => document.activeElement.innerText);
+}
+
+async function changeUnits() {
+  await page.selectOption("#unit-force", "lbf");
+  await page.selectOption("#unit-length", "in");
+  await hasText("#readings", "−0.394 … 0.394");
+  await page.reload();
+  await hasText("#readings", "−0.394 … 0.394");
+  seen.units = await page.locator("#readings .unit").allInnerTexts();
+  seen.captions = await page.locator("figure.loop figcaption").allInnerTexts();
+}
+
+/** Walks with the keyboard from the first link to a run, and back. */
+async function walk() {
+  await page.goto(`${url}/#/bench`);
+  await page.locator(".views a[data-view=runs]").focus();
+  await page.keyboard.press("Enter");
+  await until(() => document.activeElement.innerText === "Runs");
+  for (let k = 0; k < 10 && !(await page.evaluate(() => document.activeElement.matches("#runs a"))); k++) await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
+  await hasText("#run", "Facts");
+  seen.walked = new URL(page.url()).hash;
+  await page.goBack();
+  await page.locator("#runs").waitFor();
+}
+
+/** Counts the tones of a trip, and after it is silenced. */
+async function trip() {
+  await page.goto(`${url}/#/plan/quick`);
+  await hasText("#plan", "Preview");
+  await page.evaluate(() => {
+    window.tones = 0;
+    const begin = OscillatorNode.prototype.start;
+    OscillatorNode.prototype.start = function start(...times) {
+      window.tones += 1;
+      return begin.apply(this, times);
+    };
+  });
+  await page.click("#plan-title"); // sound is allowed after a click
+  await fetch(`${url}/api/v1/agent/stop`, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
+  await page.locator("#trip").waitFor();
+  await until(() => window.tones >= 4);
+  seen.trip = await page.locator("#trip").innerText();
+  seen.violations.trip = await audit();
+  await page.click("#silence");
+  seen.silenced = await page.locator("#silence").isHidden();
+  seen.bannerStays = await page.locator("#trip").isVisible();
+}
+
+try {
+  for (const step of [signIn, readReport]) await step();
+  for (const hash of VIEWS) await openDirectly(hash);
+  for (const step of [readRun, plan, changeUnits, walk, trip]) await step();
+  await page.goto(`${url}/#/bench`);
+  await page.reload();
+  await hasText("#state-word", "Tripped");
+  seen.events = await page.locator("#events li").allInnerTexts();
+  console.log(JSON.stringify(seen));
+} finally {
+  await close();
+}

@@ -1,0 +1,43 @@
+// Watches the state of a bench whose agent falls silent, over reconnections and a reload, and prints it as JSON:
+//   node silent_bench.mjs URL TOKEN CHROMIUM
+
+import { openPage } from "./browser.mjs";
+
+const [url, token, chromium] = process.argv.slice(2);
+const { page, close } = await openPage(chromium);
+const seen = { errors: [] };
+page.on("pageerror", (error) => seen.errors.push(String(error)));
+
+/** Starts to note each state word with its time [s] in the page. */
+const watch = () =>
+  page.evaluate(() => {
+    window.noted = [];
+    const began = performance.now();
+    setInterval(() => {
+      const word = document.getElementById("state-word").innerText;
+      if (window.noted.at(-1)?.[1] !== word) window.noted.push([(performance.now() - began) / 1000, word]);
+    }, 20);
+  });
+const noted = () => page.evaluate(() => window.noted);
+const look = () =>
+  page.evaluate(() => ({
+    line: document.getElementById("bar-line").innerText,
+    marks: [...document.querySelectorAll("#instruments .mark")].map((mark) => [mark.className, mark.innerText]),
+    startDisabled: document.getElementById("start").disabled,
+    liveAge: document.getElementById("live-age").innerText,
+  }));
+
+await page.goto(`${url}/#token=${token}`);
+await page.waitForFunction(() => document.getElementById("state-word").innerText === "Idle");
+await watch();
+await fetch(`${url}/api/v1/silence`, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
+await page.waitForTimeout(9_000); // longer than a silence after which the websocket was opened again
+seen.words = await noted();
+seen.after = await look();
+await page.reload();
+await watch();
+await page.waitForTimeout(4_000);
+seen.wordsAfterReload = await noted();
+seen.afterReload = await look();
+await close();
+console.log(JSON.stringify(seen));

@@ -1,0 +1,85 @@
+"""Views of the web page at their addresses, in a real browser: content and accessibility."""
+
+import re
+
+import pytest
+
+from tests.support.fake_page_service import TRIP, FakeBench
+from tests.support.page_in_browser import browser_test, operate_page
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Return what a person with bookmarks sees in each view."""
+    return operate_page(FakeBench(), "open_views.mjs")
+
+
+@browser_test
+def test_every_view_opens_by_its_address_in_a_new_tab(seen):
+    assert seen["errors"] == []
+    assert seen["titles"] == {
+        "#/bench": "Bench",
+        "#/plan/quick": "Plan",
+        "#/runs": "Runs",
+        "#/runs/run-1": "MR-0042, quick",
+        "#/runs/run-1/report": "MR-0042, quick",
+    }
+
+
+@browser_test
+def test_the_address_of_a_report_survives_signing_in_and_a_reload(seen):
+    assert seen["addressAfterSignIn"] == "#/runs/run-1/report"
+    assert seen["report"].startswith("Damper report")
+
+
+@browser_test
+def test_no_view_has_a_finding_of_axe_core(seen):
+    assert {view: found for view, found in seen["violations"].items() if found} == {}
+
+
+@browser_test
+def test_all_controls_are_high_enough_for_a_gloved_thumb_and_nothing_needs_a_sideways_scroll(seen):
+    assert {view: small for view, small in seen["small"].items() if small} == {}
+    assert {view: width for view, width in seen["overflow"].items() if width} == {}
+
+
+@browser_test
+def test_a_run_shows_its_facts_with_the_zone_of_times_and_the_tables_of_its_fit(seen):
+    assert re.search(r"2025-03-04 \d\d:11:30 UTC", seen["facts"])
+    assert "1.04 times the noise floor" in seen["facts"]
+    assert seen["tables"] == [
+        "Force error by drive; noise floor 2.49 N",
+        "Parameters of the modified Bouc-Wen law",
+    ]
+    assert seen["drives"] == ["0", "0.1", "0.2", "0.3", "0.4", "0.5"]
+
+
+@browser_test
+def test_a_planned_method_is_used_on_the_bench(seen):
+    assert "coil voltage" in seen["planFacts"]
+    assert "± 25 mm" in seen["planFacts"]
+    assert seen["focused"] == "Bench"
+
+
+@browser_test
+def test_units_are_chosen_by_the_person_and_kept(seen):
+    assert seen["units"][:3] == [" lbf", " in", " in/s"]
+    assert seen["captions"] == ["Force [lbf] against displacement [in]", "Force [lbf] against velocity [in/s]"]
+
+
+@browser_test
+def test_the_keyboard_reaches_a_run_from_the_navigation(seen):
+    assert seen["walked"] == "#/runs/run-3"
+
+
+@browser_test
+def test_a_trip_is_large_and_audible_in_every_view_until_it_is_silenced(seen):
+    assert TRIP in seen["trip"]
+    assert seen["silenced"]
+    assert seen["bannerStays"]
+
+
+@browser_test
+def test_events_survive_a_reload(seen):
+    assert sum("the agent is ready" in event for event in seen["events"]) > 1
+    assert all(re.match(r"\d\d:\d\d:\d\d UTC", event) for event in seen["events"])

@@ -6,6 +6,7 @@ BenchError
 ├── RunError               a run failed or could not be started
 │   └── InterlockError     an interlock refused a command
 ├── AgentUnreachableError  the rig agent does not reply
+├── SecretFileError        a file with a secret is missing, or other users may read it
 ├── LogError               a log cannot be read, written or repaired
 ├── RecordingError         a recording cannot be imported
 └── ReportError            a report or a demo cannot be made
@@ -31,6 +32,10 @@ class RunError(BenchError):
 
 class AgentUnreachableError(BenchError):
     """The rig agent does not reply."""
+
+
+class SecretFileError(BenchError):
+    """A file with a secret is missing, or other users may read it."""
 
 
 class LogError(BenchError):

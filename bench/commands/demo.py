@@ -12,7 +12,10 @@ def demo(
     ] = False,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for all results.")] = Path("runs/demo"),
     serve: Annotated[
-        bool, typer.Option("--serve", help="Keep the bench and its page running afterwards.")
+        bool,
+        typer.Option(
+            "--serve", help="Keep the bench and its page running afterwards, with three recorded runs to explore."
+        ),
     ] = False,
     seed: Annotated[
         int, typer.Option(metavar="N", min=0, help="Seed of the hidden effect; the same seed hides the same one.")
@@ -28,5 +31,6 @@ def demo(
 
     from bench.demo import Demo, DemoFolder
 
-    folder = DemoFolder(out, "quick", None, seed) if quick else DemoFolder(out, "six_voltages", "validation", seed)
+    full = DemoFolder(out, "six_voltages", "validation", seed, ("quick",))
+    folder = DemoFolder(out, "quick", None, seed, ("validation", "multisine")) if quick else full
     Demo(folder, Console(stderr=True)).run(Console(), serve=serve)

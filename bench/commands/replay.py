@@ -21,6 +21,9 @@ def replay(
             metavar="ADDRESS", help="Address at which the samples are published, such as tcp://127.0.0.1:5571."
         ),
     ] = None,
+    key: Annotated[
+        Path, typer.Option(metavar="FILE", help="Key of a TCP --publish, created unless it exists.")
+    ] = Path("agent.key"),
 ) -> None:
     """Check that decoding the raw frames of a log gives its recorded readings.
 
@@ -43,7 +46,7 @@ def replay(
         instruments = [result._asdict() for result in results]
         _write_document(out, {"log": str(log), "samples": samples, "equal": equal, "instruments": instruments})
     if publish is not None:
-        play_log(log, pace, publish)
+        play_log(log, pace, publish, key)
     if not equal:
         raise typer.Exit(1)
 

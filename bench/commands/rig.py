@@ -15,13 +15,28 @@ def rig(
     ] = None,
     samples: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="ZeroMQ address for published samples, instead of the configured."),
+        typer.Option(metavar="ADDRESS", help="ZeroMQ address for published samples; by default the next port."),
     ] = None,
+    end: Annotated[
+        bool,
+        typer.Option("--end", help="End the running agent of this bench if it is idle; a service starts another."),
+    ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="With --end: also end a tripped agent, which forgets the trip.")
+    ] = False,
 ) -> None:
     """Control the instruments of a bench, and execute the commands of `mrbench prepare` and of the service.
 
-    Runs until Ctrl-C or SIGTERM.
+    Runs until Ctrl-C or SIGTERM. With --end, it ends the agent that runs.
     """
+    if force and not end:
+        raise typer.BadParameter("--force needs --end")
+    if end:
+        from bench.agent_protocol import request_end
+
+        return typer.echo(request_end(config, force=force))
     from bench.agent import serve_agent
 
-    serve_agent(config, commands, samples, lambda line: typer.echo(line), lambda line: typer.echo(line, err=True))
+    return serve_agent(
+        config, commands, samples, lambda line: typer.echo(line), lambda line: typer.echo(line, err=True)
+    )

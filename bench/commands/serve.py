@@ -1,5 +1,6 @@
 """``mrbench serve``: the service with its web page."""
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,7 @@ def serve(
     config: Annotated[
         Path | None,
         typer.Option(
-            metavar="FILE", help="bench.toml of the rig; if no rig agent replies, one is started with it."
+            metavar="FILE", help="bench.toml of the rig; its agent is started, and started again when it dies."
         ),
     ] = None,
     host: Annotated[
@@ -27,20 +28,50 @@ def serve(
             help="Command address of a running rig agent; its samples are published at the next port.",
         ),
     ] = None,
+    start_agent: Annotated[
+        bool, typer.Option(help="Whether an agent of --config is started here; without, another process does.")
+    ] = True,
+    agent_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Key of --agent, which its agent keeps beside bench.toml.")
+    ] = None,
     scheduler: Annotated[
         str | None,
-        typer.Option(metavar="tcp://HOST:PORT", help="Dask scheduler with workers, instead of starting one here."),
+        typer.Option(metavar="tls://HOST:PORT", help="Job scheduler with workers, instead of starting one here."),
     ] = None,
     new_token: Annotated[
         bool, typer.Option("--new-token", help="Create a new token; the old one becomes invalid.")
     ] = False,
+    scheduler_tls: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="TLS file of --scheduler; by default jobs.pem in --data.")
+    ] = None,
+    plain_scheduler: Annotated[
+        bool,
+        typer.Option(
+            "--plain-scheduler",
+            help="Accept a scheduler without TLS on another machine: anybody who reaches it can execute code.",
+        ),
+    ] = False,
 ) -> None:
     """Serve the REST interface, the live values and the web page.
 
-    Starts a rig agent and one worker, unless their addresses are given. Prints the page's address, and the token
-    when it is new.
+    Starts a rig agent and one worker, unless their addresses are given. Prints the page's address. A new token is
+    printed on a terminal only; otherwise it is written to the file `token` in the data folder.
     """
     from bench.service import ServeOptions
     from bench.service import serve as run_service
 
-    run_service(ServeOptions(data, host, port, config, agent, scheduler, new_token), lambda line: typer.echo(line))
+    options = ServeOptions(
+        data=data,
+        host=host,
+        port=port,
+        config=config,
+        agent=agent,
+        start_agent=start_agent,
+        agent_key=agent_key,
+        scheduler=scheduler,
+        new_token=new_token,
+        scheduler_tls=scheduler_tls,
+        allow_plain_scheduler=plain_scheduler,
+        is_terminal=sys.stdout.isatty(),
+    )
+    run_service(options, lambda line: typer.echo(line))

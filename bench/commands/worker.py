@@ -1,4 +1,4 @@
-"""``mrbench worker``: a process that executes identification jobs, on this or another machine."""
+"""``mrbench worker`` and ``mrbench scheduler``: execution of identification jobs, on this or another machine."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,6 +12,16 @@ def worker(
         typer.Option(metavar="ADDRESS", help="Scheduler; by default that of the service that uses --data."),
     ] = None,
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
+    scheduler_tls: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="TLS file of --scheduler; by default jobs.pem in --data.")
+    ] = None,
+    plain_scheduler: Annotated[
+        bool,
+        typer.Option(
+            "--plain-scheduler",
+            help="Accept a scheduler without TLS on another machine: anybody who reaches it can execute code.",
+        ),
+    ] = False,
     nice: Annotated[
         int,
         typer.Option(
@@ -26,8 +36,30 @@ def worker(
 
     Ends when the scheduler ends.
     """
-    from bench.jobs import find_scheduler, run_worker
+    from bench.jobs import find_scheduler, get_tls_file, locate_scheduler, run_worker
     from bench.log_lines import log_to_stderr
 
     log_to_stderr()
-    run_worker(scheduler or find_scheduler(data), nice)
+    location = locate_scheduler(
+        scheduler or find_scheduler(data), scheduler_tls or get_tls_file(data), allow_plain=plain_scheduler
+    )
+    run_worker(location, nice)
+
+
+def scheduler(
+    data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
+    host: Annotated[
+        str, typer.Option(metavar="HOST", help="Address to listen on; 0.0.0.0 for workers on other machines.")
+    ] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 chooses a free one.")] = 8786,
+) -> None:
+    """Distribute the jobs of services to workers, also on other machines.
+
+    Needed only where they outlive the service or run elsewhere: `mrbench serve` starts a scheduler of its own. All
+    connections are encrypted; jobs.pem in --data is created at the first start and admits services and workers.
+    """
+    from bench.jobs import run_scheduler
+    from bench.log_lines import log_to_stderr
+
+    log_to_stderr()
+    run_scheduler(data, host, port, lambda line: typer.echo(line))

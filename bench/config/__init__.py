@@ -1,6 +1,6 @@
 """Configuration of a bench (``bench.toml``)."""
 
-from bench.config.bench_config import BenchConfig, ChannelSection, load_config
+from bench.config.bench_config import AgentSection, BenchConfig, ChannelSection, compute_identity, load_config
 from bench.config.instruments import (
     ActuatorSection,
     AsciiLoadCellSection,
@@ -14,6 +14,7 @@ from bench.config.instruments import (
 
 __all__ = [
     "ActuatorSection",
+    "AgentSection",
     "AsciiLoadCellSection",
     "BenchConfig",
     "ChannelSection",
@@ -23,5 +24,6 @@ __all__ = [
     "LvdtSection",
     "ModbusSection",
     "ThermometerSection",
+    "compute_identity",
     "load_config",
 ]

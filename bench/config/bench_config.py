@@ -4,6 +4,7 @@ It is written by hand for a real bench, and by ``mrbench sim`` for the simulated
 is read, and an error names file, section, key, value and the permitted values.
 """
 
+import hashlib
 import tomllib
 from collections import Counter
 from pathlib import Path
@@ -45,10 +46,20 @@ class RigSection(FrozenModel):
 
 
 class AgentSection(FrozenModel):
-    """Addresses of the rig agent; port * is any free one."""
+    """Addresses of the rig agent, only needed if clients are on other machines; port * is any free one."""
 
-    commands: str = Field(default="tcp://127.0.0.1:5570", description="ZeroMQ address for commands")
-    samples: str = Field(default="tcp://127.0.0.1:5571", description="ZeroMQ address of publications")
+    commands: str = Field(
+        default="",
+        description="ZeroMQ address for commands, tcp://HOST:PORT or ipc:///FOLDER/NAME; by default a socket that "
+        "only this user reaches",
+    )
+    samples: str = Field(
+        default="", description="ZeroMQ address of publications; by default the next port, or NAME.samples"
+    )
+    key: str = Field(
+        default="agent.key",
+        description="file with the key of TCP connections, relative to bench.toml; created at the first start",
+    )
 
 
 ChannelName: TypeAlias = Literal[
@@ -95,6 +106,11 @@ def load_config(path: Path) -> BenchConfig:
         raise ConfigError(f"{path}: not a TOML file: {error}") from None
     except ValidationError as error:
         raise ConfigError(f"{path}: {_describe_first_error(error)}") from None
+
+
+def compute_identity(config: BenchConfig) -> str:
+    """Return a text that differs for configurations with another content; comments do not count."""
+    return hashlib.sha256(config.model_dump_json().encode()).hexdigest()[:16]
 
 
 def _describe_first_error(error: ValidationError) -> str:

@@ -10,7 +10,7 @@ from rich.console import Console
 from bench.demo.api_client import ApiClient
 from bench.demo.folder import DemoFolder
 from bench.demo.processes import start_processes
-from bench.demo.recording import await_fit, record
+from bench.demo.recording import await_job, cancel_jobs, record
 from bench.demo.summary import print_answer, print_files, print_truth
 from bench.errors import ReportError, RunError
 from bench.processes import MRBENCH_COMMAND
@@ -41,11 +41,12 @@ class Demo:
             RunError: a process, a run or a command failed; the message names it and the reason.
         """
         self._make_folder()
+        self._steps += (len(self._folder.further_methods) + 1) * serve
         self._announce(
             f"start simulated rig with a hidden effect (seed {self._folder.seed}), agent, service, worker"
         )
-        with _handle_termination(), start_processes(self._folder) as page:
-            self._find_effect(ApiClient(page))
+        with _handle_termination(), start_processes(self._folder) as page, _stop_jobs(ApiClient(page)) as api:
+            self._find_effect(api)
             print_answer(self._folder, console)
             self._announce("open the truth")
             print_truth(self._folder, console)
@@ -53,10 +54,17 @@ class Demo:
             self._write_report()
             print_files(self._folder, console)
             if serve:
-                console.print(
-                    f"\nthe bench keeps running: {page}\nCtrl-C stops it", soft_wrap=True, highlight=False
-                )
-                _wait_for_interrupt()
+                with contextlib.suppress(KeyboardInterrupt):
+                    self._keep_serving(api, page, console)
+
+    def _keep_serving(self, api: ApiClient, page: str, console: Console) -> None:
+        """Record further runs, which the page shows as they are made, and wait for Ctrl-C."""
+        console.print(f"\nthe bench keeps running: {page}\nCtrl-C stops it", soft_wrap=True, highlight=False)
+        for method in self._folder.further_methods:
+            self._announce(f"record {method}, a further run to explore")
+            self._record_run(api, method)
+        self._announce("three runs are recorded, and are identified and diagnosed one after the other")
+        signal.pause()
 
     def _find_effect(self, api: ApiClient) -> None:
         """Record, identify and diagnose; then record validation strokes and play the twin on them."""
@@ -64,10 +72,12 @@ class Demo:
         run = self._record(api, folder.method)
         api.download(f"/runs/{run}/log", folder.log)
         self._announce("identify the damper")
-        await_fit(api, run)
-        api.download(f"/runs/{run}/fit", folder.fit)
+        fit = await_job(api, run, "identify")
+        api.download(f"/fits/{fit['id']}", folder.fit)
         self._announce("diagnose the sim-to-real gap")
-        _run_mrbench("diagnose", folder.log, "--out", folder.diagnosis, "--twin", folder.twin)
+        diagnosis = await_job(api, run, "diagnose")
+        api.download(f"/diagnoses/{diagnosis['id']}", folder.diagnosis)
+        api.download(f"/twins/{diagnosis['id']}", folder.twin)
         if folder.validation_method is not None and folder.validation_log is not None:
             run = self._record(api, folder.validation_method)
             api.download(f"/runs/{run}/log", folder.validation_log)
@@ -76,6 +86,9 @@ class Demo:
 
     def _record(self, api: ApiClient, method: str) -> str:
         self._announce(f"record {method} over the wires")
+        return self._record_run(api, method)
+
+    def _record_run(self, api: ApiClient, method: str) -> str:
         with show_progress(method) as progress:
             return record(api, method, progress, lambda text: self._progress_console.print(text, highlight=False))
 
@@ -104,9 +117,14 @@ def _run_mrbench(*arguments: object) -> None:
         raise RunError(f"mrbench {arguments[0]} failed; see its message above")
 
 
-def _wait_for_interrupt() -> None:
-    with contextlib.suppress(KeyboardInterrupt):
-        signal.pause()
+@contextlib.contextmanager
+def _stop_jobs(api: ApiClient) -> Iterator[ApiClient]:
+    """Cancel at the end the jobs that nobody waits for, such as those on the validation strokes."""
+    try:
+        yield api
+    finally:
+        with contextlib.suppress(RunError):
+            cancel_jobs(api)
 
 
 @contextlib.contextmanager

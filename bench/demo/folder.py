@@ -15,6 +15,8 @@ class DemoFolder:
     """Method of the validation strokes; None to record none."""
     seed: int
     """Seed of the hidden effect."""
+    further_methods: tuple[str, ...] = ()
+    """Methods that are recorded afterwards if the service keeps running, so that it has three runs to explore."""
 
     @property
     def log(self) -> Path:
@@ -62,13 +64,8 @@ class DemoFolder:
         return self.path / "plots"
 
     @property
-    def rig(self) -> Path:
-        """Configuration that the simulated rig writes, with the addresses of its instruments."""
-        return self.path / "rig.toml"
-
-    @property
     def config(self) -> Path:
-        """Configuration of the bench: the instruments, and the addresses of the agent."""
+        """Configuration that the simulated rig writes, with the addresses of its instruments."""
         return self.path / "bench.toml"
 
     @property

@@ -1,17 +1,15 @@
 """Processes of the demonstration: the simulated rig, and a service that starts agent and worker."""
 
 import contextlib
-import socket
 import subprocess
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from bench.agent_protocol import AgentClient, ShutDownCommand, StatusCommand
-from bench.config import load_config
+from bench.agent_protocol import AgentClient, ShutDownCommand, StatusCommand, find_agent
 from bench.demo.folder import DemoFolder
 from bench.errors import AgentUnreachableError, RunError
-from bench.processes import MRBENCH_COMMAND, terminate
+from bench.processes import MRBENCH_COMMAND, open_privately, terminate
 
 _START_TIMEOUT = 120.0
 """Longest time [s] until a process is ready; the rig compiles code when it is first started."""
@@ -39,38 +37,25 @@ def start_processes(folder: DemoFolder) -> Iterator[str]:
     with contextlib.ExitStack() as stack:
         # The file of an earlier demo contains closed ports. If it cannot be deleted, the rig reports that itself.
         with contextlib.suppress(OSError):
-            folder.rig.unlink(missing_ok=True)
-        sim = ["sim", "--draw", str(folder.seed), "--truth", str(folder.truth), "--out", str(folder.rig)]
+            folder.config.unlink(missing_ok=True)
+        sim = ["sim", "--draw", str(folder.seed), "--truth", str(folder.truth), "--out", str(folder.config)]
         rig = stack.enter_context(_start_process(sim, folder.path / "rig.log"))
-        _wait_until_ready(rig, folder.path / "rig.log", folder.rig.is_file)
-        _configure(folder)
+        _wait_until_ready(rig, folder.path / "rig.log", folder.config.is_file)
         stack.callback(_shut_down_agent, folder.config)
-        # The token of an earlier demo is not stored anywhere, so a new one is needed.
+        # The token of an earlier demo may be known to others.
         serve = ["serve", "--config", str(folder.config), "--data", str(folder.data), "--port", "0", "--new-token"]
         output = folder.path / "service.log"
         service = stack.enter_context(_start_process(serve, output))
-        _wait_until_ready(service, output, lambda: "#token=" in output.read_text("utf-8"))
-        yield next(line for line in output.read_text("utf-8").splitlines() if "#token=" in line)
-
-
-def _configure(folder: DemoFolder) -> None:
-    """Write the configuration with free ports for the agent: another agent may use the default ones."""
-    commands, samples = _find_free_ports(2)
-    agent = f'\n[agent]\ncommands = "tcp://127.0.0.1:{commands}"\nsamples = "tcp://127.0.0.1:{samples}"\n'
-    folder.config.write_text(folder.rig.read_text("utf-8") + agent, "utf-8")
-
-
-def _find_free_ports(count: int) -> list[int]:
-    # All are open at the same time: a closed port can be assigned again at once.
-    with contextlib.ExitStack() as stack:
-        sockets = [stack.enter_context(socket.create_server(("127.0.0.1", 0))) for _ in range(count)]
-        return [listener.getsockname()[1] for listener in sockets]
+        _wait_until_ready(service, output, lambda: " (the token is new" in output.read_text("utf-8"))
+        line = next(line for line in output.read_text("utf-8").splitlines() if " (the token is new" in line)
+        yield f"{line.split()[0]}#token={(folder.data / 'token').read_text('ascii')}"
 
 
 @contextlib.contextmanager
 def _start_process(arguments: list[str], output: Path) -> Iterator["subprocess.Popen[bytes]"]:
     """Run a command in a separate session: Ctrl-C reaches only the demo, which ends its processes in order."""
-    with output.open("wb") as file:
+    output.unlink(missing_ok=True)
+    with open_privately(output) as file:
         process = subprocess.Popen(
             [*MRBENCH_COMMAND, *arguments],
             stdin=subprocess.DEVNULL,
@@ -97,8 +82,7 @@ def _wait_until_ready(process: "subprocess.Popen[bytes]", output: Path, is_ready
 
 def _shut_down_agent(config: Path) -> None:
     """Shut down the agent if it is still running: it continues when its service is killed."""
-    agent = load_config(config).agent
-    client = AgentClient(agent.commands, agent.samples)
+    client = AgentClient(*find_agent(config))
     with contextlib.suppress(AgentUnreachableError):
         client.send(StatusCommand(), _STATUS_TIMEOUT)
         client.send(ShutDownCommand(), _STOP_TIMEOUT)

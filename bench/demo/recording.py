@@ -1,5 +1,6 @@
-"""Recording of a run through the service, and waiting for its identification."""
+"""Recording of a run through the service, and waiting for its jobs."""
 
+import contextlib
 import time
 from collections.abc import Callable
 from typing import Any
@@ -12,8 +13,10 @@ _POLL_PERIOD = 0.25
 """Time [s] between two requests."""
 _RUN_MARGIN = 60.0
 """Time [s] that a run may last beyond its planned duration."""
-_FIT_TIMEOUT = 900.0
-"""Longest time [s] of an identification."""
+_JOB_TIMEOUT = 900.0
+"""Longest time [s] of an identification or a diagnosis."""
+_STOP_TIMEOUT = 30.0
+"""Longest time [s] until cancelled jobs have stopped."""
 _MAX_ATTEMPTS = 3
 """Largest number of runs of a method: on a busy machine late setpoints can make the interlocks end a run."""
 _FINAL_STATES = ("done", "failed", "cancelled")
@@ -67,21 +70,47 @@ def _run(api: ApiClient, method: str, progress: Progress) -> str:
     return str(run["id"])
 
 
-def await_fit(api: ApiClient, run_id: str) -> None:
-    """Wait for the identification of a run.
+def await_job(api: ApiClient, run_id: str, kind: str) -> dict[str, Any]:
+    """Wait for the identification or diagnosis of a run, and return its job.
+
+    Args:
+        api: client of the service.
+        run_id: id of the run.
+        kind: ``identify`` or ``diagnose``.
 
     Raises:
-        RunError: the identification failed or takes too long.
+        RunError: the job failed or takes too long.
     """
-    deadline = time.monotonic() + _FIT_TIMEOUT
-    while not (job := _find_identification(api, run_id)) or job["state"] not in _FINAL_STATES:
+    deadline = time.monotonic() + _JOB_TIMEOUT
+    while not (job := _find_job(api, run_id, kind)) or job["state"] not in _FINAL_STATES:
         if time.monotonic() > deadline:
-            raise RunError(f"the identification of {run_id} has not ended within {_FIT_TIMEOUT:g} s")
+            raise RunError(f"the job {kind} of {run_id} has not ended within {_JOB_TIMEOUT:g} s")
         time.sleep(_POLL_PERIOD)
     if job["state"] != "done":
-        raise RunError(f"the identification of {run_id} {job['state']}: {job['error']}")
+        raise RunError(f"the job {kind} of {run_id} {job['state']}: {job['error']}")
+    return job
 
 
-def _find_identification(api: ApiClient, run_id: str) -> dict[str, Any] | None:
+def _find_job(api: ApiClient, run_id: str, kind: str) -> dict[str, Any] | None:
     jobs: list[dict[str, Any]] = api.get(f"/runs/{run_id}")["jobs"]
-    return jobs[-1] if jobs else None
+    return next((job for job in jobs if job["kind"] == kind), None)
+
+
+def cancel_jobs(api: ApiClient) -> None:
+    """Cancel all unfinished jobs and wait until they have stopped, so that none is left running or half written.
+
+    Raises:
+        RunError: a job does not stop.
+    """
+    deadline = time.monotonic() + _STOP_TIMEOUT
+    asked: set[str] = set()
+    while jobs := api.get("/jobs?state=queued&state=running")["items"]:
+        if time.monotonic() > deadline:
+            raise RunError(f"{len(jobs)} jobs have not stopped within {_STOP_TIMEOUT:g} s")
+        for job in jobs:
+            if job["id"] not in asked:
+                asked.add(job["id"])
+                # A job that ends at this moment is refused, and is not in the list any more.
+                with contextlib.suppress(RunError):
+                    api.post(f"/jobs/{job['id']}/cancel", {})
+        time.sleep(_POLL_PERIOD)

@@ -1,0 +1,34 @@
+"""``mrbench verify``: comparison of the logs in a data folder with the hashes in its catalogue."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def verify(
+    data: Annotated[Path, typer.Argument(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
+) -> None:
+    """Check that the recorded logs are unchanged, by the hashes that were stored when they were recorded.
+
+    Lists each log that was changed or is missing, and then exits with status 1. The service may run meanwhile.
+    """
+    from bench.catalogue import Catalogue, check_all, find_catalogue, open_database
+    from bench.errors import LogError
+
+    folder = data.resolve()
+    catalogue = Catalogue(open_database(find_catalogue(folder)), folder)
+    try:
+        rows = list(check_all(catalogue))
+    finally:
+        catalogue.close()
+    damaged = [row for row in rows if row.integrity != "intact"]
+    for row in damaged:
+        found = f": recorded {row.log_sha256}, found {row.found_sha256}" if row.found_sha256 else ""
+        typer.echo(f"{row.log}: {row.integrity}{found}")
+    typer.echo(f"{len(rows) - len(damaged)} of {len(rows)} logs are unchanged since they were recorded")
+    if damaged:
+        raise LogError(
+            f"{folder}: {len(damaged)} logs were changed or are missing; restore them from a backup; their fits "
+            "stand as those of the recorded logs"
+        )

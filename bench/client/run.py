@@ -17,6 +17,8 @@ from bench.validation import describe_validation_error
 _POLL_PERIOD = 0.5
 """Time [s] between two requests while a script waits."""
 _UNFINISHED_JOBS = ("queued", "running")
+_IDENTIFIED_OUTCOMES = ("clean", "lossy")
+"""Outcomes of a run of the bench that the service identifies by itself."""
 
 
 class JobState(BaseModel):
@@ -29,6 +31,11 @@ class JobState(BaseModel):
     state: str
     error: str = ""
 
+    @property
+    def is_finished(self) -> bool:
+        """Return whether the job is done, failed or cancelled."""
+        return self.state not in _UNFINISHED_JOBS
+
 
 class RunState(BaseModel):
     """State of a run when it was requested; the service may send further fields."""
@@ -39,6 +46,8 @@ class RunState(BaseModel):
     method: str
     specimen: str
     operator: str
+    source: str = "run"
+    """run for a run of the bench, import for a recording made elsewhere."""
     state: str
     """running, ended or truncated."""
     ending: str | None = None
@@ -55,6 +64,15 @@ class RunState(BaseModel):
     noise_floor_n: float | None = None
     """Noise floor of the force [N]."""
     jobs: tuple[JobState, ...] = ()
+
+    @property
+    def is_evaluated(self) -> bool:
+        """Return whether the run has ended and all its jobs are finished.
+
+        The service queues the identification of a run shortly after its end, so a run without jobs may await it.
+        """
+        awaits_job = self.source == "run" and self.outcome in _IDENTIFIED_OUTCOMES and not self.jobs
+        return self.state != "running" and not awaits_job and all(job.is_finished for job in self.jobs)
 
 
 class Run:
@@ -100,11 +118,7 @@ class Run:
         Raises:
             ClientError: a job is not finished in time, or the service cannot be reached.
         """
-
-        def is_finished(state: RunState) -> bool:
-            return state.state != "running" and not any(job.state in _UNFINISHED_JOBS for job in state.jobs)
-
-        return self._wait(is_finished, timeout, "been evaluated")
+        return self._wait(lambda state: state.is_evaluated, timeout, "been evaluated")
 
     def arrays(self) -> Arrays:
         """Return all samples, each channel of shape (samples,) with its unit.

@@ -4,6 +4,7 @@ import { TripAlarm } from "./alarm.js";
 import { get, post } from "./api.js";
 import { leaveDialogs, onAnswer, openDialog } from "./dialogs.js";
 import { byId, clock, duration, fixed, write, zone } from "./format.js";
+import { RunControl } from "./run_control.js";
 
 const STATE_NAMES = {
   unknown: "No connection",
@@ -32,6 +33,7 @@ export class TopBar {
     this.openedAt = performance.now();
     this.state = null;
     this.alarm = new TripAlarm();
+    this.control = new RunControl({ onDetail: (...detail) => this.showDetail(...detail), run: () => this.run });
     byId("stop").addEventListener("click", () => this.stop());
     byId("reset").addEventListener("click", () => this.askForReset());
     onAnswer("reset-dialog", "reset", () => this.reset());
@@ -82,6 +84,7 @@ export class TopBar {
     write(byId("bar-line"), this.line(state));
     // Without news of the bench, its last trip still stands.
     this.alarm.show(this.status?.state === "tripped" ? this.status.trip || "no reason given" : "");
+    this.control.show(state);
     this.showProgress(state);
   }
 
@@ -103,7 +106,8 @@ export class TopBar {
     const description = `${run.method} on ${run.specimen || "an unnamed specimen"}`;
     if (state === "idle") return `Last run: ${description}: ${[run.outcome, run.reason].filter(Boolean).join(", ")}.`;
     const by = run.operator ? ` by ${run.operator}` : "";
-    return `${description}, started ${clock(new Date(run.started))} ${zone(new Date(run.started))}${by}`;
+    const pause = run.pause ? `. Pause: ${run.pause}` : "";
+    return `${description}, started ${clock(new Date(run.started))} ${zone(new Date(run.started))}${by}${pause}`;
   }
 
   showProgress(state) {

@@ -36,7 +36,9 @@ seen.words = await noted();
 seen.after = await look();
 await page.reload();
 await watch();
-await page.waitForTimeout(4_000);
+// A busy machine may need seconds until the last status has arrived again.
+await page.waitForFunction(
+  () => Number(/No data for (\d+) s/.exec(document.getElementById("bar-line").innerText)?.[1]) >= 13, null, { timeout: 30_000 });
 seen.wordsAfterReload = await noted();
 seen.afterReload = await look();
 await close();

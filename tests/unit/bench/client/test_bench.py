@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from bench.client import Bench, ClientError
+from bench.client import Bench, ClientError, RunState
 from tests.support.service_logs import write_complete_log, write_truncated_log
 
 TIMEOUT = 20.0
@@ -68,8 +68,19 @@ def test_jobs_are_waited_for(service, bench):
     run = await_run(bench, "one")
     with pytest.raises(ClientError, match="has not been evaluated"):
         run.wait_for_jobs(0.0)
-    bench._session.post(f"/jobs/{run.get_state().jobs[0].id}/cancel")
+    deadline = time.monotonic() + TIMEOUT
+    while not (jobs := run.get_state().jobs):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    bench._session.post(f"/jobs/{jobs[0].id}/cancel")
     assert "cancelled" in {job.state for job in run.wait_for_jobs(TIMEOUT).jobs}
+
+
+def test_an_ended_run_without_jobs_awaits_its_identification():
+    facts = {"id": "one", "method": "quick", "specimen": "", "operator": "", "state": "ended"}
+    assert not RunState(**facts, outcome="clean").is_evaluated
+    assert RunState(**facts, outcome="incomplete").is_evaluated
+    assert RunState(**facts, outcome="clean", source="import").is_evaluated
 
 
 def test_runs_are_listed_over_several_pages(service, bench, monkeypatch):

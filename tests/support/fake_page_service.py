@@ -25,8 +25,10 @@ TOKEN = "a-token"
 SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
 REFUSAL = "lvdt: not connected for 3.2 s; plug it in and start again"
 CLAMPED = "a specimen is clamped, and homing would drive it into its ends; unclamp it and call unmount first"
+HASH = "5f" * 32
 RATE = 1000
 BATCH = 40
+PAUSE = "at checkpoint 10mm_1Hz, in 4 s"
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
 METHODS = [
     {"name": name, "title": title, "duration_s": duration, "drive_kind": "coil_v", "checkpoints": []}
@@ -95,7 +97,8 @@ class FakeBench:
         found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
         activity = "identify: refine, start 3 of 8"
         self.runs = {
-            "run-3": run(3, "lossy", reason="12 samples of force were lost"),
+            "run-3": run(3, "lossy", reason="12 samples of force were lost", ending="stopped", log_sha256=HASH,
+                         jobs=[fit_job("run-3", "failed", error="the worker was killed")]),
             "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity=activity)]),
             "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
@@ -191,6 +194,11 @@ def rig_routes(bench: FakeBench) -> APIRouter:
         bench.state, bench.trip, bench.run = "tripped", TRIP, None
         return bench.status()
 
+    @router.post("/bench/abort")
+    async def abort() -> Any:
+        bench.state, bench.trip, bench.run = "tripped", "aborted on request", None
+        return bench.status()
+
     @router.post("/agent/prepare")
     async def prepare(wanted: dict[str, Any]) -> Any:
         if wanted["step"] == "home" and bench.reference_state == "mounted":
@@ -249,6 +257,27 @@ def run_routes(bench: FakeBench) -> APIRouter:
         bench.state, bench.trip, bench.run = "tripped", TRIP, None
         bench.runs[run_id] |= {"state": "ended", "outcome": "incomplete", "reason": TRIP}
         return bench.runs[run_id]
+
+    @router.post("/runs/{run_id}/pause")
+    async def pause(run_id: str) -> Any:
+        assert bench.run is not None
+        bench.run["pause"] = PAUSE
+        return bench.status()
+
+    @router.post("/runs/{run_id}/resume", status_code=201)
+    async def resume(run_id: str) -> Any:
+        return bench.begin({"method": "quick", "specimen": "MR-0042", "operator": "", "continues": run_id})
+
+    @router.post("/runs/{run_id}/integrity")
+    async def check(run_id: str) -> Any:
+        bench.runs[run_id]["integrity"] = "changed"
+        return {"integrity": "changed", "recorded_sha256": HASH, "found_sha256": "0" * 64, "checked": None}
+
+    @router.post("/jobs/{job_id}/retry")
+    async def retry(job_id: str) -> Any:
+        job = bench.runs["run-3"]["jobs"][0]
+        job |= {"state": "queued", "error": ""}
+        return job
 
     @router.post("/jobs/{job_id}/cancel")
     async def cancel(job_id: str) -> Any:

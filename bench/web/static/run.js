@@ -74,11 +74,12 @@ export class RunView {
       "Fit RMSE / noise floor": describeFit(run),
       Diagnosis: run.diagnosis ? [describeVerdict(run.diagnosis), element("small", {}, run.diagnosis.explanation)] : ["–"],
       Jobs: [jobs.length ? element("ol", {}, ...jobs) : "none"],
-      Log: [element("span", { className: "path" }, run.log || "none")],
+      Log: [element("span", { className: "path" }, run.log || "none"), ...describeIntegrity(run)],
+      ...(run.continues && { Continues: [element("a", { href: runAddress(run.continues) }, `run ${run.continues}`)] }),
     };
     const list = element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, content]) =>
       element("div", {}, element("dt", {}, name), element("dd", {}, ...content))));
-    const buttons = element("p", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run));
+    const buttons = element("p", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), ...this.actions.more(run));
     this.facts.replaceChildren(element("h2", {}, "Facts"), list, buttons, this.actions.answer(run));
     if (focused) this.facts.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
   }
@@ -106,6 +107,14 @@ export class RunView {
       element("section", { "aria-label": "Provenance" }, element("h2", {}, "Provenance"),
         ...origin.map((text) => element("p", { className: "path" }, text))));
   }
+}
+
+/** Tells whether the log is as it was recorded, with the hash stored then. */
+function describeIntegrity({ integrity, log_sha256: hash }) {
+  if (!hash) return [];
+  const damaged = integrity && integrity !== "intact";
+  const found = damaged ? element("small", { className: "problem" }, `The log is ${integrity}; results may not be its own.`) : null;
+  return [found, element("small", { className: "path" }, `SHA-256 ${hash}`)];
 }
 
 /** Identifies the results of a run, to find out whether there is a new one. */

@@ -2,7 +2,7 @@
 
 import { file, get, post } from "./api.js";
 import { element, instant } from "./format.js";
-import { hasEnded, hasReport, isFitted, isUnfinished } from "./run_facts.js";
+import { canResume, hasEnded, hasReport, isFitted, isUnfinished, mayRetry } from "./run_facts.js";
 import { runAddress } from "./router.js";
 
 const encode = encodeURIComponent;
@@ -35,7 +35,18 @@ export class RunActions {
     if (unfinished.length) return unfinished.map((job) => this.button(run, `cancel-${job.id}`, "Cancel", () => this.cancel(run, job)));
     if (run.state === "truncated") return [this.button(run, "repair", "Repair log", () => this.repair(run))];
     if (!hasEnded(run)) return [];
-    return [this.button(run, "identify", "Identify", () => this.identify(run))];
+    const made = [this.button(run, "identify", "Identify", () => this.identify(run))];
+    if (isFitted(run)) made.push(this.button(run, "diagnose", "Diagnose", () => this.diagnose(run)));
+    return made;
+  }
+
+  /** Further buttons of the view of one run: resumption, retry of failed jobs, check of the log. */
+  more(run) {
+    const made = run.jobs.filter((job) => mayRetry(job)).map((job) =>
+      this.button(run, `retry-${job.id}`, `Retry ${job.kind}`, () => this.retry(run, job)));
+    if (run.log_sha256) made.push(this.button(run, "integrity", "Check log", () => this.checkLog(run)));
+    if (canResume(run)) made.push(this.button(run, "resume", "Resume", () => this.resume(run)));
+    return made;
   }
 
   button(run, key, text, act) {
@@ -69,6 +80,38 @@ export class RunActions {
       return job.state === "done"
         ? `This fit exists already, made ${instant(job.finished)}; nothing was computed again.`
         : "The identification was requested.";
+    });
+  }
+
+  diagnose(run) {
+    return this.attempt(run, "Not requested", async () => {
+      const job = await post(`runs/${encode(run.id)}/diagnose`);
+      return job.state === "done"
+        ? `This diagnosis exists already, made ${instant(job.finished)}; nothing was computed again.`
+        : "The diagnosis was requested.";
+    });
+  }
+
+  retry(run, job) {
+    return this.attempt(run, "Not requested", async () => {
+      await post(`jobs/${encode(job.id)}/retry`, { reason: "requested in the page" });
+      return `The job ${job.kind} was queued again.`;
+    });
+  }
+
+  checkLog(run) {
+    return this.attempt(run, "Not checked", async () => {
+      const { integrity, recorded_sha256: hash } = await post(`runs/${encode(run.id)}/integrity`);
+      return integrity === "intact" ? `The log is as it was recorded, SHA-256 ${hash}.` : `The log is ${integrity}: restore it from a backup.`;
+    });
+  }
+
+  resume(run) {
+    return this.attempt(run, "Not resumed", async () => {
+      const next = await post(`runs/${encode(run.id)}/resume`);
+      this.onRun(next);
+      location.hash = "#/bench";
+      return "The run was resumed; the new run continues it.";
     });
   }
 

@@ -11,6 +11,8 @@ const CUT_OFF = "The recording was cut off. Repair keeps what was recorded.";
 
 export const hasEnded = (run) => Boolean(run.outcome);
 export const isUnfinished = (job) => UNFINISHED.includes(job.state);
+export const mayRetry = (job) => ["failed", "cancelled"].includes(job.state);
+export const canResume = (run) => run.source === "run" && hasEnded(run) && run.ending !== "completed";
 export const isFitted = (run) => run.jobs.some((job) => job.state === "done" && job.kind === "identify");
 export const hasReport = (run) => run.jobs.some((job) => job.state === "done");
 

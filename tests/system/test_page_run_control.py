@@ -1,0 +1,47 @@
+"""Pause, abort and resumption of a run, retry of a job and check of a log at the web page, in a real browser."""
+
+import pytest
+
+from tests.support.fake_page_service import HASH, PAUSE, FakeBench
+from tests.support.page_in_browser import browser_test, operate_page
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return FakeBench()
+
+
+@pytest.fixture(scope="module")
+def seen(bench):
+    return operate_page(bench, "control_run.mjs")
+
+
+@browser_test
+def test_each_state_offers_the_buttons_that_have_a_function_in_it(seen):
+    assert seen["errors"] == []
+    assert seen["buttons"] == {"idle": [], "running": ["pause", "abort"], "tripped": ["reset"]}
+    assert min(seen["heights"]) >= 44
+
+
+@browser_test
+def test_a_requested_pause_says_when_it_takes_effect(seen):
+    assert f"Pause: {PAUSE}" in seen["pause"]
+    assert seen["pauseDisabled"]
+
+
+@browser_test
+def test_the_buttons_call_the_service(seen, bench):
+    paths = [path for path, _ in bench.posted]
+    wanted = ["runs/run-4/pause", "bench/abort", "jobs/job-run-3/retry", "runs/run-3/integrity", "runs/run-3/resume"]
+    assert [path for path in paths if path in wanted] == wanted
+
+
+@browser_test
+def test_a_changed_log_is_named_with_its_recorded_hash(seen):
+    assert "The log is changed; results may not be its own." in seen["facts"]
+    assert HASH in seen["facts"]
+
+
+@browser_test
+def test_a_resumed_run_leads_to_the_bench(seen):
+    assert seen["address"] == "#/bench"

@@ -166,7 +166,7 @@ def application(bench: FakeBench) -> FastAPI:
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
 
-    for routes in (rig_routes, method_routes, run_routes, result_routes, live_routes):
+    for routes in (rig_routes, method_routes, run_routes, run_control_routes, result_routes, live_routes):
         app.include_router(routes(bench), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
@@ -257,6 +257,13 @@ def run_routes(bench: FakeBench) -> APIRouter:
         bench.state, bench.trip, bench.run = "tripped", TRIP, None
         bench.runs[run_id] |= {"state": "ended", "outcome": "incomplete", "reason": TRIP}
         return bench.runs[run_id]
+
+    return router
+
+
+def run_control_routes(bench: FakeBench) -> APIRouter:
+    """Create the routes that pause, resume and check a run, and repeat or cancel a job."""
+    router = APIRouter()
 
     @router.post("/runs/{run_id}/pause")
     async def pause(run_id: str) -> Any:

@@ -144,13 +144,13 @@ def test_the_report_of_the_demo_states_that_its_recording_was_fitted(demo):
 
 
 def test_a_failing_process_ends_the_demo_with_its_own_message(tmp_path):
-    (tmp_path / "demo" / "rig.toml").mkdir(parents=True)
+    (tmp_path / "demo" / "bench.toml").mkdir(parents=True)
     result = mrbench("demo", "--quick", "--out", tmp_path / "demo")
     assert result.returncode == 1
     step, message = result.stderr.splitlines()
     assert step.startswith("1/6 start simulated rig")
     assert message.startswith("mrbench: a process of the demo ended at once: ")
-    assert "rig.toml: cannot be replaced" in message
+    assert "bench.toml: cannot be replaced" in message
     assert result.stdout == ""
 
 

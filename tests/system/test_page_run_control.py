@@ -32,7 +32,13 @@ def test_a_requested_pause_says_when_it_takes_effect(seen):
 @browser_test
 def test_the_buttons_call_the_service(seen, bench):
     paths = [path for path, _ in bench.posted]
-    wanted = ["runs/run-4/pause", "bench/abort", "jobs/job-run-3/retry", "runs/run-3/integrity", "runs/run-3/resume"]
+    wanted = [
+        "runs/run-4/pause",
+        "bench/abort",
+        "jobs/job-run-3/retry",
+        "runs/run-3/integrity",
+        "runs/run-3/resume",
+    ]
     assert [path for path in paths if path in wanted] == wanted
 
 

@@ -35,7 +35,7 @@ try {
   seen.readings = await page.locator("#readings > div").allInnerTexts();
   await page.screenshot({ path: picture });
   await hasText("#state-word", "Idle", 60_000);
-  await until(() => /N \/ .*N/.test(document.querySelector("#runs")?.innerText ?? ""), null, FIT_WITHIN);
+  await until(() => /N \/ .*N/.test(document.querySelector("#runs tr")?.innerText ?? ""), null, FIT_WITHIN);
   seen.runs = await page.locator("#runs tr").allInnerTexts();
   seen.instruments = await page.locator("#instruments tr").allInnerTexts();
   console.log(JSON.stringify(seen));

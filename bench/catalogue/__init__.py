@@ -15,6 +15,7 @@ from bench.catalogue.models import (
     RunRow,
     RunState,
 )
+from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
 
@@ -29,6 +30,7 @@ __all__ = [
     "JobRow",
     "JobState",
     "LogIntegrity",
+    "RunFilter",
     "RunOutcome",
     "RunPlan",
     "RunRow",

@@ -9,6 +9,7 @@ from sqlalchemy.orm import sessionmaker
 
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
+from bench.catalogue.run_filter import RunFilter
 
 
 class Catalogue:
@@ -53,14 +54,17 @@ class Catalogue:
         with self._sessions() as session:
             return session.get(RunRow, run_id)
 
-    def list_runs(self, limit: int, before: RunRow | None = None) -> Sequence[RunRow]:
+    def list_runs(
+        self, limit: int, before: RunRow | None = None, selection: RunFilter | None = None
+    ) -> Sequence[RunRow]:
         """Return runs, newest first.
 
         Args:
             limit: largest number of runs.
             before: return only runs that come after this one in the order.
+            selection: return only these runs; None for all.
         """
-        query = select(RunRow).order_by(RunRow.started.desc(), RunRow.id.desc()).limit(limit)
+        query = select(RunRow).where(*(selection or RunFilter()).make_conditions()).order_by(RunRow.started.desc(), RunRow.id.desc()).limit(limit)
         # Pages start at a row, not at a count: a run that is added meanwhile then shifts no page.
         if before is not None:
             query = query.where(tuple_(RunRow.started, RunRow.id) < tuple_(before.started, before.id))

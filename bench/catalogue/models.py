@@ -47,7 +47,10 @@ class RunRow(Base):
     """One run and its log."""
 
     __tablename__ = "runs"
-    __table_args__ = (Index("runs_newest_first", "started", "id"),)
+    __table_args__ = (
+        Index("runs_newest_first", "started", "id"),
+        Index("runs_of_specimen", "specimen", "started", "id"),
+    )
 
     id: Mapped[str] = mapped_column(Text, primary_key=True)
     method: Mapped[str] = mapped_column(Text)
@@ -121,7 +124,7 @@ class JobRow(Base):
     result: Mapped[str | None] = mapped_column(Text, default=None)
     """Folder of the results, relative to the data folder or absolute."""
     summary: Mapped[dict[str, Any] | None] = mapped_column(JSON, default=None)
-    """Errors of a fit; verdict, effects and shrinkage of a diagnosis."""
+    """Errors and parameters of a fit; verdict, effects and shrinkage of a diagnosis."""
 
 
 class BatchRow(Base):

@@ -2,6 +2,7 @@
 
 import uuid
 from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -48,16 +49,24 @@ class Bench:
         """Return a run by its id; nothing is requested yet."""
         return Run(self._session, run_id)
 
-    def list_runs(self, limit: int = _PAGE_SIZE) -> list[RunState]:
-        """Return the newest runs, the newest first.
+    def list_runs(self, limit: int = _PAGE_SIZE, **search: str | float | datetime) -> list[RunState]:
+        """Return the runs that meet all conditions, the newest first.
 
         Args:
             limit: largest number of runs.
+            search: conditions, as `GET /runs` has them: specimen, method, outcome, ending, started_from, started_to,
+                effect, parameter with parameter_min and parameter_max (unit of the fit), text.
 
         Raises:
-            ClientError: the service cannot be reached.
+            ClientError: a condition is refused, or the service cannot be reached.
         """
-        return list(islice(self._iterate_runs(min(limit, _PAGE_SIZE)), limit))
+        # `from` is a keyword of Python, so that it cannot name an argument.
+        names = {"started_from": "from", "started_to": "to"}
+        conditions = {
+            names.get(name, name): value.astimezone(UTC).isoformat() if isinstance(value, datetime) else value
+            for name, value in search.items()
+        }
+        return list(islice(self._iterate_runs(min(limit, _PAGE_SIZE), conditions), limit))
 
     def start(
         self, method: str | Mapping[str, Any], specimen: str, operator: str = "", resume_after: str = ""
@@ -84,10 +93,10 @@ class Bench:
         """
         self._session.post("/agent/stop")
 
-    def _iterate_runs(self, page_size: int) -> Iterator[RunState]:
+    def _iterate_runs(self, page_size: int, conditions: Mapping[str, str | float]) -> Iterator[RunState]:
         before = None
         while True:
-            page = self._session.get("/runs", limit=page_size, before=before)
+            page = self._session.get("/runs", limit=page_size, before=before, **conditions)
             yield from map(parse_run_state, page["items"])
             before = page["next"]
             if before is None:

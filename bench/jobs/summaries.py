@@ -25,6 +25,7 @@ def read_fit_summary(path: Path) -> ResultSummary:
         "rmse_n": fit.rmse_n.train,
         "held_out_rmse_n": fit.rmse_n.held_out,
         "noise_floor_n": fit.noise_floor_n,
+        "parameters": {name: estimate.value for name, estimate in fit.parameters.items()},
     }
 
 

@@ -16,6 +16,7 @@ from bench.methods import Method, compile_method, parse_method
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict
 from bench.service.routes.methods import load_shipped_method
+from bench.service.routes.run_search import RunSearch
 from bench.service.run_registry import make_run_row
 from bench.service.views import Run, RunPage, StartRunRequest, make_run_view
 
@@ -102,12 +103,14 @@ def _request_start(
 @router.get("")
 def list_runs(
     context: Context,
+    search: RunSearch,
     limit: Annotated[int, Query(ge=1, le=200, description="largest number of items")] = 50,
     before: Annotated[str | None, Query(description="`next` of the previous page")] = None,
 ) -> RunPage:
-    """List the runs, newest first."""
+    """List the runs that meet all given conditions, newest first."""
     # One run more than shown, to find out whether there is a next page.
-    rows = context.catalogue.list_runs(limit + 1, None if before is None else context.get_run(before))
+    last = None if before is None else context.get_run(before)
+    rows = context.catalogue.list_runs(limit + 1, last, search)
     page = rows[:limit]
     return RunPage(items=tuple(context.make_run_views(*page)), next=page[-1].id if len(rows) > limit else None)
 

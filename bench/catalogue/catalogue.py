@@ -64,7 +64,12 @@ class Catalogue:
             before: return only runs that come after this one in the order.
             selection: return only these runs; None for all.
         """
-        query = select(RunRow).where(*(selection or RunFilter()).make_conditions()).order_by(RunRow.started.desc(), RunRow.id.desc()).limit(limit)
+        query = (
+            select(RunRow)
+            .where(*(selection or RunFilter()).make_conditions())
+            .order_by(RunRow.started.desc(), RunRow.id.desc())
+            .limit(limit)
+        )
         # Pages start at a row, not at a count: a run that is added meanwhile then shifts no page.
         if before is not None:
             query = query.where(tuple_(RunRow.started, RunRow.id) < tuple_(before.started, before.id))

@@ -54,8 +54,8 @@ class Bench:
 
         Args:
             limit: largest number of runs.
-            search: conditions, as `GET /runs` has them: specimen, method, outcome, ending, started_from, started_to,
-                effect, parameter with parameter_min and parameter_max (unit of the fit), text.
+            search: conditions, as `GET /runs` has them: specimen, method, outcome, ending, started_from,
+                started_to, effect, parameter with parameter_min and parameter_max (unit of the fit), text.
 
         Raises:
             ClientError: a condition is refused, or the service cannot be reached.

@@ -85,6 +85,7 @@ class FakeBench:
 
     def __init__(self) -> None:
         self.posted: list[tuple[str, Any]] = []
+        self.searches: list[dict[str, str]] = []
         self.state = "idle"
         self.trip = ""
         self.run: dict[str, Any] | None = None
@@ -238,8 +239,13 @@ def run_routes(bench: FakeBench) -> APIRouter:
     router = APIRouter()
 
     @router.get("/runs")
-    async def runs() -> Any:
-        return {"items": sorted(bench.runs.values(), key=lambda one: one["started"], reverse=True), "next": None}
+    async def runs(request: Request) -> Any:
+        bench.searches.append(dict(request.query_params))
+        wanted = {
+            name: request.query_params[name] for name in ("outcome", "specimen") if name in request.query_params
+        }
+        found = [one for one in bench.runs.values() if wanted.items() <= one.items()]
+        return {"items": sorted(found, key=lambda one: one["started"], reverse=True), "next": None}
 
     @router.get("/runs/{run_id}")
     async def one_run(run_id: str) -> Any:

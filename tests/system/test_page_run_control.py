@@ -1,4 +1,6 @@
-"""Pause, abort and resumption of a run, retry of a job and check of a log at the web page, in a real browser."""
+"""Control of a run, retry of a job, check of a log and search at the web page, in a real browser."""
+
+import re
 
 import pytest
 
@@ -51,3 +53,13 @@ def test_a_changed_log_is_named_with_its_recorded_hash(seen):
 @browser_test
 def test_a_resumed_run_leads_to_the_bench(seen):
     assert seen["address"] == "#/bench"
+
+
+@browser_test
+def test_a_search_stands_in_the_address_and_survives_a_reload(seen, bench):
+    assert "lossy" in seen["found"]
+    assert seen["search"] == "#/runs?outcome=lossy&from=2025-03-04"
+    assert seen["kept"] == "lossy"
+    asked = [search for search in bench.searches if search.get("outcome") == "lossy"]
+    assert all(re.fullmatch(r"2025-03-0[34]T\d\d:\d\d:00.000Z", search["from"]) for search in asked)
+    assert len(asked) >= 2

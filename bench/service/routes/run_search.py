@@ -36,7 +36,7 @@ def _read_search(
         Query(
             pattern=_NAME,
             max_length=_MAX_TEXT,
-            description="parameter of the newest fit, such as `k0`; fits of versions without this search are not found",
+            description="parameter of the newest fit, such as `k0`; older fits are only found once made again",
         ),
     ] = None,
     parameter_min: Annotated[

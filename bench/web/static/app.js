@@ -16,6 +16,7 @@ import { SampleRing } from "./ring.js";
 import { Router } from "./router.js";
 import { RunView } from "./run.js";
 import { RunList } from "./runs.js";
+import { RunSearch } from "./run_search.js";
 import { ServiceClock } from "./service_clock.js";
 import { StartForm } from "./start.js";
 import { TopBar } from "./topbar.js";
@@ -32,6 +33,7 @@ const runs = new RunList({
   onSpecimens: (names) => form.suggestSpecimens(names),
   onRun: (run) => runView.update(run),
 });
+const search = new RunSearch();
 const form = new StartForm({
   onStarted: (run) => {
     runs.update(run);
@@ -56,6 +58,7 @@ const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: by
 const router = new Router({
   bench: ({ query }) => query.has("method") && form.choose(query.get("method")),
   plan: (address) => plan.show(address),
+  runs: ({ query }) => runs.search(search.read(query)),
   run: (address) => runView.show(address),
 });
 

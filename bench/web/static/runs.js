@@ -14,15 +14,31 @@ export class RunList {
     Object.assign(this, { onSpecimens, onRun });
     this.runs = new Map();
     this.next = null;
+    this.conditions = {};
     this.actions = new RunActions({ onRun: (run) => this.update(run), onNote: () => this.show() });
     byId("older").addEventListener("click", () => this.load(this.next));
   }
 
+  /** Lists the runs that meet conditions; all without any. */
+  search(conditions) {
+    if (JSON.stringify(conditions) === JSON.stringify(this.conditions)) return;
+    this.conditions = conditions;
+    this.runs.clear();
+    this.next = null;
+    this.load();
+  }
+
+  get isSearch() {
+    return Object.keys(this.conditions).length > 0;
+  }
+
   /** Loads the newest page, or the page before a run. */
   async load(before = null) {
+    const { conditions } = this;
     try {
-      const query = new URLSearchParams({ limit: PAGE, ...(before && { before }) });
+      const query = new URLSearchParams({ limit: PAGE, ...conditions, ...(before && { before }) });
       const { items, next } = await get(`runs?${query}`);
+      if (conditions !== this.conditions) return; // another search was made meanwhile
       for (const run of items) this.runs.set(run.id, run);
       // A reload of the newest page keeps the position in the older ones.
       if (before || this.runs.size <= PAGE) this.next = next;
@@ -34,7 +50,8 @@ export class RunList {
 
   /** Shows a changed run. */
   update(run) {
-    this.runs.set(run.id, run);
+    // A search shows what it has found; a run that starts meanwhile is found by the next search.
+    if (!this.isSearch || this.runs.has(run.id)) this.runs.set(run.id, run);
     this.show();
     this.onRun(run);
   }
@@ -62,7 +79,8 @@ export class RunList {
     byId("runs").replaceChildren(...runs.map((run) => this.row(run)));
     if (focused) byId("runs").querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
     write(byId("runs-zone"), `(${zone()})`);
-    write(byId("runs-note"), runs.length ? "" : "No runs yet.");
+    write(byId("runs-note"), runs.length ? "" : this.isSearch ? "No run meets all conditions." : "No runs yet.");
+    write(byId("runs-title"), this.isSearch ? "Found, newest first" : "Newest first");
     byId("older").hidden = !this.next;
     this.onSpecimens([...new Set(runs.map(({ specimen }) => specimen).filter(Boolean))]);
   }

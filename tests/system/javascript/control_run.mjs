@@ -51,6 +51,24 @@ try {
   await page.click("button:has-text('Resume')");
   await hasState("Running");
   seen.address = new URL(page.url()).hash;
+
+  await page.click(".views a[data-view=runs]");
+  await shows("runs", "run");
+  await page.click("#search-more summary");
+  await page.selectOption("[name=outcome]", "lossy");
+  await page.fill("[name=from]", "2025-03-04");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => document.querySelectorAll("#runs tr").length === 1);
+  seen.found = await page.locator("#runs tr").innerText();
+  seen.search = new URL(page.url()).hash;
+  await page.reload();
+  await shows("runs-title", "Found");
+  seen.kept = await page.inputValue("[name=outcome]");
+  await page.fill("#search-form [name=specimen]", "nothing");
+  await page.click("#search-form button.primary");
+  await shows("runs-note", "No run meets all conditions.");
+  await page.click("#search-clear");
+  await page.waitForFunction(() => document.querySelectorAll("#runs tr").length > 3);
   console.log(JSON.stringify(seen));
 } finally {
   await close();

@@ -8,7 +8,8 @@ from bench.catalogue import JobRow, RunRow
 
 STARTED = datetime(2026, 3, 1, 10, tzinfo=UTC)
 RUNS = {
-    "a": {"specimen": "damper 7", "method": "quick", "operator": "M. Curie", "outcome": "clean", "ending": "completed"},
+    "a": {"specimen": "damper 7", "method": "quick", "operator": "M. Curie", "outcome": "clean",
+          "ending": "completed"},
     "b": {"specimen": "damper 7", "method": "paper_sines", "outcome": "incomplete", "ending": "tripped",
           "reason": "force 1 523 N exceeds the limit_of 1 500 N"},
     "c": {"specimen": "damper 8", "method": "quick", "outcome": "clean", "ending": "completed"},
@@ -44,8 +45,8 @@ def make_diagnosis(effects):
 def add_job(catalogue, run, kind, hour, summary):
     made = STARTED + timedelta(hours=hour)
     catalogue.add(
-        JobRow(id=f"{run}-{kind}-{hour}", run_id=run, kind=kind, key=f"{run}{kind}{hour}", settings={}, state="done",
-               created=made, finished=made, summary=summary, result="folder")
+        JobRow(id=f"{run}-{kind}-{hour}", run_id=run, kind=kind, key=f"{run}{kind}{hour}", settings={},
+               state="done", created=made, finished=made, summary=summary, result="folder")
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ MODULES = {
     "fitting": "speed.fitting",
     "logs": "speed.logs",
     "commands": "speed.commands",
+    "catalogue": "speed.catalogue",
     "interval_coverage": "accuracy.interval_coverage",
     "soak": "speed.soak",
     "choices": "accuracy.design_choices",

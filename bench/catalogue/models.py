@@ -88,6 +88,7 @@ class JobRow(Base):
     """One identification or diagnosis of a run by a worker; a job that is tried again keeps its row."""
 
     __tablename__ = "jobs"
+    __table_args__ = (Index("jobs_newest_result", "run_id", "kind", "state", "finished", "id"),)
 
     id: Mapped[str] = mapped_column(Text, primary_key=True)
     run_id: Mapped[str] = mapped_column(ForeignKey("runs.id"), index=True)

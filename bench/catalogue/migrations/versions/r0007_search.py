@@ -1,4 +1,4 @@
-"""Index of the runs of a specimen, newest first, for the search."""
+"""Indices for the search: runs of a specimen, newest first, and the newest result of each kind of a run."""
 
 from alembic import op
 
@@ -7,10 +7,12 @@ down_revision = "0006"
 
 
 def upgrade() -> None:
-    """Create the index."""
+    """Create the indices."""
+    op.create_index("jobs_newest_result", "jobs", ["run_id", "kind", "state", "finished", "id"])
     op.create_index("runs_of_specimen", "runs", ["specimen", "started", "id"])
 
 
 def downgrade() -> None:
-    """Drop the index."""
+    """Drop the indices."""
+    op.drop_index("jobs_newest_result", "jobs")
     op.drop_index("runs_of_specimen", "runs")

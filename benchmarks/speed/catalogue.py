@@ -1,0 +1,125 @@
+"""Time of lists and searches in a catalogue of 10 000 runs with a fit and a diagnosis each, without HTTP.
+
+python -m benchmarks catalogue
+"""
+
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from sqlalchemy import insert, text
+
+from bench.catalogue import Catalogue, JobRow, RunFilter, RunRow, make_sqlite_url, open_database
+from benchmarks.common import print_line
+
+RUN_COUNT = 10_000
+PAGE = 50
+_REPEATS = 30
+_PARAMETERS = (
+    "alpha_0",
+    "alpha_1",
+    "c0_0",
+    "c0_1",
+    "c1_0",
+    "c1_1",
+    "k0",
+    "k1",
+    "x0",
+    "gamma",
+    "beta",
+    "A",
+    "n",
+    "eta",
+)
+_EFFECTS = ("gas_spring", "backlash", "seal_friction", "viscous_heating", "displacement_delay")
+_FIRST = datetime(2024, 1, 1, tzinfo=UTC)
+
+
+def run() -> None:
+    """Print the median time of a page of the list and of each kind of search."""
+    with TemporaryDirectory() as folder:
+        engine = open_database(make_sqlite_url(Path(folder) / "catalogue.db"))
+        catalogue = Catalogue(engine, Path(folder))
+        with engine.begin() as connection:
+            runs, jobs = zip(*_make_rows(), strict=True)
+            connection.execute(insert(RunRow), list(runs))
+            connection.execute(insert(JobRow), [job for pair in jobs for job in pair])
+        with engine.connect() as connection:
+            empty = _measure(lambda: connection.execute(text("select 1")).all())
+        print(f"catalogue: pages of {PAGE} of {RUN_COUNT} runs with their jobs, two each; without HTTP")
+        print_line("baseline: an empty query of the same database", 1e3 * empty, "ms", "")
+        print_line("list, newest page", 1e3 * _measure(lambda: _load(catalogue, RunFilter())), "ms", "at most 30")
+        for name, selection in _make_searches().items():
+            print_line(
+                name, 1e3 * _measure(lambda wanted=selection: _load(catalogue, wanted)), "ms", "at most 100"
+            )
+        catalogue.close()
+
+
+def _load(catalogue: Catalogue, selection: RunFilter) -> int:
+    rows = catalogue.list_runs(PAGE + 1, None, selection)
+    catalogue.list_jobs_of_runs([row.id for row in rows], PAGE)
+    return len(rows)
+
+
+def _measure(action: Callable[[], object]) -> float:
+    """Return the median time of an action [s]."""
+    times = []
+    for _ in range(_REPEATS):
+        began = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - began)
+    return statistics.median(times)
+
+
+def _make_searches() -> dict[str, RunFilter]:
+    month = _FIRST + timedelta(days=100)
+    return {
+        "specimen with 20 runs": RunFilter(specimen="MR-0007"),
+        "one week": RunFilter(started_from=month, started_to=month + timedelta(days=7)),
+        "text that no run contains": RunFilter(text="nothing"),
+        "effect that every fifth run has": RunFilter(effect="backlash"),
+        "effect that no run has": RunFilter(effect="remanence"),
+        "parameter range with one run in a hundred": RunFilter(
+            parameter="k0", parameter_min=1000.0, parameter_max=1010.0
+        ),
+        "parameter range without a run": RunFilter(parameter="k0", parameter_min=1e9),
+        "specimen, ending and effect together": RunFilter(
+            specimen="MR-0007", ending="completed", effect="backlash"
+        ),
+    }
+
+
+def _make_rows() -> Iterator[tuple[dict[str, Any], tuple[dict[str, Any], ...]]]:
+    """Yield runs with their two jobs."""
+    random = np.random.default_rng(77)
+    for number in range(RUN_COUNT):
+        started = _FIRST + timedelta(hours=number)
+        made = {
+            "id": f"run-{number:05}", "method": "quick", "specimen": f"MR-{number % 500:04}",
+            "operator": "A. Meyer",
+            "started": started, "state": "ended", "outcome": "clean", "ending": "completed",
+            "log": f"{number}.mcap",
+        }  # fmt: skip
+        values = {
+            name: float(value) for name, value in zip(_PARAMETERS, random.uniform(500, 1500, 14), strict=True)
+        }
+        fit = {"rmse_n": 1.3, "noise_floor_n": 1.2, "result": "converged", "parameters": values}
+        gap = {"verdict": "explained", "effects": [_EFFECTS[number % 5]], "explanation": 30 * "Words. "}
+        yield made, (_make_job(number, "identify", started, fit), _make_job(number, "diagnose", started, gap))
+
+
+def _make_job(number: int, kind: str, made: datetime, summary: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "id": f"{kind}-{number}", "run_id": f"run-{number:05}", "kind": kind, "key": f"{kind}-{number}",
+        "settings": {}, "state": "done", "created": made, "finished": made, "summary": summary, "result": "folder",
+    }  # fmt: skip
+
+
+if __name__ == "__main__":
+    run()

@@ -56,9 +56,7 @@ def run() -> None:
         print_line("baseline: an empty query of the same database", 1e3 * empty, "ms", "")
         print_line("list, newest page", 1e3 * _measure(lambda: _load(catalogue, RunFilter())), "ms", "at most 30")
         for name, selection in _make_searches().items():
-            print_line(
-                name, 1e3 * _measure(partial(_load, catalogue, selection)), "ms", "at most 100"
-            )
+            print_line(name, 1e3 * _measure(partial(_load, catalogue, selection)), "ms", "at most 100")
         catalogue.close()
 
 

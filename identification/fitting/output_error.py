@@ -67,6 +67,8 @@ class OptimiserSettings:
     """Steps or processor time after which no further start is tried."""
     holds_shape: bool = False
     """True to hold the shape of the loop in the first steps from a given start, as from a regression."""
+    tolerance: float = 0.0
+    """Part of the excess over the noise that a step must be expected to remove, else a minimisation ends [1]."""
 
 
 def fit_output_error(
@@ -92,14 +94,14 @@ def _search(problem: Problem, settings: OptimiserSettings, progress: Progress, s
     preview = _decimate_for_preview(problem)
     starts = make_starting_points(preview) if start is None else [start]
     is_distant = start is None or settings.holds_shape
-    first = _approach(preview, starts[0], settings.iterations, meter.report) if is_distant else starts[0]
-    best = minimise(problem, first, settings.iterations, meter.report)
+    first = _approach(preview, starts[0], settings, meter.report) if is_distant else starts[0]
+    best = minimise(problem, first, settings.iterations, meter.report, tolerance=settings.tolerance)
     agreeing = 0
     for other_start in itertools.islice(_generate_restarts(preview, starts, settings.seed), settings.restarts):
         if meter.is_spent or _is_conclusive(problem, best) or agreeing >= _MIN_AGREEING:
             break
-        approached = _approach(preview, other_start, settings.iterations, meter.report)
-        other = minimise(problem, approached, settings.iterations, meter.report)
+        approached = _approach(preview, other_start, settings, meter.report)
+        other = minimise(problem, approached, settings.iterations, meter.report, tolerance=settings.tolerance)
         change = other.evaluation.cost / best.evaluation.cost - 1.0
         agreeing += abs(change) < _SAME_COST
         if change < 0.0:
@@ -117,7 +119,7 @@ def _is_conclusive(problem: Problem, minimum: Minimum) -> bool:
     return minimum.evaluation.cost / problem.samples < _FLOOR_RATIO and bool(interior.all())
 
 
-def _approach(preview: Problem, start: Array, iterations: int, progress: Progress) -> Array:
+def _approach(preview: Problem, start: Array, settings: OptimiserSettings, progress: Progress) -> Array:
     """Return the unknowns (U,) of a start's minimum on the preview.
 
     The first steps hold the shape of the loop and the rate of the field, which cannot be found while the forces
@@ -125,8 +127,11 @@ def _approach(preview: Problem, start: Array, iterations: int, progress: Progres
     """
     shape = np.zeros(len(start), bool)
     shape[preview.layout.coordinates] = preview.space.shape_mask
-    near = minimise(preview, start, min(_FIRST_STAGE, iterations), progress, held=shape)
-    return minimise(preview, near.unknowns, iterations, progress).unknowns
+    tolerance = settings.tolerance
+    near = minimise(
+        preview, start, min(_FIRST_STAGE, settings.iterations), progress, held=shape, tolerance=tolerance
+    )
+    return minimise(preview, near.unknowns, settings.iterations, progress, tolerance=tolerance).unknowns
 
 
 def _generate_restarts(problem: Problem, starts: list[Array], seed: int) -> Iterator[Array]:
@@ -145,7 +150,12 @@ def _decimate_for_preview(problem: Problem) -> Problem:
 
 
 def minimise(
-    problem: Problem, start: Array, iterations: int, progress: Progress, held: BoolArray | None = None
+    problem: Problem,
+    start: Array,
+    iterations: int,
+    progress: Progress,
+    held: BoolArray | None = None,
+    tolerance: float = 0.0,
 ) -> Minimum:
     """Minimise the cost by Levenberg-Marquardt from one start; the delays are fixed far from the minimum.
 
@@ -155,6 +165,8 @@ def minimise(
         iterations: largest number of steps.
         progress: receives every step.
         held: (U,) True for unknowns that stay at the start; None for none.
+        tolerance: part of the excess over the noise that a step must be expected to remove [1]. A search among
+            sets of effects compares excesses, so it needs none of the digits of a final fit.
     """
     unknowns, here = start, problem.evaluate(start)
     damping, scale = 1e-2, np.zeros(len(start))
@@ -165,7 +177,7 @@ def minimise(
         scale = np.maximum(scale, np.diag(here.hessian))
         step = solve_bounded_step(problem, here, free, damping * np.maximum(scale, 1e-12 * scale.max()), unknowns)
         gain = -float(2.0 * here.gradient @ step + step @ here.hessian @ step)
-        small = _MIN_GAIN * max(1.0, here.cost / problem.samples)
+        small = max(_MIN_GAIN * max(1.0, here.cost / problem.samples), tolerance * (here.cost - problem.samples))
         if gain < (small if free[problem.delay_mask].any() else _DELAY_RELEASE * here.cost):
             if (free == allowed).all():
                 return Minimum(unknowns, here, iteration, converged=True)

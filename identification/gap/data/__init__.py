@@ -1,5 +1,6 @@
 """Cycles of a recording, held-out samples, data quality, and the residual on them."""
 
+from identification.gap.data.correlation import compute_correlation_length
 from identification.gap.data.cycles import Cycles, Indices, split_by_piece
 from identification.gap.data.evaluation import EvaluationData
 from identification.gap.data.quality import (
@@ -19,6 +20,7 @@ __all__ = [
     "Shrinkage",
     "check_cycle_count",
     "check_sliding_recorded",
+    "compute_correlation_length",
     "compute_harmonics",
     "describe_unobservable_effects",
     "estimate_drift",

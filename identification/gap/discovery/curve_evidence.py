@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import Evaluation, Problem
-from identification.gap.data import Indices
+from identification.gap.data import Indices, compute_correlation_length
 
 _DEVIATIONS = np.geomspace(1e-4, 1e2, 43)
 """Prior deviations of the coefficients that are tried [1]."""
@@ -92,12 +92,4 @@ def estimate_correlation_length(residuals: list[Array]) -> float:
     It is the integral of the autocorrelation up to its first zero.
     """
     longest = max(residuals, key=len)
-    centred = longest - longest.mean()
-    spectrum = np.abs(np.fft.rfft(centred, 2 * len(centred))) ** 2
-    correlation = np.fft.irfft(spectrum)[: len(centred)]
-    if correlation[0] <= 0.0:
-        return 1.0
-    correlation = correlation / correlation[0]
-    negative = np.flatnonzero(correlation < 0.0)
-    end = int(negative[0]) if len(negative) else len(correlation)
-    return float(1.0 + 2.0 * np.sum(correlation[1:end]))
+    return compute_correlation_length(longest - longest.mean())

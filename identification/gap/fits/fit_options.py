@@ -21,6 +21,8 @@ class FitOptions:
     """Compare starts on every n-th of the decimated samples."""
     law_steps: int = 0
     """Steps of the law alone, with fixed effects, before law and effects move together."""
+    tolerance: float = 0.0
+    """Part of the excess over the noise that a step must be expected to remove, else a descent ends [1]."""
     refit_full: bool = True
     """Refine the result on all samples; otherwise the results are those of the given problem."""
 

@@ -21,6 +21,8 @@ from identification.uncertainty import Covariance, estimate_covariance
 
 _BACKLASH_DECIMATION = 2
 """Largest decimation with backlash, whose contacts are short."""
+_REFIT_TOLERANCE = 1e-5
+"""Part of the excess that a step on all samples must be expected to remove, else the refit ends [1]."""
 _SAME_COST = 1.005
 """Ratio of costs within which two descents count as the same minimum."""
 
@@ -141,7 +143,9 @@ def _descend(problem: Problem, starts: Sequence[Array], options: FitOptions) -> 
     """Return the best minimum from some starts, the most promising first; stop at one that is no better."""
     minima: list[Minimum] = []
     for unknowns in starts[: options.descents]:
-        minima.append(minimise(problem, unknowns, options.iterations, ignore_progress))
+        minima.append(
+            minimise(problem, unknowns, options.iterations, ignore_progress, tolerance=options.tolerance)
+        )
         if len(minima) > 1 and minima[-1].evaluation.cost * _SAME_COST > minima[0].evaluation.cost:
             break
     return min(minima, key=lambda m: m.evaluation.cost)
@@ -164,4 +168,5 @@ def refit_all_samples(problem: Problem, near: JointFit, simulated: Sequence[Arra
     pieces = tuple(replace(p, force=p.force - c) for p, c in zip(quick.pieces, corrections, strict=True))
     corrected = replace(quick, pieces=pieces)
     with use_one_thread():
-        return JointFit(corrected, minimise(corrected, unknowns, iterations, ignore_progress))
+        minimum = minimise(corrected, unknowns, iterations, ignore_progress, tolerance=_REFIT_TOLERANCE)
+        return JointFit(corrected, minimum)

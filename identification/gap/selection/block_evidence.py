@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.data import Residual
+from identification.gap.data import Residual, compute_correlation_length
 
 _EFFECTIVE_SAMPLES = 1.6
 """Independent samples in a block. Origin: chosen between the evidence of true effects and of confusable ones."""
@@ -20,13 +20,33 @@ _MIN_VALID_SHARE = 0.5
 """Share of valid samples above which a block counts."""
 
 
-def compute_evidence(before: Residual, after: Residual, block_length: float) -> float:
+def compute_evidence(
+    before: Residual, after: Residual, block_length: float, samples: float = _EFFECTIVE_SAMPLES
+) -> float:
     """Return the log odds (natural) of the candidate that leaves ``after`` over the one that leaves ``before``.
 
-    A block lasts ``block_length`` [s]: less than a stroke, more than the field takes to settle.
+    A block lasts ``block_length`` [s]: less than a stroke, more than the field takes to settle. It counts as
+    ``samples`` independent samples.
     """
     ratios = _compute_mean_squares(before, block_length) / _compute_mean_squares(after, block_length)
-    return 0.5 * _EFFECTIVE_SAMPLES * float(np.sum(np.log(ratios)))
+    return 0.5 * samples * float(np.sum(np.log(ratios)))
+
+
+def count_independent_samples(residual: Residual, block_length: float) -> float:
+    """Return the number of independent samples in a block of a residual: its length over the correlation time.
+
+    Use it where the residual is the error of a model, not noise. It is never below the number that holds between
+    confusable effects.
+    """
+    times, weights, start = [], [], 0
+    for count, rate in residual.rates:
+        part = slice(start, start + count)
+        values = np.where(residual.valid[part], residual.values[part], 0.0)
+        start += count
+        if values.any():
+            times.append(compute_correlation_length(values) / rate)
+            weights.append(float(values @ values))
+    return max(block_length / float(np.average(times, weights=weights)), _EFFECTIVE_SAMPLES)
 
 
 def bound_evidence(residual: Residual, floor: float, block_length: float) -> float:

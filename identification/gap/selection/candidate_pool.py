@@ -37,11 +37,19 @@ _BLOCK_ANGLE = 4.0
 """Length of a block of the block evidence, over half stroke divided by peak speed [1]."""
 _USUAL_RATE = 10.0
 """Peak speed over half stroke [1/s] of the recordings for which the sampling rates of the settings are stated."""
-QUICK_FIT = FitOptions(decimation=1, starts=0, descents=1, iterations=25, regression_start=False, refit_full=False)
+SEARCH_TOLERANCE = 1e-4
+"""Part of the excess that a step of a search must be expected to remove, else its descent ends [1]."""
+QUICK_FIT = FitOptions(
+    decimation=1,
+    starts=0,
+    descents=1,
+    iterations=25,
+    regression_start=False,
+    refit_full=False,
+    tolerance=SEARCH_TOLERANCE,
+)
 """One descent from the best of the given starts, on decimated data."""
-
-
-_SEARCH = OptimiserSettings(iterations=40, restarts=1)
+_SEARCH = OptimiserSettings(iterations=40, restarts=1, tolerance=SEARCH_TOLERANCE)
 """Search from the regression and, if its minimum is not conclusive, from the low-slip start."""
 
 

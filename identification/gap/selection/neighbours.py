@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.fitting import EffectModel
 from identification.gap.fits import Candidate, FitOptions, remove_effect_unknowns
-from identification.gap.selection.candidate_pool import QUICK_FIT, CandidatePool
+from identification.gap.selection.candidate_pool import QUICK_FIT, SEARCH_TOLERANCE, CandidatePool
 from identification.gap.selection.screening import ScreeningResult
 
 _STAGED_FIT = FitOptions(
@@ -18,6 +18,7 @@ _STAGED_FIT = FitOptions(
     start_decimation=2,
     law_steps=5,
     refit_full=False,
+    tolerance=SEARCH_TOLERANCE,
 )
 """Two descents, each after some steps of the law alone, on decimated data."""
 

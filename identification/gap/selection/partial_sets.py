@@ -3,21 +3,26 @@
 Each candidate is compared with the law alone by block evidence on the held-out strokes. An effect that only takes
 up the form error of an unknown cause reduces the error in some blocks and increases it in others. The larger the
 part of the gap that a set leaves, the less certain it is that its effects are at work.
+
+The search for the whole cause ends early, because hardly any effect brings an unknown cause near the floor. So the
+most probable partial set grows here: every effect with an expected gain is fitted with it, and the growth ends
+when no larger set is more probable.
 """
 
 import math
 
 import numpy as np
 
-from identification.gap.selection.block_evidence import compute_evidence
+from identification.gap.selection.block_evidence import compute_evidence, count_independent_samples
 from identification.gap.selection.candidate_pool import CandidatePool
-from identification.gap.selection.neighbours import find_subset
+from identification.gap.selection.neighbours import find_subset, fit_extension, fit_without_effect
 from identification.gap.selection.posterior import (
     Posterior,
     compute_log_prior,
     compute_misattribution,
     normalise_scores,
 )
+from identification.gap.selection.screening import select_shortlist
 
 _GENUINE_PROBABILITY = 0.5
 """Probability that an effect which closes a part of the gap of an unknown cause is at work, and no look-alike."""
@@ -26,15 +31,17 @@ _GENUINE_PROBABILITY = 0.5
 def find_partial_sets(pool: CandidatePool, posterior: Posterior) -> Posterior:
     """Return the probabilities of the fitted sets, also as parts of a cause that the library does not contain.
 
-    ``posterior`` has the probabilities of the sets as the whole cause, and that of an unknown one.
-    The most probable set, and its subsets with one effect less, are fitted if they are not.
+    ``posterior`` has the probabilities of the sets as the whole cause, and that of an unknown one. The most
+    probable set grows effect by effect, and its subsets with one effect less are fitted if they are not.
     """
-    for _ in range(pool.settings.max_refits):
-        partial = compute_partial_posterior(pool)
-        best = partial.rank_sets()[0][0]
-        if best in pool.full_fits:
+    best = _fit_most_probable_set(pool)
+    while len(best) < pool.settings.max_partial_effects:
+        _fit_extensions(pool, best)
+        grown = _prune(pool, _fit_most_probable_set(pool))
+        if len(grown) <= len(best):
             break
-        pool.fit_fully(best)
+        best = grown
+    best = _fit_most_probable_set(pool)
     for model in pool.candidates[best].fit.effects:
         find_subset(pool, pool.candidates[best], model)
     partial, part = compute_partial_posterior(pool), _GENUINE_PROBABILITY * posterior.unknown
@@ -42,16 +49,46 @@ def find_partial_sets(pool: CandidatePool, posterior: Posterior) -> Posterior:
     return Posterior(sets, 1.0 - sum(sets.values()))
 
 
+def _fit_most_probable_set(pool: CandidatePool) -> frozenset[str]:
+    """Fit the most probable partial set on all samples; repeat where another is then more probable."""
+    for _ in range(pool.settings.max_refits):
+        best = compute_partial_posterior(pool).rank_sets()[0][0]
+        if best in pool.full_fits:
+            break
+        pool.fit_fully(best)
+    return best
+
+
+def _prune(pool: CandidatePool, names: frozenset[str]) -> frozenset[str]:
+    """Fit a set without each of its effects, from its own end; return the set that is then most probable.
+
+    A larger set is fitted later than the set it grew from. So an effect without influence seems to gain what the
+    law has gained by the further descent.
+    """
+    for model in pool.candidates[names].fit.effects:
+        fit_without_effect(pool, pool.candidates[names], model)
+    return _fit_most_probable_set(pool)
+
+
+def _fit_extensions(pool: CandidatePool, names: frozenset[str]) -> None:
+    """Fit a set with each further effect that is expected to close a part of the gap, where it is not known."""
+    known = pool.candidates[names]
+    for gain in select_shortlist(pool.screen(known, names), len(pool.library)):
+        if names | {gain.effect_model.name} not in pool.candidates:
+            fit_extension(pool, known, gain)
+
+
 def compute_partial_posterior(pool: CandidatePool) -> Posterior:
     """Compute the probabilities of the fitted sets from block evidence on the held-out strokes."""
     before = pool.select_held_out(frozenset())
+    samples = count_independent_samples(before, pool.block_length)
     names = list(pool.candidates)
     weights = {s.names: s.weight for s in pool.collect_evidence()}
     scores = np.array(
         [
             compute_log_prior(n)
             + math.log(weights[n])
-            + compute_evidence(before, pool.select_held_out(n), pool.block_length)
+            + compute_evidence(before, pool.select_held_out(n), pool.block_length, samples)
             for n in names
         ]
     )

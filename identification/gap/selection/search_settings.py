@@ -84,6 +84,8 @@ class SearchSettings:
     """Largest number of effects in a set."""
     max_remaining_share: float = 0.2
     """Part of the baseline's excess that a set may leave for an extension to be tried."""
+    max_partial_effects: int = 5
+    """Largest number of effects in a set that is a part of an unknown cause."""
     confusion_penalty: float = 8.0
     """Logarithm of the odds that a confusable effect has to add. Origin: form errors alone brought up to 6."""
 

@@ -53,7 +53,7 @@ def test_the_meter_counts_reports_and_passes_them_on():
 def test_no_further_start_is_tried_after_the_steps_are_spent(monkeypatch, steps, starts):
     tried = []
 
-    def minimise(problem, start, iterations, progress, held=None):
+    def minimise(problem, start, iterations, progress, held=None, tolerance=0.0):
         tried.append(start)
         progress("refine", 1.0)
         return output_error.Minimum(start, type("Here", (), {"cost": float(len(tried))})(), 1, converged=True)

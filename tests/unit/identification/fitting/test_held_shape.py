@@ -18,9 +18,9 @@ def held(monkeypatch):
     """Masks of the unknowns that each minimisation held; None for none."""
     masks, minimise = [], output_error.minimise
 
-    def watch(problem, start, iterations, progress, held=None):
+    def watch(problem, start, iterations, progress, held=None, tolerance=0.0):
         masks.append(held)
-        return minimise(problem, start, min(iterations, 2), progress, held)
+        return minimise(problem, start, min(iterations, 2), progress, held, tolerance)
 
     monkeypatch.setattr(output_error, "minimise", watch)
     return masks

@@ -5,7 +5,11 @@ import pytest
 from numpy.random import default_rng
 
 from identification.gap.data.residual_map import Residual
-from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
+from identification.gap.selection.block_evidence import (
+    bound_evidence,
+    compute_evidence,
+    count_independent_samples,
+)
 
 RATE, SECONDS, FLOOR, BLOCK = 500.0, 40.0, 2.0, 0.4
 TIME = np.arange(round(RATE * SECONDS)) / RATE
@@ -77,3 +81,23 @@ def test_blocks_with_more_than_half_of_their_samples_count():
 def test_a_block_below_the_floor_brings_no_evidence():
     residual = make_blocks([1, 1, 1, 1, 6, 6, 6, 6])
     assert bound_evidence(residual, 3.0, BLOCK) == pytest.approx(0.8 * np.log(4.0))
+
+
+def test_evidence_grows_with_the_independent_samples_of_a_block():
+    before, after = make_blocks([2, -2, 2, 2]), make_blocks([1, 1, 1, 1])
+    assert compute_evidence(before, after, BLOCK, 10.0) == pytest.approx(5.0 * np.log(4.0))
+
+
+def test_a_block_of_a_slow_residual_has_fewer_independent_samples():
+    slow, fast = np.sin(2.0 * np.pi * TIME / 0.4), np.sin(2.0 * np.pi * TIME / 0.04)
+    residuals = [
+        Residual(e, 0.0 * TIME, 0.0 * TIME, TIME, TIME >= 0.0, ((len(TIME), RATE),)) for e in (slow, fast)
+    ]
+    counts = [count_independent_samples(r, 2.0) for r in residuals]
+    assert counts[1] == pytest.approx(10.0 * counts[0], rel=0.2)
+    assert count_independent_samples(make_residual(0.0 * TIME), 2.0) == pytest.approx(2.0 * RATE, rel=0.1)
+
+
+def test_a_block_never_has_fewer_independent_samples_than_between_confusable_effects():
+    constant = Residual(TIME * 0.0 + 3.0, 0.0 * TIME, 0.0 * TIME, TIME, TIME >= 0.0, ((len(TIME), RATE),))
+    assert count_independent_samples(constant, BLOCK) == 1.6

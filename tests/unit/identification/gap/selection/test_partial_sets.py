@@ -12,6 +12,7 @@ from tests.support.candidate_pools import make_pool
 
 NONE, STOP, CROSSTALK = frozenset(), frozenset({"end_stop"}), frozenset({"coil_crosstalk"})
 FRICTION = ActiveEffect(EFFECTS["seal_friction"], (2.0, 2.0, 0.015), "stribeck")
+LARGE_FRICTION = ActiveEffect(EFFECTS["seal_friction"], (10.0, 10.0, 0.015), "stribeck")
 
 
 @pytest.fixture(scope="module")
@@ -57,3 +58,20 @@ def test_the_subsets_of_the_most_probable_set_are_fitted(pool, monkeypatch):
     find_partial_sets(pool, Posterior({NONE: 0.1}, 0.9))
     assert both in pool.full_fits
     assert {frozenset({n}) for n in both} <= set(pool.candidates)
+
+
+def test_a_partial_set_grows_by_the_effect_that_helps_on_held_out_strokes():
+    pool = make_pool("end_stop", LARGE_FRICTION)
+    pool.candidates[NONE] = pool.fit_law()
+    pool.extend("end_stop")
+    partial = find_partial_sets(pool, Posterior({NONE: 0.1}, 0.9))
+    assert partial.rank_sets()[0][0] == {"end_stop", "seal_friction"}
+    assert pool.reaches_floor(pool.candidates[partial.rank_sets()[0][0]])
+
+
+def test_a_partial_set_has_no_more_effects_than_the_settings_allow():
+    pool = make_pool("end_stop", LARGE_FRICTION, max_partial_effects=1)
+    pool.candidates[NONE] = pool.fit_law()
+    pool.extend("end_stop")
+    find_partial_sets(pool, Posterior({NONE: 0.1}, 0.9))
+    assert max(map(len, pool.candidates)) == 1

@@ -12,6 +12,7 @@ from bench.service.routes import (
     rig,
     run_files,
     runs,
+    uploads,
 )
 
 PUBLIC_ROUTERS = (rig.public_router, live.router)
@@ -24,6 +25,7 @@ PROTECTED_ROUTERS = (
     continuation.router,
     integrity.router,
     run_files.router,
+    uploads.router,
     results.router,
     jobs.router,
     batches.router,

@@ -1,4 +1,4 @@
-"""What is kept beside the logs: notes, tags and events."""
+"""Records that are kept beside the logs: notes, tags and events."""
 
 from bench.catalogue.records.event_journal import EventJournal
 from bench.catalogue.records.log_events import LogEvent, read_log_events

@@ -8,6 +8,7 @@ from bench.service.routes import (
     live,
     methods,
     previews,
+    recordings,
     results,
     rig,
     run_files,
@@ -29,6 +30,7 @@ PROTECTED_ROUTERS = (
     results.router,
     jobs.router,
     batches.router,
+    *recordings.ROUTERS,
 )
 """Routers that need the token."""
 

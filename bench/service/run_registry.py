@@ -112,7 +112,7 @@ class RunRegistry:
         Returns:
             The new run; None if the catalogue has it already, and nothing was moved then.
         """
-        async with self._lock:  # otherwise a scan could find the log between both steps
+        async with self.lock:  # otherwise a scan could find the log between both steps
             row = await asyncio.to_thread(self._move, found, log)
             if row is not None:
                 await self._handle_change(row, is_wanted=True)

@@ -3,6 +3,7 @@
 from bench.service.routes import (
     batches,
     continuation,
+    exchange,
     integrity,
     jobs,
     live,
@@ -13,7 +14,6 @@ from bench.service.routes import (
     rig,
     run_files,
     runs,
-    uploads,
 )
 
 PUBLIC_ROUTERS = (rig.public_router, live.router)
@@ -26,10 +26,10 @@ PROTECTED_ROUTERS = (
     continuation.router,
     integrity.router,
     run_files.router,
-    uploads.router,
     results.router,
     jobs.router,
     batches.router,
+    *exchange.ROUTERS,
     *recordings.ROUTERS,
 )
 """Routers that need the token."""

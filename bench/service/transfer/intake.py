@@ -8,17 +8,16 @@ import shutil
 from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import IO, NamedTuple
 
 from bench.catalogue import LogSummary, read_log_summary
 from bench.errors import LogError, RecordingError
 from bench.service.transfer.command import run_command
+from bench.service.transfer.folder import make_folder
 from bench.service.transfer.names import make_safe_name
 
 MAX_UPLOAD_SIZE = 500_000_000
 """Largest upload [bytes]: a CSV of two hours at 1 kHz has about 400 MB."""
-_PREFIX = ".upload-"
 _CSV_ENDINGS = (".csv", ".csv.gz")
 _LOG_ENDING = ".mcap"
 
@@ -28,12 +27,6 @@ class ReceivedFile(NamedTuple):
 
     name: str
     content: IO[bytes]
-
-
-def remove_leftovers(data: Path) -> None:
-    """Delete the folders of uploads that a kill of the service has interrupted."""
-    for folder in data.glob(f"{_PREFIX}*"):
-        shutil.rmtree(folder, ignore_errors=True)
 
 
 @asynccontextmanager
@@ -56,7 +49,7 @@ async def import_files(
     """
     given = [*options, *([f"--specimen={specimen}"] if specimen else [])]
     with _convert_disk_errors(data):
-        folder = Path(await asyncio.to_thread(mkdtemp, prefix=_PREFIX, dir=data))
+        folder = await asyncio.to_thread(make_folder, data)
     try:
         yield await asyncio.to_thread(_make_log, folder, files, given)
     finally:

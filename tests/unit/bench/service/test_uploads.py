@@ -21,7 +21,9 @@ def upload(client, *files, **fields):
 
 
 def list_files(service):
-    return sorted(path.name for path in service.data.iterdir() if path.suffix == ".mcap" or "upload" in path.name)
+    return sorted(
+        path.name for path in service.data.iterdir() if path.suffix == ".mcap" or "transfer" in path.name
+    )
 
 
 @pytest.fixture
@@ -105,8 +107,8 @@ def test_invalid_fields_are_refused(client):
 
 def test_folders_of_interrupted_uploads_are_removed_at_the_next_start(service):
     service.end()
-    (service.data / ".upload-x").mkdir()
-    (service.data / ".upload-x" / "import.mcap").write_bytes(b"half")
+    (service.data / ".transfer-x").mkdir()
+    (service.data / ".transfer-x" / "import.mcap").write_bytes(b"half")
     service.start()
     assert list_files(service) == []
 

@@ -1,4 +1,4 @@
-"""`mrbench campaign`: dry run of a campaign."""
+"""Arguments of `mrbench campaign`, and the choice of the action."""
 
 from enum import StrEnum
 from pathlib import Path

@@ -6,6 +6,7 @@ BenchError
 ├── RunError               a run failed or could not be started
 │   └── InterlockError     an interlock refused a command
 ├── AgentUnreachableError  the rig agent does not reply
+│   └── NoRigError         the service has no rig
 ├── SecretFileError        a file with a secret is missing, or other users may read it
 ├── LogError               a log cannot be read, written or repaired
 ├── RecordingError         a recording cannot be imported
@@ -32,6 +33,10 @@ class RunError(BenchError):
 
 class AgentUnreachableError(BenchError):
     """The rig agent does not reply."""
+
+
+class NoRigError(AgentUnreachableError):
+    """The service was started without a rig."""
 
 
 class SecretFileError(BenchError):

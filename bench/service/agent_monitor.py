@@ -9,7 +9,7 @@ from typing import Protocol
 from pydantic import BaseModel
 
 from bench.agent_protocol import AgentEvent, AgentStatus, Message, Reply, ResetCommand, Samples, StatusCommand
-from bench.errors import AgentUnreachableError, RunError
+from bench.errors import AgentUnreachableError, NoRigError, RunError
 
 BATCH_TIME = 0.04
 """Time between two batches of samples to subscribers [s]: 25 batches per second suit a live plot."""
@@ -45,9 +45,9 @@ class NoAgent:
         """Refuse the command.
 
         Raises:
-            AgentUnreachableError: always.
+            NoRigError: always.
         """
-        raise AgentUnreachableError(self._MESSAGE)
+        raise NoRigError(self._MESSAGE)
 
     def subscribe(self, stopping: threading.Event) -> Iterator[PublishedMessage]:
         """Yield only None, until the service stops."""

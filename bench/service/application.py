@@ -26,12 +26,13 @@ from bench.service.context import ServiceContext
 from bench.service.live import LiveBroadcaster, serialise_message
 from bench.service.middleware import (
     BodyLimitMiddleware,
+    HeadMiddleware,
     RequestLogMiddleware,
     SecurityHeadersMiddleware,
     TokenCheckMiddleware,
 )
 from bench.service.query_check import refuse_unknown_parameters
-from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS
+from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS, refuse_unknown_paths
 from bench.service.run_registry import RunRegistry
 from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers
 
@@ -78,6 +79,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
     # The middleware that is added last sees a request first.
+    app.add_middleware(HeadMiddleware, below="/api/")
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)
     app.add_middleware(RequestLogMiddleware)
@@ -92,6 +94,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
             dependencies=[Depends(_BEARER), Depends(refuse_unknown_parameters)],
             responses=problems.RESPONSES,
         )
+    refuse_unknown_paths(app, f"{API}/")
     if PAGE_FOLDER.is_dir():
         app.mount("/", StaticFiles(directory=PAGE_FOLDER, html=True), name="page")
     return app

@@ -11,7 +11,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, RecordingError
+from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, NoRigError, RecordingError
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -84,6 +84,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
     }
     for status, description in (
+        (400, "The request cannot be read"),
         (401, "The token is missing or wrong"),
         (404, "The object does not exist"),
         (409, "Not possible in the present state"),
@@ -106,6 +107,7 @@ _HTTP_NAMES = {
 _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
     (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method was refused"),
     (RecordingError, HTTPStatus.UNPROCESSABLE_ENTITY, "recording-refused", "The recording was refused"),
+    (NoRigError, HTTPStatus.NOT_FOUND, "no-rig", "No rig is configured"),
     (AgentUnreachableError, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),

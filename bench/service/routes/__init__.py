@@ -15,6 +15,7 @@ from bench.service.routes import (
     run_files,
     runs,
 )
+from bench.service.routes.unknown_paths import refuse_unknown_paths
 
 PUBLIC_ROUTERS = (rig.public_router, live.router)
 """Routers that need no token in the header; `live` checks its own."""
@@ -34,4 +35,4 @@ PROTECTED_ROUTERS = (
 )
 """Routers that need the token."""
 
-__all__ = ["PROTECTED_ROUTERS", "PUBLIC_ROUTERS"]
+__all__ = ["PROTECTED_ROUTERS", "PUBLIC_ROUTERS", "refuse_unknown_paths"]

@@ -48,10 +48,13 @@ def send_temporary_file(
     except BaseException:
         shutil.rmtree(folder, ignore_errors=True)
         raise
-    return FileResponse(
+    response = FileResponse(
         path,
+        stat_result=path.stat(),
         media_type=media_type,
         filename=path.name,
         content_disposition_type="inline" if inline else "attachment",
         background=BackgroundTask(shutil.rmtree, folder, ignore_errors=True),
     )
+    del response.headers["etag"]  # the same content has another file each time
+    return response

@@ -7,15 +7,19 @@ const FILE_TIMEOUT_MS = 600_000;
 
 /** Error of a request, with the detail that the service returned; `message` is a sentence for a person. */
 export class Problem extends Error {
-  constructor(status, title, detail) {
+  constructor(status, title, detail, type = "") {
     super(detail || title);
-    this.status = status;
-    this.title = title;
+    Object.assign(this, { status, title, type });
   }
 
   /** Returns a sentence that begins with the consequence. */
   after(consequence) {
     return `${consequence}: ${this.message.replace(/\.$/, "")}.`;
+  }
+
+  /** True if the service was started without a rig, which is no failure. */
+  get hasNoRig() {
+    return this.type === "urn:mrbench:problem:no-rig";
   }
 
   get unauthorised() {
@@ -106,10 +110,10 @@ async function readProblem(response) {
   return makeProblem(response.status, response.statusText, await response.json().catch(() => ({})));
 }
 
-function makeProblem(status, phrase, { title, detail }) {
+function makeProblem(status, phrase, { title, detail, type }) {
   if (status === 401) {
     document.dispatchEvent(new Event("unauthorised")); // one place asks for another token
     return new Problem(401, "Not signed in", "The service does not accept this token.");
   }
-  return new Problem(status, title ?? `${status} ${phrase}`, typeof detail === "string" ? detail : "");
+  return new Problem(status, title ?? `${status} ${phrase}`, typeof detail === "string" ? detail : "", type);
 }

@@ -71,6 +71,7 @@ offerUnits(() => {
 
 let requesting = false;
 let requestedAt = -Infinity;
+let withoutRig = false;
 let driveKind = "";
 let sampledUtc = null;
 
@@ -103,7 +104,10 @@ const HANDLERS = {
 const link = new LiveLink({
   onMessage: ({ topic, data }) => HANDLERS[topic]?.(data),
   onClosed: requestStatus,
-  onReopened: () => runs.load(), // changes in the meantime were missed
+  onReopened: () => {
+    withoutRig = false; // the service may have been started again with one
+    runs.load(); // changes in the meantime were missed
+  },
 });
 
 /** Requests the agent's status by REST: its error explains why no live messages arrive. */
@@ -114,7 +118,8 @@ async function requestStatus() {
   try {
     HANDLERS.status(await get("agent"));
   } catch (problem) {
-    if (!problem.unauthorised) bar.showFailure(problem.after("Trying again"));
+    withoutRig = problem.hasNoRig;
+    if (!problem.unauthorised) bar.showFailure(problem.after(withoutRig ? "No rig" : "Trying again"));
   } finally {
     requesting = false;
   }
@@ -153,7 +158,7 @@ byId("token-form").addEventListener("submit", () => {
 setInterval(showAge, 250);
 setInterval(() => {
   const due = performance.now() - requestedAt > (bar.stale ? REQUEST_EVERY.stale : REQUEST_EVERY.fresh);
-  if (due && bar.age > REQUEST_AFTER && !byId("token-dialog").open) requestStatus();
+  if (due && !withoutRig && bar.age > REQUEST_AFTER && !byId("token-dialog").open) requestStatus();
 }, 200);
 document.addEventListener("unauthorised", () => askForToken("The service does not accept this token."));
 addEventListener("hashchange", () => location.hash.startsWith("#token=") && takeToken() && begin());

@@ -1,6 +1,7 @@
 """REST routes, one module for each resource."""
 
 from bench.service.routes import (
+    analyses,
     batches,
     continuation,
     integrity,
@@ -29,6 +30,7 @@ PROTECTED_ROUTERS = (
     jobs.router,
     batches.router,
     *recordings.ROUTERS,
+    *analyses.ROUTERS,
 )
 """Routers that need the token."""
 

@@ -4,6 +4,7 @@ from bench.service.routes import (
     analyses,
     batches,
     continuation,
+    exchange,
     integrity,
     jobs,
     live,
@@ -29,6 +30,7 @@ PROTECTED_ROUTERS = (
     results.router,
     jobs.router,
     batches.router,
+    *exchange.ROUTERS,
     *recordings.ROUTERS,
     *analyses.ROUTERS,
 )

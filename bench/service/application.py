@@ -17,11 +17,11 @@ from bench.agent_protocol import AgentStatus
 from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
+from bench.live import LiveBroadcaster, serialise_message
 from bench.service import problems
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentLink, AgentMonitor
 from bench.service.context import ServiceContext
-from bench.service.live import LiveBroadcaster, serialise_message
 from bench.service.middleware import (
     BodyLimitMiddleware,
     RequestLogMiddleware,

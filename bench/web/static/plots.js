@@ -9,6 +9,8 @@ const LOOP_SECONDS = 2;
 const LOOP_PIECES = 12;
 const LEAST_STEP_PX = 1; // shorter steps of a loop are not visible
 const SHRINK_AFTER_MS = 2_000;
+/** Pause after a frame as a share of its time, so that a slow device still has time for the person. */
+const REST_SHARE = 0.4;
 const MARGIN = 0.03; // share of an axis that stays free at each end
 
 /** Bounds of an axis that grow at once and shrink late, so that a moving plot stays readable. */
@@ -59,7 +61,16 @@ function roundStep(size) {
   return power * [1, 2, 5, 10].find((digit) => digit * power >= size * (1 - 1e-9));
 }
 
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const DARK = matchMedia("(prefers-color-scheme: dark)");
+const colours = new Map(); // kept, because reading a style many times in each frame is slow
+DARK.addEventListener("change", () => colours.clear());
+
+/** Value of a colour of the style sheet in the present scheme. */
+export function colour(name) {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return colours.get(name);
+}
+
 const FONT = "11px system-ui, 'Segoe UI', Roboto, sans-serif";
 
 export function axis(more) {
@@ -193,12 +204,13 @@ export class LivePlots {
   constructor(ring, quantities, { loops, strips }, reveal = () => {}) {
     Object.assign(this, { ring, reveal, place: loops });
     this.drawn = -1;
+    this.restUntil = 0;
     const redraw = () => { this.drawn = -1; };
     const { force, displacement, velocity, drive, temperature } = quantities;
     const crossed = [displacement, velocity].map((across) => loop(ring, across, force, loops, redraw));
     const traced = [force, displacement, drive, temperature];
     this.plots = [...crossed, ...traced.map((one, k) => strip(ring, one, strips, k === traced.length - 1, redraw))];
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    DARK.addEventListener("change", () => {
       for (const { plot } of this.plots) plot.redraw(false, true);
     });
     const onFrame = () => {
@@ -211,9 +223,12 @@ export class LivePlots {
   draw() {
     this.reveal();
     if (!this.place.checkVisibility()) return;
-    if (!this.ring.end || this.drawn === this.ring.end) return;
+    const began = performance.now();
+    if (!this.ring.end || this.drawn === this.ring.end || began < this.restUntil) return;
     this.drawn = this.ring.end;
     for (const plot of this.plots) plot.draw();
+    const ended = performance.now();
+    this.restUntil = ended + REST_SHARE * (ended - began);
   }
 
   /** Writes the captions again, after a unit has changed. */

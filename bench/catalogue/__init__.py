@@ -8,9 +8,12 @@ from bench.catalogue.log_summary import is_complete
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
+    EventRow,
     JobRow,
     JobState,
     LogIntegrity,
+    NoteKind,
+    NoteRow,
     RunOutcome,
     RunRow,
     RunState,
@@ -18,6 +21,7 @@ from bench.catalogue.models import (
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
+from bench.catalogue.trash import move_to_trash, restore_from_trash
 
 __all__ = [
     "CATALOGUE_FILE",
@@ -25,11 +29,14 @@ __all__ = [
     "UNFINISHED_STATES",
     "BatchRow",
     "Catalogue",
+    "EventRow",
     "JobFilter",
     "JobQueue",
     "JobRow",
     "JobState",
     "LogIntegrity",
+    "NoteKind",
+    "NoteRow",
     "RunFilter",
     "RunOutcome",
     "RunPlan",
@@ -41,7 +48,9 @@ __all__ = [
     "find_catalogue",
     "is_complete",
     "make_sqlite_url",
+    "move_to_trash",
     "open_database",
     "read_plan",
+    "restore_from_trash",
     "scan_logs",
 ]

@@ -11,6 +11,7 @@ from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.live import LiveBroadcaster
+from bench.samples import SampleStore
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentMonitor
 from bench.service.problems import make_not_found
@@ -35,6 +36,7 @@ class ServiceContext:
     has_local_logs: bool
     """True if the agent writes into the service's data folder."""
     space_monitor: SpaceMonitor
+    sample_store: SampleStore
 
     @property
     def data(self) -> Path:

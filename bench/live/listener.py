@@ -37,7 +37,7 @@ class ListenerSettings:
     rate_hz: float = math.inf
     """Largest rate of the samples [Hz]; a faster bench is decimated."""
     acknowledges: bool = False
-    """Whether it acknowledges the batches that it has handled."""
+    """True if it acknowledges the batches that it has handled."""
 
 
 class Listener:

@@ -1,5 +1,6 @@
 """The catalogue: runs, their logs, and the jobs on them, in a database."""
 
+from bench.catalogue.backup import Copied, back_up, restore_backup
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
@@ -29,6 +30,7 @@ __all__ = [
     "UNFINISHED_STATES",
     "BatchRow",
     "Catalogue",
+    "Copied",
     "EventRow",
     "JobFilter",
     "JobQueue",
@@ -43,6 +45,7 @@ __all__ = [
     "RunPlan",
     "RunRow",
     "RunState",
+    "back_up",
     "catalogue_log",
     "check_all",
     "check_integrity",
@@ -53,6 +56,7 @@ __all__ = [
     "open_database",
     "read_log_summary",
     "read_plan",
+    "restore_backup",
     "restore_from_trash",
     "scan_logs",
 ]

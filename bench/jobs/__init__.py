@@ -2,7 +2,14 @@
 
 from bench.jobs.engine import DaskEngine, JobEngine
 from bench.jobs.errors import JobError
-from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE
+from bench.jobs.job_spec import (
+    DIAGNOSIS_FILE,
+    FIT_FILE,
+    PREDICTION_FILE,
+    REPORT_FILE,
+    SERIES_FILE,
+    TWIN_FILE,
+)
 from bench.jobs.job_view import (
     BatchRequest,
     DiagnosisSummary,
@@ -15,14 +22,24 @@ from bench.jobs.job_view import (
 )
 from bench.jobs.manager import JobManager
 from bench.jobs.scheduler import find_scheduler, run_scheduler, start_scheduler
-from bench.jobs.settings import DiagnoseSettings, IdentifySettings, JobKind, JobSettings, parse_settings
+from bench.jobs.settings import (
+    DiagnoseSettings,
+    IdentifySettings,
+    JobKind,
+    JobSettings,
+    PredictSettings,
+    get_kind,
+    parse_settings,
+)
 from bench.jobs.tls import SchedulerLocation, get_tls_file, locate_scheduler
 from bench.jobs.worker import run_worker
 
 __all__ = [
     "DIAGNOSIS_FILE",
     "FIT_FILE",
+    "PREDICTION_FILE",
     "REPORT_FILE",
+    "SERIES_FILE",
     "TWIN_FILE",
     "BatchRequest",
     "DaskEngine",
@@ -36,10 +53,12 @@ __all__ = [
     "JobManager",
     "JobPage",
     "JobSettings",
+    "PredictSettings",
     "RetryRequest",
     "SchedulerLocation",
     "find_newest_done",
     "find_scheduler",
+    "get_kind",
     "get_tls_file",
     "locate_scheduler",
     "make_diagnosis_summary",

@@ -15,6 +15,7 @@ from bench.catalogue.models import (
     RunRow,
     RunState,
 )
+from bench.catalogue.planning import ClaimedKey, IdempotencyKeys
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
@@ -25,6 +26,8 @@ __all__ = [
     "UNFINISHED_STATES",
     "BatchRow",
     "Catalogue",
+    "ClaimedKey",
+    "IdempotencyKeys",
     "JobFilter",
     "JobQueue",
     "JobRow",

@@ -9,6 +9,7 @@ from sqlalchemy.orm import sessionmaker
 
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
+from bench.catalogue.planning import IdempotencyKeys
 from bench.catalogue.run_filter import RunFilter
 
 
@@ -24,6 +25,7 @@ class Catalogue:
         """
         self.folder = folder
         self.job_queue = JobQueue(engine)
+        self.idempotency_keys = IdempotencyKeys(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.
         self._sessions = sessionmaker(engine, expire_on_commit=False)

@@ -52,6 +52,17 @@ export function liveAddress() {
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
 
+/** Posts a request that starts something: with a key, so that it is repeated safely if its answer is lost. */
+export async function start(path, body) {
+  const headers = { "Idempotency-Key": crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}` };
+  try {
+    return await call("POST", path, body, TIMEOUT_MS, headers);
+  } catch (problem) {
+    if (problem.status !== 0) throw problem;
+    return call("POST", path, body, TIMEOUT_MS, headers); // no answer: perhaps it was lost on its way
+  }
+}
+
 /** Fetches a file with the token in the header, which a plain link cannot send. */
 export async function file(path) {
   const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
@@ -59,13 +70,13 @@ export async function file(path) {
   return { blob: await response.blob(), name: match?.[1] ?? path.replaceAll("/", "-") };
 }
 
-async function call(method, path, body, timeout) {
-  const response = await send(method, path, body, timeout);
+async function call(method, path, body, timeout, headers) {
+  const response = await send(method, path, body, timeout, headers);
   return response.status === 204 ? null : response.json();
 }
 
-async function send(method, path, body, timeout = TIMEOUT_MS) {
-  const headers = { Authorization: `Bearer ${token() ?? ""}` };
+async function send(method, path, body, timeout = TIMEOUT_MS, more = {}) {
+  const headers = { Authorization: `Bearer ${token() ?? ""}`, ...more };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   let response;
   try {

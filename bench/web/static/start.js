@@ -1,6 +1,6 @@
 // Form that starts a run: method, specimen and operator.
 
-import { get, post } from "./api.js";
+import { get, start } from "./api.js";
 import { byId, describeDriveKind, duration, element, write } from "./format.js";
 
 const OPERATOR = "mrbench.operator";
@@ -93,7 +93,7 @@ export class StartForm {
     this.busy = true;
     this.show({ problem: "" });
     try {
-      const run = await post("runs", { method, specimen, operator }); // returns once the run has started
+      const run = await start("runs", { method, specimen, operator }); // returns once the run has started
       localStorage.setItem(OPERATOR, operator);
       this.onStarted(run);
     } catch (problem) {

@@ -1,0 +1,5 @@
+"""What is known before a run: keys of requests."""
+
+from bench.catalogue.planning.idempotency import ClaimedKey, IdempotencyKeys
+
+__all__ = ["ClaimedKey", "IdempotencyKeys"]

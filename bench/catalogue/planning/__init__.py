@@ -1,4 +1,4 @@
-"""What is known before a run: keys of requests."""
+"""Planning in the catalogue: keys of requests."""
 
 from bench.catalogue.planning.idempotency import ClaimedKey, IdempotencyKeys
 

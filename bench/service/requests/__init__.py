@@ -1,4 +1,4 @@
-"""What many requests have in common: known query parameters, and keys that make a repetition harmless."""
+"""Common parts of requests: known query parameters, and keys that make a repetition harmless."""
 
 from bench.service.requests.idempotency import IDEMPOTENT, IdempotentRoute, find_first_request
 from bench.service.requests.query_check import refuse_unknown_parameters

@@ -130,6 +130,7 @@ class Run:
         return RunStatus(
             id=request.identity.make_run_id(method.name),
             method=method.name,
+            method_sha256=self._method_sha256,
             specimen=request.identity.specimen,
             operator=request.identity.operator,
             log=str(request.path),

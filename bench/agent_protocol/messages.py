@@ -125,6 +125,7 @@ class RunStatus(Message):
 
     id: str
     method: str = Field(description="name of the method")
+    method_sha256: str = Field(default="", description="hash of the content of the method")
     specimen: str
     operator: str
     log: str = Field(description="file of the log on the agent's machine")

@@ -15,7 +15,15 @@ from bench.catalogue.models import (
     RunRow,
     RunState,
 )
-from bench.catalogue.planning import ClaimedKey, IdempotencyKeys
+from bench.catalogue.planning import (
+    SHIPPED_VERSION,
+    ClaimedKey,
+    IdempotencyKeys,
+    MethodRow,
+    MethodStore,
+    Specimen,
+    SpecimenStore,
+)
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
@@ -23,6 +31,7 @@ from bench.catalogue.scan import catalogue_log, scan_logs
 __all__ = [
     "CATALOGUE_FILE",
     "REPEATABLE_STATES",
+    "SHIPPED_VERSION",
     "UNFINISHED_STATES",
     "BatchRow",
     "Catalogue",
@@ -33,11 +42,15 @@ __all__ = [
     "JobRow",
     "JobState",
     "LogIntegrity",
+    "MethodRow",
+    "MethodStore",
     "RunFilter",
     "RunOutcome",
     "RunPlan",
     "RunRow",
     "RunState",
+    "Specimen",
+    "SpecimenStore",
     "catalogue_log",
     "check_all",
     "check_integrity",

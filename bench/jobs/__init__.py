@@ -2,7 +2,7 @@
 
 from bench.jobs.engine import DaskEngine, JobEngine
 from bench.jobs.errors import JobError
-from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE
+from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TREND_FILE, TWIN_FILE
 from bench.jobs.job_view import (
     BatchRequest,
     DiagnosisSummary,
@@ -15,7 +15,15 @@ from bench.jobs.job_view import (
 )
 from bench.jobs.manager import JobManager
 from bench.jobs.scheduler import find_scheduler, run_scheduler, start_scheduler
-from bench.jobs.settings import DiagnoseSettings, IdentifySettings, JobKind, JobSettings, parse_settings
+from bench.jobs.settings import (
+    AnalysisKind,
+    DiagnoseSettings,
+    IdentifySettings,
+    JobKind,
+    JobSettings,
+    TrendSettings,
+    parse_settings,
+)
 from bench.jobs.tls import SchedulerLocation, get_tls_file, locate_scheduler
 from bench.jobs.worker import run_worker
 
@@ -23,7 +31,9 @@ __all__ = [
     "DIAGNOSIS_FILE",
     "FIT_FILE",
     "REPORT_FILE",
+    "TREND_FILE",
     "TWIN_FILE",
+    "AnalysisKind",
     "BatchRequest",
     "DaskEngine",
     "DiagnoseSettings",
@@ -38,6 +48,7 @@ __all__ = [
     "JobSettings",
     "RetryRequest",
     "SchedulerLocation",
+    "TrendSettings",
     "find_newest_done",
     "find_scheduler",
     "get_tls_file",

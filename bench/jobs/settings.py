@@ -1,4 +1,4 @@
-"""Settings of the two kinds of jobs, and the options of the commands that they stand for."""
+"""Settings of the kinds of jobs, and the options of the commands that they stand for."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypeAlias
@@ -7,7 +7,9 @@ from pydantic import Field
 
 from bench.validation import FrozenModel
 
-JobKind: TypeAlias = Literal["identify", "diagnose"]
+AnalysisKind: TypeAlias = Literal["identify", "diagnose"]
+"""Kinds of jobs on a single run."""
+JobKind: TypeAlias = Literal["identify", "diagnose", "trend"]
 
 
 class IdentifySettings(FrozenModel):
@@ -55,22 +57,37 @@ class DiagnoseSettings(FrozenModel):
         return [*_make_hold_out_arguments(self.hold_out, self.hold_out_after), *chosen]
 
 
-JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings
+class TrendSettings(FrozenModel):
+    """Settings of the trend of a specimen."""
+
+    runs: tuple[str, ...] = Field(min_length=3, max_length=200, description="ids of its runs, the oldest first")
+    time_limit_s: float = Field(default=14400.0, gt=0, description="[s] after which the job fails")
+
+    def make_cli_arguments(self) -> list[str]:
+        """Return the options of `mrbench trend`; it has none."""
+        return []
+
+
+JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings | TrendSettings
+_KINDS: dict[JobKind, type[JobSettings]] = {
+    "identify": IdentifySettings,
+    "diagnose": DiagnoseSettings,
+    "trend": TrendSettings,
+}
 
 
 def get_kind(settings: JobSettings) -> JobKind:
     """Return the kind of job that settings belong to."""
-    return "diagnose" if isinstance(settings, DiagnoseSettings) else "identify"
+    return next(kind for kind, model in _KINDS.items() if isinstance(settings, model))
 
 
-def parse_settings(kind: str, document: Mapping[str, Any]) -> JobSettings:
+def parse_settings(kind: JobKind, document: Mapping[str, Any]) -> JobSettings:
     """Return the settings of a job of a kind.
 
     Raises:
         ValidationError: the document is not one of this kind.
     """
-    model: type[IdentifySettings | DiagnoseSettings] = IdentifySettings if kind == "identify" else DiagnoseSettings
-    return model.model_validate(document)
+    return _KINDS[kind].model_validate(document)
 
 
 def _make_hold_out_arguments(patterns: Sequence[str], after: float | None) -> list[str]:

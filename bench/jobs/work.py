@@ -13,10 +13,18 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 from bench.jobs.errors import JobCancelledError, JobError
-from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE, JobSpec, ResultSummary
+from bench.jobs.job_spec import (
+    DIAGNOSIS_FILE,
+    FIT_FILE,
+    REPORT_FILE,
+    TREND_FILE,
+    TWIN_FILE,
+    JobSpec,
+    ResultSummary,
+)
 from bench.jobs.progress import PROGRESS_ENVIRONMENT, CommandStep, JobProgress, is_report
-from bench.jobs.settings import DiagnoseSettings
-from bench.jobs.summaries import read_diagnosis_summary, read_fit_summary
+from bench.jobs.settings import DiagnoseSettings, TrendSettings
+from bench.jobs.summaries import read_diagnosis_summary, read_fit_summary, read_trend_summary
 from bench.processes import MRBENCH_COMMAND, LineQueue, start_line_reader
 
 POLL_PERIOD = 0.25
@@ -40,7 +48,7 @@ class JobCallbacks:
 def execute_job(
     spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...] = MRBENCH_COMMAND
 ) -> ResultSummary:
-    """Identify or diagnose a log and write a report; the files appear together, or not at all.
+    """Identify or diagnose a log and write a report, or find the trend over logs; the files appear together, or not at all.
 
     Args:
         spec: the job; if its result exists, it is only read.
@@ -48,14 +56,15 @@ def execute_job(
         mrbench: the command line to call.
 
     Returns:
-        Summary of the fit or of the diagnosis.
+        Summary of the fit, of the diagnosis or of the trend.
 
     Raises:
         JobError: a command failed, or the time limit was reached.
         JobCancelledError: the job was cancelled.
     """
-    log, result = Path(spec.log), Path(spec.result)
-    if not log.is_file():
+    result = Path(spec.result)
+    log = next((Path(log) for log in (spec.log, *spec.logs) if not Path(log).is_file()), None)
+    if log is not None:
         raise JobError(f"{log} is not on the worker's machine; workers need the data folder at the same path")
     deadline = time.monotonic() + spec.settings.time_limit_s
     if not result.is_dir():
@@ -63,6 +72,8 @@ def execute_job(
             for step, arguments in _list_commands(spec, folder):
                 _run_command([*mrbench, *arguments], step, callbacks, deadline)
             _publish_result(folder, result)
+    if isinstance(spec.settings, TrendSettings):
+        return read_trend_summary(result / TREND_FILE)
     if isinstance(spec.settings, DiagnoseSettings):
         return read_diagnosis_summary(result / DIAGNOSIS_FILE)
     return read_fit_summary(result / FIT_FILE)
@@ -72,6 +83,8 @@ def _list_commands(spec: JobSpec, folder: Path) -> list[tuple[CommandStep, list[
     """Return the arguments of the commands of a job, which write to a folder."""
     fit, diagnosis = folder / FIT_FILE, folder / DIAGNOSIS_FILE
     options = spec.settings.make_cli_arguments()
+    if isinstance(spec.settings, TrendSettings):
+        return [(CommandStep("trend", 0.0, 1.0), ["trend", *spec.logs, "--out", str(folder / TREND_FILE)])]
     if isinstance(spec.settings, DiagnoseSettings):
         name = "diagnose"
         options += ["--model", spec.model] if spec.model else []

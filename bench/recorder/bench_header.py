@@ -70,6 +70,7 @@ def make_run_header(
         id=identity.make_run_id(method.name),
         specimen=identity.specimen,
         method=method.name,
+        method_sha256=method.compute_sha256(),
         operator=identity.operator,
         drive_kind=rig.drive_kind,
         drive_unit="A" if rig.drive_unit == "A" else "V",

@@ -96,6 +96,12 @@ class Run(View):
 
     id: str
     method: str
+    method_version: int | None = Field(
+        description="version of the method; null if its content was not stored under its name"
+    )
+    method_sha256: str | None = Field(
+        description="hash of the content of the method; null in runs of older versions and in imports"
+    )
     specimen: str
     operator: str
     source: str = Field(description="`run`, or `import` for a recording made elsewhere")
@@ -178,6 +184,8 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
     return Run(
         id=row.id,
         method=row.method,
+        method_version=row.method_version,
+        method_sha256=row.method_sha256,
         specimen=row.specimen,
         operator=row.operator,
         source=row.source,

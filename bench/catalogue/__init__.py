@@ -8,9 +8,12 @@ from bench.catalogue.log_summary import is_complete
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
+    EventRow,
     JobRow,
     JobState,
     LogIntegrity,
+    NoteKind,
+    NoteRow,
     RunOutcome,
     RunRow,
     RunState,
@@ -19,6 +22,7 @@ from bench.catalogue.planning import ClaimedKey, IdempotencyKeys
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
+from bench.catalogue.trash import move_to_trash, restore_from_trash
 
 __all__ = [
     "CATALOGUE_FILE",
@@ -27,12 +31,15 @@ __all__ = [
     "BatchRow",
     "Catalogue",
     "ClaimedKey",
+    "EventRow",
     "IdempotencyKeys",
     "JobFilter",
     "JobQueue",
     "JobRow",
     "JobState",
     "LogIntegrity",
+    "NoteKind",
+    "NoteRow",
     "RunFilter",
     "RunOutcome",
     "RunPlan",
@@ -44,7 +51,9 @@ __all__ = [
     "find_catalogue",
     "is_complete",
     "make_sqlite_url",
+    "move_to_trash",
     "open_database",
     "read_plan",
+    "restore_from_trash",
     "scan_logs",
 ]

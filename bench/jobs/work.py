@@ -12,12 +12,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
+from bench.errors import LogError
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE, JobSpec, ResultSummary
 from bench.jobs.progress import PROGRESS_ENVIRONMENT, CommandStep, JobProgress, is_report
 from bench.jobs.settings import DiagnoseSettings
 from bench.jobs.summaries import read_diagnosis_summary, read_fit_summary
 from bench.processes import MRBENCH_COMMAND, LineQueue, start_line_reader
+from bench.samples import SampleStore
 
 POLL_PERIOD = 0.25
 """Time [s] between two checks for cancellation."""
@@ -58,6 +60,7 @@ def execute_job(
     if not log.is_file():
         raise JobError(f"{log} is not on the worker's machine; workers need the data folder at the same path")
     deadline = time.monotonic() + spec.settings.time_limit_s
+    _store_samples(log, spec.log_sha256)
     if not result.is_dir():
         with _make_work_folder(result) as folder:
             for step, arguments in _list_commands(spec, folder):
@@ -66,6 +69,13 @@ def execute_job(
     if isinstance(spec.settings, DiagnoseSettings):
         return read_diagnosis_summary(result / DIAGNOSIS_FILE)
     return read_fit_summary(result / FIT_FILE)
+
+
+def _store_samples(log: Path, sha256: str) -> None:
+    """Store the samples as columns, so that the service need not read the log when a person looks at the run."""
+    with contextlib.suppress(LogError):  # the command of the job says what is wrong with the log
+        if sha256:
+            SampleStore(log.parent).load(log, sha256)
 
 
 def _list_commands(spec: JobSpec, folder: Path) -> list[tuple[CommandStep, list[str]]]:

@@ -114,6 +114,11 @@ class Run(View):
     reason: str = Field(description="reason why the outcome is not clean")
     continues: str | None = Field(description="id of the run that this one continues after a checkpoint")
     log: str = Field(description="file of the log, relative to the data folder or absolute")
+    log_bytes: int | None = Field(description="size of the log [bytes]; null until it was read")
+    lost: dict[str, int] = Field(description="number of lost samples by channel; empty if none was lost")
+    alarms: tuple[str, ...] = Field(description="texts of the alarms during the run")
+    tags: tuple[str, ...] = Field(description="words by which a person sorts runs")
+    trashed: datetime | None = Field(description="UTC at which the run was moved to the trash; null outside it")
     log_sha256: str | None = Field(description="hash of the log as it was recorded; null without a complete log")
     integrity: LogIntegrity | None = Field(
         description="latest comparison of the log with its hash: intact, changed or missing; null before the first"
@@ -189,6 +194,11 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         reason=row.reason,
         continues=row.continues,
         log=row.log,
+        log_bytes=row.log_bytes,
+        lost=row.lost or {},
+        alarms=tuple(row.alarms or ()),
+        tags=tuple(row.tags or ()),
+        trashed=row.trashed,
         log_sha256=row.log_sha256,
         integrity=row.integrity,
         progress=_find_progress(row, status),
@@ -198,6 +208,11 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         diagnosis=make_diagnosis_summary(newest_diagnosis) if newest_diagnosis else None,
         jobs=tuple(make_job_view(job) for job in reversed(jobs)),
     )
+
+
+def make_run_tag(row: RunRow) -> str:
+    """Return the entity tag of what a person may change on a run."""
+    return f'"{row.revision}"'
 
 
 def _find_progress(row: RunRow, status: AgentStatus | None) -> RunProgress | None:

@@ -8,6 +8,7 @@ from bench.service.routes import (
     live,
     methods,
     previews,
+    recordings,
     results,
     rig,
     run_files,
@@ -27,6 +28,7 @@ PROTECTED_ROUTERS = (
     results.router,
     jobs.router,
     batches.router,
+    *recordings.ROUTERS,
 )
 """Routers that need the token."""
 

@@ -20,7 +20,7 @@ from bench.service.requests import IDEMPOTENT, IdempotentRoute, find_first_reque
 from bench.service.routes.methods import load_shipped_method
 from bench.service.routes.run_search import RunSearch
 from bench.service.run_registry import make_run_row
-from bench.service.views import Run, RunPage, StartRunRequest, make_run_view
+from bench.service.views import Run, RunPage, StartRunRequest, make_run_tag, make_run_view
 
 router = APIRouter(prefix="/runs", tags=["runs"], route_class=IdempotentRoute)
 _START_TIMEOUT = 5.0
@@ -161,9 +161,14 @@ def list_runs(
 
 
 @router.get("/{run_id}")
-def get_run(run_id: str, context: Context) -> Run:
-    """Return one run with its progress, its jobs and the result of its newest fit."""
-    return _make_view(context, run_id)
+def get_run(run_id: str, context: Context, response: Response) -> Run:
+    """Return one run with its progress, its jobs and the result of its newest fit.
+
+    The header `ETag` names the state of what a person may change, for `If-Match` of `PATCH`.
+    """
+    row = context.get_run(run_id)
+    response.headers["ETag"] = make_run_tag(row)
+    return context.make_run_views(row)[0]
 
 
 @router.post("/{run_id}/stop")

@@ -57,6 +57,7 @@ class Run:
         self._outcome: RunOutcome | None = None
         self._lost: dict[str, int] = {}
         self._started = datetime.now(UTC)
+        self._method_sha256 = request.method.compute_sha256()
 
     @property
     def log(self) -> LiveRecorder | None:

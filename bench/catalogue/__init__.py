@@ -8,9 +8,12 @@ from bench.catalogue.log_summary import is_complete
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
+    EventRow,
     JobRow,
     JobState,
     LogIntegrity,
+    NoteKind,
+    NoteRow,
     RunOutcome,
     RunRow,
     RunState,
@@ -27,6 +30,7 @@ from bench.catalogue.planning import (
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
+from bench.catalogue.trash import move_to_trash, restore_from_trash
 
 __all__ = [
     "CATALOGUE_FILE",
@@ -36,6 +40,7 @@ __all__ = [
     "BatchRow",
     "Catalogue",
     "ClaimedKey",
+    "EventRow",
     "IdempotencyKeys",
     "JobFilter",
     "JobQueue",
@@ -44,6 +49,8 @@ __all__ = [
     "LogIntegrity",
     "MethodRow",
     "MethodStore",
+    "NoteKind",
+    "NoteRow",
     "RunFilter",
     "RunOutcome",
     "RunPlan",
@@ -57,7 +64,9 @@ __all__ = [
     "find_catalogue",
     "is_complete",
     "make_sqlite_url",
+    "move_to_trash",
     "open_database",
     "read_plan",
+    "restore_from_trash",
     "scan_logs",
 ]

@@ -10,6 +10,7 @@ from sqlalchemy.orm import sessionmaker
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
 from bench.catalogue.planning import SHIPPED_VERSION, IdempotencyKeys, MethodStore, SpecimenStore
+from bench.catalogue.records import EventJournal, Notebook
 from bench.catalogue.run_filter import RunFilter
 from bench.methods import list_shipped_methods, load_method
 
@@ -28,6 +29,7 @@ class Catalogue:
         self.job_queue = JobQueue(engine)
         self.idempotency_keys = IdempotencyKeys(engine)
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
+        self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.
         self._sessions = sessionmaker(engine, expire_on_commit=False)
@@ -114,6 +116,12 @@ class Catalogue:
         query = select(RunRow.id, RunRow.log).where(RunRow.log_sha256.is_not(None), ~is_missing)
         with self._sessions() as session:
             return [(run_id, log) for run_id, log in session.execute(query)]
+
+    def list_unread(self, limit: int) -> Sequence[RunRow]:
+        """Return runs with a complete log whose losses and events were not read, the newest first."""
+        query = select(RunRow).where(RunRow.log_sha256.is_not(None), RunRow.alarms.is_(None))
+        with self._sessions() as session:
+            return session.scalars(query.order_by(RunRow.started.desc()).limit(limit)).all()
 
     def update_run(self, run_id: str, **values: Any) -> RunRow:
         """Set columns of a run and return the changed run."""

@@ -16,6 +16,8 @@ from bench.log import write_atomically
 
 _TIMEOUT = 30.0
 """Longest time [s] for one reply."""
+_CHANNELS_HEADER = "X-Mrbench-Channels"
+"""Header of binary samples with name and unit of each channel."""
 _TOKEN_FIELD = "token="
 """Name of the token in the address that the service prints."""
 
@@ -46,9 +48,18 @@ class Session:
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        given = {name: value for name, value in query.items() if value is not None}
-        with self._request("GET", f"{path}?{urlencode(given)}" if given else path) as reply:
+        with self._request("GET", _add_query(path, query)) as reply:
             return _decode(path, reply.read())
+
+    def get_batches(self, path: str, **query: object) -> tuple[bytes, list[dict[str, str]]]:
+        """Return binary samples, and the list of their channels from the header of the reply.
+
+        Raises:
+            ClientError: the service refuses, cannot be reached, or lists no channels.
+        """
+        with self._request("GET", _add_query(path, query)) as reply:
+            channels: list[dict[str, str]] = _decode(path, reply.headers.get(_CHANNELS_HEADER, "").encode())
+            return reply.read(), channels
 
     def post(self, path: str, content: Mapping[str, Any] | None = None, key: str | None = None) -> Any:
         """Return the reply to POST, decoded from JSON.
@@ -111,6 +122,12 @@ class Session:
                 raise _make_refusal(path, error) from None
         except (URLError, OSError, HTTPException) as error:
             raise ClientError(f"the service at {self._base} does not reply to {path}: {error}") from error
+
+
+def _add_query(path: str, query: Mapping[str, object]) -> str:
+    """Return a path with the parts of a query that are not None; a sequence gives several parts of one name."""
+    given = {name: value for name, value in query.items() if value is not None}
+    return f"{path}?{urlencode(given, doseq=True)}" if given else path
 
 
 def quote_name(name: str) -> str:

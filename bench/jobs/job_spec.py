@@ -41,6 +41,8 @@ class JobSpec:
     """Logs of a trend, the oldest first."""
     model: str = ""
     """Fit or twin whose own gap a diagnosis reports; empty without one."""
+    log_sha256: str = ""
+    """Hash of the log, under which its samples are stored; empty if it is not known."""
 
 
 def compute_content_key(log_sha256: str, settings: JobSettings, inputs: Sequence[str] = ()) -> str:

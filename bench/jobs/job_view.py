@@ -40,7 +40,9 @@ class Job(FrozenModel):
 
     id: str = Field(description="also the id of its fit or diagnosis")
     run: str = Field(description="id of the run")
-    kind: str = Field(description="`identify`, `diagnose`, or `trend` of the specimen, which belongs to its newest run")
+    kind: str = Field(
+        description="`identify`, `diagnose`, or `trend` of the specimen, which belongs to its newest run"
+    )
     state: JobState
     stage: str = Field(description="present stage, such as `refine`; the last one of a job that has ended")
     fraction: float | None = Field(

@@ -234,6 +234,7 @@ class JobManager:
             submission=job.submissions,
             fit=paths.get("fit", ""),
             model=paths.get("model", ""),
+            log_sha256=run.log_sha256 or "",
         )
 
     def _has_files(self, job: JobRow) -> bool:

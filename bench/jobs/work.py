@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
+from bench.errors import LogError
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.job_spec import (
     DIAGNOSIS_FILE,
@@ -26,6 +27,7 @@ from bench.jobs.progress import PROGRESS_ENVIRONMENT, CommandStep, JobProgress, 
 from bench.jobs.settings import DiagnoseSettings, TrendSettings
 from bench.jobs.summaries import read_diagnosis_summary, read_fit_summary, read_trend_summary
 from bench.processes import MRBENCH_COMMAND, LineQueue, start_line_reader
+from bench.samples import SampleStore
 
 POLL_PERIOD = 0.25
 """Time [s] between two checks for cancellation."""
@@ -48,7 +50,7 @@ class JobCallbacks:
 def execute_job(
     spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...] = MRBENCH_COMMAND
 ) -> ResultSummary:
-    """Identify or diagnose a log and write a report, or find the trend over logs; the files appear together, or not at all.
+    """Identify or diagnose a log with a report, or find a trend; the files appear together, or not at all.
 
     Args:
         spec: the job; if its result exists, it is only read.
@@ -62,11 +64,12 @@ def execute_job(
         JobError: a command failed, or the time limit was reached.
         JobCancelledError: the job was cancelled.
     """
-    result = Path(spec.result)
-    log = next((Path(log) for log in (spec.log, *spec.logs) if not Path(log).is_file()), None)
-    if log is not None:
-        raise JobError(f"{log} is not on the worker's machine; workers need the data folder at the same path")
+    log, result = Path(spec.log), Path(spec.result)
+    missing = next((path for path in (log, *map(Path, spec.logs)) if not path.is_file()), None)
+    if missing is not None:
+        raise JobError(f"{missing} is not on the worker's machine; workers need the data folder at the same path")
     deadline = time.monotonic() + spec.settings.time_limit_s
+    _store_samples(log, spec.log_sha256)
     if not result.is_dir():
         with _make_work_folder(result) as folder:
             for step, arguments in _list_commands(spec, folder):
@@ -77,6 +80,13 @@ def execute_job(
     if isinstance(spec.settings, DiagnoseSettings):
         return read_diagnosis_summary(result / DIAGNOSIS_FILE)
     return read_fit_summary(result / FIT_FILE)
+
+
+def _store_samples(log: Path, sha256: str) -> None:
+    """Store the samples as columns, so that the service need not read the log when a person looks at the run."""
+    with contextlib.suppress(LogError):  # the command of the job says what is wrong with the log
+        if sha256:
+            SampleStore(log.parent).load(log, sha256)
 
 
 def _list_commands(spec: JobSpec, folder: Path) -> list[tuple[CommandStep, list[str]]]:

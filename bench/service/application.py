@@ -11,12 +11,14 @@ from typing import Any
 from fastapi import Depends, FastAPI
 from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
+from pydantic import BaseModel
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
-from bench.agent_protocol import AgentStatus
+from bench.agent_protocol import AgentEvent, AgentStatus
 from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
+from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentLink, AgentMonitor
@@ -132,8 +134,15 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         if not loop.is_closed():
             asyncio.run_coroutine_threadsafe(registry.observe(status), loop)
 
+    publish = broadcaster.make_publisher(loop)
+
+    def on_message(topic: str, message: BaseModel) -> None:
+        publish(topic, message)
+        if isinstance(message, AgentEvent):
+            registry.record_event(message)
+
     job_manager = JobManager(catalogue, engine, on_job_changed)
-    monitor = AgentMonitor(settings.link, broadcaster.make_publisher(loop), on_status)
+    monitor = AgentMonitor(settings.link, on_message, on_status)
     registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
         settings.access,
@@ -145,6 +154,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         registry,
         settings.has_local_logs,
         SpaceMonitor(settings.data),
+        SampleStore(settings.data),
     )
     return context
 

@@ -12,6 +12,7 @@ from starlette.requests import HTTPConnection
 from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
+from bench.samples import SampleStore
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentMonitor
 from bench.service.live import LiveBroadcaster
@@ -37,6 +38,7 @@ class ServiceContext:
     has_local_logs: bool
     """True if the agent writes into the service's data folder."""
     space_monitor: SpaceMonitor
+    sample_store: SampleStore
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
     """Locks of the idempotency keys of requests in progress."""
 

@@ -7,7 +7,9 @@ from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bench.agent_protocol import AgentStatus, RunStatus
+from sqlalchemy.exc import SQLAlchemyError
+
+from bench.agent_protocol import AgentEvent, AgentStatus, RunStatus
 from bench.catalogue import Catalogue, LogIntegrity, RunRow, catalogue_log, is_complete, scan_logs
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
@@ -44,7 +46,8 @@ class RunRegistry:
         self._catalogue, self._job_manager = catalogue, job_manager
         self._get_status, self._on_changed = status, notify
         self._known_states: set[tuple[str, bool]] = set()
-        self._lock = asyncio.Lock()
+        self.lock = asyncio.Lock()
+        """Held while logs are catalogued or moved."""
         self._failures = RepeatedFailure(_LOG, "runs_not_recorded", "runs_recorded_again")
 
     async def observe(self, status: AgentStatus) -> None:
@@ -64,14 +67,26 @@ class RunRegistry:
         for run in runs.values():
             key = (run.id, run.outcome is not None)  # a run is recorded when it starts and when it ends
             if key not in self._known_states:
-                async with self._lock:
+                async with self.lock:
                     await (self._finish_run(run) if run.outcome else self._add_run(run))
                 # Added last, so that a failed update is tried again with the next status.
                 self._known_states.add(key)
 
+    def record_event(self, event: AgentEvent) -> None:
+        """Store an event with the run in progress; called from any thread.
+
+        A failure, such as a full disk, is logged; the log of the run contains its events in any case.
+        """
+        status = self._get_status()
+        run = status.run if status and status.run and status.run.outcome is None else None
+        try:
+            self._catalogue.event_journal.record(event.kind, event.text, run.id if run else None)
+        except SQLAlchemyError as error:
+            self._failures.note(error)
+
     async def scan(self) -> None:
         """Scan the data folder once."""
-        async with self._lock:
+        async with self.lock:
             for row in await asyncio.to_thread(scan_logs, self._catalogue, self._is_being_written):
                 await self._handle_change(row)
 

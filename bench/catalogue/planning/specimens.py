@@ -101,15 +101,17 @@ class SpecimenStore:
 
     def list_runs(self, serial: str, limit: int) -> Sequence[RunRow]:
         """Return the newest runs of a specimen with a complete log, oldest first."""
-        query = select(RunRow).where(RunRow.specimen == serial, RunRow.log_sha256.is_not(None))
+        query = select(RunRow).where(
+            RunRow.specimen == serial, RunRow.log_sha256.is_not(None), RunRow.trashed.is_(None)
+        )
         with self._sessions() as session:
             newest = session.scalars(query.order_by(RunRow.started.desc(), RunRow.id.desc()).limit(limit)).all()
             return newest[::-1]
 
 
 def _select_specimens() -> tuple[Select[Any], Any]:
-    """Return the query for all specimens, and its column of serial numbers."""
-    named = RunRow.specimen != ""
+    """Return the query for all specimens, and its column of serial numbers; runs in the trash do not count."""
+    named = (RunRow.specimen != "") & RunRow.trashed.is_(None)
     serials = union(select(SpecimenRow.serial), select(RunRow.specimen.label("serial")).where(named)).subquery()
     runs = (
         select(RunRow.specimen, func.count().label("number"), func.max(RunRow.started).label("last"))

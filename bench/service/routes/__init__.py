@@ -6,8 +6,8 @@ from bench.service.routes import (
     integrity,
     jobs,
     live,
-    methods,
-    previews,
+    planning,
+    recordings,
     results,
     rig,
     run_files,
@@ -18,8 +18,7 @@ PUBLIC_ROUTERS = (rig.public_router, live.router)
 """Routers that need no token in the header; `live` checks its own."""
 PROTECTED_ROUTERS = (
     rig.router,
-    methods.router,
-    previews.router,
+    *planning.ROUTERS,
     runs.router,
     continuation.router,
     integrity.router,
@@ -27,6 +26,7 @@ PROTECTED_ROUTERS = (
     results.router,
     jobs.router,
     batches.router,
+    *recordings.ROUTERS,
 )
 """Routers that need the token."""
 

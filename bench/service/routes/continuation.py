@@ -44,7 +44,7 @@ async def resume_run(
     """
     row = await asyncio.to_thread(context.get_run, run_id)
     method, checkpoint = await asyncio.to_thread(_find_continuation, context, row)
-    start = StartRunRequest(
+    start = StartRunRequest.model_construct(  # the first part was accepted with these values
         method=method.name,
         specimen=row.specimen,
         operator=row.operator,

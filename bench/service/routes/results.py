@@ -78,8 +78,10 @@ def check_complete(row: RunRow, verb: str) -> None:
     """Refuse a run without a complete log, or with another one than was recorded.
 
     Raises:
-        ProblemError: its log has no end, was changed or is missing.
+        ProblemError: its log has no end, was changed or is missing, or the run is in the trash.
     """
+    if row.trashed is not None:
+        raise make_conflict("in-trash", "In the trash", f"run {row.id} is in the trash; restore it first")
     if row.log_sha256 is None:
         raise make_conflict(
             "run-not-ended", "No complete log", f"run {row.id} is {row.state}; only a complete log can be {verb}"

@@ -3,8 +3,9 @@
 import asyncio
 import time
 from datetime import UTC, datetime
+from http import HTTPStatus
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.exc import SQLAlchemyError
@@ -17,10 +18,10 @@ from bench.methods import Method, compile_method, parse_method
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict
 from bench.service.requests import IDEMPOTENT, IdempotentRoute, find_first_request
-from bench.service.routes.methods import load_shipped_method
+from bench.service.routes.planning import find_method
 from bench.service.routes.run_search import RunSearch
 from bench.service.run_registry import make_run_row
-from bench.service.views import Run, RunPage, StartRunRequest, make_run_view
+from bench.service.views import Run, RunPage, StartRunRequest, make_run_tag, make_run_view
 
 router = APIRouter(prefix="/runs", tags=["runs"], route_class=IdempotentRoute)
 _START_TIMEOUT = 5.0
@@ -30,7 +31,7 @@ _START_TIMEOUT = 5.0
 @router.post("", status_code=201, dependencies=[IDEMPOTENT])
 async def start_run(request: StartRunRequest, http: Request, context: Context, response: Response) -> Run:
     """Start a run; the agent executes and records it even if the service ends."""
-    method = await asyncio.to_thread(_check_method, request.method)
+    method = await asyncio.to_thread(_check_method, context, request)
     return await begin_run(context, response, method, request, first_request=find_first_request(http))
 
 
@@ -108,16 +109,19 @@ def _make_view(context: ServiceContext, run_id: str) -> Run:
     return context.make_run_views(context.get_run(run_id))[0]
 
 
-def _check_method(method: str | dict[str, Any]) -> Method:
+def _check_method(context: ServiceContext, request: StartRunRequest) -> Method:
     """Return a method, by name or from its document, after it was compiled within its limits.
 
     Raises:
         MethodError: the document is invalid, or the method exceeds its limits.
-        ProblemError: there is no included method with this name.
+        ProblemError: there is no method with this name and version, or nothing names a specimen.
     """
-    if isinstance(method, str):
-        return load_shipped_method(method)
-    parsed = parse_method(method, "the request")
+    if request.specimen is None and not context.monitor.describe_bench().specimen:
+        detail = "specimen: give the serial number of the damper under test; bench.toml names none"
+        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "Invalid request", detail)
+    if isinstance(request.method, str):
+        return find_method(context, request.method, request.method_version).method
+    parsed = parse_method(request.method, "the request")
     compile_method(parsed)
     return parsed
 
@@ -130,7 +134,7 @@ def _request_start(
     before = context.monitor.get_status().run
     command = RunCommand(
         method=method.model_dump(mode="json", by_alias=True, exclude_defaults=True),
-        specimen=request.specimen,
+        specimen=request.specimen or "",
         operator=request.operator,
         resume_after=request.resume_after,
         continues=continues,
@@ -161,9 +165,14 @@ def list_runs(
 
 
 @router.get("/{run_id}")
-def get_run(run_id: str, context: Context) -> Run:
-    """Return one run with its progress, its jobs and the result of its newest fit."""
-    return _make_view(context, run_id)
+def get_run(run_id: str, context: Context, response: Response) -> Run:
+    """Return one run with its progress, its jobs and the result of its newest fit.
+
+    The header `ETag` names the state of what a person may change, for `If-Match` of `PATCH`.
+    """
+    row = context.get_run(run_id)
+    response.headers["ETag"] = make_run_tag(row)
+    return context.make_run_views(row)[0]
 
 
 @router.post("/{run_id}/stop")

@@ -33,7 +33,7 @@ export class StartForm {
   /** Loads the methods, the shortest first; the selection is kept. */
   async load() {
     try {
-      const methods = await get("methods");
+      const methods = (await get("methods")).items;
       const chosen = this.method() ?? this.wanted;
       this.methods = methods.sort((a, b) => a.duration_s - b.duration_s);
       this.list(chosen);

@@ -23,6 +23,7 @@ from bench.jobs.job_spec import (
 )
 from bench.jobs.settings import DiagnoseSettings, IdentifySettings
 from bench.jobs.work import WATCHDOG_COMMAND, JobCallbacks, execute_job
+from tests.support.logs import write_log
 from tests.support.reports import diagnosis_document, fit_document
 
 COMMAND = """
@@ -224,3 +225,14 @@ subprocess.Popen({[*WATCHDOG_COMMAND, sys.executable, "-c", inner]!r}, stdin=sub
         assert all(is_running(pid) for pid in pids)
         os.kill(process.pid, number)
     wait_until(lambda: not any(is_running(pid) for pid in pids))
+
+
+def test_the_samples_of_the_log_are_stored_for_the_views(bench):
+    write_log(bench.folder / "run.mcap")
+    bench.execute(log_sha256="ab" * 32)
+    assert [path.name for path in (bench.folder / ".samples").iterdir()] == [f"{'ab' * 32}.npz"]
+
+
+def test_an_unreadable_log_is_left_to_the_command(bench):
+    assert bench.execute(log_sha256="ab" * 32)
+    assert not (bench.folder / ".samples").exists()

@@ -1,0 +1,64 @@
+"""Route that lists the files of a run."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from urllib.parse import quote
+
+from fastapi import APIRouter
+
+from bench.catalogue import JobFilter, JobRow, RunRow
+from bench.jobs import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE
+from bench.service.context import Context, ServiceContext
+from bench.service.routes.recordings.views import RunFile, RunFileList
+
+router = APIRouter(prefix="/runs", tags=["recordings"])
+_MAX_JOBS = 200
+_API = "/api/v1"
+_RESULTS = {
+    FIT_FILE: ("fit", "fits/{}", "application/json"),
+    DIAGNOSIS_FILE: ("diagnosis", "diagnoses/{}", "application/json"),
+    TWIN_FILE: ("twin", "twins/{}", "application/json"),
+}
+"""Kind, path below the interface and media type of a result, by the name of its file."""
+
+
+@router.get("/{run_id}/files")
+def list_files(run_id: str, context: Context) -> RunFileList:
+    """List the files of a run with their sizes and addresses: log, fits, diagnoses, twins, newest report."""
+    row = context.get_run(run_id)
+    jobs = context.catalogue.job_queue.list_jobs(JobFilter(("done",), None, run_id), _MAX_JOBS)
+    results = [file for job in jobs for file in _list_results(context, job)]
+    return RunFileList(items=(*_list_log(context, row), *_list_report(context, row, jobs), *results))
+
+
+def _list_log(context: ServiceContext, row: RunRow) -> Iterator[RunFile]:
+    path = context.catalogue.resolve_path(row.log)
+    if path.is_file():
+        yield _make_file(path, "log", f"runs/{quote(row.id, safe='')}/log", "application/octet-stream", None)
+
+
+def _list_report(context: ServiceContext, row: RunRow, jobs: Sequence[JobRow]) -> Iterator[RunFile]:
+    newest = max(jobs, key=lambda job: job.finished or job.created, default=None)
+    if newest is not None:
+        path = context.catalogue.resolve_path(newest.result or "") / REPORT_FILE
+        if path.is_file():
+            yield _make_file(path, "report", f"runs/{quote(row.id, safe='')}/report", "text/html", newest)
+
+
+def _list_results(context: ServiceContext, job: JobRow) -> Iterator[RunFile]:
+    folder = context.catalogue.resolve_path(job.result or "")
+    for name, (kind, address, media_type) in _RESULTS.items():
+        if job.result is not None and (folder / name).is_file():
+            yield _make_file(folder / name, kind, address.format(job.id), media_type, job)
+
+
+def _make_file(path: Path, kind: str, address: str, media_type: str, job: JobRow | None) -> RunFile:
+    return RunFile(
+        name=path.name,
+        kind=kind,
+        path=f"{_API}/{address}",
+        media_type=media_type,
+        size=path.stat().st_size,
+        job=job.id if job else None,
+        made=job.finished if job else None,
+    )

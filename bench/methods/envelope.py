@@ -101,6 +101,21 @@ def compute_expected_force(programme: Programme, parameters: Parameters) -> Arra
     return np.asarray(dissipative + springs, dtype=np.float64)
 
 
+def compute_heat(programme: Programme, damper: str | None = None) -> float:
+    """Compute the heat [J] that a damper dissipates at most during a programme.
+
+    Args:
+        programme: compiled method.
+        damper: name of a shipped parameter set; by default `DEFAULT_DAMPER` for the drive unit.
+
+    Raises:
+        MethodError: there is no such damper, or its drive has another unit.
+    """
+    unit = programme.method.drive_unit
+    force = compute_expected_force(programme, _find_parameters(damper or DEFAULT_DAMPER[unit], unit))
+    return float(np.sum(force * np.abs(programme.velocity)) / programme.rate)
+
+
 def format_envelope(envelope: Envelope) -> list[str]:
     """Format the envelope as a table of plain text."""
     width = max(len(peaks.name) for peaks in (envelope.total, *envelope.segments))

@@ -1,0 +1,7 @@
+"""Errors of campaigns."""
+
+from bench.errors import BenchError
+
+
+class CampaignError(BenchError):
+    """A campaign is invalid, or a command is not possible in its present state."""

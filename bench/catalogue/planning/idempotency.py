@@ -23,8 +23,8 @@ class IdempotencyRow(Base):
     """Verb and path of the request."""
     created: Mapped[datetime] = mapped_column(UtcTime, index=True)
     """UTC of the first request."""
-    fingerprint: Mapped[str | None] = mapped_column(Text, default=None)
-    """SHA-256 of the body; None while it is not known."""
+    fingerprint: Mapped[str] = mapped_column(Text)
+    """SHA-256 of the body."""
     status: Mapped[int | None] = mapped_column(default=None)
     """HTTP status of the answer; None while there is none."""
     headers: Mapped[dict[str, str]] = mapped_column(JSON, default=dict)
@@ -37,7 +37,7 @@ class ClaimedKey:
 
     operation: str
     created: datetime
-    fingerprint: str | None
+    fingerprint: str
     status: int | None
     headers: Mapping[str, str]
     answer: str
@@ -50,30 +50,27 @@ class IdempotencyKeys:
         """Use an open database."""
         self._sessions = sessionmaker(engine, expire_on_commit=False)
 
-    def claim(self, key: str, operation: str, now: datetime) -> ClaimedKey:
+    def claim(self, key: str, operation: str, fingerprint: str, now: datetime) -> ClaimedKey:
         """Store a key that is new, and return what is stored of it; expired keys are deleted.
 
         Args:
             key: as the client has chosen it.
             operation: verb and path of the request, stored with a new key.
+            fingerprint: SHA-256 of its body, stored with a new key.
             now: UTC.
         """
         with self._sessions.begin() as session:
             session.execute(delete(IdempotencyRow).where(IdempotencyRow.created < now - LIFETIME))
             row = session.get(IdempotencyRow, key)
             if row is None:
-                row = IdempotencyRow(key=key, operation=operation, created=now, headers={}, answer="")
+                row = IdempotencyRow(
+                    key=key, operation=operation, fingerprint=fingerprint, created=now, headers={}, answer=""
+                )
                 session.add(row)
             return ClaimedKey(row.operation, row.created, row.fingerprint, row.status, row.headers, row.answer)
 
-    def note_fingerprint(self, key: str, fingerprint: str) -> None:
-        """Store the hash of a body before its request is handled."""
-        self._update(key, fingerprint=fingerprint)
-
-    def store(self, key: str, fingerprint: str, status: int, headers: Mapping[str, str], answer: str) -> None:
+    def store(self, key: str, status: int, headers: Mapping[str, str], answer: str) -> None:
         """Store the answer of a request."""
-        self._update(key, fingerprint=fingerprint, status=status, headers=dict(headers), answer=answer)
-
-    def _update(self, key: str, **values: object) -> None:
+        values = {"status": status, "headers": dict(headers), "answer": answer}
         with self._sessions.begin() as session:
             session.execute(update(IdempotencyRow).where(IdempotencyRow.key == key).values(**values))

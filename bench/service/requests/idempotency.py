@@ -21,7 +21,6 @@ from weakref import WeakValueDictionary
 from fastapi import Depends, Header, Request, Response
 from fastapi.routing import APIRoute
 from sqlalchemy.exc import SQLAlchemyError
-from starlette.types import Message
 
 from bench.catalogue import ClaimedKey, IdempotencyKeys
 from bench.service.context import ServiceContext
@@ -33,6 +32,8 @@ _HEADER = "Idempotency-Key"
 _PATTERN = re.compile(r"[!-~]{1,255}")
 _KEPT_HEADERS = ("location", "etag")
 """Headers of an answer that are stored with it."""
+_CHUNK = 1 << 20
+"""Number of bytes of an upload that are read at once."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -92,20 +93,36 @@ async def _handle_with_key(handle: Handler, request: Request, key: str) -> Respo
 
 async def _handle_alone(handle: Handler, request: Request, key: str, keys: IdempotencyKeys) -> Response:
     operation = f"{request.method} {request.url.path}?{request.url.query}"
-    claimed = await asyncio.to_thread(keys.claim, key, operation, datetime.now(UTC))
-    body = _BodyHash(request)
+    fingerprint = await _compute_fingerprint(request)
+    claimed = await asyncio.to_thread(keys.claim, key, operation, fingerprint, datetime.now(UTC))
     if claimed.operation != operation:
         raise _refuse(f"{_HEADER} {shorten(key)} belongs to {shorten(claimed.operation)}; use a new key")
-    if claimed.fingerprint is not None and await body.read() != claimed.fingerprint:
+    if claimed.fingerprint != fingerprint:
         raise _refuse(f"{_HEADER} {shorten(key)} was used with another body; use a new key for another request")
     if claimed.status is not None:
         return _restore(claimed)
     request.state.first_request = claimed.created
-    if claimed.fingerprint is None and not body.is_stream:
-        await asyncio.to_thread(keys.note_fingerprint, key, await body.read())
     response = await handle(request)
-    await asyncio.to_thread(_store, keys, key, body.digest, response)
+    await asyncio.to_thread(_store, keys, key, response)
     return response
+
+
+async def _compute_fingerprint(request: Request) -> str:
+    """Compute the SHA-256 of a body; of a form that of its parts, because their boundary is chosen at random.
+
+    The handler reads the same body afterwards, which the framework keeps.
+    """
+    digest = hashlib.sha256()
+    if not request.headers.get("content-type", "").startswith("multipart/"):
+        digest.update(await request.body())
+        return digest.hexdigest()
+    for name, part in (await request.form()).multi_items():
+        digest.update(f"{name}={part if isinstance(part, str) else part.filename}\n".encode())
+        if not isinstance(part, str):
+            while chunk := await part.read(_CHUNK):
+                digest.update(chunk)
+            await part.seek(0)
+    return digest.hexdigest()
 
 
 def _restore(claimed: ClaimedKey) -> Response:
@@ -113,44 +130,13 @@ def _restore(claimed: ClaimedKey) -> Response:
     return Response(claimed.answer, claimed.status or HTTPStatus.OK, headers, "application/json")
 
 
-def _store(keys: IdempotencyKeys, key: str, fingerprint: str, response: Response) -> None:
+def _store(keys: IdempotencyKeys, key: str, response: Response) -> None:
     """Store an answer; if that fails, a repetition is handled like one after an interruption."""
     headers = {name: response.headers[name] for name in _KEPT_HEADERS if name in response.headers}
     try:
-        keys.store(key, fingerprint, response.status_code, headers, bytes(response.body).decode())
+        keys.store(key, response.status_code, headers, bytes(response.body).decode())
     except SQLAlchemyError as error:
         _LOG.warning("answer_not_stored", extra={"why": str(error).splitlines()[0]})
-
-
-class _BodyHash:
-    """SHA-256 of the body of a request: of JSON before it is handled, of an upload while it passes."""
-
-    def __init__(self, request: Request) -> None:
-        self._request = request
-        self._hash = hashlib.sha256()
-        media_type = request.headers.get("content-type", "application/json").partition(";")[0]
-        self.is_stream = media_type != "application/json"
-        if self.is_stream:
-            self._receive, request._receive = request._receive, self._pass_on  # noqa: SLF001  no public way
-
-    @property
-    def digest(self) -> str:
-        """Hash of what was read so far."""
-        return self._hash.hexdigest()
-
-    async def read(self) -> str:
-        """Read the whole body and return its hash; JSON stays readable for the handler."""
-        if self.is_stream:
-            async for _ in self._request.stream():
-                pass
-        else:
-            self._hash = hashlib.sha256(await self._request.body())
-        return self.digest
-
-    async def _pass_on(self) -> Message:
-        message = await self._receive()
-        self._hash.update(message.get("body", b""))
-        return message
 
 
 def _refuse(detail: str) -> ProblemError:

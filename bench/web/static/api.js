@@ -52,9 +52,12 @@ export function liveAddress() {
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
 
+/** Makes a key for one request; `randomUUID` is missing on a page that was loaded without TLS from elsewhere. */
+const makeKey = () => crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
+
 /** Posts a request that starts something: with a key, so that it is repeated safely if its answer is lost. */
 export async function start(path, body) {
-  const headers = { "Idempotency-Key": crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}` };
+  const headers = { "Idempotency-Key": makeKey() };
   try {
     return await call("POST", path, body, TIMEOUT_MS, headers);
   } catch (problem) {
@@ -76,6 +79,7 @@ export function upload(path, form, onProgress) {
     const request = new XMLHttpRequest();
     request.open("POST", new URL(path, BASE));
     request.setRequestHeader("Authorization", `Bearer ${token() ?? ""}`);
+    request.setRequestHeader("Idempotency-Key", makeKey());
     request.responseType = "json";
     request.upload.addEventListener("progress", ({ loaded, total }) => onProgress(total ? loaded / total : 0));
     request.addEventListener("error", () => reject(new Problem(0, "No answer", `The service at ${BASE.host} cannot be reached.`)));

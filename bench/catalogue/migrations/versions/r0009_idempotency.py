@@ -16,7 +16,7 @@ def upgrade() -> None:
         sa.Column("key", sa.Text(), primary_key=True),
         sa.Column("operation", sa.Text(), nullable=False),
         sa.Column("created", UtcTime(), nullable=False),
-        sa.Column("fingerprint", sa.Text()),
+        sa.Column("fingerprint", sa.Text(), nullable=False),
         sa.Column("status", sa.Integer()),
         sa.Column("headers", sa.JSON(), nullable=False),
         sa.Column("answer", sa.Text(), nullable=False),

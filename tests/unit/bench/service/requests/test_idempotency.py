@@ -140,6 +140,21 @@ def test_the_description_names_the_header_of_what_starts_something(service):
 def test_keys_expire_after_a_day(service):
     keys = service.client.app.state.context.catalogue.idempotency_keys
     long_ago = datetime.now(UTC) - timedelta(days=2)
-    keys.claim("key-1", "POST /api/v1/runs?", long_ago)
-    keys.store("key-1", "0" * 64, 201, {}, "{}")
+    keys.claim("key-1", "POST /api/v1/runs?", "0" * 64, long_ago)
+    keys.store("key-1", 201, {}, "{}")
     assert post(service, "/runs", BODY, "key-1").json()["state"] == "running"
+
+
+def test_an_upload_is_recognised_although_its_boundary_differs(service):
+    rows = "".join(f"{k / 1000:.3f},{k * 1e-6:.6f},{k:.1f},0.0\n" for k in range(300))
+    content = "time_s,displacement_m,force_n,voltage_v\n" + rows
+
+    def send(text):
+        files = {"file": ("a.csv", text.encode(), "text/csv")}
+        return service.client.post("/api/v1/logs", files=files, headers={"Idempotency-Key": "key-1"})
+
+    first, second = send(content), send(content)
+    assert (first.status_code, second.status_code) == (201, 201), first.text
+    assert second.json() == first.json()
+    assert len(list(service.data.glob("*.mcap"))) == 1
+    assert send(content + "0.300,0.0003,1.0,0.0\n").status_code == 422

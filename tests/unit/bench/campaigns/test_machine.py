@@ -28,9 +28,7 @@ def test_all_steps_are_done_in_order_with_restore_points_around_each():
     assert bench.run().status == "done"
     assert states(bench) == ["done"] * 3
     assert [fact.specimen for fact in bench.state.facts] == ["MR-1", "MR-2"]
-    begun, ended = (
-        [text for text in bench.texts("restore_point") if word in text] for word in ("begins", "done")
-    )
+    begun, ended = ([text for text in bench.texts("restore_point") if word in text] for word in ("begins", "done"))
     assert len(begun) == len(ended) == 3
     times = bench.state.times
     assert (times.stroking_s, times.rest_s) == (40.0, 100.0)

@@ -32,7 +32,7 @@ class Observation(FrozenModel):
     """State of the bench at one moment."""
 
     report: ExecutionReport | None = None
-    """Of the active execution; None if it is not known."""
+    """Report on the active execution; None if it is not known."""
     temperature_c: float | None = None
     """Present reading of the thermometer; None without one."""
     results: dict[str, RunResult] = Field(default_factory=dict)

@@ -95,7 +95,7 @@ class Active(FrozenModel):
     execution: Execution | None = None
     deadline: float | None = None
     is_question: bool = False
-    """Whether a person decides on a failure: retry, skip or stop."""
+    """True if a person decides on a failure: retry, skip or stop."""
     started: float = 0.0
     """Begin of the whole step, for its time limit."""
 
@@ -153,7 +153,7 @@ class CampaignState(FrozenModel):
     waits_since: float | None = None
     """Time since which the bench cannot start it."""
     is_wait_told: bool = False
-    """Whether a person was told of it."""
+    """True if a person was told of it."""
     facts: tuple[RunFact, ...] = ()
     """Complete runs, oldest first."""
     results: dict[str, RunResult] = Field(default_factory=dict)
@@ -173,15 +173,15 @@ class CampaignState(FrozenModel):
 
     @property
     def has_ended(self) -> bool:
-        """Whether the campaign does not continue."""
+        """Return whether the campaign does not continue."""
         return self.status in ENDED
 
     @property
     def is_stroking(self) -> bool:
-        """Whether a run is in progress or about to begin."""
+        """Return whether a run is in progress or about to begin."""
         return self.active is not None and self.active.phase in ("starting", "stroking")
 
     @property
     def needs_person(self) -> bool:
-        """Whether the campaign waits for an answer."""
+        """Return whether the campaign waits for an answer."""
         return self.active is not None and self.active.phase == "asking" and not self.has_ended

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
@@ -161,21 +162,32 @@ def render(report: Report, figures: dict[str, Figure], command: str, created_at:
         name: Picture(*CAPTIONS[name], base64.b64encode(plots.render_png(figure)).decode())
         for name, figure in figures.items()
     }
+    values = make_context(report, command, created_at)
+    return environment.get_template("report.html").render(pictures=pictures, **values)
+
+
+def make_context(report: Report, command: str, created_at: datetime) -> dict[str, Any]:
+    """Return all texts and tables of a report, formatted for a person, for a template or another format.
+
+    Args:
+        report: content of the report.
+        command: command line that writes it.
+        created_at: time at which it is written.
+    """
     found = report.diagnosis
-    return environment.get_template("report.html").render(
-        title=_make_title(report.log),
-        run=content.make_header_rows(report.log, report.sha256),
-        findings=make_findings(report.log, report.fit, report.prediction, report.is_fitted_log),
-        pictures=pictures,
-        outcome=content.make_outcome_rows(report.log),
-        channels=content.make_channel_rows(report.log),
-        diagnosis=None if found is None else diagnosis.make_context(found, report.recording.drive_unit),
-        truth=_make_truth_context(report),
-        fit=None if report.fit is None else _make_fit_context(report),
-        created_at=f"{created_at:%Y-%m-%d %H:%M} UTC",
-        version=version("mrbench"),
-        command=command,
-    )
+    return {
+        "title": _make_title(report.log),
+        "run": content.make_header_rows(report.log, report.sha256),
+        "findings": make_findings(report.log, report.fit, report.prediction, report.is_fitted_log),
+        "outcome": content.make_outcome_rows(report.log),
+        "channels": content.make_channel_rows(report.log),
+        "diagnosis": None if found is None else diagnosis.make_context(found, report.recording.drive_unit),
+        "truth": _make_truth_context(report),
+        "fit": None if report.fit is None else _make_fit_context(report),
+        "created_at": f"{created_at:%Y-%m-%d %H:%M} UTC",
+        "version": version("mrbench"),
+        "command": command,
+    }
 
 
 def _make_title(log: Log) -> str:

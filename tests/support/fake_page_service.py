@@ -8,10 +8,10 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import uvicorn
-from fastapi import APIRouter, FastAPI, Request, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, FastAPI, Form, Request, UploadFile, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
@@ -25,6 +25,7 @@ TOKEN = "a-token"
 SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
 REFUSAL = "lvdt: not connected for 3.2 s; plug it in and start again"
 CLAMPED = "a specimen is clamped, and homing would drive it into its ends; unclamp it and call unmount first"
+BAD_CELL = "bad.csv, row 2, column force_n: 'much' is not a number"
 HASH = "5f" * 32
 RATE = 1000
 BATCH = 40
@@ -167,7 +168,15 @@ def application(bench: FakeBench) -> FastAPI:
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
 
-    for routes in (rig_routes, method_routes, run_routes, run_control_routes, result_routes, live_routes):
+    for routes in (
+        rig_routes,
+        method_routes,
+        run_routes,
+        run_control_routes,
+        result_routes,
+        upload_routes,
+        live_routes,
+    ):
         app.include_router(routes(bench), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
@@ -320,6 +329,21 @@ def result_routes(bench: FakeBench) -> APIRouter:
     @router.post("/runs/{run_id}/identify")
     async def identify(run_id: str) -> Any:
         return bench.runs[run_id]["jobs"][-1]
+
+    return router
+
+
+def upload_routes(bench: FakeBench) -> APIRouter:
+    """Create the route of uploads; a file with the cell `much` is refused."""
+    router = APIRouter()
+
+    @router.post("/logs", status_code=201)
+    async def take(file: list[UploadFile], specimen: Annotated[str, Form()] = "") -> Any:
+        if b"much" in await file[0].read():
+            return problem(422, "The recording was refused", BAD_CELL)
+        method = ", ".join(Path(one.filename or "").stem for one in file)
+        bench.runs["run-5"] = run(5, "clean", id="run-5", source="import", specimen=specimen, method=method)
+        return bench.runs["run-5"]
 
     return router
 

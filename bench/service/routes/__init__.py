@@ -3,6 +3,7 @@
 from bench.service.routes import (
     batches,
     continuation,
+    exchange,
     integrity,
     jobs,
     live,
@@ -28,6 +29,7 @@ PROTECTED_ROUTERS = (
     results.router,
     jobs.router,
     batches.router,
+    *exchange.ROUTERS,
     *recordings.ROUTERS,
 )
 """Routers that need the token."""

@@ -10,7 +10,6 @@ from bench.catalogue import JobFilter, JobRow, RunRow
 from bench.jobs import (
     DIAGNOSIS_FILE,
     FIT_FILE,
-    REPORT_FILE,
     TWIN_FILE,
     DiagnoseSettings,
     IdentifySettings,
@@ -24,7 +23,6 @@ from bench.service.problems import ProblemError, make_conflict, make_not_found
 from bench.service.run_registry import DAMAGED
 
 router = APIRouter(tags=["results"])
-_MEDIA_TYPES = {".json": "application/json", ".html": "text/html"}
 _VERBS: dict[JobKind, str] = {"identify": "identified", "diagnose": "diagnosed"}
 _NOUNS: dict[JobKind, str] = {"identify": "fit", "diagnose": "diagnosis"}
 
@@ -33,7 +31,7 @@ def _describe_file(media_type: str) -> dict[int | str, dict[str, Any]]:
     return {200: {"description": "the file", "content": {media_type: {}}}}
 
 
-_JSON_FILE, _PAGE = _describe_file("application/json"), _describe_file("text/html")
+_JSON_FILE = _describe_file("application/json")
 _SAME_JOB: dict[int | str, dict[str, Any]] = {
     200: {"description": "an equal job is unfinished or done, and is returned; nothing was queued", "model": Job}
 }
@@ -106,15 +104,6 @@ def get_newest_diagnosis(run_id: str, context: Context) -> SnapshotResponse:
     return _make_response(context, _find_newest(context, run_id, "diagnose"), DIAGNOSIS_FILE)
 
 
-@router.get("/runs/{run_id}/report", response_class=FileResponse, responses=_PAGE)
-def get_newest_report(run_id: str, context: Context) -> SnapshotResponse:
-    """Return the report of the newest diagnosis with its fit, or of a fit that is newer, as one page."""
-    queue = context.catalogue.job_queue
-    found = [job for kind in _NOUNS if (job := queue.find_newest_done(run_id, kind))]
-    newest = max(found, key=lambda job: job.finished or job.created, default=None)
-    return _make_response(context, newest or _find_newest(context, run_id, "identify"), REPORT_FILE)
-
-
 @router.get("/fits/{fit_id}", response_class=FileResponse, responses=_JSON_FILE)
 def get_fit(fit_id: str, context: Context) -> SnapshotResponse:
     """Return a fit, `mrbench.fit/1`; its id is that of its job."""
@@ -164,7 +153,7 @@ def _describe_state(job: JobRow) -> str:
 def _make_response(context: ServiceContext, job: JobRow, name: str) -> SnapshotResponse:
     path = context.catalogue.resolve_path(job.result or "") / name
     try:
-        return SnapshotResponse(path, _MEDIA_TYPES[path.suffix], f"{job.run_id}.{name}", inline=True)
+        return SnapshotResponse(path, "application/json", f"{job.run_id}.{name}", inline=True)
     except FileNotFoundError:
         what = f"{name} of run"
         raise make_not_found(what, f"{job.run_id}: {path} was removed; request the job again") from None

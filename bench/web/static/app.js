@@ -21,6 +21,7 @@ import { ServiceClock } from "./service_clock.js";
 import { StartForm } from "./start.js";
 import { TopBar } from "./topbar.js";
 import { offerUnits } from "./units.js";
+import { UploadDialog } from "./upload.js";
 
 /** Silence [s] after which the status is requested by REST; the agent publishes it four times a second. */
 const REQUEST_AFTER = 0.9;
@@ -52,6 +53,7 @@ const preparation = new Preparation();
 const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
+new UploadDialog({ onRun: (run) => runs.update(run) });
 new Readings(ring, byId("readings"), STRIP_SECONDS);
 const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: byId("strips") });
 

@@ -16,6 +16,7 @@ from bench.log.messages import (
     WIRE,
     Outcome,
     Phase,
+    list_sample_units,
     make_message_schema,
 )
 from bench.log.reader import Log, LoggedSegment, check_complete, check_profile, read_log
@@ -62,6 +63,7 @@ __all__ = [
     "convert_file_errors",
     "export_log",
     "is_closed",
+    "list_sample_units",
     "make_columns",
     "make_frames_message",
     "make_message_schema",

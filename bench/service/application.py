@@ -18,12 +18,12 @@ from bench.agent_protocol import AgentEvent, AgentStatus
 from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
+from bench.live import LiveBatch, LiveBroadcaster, serialise_message
 from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentLink, AgentMonitor
 from bench.service.context import ServiceContext
-from bench.service.live import LiveBroadcaster, serialise_message
 from bench.service.middleware import (
     BodyLimitMiddleware,
     RequestLogMiddleware,
@@ -138,7 +138,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
 
     publish = broadcaster.make_publisher(loop)
 
-    def on_message(topic: str, message: BaseModel) -> None:
+    def on_message(topic: str, message: BaseModel | LiveBatch) -> None:
         publish(topic, message)
         if isinstance(message, AgentEvent):
             registry.record_event(message)

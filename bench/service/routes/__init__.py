@@ -1,6 +1,7 @@
 """REST routes, one module for each resource."""
 
 from bench.service.routes import (
+    analyses,
     batches,
     continuation,
     exchange,
@@ -31,6 +32,7 @@ PROTECTED_ROUTERS = (
     batches.router,
     *exchange.ROUTERS,
     *recordings.ROUTERS,
+    *analyses.ROUTERS,
 )
 """Routers that need the token."""
 

@@ -1,5 +1,6 @@
 """The catalogue: runs, their logs, and the jobs on them, in a database."""
 
+from bench.catalogue.campaign_table import CampaignChange, CampaignTable
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
@@ -8,6 +9,8 @@ from bench.catalogue.log_summary import LogSummary, is_complete, read_log_summar
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
+    CampaignEventRow,
+    CampaignRow,
     EventRow,
     JobRow,
     JobState,
@@ -38,6 +41,10 @@ __all__ = [
     "SHIPPED_VERSION",
     "UNFINISHED_STATES",
     "BatchRow",
+    "CampaignChange",
+    "CampaignEventRow",
+    "CampaignRow",
+    "CampaignTable",
     "Catalogue",
     "ClaimedKey",
     "EventRow",

@@ -7,6 +7,7 @@ from typing import Any
 from sqlalchemy import Engine, func, select, tuple_, update
 from sqlalchemy.orm import sessionmaker
 
+from bench.catalogue.campaign_table import CampaignTable
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
 from bench.catalogue.planning import SHIPPED_VERSION, IdempotencyKeys, MethodStore, SpecimenStore
@@ -29,6 +30,7 @@ class Catalogue:
         self.job_queue = JobQueue(engine)
         self.idempotency_keys = IdempotencyKeys(engine)
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
+        self.campaigns = CampaignTable(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.

@@ -2,7 +2,18 @@
 
 from bench.jobs.engine import DaskEngine, JobEngine
 from bench.jobs.errors import JobError
-from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TREND_FILE, TWIN_FILE
+from bench.jobs.job_spec import (
+    DIAGNOSIS_FILE,
+    FIT_FILE,
+    PREDICTION_FILE,
+    REPORT_FILE,
+    SERIES_FILE,
+    TREND_FILE,
+    TWIN_FILE,
+    JobSpec,
+    compute_content_key,
+    get_result_folder,
+)
 from bench.jobs.job_view import (
     BatchRequest,
     DiagnosisSummary,
@@ -21,16 +32,21 @@ from bench.jobs.settings import (
     IdentifySettings,
     JobKind,
     JobSettings,
+    PredictSettings,
     TrendSettings,
+    get_kind,
     parse_settings,
 )
 from bench.jobs.tls import SchedulerLocation, get_tls_file, locate_scheduler
+from bench.jobs.work import JobCallbacks, execute_job
 from bench.jobs.worker import run_worker
 
 __all__ = [
     "DIAGNOSIS_FILE",
     "FIT_FILE",
+    "PREDICTION_FILE",
     "REPORT_FILE",
+    "SERIES_FILE",
     "TREND_FILE",
     "TWIN_FILE",
     "AnalysisKind",
@@ -40,17 +56,24 @@ __all__ = [
     "DiagnosisSummary",
     "IdentifySettings",
     "Job",
+    "JobCallbacks",
     "JobEngine",
     "JobError",
     "JobKind",
     "JobManager",
     "JobPage",
     "JobSettings",
+    "JobSpec",
+    "PredictSettings",
     "RetryRequest",
     "SchedulerLocation",
     "TrendSettings",
+    "compute_content_key",
+    "execute_job",
     "find_newest_done",
     "find_scheduler",
+    "get_kind",
+    "get_result_folder",
     "get_tls_file",
     "locate_scheduler",
     "make_diagnosis_summary",

@@ -65,7 +65,7 @@ class JobManager:
             The job, and whether it was queued now.
 
         Raises:
-            JobError: the model of a diagnosis does not exist, or an equal job is still being stopped.
+            JobError: the model of a job does not exist, or an equal job is still being stopped.
         """
         wanted = await asyncio.to_thread(self._make_job, run, settings)
         for job in await asyncio.to_thread(self._queue.find_repeatable, wanted.key):
@@ -152,15 +152,20 @@ class JobManager:
         """Return a new row for a job, which reads the newest fit of its run if it is a diagnosis."""
         if isinstance(settings, TrendSettings):
             return self._make_row(run, settings, {}, [one.log_sha256 or "" for one in self._get_runs(settings)])
-        if not isinstance(settings, DiagnoseSettings):
+        if isinstance(settings, IdentifySettings):
             return self._make_row(run, settings, {})
-        inputs = {"fit": self._queue.find_newest_done(run.id, "identify")}
+        inputs: dict[str, JobRow | None] = {}
+        if isinstance(settings, DiagnoseSettings):
+            inputs["fit"] = self._queue.find_newest_done(run.id, "identify")
         if settings.model is not None:
-            inputs["model"] = self._catalogue.get_job(settings.model)
-            model = inputs["model"]
-            if model is None or model.result is None or model.kind not in _MODEL_FILES:
-                raise JobError(f"there is no fit or diagnosis {settings.model}; give the id of a job that is done")
+            inputs["model"] = self._get_model(settings.model)
         return self._make_row(run, settings, {name: job for name, job in inputs.items() if job is not None})
+
+    def _get_model(self, job_id: str) -> JobRow:
+        job = self._catalogue.get_job(job_id)
+        if job is None or job.result is None or job.kind not in _MODEL_FILES:
+            raise JobError(f"there is no fit or diagnosis {job_id}; give the id of a job that is done")
+        return job
 
     def _get_runs(self, settings: TrendSettings) -> list[RunRow]:
         """Return the runs of a trend.

@@ -7,9 +7,9 @@ from pydantic import Field
 
 from bench.validation import FrozenModel
 
-AnalysisKind: TypeAlias = Literal["identify", "diagnose"]
+AnalysisKind: TypeAlias = Literal["identify", "diagnose", "predict"]
 """Kinds of jobs on a single run."""
-JobKind: TypeAlias = Literal["identify", "diagnose", "trend"]
+JobKind: TypeAlias = Literal["identify", "diagnose", "predict", "trend"]
 
 
 class IdentifySettings(FrozenModel):
@@ -68,10 +68,25 @@ class TrendSettings(FrozenModel):
         return []
 
 
-JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings | TrendSettings
+class PredictSettings(FrozenModel):
+    """Settings of a prediction: the simulation of a fit or twin on a run that it need not have read."""
+
+    model: str = Field(
+        min_length=1, max_length=64, description="id of a fit, or of a diagnosis for its twin; of any run"
+    )
+    free_offset: bool = Field(default=False, description="adapt a constant offset of the force to this run")
+    time_limit_s: float = Field(default=1800.0, gt=0, description="[s] after which the job fails")
+
+    def make_cli_arguments(self) -> list[str]:
+        """Return the options of `mrbench predict`."""
+        return ["--free", "offset"] if self.free_offset else []
+
+
+JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings | PredictSettings | TrendSettings
 _KINDS: dict[JobKind, type[JobSettings]] = {
     "identify": IdentifySettings,
     "diagnose": DiagnoseSettings,
+    "predict": PredictSettings,
     "trend": TrendSettings,
 }
 

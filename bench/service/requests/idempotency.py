@@ -87,8 +87,11 @@ async def _handle_with_key(handle: Handler, request: Request, key: str) -> Respo
     # Two simultaneous requests with one key: the second waits for the answer of the first.
     locks: WeakValueDictionary[str, asyncio.Lock] = context.key_locks
     lock = locks.setdefault(key, asyncio.Lock())
-    async with lock:
-        return await _handle_alone(handle, request, key, context.catalogue.idempotency_keys)
+    try:
+        async with lock:
+            return await _handle_alone(handle, request, key, context.catalogue.idempotency_keys)
+    finally:
+        await request.close()  # the files of a form that no handler has read
 
 
 async def _handle_alone(handle: Handler, request: Request, key: str, keys: IdempotencyKeys) -> Response:

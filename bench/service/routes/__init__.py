@@ -1,6 +1,7 @@
 """REST routes, one module for each resource."""
 
 from bench.service.routes import (
+    analyses,
     batches,
     continuation,
     exchange,
@@ -29,6 +30,7 @@ PROTECTED_ROUTERS = (
     batches.router,
     *exchange.ROUTERS,
     *recordings.ROUTERS,
+    *analyses.ROUTERS,
 )
 """Routers that need the token."""
 

@@ -232,7 +232,7 @@ class BenchChannel(Message):
 
 
 class BenchDescription(Message):
-    """What the configuration says about the bench."""
+    """Description of the bench in its configuration."""
 
     name: str
     specimen: str = Field(description="mounted damper, used if a run does not name one; empty without one")

@@ -7,6 +7,7 @@ BenchError
 │   └── InterlockError     an interlock refused a command
 ├── AgentUnreachableError  the rig agent does not reply
 ├── SecretFileError        a file with a secret is missing, or other users may read it
+├── LiveDataError          a live batch cannot be read
 ├── LogError               a log cannot be read, written or repaired
 ├── RecordingError         a recording cannot be imported
 └── ReportError            a report or a demo cannot be made
@@ -24,6 +25,10 @@ class BenchError(Exception):
 
 class MethodError(BenchError):
     """A method cannot be compiled or exceeds its own limits."""
+
+
+class LiveDataError(BenchError):
+    """A live batch or its list of channels cannot be read."""
 
 
 class RunError(BenchError):

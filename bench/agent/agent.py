@@ -30,14 +30,15 @@ from bench.agent_protocol import (
     Reply,
     RunCommand,
     RunStatus,
-    Samples,
 )
 from bench.config import BenchConfig, compute_identity
 from bench.disk import SpaceMonitor
 from bench.endings import SHUT_DOWN_REASON, STOP_REASON, RunEnding
 from bench.errors import BenchError, LogError
+from bench.live import BatchMaker, LiveBatch
+from bench.log import list_sample_units
 from bench.methods import NO_SEGMENT
-from bench.recorder import RecordingThread, find_force_rate
+from bench.recorder import RecordingThread
 from bench.rig import (
     PRIORITY_STEP,
     Acquisition,
@@ -54,7 +55,7 @@ from bench.safety import Action, Interlocks
 from bench.sequencer import move_rod
 from drivers import DriverError, Frame
 
-MessageSink: TypeAlias = Callable[[AgentStatus | Samples | AgentEvent], None]
+MessageSink: TypeAlias = Callable[[AgentStatus | LiveBatch | AgentEvent], None]
 
 _STATUS_PERIOD = 0.25
 """[s] Longest interval between two published statuses."""
@@ -103,8 +104,9 @@ class Agent:
             self._rig, self._interlocks, self._clock, self._acquisition.maps, self._report_event, self._stop_moving
         )
         aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
+        batch_maker = BatchMaker(list_sample_units(self._rig.drive_unit))
         self._recording_thread = RecordingThread(
-            aligner, find_force_rate(config), self._clock, publish, self._on_cycle, self._on_log_failed
+            aligner, batch_maker, self._clock, publish, self._on_cycle, self._on_log_failed
         )
         self._executor = RunExecutor(
             config, source, self._rig, self._interlocks, self._supervisor, self._acquisition,

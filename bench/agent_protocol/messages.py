@@ -1,8 +1,8 @@
-"""Messages between the rig agent and its clients: commands, replies and publications, all as JSON.
+"""Messages between the rig agent and its clients: commands, replies and publications, as JSON except samples.
 
 Each command is sent to the agent's request socket and is answered by one `Reply`. The publishing socket sends an
-`AgentStatus` at every change and at least four times a second (topic ``status``), bench samples in batches
-(``samples``) and events (``event``).
+`AgentStatus` at every change and at least four times a second (topic ``status``), events (``event``), and all
+bench samples in live batches (``samples``, see `bench.live`).
 """
 
 from typing import Annotated, Any, Literal, Self, TypeAlias
@@ -195,17 +195,6 @@ class AgentStatus(Message):
     notice: str = Field(
         default="", description="what a person has to do so that the agent has the present bench.toml; else empty"
     )
-
-
-class Samples(Message):
-    """Batch of bench samples for live views: one value per sample in each list, SI units."""
-
-    time_ns: list[int] = Field(description="bench clock")
-    values: dict[str, list[float | None]] = Field(
-        description="by field of `/bench/sample`; null for a missing value"
-    )
-    segment: str = Field(default="", description="segment of the newest sample; empty between segments")
-    utc_s: float = Field(default=0.0, description="UTC of the newest sample [s since 1970]")
 
 
 class AgentEvent(Message):

@@ -5,7 +5,7 @@ from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
 from bench.catalogue.job_queue import REPEATABLE_STATES, JobFilter, JobQueue
-from bench.catalogue.log_summary import is_complete
+from bench.catalogue.log_summary import LogSummary, is_complete, read_log_summary
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
@@ -42,6 +42,7 @@ __all__ = [
     "JobRow",
     "JobState",
     "LogIntegrity",
+    "LogSummary",
     "NoteKind",
     "NoteRow",
     "RunFilter",
@@ -57,6 +58,7 @@ __all__ = [
     "make_sqlite_url",
     "move_to_trash",
     "open_database",
+    "read_log_summary",
     "read_plan",
     "restore_from_trash",
     "scan_logs",

@@ -1,5 +1,6 @@
 """A bench, as its service shows it."""
 
+import math
 import uuid
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -7,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from bench.client.live import LiveSamples, iterate_live
 from bench.client.run import Run, RunState, parse_run_state
 from bench.client.session import Session
 
@@ -84,6 +86,17 @@ class Bench:
         """
         request = {"method": method, "specimen": specimen, "operator": operator, "resume_after": resume_after}
         return self.run(str(self._session.post("/runs", request, key=uuid.uuid4().hex)["id"]))
+
+    def live(self, rate_hz: float = math.inf) -> Iterator[LiveSamples]:
+        """Yield live samples of all channels as arrays with units, until the caller stops.
+
+        Args:
+            rate_hz: largest rate of the samples [Hz]; a faster bench is decimated, which keeps every extreme.
+
+        Raises:
+            ClientError: the service refuses, cannot be reached or falls silent.
+        """
+        return iterate_live(self._session, rate_hz)
 
     def stop(self) -> None:
         """Stop a run or a setup step in a controlled way; harmless when nothing moves.

@@ -3,13 +3,17 @@
 import json
 import shutil
 import ssl
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from http.client import HTTPException
 from pathlib import Path
 from typing import Any
 from urllib.error import HTTPError, URLError
 from urllib.parse import quote, urldefrag, urlencode
 from urllib.request import Request, urlopen
+
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import ClientConnection, connect
 
 from bench.client.errors import ClientError
 from bench.log import write_atomically
@@ -94,6 +98,27 @@ class Session:
             if announced is not None and received != int(announced):
                 raise ClientError(f"{to}: {received} of {announced} bytes of {path} arrived; repeat the download")
         return to
+
+    @contextmanager
+    def connect(self, path: str, wishes: Mapping[str, Any]) -> Iterator[ClientConnection]:
+        """Open a websocket for the duration of a block, and sign in with its first message.
+
+        Args:
+            path: path below ``/api/v1``.
+            wishes: further fields of the first message.
+
+        Raises:
+            ClientError: the service cannot be reached, or the connection ends.
+        """
+        address = f"ws{self._base.removeprefix('http')}{path}"
+        tls = self._tls if address.startswith("wss:") else None
+        try:
+            with connect(address, ssl=tls, max_size=None) as socket:
+                socket.send(json.dumps({"token": self._token, **wishes}))
+                yield socket
+        except (OSError, WebSocketException) as error:
+            reason = str(error) or "it is silent"
+            raise ClientError(f"the service at {self._base} does not reply to {path}: {reason}") from error
 
     def _request(
         self, method: str, path: str, content: bytes | None = None, headers: Mapping[str, str] | None = None

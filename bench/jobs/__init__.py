@@ -5,7 +5,9 @@ from bench.jobs.errors import JobError
 from bench.jobs.job_spec import (
     DIAGNOSIS_FILE,
     FIT_FILE,
+    PREDICTION_FILE,
     REPORT_FILE,
+    SERIES_FILE,
     TWIN_FILE,
     JobSpec,
     compute_content_key,
@@ -23,7 +25,15 @@ from bench.jobs.job_view import (
 )
 from bench.jobs.manager import JobManager
 from bench.jobs.scheduler import find_scheduler, run_scheduler, start_scheduler
-from bench.jobs.settings import DiagnoseSettings, IdentifySettings, JobKind, JobSettings, get_kind, parse_settings
+from bench.jobs.settings import (
+    DiagnoseSettings,
+    IdentifySettings,
+    JobKind,
+    JobSettings,
+    PredictSettings,
+    get_kind,
+    parse_settings,
+)
 from bench.jobs.tls import SchedulerLocation, get_tls_file, locate_scheduler
 from bench.jobs.work import JobCallbacks, execute_job
 from bench.jobs.worker import run_worker
@@ -31,7 +41,9 @@ from bench.jobs.worker import run_worker
 __all__ = [
     "DIAGNOSIS_FILE",
     "FIT_FILE",
+    "PREDICTION_FILE",
     "REPORT_FILE",
+    "SERIES_FILE",
     "TWIN_FILE",
     "BatchRequest",
     "DaskEngine",
@@ -47,6 +59,7 @@ __all__ = [
     "JobPage",
     "JobSettings",
     "JobSpec",
+    "PredictSettings",
     "RetryRequest",
     "SchedulerLocation",
     "compute_content_key",

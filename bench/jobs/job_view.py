@@ -36,11 +36,11 @@ class Retry(FrozenModel):
 
 
 class Job(FrozenModel):
-    """One identification or diagnosis of a run."""
+    """One identification, diagnosis or prediction of a run."""
 
-    id: str = Field(description="also the id of its fit or diagnosis")
+    id: str = Field(description="also the id of its fit, diagnosis or prediction")
     run: str = Field(description="id of the run")
-    kind: str = Field(description="`identify` or `diagnose`")
+    kind: str = Field(description="`identify`, `diagnose` or `predict`")
     state: JobState
     stage: str = Field(description="present stage, such as `refine`; the last one of a job that has ended")
     fraction: float | None = Field(
@@ -58,7 +58,9 @@ class Job(FrozenModel):
     created: datetime = Field(description="UTC")
     started: datetime | None = Field(description="UTC of the last start by a worker")
     finished: datetime | None = Field(description="UTC")
-    rmse_n: float | None = Field(description="force error on the fitted samples [N]; null without a fit")
+    rmse_n: float | None = Field(
+        description="force error of a fit on its samples, or of a prediction [N]; else null"
+    )
     noise_floor_n: float | None = Field(description="noise floor of the recorded force [N]; null until done")
     result: str = Field(description="of a fit: `converged`, or the reason why not; empty without one")
     diagnosis: DiagnosisSummary | None = Field(description="answer of a diagnosis; null until done")

@@ -57,7 +57,7 @@ class JobManager:
             The job, and whether it was queued now.
 
         Raises:
-            JobError: the model of a diagnosis does not exist, or an equal job is still being stopped.
+            JobError: the model of a job does not exist, or an equal job is still being stopped.
         """
         wanted = await asyncio.to_thread(self._make_job, run, settings)
         for job in await asyncio.to_thread(self._queue.find_repeatable, wanted.key):
@@ -142,14 +142,20 @@ class JobManager:
 
     def _make_job(self, run: RunRow, settings: JobSettings) -> JobRow:
         """Return a new row for a job, which reads the newest fit of its run if it is a diagnosis."""
-        if not isinstance(settings, DiagnoseSettings):
+        if isinstance(settings, IdentifySettings):
             return self._make_row(run, settings, {})
-        inputs = {"fit": self._queue.find_newest_done(run.id, "identify")}
+        inputs: dict[str, JobRow | None] = {}
+        if isinstance(settings, DiagnoseSettings):
+            inputs["fit"] = self._queue.find_newest_done(run.id, "identify")
         if settings.model is not None:
-            inputs["model"] = self._catalogue.get_job(settings.model)
-            if inputs["model"] is None or inputs["model"].result is None:
-                raise JobError(f"there is no fit or diagnosis {settings.model}; give the id of a job that is done")
+            inputs["model"] = self._get_model(settings.model)
         return self._make_row(run, settings, {name: job for name, job in inputs.items() if job is not None})
+
+    def _get_model(self, job_id: str) -> JobRow:
+        job = self._catalogue.get_job(job_id)
+        if job is None or job.result is None or job.kind not in _MODEL_FILES:
+            raise JobError(f"there is no fit or diagnosis {job_id}; give the id of a job that is done")
+        return job
 
     def _make_row(self, run: RunRow, settings: JobSettings, inputs: dict[str, JobRow]) -> JobRow:
         keys = [f"{name}:{job.key}" for name, job in sorted(inputs.items())]

@@ -1,4 +1,4 @@
-"""Settings of the two kinds of jobs, and the options of the commands that they stand for."""
+"""Settings of the kinds of jobs, and the options of the commands that they stand for."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypeAlias
@@ -7,7 +7,7 @@ from pydantic import Field
 
 from bench.validation import FrozenModel
 
-JobKind: TypeAlias = Literal["identify", "diagnose"]
+JobKind: TypeAlias = Literal["identify", "diagnose", "predict"]
 
 
 class IdentifySettings(FrozenModel):
@@ -55,11 +55,32 @@ class DiagnoseSettings(FrozenModel):
         return [*_make_hold_out_arguments(self.hold_out, self.hold_out_after), *chosen]
 
 
-JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings
+class PredictSettings(FrozenModel):
+    """Settings of a prediction: the simulation of a fit or twin on a run that it need not have read."""
+
+    model: str = Field(
+        min_length=1, max_length=64, description="id of a fit, or of a diagnosis for its twin; of any run"
+    )
+    free_offset: bool = Field(default=False, description="adapt a constant offset of the force to this run")
+    time_limit_s: float = Field(default=1800.0, gt=0, description="[s] after which the job fails")
+
+    def make_cli_arguments(self) -> list[str]:
+        """Return the options of `mrbench predict`."""
+        return ["--free", "offset"] if self.free_offset else []
+
+
+JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings | PredictSettings
+_MODELS: dict[str, type[JobSettings]] = {
+    "identify": IdentifySettings,
+    "diagnose": DiagnoseSettings,
+    "predict": PredictSettings,
+}
 
 
 def get_kind(settings: JobSettings) -> JobKind:
     """Return the kind of job that settings belong to."""
+    if isinstance(settings, PredictSettings):
+        return "predict"
     return "diagnose" if isinstance(settings, DiagnoseSettings) else "identify"
 
 
@@ -69,8 +90,7 @@ def parse_settings(kind: str, document: Mapping[str, Any]) -> JobSettings:
     Raises:
         ValidationError: the document is not one of this kind.
     """
-    model: type[IdentifySettings | DiagnoseSettings] = IdentifySettings if kind == "identify" else DiagnoseSettings
-    return model.model_validate(document)
+    return _MODELS[kind].model_validate(document)
 
 
 def _make_hold_out_arguments(patterns: Sequence[str], after: float | None) -> list[str]:

@@ -2,8 +2,10 @@
 
 from bench.replay.compare import replay_frames
 from bench.replay.player import parse_speed, play_log
+from bench.replay.selection import Selection
 
 __all__ = [
+    "Selection",
     "parse_speed",
     "play_log",
     "replay_frames",

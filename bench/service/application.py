@@ -18,12 +18,12 @@ from bench.agent_protocol import AgentEvent, AgentStatus
 from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
+from bench.live import LiveBatch, LiveBroadcaster, serialise_message
 from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentLink, AgentMonitor
 from bench.service.context import ServiceContext
-from bench.service.live import LiveBroadcaster, serialise_message
 from bench.service.middleware import (
     BodyLimitMiddleware,
     RequestLogMiddleware,
@@ -33,6 +33,7 @@ from bench.service.middleware import (
 from bench.service.query_check import refuse_unknown_parameters
 from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS
 from bench.service.run_registry import RunRegistry
+from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers
 
 API = "/api/v1"
 PUBLIC_PATHS = (f"{API}/health", f"{API}/openapi.json")
@@ -77,7 +78,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
     # The middleware that is added last sees a request first.
-    app.add_middleware(BodyLimitMiddleware)
+    app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)
     app.add_middleware(RequestLogMiddleware)
     app.add_middleware(SecurityHeadersMiddleware, api="/api/")
@@ -106,6 +107,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
     database = await asyncio.to_thread(
         open_database, settings.database or make_sqlite_url(settings.data / CATALOGUE_FILE)
     )
+    await asyncio.to_thread(remove_leftovers, settings.data)
     async with AsyncExitStack() as stack:
         catalogue = Catalogue(database, settings.data)
         stack.callback(catalogue.close)
@@ -136,7 +138,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
 
     publish = broadcaster.make_publisher(loop)
 
-    def on_message(topic: str, message: BaseModel) -> None:
+    def on_message(topic: str, message: BaseModel | LiveBatch) -> None:
         publish(topic, message)
         if isinstance(message, AgentEvent):
             registry.record_event(message)

@@ -10,10 +10,10 @@ from starlette.requests import HTTPConnection
 from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
+from bench.live import LiveBroadcaster
 from bench.samples import SampleStore
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentMonitor
-from bench.service.live import LiveBroadcaster
 from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
 from bench.service.views import Run, make_run_view

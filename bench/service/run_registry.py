@@ -102,6 +102,29 @@ class RunRegistry:
                 failures.clear()
             await asyncio.sleep(SCAN_PERIOD)
 
+    async def adopt(self, found: Path, log: Path) -> RunRow | None:
+        """Move a log from elsewhere to its place in the data folder, and treat it as that of a recorded run.
+
+        Args:
+            found: complete file on the same disk.
+            log: its place in the data folder, where no file exists.
+
+        Returns:
+            The new run; None if the catalogue has it already, and nothing was moved then.
+        """
+        async with self.lock:  # otherwise a scan could find the log between both steps
+            row = await asyncio.to_thread(self._move, found, log)
+            if row is not None:
+                await self._handle_change(row, is_wanted=True)
+        return row
+
+    def _move(self, found: Path, log: Path) -> RunRow | None:
+        found.rename(log)
+        row = catalogue_log(self._catalogue, log)
+        if row is None:
+            log.rename(found)
+        return row
+
     async def _add_run(self, run: RunStatus) -> RunRow:
         row = await asyncio.to_thread(self._catalogue.get_run, run.id)
         if row is None:
@@ -126,10 +149,13 @@ class RunRegistry:
         # Without a usable log, or with one on the agent's machine, the report is everything.
         return ended or self._catalogue.update_run(run.id, state="ended", outcome=run.outcome)
 
-    async def _handle_change(self, row: RunRow) -> None:
+    async def _handle_change(self, row: RunRow, *, is_wanted: bool = False) -> None:
+        """Publish a changed run and identify it if it is complete; an import only if a person has asked for it."""
         _LOG.info("run_" + row.state, extra={"run": row.id, "outcome": row.outcome, "reason": row.reason})
         await self._on_changed(row)
-        is_complete_run = row.source == "run" and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
+        is_complete_run = (
+            (is_wanted or row.source == "run") and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
+        )
         if (
             is_complete_run
             and row.integrity not in DAMAGED

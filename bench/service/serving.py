@@ -205,6 +205,7 @@ def _run_server(app: object, listener: socket.socket) -> None:
         server_header=False,
         timeout_graceful_shutdown=_SHUTDOWN_TIMEOUT,
         ws_max_size=65536,
+        ws_per_message_deflate=False,  # samples hardly shrink, and each listener would cost a compression
     )
     server = _Server(settings)
     server.run(sockets=[listener])

@@ -156,6 +156,8 @@ def test_a_decimated_trace_keeps_all_extremes_and_shows_gaps(seen):
         assert max(near) >= 2 * max(given[first : first + 20]) - 1e-6
         assert min(near) <= 2 * min(given[first : first + 20]) + 1e-6
     assert thinned["recent"]["high"] == 50
+    assert thinned["afterRepetition"] == len(given)
+    assert thinned["shown"] == [15_000, pytest.approx(1.0, abs=1e-3)]
     assert thinned["afterRestart"] == 1
 
 

@@ -1,8 +1,10 @@
 """REST routes, one module for each resource."""
 
 from bench.service.routes import (
+    analyses,
     batches,
     continuation,
+    exchange,
     integrity,
     jobs,
     live,
@@ -28,7 +30,9 @@ PROTECTED_ROUTERS = (
     results.router,
     jobs.router,
     batches.router,
+    *exchange.ROUTERS,
     *recordings.ROUTERS,
+    *analyses.ROUTERS,
 )
 """Routers that need the token."""
 

@@ -59,6 +59,23 @@ export async function file(path) {
   return { blob: await response.blob(), name: match?.[1] ?? path.replaceAll("/", "-") };
 }
 
+/** Sends a form with files; `onProgress` receives the sent share. A plain fetch reports no progress. */
+export function upload(path, form, onProgress) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open("POST", new URL(path, BASE));
+    request.setRequestHeader("Authorization", `Bearer ${token() ?? ""}`);
+    request.responseType = "json";
+    request.upload.addEventListener("progress", ({ loaded, total }) => onProgress(total ? loaded / total : 0));
+    request.addEventListener("error", () => reject(new Problem(0, "No answer", `The service at ${BASE.host} cannot be reached.`)));
+    request.addEventListener("load", () => {
+      if (request.status < 300) resolve(request.response);
+      else reject(makeProblem(request.status, request.statusText, request.response ?? {}));
+    });
+    request.send(form);
+  });
+}
+
 async function call(method, path, body, timeout) {
   const response = await send(method, path, body, timeout);
   return response.status === 204 ? null : response.json();
@@ -86,11 +103,13 @@ function describeFailure(error, timeout) {
 }
 
 async function readProblem(response) {
-  if (response.status === 401) {
+  return makeProblem(response.status, response.statusText, await response.json().catch(() => ({})));
+}
+
+function makeProblem(status, phrase, { title, detail }) {
+  if (status === 401) {
     document.dispatchEvent(new Event("unauthorised")); // one place asks for another token
     return new Problem(401, "Not signed in", "The service does not accept this token.");
   }
-  const { title, detail } = await response.json().catch(() => ({}));
-  const text = typeof detail === "string" ? detail : "";
-  return new Problem(response.status, title ?? `${response.status} ${response.statusText}`, text);
+  return new Problem(status, title ?? `${status} ${phrase}`, typeof detail === "string" ? detail : "");
 }

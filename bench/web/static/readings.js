@@ -11,14 +11,14 @@ const PERIOD_MS = 200;
 
 export class Readings {
   constructor(ring, place, seconds) {
-    Object.assign(this, { ring, seconds, written: -1 });
+    Object.assign(this, { ring, seconds, shown: -1 });
     this.rows = SHOWN.map((name) => row(QUANTITIES[name], place));
     setInterval(() => this.write(), PERIOD_MS);
   }
 
   write() {
-    if (this.written === this.ring.written) return;
-    this.written = this.ring.written;
+    if (this.shown === this.ring.end) return;
+    this.shown = this.ring.end;
     for (const { quantity, number, unit, extremes } of this.rows) {
       const { last, low, high } = this.ring.recent(quantity.field, this.seconds, FRESH_S);
       const shown = (value) => fixed(value * quantity.scale, quantity.digits);

@@ -5,7 +5,7 @@ import { makeDriveTable, makeParameterTable } from "./fit_tables.js";
 import { byId, duration, element, instant, write } from "./format.js";
 import { makeReport } from "./report.js";
 import { RunActions } from "./run_actions.js";
-import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted } from "./run_facts.js";
+import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted, mayReport } from "./run_facts.js";
 import { runAddress } from "./router.js";
 
 export class RunView {
@@ -79,7 +79,7 @@ export class RunView {
     };
     const list = element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, content]) =>
       element("div", {}, element("dt", {}, name), element("dd", {}, ...content))));
-    const buttons = element("p", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), ...this.actions.more(run));
+    const buttons = element("p", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), ...this.actions.more(run), ...this.actions.exports(run));
     this.facts.replaceChildren(element("h2", {}, "Facts"), list, buttons, this.actions.answer(run));
     if (focused) this.facts.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
   }
@@ -88,12 +88,13 @@ export class RunView {
   async load() {
     const { run, part } = this;
     if (part !== "report" && isFitted(run)) await this.loadFit(run);
-    if (!hasReport(run)) {
-      this.report.replaceChildren(element("h2", {}, "Report"), element("p", { className: "soft" }, "A report is made with the first fit."));
+    if (!(part === "report" ? mayReport(run) : hasReport(run))) {
+      const text = mayReport(run) ? "Report alone shows the recording; a report with a fit is made by the identification." : "A report needs a complete log.";
+      this.report.replaceChildren(element("h2", {}, "Report"), element("p", { className: "soft" }, text));
       return;
     }
     const made = await makeReport(run);
-    if (run.id === this.id) this.report.replaceChildren(element("h2", {}, "Report: measured over simulated"), ...made);
+    if (run.id === this.id) this.report.replaceChildren(element("h2", {}, isFitted(run) ? "Report: measured over simulated" : "Report on the recording"), ...made);
   }
 
   async loadFit(run) {

@@ -2,10 +2,14 @@
 
 import { file, get, post } from "./api.js";
 import { element, instant } from "./format.js";
-import { canResume, hasEnded, hasReport, isFitted, isUnfinished, mayRetry } from "./run_facts.js";
+import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
 import { runAddress } from "./router.js";
 
 const encode = encodeURIComponent;
+const EXPORTS = [
+  ["CSV", "export?format=csv"], ["Parquet", "export?format=parquet"], ["MAT", "export?format=mat"],
+  ["PDF report", "report?format=pdf"], ["XLSX report", "report?format=xlsx"],
+];
 
 export class RunActions {
   /** Takes functions that receive a changed run, and the id of a run with a new note. */
@@ -21,12 +25,17 @@ export class RunActions {
 
   /** Links and buttons for the files of a run. */
   files(run) {
-    const report = hasReport(run)
+    const report = mayReport(run)
       ? element("a", { className: "button", href: runAddress(run.id, "report"), "aria-label": `Report of ${name(run)}` }, "Report")
       : null;
     const made = [this.button(run, "log", "Log", () => this.save(run, "log"))];
     if (isFitted(run)) made.push(this.button(run, "fit", "Fit", () => this.save(run, "fit")));
     return report ? [report, ...made] : made;
+  }
+
+  /** Buttons that save the samples and the report of a complete log in the formats of other tools. */
+  exports(run) {
+    return run.log_sha256 ? EXPORTS.map(([text, part]) => this.button(run, part, text, () => this.save(run, part))) : [];
   }
 
   /** Button that starts, cancels or repairs, by the state of the run. */
@@ -61,8 +70,9 @@ export class RunActions {
     this.onNote(run.id);
   }
 
-  /** Saves a file of a run. */
+  /** Saves a file of a run; some are made at their request. */
   async save(run, part) {
+    this.note(run, "The file is fetched …");
     try {
       const { blob, name: fileName } = await file(`runs/${encode(run.id)}/${part}`);
       const address = URL.createObjectURL(blob);
@@ -70,7 +80,7 @@ export class RunActions {
       setTimeout(() => URL.revokeObjectURL(address), 60_000);
       this.note(run, `${fileName} was saved.`);
     } catch (problem) {
-      this.note(run, problem.after(`No ${part}`));
+      this.note(run, problem.after("Not saved"));
     }
   }
 

@@ -59,18 +59,18 @@ class RunFile(View):
     """One file of a run."""
 
     name: str
-    kind: str = Field(description="log, fit, diagnosis, twin, prediction or report")
+    kind: str = Field(description="log, fit, diagnosis, twin, export or report")
     path: str = Field(description="address below the service that returns it")
     media_type: str
-    size: int = Field(description="[bytes]")
-    job: str | None = Field(description="id of the job that made it; null for the log")
-    made: datetime | None = Field(description="UTC at which the job ended; null for the log")
+    size: int | None = Field(default=None, description="[bytes]; null for a file that is made at its request")
+    job: str | None = Field(default=None, description="id of the job that made it; null without one")
+    made: datetime | None = Field(default=None, description="UTC at which the job ended; null without one")
 
 
 class RunFileList(View):
     """Files of a run."""
 
-    items: tuple[RunFile, ...] = Field(description="the log first, then the newest results first")
+    items: tuple[RunFile, ...] = Field(description="log, newest results, exports, reports")
 
 
 class NoteRequest(View):

@@ -5,13 +5,14 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from bench.agent_protocol import (
     AgentStatus,
     Message,
     PauseCommand,
     RunCommand,
     RunStatus,
-    Samples,
     StatusCommand,
 )
 from bench.campaigns.benches.recovery import make_end_report, recover_execution
@@ -27,7 +28,8 @@ from bench.campaigns.engine import (
 )
 from bench.campaigns.store import StoredCampaign
 from bench.catalogue import Catalogue
-from bench.errors import RunError
+from bench.errors import BenchError, RunError
+from bench.live import LiveBatch
 
 START_TIMEOUT = 10.0
 """[s] Time limit from an accepted command to the run in the agent's status."""
@@ -40,9 +42,12 @@ _START_PERIOD = 0.1
 class AgentConnection(Protocol):
     """Connection to the agent, such as the monitor of the service."""
 
-    @property
-    def latest_status(self) -> AgentStatus | None:
-        """Latest status, or None if the agent does not answer."""
+    def get_status(self) -> AgentStatus:
+        """Return the current status.
+
+        Raises:
+            BenchError: the agent does not answer.
+        """
 
     def send_command(self, command: Message, timeout: float = 5.0) -> AgentStatus:
         """Send a command and return the status after it.
@@ -61,11 +66,12 @@ class Thermometer:
         self._value: float | None = None
         self._read_at = float("-inf")
 
-    def take(self, samples: Samples) -> None:
+    def take(self, batch: LiveBatch) -> None:
         """Take the newest temperature of a batch, if it has one."""
-        shown = [value for value in samples.values.get("temperature", ()) if value is not None]
-        if shown:
-            self._value, self._read_at = shown[-1], self._clock()
+        for channel, values in zip(batch.channels, batch.values, strict=True):
+            shown = values[np.isfinite(values)] if channel.name == "temperature" else values[:0]
+            if shown.size:
+                self._value, self._read_at = float(shown[-1]), self._clock()
 
     def read(self) -> float | None:
         """Return the temperature [°C]; None without a reading within `READING_LIFETIME`."""
@@ -101,7 +107,7 @@ class AgentBench:
         Raises:
             CampaignError: the agent does not answer, or has no thermometer that works.
         """
-        status = self._agent.latest_status
+        status = self._get_status()
         if status is None:
             raise CampaignError("the rig agent does not answer; start it, then the campaign")
         has_one = any(one.driver == "thermometer" and one.connected for one in status.instruments)
@@ -125,7 +131,7 @@ class AgentBench:
             report=self._report(campaign) if campaign.state.is_stroking else None,
             temperature_c=self._thermometer.read(),
             results=self._read_results(campaign),
-            obstacle=_find_obstacle(self._agent.latest_status),
+            obstacle=_find_obstacle(self._get_status()),
         )
 
     def start(self, campaign: StoredCampaign) -> None:
@@ -164,12 +170,19 @@ class AgentBench:
         """Let time pass until the next observation."""
         self._wait()
 
+    def _get_status(self) -> AgentStatus | None:
+        """Return the status of the agent, requested if the latest is old; None if it does not answer."""
+        try:
+            return self._agent.get_status()
+        except BenchError:
+            return None
+
     def _report(self, campaign: StoredCampaign) -> ExecutionReport | None:
         """Return the state of the active run; None while it is not known."""
         active = campaign.state.active
         if active is None or active.execution is None:
             return None
-        status = self._agent.latest_status
+        status = self._get_status()
         if status is None:  # it may record meanwhile
             return None
         path = self._catalogue.folder / active.execution.log

@@ -172,9 +172,8 @@ def parse_campaign(content: Any, origin: str) -> Campaign:
         return Campaign.model_validate(content)
     except ValidationError as error:
         first, message = get_first_error(error)
-        raise CampaignDocumentError(
-            f"{origin} is not a campaign: {_format_place(first['loc'])}: {message}"
-        ) from None
+        place = _format_place(first["loc"])
+        raise CampaignDocumentError(f"{origin} is not a campaign: {place}: {message}") from None
 
 
 _VARIANTS = ("list", "of_matrix", *(kind.__name__ for kind in (IntervalGoal, DiagnosisGoal)))

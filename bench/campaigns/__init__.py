@@ -2,6 +2,7 @@
 
 from bench.campaigns.benches import AgentBench, CampaignBench, PlantBench, Thermometer
 from bench.campaigns.document import (
+    WARM_UP_METHOD,
     AnyStep,
     Campaign,
     CampaignDocumentError,
@@ -36,6 +37,7 @@ from bench.campaigns.store import CampaignStore, StoredCampaign
 from bench.campaigns.view import CampaignView, ItemView, format_view, make_view
 
 __all__ = [
+    "WARM_UP_METHOD",
     "AgentBench",
     "AnyStep",
     "Campaign",

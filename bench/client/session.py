@@ -76,9 +76,20 @@ class Session:
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
+        return self._send("POST", path, content, key)
+
+    def patch(self, path: str, content: Mapping[str, Any]) -> Any:
+        """Return the reply to PATCH, decoded from JSON.
+
+        Raises:
+            ClientError: the service refuses or cannot be reached.
+        """
+        return self._send("PATCH", path, content)
+
+    def _send(self, method: str, path: str, content: Mapping[str, Any] | None, key: str | None = None) -> Any:
         headers = {} if key is None else {"Idempotency-Key": key}
         body = b"" if content is None else json.dumps(content).encode()
-        with self._request("POST", path, body, headers) as reply:
+        with self._request(method, path, body, headers) as reply:
             return _decode(path, reply.read())
 
     def download(self, path: str, to: Path) -> Path:

@@ -21,6 +21,15 @@ from bench.catalogue.models import (
     RunRow,
     RunState,
 )
+from bench.catalogue.planning import (
+    SHIPPED_VERSION,
+    ClaimedKey,
+    IdempotencyKeys,
+    MethodRow,
+    MethodStore,
+    Specimen,
+    SpecimenStore,
+)
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
@@ -29,6 +38,7 @@ from bench.catalogue.trash import move_to_trash, restore_from_trash
 __all__ = [
     "CATALOGUE_FILE",
     "REPEATABLE_STATES",
+    "SHIPPED_VERSION",
     "UNFINISHED_STATES",
     "BatchRow",
     "CampaignChange",
@@ -36,13 +46,17 @@ __all__ = [
     "CampaignRow",
     "CampaignTable",
     "Catalogue",
+    "ClaimedKey",
     "EventRow",
+    "IdempotencyKeys",
     "JobFilter",
     "JobQueue",
     "JobRow",
     "JobState",
     "LogIntegrity",
     "LogSummary",
+    "MethodRow",
+    "MethodStore",
     "NoteKind",
     "NoteRow",
     "RunFilter",
@@ -50,6 +64,8 @@ __all__ = [
     "RunPlan",
     "RunRow",
     "RunState",
+    "Specimen",
+    "SpecimenStore",
     "catalogue_log",
     "check_all",
     "check_integrity",

@@ -56,6 +56,10 @@ class RunRow(Base):
 
     id: Mapped[str] = mapped_column(Text, primary_key=True)
     method: Mapped[str] = mapped_column(Text)
+    method_version: Mapped[int | None] = mapped_column(default=None)
+    """Version of the method; None if its content was not stored under its name."""
+    method_sha256: Mapped[str | None] = mapped_column(Text, default=None)
+    """Hash of the content of the method; None in runs of older versions and in imports."""
     specimen: Mapped[str] = mapped_column(Text, default="")
     operator: Mapped[str] = mapped_column(Text, default="")
     source: Mapped[str] = mapped_column(Text, default="run")

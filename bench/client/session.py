@@ -71,12 +71,22 @@ class Session:
         Args:
             path: path below ``/api/v1``.
             content: body of the request.
-            key: idempotency key; a repeated request with the same key has no further effect.
+            key: idempotency key; a repeated request with the same key has no further effect, and one whose
+                answer was lost is repeated here, once.
 
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        return self._send("POST", path, content, key)
+        body = b"" if content is None else json.dumps(content).encode()
+        if key is None:
+            return self._post(path, body, {})
+        headers = {"Idempotency-Key": key}
+        try:
+            return self._post(path, body, headers)
+        except ClientError as error:
+            if error.status is not None:
+                raise
+            return self._post(path, body, headers)
 
     def patch(self, path: str, content: Mapping[str, Any]) -> Any:
         """Return the reply to PATCH, decoded from JSON.
@@ -84,12 +94,7 @@ class Session:
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        return self._send("PATCH", path, content)
-
-    def _send(self, method: str, path: str, content: Mapping[str, Any] | None, key: str | None = None) -> Any:
-        headers = {} if key is None else {"Idempotency-Key": key}
-        body = b"" if content is None else json.dumps(content).encode()
-        with self._request(method, path, body, headers) as reply:
+        with self._request("PATCH", path, json.dumps(content).encode()) as reply:
             return _decode(path, reply.read())
 
     def download(self, path: str, to: Path) -> Path:
@@ -109,6 +114,14 @@ class Session:
             if announced is not None and received != int(announced):
                 raise ClientError(f"{to}: {received} of {announced} bytes of {path} arrived; repeat the download")
         return to
+
+    def _post(self, path: str, body: bytes, headers: Mapping[str, str]) -> Any:
+        with self._request("POST", path, body, headers) as reply:
+            try:
+                content: bytes = reply.read()
+            except (OSError, HTTPException) as error:
+                raise ClientError(f"the answer to {path} broke off ({error}); repeat it") from error
+        return _decode(path, content)
 
     @contextmanager
     def connect(self, path: str, wishes: Mapping[str, Any]) -> Iterator[ClientConnection]:

@@ -8,6 +8,7 @@ from bench.jobs.job_spec import (
     PREDICTION_FILE,
     REPORT_FILE,
     SERIES_FILE,
+    TREND_FILE,
     TWIN_FILE,
     JobSpec,
     compute_content_key,
@@ -26,11 +27,13 @@ from bench.jobs.job_view import (
 from bench.jobs.manager import JobManager
 from bench.jobs.scheduler import find_scheduler, run_scheduler, start_scheduler
 from bench.jobs.settings import (
+    AnalysisKind,
     DiagnoseSettings,
     IdentifySettings,
     JobKind,
     JobSettings,
     PredictSettings,
+    TrendSettings,
     get_kind,
     parse_settings,
 )
@@ -44,7 +47,9 @@ __all__ = [
     "PREDICTION_FILE",
     "REPORT_FILE",
     "SERIES_FILE",
+    "TREND_FILE",
     "TWIN_FILE",
+    "AnalysisKind",
     "BatchRequest",
     "DaskEngine",
     "DiagnoseSettings",
@@ -62,6 +67,7 @@ __all__ = [
     "PredictSettings",
     "RetryRequest",
     "SchedulerLocation",
+    "TrendSettings",
     "compute_content_key",
     "execute_job",
     "find_newest_done",

@@ -11,6 +11,8 @@ from bench.jobs.settings import JobSettings, get_kind
 
 FIT_FILE, REPORT_FILE = "fit.json", "report.html"
 """Files in the result folder of an identification."""
+TREND_FILE = "trend.json"
+"""File in the result folder of a trend."""
 SERIES_FILE = "series.npz"
 """Recorded and simulated force in the result folder of an identification or a prediction."""
 PREDICTION_FILE = "prediction.json"
@@ -21,7 +23,7 @@ DIAGNOSIS_FILE, TWIN_FILE = "diagnosis.json", "twin.json"
 ResultSummary = dict[str, Any]
 """Part of a result that the catalogue keeps: errors of a fit; verdict, effects and shrinkage of a diagnosis."""
 
-_FOLDER_WORDS = {"identify": "fit", "diagnose": "diagnosis", "predict": "prediction"}
+_FOLDER_WORDS = {"identify": "fit", "diagnose": "diagnosis", "predict": "prediction", "trend": "trend"}
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,8 @@ class JobSpec:
     """Number of times that the job was queued; a request to cancel is meant for one of them."""
     fit: str = ""
     """Fit that the report of a diagnosis shows as well; empty without one."""
+    logs: tuple[str, ...] = ()
+    """Logs of a trend, the oldest first."""
     model: str = ""
     """Fit or twin that a prediction simulates, or whose own gap a diagnosis reports; empty without one."""
     log_sha256: str = ""

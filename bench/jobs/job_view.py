@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field
 
 from bench.catalogue import JobRow, JobState
-from bench.jobs.settings import JobKind
+from bench.jobs.settings import AnalysisKind, JobKind
 from bench.validation import FrozenModel
 
 
@@ -36,11 +36,13 @@ class Retry(FrozenModel):
 
 
 class Job(FrozenModel):
-    """One identification, diagnosis or prediction of a run."""
+    """One identification, diagnosis or prediction of a run, or one trend of a specimen."""
 
     id: str = Field(description="also the id of its fit, diagnosis or prediction")
     run: str = Field(description="id of the run")
-    kind: str = Field(description="`identify`, `diagnose` or `predict`")
+    kind: str = Field(
+        description="`identify`, `diagnose`, `predict`, or `trend` of the specimen, with its newest run"
+    )
     state: JobState
     stage: str = Field(description="present stage, such as `refine`; the last one of a job that has ended")
     fraction: float | None = Field(
@@ -82,7 +84,7 @@ class RetryRequest(FrozenModel):
 class BatchRequest(FrozenModel):
     """Request of the same job for several runs."""
 
-    kind: JobKind
+    kind: AnalysisKind
     runs: tuple[str, ...] = Field(min_length=1, max_length=1000, description="ids of the runs")
     settings: dict[str, Any] = Field(default={}, description="settings of the jobs, as for a single run")
 

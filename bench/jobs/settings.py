@@ -7,7 +7,9 @@ from pydantic import Field
 
 from bench.validation import FrozenModel
 
-JobKind: TypeAlias = Literal["identify", "diagnose", "predict"]
+AnalysisKind: TypeAlias = Literal["identify", "diagnose", "predict"]
+"""Kinds of jobs on a single run."""
+JobKind: TypeAlias = Literal["identify", "diagnose", "predict", "trend"]
 
 
 class IdentifySettings(FrozenModel):
@@ -55,6 +57,17 @@ class DiagnoseSettings(FrozenModel):
         return [*_make_hold_out_arguments(self.hold_out, self.hold_out_after), *chosen]
 
 
+class TrendSettings(FrozenModel):
+    """Settings of the trend of a specimen."""
+
+    runs: tuple[str, ...] = Field(min_length=3, max_length=200, description="ids of its runs, the oldest first")
+    time_limit_s: float = Field(default=14400.0, gt=0, description="[s] after which the job fails")
+
+    def make_cli_arguments(self) -> list[str]:
+        """Return the options of `mrbench trend`; it has none."""
+        return []
+
+
 class PredictSettings(FrozenModel):
     """Settings of a prediction: the simulation of a fit or twin on a run that it need not have read."""
 
@@ -69,28 +82,27 @@ class PredictSettings(FrozenModel):
         return ["--free", "offset"] if self.free_offset else []
 
 
-JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings | PredictSettings
-_MODELS: dict[str, type[JobSettings]] = {
+JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings | PredictSettings | TrendSettings
+_KINDS: dict[JobKind, type[JobSettings]] = {
     "identify": IdentifySettings,
     "diagnose": DiagnoseSettings,
     "predict": PredictSettings,
+    "trend": TrendSettings,
 }
 
 
 def get_kind(settings: JobSettings) -> JobKind:
     """Return the kind of job that settings belong to."""
-    if isinstance(settings, PredictSettings):
-        return "predict"
-    return "diagnose" if isinstance(settings, DiagnoseSettings) else "identify"
+    return next(kind for kind, model in _KINDS.items() if isinstance(settings, model))
 
 
-def parse_settings(kind: str, document: Mapping[str, Any]) -> JobSettings:
+def parse_settings(kind: JobKind, document: Mapping[str, Any]) -> JobSettings:
     """Return the settings of a job of a kind.
 
     Raises:
         ValidationError: the document is not one of this kind.
     """
-    return _MODELS[kind].model_validate(document)
+    return _KINDS[kind].model_validate(document)
 
 
 def _make_hold_out_arguments(patterns: Sequence[str], after: float | None) -> list[str]:

@@ -53,6 +53,20 @@ def read_diagnosis_summary(path: Path) -> ResultSummary:
     }
 
 
+def read_trend_summary(path: Path) -> ResultSummary:
+    """Read the summary of a trend.
+
+    Raises:
+        JobError: the file is not a trend.
+    """
+    try:
+        document = json.loads(path.read_text("utf-8"))
+        changed = [one["quantity"] for one in document["changes"] if one["direction"] != "steady"]
+        return {"changes": changed, "explanation": document["explanation"]}
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise JobError(f"{path} cannot be read: {error}") from None
+
+
 def read_prediction_summary(path: Path) -> ResultSummary:
     """Read the summary of a prediction.
 

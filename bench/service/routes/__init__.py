@@ -9,8 +9,7 @@ from bench.service.routes import (
     integrity,
     jobs,
     live,
-    methods,
-    previews,
+    planning,
     recordings,
     results,
     rig,
@@ -22,8 +21,7 @@ PUBLIC_ROUTERS = (rig.public_router, live.router)
 """Routers that need no token in the header; `live` checks its own."""
 PROTECTED_ROUTERS = (
     rig.router,
-    methods.router,
-    previews.router,
+    *planning.ROUTERS,
     runs.router,
     continuation.router,
     integrity.router,

@@ -22,9 +22,10 @@ from bench.jobs import (
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse
 from bench.service.problems import ProblemError, make_conflict, make_not_found
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.run_registry import DAMAGED
 
-router = APIRouter(tags=["results"])
+router = APIRouter(tags=["results"], route_class=IdempotentRoute)
 _VERBS: dict[JobKind, str] = {"identify": "identified", "diagnose": "diagnosed", "predict": "predicted"}
 _NOUNS: dict[JobKind, str] = {"identify": "fit", "diagnose": "diagnosis"}
 
@@ -39,7 +40,7 @@ SAME_JOB: dict[int | str, dict[str, Any]] = {
 }
 
 
-@router.post("/runs/{run_id}/identify", status_code=201, responses=SAME_JOB)
+@router.post("/runs/{run_id}/identify", status_code=201, responses=SAME_JOB, dependencies=[IDEMPOTENT])
 async def identify_run(
     run_id: str, context: Context, response: Response, settings: IdentifySettings | None = None
 ) -> Job:
@@ -50,7 +51,7 @@ async def identify_run(
     return await request_job(context, run_id, settings or IdentifySettings(), response)
 
 
-@router.post("/runs/{run_id}/diagnose", status_code=201, responses=SAME_JOB)
+@router.post("/runs/{run_id}/diagnose", status_code=201, responses=SAME_JOB, dependencies=[IDEMPOTENT])
 async def diagnose_run(
     run_id: str, context: Context, response: Response, settings: DiagnoseSettings | None = None
 ) -> Job:

@@ -16,6 +16,7 @@ from bench.samples import select_extremes
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse
 from bench.service.problems import ProblemError
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.recordings import load_samples
 from bench.service.routes.results import (
     JSON_FILE,
@@ -26,7 +27,7 @@ from bench.service.routes.results import (
 )
 from bench.service.views import View
 
-router = APIRouter(tags=["results"])
+router = APIRouter(tags=["results"], route_class=IdempotentRoute)
 Start = Annotated[float | None, Query(alias="from", allow_inf_nan=False, description="[s] of the run")]
 Stop = Annotated[float | None, Query(alias="to", allow_inf_nan=False, description="[s] of the run")]
 Points = Annotated[
@@ -50,7 +51,7 @@ class SimulatedSeries(View):
     errors: tuple[StrokeError, ...] = Field(description="force error of each segment, over all its samples")
 
 
-@router.post("/runs/{run_id}/predict", status_code=201, responses=SAME_JOB)
+@router.post("/runs/{run_id}/predict", status_code=201, responses=SAME_JOB, dependencies=[IDEMPOTENT])
 async def predict_run(run_id: str, context: Context, response: Response, settings: PredictSettings) -> Job:
     """Queue the simulation of a fit or twin, of this or another run, on the strokes of a run.
 

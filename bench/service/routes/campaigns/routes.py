@@ -36,6 +36,7 @@ from bench.disk import RESERVE, find_free_space
 from bench.service.campaigns import AGENT_BENCH
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import make_conflict, make_not_found
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.campaigns.photos import save_photo
 from bench.service.routes.campaigns.views import (
     AnswerRequest,
@@ -50,7 +51,7 @@ from bench.service.routes.campaigns.views import (
     make_summary,
 )
 
-router = APIRouter(tags=["campaigns"])
+router = APIRouter(tags=["campaigns"], route_class=IdempotentRoute)
 _EVENTS = 200
 """Number of newest events in a view."""
 
@@ -70,7 +71,7 @@ def list_campaigns(
     return CampaignPage(items=items, next=items[-1].id if len(found) > limit else None)
 
 
-@router.post("/campaigns", status_code=201)
+@router.post("/campaigns", status_code=201, dependencies=[IDEMPOTENT])
 async def start_campaign(request: StartCampaignRequest, context: Context, response: Response) -> CampaignView:
     """Start a campaign on the bench; it continues after any crash. Refused if a condition can never be met."""
     worker = await context.engine.describe_state()

@@ -11,6 +11,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from bench.campaigns import CampaignDocumentError
 from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, NoRigError, RecordingError
 
 MEDIA_TYPE = "application/problem+json"
@@ -108,6 +109,12 @@ _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
     (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method was refused"),
     (RecordingError, HTTPStatus.UNPROCESSABLE_ENTITY, "recording-refused", "The recording was refused"),
     (NoRigError, HTTPStatus.NOT_FOUND, "no-rig", "No rig is configured"),
+    (
+        CampaignDocumentError,
+        HTTPStatus.UNPROCESSABLE_ENTITY,
+        "campaign-refused",
+        "The campaign was refused",
+    ),
     (AgentUnreachableError, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),

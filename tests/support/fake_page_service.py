@@ -19,6 +19,7 @@ from fastapi.staticfiles import StaticFiles
 from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import load_method
 from bench.service.routes.previews import preview_method
+from tests.support.fake_recording import recording_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
@@ -193,6 +194,7 @@ def application(bench: FakeBench) -> FastAPI:
         live_routes,
     ):
         app.include_router(routes(bench), prefix="/api/v1")
+    app.include_router(recording_routes(), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 

@@ -1,7 +1,7 @@
 """REST routes of what a run has recorded and what persons add to it."""
 
-from bench.service.routes.recordings import events, files, notes, samples, trash
+from bench.service.routes.recordings import events, files, notes, replay, samples, trash
 
-ROUTERS = (samples.router, events.router, files.router, notes.router, trash.router)
+ROUTERS = (samples.router, events.router, files.router, notes.router, replay.router, trash.router)
 
 __all__ = ["ROUTERS"]

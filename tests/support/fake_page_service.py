@@ -131,7 +131,8 @@ class FakeBench:
             "state": self.state, "utc_s": time.time(), "trip": self.trip, "run": self.run, "finished": [],
             "instruments": INSTRUMENTS,
             "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
-            "limits": LIMITS, "travel_m": (-0.06, 0.06), "drive_kind": "coil_v", "drive_unit": "V", "reference_state": self.reference_state, "step": self.step,
+            "limits": LIMITS, "travel_m": (-0.06, 0.06), "drive_kind": "coil_v", "drive_unit": "V",
+            "reference_state": self.reference_state, "step": self.step,
         }  # fmt: skip
 
     def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:

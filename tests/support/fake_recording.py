@@ -17,9 +17,9 @@ SEGMENTS = [
     {"index": 1, "name": "10mm_1Hz_0.2V", "stretch": "quick", "start_s": 12.0, "stop_s": 22.0},
 ]
 EVENTS = [
-    {"id": 1, "run": "run-1", "at": "2025-03-04T09:11:41Z", "time_s": 11.0, "kind": "checkpoint", "text": "after segment 10mm_1Hz_0V"},
-    {"id": 2, "run": "run-1", "at": "2025-03-04T09:11:45Z", "time_s": 15.0, "kind": "alarm", "text": "temperature 61 °C"},
-]  # fmt: skip
+    {"id": 1, "run": "run-1", "time_s": 11.0, "kind": "checkpoint", "text": "after segment 10mm_1Hz_0V"},
+    {"id": 2, "run": "run-1", "time_s": 15.0, "kind": "alarm", "text": "temperature 61 °C"},
+]
 FRAMES = "The raw frames of 5 instruments were decoded again: all 120 readings are equal."
 
 

@@ -36,10 +36,13 @@ def replay_run(run_id: str, context: Context) -> ReplayView:
     """
     results = replay_frames(context.catalogue.resolve_path(context.get_run(run_id).log))
     instruments = tuple(ReplayedInstrument.model_validate(one._asdict()) for one in results)
-    return ReplayView(equal=all(one.is_equal for one in results), instruments=instruments, text=_describe(results))
+    return ReplayView(
+        equal=all(one.is_equal for one in results), instruments=instruments, text=describe_replay(results)
+    )
 
 
-def _describe(results: list[ReplayResult]) -> str:
+def describe_replay(results: list[ReplayResult]) -> str:
+    """Return one sentence on the results, for a person."""
     if not results:
         return "The log has no raw frames: it was imported, or recorded without wires."
     different = [str(one) for one in results if not one.is_equal]

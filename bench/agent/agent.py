@@ -19,13 +19,19 @@ from bench.agent.run_executor import RunExecutor, find_log_folder
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
 from bench.agent.state_machine import StateMachine
-from bench.agent.status import collect_warnings, make_instrument_statuses, make_limit_statuses
+from bench.agent.status import (
+    collect_warnings,
+    describe_bench,
+    make_instrument_statuses,
+    make_limit_statuses,
+)
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import (
     AgentEvent,
     AgentState,
     AgentStatus,
+    BenchDescription,
     PrepareCommand,
     Reply,
     RunCommand,
@@ -188,6 +194,10 @@ class Agent:
             return None
         position = next(one for one in actuator.channels if one.name == "actuator_position")
         return position.low, position.high
+
+    def describe(self) -> BenchDescription:
+        """Return what the configuration says about the bench."""
+        return describe_bench(self._config, self._rig)
 
     def get_run_status(self) -> RunStatus | None:
         """Return the status of the run in progress or of the latest run; None before the first."""

@@ -57,6 +57,7 @@ class Run:
         self._outcome: RunOutcome | None = None
         self._lost: dict[str, int] = {}
         self._started = datetime.now(UTC)
+        self._method_sha256 = request.method.compute_sha256()
 
     @property
     def log(self) -> LiveRecorder | None:
@@ -131,6 +132,7 @@ class Run:
         return RunStatus(
             id=request.identity.make_run_id(method.name),
             method=method.name,
+            method_sha256=self._method_sha256,
             specimen=request.identity.specimen,
             operator=request.identity.operator,
             log=str(request.path),

@@ -33,6 +33,12 @@ class StatusCommand(Message):
     command: Literal["status"] = "status"
 
 
+class DescribeCommand(Message):
+    """Request of the `BenchDescription`, which stays the same while the agent runs."""
+
+    command: Literal["describe"] = "describe"
+
+
 class RunCommand(Message):
     """Start of a run; refused unless the agent is idle. The reply comes as soon as the run is accepted."""
 
@@ -109,6 +115,7 @@ class ShutDownCommand(Message):
 
 Command: TypeAlias = Annotated[
     StatusCommand
+    | DescribeCommand
     | RunCommand
     | StopCommand
     | PauseCommand
@@ -125,6 +132,7 @@ class RunStatus(Message):
 
     id: str
     method: str = Field(description="name of the method")
+    method_sha256: str = Field(default="", description="hash of the content of the method")
     specimen: str
     operator: str
     log: str = Field(description="file of the log on the agent's machine")
@@ -219,9 +227,39 @@ class AgentEvent(Message):
     text: str
 
 
+class BenchLimit(Message):
+    """Values of one quantity beyond which the bench acts, for either sign; null for no action."""
+
+    unit: str
+    indicate: float | None = Field(description="alarm; the run continues")
+    hold: float | None = Field(description="the motion fades out and the rod is held")
+    controlled_stop: float | None = Field(description="the motion fades out, the run ends")
+    trip: float | None = Field(description="coil and actuator are stopped at once; latches")
+
+
+class BenchChannel(Message):
+    """One recorded channel."""
+
+    unit: str
+    rate_hz: float = Field(description="[Hz] sampling rate of the instrument")
+    delay_s: float = Field(description="[s] delay of the channel behind the measured quantity")
+
+
+class BenchDescription(Message):
+    """Description of the bench in its configuration."""
+
+    name: str
+    specimen: str = Field(description="mounted damper, used if a run does not name one; empty without one")
+    drive_kind: str = Field(description="coil_v or coil_a")
+    drive_unit: str = Field(description="V or A")
+    limits: dict[str, BenchLimit] = Field(description="limits of the fixture by quantity")
+    channels: dict[str, BenchChannel] = Field(description="recorded channels; `coil_drive` repeats a measured one")
+
+
 class Reply(Message):
     """Reply to a command."""
 
     ok: bool
     error: str = Field(default="", description="what failed, the value and the limit, what to do")
     status: AgentStatus | None = None
+    description: BenchDescription | None = Field(default=None, description="only in the reply to `describe`")

@@ -1,5 +1,6 @@
 """The catalogue: runs, their logs, and the jobs on them, in a database."""
 
+from bench.catalogue.campaign_table import CampaignChange, CampaignTable
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
@@ -8,6 +9,8 @@ from bench.catalogue.log_summary import LogSummary, is_complete, read_log_summar
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
+    CampaignEventRow,
+    CampaignRow,
     EventRow,
     JobRow,
     JobState,
@@ -18,6 +21,15 @@ from bench.catalogue.models import (
     RunRow,
     RunState,
 )
+from bench.catalogue.planning import (
+    SHIPPED_VERSION,
+    ClaimedKey,
+    IdempotencyKeys,
+    MethodRow,
+    MethodStore,
+    Specimen,
+    SpecimenStore,
+)
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
@@ -26,16 +38,25 @@ from bench.catalogue.trash import move_to_trash, restore_from_trash
 __all__ = [
     "CATALOGUE_FILE",
     "REPEATABLE_STATES",
+    "SHIPPED_VERSION",
     "UNFINISHED_STATES",
     "BatchRow",
+    "CampaignChange",
+    "CampaignEventRow",
+    "CampaignRow",
+    "CampaignTable",
     "Catalogue",
+    "ClaimedKey",
     "EventRow",
+    "IdempotencyKeys",
     "JobFilter",
     "JobQueue",
     "JobRow",
     "JobState",
     "LogIntegrity",
     "LogSummary",
+    "MethodRow",
+    "MethodStore",
     "NoteKind",
     "NoteRow",
     "RunFilter",
@@ -43,6 +64,8 @@ __all__ = [
     "RunPlan",
     "RunRow",
     "RunState",
+    "Specimen",
+    "SpecimenStore",
     "catalogue_log",
     "check_all",
     "check_integrity",

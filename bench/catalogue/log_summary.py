@@ -33,6 +33,8 @@ class LogSummary:
 
     id: str
     method: str
+    method_sha256: str
+    """Hash of the content of the method; empty in logs of older versions and in imports."""
     specimen: str
     operator: str
     source: str
@@ -127,6 +129,7 @@ def _make_summary(
         # An import is named after its CSV files, which can be imported twice; the log's file name is unique.
         id=path.stem if run.get("source") == "import" else run["id"],
         method=run.get("method", ""),
+        method_sha256=run.get("method_sha256", ""),
         specimen=run.get("specimen", ""),
         operator=run.get("operator", ""),
         source=run.get("source", "run"),

@@ -56,6 +56,10 @@ class RunRow(Base):
 
     id: Mapped[str] = mapped_column(Text, primary_key=True)
     method: Mapped[str] = mapped_column(Text)
+    method_version: Mapped[int | None] = mapped_column(default=None)
+    """Version of the method; None if its content was not stored under its name."""
+    method_sha256: Mapped[str | None] = mapped_column(Text, default=None)
+    """Hash of the content of the method; None in runs of older versions and in imports."""
     specimen: Mapped[str] = mapped_column(Text, default="")
     operator: Mapped[str] = mapped_column(Text, default="")
     source: Mapped[str] = mapped_column(Text, default="run")
@@ -181,3 +185,38 @@ class EventRow(Base):
     """Time since the first sample of the run [s]; None until the log was read."""
     kind: Mapped[str] = mapped_column(Text)
     text: Mapped[str] = mapped_column(Text)
+
+
+class CampaignRow(Base):
+    """One campaign with its present state, which is its latest restore point."""
+
+    __tablename__ = "campaigns"
+
+    id: Mapped[str] = mapped_column(Text, primary_key=True)
+    name: Mapped[str] = mapped_column(Text)
+    key: Mapped[str] = mapped_column(Text, index=True)
+    """Hash of document and methods: equal campaigns have equal keys."""
+    bench: Mapped[str] = mapped_column(Text, default="")
+    """Executor: `agent`, or `scenario NAME` for the simulated plant."""
+    status: Mapped[str] = mapped_column(Text, index=True)
+    created: Mapped[datetime] = mapped_column(UtcTime)
+    methods: Mapped[dict[str, Any]] = mapped_column(JSON)
+    """Documents of the methods by name, fixed for the whole campaign."""
+    state: Mapped[dict[str, Any]] = mapped_column(JSON)
+
+
+class CampaignEventRow(Base):
+    """One event of a campaign: restore point, edit, message."""
+
+    __tablename__ = "campaign_events"
+
+    id: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    campaign_id: Mapped[str] = mapped_column(ForeignKey("campaigns.id"), index=True)
+    at: Mapped[datetime] = mapped_column(UtcTime)
+    kind: Mapped[str] = mapped_column(Text)
+    text: Mapped[str] = mapped_column(Text)
+    who: Mapped[str] = mapped_column(Text, default="")
+    item: Mapped[str] = mapped_column(Text, default="")
+    """Id of the step; empty for the campaign as a whole."""
+    notification: Mapped[str] = mapped_column(Text, default="")
+    """`due`, `sent`, or the reason of a failure; empty where none is needed."""

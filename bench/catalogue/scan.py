@@ -75,6 +75,8 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
     row = RunRow(
         id=summary.id,
         method=summary.method,
+        method_version=catalogue.find_method_version(summary.method, summary.method_sha256),
+        method_sha256=summary.method_sha256 or None,
         specimen=summary.specimen,
         operator=summary.operator,
         source=summary.source,

@@ -14,6 +14,8 @@ from bench.client.session import Session
 
 _PAGE_SIZE = 50
 """Number of runs requested at a time."""
+_MOST_METHODS = 500
+"""Largest number of listed methods."""
 
 
 class Bench:
@@ -40,12 +42,12 @@ class Bench:
         return str(self._session.get("/agent")["state"])
 
     def list_methods(self) -> list[dict[str, Any]]:
-        """Return the methods that come with mrbench: name, title, duration and kind of drive.
+        """Return the newest version of each method: name, version, title, duration and kind of drive.
 
         Raises:
             ClientError: the service cannot be reached.
         """
-        return list(self._session.get("/methods"))
+        return list(self._session.get("/methods", limit=_MOST_METHODS)["items"])
 
     def run(self, run_id: str) -> Run:
         """Return a run by its id; nothing is requested yet."""

@@ -71,15 +71,22 @@ class Session:
         Args:
             path: path below ``/api/v1``.
             content: body of the request.
-            key: idempotency key; a repeated request with the same key has no further effect.
+            key: idempotency key; a repeated request with the same key has no further effect, and one whose
+                answer was lost is repeated here, once.
 
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        headers = {} if key is None else {"Idempotency-Key": key}
         body = b"" if content is None else json.dumps(content).encode()
-        with self._request("POST", path, body, headers) as reply:
-            return _decode(path, reply.read())
+        if key is None:
+            return self._post(path, body, {})
+        headers = {"Idempotency-Key": key}
+        try:
+            return self._post(path, body, headers)
+        except ClientError as error:
+            if error.status is not None:
+                raise
+            return self._post(path, body, headers)
 
     def download(self, path: str, to: Path) -> Path:
         """Download a file, which appears complete or not at all, and return its path.
@@ -98,6 +105,14 @@ class Session:
             if announced is not None and received != int(announced):
                 raise ClientError(f"{to}: {received} of {announced} bytes of {path} arrived; repeat the download")
         return to
+
+    def _post(self, path: str, body: bytes, headers: Mapping[str, str]) -> Any:
+        with self._request("POST", path, body, headers) as reply:
+            try:
+                content: bytes = reply.read()
+            except (OSError, HTTPException) as error:
+                raise ClientError(f"the answer to {path} broke off ({error}); repeat it") from error
+        return _decode(path, content)
 
     @contextmanager
     def connect(self, path: str, wishes: Mapping[str, Any]) -> Iterator[ClientConnection]:

@@ -25,6 +25,10 @@ def report(
         Path | None,
         typer.Option(metavar="PREDICTION", help="With --truth: prediction of another recording by the twin."),
     ] = None,
+    series: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="With --fit: also write recorded and simulated force (.npz)."),
+    ] = None,
     plots: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Also write the plots to this folder, as SVG and PNG.")
     ] = None,
@@ -50,11 +54,13 @@ def report(
         raise typer.BadParameter("--truth is compared with a diagnosis; add --diagnosis FILE")
     if unseen is not None and truth is None:
         raise typer.BadParameter("--unseen is shown next to the truth; add --truth FILE")
+    if series is not None and (fit is None or series.suffix != ".npz"):
+        raise typer.BadParameter("--series is that of a fit, as .npz; add --fit FILE, or give another suffix")
     documents = {"--fit": fit, "--diagnosis": diagnosis, "--truth": truth, "--unseen": unseen}
     command = ["mrbench", "report", str(log)]
-    for option, path in {**documents, "--out": out, "--plots": plots}.items():
+    for option, path in {**documents, "--out": out, "--series": series, "--plots": plots}.items():
         command += [option, str(path)] if path else []
-    content = gather(log, fit, diagnosis, truth, unseen)
+    content = gather(log, fit, diagnosis, truth, unseen, series)
     figures = make_figures(content)
     if plots is not None:
         save_figures(figures, plots)

@@ -92,6 +92,7 @@ def gather(
     diagnosis_path: Path | None = None,
     truth: Path | None = None,
     unseen: Path | None = None,
+    series_path: Path | None = None,
 ) -> Report:
     """Read a log and the documents on it, and simulate the fit on the log.
 
@@ -101,6 +102,7 @@ def gather(
         diagnosis_path: diagnosis document.
         truth: truth file of a drawn damper, which is compared with the diagnosis.
         unseen: prediction document of the diagnosed twin on another recording.
+        series_path: file that receives recorded and simulated force.
 
     Raises:
         ReportError: a document is invalid, or the fit cannot be simulated on this log.
@@ -109,7 +111,7 @@ def gather(
     fit_document = None if fit is None else read_fit(fit)
     diagnosis_document = None if diagnosis_path is None else read_diagnosis(diagnosis_path)
     content_of_log = read_log(log)
-    prediction, series = (None, None) if fit is None else predict(fit, log)
+    prediction, series = (None, None) if fit is None else predict(fit, log, series_path)
     with log.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     recording = make_recording(content_of_log, series)

@@ -8,7 +8,16 @@ from typing import Protocol
 
 from pydantic import BaseModel
 
-from bench.agent_protocol import AgentEvent, AgentStatus, Message, Reply, ResetCommand, StatusCommand
+from bench.agent_protocol import (
+    AgentEvent,
+    AgentStatus,
+    BenchDescription,
+    DescribeCommand,
+    Message,
+    Reply,
+    ResetCommand,
+    StatusCommand,
+)
 from bench.errors import AgentUnreachableError, RunError
 from bench.live import LiveBatch
 
@@ -105,6 +114,19 @@ class AgentMonitor:
             AgentUnreachableError: the agent does not answer.
         """
         return self.latest_status or self.send_command(StatusCommand(), timeout)
+
+    def describe_bench(self) -> BenchDescription:
+        """Return what the agent's configuration says about the bench.
+
+        Raises:
+            AgentUnreachableError: the agent does not answer, or is of an older version.
+        """
+        description = self._link.send(DescribeCommand()).description
+        if description is None:
+            raise AgentUnreachableError(
+                "the rig agent cannot describe the bench; it must have the service's version"
+            )
+        return description
 
     def reset(self) -> AgentStatus:
         """Reset a trip.

@@ -30,7 +30,7 @@ from bench.service.middleware import (
     SecurityHeadersMiddleware,
     TokenCheckMiddleware,
 )
-from bench.service.query_check import refuse_unknown_parameters
+from bench.service.requests import refuse_unknown_parameters
 from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS
 from bench.service.run_registry import RunRegistry
 from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers

@@ -1,8 +1,10 @@
 """Objects shared by all routes, created when the service starts."""
 
-from dataclasses import dataclass
+import asyncio
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
+from weakref import WeakValueDictionary
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection
@@ -37,6 +39,8 @@ class ServiceContext:
     """True if the agent writes into the service's data folder."""
     space_monitor: SpaceMonitor
     sample_store: SampleStore
+    key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
+    """Locks of the idempotency keys of requests in progress."""
 
     @property
     def data(self) -> Path:

@@ -180,6 +180,8 @@ def make_run_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
     return RunRow(
         id=run.id,
         method=run.method,
+        method_version=catalogue.find_method_version(run.method, run.method_sha256),
+        method_sha256=run.method_sha256 or None,
         specimen=run.specimen,
         operator=run.operator,
         source="run",

@@ -17,8 +17,8 @@ from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
 from bench.live import Channel, LiveBatch, describe_channels
-from bench.methods import load_method
-from bench.service.routes.previews import preview_method
+from bench.methods import compile_method, load_method
+from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_recording import recording_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
@@ -43,7 +43,19 @@ CHANNELS = (
 PAUSE = "at checkpoint 10mm_1Hz, in 4 s"
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
 METHODS = [
-    {"name": name, "title": title, "duration_s": duration, "drive_kind": "coil_v", "checkpoints": []}
+    {
+        "name": name,
+        "title": title,
+        "duration_s": duration,
+        "drive_kind": "coil_v",
+        "checkpoints": [],
+        "version": 1,
+        "source": "included",
+        "usable": True,
+        "obstacle": "",
+        "sha256": HASH,
+        "created": None,
+    }
     for name, title, duration in (
         ("identification", "Strokes for an identification", 162.0),
         ("paper_sines", "Six voltages on a 10 mm sine at 1 Hz", 602.5),
@@ -248,7 +260,7 @@ def method_routes(bench: FakeBench) -> APIRouter:
 
     @router.get("")
     async def methods() -> Any:
-        return METHODS
+        return {"items": METHODS, "next": None}
 
     @router.get("/{name}")
     async def method(name: str) -> Any:
@@ -256,7 +268,7 @@ def method_routes(bench: FakeBench) -> APIRouter:
 
     @router.get("/{name}/preview")
     async def preview(name: str) -> Any:
-        return preview_method(name)
+        return make_preview(compile_method(load_method(name)))
 
     return router
 

@@ -11,28 +11,65 @@ class Action(StrEnum):
     """Actions on a campaign."""
 
     PLAN = "plan"
+    RUN = "run"
+    STATUS = "status"
+    PAUSE = "pause"
+    RESUME = "resume"
+    STOP = "stop"
 
 
 def campaign(
-    action: Annotated[Action, typer.Argument(help="plan: time, heat, disk, limits and identifiability.")],
-    target: Annotated[str, typer.Argument(help="File of the campaign.", metavar="FILE")],
+    action: Annotated[
+        Action,
+        typer.Argument(
+            help="plan: time, heat, disk, limits and identifiability. run: start or continue it. "
+            "status, pause (at the next checkpoint), resume, stop (after the run in progress)."
+        ),
+    ],
+    target: Annotated[
+        str, typer.Argument(help="File of the campaign for plan and run, else its id.", metavar="FILE|ID")
+    ] = "",
+    scenario: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="With run: on the simulated plant, faster than real time."),
+    ] = None,
     out: Annotated[str, typer.Option(metavar="FILE", help="- prints JSON.")] = "",
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder for logs and catalogue.")] = Path("runs"),
+    operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
     quick: Annotated[
         bool, typer.Option("--quick", help="With plan: leave out what the strokes can identify.")
     ] = False,
+    identify: Annotated[
+        bool, typer.Option("--identify", help="With run --scenario: identify and diagnose every run.")
+    ] = False,
+    answer: Annotated[
+        str | None, typer.Option(metavar="NOTE", help="With resume: answer the prompt with this note.")
+    ] = None,
+    choice: Annotated[
+        str | None, typer.Option(metavar="retry|skip|stop", help="With resume: decide on a failed step.")
+    ] = None,
+    new: Annotated[
+        bool, typer.Option("--new", help="With run: start again, also if the campaign is not finished.")
+    ] = False,
 ) -> None:
-    """Plan a campaign: ordered runs with rests and conditions between them."""
-    _plan(Path(target), data, quick=quick, as_json=out == "-")
+    """Plan, run and control campaigns: ordered runs with rests and conditions between them.
 
+    A campaign that was interrupted continues with the same command: no finished run is repeated.
+    """
+    as_json = out == "-"
+    if action in (Action.PLAN, Action.RUN) and not target:
+        raise typer.BadParameter("give the file of the campaign")
+    if action is Action.PLAN:
+        from bench.commands.campaign.plan import plan
 
-def _plan(path: Path, data: Path, *, quick: bool, as_json: bool) -> None:
-    from bench.campaigns import collect_methods, format_plan, load_campaign, plan_campaign
-    from bench.disk import RESERVE, find_free_space
-    from bench.runs import assess_design
+        plan(Path(target), data, quick=quick, as_json=as_json)
+    elif action is Action.RUN:
+        if scenario is None:
+            raise typer.BadParameter("give --scenario NAME or FILE")
+        from bench.commands.campaign.run import run_on_plant
 
-    document = load_campaign(path)
-    free = find_free_space(data).free - RESERVE
-    methods = collect_methods(document, allow_files=True)
-    plan = plan_campaign(document, methods, None if quick else assess_design, free)
-    typer.echo(plan.model_dump_json(by_alias=True, indent=2) if as_json else "\n".join(format_plan(plan)))
+        run_on_plant(Path(target), scenario, data, operator, identify=identify, is_new=new, as_json=as_json)
+    else:
+        from bench.commands.campaign.control import control
+
+        control(action.value, target, data, operator, note=answer, choice=choice, as_json=as_json)

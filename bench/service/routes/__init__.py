@@ -1,14 +1,14 @@
 """REST routes, one module for each resource."""
 
 from bench.service.routes import (
+    analyses,
     batches,
     continuation,
     exchange,
     integrity,
     jobs,
     live,
-    methods,
-    previews,
+    planning,
     recordings,
     results,
     rig,
@@ -20,8 +20,7 @@ PUBLIC_ROUTERS = (rig.public_router, live.router)
 """Routers that need no token in the header; `live` checks its own."""
 PROTECTED_ROUTERS = (
     rig.router,
-    methods.router,
-    previews.router,
+    *planning.ROUTERS,
     runs.router,
     continuation.router,
     integrity.router,
@@ -31,6 +30,7 @@ PROTECTED_ROUTERS = (
     batches.router,
     *exchange.ROUTERS,
     *recordings.ROUTERS,
+    *analyses.ROUTERS,
 )
 """Routers that need the token."""
 

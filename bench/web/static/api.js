@@ -64,6 +64,20 @@ export async function samples(path) {
   return batches;
 }
 
+/** Makes a key for one request; `randomUUID` is missing on a page that was loaded without TLS from elsewhere. */
+const makeKey = () => crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
+
+/** Posts a request that starts something: with a key, so that it is repeated safely if its answer is lost. */
+export async function start(path, body) {
+  const headers = { "Idempotency-Key": makeKey() };
+  try {
+    return await call("POST", path, body, TIMEOUT_MS, headers);
+  } catch (problem) {
+    if (problem.status !== 0) throw problem;
+    return call("POST", path, body, TIMEOUT_MS, headers); // no answer: perhaps it was lost on its way
+  }
+}
+
 /** Fetches a file with the token in the header, which a plain link cannot send. */
 export async function file(path) {
   const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
@@ -77,6 +91,7 @@ export function upload(path, form, onProgress) {
     const request = new XMLHttpRequest();
     request.open("POST", new URL(path, BASE));
     request.setRequestHeader("Authorization", `Bearer ${token() ?? ""}`);
+    request.setRequestHeader("Idempotency-Key", makeKey());
     request.responseType = "json";
     request.upload.addEventListener("progress", ({ loaded, total }) => onProgress(total ? loaded / total : 0));
     request.addEventListener("error", () => reject(new Problem(0, "No answer", `The service at ${BASE.host} cannot be reached.`)));
@@ -88,13 +103,13 @@ export function upload(path, form, onProgress) {
   });
 }
 
-async function call(method, path, body, timeout) {
-  const response = await send(method, path, body, timeout);
+async function call(method, path, body, timeout, headers) {
+  const response = await send(method, path, body, timeout, headers);
   return response.status === 204 ? null : response.json();
 }
 
-async function send(method, path, body, timeout = TIMEOUT_MS) {
-  const headers = { Authorization: `Bearer ${token() ?? ""}` };
+async function send(method, path, body, timeout = TIMEOUT_MS, more = {}) {
+  const headers = { Authorization: `Bearer ${token() ?? ""}`, ...more };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   let response;
   try {

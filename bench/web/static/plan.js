@@ -24,7 +24,7 @@ export class PlanView {
   }
 
   async list() {
-    const methods = (await get("methods")).sort((a, b) => a.duration_s - b.duration_s);
+    const methods = (await get("methods")).items.sort((a, b) => a.duration_s - b.duration_s);
     byId("plan-methods").replaceChildren(...methods.map(({ name, title, duration_s: length }) => {
       const link = element("a", { href: `#/plan/${encodeURIComponent(name)}` }, element("strong", {}, name), ` ${duration(length)}`);
       if (name === this.name) link.setAttribute("aria-current", "page");

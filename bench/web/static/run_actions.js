@@ -1,6 +1,6 @@
 // Actions on a run: files, identification, diagnosis, repair. Each leaves a visible answer beside the run.
 
-import { file, get, post } from "./api.js";
+import { file, get, post, start } from "./api.js";
 import { element, instant } from "./format.js";
 import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
 import { runAddress } from "./router.js";
@@ -89,7 +89,7 @@ export class RunActions {
 
   async identify(run) {
     await this.attempt(run, "Not requested", async () => {
-      const job = await post(`runs/${encode(run.id)}/identify`);
+      const job = await start(`runs/${encode(run.id)}/identify`);
       return job.state === "done"
         ? `This fit exists already, made ${instant(job.finished)}; nothing was computed again.`
         : "The identification was requested.";
@@ -98,7 +98,7 @@ export class RunActions {
 
   diagnose(run) {
     return this.attempt(run, "Not requested", async () => {
-      const job = await post(`runs/${encode(run.id)}/diagnose`);
+      const job = await start(`runs/${encode(run.id)}/diagnose`);
       return job.state === "done"
         ? `This diagnosis exists already, made ${instant(job.finished)}; nothing was computed again.`
         : "The diagnosis was requested.";
@@ -107,7 +107,7 @@ export class RunActions {
 
   retry(run, job) {
     return this.attempt(run, "Not requested", async () => {
-      await post(`jobs/${encode(job.id)}/retry`, { reason: "requested in the page" });
+      await start(`jobs/${encode(job.id)}/retry`, { reason: "requested in the page" });
       return `The job ${job.kind} was queued again.`;
     });
   }
@@ -121,7 +121,7 @@ export class RunActions {
 
   resume(run) {
     return this.attempt(run, "Not resumed", async () => {
-      const next = await post(`runs/${encode(run.id)}/resume`);
+      const next = await start(`runs/${encode(run.id)}/resume`);
       this.onRun(next);
       location.hash = "#/bench";
       return "The run was resumed; the new run continues it.";

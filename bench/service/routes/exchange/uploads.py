@@ -10,15 +10,16 @@ from bench.catalogue import RunRow
 from bench.csv_import import COLUMN_NAMES
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import make_conflict
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.transfer import ReceivedFile, import_files, make_log_name
 from bench.service.views import Run
 
-router = APIRouter(prefix="/logs", tags=["runs"])
+router = APIRouter(prefix="/logs", tags=["runs"], route_class=IdempotentRoute)
 _DriveKind = Literal["driver_command_v", "coil_v", "coil_a"]
 _Column = Annotated[str, Form(pattern=rf"^({'|'.join(COLUMN_NAMES)})=[^\x00]+$", max_length=200)]
 
 
-@router.post("", status_code=201)
+@router.post("", status_code=201, dependencies=[IDEMPOTENT])
 async def upload_recording(
     context: Context,
     response: Response,

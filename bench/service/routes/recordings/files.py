@@ -7,7 +7,7 @@ from urllib.parse import quote
 from fastapi import APIRouter
 
 from bench.catalogue import JobFilter, JobRow, RunRow
-from bench.jobs import DIAGNOSIS_FILE, FIT_FILE, TWIN_FILE
+from bench.jobs import DIAGNOSIS_FILE, FIT_FILE, PREDICTION_FILE, TWIN_FILE
 from bench.service.context import Context, ServiceContext
 from bench.service.routes.exchange import list_offers
 from bench.service.routes.recordings.views import RunFile, RunFileList
@@ -18,6 +18,7 @@ _API = "/api/v1"
 _RESULTS = {
     FIT_FILE: ("fit", "fits/{}", "application/json"),
     DIAGNOSIS_FILE: ("diagnosis", "diagnoses/{}", "application/json"),
+    PREDICTION_FILE: ("prediction", "predictions/{}", "application/json"),
     TWIN_FILE: ("twin", "twins/{}", "application/json"),
 }
 """Kind, path below the interface and media type of a result, by the name of its file."""
@@ -25,7 +26,7 @@ _RESULTS = {
 
 @router.get("/{run_id}/files")
 def list_files(run_id: str, context: Context) -> RunFileList:
-    """List the files of a run with their sizes and addresses: log, fits, diagnoses, twins, exports and reports."""
+    """List the files of a run with their sizes and addresses: log, results, exports and reports."""
     row = context.get_run(run_id)
     jobs = context.catalogue.job_queue.list_jobs(JobFilter(("done",), None, run_id), _MAX_JOBS)
     results = [file for job in jobs for file in _list_results(context, job)]

@@ -8,11 +8,12 @@ from fastapi import APIRouter, Header, Response
 from bench.catalogue import NoteRow
 from bench.service.context import Context
 from bench.service.problems import MEDIA_TYPE, ProblemError
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.recordings.events import After, Limit
 from bench.service.routes.recordings.views import NotePage, NoteRequest, NoteView, RunChange
 from bench.service.views import Run, make_run_tag
 
-router = APIRouter(prefix="/runs", tags=["recordings"])
+router = APIRouter(prefix="/runs", tags=["recordings"], route_class=IdempotentRoute)
 _PROBLEM = {"content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
 _PRECONDITIONS: dict[int | str, dict[str, Any]] = {
     412: {"description": "The run was changed meanwhile", **_PROBLEM},
@@ -29,7 +30,7 @@ def list_notes(run_id: str, context: Context, limit: Limit = 200, after: After =
     return NotePage(items=items, next=items[-1].id if len(rows) > limit else None)
 
 
-@router.post("/{run_id}/notes", status_code=201)
+@router.post("/{run_id}/notes", status_code=201, dependencies=[IDEMPOTENT])
 def add_note(run_id: str, request: NoteRequest, context: Context) -> NoteView:
     """Add a note to a run. Notes are never changed; a correction is a further note."""
     context.get_run(run_id)

@@ -17,7 +17,7 @@ API = "/api/v1"
 def service(service):
     """Return a service with one recorded run of 3 s."""
     write_log(service.data / "one.mcap")
-    service.wait_for("/runs", lambda page: page["items"])
+    service.scan()
     return service
 
 
@@ -77,7 +77,7 @@ def test_a_wrong_request_is_refused_with_its_reason(service, path, status, messa
 
 def test_a_truncated_log_has_no_samples_yet(service):
     write_truncated_log(service.data / "two.mcap", run="run-2")
-    service.wait_for("/runs", lambda page: len(page["items"]) == 2)
+    service.scan()
     answer = service.client.get(f"{API}/runs/run-2/samples")
     assert answer.status_code == 409
     assert "truncated" in answer.json()["detail"]

@@ -11,7 +11,7 @@ def programme():
 
 
 def test_cycles_are_counted_from_the_begin_of_their_segment(programme):
-    index = next(one.index for one in programme.segments if one.frequency)
+    index = programme.segments[-1].index
     segment = programme.segments[index]
     begin, period = float(programme.time[segment.start]), 1 / segment.frequency
     cycles = round((segment.stop - segment.start) / programme.rate * segment.frequency)

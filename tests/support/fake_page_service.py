@@ -17,7 +17,7 @@ from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
 from bench.live import Channel, LiveBatch, describe_channels
-from bench.methods import compile_method, load_method
+from bench.methods import compile_method, compute_envelope, load_method
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_recording import recording_routes
 
@@ -269,6 +269,18 @@ def method_routes(bench: FakeBench) -> APIRouter:
     @router.get("/{name}/preview")
     async def preview(name: str) -> Any:
         return make_preview(compile_method(load_method(name)))
+
+    @router.post("/dry-run")
+    async def dry_run(wanted: dict[str, Any]) -> Any:
+        programme = compile_method(load_method(wanted["method"]))
+        envelope = compute_envelope(programme).model_dump(mode="json", by_alias=True)
+        words = {"messages": ["k0 to 3 % (standard deviation)"]} if wanted.get("identifiability", True) else None
+        trip = {"unit": "N", "indicate": None, "hold": None, "controlled_stop": None, "trip": 5000.0}
+        facts = {"limits": {"force": trip}, "obstacles": [], "unknown": "", "log_bytes": 8_900_000}
+        return {
+            "envelope": envelope | {"design": words}, "mean_heat_w": envelope["heat_j"] / programme.duration,
+            "bench": facts | {"free_bytes": 42_000_000_000}, "identifiability_error": "",
+        }  # fmt: skip
 
     return router
 

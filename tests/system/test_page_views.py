@@ -62,6 +62,14 @@ def test_a_planned_method_is_used_on_the_bench(seen):
 
 
 @browser_test
+def test_a_plan_forecasts_peaks_beside_limits_heat_disk_and_what_is_identifiable(seen):
+    assert re.search(r"Force, at most\s+[\d.]+ N\s+\d+ N\s+5000 N", seen["forecast"])
+    assert re.search(r"Heat in the damper at most [\d.]+ J, [\d.]+ W on average", seen["forecast"])
+    assert "The log needs up to 8.9 MB; the disk has 42 GB free" in seen["forecast"]
+    assert "k0 to 3 % (standard deviation)" in seen["forecast"]
+
+
+@browser_test
 def test_units_are_chosen_by_the_person_and_kept(seen):
     assert seen["units"][:3] == [" lbf", " in", " in/s"]
     assert seen["captions"] == ["Force [lbf] against displacement [in]", "Force [lbf] against velocity [in/s]"]

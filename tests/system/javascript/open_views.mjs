@@ -16,7 +16,7 @@ const hasText = (selector, words) =>
   until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
 const shownTitle = () => page.evaluate(() => [...document.querySelectorAll("h1")].find((one) => one.checkVisibility()).innerText);
 const READY = {
-  "#/bench": ["#readings", "−10.00 … 10.00"], "#/plan/quick": ["#plan", "Preview"], "#/runs": ["#runs", "MR-0042"],
+  "#/bench": ["#readings", "−10.00 … 10.00"], "#/plan/quick": ["#plan", "k0 to 3 %"], "#/runs": ["#runs", "MR-0042"],
   "#/runs/run-1": ["#run", "Provenance"], "#/runs/run-1/report": ["#run", "Report: measured over simulated"],
 };
 
@@ -112,6 +112,8 @@ async function readRun() {
 async function plan() {
   await page.goto(`${url}/#/plan/identification`);
   await hasText("#plan", "Preview");
+  await hasText("#plan", "k0 to 3 %");
+  seen.forecast = await page.locator("#plan .forecast").innerText();
   seen.planFacts = await page.locator("#plan .facts").innerText();
   await page.getByRole("link", { name: "Use on the bench" }).click();
   await until(() => document.querySelector("input[value=identification]")?.checked);

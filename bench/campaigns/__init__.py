@@ -1,46 +1,80 @@
 """Campaigns: ordered runs with rests and conditions between them, resumed after anything."""
 
-from bench.campaigns.benches import CampaignBench, PlantBench
+from bench.campaigns.benches import AgentBench, CampaignBench, PlantBench, Thermometer
 from bench.campaigns.document import (
+    WARM_UP_METHOD,
+    AnyStep,
     Campaign,
+    CampaignDocumentError,
     CampaignError,
     CampaignPlan,
+    Methods,
     collect_methods,
+    collect_step_methods,
     expand_campaign,
     format_plan,
     load_campaign,
     parse_campaign,
     plan_campaign,
 )
-from bench.campaigns.engine import CampaignState, Message, answer, parse_choice, pause, resume, stop
+from bench.campaigns.engine import (
+    CampaignState,
+    Choice,
+    Message,
+    QueueEdit,
+    answer,
+    apply_edit,
+    collect_edit_methods,
+    needs_results,
+    parse_choice,
+    pause,
+    resume,
+    stop,
+)
+from bench.campaigns.notifications import make_test_content, send_all
 from bench.campaigns.runner import CampaignRunner, lock_campaign
 from bench.campaigns.store import CampaignStore, StoredCampaign
-from bench.campaigns.view import CampaignView, format_view, make_view
+from bench.campaigns.view import CampaignView, ItemView, format_view, make_view
 
 __all__ = [
+    "WARM_UP_METHOD",
+    "AgentBench",
+    "AnyStep",
     "Campaign",
     "CampaignBench",
+    "CampaignDocumentError",
     "CampaignError",
     "CampaignPlan",
     "CampaignRunner",
     "CampaignState",
     "CampaignStore",
     "CampaignView",
+    "Choice",
+    "ItemView",
     "Message",
+    "Methods",
     "PlantBench",
+    "QueueEdit",
     "StoredCampaign",
+    "Thermometer",
     "answer",
+    "apply_edit",
+    "collect_edit_methods",
     "collect_methods",
+    "collect_step_methods",
     "expand_campaign",
     "format_plan",
     "format_view",
     "load_campaign",
     "lock_campaign",
+    "make_test_content",
     "make_view",
+    "needs_results",
     "parse_campaign",
     "parse_choice",
     "pause",
     "plan_campaign",
     "resume",
+    "send_all",
     "stop",
 ]

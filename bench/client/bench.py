@@ -8,6 +8,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from bench.client.campaign import Campaign
 from bench.client.live import LiveSamples, iterate_live
 from bench.client.run import Run, RunState, parse_run_state
 from bench.client.session import Session
@@ -88,6 +89,31 @@ class Bench:
         """
         request = {"method": method, "specimen": specimen, "operator": operator, "resume_after": resume_after}
         return self.run(str(self._session.post("/runs", request, key=uuid.uuid4().hex)["id"]))
+
+    def start_campaign(self, campaign: Mapping[str, Any], operator: str = "") -> Campaign:
+        """Start a campaign and return it; it continues if the script ends.
+
+        Args:
+            campaign: document `mrbench.campaign/1`.
+            operator: name of the person.
+
+        Raises:
+            ClientError: the campaign is refused, or the service cannot be reached.
+        """
+        request = {"campaign": campaign, "operator": operator}
+        return self.campaign(str(self._session.post("/campaigns", request, key=uuid.uuid4().hex)["id"]))
+
+    def campaign(self, campaign_id: str) -> Campaign:
+        """Return a campaign by its id; nothing is requested yet."""
+        return Campaign(self._session, campaign_id)
+
+    def list_campaigns(self, limit: int = _PAGE_SIZE) -> list[dict[str, Any]]:
+        """Return the newest campaigns in short.
+
+        Raises:
+            ClientError: the service cannot be reached.
+        """
+        return list(self._session.get("/campaigns", limit=limit)["items"])
 
     def live(self, rate_hz: float = math.inf) -> Iterator[LiveSamples]:
         """Yield live samples of all channels as arrays with units, until the caller stops.

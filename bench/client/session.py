@@ -88,6 +88,15 @@ class Session:
                 raise
             return self._post(path, body, headers)
 
+    def patch(self, path: str, content: Mapping[str, Any]) -> Any:
+        """Return the reply to PATCH, decoded from JSON.
+
+        Raises:
+            ClientError: the service refuses or cannot be reached.
+        """
+        with self._request("PATCH", path, json.dumps(content).encode()) as reply:
+            return _decode(path, reply.read())
+
     def download(self, path: str, to: Path) -> Path:
         """Download a file, which appears complete or not at all, and return its path.
 

@@ -23,6 +23,7 @@ from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentLink, AgentMonitor
+from bench.service.campaigns import CampaignExecutor
 from bench.service.context import ServiceContext
 from bench.service.middleware import (
     BodyLimitMiddleware,
@@ -116,6 +117,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         stack.push_async_callback(engine.close)
         await engine.start(context.job_manager)
         stack.enter_context(context.monitor)
+        stack.enter_context(context.campaigns)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.live.publish_clock()))
         yield
@@ -142,9 +144,12 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         publish(topic, message)
         if isinstance(message, AgentEvent):
             registry.record_event(message)
+        elif isinstance(message, LiveBatch):
+            campaigns.thermometer.take(message)
 
     job_manager = JobManager(catalogue, engine, on_job_changed)
     monitor = AgentMonitor(settings.link, on_message, on_status)
+    campaigns = CampaignExecutor(catalogue, monitor, is_local=settings.has_local_logs)
     registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
         settings.access,
@@ -157,6 +162,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         settings.has_local_logs,
         SpaceMonitor(settings.data),
         SampleStore(settings.data),
+        campaigns,
     )
     return context
 

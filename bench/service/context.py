@@ -16,6 +16,7 @@ from bench.live import LiveBroadcaster
 from bench.samples import SampleStore
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentMonitor
+from bench.service.campaigns import CampaignExecutor
 from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
 from bench.service.views import Run, make_run_view
@@ -39,6 +40,7 @@ class ServiceContext:
     """True if the agent writes into the service's data folder."""
     space_monitor: SpaceMonitor
     sample_store: SampleStore
+    campaigns: CampaignExecutor
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
     """Locks of the idempotency keys of requests in progress."""
 

@@ -11,6 +11,7 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
+from bench.campaigns import CampaignDocumentError
 from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, RecordingError
 
 MEDIA_TYPE = "application/problem+json"
@@ -106,6 +107,12 @@ _HTTP_NAMES = {
 _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
     (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method was refused"),
     (RecordingError, HTTPStatus.UNPROCESSABLE_ENTITY, "recording-refused", "The recording was refused"),
+    (
+        CampaignDocumentError,
+        HTTPStatus.UNPROCESSABLE_ENTITY,
+        "campaign-refused",
+        "The campaign was refused",
+    ),
     (AgentUnreachableError, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),

@@ -10,6 +10,7 @@ from pathlib import Path
 from sqlalchemy.exc import SQLAlchemyError
 
 from bench.agent_protocol import AgentEvent, AgentStatus, RunStatus
+from bench.campaigns import WARM_UP_METHOD
 from bench.catalogue import Catalogue, LogIntegrity, RunRow, catalogue_log, is_complete, scan_logs
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
@@ -154,7 +155,10 @@ class RunRegistry:
         _LOG.info("run_" + row.state, extra={"run": row.id, "outcome": row.outcome, "reason": row.reason})
         await self._on_changed(row)
         is_complete_run = (
-            (is_wanted or row.source == "run") and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
+            (is_wanted or row.source == "run")
+            and row.outcome in IDENTIFIED_OUTCOMES
+            and row.log_sha256
+            and row.method != WARM_UP_METHOD
         )
         if (
             is_complete_run

@@ -14,7 +14,7 @@ from bench.campaigns.document.document import (
     load_campaign,
     parse_campaign,
 )
-from bench.campaigns.document.errors import CampaignError
+from bench.campaigns.document.errors import CampaignDocumentError, CampaignError
 from bench.campaigns.document.expansion import expand_campaign
 from bench.campaigns.document.plan import (
     CampaignPlan,
@@ -43,6 +43,7 @@ from bench.campaigns.document.strokes import (
     Methods,
     add_strokes,
     collect_methods,
+    collect_step_methods,
     get_method_name,
     list_runs,
     make_run_method,
@@ -53,6 +54,7 @@ __all__ = [
     "WARM_UP_METHOD",
     "AnyStep",
     "Campaign",
+    "CampaignDocumentError",
     "CampaignError",
     "CampaignPlan",
     "DiagnosisGoal",
@@ -76,6 +78,7 @@ __all__ = [
     "Webhook",
     "add_strokes",
     "collect_methods",
+    "collect_step_methods",
     "describe_step",
     "estimate_durations",
     "expand_campaign",

@@ -16,7 +16,7 @@ from pydantic import (
     model_validator,
 )
 
-from bench.campaigns.document.errors import CampaignError
+from bench.campaigns.document.errors import CampaignDocumentError
 from bench.campaigns.document.steps import (
     STEP_KINDS,
     DiagnosisGoal,
@@ -166,13 +166,14 @@ def parse_campaign(content: Any, origin: str) -> Campaign:
     """Return the campaign of a parsed document; ``origin`` names the document in messages.
 
     Raises:
-        CampaignError: the document is invalid; the message names the position.
+        CampaignDocumentError: the document is invalid; the message names the position.
     """
     try:
         return Campaign.model_validate(content)
     except ValidationError as error:
         first, message = get_first_error(error)
-        raise CampaignError(f"{origin} is not a campaign: {_format_place(first['loc'])}: {message}") from None
+        place = _format_place(first["loc"])
+        raise CampaignDocumentError(f"{origin} is not a campaign: {place}: {message}") from None
 
 
 _VARIANTS = ("list", "of_matrix", *(kind.__name__ for kind in (IntervalGoal, DiagnosisGoal)))
@@ -193,12 +194,12 @@ def load_campaign(path: Path) -> Campaign:
     """Load a campaign from its file.
 
     Raises:
-        CampaignError: the file cannot be read, or the document is invalid.
+        CampaignDocumentError: the file cannot be read, or the document is invalid.
     """
     try:
         content = json.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise CampaignError(f"campaign {path} cannot be read: {error}") from None
+        raise CampaignDocumentError(f"campaign {path} cannot be read: {error}") from None
     except ValueError as error:
-        raise CampaignError(f"{path} is not a campaign: not JSON, {error}") from None
+        raise CampaignDocumentError(f"{path} is not a campaign: not JSON, {error}") from None
     return parse_campaign(content, str(path))

@@ -4,7 +4,7 @@ from itertools import product
 from random import Random
 
 from bench.campaigns.document.document import Campaign, Matrix, MatrixSteps
-from bench.campaigns.document.errors import CampaignError
+from bench.campaigns.document.errors import CampaignDocumentError
 from bench.campaigns.document.steps import RunSpec, RunStep, Step
 
 MAX_STEPS = 10_000
@@ -17,12 +17,12 @@ def expand_campaign(campaign: Campaign) -> tuple[Step, ...]:
     The runs of one specimen stay together, because every change of the specimen is work by hand.
 
     Raises:
-        CampaignError: there are too many steps.
+        CampaignDocumentError: there are too many steps.
     """
     steps = campaign.steps
     expanded = _expand_matrix(steps.matrix, campaign.seed) if isinstance(steps, MatrixSteps) else tuple(steps)
     if len(expanded) > MAX_STEPS:
-        raise CampaignError(
+        raise CampaignDocumentError(
             f"campaign {campaign.name} has {len(expanded)} steps, at most {MAX_STEPS} are possible; divide it"
         )
     return expanded

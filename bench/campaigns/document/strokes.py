@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from bench.campaigns.document.document import Campaign
-from bench.campaigns.document.errors import CampaignError
+from bench.campaigns.document.errors import CampaignDocumentError
 from bench.campaigns.document.expansion import expand_campaign
 from bench.campaigns.document.steps import RunSpec, Step, find_run
 from bench.errors import MethodError
@@ -30,13 +30,22 @@ def collect_methods(campaign: Campaign, *, allow_files: bool = False) -> dict[st
         allow_files: whether a method may be named by its file.
 
     Raises:
-        CampaignError: a method is missing or invalid, or two different ones have the same name.
+        CampaignDocumentError: a method is missing or invalid, or two different ones have the same name.
+    """
+    return collect_step_methods(expand_campaign(campaign), allow_files=allow_files)
+
+
+def collect_step_methods(steps: Iterable[Step], *, allow_files: bool = False) -> dict[str, Method]:
+    """Return the methods of steps by name.
+
+    Raises:
+        CampaignDocumentError: a method is missing or invalid, or two different ones have the same name.
     """
     methods: dict[str, Method] = {}
-    for run in list_runs(expand_campaign(campaign)):
+    for run in list_runs(steps):
         method = _load(run.method, allow_files=allow_files)
         if methods.setdefault(method.name, method) != method:
-            raise CampaignError(f"two different methods are named {method.name}; give each its own name")
+            raise CampaignDocumentError(f"two different methods are named {method.name}; give each its own name")
         make_run_method(methods, run)
     return methods
 
@@ -52,10 +61,10 @@ def _load(method: str | Mapping[str, Any], *, allow_files: bool) -> Method:
             return parse_method(method, "the method of a run")
         if not allow_files and method not in list_shipped_methods():
             names = ", ".join(list_shipped_methods())
-            raise CampaignError(f"there is no method {method[:80]}; the methods are {names}")
+            raise CampaignDocumentError(f"there is no method {method[:80]}; the methods are {names}")
         return load_method(method)
     except MethodError as error:
-        raise CampaignError(str(error)) from None
+        raise CampaignDocumentError(str(error)) from None
 
 
 def get_method_name(run: RunSpec) -> str:
@@ -69,14 +78,14 @@ def make_run_method(methods: Methods, run: RunSpec) -> Method:
     """Return the method of a run, with the run's constant drive if it has one.
 
     Raises:
-        CampaignError: the drive exceeds the limit of the method.
+        CampaignDocumentError: the drive exceeds the limit of the method.
     """
     method = methods[get_method_name(run)]
     if run.drive is None:
         return method
     if run.drive > method.limits.drive:
         unit = method.drive_unit
-        raise CampaignError(
+        raise CampaignDocumentError(
             f"drive {run.drive:g} {unit} exceeds the limit of method {method.name}, {method.limits.drive:g} {unit}"
         )
     drive = {"kind": "constant", "value": run.drive}
@@ -89,7 +98,7 @@ def make_warm_up(method: Method, cycles: int | None) -> Method:
     """Return the warm-up before a method: its first sine, for some cycles or one block.
 
     Raises:
-        CampaignError: the method has no sine strokes.
+        CampaignDocumentError: the method has no sine strokes.
     """
     document = method.model_dump(mode="json", by_alias=True, exclude_defaults=True)
     motion, drive = _find_sine(document)
@@ -107,7 +116,7 @@ def _find_sine(document: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, A
     for segment in document["segments"]:
         if segment["motion"]["kind"] == "sine":
             return segment["motion"], {"kind": "constant", "value": 0.0}
-    raise CampaignError(
+    raise CampaignDocumentError(
         f"method {document['name']} has no sine strokes to warm up with; give it a warm-up in its conditioning"
     )
 
@@ -116,7 +125,7 @@ def add_strokes(method: Method, strokes: Sequence[Mapping[str, Any]]) -> Method:
     """Return a method with proposed strokes added at its end, each under a new name.
 
     Raises:
-        CampaignError: a stroke does not fit the method.
+        CampaignDocumentError: a stroke does not fit the method.
     """
     document = method.model_dump(mode="json", by_alias=True, exclude_defaults=True)
     added = [{**stroke, "name": f"next_stroke_{number}"} for number, stroke in enumerate(strokes, 1)]
@@ -127,6 +136,6 @@ def _parse(document: Mapping[str, Any]) -> Method:
     try:
         return Method.model_validate(document)
     except ValidationError as error:
-        raise CampaignError(
+        raise CampaignDocumentError(
             f"method {document['name']} cannot be changed: {describe_validation_error(error)}"
         ) from None

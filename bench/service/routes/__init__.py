@@ -3,6 +3,7 @@
 from bench.service.routes import (
     analyses,
     batches,
+    campaigns,
     continuation,
     exchange,
     integrity,
@@ -30,6 +31,7 @@ PROTECTED_ROUTERS = (
     batches.router,
     *exchange.ROUTERS,
     *recordings.ROUTERS,
+    campaigns.router,
     *analyses.ROUTERS,
 )
 """Routers that need the token."""

@@ -19,7 +19,12 @@ from bench.agent.run_executor import RunExecutor, find_log_folder
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
 from bench.agent.state_machine import StateMachine
-from bench.agent.status import collect_warnings, describe_bench, make_instrument_statuses
+from bench.agent.status import (
+    collect_warnings,
+    describe_bench,
+    make_instrument_statuses,
+    make_limit_statuses,
+)
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import (
@@ -175,10 +180,20 @@ class Agent:
                 self._rig.actuator.settings.setpoint_timeout,
                 self._space_monitor.describe(),
             ),
+            limits=make_limit_statuses(self._interlocks.limits),
+            travel_m=self._find_travel(),
             drive_kind=self._rig.drive_kind,
             drive_unit=self._rig.drive_unit,
             config_identity=self._config_identity,
         )
+
+    def _find_travel(self) -> tuple[float, float] | None:
+        """Return the positions of both end stops [m]; None while the rod's position is not known."""
+        actuator = self._rig.actuator
+        if actuator.reference_state.value in ("unreferenced", "reference_lost"):
+            return None
+        position = next(one for one in actuator.channels if one.name == "actuator_position")
+        return position.low, position.high
 
     def describe(self) -> BenchDescription:
         """Return what the configuration says about the bench."""

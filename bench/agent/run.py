@@ -127,6 +127,7 @@ class Run:
         """Return progress or result."""
         request, method = self.request, self.request.method
         elapsed, segment = self.history.find_progress(self._clock())
+        cycle = request.programme.find_cycle(segment, elapsed)
         is_over = self._outcome is not None
         return RunStatus(
             id=request.identity.make_run_id(method.name),
@@ -139,6 +140,8 @@ class Run:
             duration_s=request.programme.duration,
             elapsed_s=elapsed,
             segment="" if is_over or segment == NO_SEGMENT else request.programme.segments[segment].name,
+            cycle=None if is_over or cycle is None else cycle[0],
+            cycles=None if is_over or cycle is None else cycle[1],
             outcome=self._outcome,
             ending=self._ending if is_over else None,
             reason=self._reason if is_over else "",

@@ -2,10 +2,11 @@
 
 from collections.abc import Iterable
 
-from bench.agent_protocol import BenchChannel, BenchDescription, BenchLimit, InstrumentStatus
+from bench.agent_protocol import BenchChannel, BenchDescription, BenchLimit, InstrumentStatus, LimitStatus
 from bench.config import BenchConfig
 from bench.recorder import make_channel_infos
 from bench.rig import Acquisition, RegisteredInstrument, Rig
+from bench.safety import LimitMatrix
 from drivers import Clock
 
 _LIMIT_UNITS = {
@@ -49,6 +50,15 @@ def _make_status(registered: RegisteredInstrument, acquisition: Acquisition, clo
         age_s=None if health.last_ns is None else (clock() - health.last_ns) * 1e-9,
         clock_error_bound_s=clock_map.compute_error_bound() if clock_map.is_known else None,
         message=health.message or ("does not reply" if has_failed else ""),
+    )
+
+
+def make_limit_statuses(limits: LimitMatrix) -> tuple[LimitStatus, ...]:
+    """Describe limits in force."""
+    return tuple(
+        LimitStatus(quantity=quantity, action=action.name.lower(), value=value)
+        for quantity, thresholds in limits.items()
+        for action, value in thresholds.items()
     )
 
 

@@ -140,6 +140,8 @@ class RunStatus(Message):
     duration_s: float = Field(description="planned duration [s]")
     elapsed_s: float = Field(default=0.0, description="completed time of the plan [s]")
     segment: str = Field(default="", description="name of the current segment; empty between segments")
+    cycle: int | None = Field(default=None, description="cycle of the segment, from 1; null without cycles")
+    cycles: int | None = Field(default=None, description="number of cycles of the segment; null without cycles")
     outcome: RunOutcome | None = Field(default=None, description="null while the run is in progress")
     ending: RunEnding | None = Field(
         default=None,
@@ -180,6 +182,14 @@ class InstrumentStatus(Message):
     message: str = Field(description="fault for a person; empty without a fault")
 
 
+class LimitStatus(Message):
+    """One limit in force, for either sign of its quantity."""
+
+    quantity: str = Field(description="force, displacement (of the rod), actuator_velocity, temperature, ...")
+    action: str = Field(description="what follows: indicate, hold, controlled_stop or trip")
+    value: float = Field(description="in the SI unit of the quantity; temperature in degC")
+
+
 class AgentStatus(Message):
     """State of the agent."""
 
@@ -197,6 +207,10 @@ class AgentStatus(Message):
     )
     instruments: tuple[InstrumentStatus, ...] = ()
     warnings: tuple[str, ...] = Field(default=(), description="such as: no real-time priority, with the reason")
+    limits: tuple[LimitStatus, ...] = Field(default=(), description="limits in force at present")
+    travel_m: tuple[float, float] | None = Field(
+        default=None, description="positions of both end stops of the rod [m]; null if not known"
+    )
     drive_kind: str = Field(default="", description="coil_v or coil_a")
     drive_unit: str = Field(default="", description="V or A")
     config_identity: str = Field(default="", description="differs for another content of bench.toml")

@@ -19,6 +19,7 @@ from fastapi.staticfiles import StaticFiles
 from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import compile_method, compute_envelope, load_method
 from bench.service.routes.planning.previews import make_preview
+from tests.support.fake_recording import recording_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
@@ -72,6 +73,13 @@ def instrument(name: str, driver: str, address: str, **more: Any) -> dict[str, A
     return {"name": name, "driver": driver, "address": address} | healthy | more
 
 
+LIMITS = [
+    {"quantity": "force", "action": "controlled_stop", "value": 1500.0},
+    {"quantity": "force", "action": "trip", "value": 1875.0},
+    {"quantity": "displacement", "action": "controlled_stop", "value": 0.02625},
+    {"quantity": "displacement", "action": "trip", "value": 0.055},
+    {"quantity": "temperature", "action": "indicate", "value": 60.0},
+]
 INSTRUMENTS = [
     instrument("actuator", "canopen", "socketcand://127.0.0.1:29536/can0 node 5", age_s=0.004),
     instrument("load_cell", "serial", "/dev/pts/3", lost=12, corrupted=2, resynchronised=1),
@@ -135,7 +143,8 @@ class FakeBench:
             "state": self.state, "utc_s": time.time(), "trip": self.trip, "run": self.run, "finished": [],
             "instruments": INSTRUMENTS,
             "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
-            "drive_kind": "coil_v", "drive_unit": "V", "reference_state": self.reference_state, "step": self.step,
+            "limits": LIMITS, "travel_m": (-0.06, 0.06), "drive_kind": "coil_v", "drive_unit": "V",
+            "reference_state": self.reference_state, "step": self.step,
         }  # fmt: skip
 
     def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
@@ -143,7 +152,7 @@ class FakeBench:
         known = {"id": "run-4", "started": "2025-03-04T09:30:00Z", **wanted}
         self.run = known | {
             "log": "run-4.mcap", "duration_s": 14.0, "elapsed_s": 5.0, "segment": "sine_10mm_1Hz", "outcome": None,
-            "reason": "", "lost": {},
+            "reason": "", "lost": {}, "cycle": 3, "cycles": 10,
         }  # fmt: skip
         self.state = "running"
         self.runs["run-4"] = run(4, None, state="running", **known)
@@ -198,6 +207,7 @@ def application(bench: FakeBench) -> FastAPI:
         live_routes,
     ):
         app.include_router(routes(bench), prefix="/api/v1")
+    app.include_router(recording_routes(), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 

@@ -55,6 +55,12 @@ def test_all_plots_move_and_all_readings_have_units(seen):
     lines = [reading.splitlines() for reading in seen["readings"]]
     assert {line[0]: line[1].split()[-1] for line in lines} == units
     assert {line[0]: line[2] for line in lines}["Displacement"] == "−10.00 … 10.00"
+    assert {line[0]: line[3:] for line in lines}["Displacement"] == [
+        "end stop −60.00\u00a0mm: 50.00\u00a0mm left",
+        "end stop 60.00\u00a0mm: 50.00\u00a0mm left",
+        "stop at ±26.25\u00a0mm: 16.25\u00a0mm left",
+        "trip at ±55.00\u00a0mm: 45.00\u00a0mm left",
+    ]
 
 
 @browser_test
@@ -76,7 +82,7 @@ def test_a_refusal_is_shown_next_to_the_start_button(seen):
 
 @browser_test
 def test_a_run_shows_its_progress_and_moves_the_focus_to_stop(seen, bench):
-    assert seen["progress"] == ["sine_10mm_1Hz", "9 s left of 14 s", pytest.approx(5 / 14)]
+    assert seen["progress"] == ["sine_10mm_1Hz, cycle 3 of 10", "9 s left of 14 s", pytest.approx(5 / 14)]
     assert seen["focused"] == "stop"
     assert seen["startWhileRunning"]
     wanted = {"method": "quick", "specimen": "MR-0042", "operator": "A. Meyer"}

@@ -1,5 +1,7 @@
 // Client of the REST interface: token, JSON requests, files, and errors with their messages.
 
+import { parseBatch } from "./live_batch.js";
+
 const BASE = new URL("api/v1/", document.baseURI);
 const TOKEN_KEY = "mrbench.token";
 const TIMEOUT_MS = 20_000;
@@ -51,6 +53,16 @@ export function liveAddress() {
 
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
+
+/** Fetches recorded samples in binary batches; see `parseBatch`. */
+export async function samples(path) {
+  const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
+  const channels = JSON.parse(response.headers.get("x-mrbench-channels"));
+  const content = await response.arrayBuffer();
+  const batches = [];
+  for (let offset = 0; offset < content.byteLength; offset += batches.at(-1).bytes) batches.push(parseBatch(content, channels, offset));
+  return batches;
+}
 
 /** Makes a key for one request; `randomUUID` is missing on a page that was loaded without TLS from elsewhere. */
 const makeKey = () => crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;

@@ -6,6 +6,7 @@ import { EventList } from "./events.js";
 import { byId, fixed, write } from "./format.js";
 import { HealthStrip } from "./health.js";
 import { greyInstruments, showInstruments, showWarnings } from "./instruments.js";
+import { Limits } from "./limits.js";
 import { LiveLink, fillCoilChannel } from "./live.js";
 import { PlanView } from "./plan.js";
 import { Playhead } from "./playhead.js";
@@ -55,7 +56,8 @@ const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
-new Readings(ring, byId("readings"), STRIP_SECONDS);
+const limits = new Limits();
+new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
 const playhead = new Playhead(clock);
 const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: byId("strips") }, () => ring.revealUntil(playhead.utc));
 
@@ -79,6 +81,7 @@ const HANDLERS = {
   clock: ({ utc_s: utc }) => clock.update(utc),
   status(status) {
     bar.update(status);
+    limits.update(status);
     driveKind = status.drive_kind;
     if (status.drive_unit && status.drive_unit !== QUANTITIES.drive.unit) {
       QUANTITIES.drive.unit = status.drive_unit;

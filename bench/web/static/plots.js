@@ -214,6 +214,7 @@ export class LivePlots {
       for (const { plot } of this.plots) plot.redraw(false, true);
     });
     const onFrame = () => {
+      if (this.isDestroyed) return;
       this.draw();
       requestAnimationFrame(onFrame);
     };
@@ -229,6 +230,12 @@ export class LivePlots {
     for (const plot of this.plots) plot.draw();
     const ended = performance.now();
     this.restUntil = ended + REST_SHARE * (ended - began);
+  }
+
+  /** Ends the drawing and releases the plots. */
+  destroy() {
+    this.isDestroyed = true;
+    for (const { plot } of this.plots) plot.destroy();
   }
 
   /** Writes the captions again, after a unit has changed. */

@@ -54,7 +54,7 @@ export class SampleRing {
     const pairs = Object.entries(this.values).map(([field, column]) => [column, columns[field]]);
     for (let k = 0; k < count; k++) {
       const at = this.written % this.capacity;
-      this.time[at] = Math.max(begin + k * period, this.written ? this.latest : -Infinity);
+      this.time[at] = Math.max(begin + (columns.time ? columns.time[k] : k * period), this.written ? this.latest : -Infinity);
       for (const [column, given] of pairs) column[at] = given ? given[k] : NaN;
       this.written++;
     }

@@ -28,7 +28,10 @@ export class RunActions {
     const report = mayReport(run)
       ? element("a", { className: "button", href: runAddress(run.id, "report"), "aria-label": `Report of ${name(run)}` }, "Report")
       : null;
-    const made = [this.button(run, "log", "Log", () => this.save(run, "log"))];
+    const replay = hasEnded(run)
+      ? [element("a", { className: "button", href: runAddress(run.id, "replay"), "aria-label": `Replay of ${name(run)}` }, "Replay")]
+      : [];
+    const made = [...replay, this.button(run, "log", "Log", () => this.save(run, "log"))];
     if (isFitted(run)) made.push(this.button(run, "fit", "Fit", () => this.save(run, "fit")));
     return report ? [report, ...made] : made;
   }

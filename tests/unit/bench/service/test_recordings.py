@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from bench.agent_protocol import AgentEvent
+from bench.replay import ReplayResult
 from bench.samples import decode_batches
+from bench.service.routes.recordings.replay import describe_replay
 from tests.support.logs import write_log
 from tests.support.service_logs import write_complete_log, write_truncated_log
 
@@ -198,3 +200,20 @@ def test_a_run_in_progress_is_not_moved_to_the_trash(service):
     service.client.app.state.context.catalogue.update_run("run-1", state="running")
     answer = service.client.delete(f"{API}/runs/run-1")
     assert (answer.status_code, answer.json()["title"]) == (409, "The run goes on")
+
+
+def test_the_raw_frames_of_a_run_are_decoded_again_and_the_answer_says_so(service):
+    found = service.post("/runs/run-1/replay")
+    assert (found["equal"], found["instruments"]) == (True, [])
+    assert found["text"] == "The log has no raw frames: it was imported, or recorded without wires."
+
+
+@pytest.mark.parametrize(
+    ("differences", "words"), [(0, "all 9 readings are equal"), (2, "differ from the readings")]
+)
+def test_the_answer_on_raw_frames_names_differences(differences, words):
+    text = describe_replay(
+        [ReplayResult("lvdt", 5, 9, differences, "lvdt 3 was recorded but is not in the frames")]
+    )
+    assert words in text
+    assert ("was recorded but" in text) == bool(differences)

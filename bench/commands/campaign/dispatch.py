@@ -29,6 +29,10 @@ def campaign(
     target: Annotated[
         str, typer.Argument(help="File of the campaign for plan and run, else its id.", metavar="FILE|ID")
     ] = "",
+    config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="With run: on this bench.toml, by the service that uses --data."),
+    ] = None,
     scenario: Annotated[
         str | None,
         typer.Option(metavar="NAME|FILE", help="With run: on the simulated plant, faster than real time."),
@@ -64,12 +68,31 @@ def campaign(
 
         plan(Path(target), data, quick=quick, as_json=as_json)
     elif action is Action.RUN:
-        if scenario is None:
-            raise typer.BadParameter("give --scenario NAME or FILE")
-        from bench.commands.campaign.run import run_on_plant
-
-        run_on_plant(Path(target), scenario, data, operator, identify=identify, is_new=new, as_json=as_json)
+        if (scenario is None) == (config is None):
+            raise typer.BadParameter("give one of --config bench.toml and --scenario NAME or FILE")
+        _run(Path(target), config, scenario, data, operator, identify=identify, is_new=new, as_json=as_json)
     else:
         from bench.commands.campaign.control import control
 
         control(action.value, target, data, operator, note=answer, choice=choice, as_json=as_json)
+
+
+def _run(
+    path: Path,
+    config: Path | None,
+    scenario: str | None,
+    data: Path,
+    operator: str,
+    *,
+    identify: bool,
+    is_new: bool,
+    as_json: bool,
+) -> None:
+    if config is not None:
+        from bench.commands.campaign.bench import run_on_bench
+
+        run_on_bench(path, config, data, operator, as_json=as_json)
+    else:
+        from bench.commands.campaign.run import run_on_plant
+
+        run_on_plant(path, str(scenario), data, operator, identify=identify, is_new=is_new, as_json=as_json)

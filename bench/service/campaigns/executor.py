@@ -2,9 +2,18 @@
 
 import logging
 import threading
+import time
 from types import TracebackType
 
-from bench.campaigns import AgentBench, CampaignRunner, CampaignStore, Thermometer
+from bench.campaigns import (
+    AgentBench,
+    CampaignError,
+    CampaignRunner,
+    CampaignStore,
+    StoredCampaign,
+    Thermometer,
+    stop,
+)
 from bench.catalogue import Catalogue
 from bench.log_lines import RepeatedFailure
 from bench.service.agent_monitor import AgentMonitor
@@ -63,5 +72,18 @@ class CampaignExecutor:
         in_progress = self.store.list_in_progress(AGENT_BENCH)
         if not in_progress:
             return
+        self._check_needs(in_progress[0])
         ended = CampaignRunner(self.store, in_progress[0].id, self.bench).run(self._stopping.is_set)
         _LOG.info("campaign_left", extra={"campaign": ended.id, "status": ended.state.status})
+
+    def _check_needs(self, campaign: StoredCampaign) -> None:
+        """Stop a campaign that has not begun and has a condition that can never be met."""
+        state = campaign.state
+        if state.active is not None or any(item.state != "pending" for item in state.items):
+            return
+        try:
+            self.bench.check_needs(state.campaign, [item.step for item in state.items])
+        except CampaignError as error:
+            reason = str(error)
+            now = max(time.time(), state.updated)
+            self.store.update(campaign.id, lambda present: stop(present, now, reason=reason))

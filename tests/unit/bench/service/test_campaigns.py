@@ -6,6 +6,7 @@ import time
 import pytest
 
 from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
+from bench.campaigns import parse_campaign
 from tests.support.service_logs import write_complete_log
 
 RUN = {"run": {"specimen": "MR-1", "method": "quick"}}
@@ -160,3 +161,11 @@ def test_unknown_campaigns_and_missing_recipients_are_told(service):
     assert service.client.get("/api/v1/campaigns?before=none").status_code == 404
     campaign = start(service, [{"rest": {"seconds": 500}}])
     assert "no recipients" in service.post(f"/campaigns/{campaign['id']}/test-message", {}, 409)["detail"]
+
+
+def test_a_campaign_from_the_command_line_that_cannot_be_met_ends_with_the_reason(service):
+    document = parse_campaign({"name": "night", "steps": [COOL]}, "the test")
+    store = service.client.app.state.context.campaigns.store
+    campaign = store.create(document, {}, "agent", time.time())
+    ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
+    assert "no thermometer" in ended["reason"]

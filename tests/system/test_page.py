@@ -7,7 +7,8 @@ from itertools import pairwise
 import pytest
 
 from bench.agent_protocol import AgentStatus
-from bench.service.views import MethodSummary, Run
+from bench.service.routes.planning.views import MethodSummary
+from bench.service.views import Run
 from tests.support.fake_page_service import (
     CLAMPED,
     METHODS,

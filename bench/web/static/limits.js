@@ -40,7 +40,7 @@ export class Limits {
     const quantity = QUANTITIES[name];
     const shown = (value) => `${fixed(value * quantity.scale, quantity.digits)}\u00a0${quantity.unit}`;
     const reach = Math.max(Math.abs(low), Math.abs(high));
-    const lines = this.of(name).map(({ action, value }) => `${ACTIONS[action]} at ±${shown(value)}: ${shown(value - reach)} left`);
+    const lines = this.of(name).map(({ action, value }) => `${ACTIONS[action]} at ${name === "temperature" ? "" : "±"}${shown(value)}: ${shown(value - reach)} left`);
     if (name !== "displacement" || !this.travel) return lines;
     const [bottom, top] = this.travel;
     return [`end stop ${shown(bottom)}: ${shown(low - bottom)} left`, `end stop ${shown(top)}: ${shown(top - high)} left`, ...lines];

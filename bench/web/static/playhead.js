@@ -1,9 +1,9 @@
 // Time up to which live samples are shown, so that they move evenly although they arrive in batches.
 
 /** Largest delay [s]: a longer pause of the samples is shown as one. */
-const MAX_DELAY = 0.3;
+const MAX_DELAY = 0.15;
 /** Share by which a delay that is no longer needed shrinks with each batch. */
-const SHRINK = 0.02;
+const SHRINK = 0.05;
 
 /** Smallest delay behind the present at which every frame finds new samples. */
 export class Playhead {

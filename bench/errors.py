@@ -6,7 +6,9 @@ BenchError
 ├── RunError               a run failed or could not be started
 │   └── InterlockError     an interlock refused a command
 ├── AgentUnreachableError  the rig agent does not reply
+│   └── NoRigError         the service has no rig
 ├── SecretFileError        a file with a secret is missing, or other users may read it
+├── LiveDataError          a live batch cannot be read
 ├── LogError               a log cannot be read, written or repaired
 ├── RecordingError         a recording cannot be imported
 └── ReportError            a report or a demo cannot be made
@@ -26,12 +28,20 @@ class MethodError(BenchError):
     """A method cannot be compiled or exceeds its own limits."""
 
 
+class LiveDataError(BenchError):
+    """A live batch or its list of channels cannot be read."""
+
+
 class RunError(BenchError):
     """A run failed or could not be started."""
 
 
 class AgentUnreachableError(BenchError):
     """The rig agent does not reply."""
+
+
+class NoRigError(AgentUnreachableError):
+    """The service was started without a rig."""
 
 
 class SecretFileError(BenchError):

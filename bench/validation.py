@@ -1,9 +1,38 @@
 """Base class of strict documents, and validation errors as messages for the author of a document."""
 
 from collections.abc import Sequence
+from typing import Annotated, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import ErrorDetails
+
+MAX_SERIAL_LENGTH = 200
+"""Largest number of characters of a serial number."""
+
+
+def check_serial(serial: str) -> str:
+    """Return the serial number of a specimen unchanged if it is usable.
+
+    Raises:
+        ValueError: it is empty or too long, or has control characters or spaces at its ends.
+    """
+    if not serial.strip():
+        raise ValueError("the serial number of the specimen is empty; give that of the damper under test")
+    if len(serial) > MAX_SERIAL_LENGTH:
+        raise ValueError(f"the serial number has {len(serial)} characters; give at most {MAX_SERIAL_LENGTH}")
+    if not serial.isprintable():
+        raise ValueError("the serial number contains a control character; give letters, digits, marks and spaces")
+    if serial != serial.strip():
+        raise ValueError("the serial number begins or ends with a space; remove it")
+    return serial
+
+
+SerialNumber: TypeAlias = Annotated[
+    str,
+    AfterValidator(check_serial),
+    Field(json_schema_extra={"minLength": 1, "maxLength": MAX_SERIAL_LENGTH}),
+]
+"""Serial number of a specimen, as requests give it."""
 
 
 class FrozenModel(BaseModel):

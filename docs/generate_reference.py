@@ -16,6 +16,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 import typer
 from pydantic import AliasChoices, BaseModel
 
+from bench.campaigns import Campaign, CampaignPlan
 from bench.config import BenchConfig
 from bench.log import MESSAGES, TOPIC_FAMILIES, make_message_schema
 from bench.methods import Envelope, Method
@@ -44,6 +45,8 @@ FOLDER = Path(__file__).parent / "reference"
 
 DOCUMENTS: dict[str, type[BaseModel]] = {
     "bench": BenchConfig,
+    "campaign": Campaign,
+    "campaign-plan": CampaignPlan,
     "diagnosis": Diagnosis,
     "effect": EffectFile,
     "envelope": Envelope,

@@ -27,6 +27,9 @@ def play(
     commands: Annotated[Path, typer.Option(help="Commands: npz with time, displacement, drive.")],
     out: Annotated[Path, typer.Option(help="Recorded channels: npz.")],
     seed: Annotated[int | None, typer.Option(min=0, help="Replaces the seed of the scenario.")] = None,
+    temperature: Annotated[
+        float | None, typer.Option(help="Temperature of the damper at the start [degC]; else that of the room.")
+    ] = None,
     truth: Annotated[Path | None, typer.Option(help="Also write the hidden truth, for tests only: npz.")] = None,
 ) -> None:
     """Play commands from a file, faster than real time."""
@@ -35,7 +38,7 @@ def play(
     loaded = load_scenario(scenario)
     if seed is not None:
         loaded = loaded.model_copy(update={"seed": seed})
-    result = offline_run.run_offline(loaded, offline_run.read_commands(commands), _print_progress)
+    result = offline_run.run_offline(loaded, offline_run.read_commands(commands), _print_progress, temperature)
     offline_run.write_channels(out, loaded, result)
     if truth is not None:
         offline_run.write_truth(truth, loaded, result)

@@ -48,7 +48,10 @@ class RunResult(NamedTuple):
 
 
 def run_offline(
-    scenario: Scenario, commands: CommandSeries, progress: Callable[[float], None] = lambda fraction: None
+    scenario: Scenario,
+    commands: CommandSeries,
+    progress: Callable[[float], None] = lambda fraction: None,
+    start_temperature: float | None = None,
 ) -> RunResult:
     """Play commands on the rig of a scenario.
 
@@ -56,6 +59,7 @@ def run_offline(
         scenario: damper, effects, sensors, clocks and faults.
         commands: at least 10 samples.
         progress: receives the completed fraction, 0 to 1.
+        start_temperature: of the damper [degC]; that of the room if None.
 
     Raises:
         PlantError: the specimen has no finite motion.
@@ -70,8 +74,17 @@ def run_offline(
         progress(chunk.stop / count)
     truth = TrueSignals(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     elapsed = commands.time - commands.time[0]
+    if start_temperature is not None:
+        truth = _warm(truth, scenario, elapsed, start_temperature)
     values, channel_errors = make_readings(scenario, elapsed, truth)
     return RunResult(commands.time, apply_faults(scenario, elapsed, values), truth, channel_errors)
+
+
+def _warm(truth: TrueSignals, scenario: Scenario, elapsed: Array, start: float) -> TrueSignals:
+    """Add the decaying excess over the room with which the damper starts; nothing else depends on it."""
+    thermal = scenario.thermal
+    excess = (start - thermal.ambient) * np.exp(-thermal.loss / thermal.capacity * elapsed)
+    return truth._replace(temperature=truth.temperature + excess)
 
 
 def read_commands(path: Path) -> CommandSeries:

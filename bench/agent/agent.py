@@ -19,25 +19,32 @@ from bench.agent.run_executor import RunExecutor, find_log_folder
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
 from bench.agent.state_machine import StateMachine
-from bench.agent.status import collect_warnings, make_instrument_statuses
+from bench.agent.status import (
+    collect_warnings,
+    describe_bench,
+    make_instrument_statuses,
+    make_limit_statuses,
+)
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import (
     AgentEvent,
     AgentState,
     AgentStatus,
+    BenchDescription,
     PrepareCommand,
     Reply,
     RunCommand,
     RunStatus,
-    Samples,
 )
 from bench.config import BenchConfig, compute_identity
 from bench.disk import SpaceMonitor
 from bench.endings import SHUT_DOWN_REASON, STOP_REASON, RunEnding
 from bench.errors import BenchError, LogError
+from bench.live import BatchMaker, LiveBatch
+from bench.log import list_sample_units
 from bench.methods import NO_SEGMENT
-from bench.recorder import RecordingThread, find_force_rate
+from bench.recorder import RecordingThread
 from bench.rig import (
     PRIORITY_STEP,
     Acquisition,
@@ -54,7 +61,7 @@ from bench.safety import Action, Interlocks
 from bench.sequencer import move_rod
 from drivers import DriverError, Frame
 
-MessageSink: TypeAlias = Callable[[AgentStatus | Samples | AgentEvent], None]
+MessageSink: TypeAlias = Callable[[AgentStatus | LiveBatch | AgentEvent], None]
 
 _STATUS_PERIOD = 0.25
 """[s] Longest interval between two published statuses."""
@@ -103,8 +110,9 @@ class Agent:
             self._rig, self._interlocks, self._clock, self._acquisition.maps, self._report_event, self._stop_moving
         )
         aligner = Aligner(self._acquisition.maps, self._rig.drive_channel)
+        batch_maker = BatchMaker(list_sample_units(self._rig.drive_unit))
         self._recording_thread = RecordingThread(
-            aligner, find_force_rate(config), self._clock, publish, self._on_cycle, self._on_log_failed
+            aligner, batch_maker, self._clock, publish, self._on_cycle, self._on_log_failed
         )
         self._executor = RunExecutor(
             config, source, self._rig, self._interlocks, self._supervisor, self._acquisition,
@@ -172,10 +180,24 @@ class Agent:
                 self._rig.actuator.settings.setpoint_timeout,
                 self._space_monitor.describe(),
             ),
+            limits=make_limit_statuses(self._interlocks.limits),
+            travel_m=self._find_travel(),
             drive_kind=self._rig.drive_kind,
             drive_unit=self._rig.drive_unit,
             config_identity=self._config_identity,
         )
+
+    def _find_travel(self) -> tuple[float, float] | None:
+        """Return the positions of both end stops [m]; None while the rod's position is not known."""
+        actuator = self._rig.actuator
+        if actuator.reference_state.value in ("unreferenced", "reference_lost"):
+            return None
+        position = next(one for one in actuator.channels if one.name == "actuator_position")
+        return position.low, position.high
+
+    def describe(self) -> BenchDescription:
+        """Return what the configuration says about the bench."""
+        return describe_bench(self._config, self._rig)
 
     def get_run_status(self) -> RunStatus | None:
         """Return the status of the run in progress or of the latest run; None before the first."""

@@ -57,6 +57,7 @@ class Run:
         self._outcome: RunOutcome | None = None
         self._lost: dict[str, int] = {}
         self._started = datetime.now(UTC)
+        self._method_sha256 = request.method.compute_sha256()
 
     @property
     def log(self) -> LiveRecorder | None:
@@ -126,10 +127,12 @@ class Run:
         """Return progress or result."""
         request, method = self.request, self.request.method
         elapsed, segment = self.history.find_progress(self._clock())
+        cycle = request.programme.find_cycle(segment, elapsed)
         is_over = self._outcome is not None
         return RunStatus(
             id=request.identity.make_run_id(method.name),
             method=method.name,
+            method_sha256=self._method_sha256,
             specimen=request.identity.specimen,
             operator=request.identity.operator,
             log=str(request.path),
@@ -137,6 +140,8 @@ class Run:
             duration_s=request.programme.duration,
             elapsed_s=elapsed,
             segment="" if is_over or segment == NO_SEGMENT else request.programme.segments[segment].name,
+            cycle=None if is_over or cycle is None else cycle[0],
+            cycles=None if is_over or cycle is None else cycle[1],
             outcome=self._outcome,
             ending=self._ending if is_over else None,
             reason=self._reason if is_over else "",

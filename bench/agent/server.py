@@ -11,6 +11,7 @@ from bench.agent_protocol import (
     AbortCommand,
     Command,
     CommandServer,
+    DescribeCommand,
     PauseCommand,
     PrepareCommand,
     Publisher,
@@ -73,6 +74,8 @@ def handle_command(agent: Agent, command: Command, stopping: threading.Event) ->
     match command:
         case StatusCommand():
             return Reply(ok=True, status=agent.get_status())
+        case DescribeCommand():
+            return Reply(ok=True, description=agent.describe())
         case RunCommand():
             return agent.run(command)
         case StopCommand():

@@ -1,10 +1,25 @@
-"""Parts of the agent's status: instruments with their wires, and warnings."""
+"""Parts of the agent's status: instruments with their wires, warnings; description of the bench."""
 
 from collections.abc import Iterable
 
-from bench.agent_protocol import InstrumentStatus
-from bench.rig import Acquisition, RegisteredInstrument
+from bench.agent_protocol import BenchChannel, BenchDescription, BenchLimit, InstrumentStatus, LimitStatus
+from bench.config import BenchConfig
+from bench.recorder import make_channel_infos
+from bench.rig import Acquisition, RegisteredInstrument, Rig
+from bench.safety import LimitMatrix
 from drivers import Clock
+
+_LIMIT_UNITS = {
+    "force": "N",
+    "displacement": "m",
+    "actuator_velocity": "m/s",
+    "following_error": "m",
+    "coil_current": "A",
+    "coil_voltage": "V",
+    "temperature": "degC",
+    "force_age": "s",
+    "setpoint_lateness": "s",
+}
 
 
 def make_instrument_statuses(
@@ -38,6 +53,15 @@ def _make_status(registered: RegisteredInstrument, acquisition: Acquisition, clo
     )
 
 
+def make_limit_statuses(limits: LimitMatrix) -> tuple[LimitStatus, ...]:
+    """Describe limits in force."""
+    return tuple(
+        LimitStatus(quantity=quantity, action=action.name.lower(), value=value)
+        for quantity, thresholds in limits.items()
+        for action, value in thresholds.items()
+    )
+
+
 def collect_warnings(
     acquisition: Acquisition, priority_warning: str, setpoint_timeout: float, space_warning: str
 ) -> tuple[str, ...]:
@@ -56,3 +80,22 @@ def collect_warnings(
             f"{priority_warning}; the drive stops by itself {setpoint_timeout:g} s after the last setpoint"
         )
     return tuple([*warnings, space_warning] if space_warning else warnings)
+
+
+def describe_bench(config: BenchConfig, rig: Rig) -> BenchDescription:
+    """Describe limits and channels of a bench."""
+    infos = make_channel_infos(config, rig)
+    return BenchDescription(
+        name=config.rig.name,
+        specimen=config.rig.specimen,
+        drive_kind=rig.drive_kind,
+        drive_unit=rig.drive_unit,
+        limits={
+            name: BenchLimit(unit=_LIMIT_UNITS[name], **section)
+            for name, section in config.limits.model_dump().items()
+        },
+        channels={
+            name: BenchChannel(unit=info.unit, rate_hz=info.rate_hz, delay_s=info.delay_s)
+            for name, info in infos.items()
+        },
+    )

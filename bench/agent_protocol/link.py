@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, Self, TypeAlias
 
+import orjson
 import zmq
 from pydantic import TypeAdapter, ValidationError
 
@@ -27,21 +28,17 @@ from bench.agent_protocol.messages import (
     Command,
     Message,
     Reply,
-    Samples,
 )
 from bench.errors import AgentUnreachableError, ConfigError, RunError, SecretFileError
+from bench.live import LiveBatch, decode_batch, describe_channels, parse_channels
 from bench.validation import describe_validation_error
 
 CommandHandler = Callable[[Command], Reply]
-Publication: TypeAlias = AgentStatus | Samples | AgentEvent
+Publication: TypeAlias = AgentStatus | LiveBatch | AgentEvent
 """Message that the agent publishes."""
 
 _COMMAND_ADAPTER: TypeAdapter[Command] = TypeAdapter(Command)
-_MESSAGE_TYPES: Final[dict[bytes, type[Publication]]] = {
-    STATUS: AgentStatus,
-    SAMPLES: Samples,
-    EVENT: AgentEvent,
-}
+_MESSAGE_TYPES: Final[dict[bytes, type[AgentStatus | AgentEvent]]] = {STATUS: AgentStatus, EVENT: AgentEvent}
 _TOPICS: Final = {type_: topic for topic, type_ in _MESSAGE_TYPES.items()}
 _POLL_PERIOD = 100
 """[ms] Interval at which a loop checks whether it has to end."""
@@ -106,7 +103,7 @@ class Publisher(_SocketOwner):
 
     def publish(self, message: Publication) -> None:
         """Send a message to all subscribers; dropped for slow ones, and after the publisher is closed."""
-        frames = [_TOPICS[type(message)], message.model_dump_json().encode()]
+        frames = _serialise(message)
         with self._lock:
             if not self._socket.closed:
                 self._socket.send_multipart(frames)
@@ -161,6 +158,7 @@ class AgentClient:
 
         Raises:
             AgentUnreachableError: address or key is invalid.
+            LiveDataError: samples of another version.
         """
         with _open_socket(zmq.SUB) as socket:
             socket.subscribe(b"")
@@ -169,8 +167,22 @@ class AgentClient:
                 if not socket.poll(_POLL_PERIOD):
                     yield None
                     continue
-                topic, content = socket.recv_multipart()
-                yield _MESSAGE_TYPES[topic].model_validate_json(content)
+                yield _parse(socket.recv_multipart())
+
+
+def _serialise(message: Publication) -> list[bytes]:
+    """Return the parts of a publication: topic, then JSON, or list of channels and binary batch."""
+    if isinstance(message, LiveBatch):
+        return [SAMPLES, orjson.dumps(describe_channels(message.channels)), message.encode()]
+    return [_TOPICS[type(message)], message.model_dump_json().encode()]
+
+
+def _parse(parts: list[bytes]) -> Publication:
+    if parts[0] == SAMPLES:
+        _, channels, content = parts
+        return decode_batch(content, parse_channels(channels))
+    topic, content = parts
+    return _MESSAGE_TYPES[topic].model_validate_json(content)
 
 
 def _open_socket(kind: int, context: "zmq.Context[zmq.Socket[bytes]] | None" = None) -> "zmq.Socket[bytes]":

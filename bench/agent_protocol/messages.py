@@ -1,8 +1,8 @@
-"""Messages between the rig agent and its clients: commands, replies and publications, all as JSON.
+"""Messages between the rig agent and its clients: commands, replies and publications, as JSON except samples.
 
 Each command is sent to the agent's request socket and is answered by one `Reply`. The publishing socket sends an
-`AgentStatus` at every change and at least four times a second (topic ``status``), bench samples in batches
-(``samples``) and events (``event``).
+`AgentStatus` at every change and at least four times a second (topic ``status``), events (``event``), and all
+bench samples in live batches (``samples``, see `bench.live`).
 """
 
 from typing import Annotated, Any, Literal, Self, TypeAlias
@@ -31,6 +31,12 @@ class StatusCommand(Message):
     """Request of the `AgentStatus`."""
 
     command: Literal["status"] = "status"
+
+
+class DescribeCommand(Message):
+    """Request of the `BenchDescription`, which stays the same while the agent runs."""
+
+    command: Literal["describe"] = "describe"
 
 
 class RunCommand(Message):
@@ -109,6 +115,7 @@ class ShutDownCommand(Message):
 
 Command: TypeAlias = Annotated[
     StatusCommand
+    | DescribeCommand
     | RunCommand
     | StopCommand
     | PauseCommand
@@ -125,6 +132,7 @@ class RunStatus(Message):
 
     id: str
     method: str = Field(description="name of the method")
+    method_sha256: str = Field(default="", description="hash of the content of the method")
     specimen: str
     operator: str
     log: str = Field(description="file of the log on the agent's machine")
@@ -132,6 +140,8 @@ class RunStatus(Message):
     duration_s: float = Field(description="planned duration [s]")
     elapsed_s: float = Field(default=0.0, description="completed time of the plan [s]")
     segment: str = Field(default="", description="name of the current segment; empty between segments")
+    cycle: int | None = Field(default=None, description="cycle of the segment, from 1; null without cycles")
+    cycles: int | None = Field(default=None, description="number of cycles of the segment; null without cycles")
     outcome: RunOutcome | None = Field(default=None, description="null while the run is in progress")
     ending: RunEnding | None = Field(
         default=None,
@@ -172,6 +182,14 @@ class InstrumentStatus(Message):
     message: str = Field(description="fault for a person; empty without a fault")
 
 
+class LimitStatus(Message):
+    """One limit in force, for either sign of its quantity."""
+
+    quantity: str = Field(description="force, displacement (of the rod), actuator_velocity, temperature, ...")
+    action: str = Field(description="what follows: indicate, hold, controlled_stop or trip")
+    value: float = Field(description="in the SI unit of the quantity; temperature in degC")
+
+
 class AgentStatus(Message):
     """State of the agent."""
 
@@ -189,23 +207,16 @@ class AgentStatus(Message):
     )
     instruments: tuple[InstrumentStatus, ...] = ()
     warnings: tuple[str, ...] = Field(default=(), description="such as: no real-time priority, with the reason")
+    limits: tuple[LimitStatus, ...] = Field(default=(), description="limits in force at present")
+    travel_m: tuple[float, float] | None = Field(
+        default=None, description="positions of both end stops of the rod [m]; null if not known"
+    )
     drive_kind: str = Field(default="", description="coil_v or coil_a")
     drive_unit: str = Field(default="", description="V or A")
     config_identity: str = Field(default="", description="differs for another content of bench.toml")
     notice: str = Field(
         default="", description="what a person has to do so that the agent has the present bench.toml; else empty"
     )
-
-
-class Samples(Message):
-    """Batch of bench samples for live views: one value per sample in each list, SI units."""
-
-    time_ns: list[int] = Field(description="bench clock")
-    values: dict[str, list[float | None]] = Field(
-        description="by field of `/bench/sample`; null for a missing value"
-    )
-    segment: str = Field(default="", description="segment of the newest sample; empty between segments")
-    utc_s: float = Field(default=0.0, description="UTC of the newest sample [s since 1970]")
 
 
 class AgentEvent(Message):
@@ -216,9 +227,39 @@ class AgentEvent(Message):
     text: str
 
 
+class BenchLimit(Message):
+    """Values of one quantity beyond which the bench acts, for either sign; null for no action."""
+
+    unit: str
+    indicate: float | None = Field(description="alarm; the run continues")
+    hold: float | None = Field(description="the motion fades out and the rod is held")
+    controlled_stop: float | None = Field(description="the motion fades out, the run ends")
+    trip: float | None = Field(description="coil and actuator are stopped at once; latches")
+
+
+class BenchChannel(Message):
+    """One recorded channel."""
+
+    unit: str
+    rate_hz: float = Field(description="[Hz] sampling rate of the instrument")
+    delay_s: float = Field(description="[s] delay of the channel behind the measured quantity")
+
+
+class BenchDescription(Message):
+    """Description of the bench in its configuration."""
+
+    name: str
+    specimen: str = Field(description="mounted damper, used if a run does not name one; empty without one")
+    drive_kind: str = Field(description="coil_v or coil_a")
+    drive_unit: str = Field(description="V or A")
+    limits: dict[str, BenchLimit] = Field(description="limits of the fixture by quantity")
+    channels: dict[str, BenchChannel] = Field(description="recorded channels; `coil_drive` repeats a measured one")
+
+
 class Reply(Message):
     """Reply to a command."""
 
     ok: bool
     error: str = Field(default="", description="what failed, the value and the limit, what to do")
     status: AgentStatus | None = None
+    description: BenchDescription | None = Field(default=None, description="only in the reply to `describe`")

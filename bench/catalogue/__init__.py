@@ -1,47 +1,85 @@
 """The catalogue: runs, their logs, and the jobs on them, in a database."""
 
+from bench.catalogue.backup import Copied, back_up, restore_backup
+from bench.catalogue.campaign_table import CampaignChange, CampaignTable
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
 from bench.catalogue.job_queue import REPEATABLE_STATES, JobFilter, JobQueue
-from bench.catalogue.log_summary import is_complete
+from bench.catalogue.log_summary import LogSummary, is_complete, read_log_summary
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
+    CampaignEventRow,
+    CampaignRow,
+    EventRow,
     JobRow,
     JobState,
     LogIntegrity,
+    NoteKind,
+    NoteRow,
     RunOutcome,
     RunRow,
     RunState,
 )
+from bench.catalogue.planning import (
+    SHIPPED_VERSION,
+    ClaimedKey,
+    IdempotencyKeys,
+    MethodRow,
+    MethodStore,
+    Specimen,
+    SpecimenStore,
+)
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
+from bench.catalogue.trash import move_to_trash, restore_from_trash
 
 __all__ = [
     "CATALOGUE_FILE",
     "REPEATABLE_STATES",
+    "SHIPPED_VERSION",
     "UNFINISHED_STATES",
     "BatchRow",
+    "CampaignChange",
+    "CampaignEventRow",
+    "CampaignRow",
+    "CampaignTable",
     "Catalogue",
+    "ClaimedKey",
+    "Copied",
+    "EventRow",
+    "IdempotencyKeys",
     "JobFilter",
     "JobQueue",
     "JobRow",
     "JobState",
     "LogIntegrity",
+    "LogSummary",
+    "MethodRow",
+    "MethodStore",
+    "NoteKind",
+    "NoteRow",
     "RunFilter",
     "RunOutcome",
     "RunPlan",
     "RunRow",
     "RunState",
+    "Specimen",
+    "SpecimenStore",
+    "back_up",
     "catalogue_log",
     "check_all",
     "check_integrity",
     "find_catalogue",
     "is_complete",
     "make_sqlite_url",
+    "move_to_trash",
     "open_database",
+    "read_log_summary",
     "read_plan",
+    "restore_backup",
+    "restore_from_trash",
     "scan_logs",
 ]

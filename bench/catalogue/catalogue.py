@@ -7,9 +7,13 @@ from typing import Any
 from sqlalchemy import Engine, func, select, tuple_, update
 from sqlalchemy.orm import sessionmaker
 
+from bench.catalogue.campaign_table import CampaignTable
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
+from bench.catalogue.planning import SHIPPED_VERSION, IdempotencyKeys, MethodStore, SpecimenStore
+from bench.catalogue.records import EventJournal, Notebook
 from bench.catalogue.run_filter import RunFilter
+from bench.methods import list_shipped_methods, load_method
 
 
 class Catalogue:
@@ -24,6 +28,10 @@ class Catalogue:
         """
         self.folder = folder
         self.job_queue = JobQueue(engine)
+        self.idempotency_keys = IdempotencyKeys(engine)
+        self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
+        self.campaigns = CampaignTable(engine)
+        self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.
         self._sessions = sessionmaker(engine, expire_on_commit=False)
@@ -76,6 +84,12 @@ class Catalogue:
         with self._sessions() as session:
             return session.scalars(query).all()
 
+    def find_method_version(self, name: str, sha256: str) -> int | None:
+        """Return the version of a method with a content; None if that content is not known under its name."""
+        if name in list_shipped_methods() and load_method(name).compute_sha256() == sha256:
+            return SHIPPED_VERSION
+        return self.methods.find_version(name, sha256)
+
     def find_run_by_log(self, path: Path) -> RunRow | None:
         """Return the run that a log belongs to, or None."""
         with self._sessions() as session:
@@ -104,6 +118,12 @@ class Catalogue:
         query = select(RunRow.id, RunRow.log).where(RunRow.log_sha256.is_not(None), ~is_missing)
         with self._sessions() as session:
             return [(run_id, log) for run_id, log in session.execute(query)]
+
+    def list_unread(self, limit: int) -> Sequence[RunRow]:
+        """Return runs with a complete log whose losses and events were not read, the newest first."""
+        query = select(RunRow).where(RunRow.log_sha256.is_not(None), RunRow.alarms.is_(None))
+        with self._sessions() as session:
+            return session.scalars(query.order_by(RunRow.started.desc()).limit(limit)).all()
 
     def update_run(self, run_id: str, **values: Any) -> RunRow:
         """Set columns of a run and return the changed run."""

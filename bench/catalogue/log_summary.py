@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import IO, cast, get_args
 
+import orjson
 from mcap.reader import make_reader
 from mcap.records import Header, Message, Metadata
 from mcap.stream_reader import StreamReader
@@ -32,6 +33,8 @@ class LogSummary:
 
     id: str
     method: str
+    method_sha256: str
+    """Hash of the content of the method; empty in logs of older versions and in imports."""
     specimen: str
     operator: str
     source: str
@@ -46,6 +49,8 @@ class LogSummary:
     """Id of the run that it continues; empty without one."""
     ending: RunEnding | None
     """None if the log neither contains nor determines it."""
+    lost: dict[str, int]
+    """Number of lost samples by channel; empty for a truncated log."""
 
 
 def read_log_summary(path: Path) -> LogSummary:
@@ -124,6 +129,7 @@ def _make_summary(
         # An import is named after its CSV files, which can be imported twice; the log's file name is unique.
         id=path.stem if run.get("source") == "import" else run["id"],
         method=run.get("method", ""),
+        method_sha256=run.get("method_sha256", ""),
         specimen=run.get("specimen", ""),
         operator=run.get("operator", ""),
         source=run.get("source", "run"),
@@ -133,4 +139,14 @@ def _make_summary(
         reason=end.get("reason", ""),
         continues=run.get("continues", ""),
         ending=read_ending(end),
+        lost=_read_losses(end.get("lost", "")),
     )
+
+
+def _read_losses(text: str) -> dict[str, int]:
+    """Return the losses in the metadata of a log; none where an older version did not record them."""
+    try:
+        losses = orjson.loads(text or "{}")
+    except orjson.JSONDecodeError:
+        return {}
+    return {str(channel): int(count) for channel, count in losses.items()} if isinstance(losses, dict) else {}

@@ -15,6 +15,8 @@ LogIntegrity: TypeAlias = Literal["intact", "changed", "missing"]
 """Comparison of a log with its stored hash; missing: the file does not exist."""
 RunOutcome: TypeAlias = Literal["clean", "lossy", "truncated", "incomplete"]
 JobState: TypeAlias = Literal["queued", "running", "done", "failed", "cancelled"]
+NoteKind: TypeAlias = Literal["note", "tags"]
+"""A text of a person, or the record of changed tags."""
 UNFINISHED_STATES: tuple[JobState, ...] = ("queued", "running")
 """States of a job that is not finished."""
 
@@ -54,6 +56,10 @@ class RunRow(Base):
 
     id: Mapped[str] = mapped_column(Text, primary_key=True)
     method: Mapped[str] = mapped_column(Text)
+    method_version: Mapped[int | None] = mapped_column(default=None)
+    """Version of the method; None if its content was not stored under its name."""
+    method_sha256: Mapped[str | None] = mapped_column(Text, default=None)
+    """Hash of the content of the method; None in runs of older versions and in imports."""
     specimen: Mapped[str] = mapped_column(Text, default="")
     operator: Mapped[str] = mapped_column(Text, default="")
     source: Mapped[str] = mapped_column(Text, default="run")
@@ -82,6 +88,16 @@ class RunRow(Base):
     """Hash that the latest check found in a changed log."""
     checked: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     """UTC of the latest check."""
+    lost: Mapped[dict[str, int] | None] = mapped_column(JSON(none_as_null=True), default=None)
+    """Number of lost samples by channel; None until the end of the log was read."""
+    alarms: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True), default=None)
+    """Texts of the alarms in the log; None until its events were read."""
+    tags: Mapped[list[str]] = mapped_column(JSON, default=list)
+    """Words by which a person sorts runs; each change is also a note."""
+    revision: Mapped[int] = mapped_column(default=0)
+    """Number of changes of what a person can change."""
+    trashed: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
+    """UTC at which the run was moved to the trash; None outside it."""
 
 
 class JobRow(Base):
@@ -139,3 +155,68 @@ class BatchRow(Base):
     created: Mapped[datetime] = mapped_column(UtcTime)
     items: Mapped[list[dict[str, str]]] = mapped_column(JSON)
     """For each run its id, and the id of its job or the reason why there is none."""
+
+
+class NoteRow(Base):
+    """One note on a run; notes are added and never changed."""
+
+    __tablename__ = "notes"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[str] = mapped_column(ForeignKey("runs.id"), index=True)
+    at: Mapped[datetime] = mapped_column(UtcTime)
+    """UTC."""
+    author: Mapped[str] = mapped_column(Text)
+    kind: Mapped[NoteKind] = mapped_column(_make_enum_column(NoteKind))
+    text: Mapped[str] = mapped_column(Text)
+
+
+class EventRow(Base):
+    """One event of the bench or of a run."""
+
+    __tablename__ = "events"
+
+    id: Mapped[int] = mapped_column(primary_key=True)
+    run_id: Mapped[str | None] = mapped_column(ForeignKey("runs.id"), index=True)
+    """Run that the event belongs to; None outside runs."""
+    at: Mapped[datetime] = mapped_column(UtcTime)
+    """UTC; of an import without a start time, counted from the time of its log."""
+    time_s: Mapped[float | None] = mapped_column(default=None)
+    """Time since the first sample of the run [s]; None until the log was read."""
+    kind: Mapped[str] = mapped_column(Text)
+    text: Mapped[str] = mapped_column(Text)
+
+
+class CampaignRow(Base):
+    """One campaign with its present state, which is its latest restore point."""
+
+    __tablename__ = "campaigns"
+
+    id: Mapped[str] = mapped_column(Text, primary_key=True)
+    name: Mapped[str] = mapped_column(Text)
+    key: Mapped[str] = mapped_column(Text, index=True)
+    """Hash of document and methods: equal campaigns have equal keys."""
+    bench: Mapped[str] = mapped_column(Text, default="")
+    """Executor: `agent`, or `scenario NAME` for the simulated plant."""
+    status: Mapped[str] = mapped_column(Text, index=True)
+    created: Mapped[datetime] = mapped_column(UtcTime)
+    methods: Mapped[dict[str, Any]] = mapped_column(JSON)
+    """Documents of the methods by name, fixed for the whole campaign."""
+    state: Mapped[dict[str, Any]] = mapped_column(JSON)
+
+
+class CampaignEventRow(Base):
+    """One event of a campaign: restore point, edit, message."""
+
+    __tablename__ = "campaign_events"
+
+    id: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    campaign_id: Mapped[str] = mapped_column(ForeignKey("campaigns.id"), index=True)
+    at: Mapped[datetime] = mapped_column(UtcTime)
+    kind: Mapped[str] = mapped_column(Text)
+    text: Mapped[str] = mapped_column(Text)
+    who: Mapped[str] = mapped_column(Text, default="")
+    item: Mapped[str] = mapped_column(Text, default="")
+    """Id of the step; empty for the campaign as a whole."""
+    notification: Mapped[str] = mapped_column(Text, default="")
+    """`due`, `sent`, or the reason of a failure; empty where none is needed."""

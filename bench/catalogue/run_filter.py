@@ -1,12 +1,13 @@
 """Selection of runs by facts of the run and by results of its newest fit and diagnosis."""
 
+import json
 from dataclasses import dataclass
 from datetime import datetime
 
 from sqlalchemy import ColumnElement, Text, cast, exists, or_, select
 from sqlalchemy.orm import aliased
 
-from bench.catalogue.models import JobRow, RunOutcome, RunRow
+from bench.catalogue.models import JobRow, NoteRow, RunOutcome, RunRow
 from bench.endings import RunEnding
 
 _SEARCHED = (RunRow.specimen, RunRow.method, RunRow.operator, RunRow.reason)
@@ -32,11 +33,16 @@ class RunFilter:
     parameter_min: float | None = None
     parameter_max: float | None = None
     text: str | None = None
-    """Text in specimen, method, operator or reason, in any case."""
+    """Text in specimen, method, operator, reason, tags or notes, in any case."""
+    tag: str | None = None
+    """Tag that the run has, exactly."""
+    is_trashed: bool = False
+    """Runs in the trash instead of all others."""
 
     def make_conditions(self) -> list[ColumnElement[bool]]:
         """Return the conditions of a query for the selected runs."""
         given: list[ColumnElement[bool] | None] = [
+            RunRow.trashed.is_not(None) if self.is_trashed else RunRow.trashed.is_(None),
             None if self.specimen is None else RunRow.specimen == self.specimen,
             None if self.method is None else RunRow.method == self.method,
             None if self.outcome is None else RunRow.outcome == self.outcome,
@@ -44,6 +50,7 @@ class RunFilter:
             None if self.started_from is None else RunRow.started >= self.started_from,
             None if self.started_to is None else RunRow.started < self.started_to,
             None if self.text is None else _contains(self.text),
+            None if self.tag is None else _has_tag(self.tag),
             None if self.effect is None else _names_effect(self.effect),
             None if self.parameter is None else self._is_in_range(self.parameter),
         ]
@@ -60,7 +67,14 @@ class RunFilter:
 
 
 def _contains(text: str) -> ColumnElement[bool]:
-    return or_(*(column.icontains(text, autoescape=True) for column in _SEARCHED))
+    found = (column.icontains(text, autoescape=True) for column in _SEARCHED)
+    is_in_note = NoteRow.text.icontains(text, autoescape=True)
+    return or_(*found, exists().where(NoteRow.run_id == RunRow.id, is_in_note))
+
+
+def _has_tag(tag: str) -> ColumnElement[bool]:
+    # As the column stores it, with the quotes that no tag contains.
+    return cast(RunRow.tags, Text).contains(json.dumps(tag), autoescape=True)
 
 
 def _names_effect(name: str) -> ColumnElement[bool]:

@@ -9,12 +9,15 @@ from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.integrity import check_integrity, find_missing
 from bench.catalogue.log_summary import LogSummary, compute_sha256, read_log_summary
 from bench.catalogue.models import RunRow
+from bench.catalogue.records import read_log_events
 from bench.errors import LogError
 
 TRUNCATED_MESSAGE = (
     "the log has no end, its recorder was killed; repair it with `mrbench salvage` or POST /runs/{id}/salvage"
 )
 NO_LOG_MESSAGE = "the rig agent ended before it wrote a log"
+_MAX_READ = 20
+"""Number of older logs whose events are read in one scan."""
 _LOG = logging.getLogger(__name__)
 
 WriteCheck = Callable[[Path], bool]
@@ -35,6 +38,8 @@ def scan_logs(catalogue: Catalogue, is_being_written: WriteCheck) -> list[RunRow
     rows = (_scan_log(catalogue, path, is_being_written) for path in paths)
     changed = [row for row in rows if row]
     missing = find_missing(catalogue, set(paths))
+    for row in catalogue.list_unread(_MAX_READ):  # of catalogues of older versions
+        _read_content(catalogue, row)
     return [*changed, *missing, *_end_runs_without_log(catalogue, is_being_written)]
 
 
@@ -63,13 +68,15 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
         "log_sha256": sha256,
     }
     if known is not None:
-        return catalogue.update_run(known.id, **{**values, **_keep_report(known, summary)})
+        return _read_content(catalogue, catalogue.update_run(known.id, **values | _keep_report(known, summary)))
     if catalogue.get_run(summary.id) is not None:
         _log_skipped(catalogue, path, f"run {summary.id} has another log")
         return None
     row = RunRow(
         id=summary.id,
         method=summary.method,
+        method_version=catalogue.find_method_version(summary.method, summary.method_sha256),
+        method_sha256=summary.method_sha256 or None,
         specimen=summary.specimen,
         operator=summary.operator,
         source=summary.source,
@@ -79,7 +86,20 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
         **values,
     )
     catalogue.add(row)
-    return row
+    return _read_content(catalogue, row)
+
+
+def _read_content(catalogue: Catalogue, row: RunRow) -> RunRow:
+    """Store losses and events of a complete log; a damaged one has none."""
+    if row.log_sha256 is None:
+        return row
+    path = catalogue.resolve_path(row.log)
+    try:
+        lost, events = read_log_summary(path).lost, read_log_events(path)
+    except LogError:
+        lost, events = {}, []
+    catalogue.event_journal.replace(row.id, events)
+    return catalogue.update_run(row.id, lost=lost)
 
 
 def _log_skipped(catalogue: Catalogue, path: Path, why: str) -> None:

@@ -1,16 +1,17 @@
 """Samples of a run as arrays with units."""
 
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from bench.log import read_log
+from bench.client.errors import ClientError
+from bench.samples import decode_batches
 
 Array = npt.NDArray[np.float64] | npt.NDArray[np.int64]
 _TIME = "time"
-"""Channel with the time since the first sample [s]."""
+"""Channel with the time since the first returned sample [s]."""
+_SEGMENT = "segment"
 
 
 class Arrays(Mapping[str, Array]):
@@ -39,13 +40,24 @@ class Arrays(Mapping[str, Array]):
         return f"Arrays({len(self._values[_TIME])} samples: {channels})"
 
 
-def read_arrays(log: Path) -> Arrays:
-    """Read the samples of a log.
+def make_arrays(content: bytes, channels: Sequence[Mapping[str, str]]) -> Arrays:
+    """Return the samples in a reply of the service.
+
+    Args:
+        content: binary batches.
+        channels: name and unit of each channel, the time first.
 
     Raises:
-        LogError: the log is truncated, damaged or without samples.
+        ClientError: the reply is incomplete or of another version.
     """
-    content = read_log(log)
-    units = {_TIME: "s", "time_ns": "ns", **content.metadata["units"]}
-    names = [_TIME, *(name for name in content.samples if name != _TIME)]
-    return Arrays({name: content.samples[name] for name in names}, units)
+    try:
+        time, columns = decode_batches(content, len(channels))
+    except ValueError as error:
+        raise ClientError(
+            f"the samples cannot be read ({error}); use a client of the service's version"
+        ) from error
+    values: dict[str, Array] = {_TIME: time - time[0] if len(time) else time}
+    for channel, column in zip(channels[1:], columns, strict=True):
+        is_number = channel["name"] == _SEGMENT
+        values[channel["name"]] = column.astype(np.int64) if is_number else column.astype(np.float64)
+    return Arrays(values, {channel["name"]: channel["unit"] for channel in channels})

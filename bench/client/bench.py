@@ -1,5 +1,6 @@
 """A bench, as its service shows it."""
 
+import math
 import uuid
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -7,11 +8,15 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from bench.client.campaign import Campaign
+from bench.client.live import LiveSamples, iterate_live
 from bench.client.run import Run, RunState, parse_run_state
 from bench.client.session import Session
 
 _PAGE_SIZE = 50
 """Number of runs requested at a time."""
+_MOST_METHODS = 500
+"""Largest number of listed methods."""
 
 
 class Bench:
@@ -38,12 +43,12 @@ class Bench:
         return str(self._session.get("/agent")["state"])
 
     def list_methods(self) -> list[dict[str, Any]]:
-        """Return the methods that come with mrbench: name, title, duration and kind of drive.
+        """Return the newest version of each method: name, version, title, duration and kind of drive.
 
         Raises:
             ClientError: the service cannot be reached.
         """
-        return list(self._session.get("/methods"))
+        return list(self._session.get("/methods", limit=_MOST_METHODS)["items"])
 
     def run(self, run_id: str) -> Run:
         """Return a run by its id; nothing is requested yet."""
@@ -84,6 +89,42 @@ class Bench:
         """
         request = {"method": method, "specimen": specimen, "operator": operator, "resume_after": resume_after}
         return self.run(str(self._session.post("/runs", request, key=uuid.uuid4().hex)["id"]))
+
+    def start_campaign(self, campaign: Mapping[str, Any], operator: str = "") -> Campaign:
+        """Start a campaign and return it; it continues if the script ends.
+
+        Args:
+            campaign: document `mrbench.campaign/1`.
+            operator: name of the person.
+
+        Raises:
+            ClientError: the campaign is refused, or the service cannot be reached.
+        """
+        request = {"campaign": campaign, "operator": operator}
+        return self.campaign(str(self._session.post("/campaigns", request, key=uuid.uuid4().hex)["id"]))
+
+    def campaign(self, campaign_id: str) -> Campaign:
+        """Return a campaign by its id; nothing is requested yet."""
+        return Campaign(self._session, campaign_id)
+
+    def list_campaigns(self, limit: int = _PAGE_SIZE) -> list[dict[str, Any]]:
+        """Return the newest campaigns in short.
+
+        Raises:
+            ClientError: the service cannot be reached.
+        """
+        return list(self._session.get("/campaigns", limit=limit)["items"])
+
+    def live(self, rate_hz: float = math.inf) -> Iterator[LiveSamples]:
+        """Yield live samples of all channels as arrays with units, until the caller stops.
+
+        Args:
+            rate_hz: largest rate of the samples [Hz]; a faster bench is decimated, which keeps every extreme.
+
+        Raises:
+            ClientError: the service refuses, cannot be reached or falls silent.
+        """
+        return iterate_live(self._session, rate_hz)
 
     def stop(self) -> None:
         """Stop a run or a setup step in a controlled way; harmless when nothing moves.

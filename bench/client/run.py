@@ -1,6 +1,5 @@
 """One run of the service."""
 
-import tempfile
 import time
 from collections.abc import Callable
 from datetime import datetime
@@ -9,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from bench.client.arrays import Arrays, read_arrays
+from bench.client.arrays import Arrays, make_arrays
 from bench.client.errors import ClientError
 from bench.client.session import Session, quote_name
 from bench.validation import describe_validation_error
@@ -120,15 +119,24 @@ class Run:
         """
         return self._wait(lambda state: state.is_evaluated, timeout, "been evaluated")
 
-    def arrays(self) -> Arrays:
-        """Return all samples, each channel of shape (samples,) with its unit.
+    def arrays(
+        self, *channels: str, start_s: float | None = None, stop_s: float | None = None, points: int = 0
+    ) -> Arrays:
+        """Return samples, each channel of shape (samples,) with its unit, to the accuracy of 32-bit numbers.
+
+        Args:
+            channels: names of the channels; all by default.
+            start_s: first time since the start of the run [s].
+            stop_s: last time since the start of the run [s].
+            points: number of intervals of which only the extremes are returned; 0 for all samples.
 
         Raises:
-            ClientError: the log is not on the machine of the service, or the service cannot be reached.
-            LogError: the log is not complete yet, or truncated.
+            ClientError: the log is missing, truncated or not complete yet, a channel is unknown, or the service
+                cannot be reached.
         """
-        with tempfile.TemporaryDirectory() as folder:
-            return read_arrays(self.download_log(Path(folder) / "run.mcap"))
+        query = {"channel": channels or None, "from": start_s, "to": stop_s, "points": points}
+        content, listed = self._session.get_batches(f"{self._path}/samples", format="float32", **query)
+        return make_arrays(content, listed)
 
     def fit(self) -> dict[str, Any]:
         """Return the newest fit, `mrbench.fit/1`.

@@ -3,7 +3,8 @@
 import json
 import shutil
 import ssl
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from http.client import HTTPException
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,16 @@ from urllib.error import HTTPError, URLError
 from urllib.parse import quote, urldefrag, urlencode
 from urllib.request import Request, urlopen
 
+from websockets.exceptions import WebSocketException
+from websockets.sync.client import ClientConnection, connect
+
 from bench.client.errors import ClientError
 from bench.log import write_atomically
 
 _TIMEOUT = 30.0
 """Longest time [s] for one reply."""
+_CHANNELS_HEADER = "X-Mrbench-Channels"
+"""Header of binary samples with name and unit of each channel."""
 _TOKEN_FIELD = "token="
 """Name of the token in the address that the service prints."""
 
@@ -46,9 +52,18 @@ class Session:
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        given = {name: value for name, value in query.items() if value is not None}
-        with self._request("GET", f"{path}?{urlencode(given)}" if given else path) as reply:
+        with self._request("GET", _add_query(path, query)) as reply:
             return _decode(path, reply.read())
+
+    def get_batches(self, path: str, **query: object) -> tuple[bytes, list[dict[str, str]]]:
+        """Return binary samples, and the list of their channels from the header of the reply.
+
+        Raises:
+            ClientError: the service refuses, cannot be reached, or lists no channels.
+        """
+        with self._request("GET", _add_query(path, query)) as reply:
+            channels: list[dict[str, str]] = _decode(path, reply.headers.get(_CHANNELS_HEADER, "").encode())
+            return reply.read(), channels
 
     def post(self, path: str, content: Mapping[str, Any] | None = None, key: str | None = None) -> Any:
         """Return the reply to POST, decoded from JSON.
@@ -56,14 +71,30 @@ class Session:
         Args:
             path: path below ``/api/v1``.
             content: body of the request.
-            key: idempotency key; a repeated request with the same key has no further effect.
+            key: idempotency key; a repeated request with the same key has no further effect, and one whose
+                answer was lost is repeated here, once.
 
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        headers = {} if key is None else {"Idempotency-Key": key}
         body = b"" if content is None else json.dumps(content).encode()
-        with self._request("POST", path, body, headers) as reply:
+        if key is None:
+            return self._post(path, body, {})
+        headers = {"Idempotency-Key": key}
+        try:
+            return self._post(path, body, headers)
+        except ClientError as error:
+            if error.status is not None:
+                raise
+            return self._post(path, body, headers)
+
+    def patch(self, path: str, content: Mapping[str, Any]) -> Any:
+        """Return the reply to PATCH, decoded from JSON.
+
+        Raises:
+            ClientError: the service refuses or cannot be reached.
+        """
+        with self._request("PATCH", path, json.dumps(content).encode()) as reply:
             return _decode(path, reply.read())
 
     def download(self, path: str, to: Path) -> Path:
@@ -84,6 +115,35 @@ class Session:
                 raise ClientError(f"{to}: {received} of {announced} bytes of {path} arrived; repeat the download")
         return to
 
+    def _post(self, path: str, body: bytes, headers: Mapping[str, str]) -> Any:
+        with self._request("POST", path, body, headers) as reply:
+            try:
+                content: bytes = reply.read()
+            except (OSError, HTTPException) as error:
+                raise ClientError(f"the answer to {path} broke off ({error}); repeat it") from error
+        return _decode(path, content)
+
+    @contextmanager
+    def connect(self, path: str, wishes: Mapping[str, Any]) -> Iterator[ClientConnection]:
+        """Open a websocket for the duration of a block, and sign in with its first message.
+
+        Args:
+            path: path below ``/api/v1``.
+            wishes: further fields of the first message.
+
+        Raises:
+            ClientError: the service cannot be reached, or the connection ends.
+        """
+        address = f"ws{self._base.removeprefix('http')}{path}"
+        tls = self._tls if address.startswith("wss:") else None
+        try:
+            with connect(address, ssl=tls, max_size=None) as socket:
+                socket.send(json.dumps({"token": self._token, **wishes}))
+                yield socket
+        except (OSError, WebSocketException) as error:
+            reason = str(error) or "it is silent"
+            raise ClientError(f"the service at {self._base} does not reply to {path}: {reason}") from error
+
     def _request(
         self, method: str, path: str, content: bytes | None = None, headers: Mapping[str, str] | None = None
     ) -> Any:
@@ -96,6 +156,12 @@ class Session:
                 raise _make_refusal(path, error) from None
         except (URLError, OSError, HTTPException) as error:
             raise ClientError(f"the service at {self._base} does not reply to {path}: {error}") from error
+
+
+def _add_query(path: str, query: Mapping[str, object]) -> str:
+    """Return a path with the parts of a query that are not None; a sequence gives several parts of one name."""
+    given = {name: value for name, value in query.items() if value is not None}
+    return f"{path}?{urlencode(given, doseq=True)}" if given else path
 
 
 def quote_name(name: str) -> str:

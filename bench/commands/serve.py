@@ -15,7 +15,7 @@ def serve(
         ),
     ] = None,
     host: Annotated[
-        str, typer.Option(metavar="HOST", help="Address to listen on; use a TLS proxy for other than loopback.")
+        str, typer.Option(metavar="HOST", help="Address to listen on; use TLS for other than loopback.")
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 chooses a free one.")] = 8600,
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder: logs, results and catalogue.")] = Path(
@@ -51,15 +51,24 @@ def serve(
             help="Accept a scheduler without TLS on another machine: anybody who reaches it can execute code.",
         ),
     ] = False,
+    tls_cert: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Certificate chain (PEM), to serve by HTTPS; needs --tls-key."),
+    ] = None,
+    tls_key: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Private key (PEM) of --tls-cert, without a password.")
+    ] = None,
 ) -> None:
     """Serve the REST interface, the live values and the web page.
 
     Starts a rig agent and one worker, unless their addresses are given. Prints the page's address. A new token is
     printed on a terminal only; otherwise it is written to the file `token` in the data folder.
     """
-    from bench.service import ServeOptions
+    from bench.service import ServeOptions, TlsFiles
     from bench.service import serve as run_service
 
+    if (tls_cert is None) != (tls_key is None):
+        raise typer.BadParameter("a certificate and its key belong together; give --tls-cert and --tls-key")
     options = ServeOptions(
         data=data,
         host=host,
@@ -72,6 +81,7 @@ def serve(
         new_token=new_token,
         scheduler_tls=scheduler_tls,
         allow_plain_scheduler=plain_scheduler,
+        tls=None if tls_cert is None or tls_key is None else TlsFiles(tls_cert, tls_key),
         is_terminal=sys.stdout.isatty(),
     )
     run_service(options, lambda line: typer.echo(line))

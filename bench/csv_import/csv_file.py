@@ -10,7 +10,7 @@ import math
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Literal
 
@@ -31,6 +31,8 @@ DRIVE_KINDS: dict[str, Literal["V", "A"]] = {"driver_command_v": "V", "coil_v": 
 
 MIN_SAMPLES = 200
 """Smallest number of samples of a recording."""
+MAX_SIZE = 2_000_000_000
+"""Largest size of a decompressed file [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -98,7 +100,7 @@ def _read_lines(path: Path) -> list[str]:
     try:
         data = path.read_bytes()
         # gzip is recognised by its first bytes. Spreadsheets write a byte order mark before UTF-8.
-        text = (gzip.decompress(data) if data[:2] == b"\x1f\x8b" else data).decode("utf-8-sig")
+        text = (_decompress(path, data) if data[:2] == b"\x1f\x8b" else data).decode("utf-8-sig")
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise RecordingError(f"{path.name}: the gzip file is damaged ({error}); copy it again") from error
     except OSError as error:
@@ -110,6 +112,14 @@ def _read_lines(path: Path) -> list[str]:
     if not lines or not lines[0].strip():
         raise RecordingError(f"{path.name}, row 1: no header; write the column names into the first row")
     return lines
+
+
+def _decompress(path: Path, data: bytes) -> bytes:
+    """Decompress at most `MAX_SIZE`: a small file may hide one that no memory can hold."""
+    text = gzip.GzipFile(fileobj=BytesIO(data)).read(MAX_SIZE + 1)
+    if len(text) > MAX_SIZE:
+        raise RecordingError(f"{path.name}: more than {MAX_SIZE} bytes; divide the recording into several files")
+    return text
 
 
 def _get_header(name: str, headers: Mapping[str, str]) -> str:

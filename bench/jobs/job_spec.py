@@ -11,13 +11,19 @@ from bench.jobs.settings import JobSettings, get_kind
 
 FIT_FILE, REPORT_FILE = "fit.json", "report.html"
 """Files in the result folder of an identification."""
+TREND_FILE = "trend.json"
+"""File in the result folder of a trend."""
+SERIES_FILE = "series.npz"
+"""Recorded and simulated force in the result folder of an identification or a prediction."""
+PREDICTION_FILE = "prediction.json"
+"""Document in the result folder of a prediction."""
 DIAGNOSIS_FILE, TWIN_FILE = "diagnosis.json", "twin.json"
 """Further files in the result folder of a diagnosis, whose report contains the fit as well."""
 
 ResultSummary = dict[str, Any]
 """Part of a result that the catalogue keeps: errors of a fit; verdict, effects and shrinkage of a diagnosis."""
 
-_FOLDER_WORDS = {"identify": "fit", "diagnose": "diagnosis"}
+_FOLDER_WORDS = {"identify": "fit", "diagnose": "diagnosis", "predict": "prediction", "trend": "trend"}
 
 
 @dataclass(frozen=True)
@@ -35,8 +41,12 @@ class JobSpec:
     """Number of times that the job was queued; a request to cancel is meant for one of them."""
     fit: str = ""
     """Fit that the report of a diagnosis shows as well; empty without one."""
+    logs: tuple[str, ...] = ()
+    """Logs of a trend, the oldest first."""
     model: str = ""
-    """Fit or twin whose own gap a diagnosis reports; empty without one."""
+    """Fit or twin that a prediction simulates, or whose own gap a diagnosis reports; empty without one."""
+    log_sha256: str = ""
+    """Hash of the log, under which its samples are stored; empty if it is not known."""
 
 
 def compute_content_key(log_sha256: str, settings: JobSettings, inputs: Sequence[str] = ()) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 from pydantic import Field
 
 from bench.catalogue import JobRow, JobState
-from bench.jobs.settings import JobKind
+from bench.jobs.settings import AnalysisKind, JobKind
 from bench.validation import FrozenModel
 
 
@@ -36,11 +36,13 @@ class Retry(FrozenModel):
 
 
 class Job(FrozenModel):
-    """One identification or diagnosis of a run."""
+    """One identification, diagnosis or prediction of a run, or one trend of a specimen."""
 
-    id: str = Field(description="also the id of its fit or diagnosis")
+    id: str = Field(description="also the id of its fit, diagnosis or prediction")
     run: str = Field(description="id of the run")
-    kind: str = Field(description="`identify` or `diagnose`")
+    kind: str = Field(
+        description="`identify`, `diagnose`, `predict`, or `trend` of the specimen, with its newest run"
+    )
     state: JobState
     stage: str = Field(description="present stage, such as `refine`; the last one of a job that has ended")
     fraction: float | None = Field(
@@ -58,7 +60,9 @@ class Job(FrozenModel):
     created: datetime = Field(description="UTC")
     started: datetime | None = Field(description="UTC of the last start by a worker")
     finished: datetime | None = Field(description="UTC")
-    rmse_n: float | None = Field(description="force error on the fitted samples [N]; null without a fit")
+    rmse_n: float | None = Field(
+        description="force error of a fit on its samples, or of a prediction [N]; else null"
+    )
     noise_floor_n: float | None = Field(description="noise floor of the recorded force [N]; null until done")
     result: str = Field(description="of a fit: `converged`, or the reason why not; empty without one")
     diagnosis: DiagnosisSummary | None = Field(description="answer of a diagnosis; null until done")
@@ -80,7 +84,7 @@ class RetryRequest(FrozenModel):
 class BatchRequest(FrozenModel):
     """Request of the same job for several runs."""
 
-    kind: JobKind
+    kind: AnalysisKind
     runs: tuple[str, ...] = Field(min_length=1, max_length=1000, description="ids of the runs")
     settings: dict[str, Any] = Field(default={}, description="settings of the jobs, as for a single run")
 

@@ -3,10 +3,10 @@
 import asyncio
 import logging
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
-from typing import Any
+from typing import Any, cast
 
 from bench.catalogue import UNFINISHED_STATES, Catalogue, JobRow, RunRow
 from bench.jobs.engine import JobEngine
@@ -21,7 +21,15 @@ from bench.jobs.job_spec import (
 )
 from bench.jobs.progress import JobProgress
 from bench.jobs.scheduler import MAX_ATTEMPTS
-from bench.jobs.settings import DiagnoseSettings, IdentifySettings, JobSettings, get_kind, parse_settings
+from bench.jobs.settings import (
+    DiagnoseSettings,
+    IdentifySettings,
+    JobKind,
+    JobSettings,
+    TrendSettings,
+    get_kind,
+    parse_settings,
+)
 
 ANALYSED_OUTCOMES = ("clean", "lossy")
 """Outcomes of a run after which its identification is followed by a diagnosis."""
@@ -57,7 +65,7 @@ class JobManager:
             The job, and whether it was queued now.
 
         Raises:
-            JobError: the model of a diagnosis does not exist, or an equal job is still being stopped.
+            JobError: the model of a job does not exist, or an equal job is still being stopped.
         """
         wanted = await asyncio.to_thread(self._make_job, run, settings)
         for job in await asyncio.to_thread(self._queue.find_repeatable, wanted.key):
@@ -142,17 +150,39 @@ class JobManager:
 
     def _make_job(self, run: RunRow, settings: JobSettings) -> JobRow:
         """Return a new row for a job, which reads the newest fit of its run if it is a diagnosis."""
-        if not isinstance(settings, DiagnoseSettings):
+        if isinstance(settings, TrendSettings):
+            return self._make_row(run, settings, {}, [one.log_sha256 or "" for one in self._get_runs(settings)])
+        if isinstance(settings, IdentifySettings):
             return self._make_row(run, settings, {})
-        inputs = {"fit": self._queue.find_newest_done(run.id, "identify")}
+        inputs: dict[str, JobRow | None] = {}
+        if isinstance(settings, DiagnoseSettings):
+            inputs["fit"] = self._queue.find_newest_done(run.id, "identify")
         if settings.model is not None:
-            inputs["model"] = self._catalogue.get_job(settings.model)
-            if inputs["model"] is None or inputs["model"].result is None:
-                raise JobError(f"there is no fit or diagnosis {settings.model}; give the id of a job that is done")
+            inputs["model"] = self._get_model(settings.model)
         return self._make_row(run, settings, {name: job for name, job in inputs.items() if job is not None})
 
-    def _make_row(self, run: RunRow, settings: JobSettings, inputs: dict[str, JobRow]) -> JobRow:
-        keys = [f"{name}:{job.key}" for name, job in sorted(inputs.items())]
+    def _get_model(self, job_id: str) -> JobRow:
+        job = self._catalogue.get_job(job_id)
+        if job is None or job.result is None or job.kind not in _MODEL_FILES:
+            raise JobError(f"there is no fit or diagnosis {job_id}; give the id of a job that is done")
+        return job
+
+    def _get_runs(self, settings: TrendSettings) -> list[RunRow]:
+        """Return the runs of a trend.
+
+        Raises:
+            JobError: a run is no longer in the catalogue.
+        """
+        rows = {run_id: self._catalogue.get_run(run_id) for run_id in settings.runs}
+        missing = next((run_id for run_id, row in rows.items() if row is None), None)
+        if missing is not None:
+            raise JobError(f"run {missing} is no longer in the catalogue; request the trend again")
+        return [row for row in rows.values() if row is not None]
+
+    def _make_row(
+        self, run: RunRow, settings: JobSettings, inputs: dict[str, JobRow], hashes: Sequence[str] = ()
+    ) -> JobRow:
+        keys = [*(f"{name}:{job.key}" for name, job in sorted(inputs.items())), *hashes]
         now = datetime.now(UTC)
         return JobRow(
             id=uuid.uuid4().hex,
@@ -197,15 +227,19 @@ class JobManager:
         paths = {name: self._find_file(self._catalogue.get_job(source)) for name, source in job.inputs.items()}
         if paths.get("model") == "":
             raise JobError(f"the result of job {job.inputs['model']}, its model, was removed; give another model")
+        settings = parse_settings(cast(JobKind, job.kind), job.settings)
+        runs = self._get_runs(settings) if isinstance(settings, TrendSettings) else []
         return JobSpec(
             job_id=job.id,
             key=job.key,
             log=str(log),
+            logs=tuple(str(self._catalogue.resolve_path(one.log)) for one in runs),
             result=str(get_result_folder(log, job.kind, job.key)),
-            settings=parse_settings(job.kind, job.settings),
+            settings=settings,
             submission=job.submissions,
             fit=paths.get("fit", ""),
             model=paths.get("model", ""),
+            log_sha256=run.log_sha256 or "",
         )
 
     def _has_files(self, job: JobRow) -> bool:

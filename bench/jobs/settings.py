@@ -1,4 +1,4 @@
-"""Settings of the two kinds of jobs, and the options of the commands that they stand for."""
+"""Settings of the kinds of jobs, and the options of the commands that they stand for."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, Literal, TypeAlias
@@ -7,7 +7,9 @@ from pydantic import Field
 
 from bench.validation import FrozenModel
 
-JobKind: TypeAlias = Literal["identify", "diagnose"]
+AnalysisKind: TypeAlias = Literal["identify", "diagnose", "predict"]
+"""Kinds of jobs on a single run."""
+JobKind: TypeAlias = Literal["identify", "diagnose", "predict", "trend"]
 
 
 class IdentifySettings(FrozenModel):
@@ -55,22 +57,52 @@ class DiagnoseSettings(FrozenModel):
         return [*_make_hold_out_arguments(self.hold_out, self.hold_out_after), *chosen]
 
 
-JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings
+class TrendSettings(FrozenModel):
+    """Settings of the trend of a specimen."""
+
+    runs: tuple[str, ...] = Field(min_length=3, max_length=200, description="ids of its runs, the oldest first")
+    time_limit_s: float = Field(default=14400.0, gt=0, description="[s] after which the job fails")
+
+    def make_cli_arguments(self) -> list[str]:
+        """Return the options of `mrbench trend`; it has none."""
+        return []
+
+
+class PredictSettings(FrozenModel):
+    """Settings of a prediction: the simulation of a fit or twin on a run that it need not have read."""
+
+    model: str = Field(
+        min_length=1, max_length=64, description="id of a fit, or of a diagnosis for its twin; of any run"
+    )
+    free_offset: bool = Field(default=False, description="adapt a constant offset of the force to this run")
+    time_limit_s: float = Field(default=1800.0, gt=0, description="[s] after which the job fails")
+
+    def make_cli_arguments(self) -> list[str]:
+        """Return the options of `mrbench predict`."""
+        return ["--free", "offset"] if self.free_offset else []
+
+
+JobSettings: TypeAlias = IdentifySettings | DiagnoseSettings | PredictSettings | TrendSettings
+_KINDS: dict[JobKind, type[JobSettings]] = {
+    "identify": IdentifySettings,
+    "diagnose": DiagnoseSettings,
+    "predict": PredictSettings,
+    "trend": TrendSettings,
+}
 
 
 def get_kind(settings: JobSettings) -> JobKind:
     """Return the kind of job that settings belong to."""
-    return "diagnose" if isinstance(settings, DiagnoseSettings) else "identify"
+    return next(kind for kind, model in _KINDS.items() if isinstance(settings, model))
 
 
-def parse_settings(kind: str, document: Mapping[str, Any]) -> JobSettings:
+def parse_settings(kind: JobKind, document: Mapping[str, Any]) -> JobSettings:
     """Return the settings of a job of a kind.
 
     Raises:
         ValidationError: the document is not one of this kind.
     """
-    model: type[IdentifySettings | DiagnoseSettings] = IdentifySettings if kind == "identify" else DiagnoseSettings
-    return model.model_validate(document)
+    return _KINDS[kind].model_validate(document)
 
 
 def _make_hold_out_arguments(patterns: Sequence[str], after: float | None) -> list[str]:

@@ -12,12 +12,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import mkdtemp
 
+from bench.errors import LogError
 from bench.jobs.errors import JobCancelledError, JobError
-from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE, JobSpec, ResultSummary
+from bench.jobs.job_spec import (
+    DIAGNOSIS_FILE,
+    FIT_FILE,
+    PREDICTION_FILE,
+    REPORT_FILE,
+    SERIES_FILE,
+    TREND_FILE,
+    TWIN_FILE,
+    JobSpec,
+    ResultSummary,
+)
 from bench.jobs.progress import PROGRESS_ENVIRONMENT, CommandStep, JobProgress, is_report
-from bench.jobs.settings import DiagnoseSettings
-from bench.jobs.summaries import read_diagnosis_summary, read_fit_summary
+from bench.jobs.settings import DiagnoseSettings, PredictSettings, TrendSettings
+from bench.jobs.summaries import (
+    read_diagnosis_summary,
+    read_fit_summary,
+    read_prediction_summary,
+    read_trend_summary,
+)
 from bench.processes import MRBENCH_COMMAND, LineQueue, start_line_reader
+from bench.samples import SampleStore
 
 POLL_PERIOD = 0.25
 """Time [s] between two checks for cancellation."""
@@ -40,7 +57,7 @@ class JobCallbacks:
 def execute_job(
     spec: JobSpec, callbacks: JobCallbacks, mrbench: tuple[str, ...] = MRBENCH_COMMAND
 ) -> ResultSummary:
-    """Identify or diagnose a log and write a report; the files appear together, or not at all.
+    """Identify, diagnose or predict a log, or find a trend; the files appear together, or not at all.
 
     Args:
         spec: the job; if its result exists, it is only read.
@@ -48,30 +65,47 @@ def execute_job(
         mrbench: the command line to call.
 
     Returns:
-        Summary of the fit or of the diagnosis.
+        Summary of the fit, the diagnosis, the prediction or the trend.
 
     Raises:
         JobError: a command failed, or the time limit was reached.
         JobCancelledError: the job was cancelled.
     """
     log, result = Path(spec.log), Path(spec.result)
-    if not log.is_file():
-        raise JobError(f"{log} is not on the worker's machine; workers need the data folder at the same path")
+    missing = next((path for path in (log, *map(Path, spec.logs)) if not path.is_file()), None)
+    if missing is not None:
+        raise JobError(f"{missing} is not on the worker's machine; workers need the data folder at the same path")
     deadline = time.monotonic() + spec.settings.time_limit_s
+    _store_samples(log, spec.log_sha256)
     if not result.is_dir():
         with _make_work_folder(result) as folder:
             for step, arguments in _list_commands(spec, folder):
                 _run_command([*mrbench, *arguments], step, callbacks, deadline)
             _publish_result(folder, result)
+    if isinstance(spec.settings, TrendSettings):
+        return read_trend_summary(result / TREND_FILE)
     if isinstance(spec.settings, DiagnoseSettings):
         return read_diagnosis_summary(result / DIAGNOSIS_FILE)
+    if isinstance(spec.settings, PredictSettings):
+        return read_prediction_summary(result / PREDICTION_FILE)
     return read_fit_summary(result / FIT_FILE)
+
+
+def _store_samples(log: Path, sha256: str) -> None:
+    """Store the samples as columns, so that the service need not read the log when a person looks at the run."""
+    with contextlib.suppress(LogError):  # the command of the job says what is wrong with the log
+        if sha256:
+            SampleStore(log.parent).load(log, sha256)
 
 
 def _list_commands(spec: JobSpec, folder: Path) -> list[tuple[CommandStep, list[str]]]:
     """Return the arguments of the commands of a job, which write to a folder."""
+    if isinstance(spec.settings, PredictSettings):
+        return [(CommandStep("predict", 0.0, 1.0), _make_prediction_command(spec, folder))]
     fit, diagnosis = folder / FIT_FILE, folder / DIAGNOSIS_FILE
     options = spec.settings.make_cli_arguments()
+    if isinstance(spec.settings, TrendSettings):
+        return [(CommandStep("trend", 0.0, 1.0), ["trend", *spec.logs, "--out", str(folder / TREND_FILE)])]
     if isinstance(spec.settings, DiagnoseSettings):
         name = "diagnose"
         options += ["--model", spec.model] if spec.model else []
@@ -80,12 +114,17 @@ def _list_commands(spec: JobSpec, folder: Path) -> list[tuple[CommandStep, list[
     else:
         name = "identify"
         analyse = [name, spec.log, "--out", str(fit), *options]
-        documents = ["--fit", str(fit)]
+        documents = ["--fit", str(fit), "--series", str(folder / SERIES_FILE)]
     report = ["report", spec.log, *documents, "--out", str(folder / REPORT_FILE)]
     return [
         (CommandStep(name, 0.0, _ANALYSIS_SHARE), analyse),
         (CommandStep("report", _ANALYSIS_SHARE, 1.0), report),
     ]
+
+
+def _make_prediction_command(spec: JobSpec, folder: Path) -> list[str]:
+    outputs = ["--out", str(folder / PREDICTION_FILE), "--series", str(folder / SERIES_FILE)]
+    return ["predict", spec.model, spec.log, *outputs, *spec.settings.make_cli_arguments()]
 
 
 @contextlib.contextmanager

@@ -1,7 +1,7 @@
 """The run log (MCAP): writing, reading, repair and export."""
 
 from bench.log.atomic_file import write_atomically
-from bench.log.export import FORMATS, export_log
+from bench.log.export import FORMATS, Format, export_log, make_columns
 from bench.log.header import ChannelInfo, Identity, RunHeader, serialise_values, utc_at
 from bench.log.log_context import LogContext
 from bench.log.mcap_file import DAMAGE_ERRORS, MAGIC, convert_file_errors, is_closed
@@ -16,6 +16,7 @@ from bench.log.messages import (
     WIRE,
     Outcome,
     Phase,
+    list_sample_units,
     make_message_schema,
 )
 from bench.log.reader import Log, LoggedSegment, check_complete, check_profile, read_log
@@ -47,6 +48,7 @@ __all__ = [
     "WIRE",
     "ChannelInfo",
     "ClockMapProtocol",
+    "Format",
     "Identity",
     "Log",
     "LogContext",
@@ -61,6 +63,8 @@ __all__ = [
     "convert_file_errors",
     "export_log",
     "is_closed",
+    "list_sample_units",
+    "make_columns",
     "make_frames_message",
     "make_message_schema",
     "make_readings_messages",

@@ -65,6 +65,9 @@ class RunHeader(BaseModel):
     id: str = Field(description="identifier of the run")
     specimen: str = Field(description="damper under test, with its serial number")
     method: str = Field(description="name of the method; for an import, names of the files")
+    method_sha256: str = Field(
+        default="", description="hash of the content of the method; empty in logs of older versions and in imports"
+    )
     drive_kind: str = Field(description="driver_command_v, coil_v or coil_a")
     drive_unit: Literal["V", "A"] = Field(description="unit of the drive")
     source: Literal["run", "import"] = Field(description="recorded by this bench, or imported")

@@ -4,7 +4,7 @@ from bench.methods.candidate_strokes import make_candidate_strokes
 from bench.methods.checkpoints import list_checkpoints, make_remaining_method
 from bench.methods.compile import NO_SEGMENT, Programme, ProgrammeSegment, compile_method
 from bench.methods.document import DriveKind, Method, list_shipped_methods, load_method, parse_method
-from bench.methods.envelope import Envelope, compute_envelope, format_envelope
+from bench.methods.envelope import Envelope, compute_envelope, compute_heat, format_envelope
 from bench.methods.kinematics import Array, compute_move, compute_move_duration
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "ProgrammeSegment",
     "compile_method",
     "compute_envelope",
+    "compute_heat",
     "compute_move",
     "compute_move_duration",
     "format_envelope",

@@ -73,6 +73,21 @@ class Programme:
         """Time [s] from the first to the last sample."""
         return float(self.time[-1])
 
+    def find_cycle(self, segment: int, elapsed: float) -> tuple[int, int] | None:
+        """Return the present cycle of a segment, from 1, and their number; None without whole cycles.
+
+        Args:
+            segment: index of the segment; -1 between segments.
+            elapsed: time since the first sample [s].
+        """
+        frequency = None if segment == NO_SEGMENT else self.segments[segment].frequency
+        if frequency is None:
+            return None
+        one = self.segments[segment]
+        cycles = round((one.stop - one.start) / self.rate * frequency)
+        done = int((elapsed - float(self.time[one.start])) * frequency)
+        return (min(max(done, 0) + 1, cycles), cycles) if cycles else None
+
 
 def compile_method(method: Method, max_samples: int = MAX_SAMPLES) -> Programme:
     """Compile a method to samples.

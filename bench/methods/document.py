@@ -4,6 +4,7 @@
 method is loaded by its name, any other by its file.
 """
 
+import hashlib
 import json
 from importlib.resources import files
 from pathlib import Path
@@ -105,6 +106,11 @@ class Method(FrozenModel):
     def drive_unit(self) -> str:
         """Unit of the drive, ``V`` or ``A``."""
         return "A" if self.drive_kind == "coil_a" else "V"
+
+    def compute_sha256(self) -> str:
+        """Compute the hash of the content; the form of the document and default values do not count."""
+        content = self.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def to_json(self) -> str:
         """Return the document as indented JSON, without default values."""

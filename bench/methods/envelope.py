@@ -48,6 +48,7 @@ class Envelope(FrozenModel):
     samples: int = Field(description="[1] number of samples of the programme.")
     total: Peaks = Field(description="Peaks of the programme, including everything between its segments.")
     segments: tuple[Peaks, ...] = Field(description="Peaks of the segments, in order.")
+    heat_j: float = Field(default=0.0, description="[J] largest expected energy that the damper turns into heat.")
     limits: MethodLimits = Field(description="Limits of the method.")
     verdict: Literal["within limits", "force limit exceeded"] = Field(
         description="Whether the expected force stays below its limit; the other limits were checked before."
@@ -70,7 +71,8 @@ def compute_envelope(programme: Programme, damper: str | None = None) -> Envelop
     """
     unit = programme.method.drive_unit
     name = damper or DEFAULT_DAMPER[unit]
-    force = compute_expected_force(programme, _find_parameters(name, unit))
+    parameters = _find_parameters(name, unit)
+    force = compute_expected_force(programme, parameters)
     segments = tuple(
         _find_peaks(programme, force, slice(segment.start, segment.stop), segment.name)
         for segment in programme.segments
@@ -84,6 +86,7 @@ def compute_envelope(programme: Programme, damper: str | None = None) -> Envelop
         samples=len(programme.time),
         total=total.model_copy(update={"duration_s": programme.duration}),
         segments=segments,
+        heat_j=_compute_heat(programme, parameters),
         limits=limits,
         verdict="within limits" if total.force_n <= limits.force_n else "force limit exceeded",
     )
@@ -92,13 +95,40 @@ def compute_envelope(programme: Programme, damper: str | None = None) -> Envelop
 def compute_expected_force(programme: Programme, parameters: Parameters) -> Array:
     """Compute the upper bound on the force [N] of a yielded damper at each sample, shape (samples,)."""
     regular = to_coordinates(parameters)
+    dissipative, share = _compute_dissipative_force(programme, parameters)
+    springs = np.abs((regular.k1 + regular.k0 * share) * programme.displacement - regular.f0)
+    return np.asarray(dissipative + springs, dtype=np.float64)
+
+
+def _compute_dissipative_force(programme: Programme, parameters: Parameters) -> tuple[Array, Array]:
+    """Return yield and viscous force [N] at each sample, and the share c1 / (c0 + c1)."""
+    regular = to_coordinates(parameters)
     yield_force = evaluate_coefficient(regular.F_a, regular.F_b, programme.drive)
     c0 = evaluate_coefficient(regular.c0_a, regular.c0_b, programme.drive)
     c1 = evaluate_coefficient(regular.c1_a, regular.c1_b, programme.drive)
     share = c1 / (c0 + c1)
-    dissipative = share * (yield_force + c0 * np.abs(programme.velocity))
-    springs = np.abs((regular.k1 + regular.k0 * share) * programme.displacement - regular.f0)
-    return np.asarray(dissipative + springs, dtype=np.float64)
+    return share * (yield_force + c0 * np.abs(programme.velocity)), share
+
+
+def _compute_heat(programme: Programme, parameters: Parameters) -> float:
+    """Return the largest energy [J] that the damper dissipates."""
+    force, _ = _compute_dissipative_force(programme, parameters)
+    return float(np.sum(force * np.abs(programme.velocity)) / programme.rate)
+
+
+def compute_heat(programme: Programme, damper: str | None = None) -> float:
+    """Compute the heat [J] that a damper dissipates at most during a programme.
+
+    Args:
+        programme: compiled method.
+        damper: name of a shipped parameter set; by default `DEFAULT_DAMPER` for the drive unit.
+
+    Raises:
+        MethodError: there is no such damper, or its drive has another unit.
+    """
+    unit = programme.method.drive_unit
+    force = compute_expected_force(programme, _find_parameters(damper or DEFAULT_DAMPER[unit], unit))
+    return float(np.sum(force * np.abs(programme.velocity)) / programme.rate)
 
 
 def format_envelope(envelope: Envelope) -> list[str]:

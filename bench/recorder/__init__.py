@@ -6,6 +6,7 @@ from bench.recorder.bench_header import (
     describe_decoders,
     find_force_rate,
     make_attachments,
+    make_channel_infos,
     make_run_header,
 )
 from bench.recorder.live_recorder import LiveRecorder
@@ -22,5 +23,6 @@ __all__ = [
     "describe_decoders",
     "find_force_rate",
     "make_attachments",
+    "make_channel_infos",
     "make_run_header",
 ]

@@ -70,6 +70,7 @@ def make_run_header(
         id=identity.make_run_id(method.name),
         specimen=identity.specimen,
         method=method.name,
+        method_sha256=method.compute_sha256(),
         operator=identity.operator,
         drive_kind=rig.drive_kind,
         drive_unit="A" if rig.drive_unit == "A" else "V",
@@ -80,7 +81,7 @@ def make_run_header(
         resampled=RESAMPLING_NOTE,
         calibration=_describe_calibration(config, rig),
         clocks=describe_clocks(rig, maps),
-        channels=_make_channel_infos(config, rig),
+        channels=make_channel_infos(config, rig),
     )
 
 
@@ -163,7 +164,8 @@ def _describe_calibration(config: BenchConfig, rig: Rig) -> dict[str, str]:
     }
 
 
-def _make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
+def make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
+    """Return the acquisition of each recorded channel; the drive is that of the channel that measures it."""
     rates = _find_rates(config, rig)
     return {
         name: ChannelInfo(

@@ -9,21 +9,16 @@ import time
 from collections import Counter
 from collections.abc import Callable
 
-import numpy as np
-import numpy.typing as npt
-
-from bench.agent_protocol import Samples
 from bench.errors import LogError
+from bench.live import BatchMaker, LiveBatch
 from bench.log import NS_PER_SECOND
 from bench.recorder.run_recorder import Columns, RunRecorder
 from bench.rig import AlignedSamples, Aligner, Batch
 
-CYCLE_PERIOD = 0.1
-"""[s] Interval between two turns."""
-LIVE_PERIOD = 0.1
-"""[s] Interval between two messages of live samples."""
-LIVE_RATE = 250.0
-"""[Hz] Largest rate of the samples in these messages."""
+CYCLE_PERIOD = 0.05
+"""[s] Interval between two turns, each of which publishes the new samples."""
+_CLOCK_READINGS = 3
+"""Number of readings of both clocks for one stamp."""
 _JOIN_TIMEOUT = 2.0
 """[s] Time for the thread to end."""
 
@@ -33,9 +28,9 @@ class RecordingThread:
 
     Args:
         aligner: aligns the channels.
-        rate: rate of bench samples [Hz].
+        batch_maker: makes live batches of the samples.
         clock: bench clock [ns].
-        publish: receives samples for live views.
+        publish: receives all samples for live views; must not wait.
         on_cycle: is called in every turn.
         on_failed: receives the error if the log cannot be written.
     """
@@ -43,22 +38,20 @@ class RecordingThread:
     def __init__(
         self,
         aligner: Aligner,
-        rate: float,
+        batch_maker: BatchMaker,
         clock: Callable[[], int],
-        publish: Callable[[Samples], None],
+        publish: Callable[[LiveBatch], None],
         on_cycle: Callable[[], None],
         on_failed: Callable[[LogError], None],
     ) -> None:
         self.newest_ns = -1
         """Bench clock of the newest bench sample [ns]."""
         self._aligner, self._publish, self._on_cycle, self._on_failed = aligner, publish, on_cycle, on_failed
-        self._clock = clock
-        self._decimation = max(1, round(rate / LIVE_RATE))
+        self._batch_maker, self._clock = batch_maker, clock
         self._lock = threading.Lock()
         self._recording: RunRecorder | None = None
         self._lost_at_start: Counter[str] = Counter()
         self._live: list[tuple[AlignedSamples, Columns]] = []
-        self._published_at = 0.0
         self._has_defect = False
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="recording", daemon=True)
@@ -141,27 +134,9 @@ class RecordingThread:
         return failure
 
     def _publish_live(self) -> None:
-        now = time.monotonic()
-        if not self._live or now - self._published_at < LIVE_PERIOD:
-            return
-        live, self._live, self._published_at = self._live, [], now
-        recording = self._recording  # read once, because a run may end meanwhile
-        sizes = [len(aligned.time_ns) for aligned, _ in live]
-        names = live[-1][1].keys()
-        self._publish(
-            Samples(
-                time_ns=np.concatenate([aligned.time_ns for aligned, _ in live])[:: self._decimation].tolist(),
-                values={
-                    name: _make_list([columns.get(name) for _, columns in live], sizes)[:: self._decimation]
-                    for name in names
-                },
-                segment="" if recording is None else recording.segment,
-                utc_s=time.time() - (self._clock() - int(live[-1][0].time_ns[-1])) / NS_PER_SECOND,
-            )
-        )
-
-
-def _make_list(parts: list[npt.NDArray[np.float64] | None], sizes: list[int]) -> list[float | None]:
-    """Concatenate one column of several batches; None for each missing value."""
-    columns = [np.full(size, np.nan) if part is None else part for part, size in zip(parts, sizes, strict=True)]
-    return [None if value != value else value for value in np.concatenate(columns).tolist()]
+        live, self._live = self._live, []
+        # A thread that is suspended between both readings makes the difference too small, never too large.
+        utc_origin_s = max(time.time() - self._clock() / NS_PER_SECOND for _ in range(_CLOCK_READINGS))
+        for aligned, columns in live:
+            for batch in self._batch_maker.make(aligned.time_ns, columns, utc_origin_s):
+                self._publish(batch)

@@ -1,18 +1,29 @@
-"""Playback of the bench samples of a log to live views, in the messages that the agent publishes during a run."""
+"""Playback of the bench samples of a log to live views, in the batches that the agent publishes during a run."""
 
 import math
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
-from bench.agent_protocol import Publisher, Samples
 from bench.errors import LogError
-from bench.log import SAMPLE_FIELDS, Log, read_log
+from bench.live import BatchMaker, LiveBatch
+from bench.log import SAMPLE_FIELDS, Log
+from bench.replay.selection import Selection
 
-MESSAGE_PERIOD = 0.1
-"""[s] Recorded time in one message."""
+PART_TIME = 0.05
+"""[s] Recorded time in one batch."""
+
+
+class PlaybackClock(Protocol):
+    """UTC, and waiting."""
+
+    def time(self) -> float:
+        """Return the UTC [s since 1970]."""
+
+    def sleep(self, seconds: float, /) -> None:
+        """Wait for a time [s]."""
 
 
 def parse_speed(text: str) -> float:
@@ -30,52 +41,53 @@ def parse_speed(text: str) -> float:
     return speed
 
 
-def make_messages(log: Log) -> Iterator[tuple[float, Samples]]:
-    """Yield the time at which each message is due [s], from the first sample, and the message."""
-    time_s = np.asarray(log.samples["time"], dtype=np.float64)
-    edges = np.searchsorted(time_s, np.arange(0.0, time_s[-1] + MESSAGE_PERIOD, MESSAGE_PERIOD))
-    names = [name for name in SAMPLE_FIELDS if name in log.samples and name != "segment"]
-    segment = log.samples.get("segment")
-    for start, stop in zip(edges, [*edges[1:], len(time_s)], strict=True):
-        if stop > start:
-            place = -1 if segment is None else int(segment[stop - 1])
-            yield (
-                float(time_s[stop - 1]),
-                Samples(
-                    time_ns=log.samples["time_ns"][start:stop].tolist(),
-                    values={name: _make_list(log.samples[name][start:stop].tolist()) for name in names},
-                    segment=next((one.name for one in log.segments if one.index == place), ""),
-                ),
-            )
+def divide(log: Log, parts: list[slice]) -> Iterator[tuple[float, slice]]:
+    """Yield the time at which each short part is due [s], from the first sample, and its samples.
+
+    The time between two chosen parts is left out.
+    """
+    elapsed = 0.0
+    for part in parts:
+        time_s = np.asarray(log.samples["time"][part], dtype=np.float64)
+        time_s = time_s - time_s[0]
+        edges = np.searchsorted(time_s, np.arange(0.0, time_s[-1] + PART_TIME, PART_TIME))
+        for start, stop in zip(edges, [*edges[1:], len(time_s)], strict=True):
+            if stop > start:
+                yield elapsed + float(time_s[stop - 1]), slice(part.start + int(start), part.start + int(stop))
+        elapsed += float(time_s[-1])
 
 
-def _make_list(column: list[float]) -> list[float | None]:
-    return [value if value == value else None for value in column]
+def play_log(
+    log: Log,
+    selection: Selection,
+    speed: float,
+    publish: Callable[[LiveBatch], None],
+    clock: PlaybackClock = time,
+) -> int:
+    """Publish the chosen samples of a log and return their number.
 
-
-def play_log(path: Path, speed: float, address: str, key: Path, wait: Callable[[float], None] = time.sleep) -> int:
-    """Publish the samples of a log and return their number.
+    A live view judges the age of samples by their stamps. The stamps are therefore those of the playback.
 
     Args:
-        path: file of the log.
+        log: the log.
+        selection: chosen samples.
         speed: multiple of real time.
-        address: ZeroMQ address to which subscribers connect.
-        key: key file of a TCP address, created unless it exists.
-        wait: waits for a time [s].
+        publish: receives the batches.
+        clock: UTC, and waiting.
 
     Raises:
-        LogError: the log cannot be read.
-        RunError: the address is not available.
-        ConfigError: other users could reach the socket.
-        SecretFileError: the key file cannot be created, or other users may read it.
+        LogError: no sample is chosen.
     """
-    log = read_log(path)
-    count = 0
-    with Publisher(address, key) as publisher:
-        began = time.monotonic()
-        for due, message in make_messages(log):
-            wait(max(began + due / speed - time.monotonic(), 0.0))
-            # A live view judges the age of samples by their stamp, and these are played now.
-            publisher.publish(message.model_copy(update={"utc_s": time.time()}))
-            count += len(message.time_ns)
+    maker = BatchMaker(log.metadata["units"])
+    columns = {name: np.asarray(log.samples[name], np.float64) for name in SAMPLE_FIELDS if name in log.samples}
+    count, began = 0, clock.time()
+    stamp = began
+    for due, part in divide(log, selection.find_parts(log)):
+        clock.sleep(max(began + due / speed - clock.time(), 0.0))
+        before, stamp = stamp, clock.time()
+        size = part.stop - part.start
+        time_ns = (np.linspace(before - began, stamp - began, size + 1)[1:] * 1e9).astype(np.int64)
+        for batch in maker.make(time_ns, {name: column[part] for name, column in columns.items()}, began):
+            publish(batch)
+        count += size
     return count

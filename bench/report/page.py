@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
@@ -91,6 +92,7 @@ def gather(
     diagnosis_path: Path | None = None,
     truth: Path | None = None,
     unseen: Path | None = None,
+    series_path: Path | None = None,
 ) -> Report:
     """Read a log and the documents on it, and simulate the fit on the log.
 
@@ -100,6 +102,7 @@ def gather(
         diagnosis_path: diagnosis document.
         truth: truth file of a drawn damper, which is compared with the diagnosis.
         unseen: prediction document of the diagnosed twin on another recording.
+        series_path: file that receives recorded and simulated force.
 
     Raises:
         ReportError: a document is invalid, or the fit cannot be simulated on this log.
@@ -108,7 +111,7 @@ def gather(
     fit_document = None if fit is None else read_fit(fit)
     diagnosis_document = None if diagnosis_path is None else read_diagnosis(diagnosis_path)
     content_of_log = read_log(log)
-    prediction, series = (None, None) if fit is None else predict(fit, log)
+    prediction, series = (None, None) if fit is None else predict(fit, log, series_path)
     with log.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     recording = make_recording(content_of_log, series)
@@ -161,21 +164,32 @@ def render(report: Report, figures: dict[str, Figure], command: str, created_at:
         name: Picture(*CAPTIONS[name], base64.b64encode(plots.render_png(figure)).decode())
         for name, figure in figures.items()
     }
+    values = make_context(report, command, created_at)
+    return environment.get_template("report.html").render(pictures=pictures, **values)
+
+
+def make_context(report: Report, command: str, created_at: datetime) -> dict[str, Any]:
+    """Return all texts and tables of a report, formatted for a person, for a template or another format.
+
+    Args:
+        report: content of the report.
+        command: command line that writes it.
+        created_at: time at which it is written.
+    """
     found = report.diagnosis
-    return environment.get_template("report.html").render(
-        title=_make_title(report.log),
-        run=content.make_header_rows(report.log, report.sha256),
-        findings=make_findings(report.log, report.fit, report.prediction, report.is_fitted_log),
-        pictures=pictures,
-        outcome=content.make_outcome_rows(report.log),
-        channels=content.make_channel_rows(report.log),
-        diagnosis=None if found is None else diagnosis.make_context(found, report.recording.drive_unit),
-        truth=_make_truth_context(report),
-        fit=None if report.fit is None else _make_fit_context(report),
-        created_at=f"{created_at:%Y-%m-%d %H:%M} UTC",
-        version=version("mrbench"),
-        command=command,
-    )
+    return {
+        "title": _make_title(report.log),
+        "run": content.make_header_rows(report.log, report.sha256),
+        "findings": make_findings(report.log, report.fit, report.prediction, report.is_fitted_log),
+        "outcome": content.make_outcome_rows(report.log),
+        "channels": content.make_channel_rows(report.log),
+        "diagnosis": None if found is None else diagnosis.make_context(found, report.recording.drive_unit),
+        "truth": _make_truth_context(report),
+        "fit": None if report.fit is None else _make_fit_context(report),
+        "created_at": f"{created_at:%Y-%m-%d %H:%M} UTC",
+        "version": version("mrbench"),
+        "command": command,
+    }
 
 
 def _make_title(log: Log) -> str:

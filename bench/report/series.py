@@ -1,5 +1,6 @@
 """Force that a fit predicts for a log, computed by ``mrbench predict`` as a process."""
 
+import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bench.errors import ReportError
+from bench.log import write_atomically
 from bench.processes import MRBENCH_COMMAND
 from bench.report.documents import Prediction, read_prediction
 
@@ -27,10 +29,16 @@ class ForceSeries:
     number of the stretch, and whether the sample was held out."""
 
 
-def predict(fit: Path, log: Path) -> tuple[Prediction, ForceSeries]:
+def predict(fit: Path, log: Path, keep: Path | None = None) -> tuple[Prediction, ForceSeries]:
     """Simulate a fit on a log.
 
+    Args:
+        fit: fit document.
+        log: recording.
+        keep: file (.npz) that receives the series as well.
+
     Raises:
+        LogError: the series cannot be written.
         ReportError: the prediction fails; the message contains that of the command.
     """
     with TemporaryDirectory(prefix="mrbench-report-") as folder:
@@ -40,6 +48,9 @@ def predict(fit: Path, log: Path) -> tuple[Prediction, ForceSeries]:
         if result.returncode != 0:
             lines = result.stderr.strip().splitlines() or [f"exit status {result.returncode}"]
             raise ReportError(f"the fit cannot be simulated on {log}: {lines[-1].removeprefix('mrbench: ')}")
+        if keep is not None:
+            with write_atomically(keep) as partial:
+                shutil.copyfile(series, partial)
         return read_prediction(prediction), read_series(series)
 
 

@@ -39,6 +39,8 @@ def run_from_plant(
     *,
     seed: int | None = None,
     rig: Sequence[str] = RIG_COMMAND,
+    continues: str = "",
+    resumed_after: str = "",
 ) -> Programme:
     """Record a method on the simulated plant of a scenario.
 
@@ -52,6 +54,8 @@ def run_from_plant(
         progress: receives the completed share, 0 to 1.
         seed: seed of all random numbers of the rig; the scenario's own if None.
         rig: command that starts the rig.
+        continues: id of the run that this one continues or repeats; empty without one.
+        resumed_after: checkpoint after which the method begins; empty for a whole run.
 
     Returns:
         The programme that was run.
@@ -74,7 +78,9 @@ def run_from_plant(
             f" {rig_channels.info['drive_kind']}"
         )
     values = _make_columns(programme, rig_channels)
-    with LogWriter(out, _make_header(method, rig_channels, identity, seed)) as log:
+    header = _make_header(method, rig_channels, identity, seed)
+    parts = {"continues": continues, "resumed_after": resumed_after}
+    with LogWriter(out, header.model_copy(update=parts)) as log:
         _write_log(log, programme, rig_channels, values, Path(scenario).stem)
     return programme
 
@@ -85,6 +91,7 @@ def _make_header(method: Method, rig_channels: RigChannels, identity: Identity, 
         id=identity.make_run_id(method.name),
         specimen=identity.specimen or _format_specimen(info.get("specimen", {})),
         method=method.name,
+        method_sha256=method.compute_sha256(),
         operator=identity.operator,
         drive_kind=info["drive_kind"],
         drive_unit=info["drive_unit"],

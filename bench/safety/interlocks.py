@@ -68,6 +68,12 @@ class Interlocks:
         self._reported_ns: dict[tuple[Quantity, Action], int] = {}
 
     @property
+    def limits(self) -> LimitMatrix:
+        """Limits in force."""
+        with self._lock:
+            return self._limits
+
+    @property
     def trip_reason(self) -> str:
         """Reason of the trip that is latched; empty without a trip."""
         trip = self.trip

@@ -8,18 +8,26 @@ from typing import Protocol
 
 from pydantic import BaseModel
 
-from bench.agent_protocol import AgentEvent, AgentStatus, Message, Reply, ResetCommand, Samples, StatusCommand
-from bench.errors import AgentUnreachableError, RunError
+from bench.agent_protocol import (
+    AgentEvent,
+    AgentStatus,
+    BenchDescription,
+    DescribeCommand,
+    Message,
+    Reply,
+    ResetCommand,
+    StatusCommand,
+)
+from bench.errors import AgentUnreachableError, NoRigError, RunError
+from bench.live import LiveBatch
 
-BATCH_TIME = 0.04
-"""Time between two batches of samples to subscribers [s]: 25 batches per second suit a live plot."""
 STATUS_LIFETIME = 2.0
 """Age up to which a status counts as current [s]; the agent publishes four per second."""
 _RETRY_TIME = 0.5
 """Pause before a new subscription after a message that cannot be used [s]."""
 _LOG = logging.getLogger(__name__)
 
-PublishedMessage = AgentStatus | Samples | AgentEvent | None
+PublishedMessage = AgentStatus | LiveBatch | AgentEvent | None
 
 
 class AgentLink(Protocol):
@@ -45,9 +53,9 @@ class NoAgent:
         """Refuse the command.
 
         Raises:
-            AgentUnreachableError: always.
+            NoRigError: always.
         """
-        raise AgentUnreachableError(self._MESSAGE)
+        raise NoRigError(self._MESSAGE)
 
     def subscribe(self, stopping: threading.Event) -> Iterator[PublishedMessage]:
         """Yield only None, until the service stops."""
@@ -61,7 +69,7 @@ class AgentMonitor:
     def __init__(
         self,
         link: AgentLink,
-        publish: Callable[[str, BaseModel], None],
+        publish: Callable[[str, BaseModel | LiveBatch], None],
         observe: Callable[[AgentStatus], None],
     ) -> None:
         """Use a connection to the agent.
@@ -74,8 +82,6 @@ class AgentMonitor:
         self._link, self._publish, self._observe = link, publish, observe
         self._status: AgentStatus | None = None
         self._status_at = float("-inf")
-        self._pending: list[Samples] = []
-        self._forwarded_at = float("-inf")
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._listen, name="agent-monitor", daemon=True)
 
@@ -108,6 +114,19 @@ class AgentMonitor:
             AgentUnreachableError: the agent does not answer.
         """
         return self.latest_status or self.send_command(StatusCommand(), timeout)
+
+    def describe_bench(self) -> BenchDescription:
+        """Return what the agent's configuration says about the bench.
+
+        Raises:
+            AgentUnreachableError: the agent does not answer, or is of an older version.
+        """
+        description = self._link.send(DescribeCommand()).description
+        if description is None:
+            raise AgentUnreachableError(
+                "the rig agent cannot describe the bench; it must have the service's version"
+            )
+        return description
 
     def reset(self) -> AgentStatus:
         """Reset a trip.
@@ -148,33 +167,14 @@ class AgentMonitor:
                 self._stopping.wait(_RETRY_TIME)
 
     def _handle_message(self, message: PublishedMessage) -> None:
-        if isinstance(message, Samples):
-            self._pending.append(message)
+        if isinstance(message, LiveBatch):
+            self._publish("samples", message)
         elif isinstance(message, AgentEvent):
             self._publish("event", message)
         elif isinstance(message, AgentStatus):
             self._set_status(message)
             self._publish("status", message)
-        if self._pending and time.monotonic() - self._forwarded_at >= BATCH_TIME:
-            self._publish("samples", join_batches(self._pending))
-            self._pending, self._forwarded_at = [], time.monotonic()
 
     def _set_status(self, status: AgentStatus) -> None:
         self._status, self._status_at = status, time.monotonic()
         self._observe(status)
-
-
-def join_batches(batches: list[Samples]) -> Samples:
-    """Join batches into one; a field that is missing in a batch is None there."""
-    if len(batches) == 1:
-        return batches[0]
-    names = dict.fromkeys(name for batch in batches for name in batch.values)
-    return Samples(
-        time_ns=[time_ns for batch in batches for time_ns in batch.time_ns],
-        values={
-            name: [value for batch in batches for value in batch.values.get(name, [None] * len(batch.time_ns))]
-            for name in names
-        },
-        segment=batches[-1].segment,
-        utc_s=batches[-1].utc_s,
-    )

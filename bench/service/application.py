@@ -11,26 +11,31 @@ from typing import Any
 from fastapi import Depends, FastAPI
 from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
+from pydantic import BaseModel
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
-from bench.agent_protocol import AgentStatus
+from bench.agent_protocol import AgentEvent, AgentStatus
 from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
+from bench.live import LiveBatch, LiveBroadcaster, serialise_message
+from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentLink, AgentMonitor
+from bench.service.campaigns import CampaignExecutor
 from bench.service.context import ServiceContext
-from bench.service.live import LiveBroadcaster, serialise_message
 from bench.service.middleware import (
     BodyLimitMiddleware,
+    HeadMiddleware,
     RequestLogMiddleware,
     SecurityHeadersMiddleware,
     TokenCheckMiddleware,
 )
-from bench.service.query_check import refuse_unknown_parameters
-from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS
+from bench.service.requests import refuse_unknown_parameters
+from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS, refuse_unknown_paths
 from bench.service.run_registry import RunRegistry
+from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers
 
 API = "/api/v1"
 PUBLIC_PATHS = (f"{API}/health", f"{API}/openapi.json")
@@ -75,7 +80,8 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
     # The middleware that is added last sees a request first.
-    app.add_middleware(BodyLimitMiddleware)
+    app.add_middleware(HeadMiddleware, below="/api/")
+    app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)
     app.add_middleware(RequestLogMiddleware)
     app.add_middleware(SecurityHeadersMiddleware, api="/api/")
@@ -89,6 +95,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
             dependencies=[Depends(_BEARER), Depends(refuse_unknown_parameters)],
             responses=problems.RESPONSES,
         )
+    refuse_unknown_paths(app, f"{API}/")
     if PAGE_FOLDER.is_dir():
         app.mount("/", StaticFiles(directory=PAGE_FOLDER, html=True), name="page")
     return app
@@ -104,6 +111,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
     database = await asyncio.to_thread(
         open_database, settings.database or make_sqlite_url(settings.data / CATALOGUE_FILE)
     )
+    await asyncio.to_thread(remove_leftovers, settings.data)
     async with AsyncExitStack() as stack:
         catalogue = Catalogue(database, settings.data)
         stack.callback(catalogue.close)
@@ -112,6 +120,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         stack.push_async_callback(engine.close)
         await engine.start(context.job_manager)
         stack.enter_context(context.monitor)
+        stack.enter_context(context.campaigns)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.live.publish_clock()))
         yield
@@ -132,8 +141,18 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         if not loop.is_closed():
             asyncio.run_coroutine_threadsafe(registry.observe(status), loop)
 
+    publish = broadcaster.make_publisher(loop)
+
+    def on_message(topic: str, message: BaseModel | LiveBatch) -> None:
+        publish(topic, message)
+        if isinstance(message, AgentEvent):
+            registry.record_event(message)
+        elif isinstance(message, LiveBatch):
+            campaigns.thermometer.take(message)
+
     job_manager = JobManager(catalogue, engine, on_job_changed)
-    monitor = AgentMonitor(settings.link, broadcaster.make_publisher(loop), on_status)
+    monitor = AgentMonitor(settings.link, on_message, on_status)
+    campaigns = CampaignExecutor(catalogue, monitor, is_local=settings.has_local_logs)
     registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
         settings.access,
@@ -145,6 +164,8 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         registry,
         settings.has_local_logs,
         SpaceMonitor(settings.data),
+        SampleStore(settings.data),
+        campaigns,
     )
     return context
 

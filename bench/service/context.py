@@ -1,8 +1,10 @@
 """Objects shared by all routes, created when the service starts."""
 
-from dataclasses import dataclass
+import asyncio
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
+from weakref import WeakValueDictionary
 
 from fastapi import Depends
 from starlette.requests import HTTPConnection
@@ -10,9 +12,11 @@ from starlette.requests import HTTPConnection
 from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
+from bench.live import LiveBroadcaster
+from bench.samples import SampleStore
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentMonitor
-from bench.service.live import LiveBroadcaster
+from bench.service.campaigns import CampaignExecutor
 from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
 from bench.service.views import Run, make_run_view
@@ -35,6 +39,10 @@ class ServiceContext:
     has_local_logs: bool
     """True if the agent writes into the service's data folder."""
     space_monitor: SpaceMonitor
+    sample_store: SampleStore
+    campaigns: CampaignExecutor
+    key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
+    """Locks of the idempotency keys of requests in progress."""
 
     @property
     def data(self) -> Path:

@@ -3,7 +3,7 @@
 from http import HTTPStatus
 from pathlib import Path
 
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, Response
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive, Scope, Send
@@ -34,12 +34,23 @@ class SnapshotResponse(FileResponse):
         )
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the announced number of bytes, and no more.
+        """Send the announced number of bytes, and no more; 304 to a client that has this content already.
 
         Raises:
             HTTPException: the requested range is invalid, or outside the file.
         """
+        if _is_known(Headers(scope=scope).get("if-none-match", ""), self.headers["etag"]):
+            await Response(status_code=HTTPStatus.NOT_MODIFIED, headers={"ETag": self.headers["etag"]})(
+                scope, receive, send
+            )
+            return
         await super().__call__(scope, receive, _limit_length(send))
+
+
+def _is_known(known: str, tag: str) -> bool:
+    """Return whether a list of tags, or `*`, contains the tag of a file."""
+    tags = [one.strip().removeprefix("W/") for one in known.split(",")]
+    return "*" in tags or tag in tags
 
 
 def _limit_length(send: Send) -> Send:

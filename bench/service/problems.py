@@ -11,7 +11,8 @@ from fastapi.responses import JSONResponse
 from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
-from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError
+from bench.campaigns import CampaignDocumentError
+from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, NoRigError, RecordingError
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -84,6 +85,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}},
     }
     for status, description in (
+        (400, "The request cannot be read"),
         (401, "The token is missing or wrong"),
         (404, "The object does not exist"),
         (409, "Not possible in the present state"),
@@ -105,6 +107,14 @@ _HTTP_NAMES = {
 # The first matching class applies, so that the base class is last.
 _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
     (MethodError, HTTPStatus.UNPROCESSABLE_ENTITY, "method-refused", "The method was refused"),
+    (RecordingError, HTTPStatus.UNPROCESSABLE_ENTITY, "recording-refused", "The recording was refused"),
+    (NoRigError, HTTPStatus.NOT_FOUND, "no-rig", "No rig is configured"),
+    (
+        CampaignDocumentError,
+        HTTPStatus.UNPROCESSABLE_ENTITY,
+        "campaign-refused",
+        "The campaign was refused",
+    ),
     (AgentUnreachableError, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),

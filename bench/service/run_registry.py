@@ -7,7 +7,10 @@ from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bench.agent_protocol import AgentStatus, RunStatus
+from sqlalchemy.exc import SQLAlchemyError
+
+from bench.agent_protocol import AgentEvent, AgentStatus, RunStatus
+from bench.campaigns import WARM_UP_METHOD
 from bench.catalogue import Catalogue, LogIntegrity, RunRow, catalogue_log, is_complete, scan_logs
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
@@ -44,7 +47,8 @@ class RunRegistry:
         self._catalogue, self._job_manager = catalogue, job_manager
         self._get_status, self._on_changed = status, notify
         self._known_states: set[tuple[str, bool]] = set()
-        self._lock = asyncio.Lock()
+        self.lock = asyncio.Lock()
+        """Held while logs are catalogued or moved."""
         self._failures = RepeatedFailure(_LOG, "runs_not_recorded", "runs_recorded_again")
 
     async def observe(self, status: AgentStatus) -> None:
@@ -64,14 +68,26 @@ class RunRegistry:
         for run in runs.values():
             key = (run.id, run.outcome is not None)  # a run is recorded when it starts and when it ends
             if key not in self._known_states:
-                async with self._lock:
+                async with self.lock:
                     await (self._finish_run(run) if run.outcome else self._add_run(run))
                 # Added last, so that a failed update is tried again with the next status.
                 self._known_states.add(key)
 
+    def record_event(self, event: AgentEvent) -> None:
+        """Store an event with the run in progress; called from any thread.
+
+        A failure, such as a full disk, is logged; the log of the run contains its events in any case.
+        """
+        status = self._get_status()
+        run = status.run if status and status.run and status.run.outcome is None else None
+        try:
+            self._catalogue.event_journal.record(event.kind, event.text, run.id if run else None)
+        except SQLAlchemyError as error:
+            self._failures.note(error)
+
     async def scan(self) -> None:
         """Scan the data folder once."""
-        async with self._lock:
+        async with self.lock:
             for row in await asyncio.to_thread(scan_logs, self._catalogue, self._is_being_written):
                 await self._handle_change(row)
 
@@ -86,6 +102,29 @@ class RunRegistry:
             else:
                 failures.clear()
             await asyncio.sleep(SCAN_PERIOD)
+
+    async def adopt(self, found: Path, log: Path) -> RunRow | None:
+        """Move a log from elsewhere to its place in the data folder, and treat it as that of a recorded run.
+
+        Args:
+            found: complete file on the same disk.
+            log: its place in the data folder, where no file exists.
+
+        Returns:
+            The new run; None if the catalogue has it already, and nothing was moved then.
+        """
+        async with self.lock:  # otherwise a scan could find the log between both steps
+            row = await asyncio.to_thread(self._move, found, log)
+            if row is not None:
+                await self._handle_change(row, is_wanted=True)
+        return row
+
+    def _move(self, found: Path, log: Path) -> RunRow | None:
+        found.rename(log)
+        row = catalogue_log(self._catalogue, log)
+        if row is None:
+            log.rename(found)
+        return row
 
     async def _add_run(self, run: RunStatus) -> RunRow:
         row = await asyncio.to_thread(self._catalogue.get_run, run.id)
@@ -111,10 +150,16 @@ class RunRegistry:
         # Without a usable log, or with one on the agent's machine, the report is everything.
         return ended or self._catalogue.update_run(run.id, state="ended", outcome=run.outcome)
 
-    async def _handle_change(self, row: RunRow) -> None:
+    async def _handle_change(self, row: RunRow, *, is_wanted: bool = False) -> None:
+        """Publish a changed run and identify it if it is complete; an import only if a person has asked for it."""
         _LOG.info("run_" + row.state, extra={"run": row.id, "outcome": row.outcome, "reason": row.reason})
         await self._on_changed(row)
-        is_complete_run = row.source == "run" and row.outcome in IDENTIFIED_OUTCOMES and row.log_sha256
+        is_complete_run = (
+            (is_wanted or row.source == "run")
+            and row.outcome in IDENTIFIED_OUTCOMES
+            and row.log_sha256
+            and row.method != WARM_UP_METHOD
+        )
         if (
             is_complete_run
             and row.integrity not in DAMAGED
@@ -139,6 +184,8 @@ def make_run_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
     return RunRow(
         id=run.id,
         method=run.method,
+        method_version=catalogue.find_method_version(run.method, run.method_sha256),
+        method_sha256=run.method_sha256 or None,
         specimen=run.specimen,
         operator=run.operator,
         source="run",

@@ -4,10 +4,12 @@ import fcntl
 import logging
 import signal
 import socket
+import ssl
 from collections.abc import Callable, Iterator
 from contextlib import AbstractAsyncContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from urllib.parse import urlsplit
 
 import uvicorn
@@ -36,6 +38,15 @@ _SHUTDOWN_TIMEOUT = 5
 """Time for open requests to finish at shutdown [s]."""
 
 
+class TlsFiles(NamedTuple):
+    """Files by which the service answers HTTPS."""
+
+    certificate: Path
+    """Certificate chain, PEM."""
+    key: Path
+    """Its private key, PEM, without a password."""
+
+
 @dataclass(frozen=True)
 class ServeOptions:
     """Options of the service."""
@@ -58,6 +69,8 @@ class ServeOptions:
     """TLS file of the scheduler; by default that in the data folder."""
     allow_plain_scheduler: bool = False
     """Accept a scheduler without TLS beyond the loopback interface."""
+    tls: TlsFiles | None = None
+    """Files of HTTPS; without them, the service answers plain HTTP."""
     is_terminal: bool = False
     """True if the printed lines are shown on a terminal and kept nowhere: only then is the token printed."""
 
@@ -77,6 +90,8 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
         CatalogueError: the catalogue cannot be opened.
     """
     log_to_stderr()
+    if options.tls is not None:
+        check_tls(options.tls)
     data = options.data.resolve()
     link, commands = _make_agent_link(options)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
@@ -94,12 +109,12 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
             )
         )
         host, port = listener.getsockname()[:2]
-        page = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+        page = f"{'https' if options.tls else 'http'}://{f'[{host}]' if ':' in host else host}:{port}/"
         print_line(_format_address(page, token, data, is_terminal=options.is_terminal))
-        if not loopback:
-            print_line("this address is open to the network and not encrypted; put a TLS proxy in front of it")
+        if not loopback and options.tls is None:
+            print_line("this address is open to the network and not encrypted; give --tls-cert and --tls-key")
         with supervisor or nullcontext():
-            _run_server(app, listener)
+            _run_server(app, listener, options.tls)
         if supervisor is not None and supervisor.has_started:
             print_line(shut_down_idle_agent(link))
 
@@ -196,7 +211,24 @@ class _Server(uvicorn.Server):
                 signal.signal(number, handler)
 
 
-def _run_server(app: object, listener: socket.socket) -> None:
+def check_tls(files: TlsFiles) -> None:
+    """Check that a certificate and its key can be used, before anything is started.
+
+    Raises:
+        ServiceError: a file cannot be read, or they do not belong together.
+    """
+    try:
+        # Without this, the library would ask for a password on the terminal.
+        ssl.create_default_context(ssl.Purpose.CLIENT_AUTH).load_cert_chain(*files, password=lambda: b"")
+    except (OSError, ssl.SSLError) as error:
+        reason = (error.strerror or str(error)) if isinstance(error, OSError) else str(error)
+        raise ServiceError(
+            f"{files.certificate} and {files.key} cannot be used for TLS ({reason}); give a certificate chain and "
+            "its key without a password, both PEM"
+        ) from error
+
+
+def _run_server(app: object, listener: socket.socket, tls: TlsFiles | None) -> None:
     # Uvicorn's own log would contain the token that a browser sends in the URL of the websocket.
     settings = uvicorn.Config(
         app,  # type: ignore[arg-type]
@@ -205,6 +237,9 @@ def _run_server(app: object, listener: socket.socket) -> None:
         server_header=False,
         timeout_graceful_shutdown=_SHUTDOWN_TIMEOUT,
         ws_max_size=65536,
+        ssl_certfile=tls.certificate if tls else None,
+        ssl_keyfile=tls.key if tls else None,
+        ws_per_message_deflate=False,  # samples hardly shrink, and each listener would cost a compression
     )
     server = _Server(settings)
     server.run(sockets=[listener])

@@ -9,8 +9,8 @@ from bench.agent_protocol import AgentStatus
 from bench.catalogue import JobRow, LogIntegrity, RunOutcome, RunRow, RunState
 from bench.endings import RunEnding
 from bench.jobs import DiagnosisSummary, Job, find_newest_done, make_diagnosis_summary, make_job_view
-from bench.methods import DriveKind
 from bench.setup_steps import SetupStep
+from bench.validation import SerialNumber
 
 
 class View(BaseModel):
@@ -44,45 +44,6 @@ class SetupRequest(View):
         return self
 
 
-class MethodSummary(View):
-    """Summary of a method that is part of mrbench."""
-
-    name: str
-    title: str
-    duration_s: float = Field(description="duration with conditioning, fades and moves [s]")
-    drive_kind: DriveKind = Field(description="quantity that drives the damper")
-    checkpoints: tuple[str, ...] = Field(
-        description="segments after which a run can be paused, and resumed (`resume_after`)"
-    )
-
-
-class PreviewSeries(View):
-    """Planned quantity over time, reduced to the lowest and the highest value of short intervals."""
-
-    time_s: list[float] = Field(description="time from the start of the plan [s]")
-    values: list[float] = Field(description="value at each time")
-
-
-class PreviewSegment(View):
-    """Time of a segment in the plan."""
-
-    name: str
-    start_s: float = Field(description="[s]")
-    end_s: float = Field(description="[s]")
-    checkpoint: bool = Field(description="true if an interrupted run can be resumed after this segment")
-
-
-class MethodPreview(View):
-    """Motion and drive of a method as they will be commanded."""
-
-    name: str
-    duration_s: float = Field(description="duration with conditioning, fades and moves [s]")
-    drive_unit: str = Field(description="V or A")
-    displacement_m: PreviewSeries = Field(description="commanded displacement [m]")
-    drive: PreviewSeries = Field(description="commanded drive [V or A]")
-    segments: tuple[PreviewSegment, ...] = Field(description="in order")
-
-
 class RunProgress(View):
     """Progress of a run."""
 
@@ -96,6 +57,12 @@ class Run(View):
 
     id: str
     method: str
+    method_version: int | None = Field(
+        description="version of the method; null if its content was not stored under its name"
+    )
+    method_sha256: str | None = Field(
+        description="hash of the content of the method; null in runs of older versions and in imports"
+    )
     specimen: str
     operator: str
     source: str = Field(description="`run`, or `import` for a recording made elsewhere")
@@ -114,6 +81,11 @@ class Run(View):
     reason: str = Field(description="reason why the outcome is not clean")
     continues: str | None = Field(description="id of the run that this one continues after a checkpoint")
     log: str = Field(description="file of the log, relative to the data folder or absolute")
+    log_bytes: int | None = Field(description="size of the log [bytes]; null until it was read")
+    lost: dict[str, int] = Field(description="number of lost samples by channel; empty if none was lost")
+    alarms: tuple[str, ...] = Field(description="texts of the alarms during the run")
+    tags: tuple[str, ...] = Field(description="words by which a person sorts runs")
+    trashed: datetime | None = Field(description="UTC at which the run was moved to the trash; null outside it")
     log_sha256: str | None = Field(description="hash of the log as it was recorded; null without a complete log")
     integrity: LogIntegrity | None = Field(
         description="latest comparison of the log with its hash: intact, changed or missing; null before the first"
@@ -149,10 +121,14 @@ class RunPage(View):
 class StartRunRequest(View):
     """Request of a run."""
 
-    method: str | dict[str, Any] = Field(
-        description="name of an included method, or a document `mrbench.method/1`"
+    method: str | dict[str, Any] = Field(description="name of a method, or a document `mrbench.method/1`")
+    method_version: int | None = Field(
+        default=None, ge=1, description="version of the named method; by default its newest one"
     )
-    specimen: str = Field(default="", max_length=200, description="damper under test, with its serial number")
+    specimen: SerialNumber | None = Field(
+        default=None,
+        description="serial number of the damper, registered at its first use; by default that of bench.toml",
+    )
     operator: str = Field(default="", max_length=200, description="name of the operator")
     resume_after: str = Field(
         default="", description="checkpoint of the method (segment) after which an interrupted run continues"
@@ -178,6 +154,8 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
     return Run(
         id=row.id,
         method=row.method,
+        method_version=row.method_version,
+        method_sha256=row.method_sha256,
         specimen=row.specimen,
         operator=row.operator,
         source=row.source,
@@ -189,6 +167,11 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         reason=row.reason,
         continues=row.continues,
         log=row.log,
+        log_bytes=row.log_bytes,
+        lost=row.lost or {},
+        alarms=tuple(row.alarms or ()),
+        tags=tuple(row.tags or ()),
+        trashed=row.trashed,
         log_sha256=row.log_sha256,
         integrity=row.integrity,
         progress=_find_progress(row, status),
@@ -198,6 +181,11 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         diagnosis=make_diagnosis_summary(newest_diagnosis) if newest_diagnosis else None,
         jobs=tuple(make_job_view(job) for job in reversed(jobs)),
     )
+
+
+def make_run_tag(row: RunRow) -> str:
+    """Return the entity tag of what a person may change on a run."""
+    return f'"{row.revision}"'
 
 
 def _find_progress(row: RunRow, status: AgentStatus | None) -> RunProgress | None:

@@ -8,15 +8,18 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import numpy as np
 import uvicorn
-from fastapi import APIRouter, FastAPI, Request, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, FastAPI, Form, Request, UploadFile, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
-from bench.methods import load_method
-from bench.service.routes.previews import preview_method
+from bench.live import Channel, LiveBatch, describe_channels
+from bench.methods import compile_method, compute_envelope, load_method
+from bench.service.routes.planning.previews import make_preview
+from tests.support.fake_recording import recording_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
@@ -25,13 +28,34 @@ TOKEN = "a-token"
 SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
 REFUSAL = "lvdt: not connected for 3.2 s; plug it in and start again"
 CLAMPED = "a specimen is clamped, and homing would drive it into its ends; unclamp it and call unmount first"
+BAD_CELL = "bad.csv, row 2, column force_n: 'much' is not a number"
 HASH = "5f" * 32
 RATE = 1000
 BATCH = 40
+CHANNELS = (
+    Channel("displacement", "m"),
+    Channel("velocity", "m/s"),
+    Channel("force", "N"),
+    Channel("coil_drive", "V"),
+    Channel("coil_current", "A"),
+    Channel("temperature", "degC"),
+)
 PAUSE = "at checkpoint 10mm_1Hz, in 4 s"
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
 METHODS = [
-    {"name": name, "title": title, "duration_s": duration, "drive_kind": "coil_v", "checkpoints": []}
+    {
+        "name": name,
+        "title": title,
+        "duration_s": duration,
+        "drive_kind": "coil_v",
+        "checkpoints": [],
+        "version": 1,
+        "source": "included",
+        "usable": True,
+        "obstacle": "",
+        "sha256": HASH,
+        "created": None,
+    }
     for name, title, duration in (
         ("identification", "Strokes for an identification", 162.0),
         ("paper_sines", "Six voltages on a 10 mm sine at 1 Hz", 602.5),
@@ -49,6 +73,13 @@ def instrument(name: str, driver: str, address: str, **more: Any) -> dict[str, A
     return {"name": name, "driver": driver, "address": address} | healthy | more
 
 
+LIMITS = [
+    {"quantity": "force", "action": "controlled_stop", "value": 1500.0},
+    {"quantity": "force", "action": "trip", "value": 1875.0},
+    {"quantity": "displacement", "action": "controlled_stop", "value": 0.02625},
+    {"quantity": "displacement", "action": "trip", "value": 0.055},
+    {"quantity": "temperature", "action": "indicate", "value": 60.0},
+]
 INSTRUMENTS = [
     instrument("actuator", "canopen", "socketcand://127.0.0.1:29536/can0 node 5", age_s=0.004),
     instrument("load_cell", "serial", "/dev/pts/3", lost=12, corrupted=2, resynchronised=1),
@@ -76,6 +107,8 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
         "ending": None, "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None,
         "noise_floor_n": None, "result": "", "jobs": [], "continues": None, "log_sha256": None, "integrity": None,
+        "lost": {}, "alarms": [], "tags": [], "trashed": None, "method_version": None, "method_sha256": None,
+        "log_bytes": None,
         "diagnosis": None,
     } | more  # fmt: skip
 
@@ -104,7 +137,7 @@ class FakeBench:
             "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
-        self.began = time.monotonic()
+        self.began, self.began_utc = time.monotonic(), time.time()
 
     def status(self) -> dict[str, Any]:
         """Return the status of the agent as it is published."""
@@ -112,7 +145,8 @@ class FakeBench:
             "state": self.state, "utc_s": time.time(), "trip": self.trip, "run": self.run, "finished": [],
             "instruments": INSTRUMENTS,
             "warnings": ["no real-time priority: the loop runs at normal priority; set RLIMIT_RTPRIO"],
-            "drive_kind": "coil_v", "drive_unit": "V", "reference_state": self.reference_state, "step": self.step,
+            "limits": LIMITS, "travel_m": (-0.06, 0.06), "drive_kind": "coil_v", "drive_unit": "V",
+            "reference_state": self.reference_state, "step": self.step,
         }  # fmt: skip
 
     def begin(self, wanted: dict[str, Any]) -> dict[str, Any]:
@@ -120,13 +154,13 @@ class FakeBench:
         known = {"id": "run-4", "started": "2025-03-04T09:30:00Z", **wanted}
         self.run = known | {
             "log": "run-4.mcap", "duration_s": 14.0, "elapsed_s": 5.0, "segment": "sine_10mm_1Hz", "outcome": None,
-            "reason": "", "lost": {},
+            "reason": "", "lost": {}, "cycle": 3, "cycles": 10,
         }  # fmt: skip
         self.state = "running"
         self.runs["run-4"] = run(4, None, state="running", **known)
         return self.runs["run-4"]
 
-    def samples(self, first: int) -> dict[str, Any]:
+    def samples(self, first: int) -> LiveBatch:
         """Return a batch of samples: a sine of 10 mm at 1.5 Hz, and a force with a hysteresis loop."""
         times = [(first + k) / RATE for k in range(BATCH)]
         omega = 2 * math.pi * 1.5
@@ -137,14 +171,12 @@ class FakeBench:
             (60 + 900 * u) * math.tanh((v + 8 * x) / 0.02) + (900 + 2000 * u) * v
             for x, v, u in zip(displacement, velocity, drive, strict=True)
         ]
-        values = {"displacement": displacement, "velocity": velocity, "force": force, "coil_drive": drive}
-        values["coil_current"] = [u / 5 for u in drive]
+        current = [u / 5 for u in drive]
         # A slow instrument has values only in some samples.
-        values["temperature"] = [24 + 0.05 * t if not k % BATCH else None for k, t in enumerate(times)]
-        return {
-            "time_ns": [round(t * 1e9) for t in times], "values": values, "segment": "sine_10mm_1Hz",
-            "utc_s": time.time(),
-        }  # fmt: skip
+        temperature = [24 + 0.05 * t if not k % BATCH else math.nan for k, t in enumerate(times)]
+        values = np.array([displacement, velocity, force, drive, current, temperature], np.float32)
+        utc_s = self.began_utc + times[0]
+        return LiveBatch(first // BATCH, utc_s, 1 / RATE, CHANNELS, values)
 
 
 def problem(status: int, title: str, detail: str) -> JSONResponse:
@@ -167,8 +199,17 @@ def application(bench: FakeBench) -> FastAPI:
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
 
-    for routes in (rig_routes, method_routes, run_routes, run_control_routes, result_routes, live_routes):
+    for routes in (
+        rig_routes,
+        method_routes,
+        run_routes,
+        run_control_routes,
+        result_routes,
+        upload_routes,
+        live_routes,
+    ):
         app.include_router(routes(bench), prefix="/api/v1")
+    app.include_router(recording_routes(), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 
@@ -221,7 +262,7 @@ def method_routes(bench: FakeBench) -> APIRouter:
 
     @router.get("")
     async def methods() -> Any:
-        return METHODS
+        return {"items": METHODS, "next": None}
 
     @router.get("/{name}")
     async def method(name: str) -> Any:
@@ -229,7 +270,19 @@ def method_routes(bench: FakeBench) -> APIRouter:
 
     @router.get("/{name}/preview")
     async def preview(name: str) -> Any:
-        return preview_method(name)
+        return make_preview(compile_method(load_method(name)))
+
+    @router.post("/dry-run")
+    async def dry_run(wanted: dict[str, Any]) -> Any:
+        programme = compile_method(load_method(wanted["method"]))
+        envelope = compute_envelope(programme).model_dump(mode="json", by_alias=True)
+        words = {"messages": ["k0 to 3 % (standard deviation)"]} if wanted.get("identifiability", True) else None
+        trip = {"unit": "N", "indicate": None, "hold": None, "controlled_stop": None, "trip": 5000.0}
+        facts = {"limits": {"force": trip}, "obstacles": [], "unknown": "", "log_bytes": 8_900_000}
+        return {
+            "envelope": envelope | {"design": words}, "mean_heat_w": envelope["heat_j"] / programme.duration,
+            "bench": facts | {"free_bytes": 42_000_000_000}, "identifiability_error": "",
+        }  # fmt: skip
 
     return router
 
@@ -324,6 +377,21 @@ def result_routes(bench: FakeBench) -> APIRouter:
     return router
 
 
+def upload_routes(bench: FakeBench) -> APIRouter:
+    """Create the route of uploads; a file with the cell `much` is refused."""
+    router = APIRouter()
+
+    @router.post("/logs", status_code=201)
+    async def take(file: list[UploadFile], specimen: Annotated[str, Form()] = "") -> Any:
+        if b"much" in await file[0].read():
+            return problem(422, "The recording was refused", BAD_CELL)
+        method = ", ".join(Path(one.filename or "").stem for one in file)
+        bench.runs["run-5"] = run(5, "clean", id="run-5", source="import", specimen=specimen, method=method)
+        return bench.runs["run-5"]
+
+    return router
+
+
 def live_routes(bench: FakeBench) -> APIRouter:
     """Create the route of the websocket."""
     router = APIRouter()
@@ -331,7 +399,7 @@ def live_routes(bench: FakeBench) -> APIRouter:
     @router.websocket("/live")
     async def live(websocket: WebSocket) -> None:
         await websocket.accept()
-        if await websocket.receive_json() != {"token": TOKEN}:
+        if (await websocket.receive_json())["token"] != TOKEN:
             await websocket.close(4401)
             return
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
@@ -346,6 +414,7 @@ async def publish(socket: WebSocket, bench: FakeBench) -> None:
         {"topic": "event", "data": {"time_ns": 0, "kind": "state", "text": "the agent is ready"}}
     )
     await socket.send_json({"topic": "clock", "data": {"utc_s": time.time()}})
+    await socket.send_json({"topic": "channels", "data": {"channels": describe_channels(CHANNELS), "age_s": 0.0}})
     if bench.last_status is not None:
         await socket.send_json({"topic": "status", "data": bench.last_status})
     sent = round((time.monotonic() - bench.began) * RATE)
@@ -356,7 +425,7 @@ async def publish(socket: WebSocket, bench: FakeBench) -> None:
             await socket.send_json({"topic": "clock", "data": {"utc_s": time.time()}})
         if not bench.silent:
             while sent + BATCH < (time.monotonic() - bench.began) * RATE:
-                await socket.send_json({"topic": "samples", "data": bench.samples(sent)})
+                await socket.send_bytes(bench.samples(sent).encode())
                 sent += BATCH
             if turn % 3 == 0:
                 bench.last_status = bench.status()

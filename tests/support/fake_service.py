@@ -6,6 +6,10 @@ import time
 from bench.agent_protocol.messages import (
     AbortCommand,
     AgentStatus,
+    BenchChannel,
+    BenchDescription,
+    BenchLimit,
+    DescribeCommand,
     PauseCommand,
     Reply,
     ResetCommand,
@@ -14,6 +18,7 @@ from bench.agent_protocol.messages import (
     StopCommand,
 )
 from bench.errors import AgentUnreachableError
+from bench.methods import parse_method
 
 
 class FakeAgent:
@@ -26,6 +31,14 @@ class FakeAgent:
         self.refuses = ""
         self.commands = []
         self.defect = None
+        self.description = BenchDescription(
+            name="bench",
+            specimen="mounted damper",
+            drive_kind="coil_v",
+            drive_unit="V",
+            limits={"force": BenchLimit(unit="N", indicate=None, hold=None, controlled_stop=None, trip=5000.0)},
+            channels={"force": BenchChannel(unit="N", rate_hz=1000.0, delay_s=0.0)},
+        )
 
     def send(self, command, timeout=5.0):
         if self.defect:
@@ -34,6 +47,8 @@ class FakeAgent:
             raise AgentUnreachableError(
                 "no rig agent answered at tcp://127.0.0.1:5570 within 1 s; start one: mrbench rig"
             )
+        if isinstance(command, DescribeCommand):
+            return Reply(ok=True, description=self.description)
         self.commands.append(command)
         if self.refuses:
             return Reply(ok=False, error=self.refuses, status=self.status)
@@ -82,6 +97,7 @@ class FakeAgent:
         run = RunStatus(
             id=f"run-{number}",
             method=command.method["name"],
+            method_sha256=parse_method(command.method, "the command").compute_sha256(),
             specimen=command.specimen,
             continues=command.continues,
             operator=command.operator,

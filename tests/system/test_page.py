@@ -7,7 +7,8 @@ from itertools import pairwise
 import pytest
 
 from bench.agent_protocol import AgentStatus
-from bench.service.views import MethodSummary, Run
+from bench.service.routes.planning.views import MethodSummary
+from bench.service.views import Run
 from tests.support.fake_page_service import (
     CLAMPED,
     METHODS,
@@ -55,6 +56,12 @@ def test_all_plots_move_and_all_readings_have_units(seen):
     lines = [reading.splitlines() for reading in seen["readings"]]
     assert {line[0]: line[1].split()[-1] for line in lines} == units
     assert {line[0]: line[2] for line in lines}["Displacement"] == "−10.00 … 10.00"
+    assert {line[0]: line[3:] for line in lines}["Displacement"] == [
+        "end stop −60.00\u00a0mm: 50.00\u00a0mm left",
+        "end stop 60.00\u00a0mm: 50.00\u00a0mm left",
+        "stop at ±26.25\u00a0mm: 16.25\u00a0mm left",
+        "trip at ±55.00\u00a0mm: 45.00\u00a0mm left",
+    ]
 
 
 @browser_test
@@ -76,7 +83,7 @@ def test_a_refusal_is_shown_next_to_the_start_button(seen):
 
 @browser_test
 def test_a_run_shows_its_progress_and_moves_the_focus_to_stop(seen, bench):
-    assert seen["progress"] == ["sine_10mm_1Hz", "9 s left of 14 s", pytest.approx(5 / 14)]
+    assert seen["progress"] == ["sine_10mm_1Hz, cycle 3 of 10", "9 s left of 14 s", pytest.approx(5 / 14)]
     assert seen["focused"] == "stop"
     assert seen["startWhileRunning"]
     wanted = {"method": "quick", "specimen": "MR-0042", "operator": "A. Meyer"}
@@ -156,6 +163,8 @@ def test_a_decimated_trace_keeps_all_extremes_and_shows_gaps(seen):
         assert max(near) >= 2 * max(given[first : first + 20]) - 1e-6
         assert min(near) <= 2 * min(given[first : first + 20]) + 1e-6
     assert thinned["recent"]["high"] == 50
+    assert thinned["afterRepetition"] == len(given)
+    assert thinned["shown"] == [15_000, pytest.approx(1.0, abs=1e-3)]
     assert thinned["afterRestart"] == 1
 
 

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.support.fake_page_service import TRIP, FakeBench
+from tests.support.fake_page_service import BAD_CELL, TRIP, FakeBench
 from tests.support.page_in_browser import browser_test, operate_page
 
 
@@ -62,6 +62,14 @@ def test_a_planned_method_is_used_on_the_bench(seen):
 
 
 @browser_test
+def test_a_plan_forecasts_peaks_beside_limits_heat_disk_and_what_is_identifiable(seen):
+    assert re.search(r"Force, at most\s+[\d.]+ N\s+\d+ N\s+5000 N", seen["forecast"])
+    assert re.search(r"Heat in the damper at most [\d.]+ J, [\d.]+ W on average", seen["forecast"])
+    assert "The log needs up to 8.9 MB; the disk has 42 GB free" in seen["forecast"]
+    assert "k0 to 3 % (standard deviation)" in seen["forecast"]
+
+
+@browser_test
 def test_units_are_chosen_by_the_person_and_kept(seen):
     assert seen["units"][:3] == [" lbf", " in", " in/s"]
     assert seen["captions"] == ["Force [lbf] against displacement [in]", "Force [lbf] against velocity [in/s]"]
@@ -83,3 +91,11 @@ def test_a_trip_is_large_and_audible_in_every_view_until_it_is_silenced(seen):
 def test_events_survive_a_reload(seen):
     assert sum("the agent is ready" in event for event in seen["events"]) > 1
     assert all(re.match(r"\d\d:\d\d:\d\d UTC", event) for event in seen["events"])
+
+
+@browser_test
+def test_recordings_are_imported_by_a_button_and_by_dropping_them_onto_a_view(seen):
+    assert seen["refusedImport"] == f"Not imported: {BAD_CELL}."
+    assert seen["uploadLeft"]
+    assert seen["dropped"].splitlines() == ["one.csv, 0.0 MB", "two.csv, 0.0 MB"]
+    assert seen["imported"] == ["MR-0099, one, two", "#/runs/run-5"]

@@ -15,10 +15,10 @@ from bench.agent_protocol.messages import (
     PauseCommand,
     ResetCommand,
     RunCommand,
-    Samples,
     StopCommand,
 )
 from bench.catalogue.run_plan import read_plan
+from bench.live import LiveBatch
 from bench.log.reader import read_log
 from sim_rig.protocols.fault_proxy import WireFault
 from tests.support.live_bench import (
@@ -259,9 +259,11 @@ def test_agent_publishes_samples_and_the_end_of_a_run(bench):
             seen.append(message)
             if isinstance(message, AgentEvent) and message.kind == "run_finished":
                 stopping.set()
-        live = [message for message in seen if isinstance(message, Samples)]
-        assert {"force", "displacement", "displacement_command"} <= set().union(*(one.values for one in live))
-        assert all(len(column) == len(one.time_ns) for one in live for column in one.values.values())
+        live = [message for message in seen if isinstance(message, LiveBatch)]
+        units = dict(channel for one in live for channel in one.channels)
+        assert (units["force"], units["coil_drive"]) == ("N", "V")
+        assert {"displacement", "displacement_command"} <= set(units)
+        assert {round(1 / one.period_s) for one in live if one.count > 9} == {1000}
         assert "running" in {message.state for message in seen if isinstance(message, AgentStatus)}
         assert fetch_status(agent).run.outcome == "clean"
     assert bench.rests()

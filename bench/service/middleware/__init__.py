@@ -1,6 +1,7 @@
-"""ASGI middleware: log of requests, check of the token, limit on the size of bodies, headers for browsers."""
+"""ASGI middleware: log of requests, check of the token, limit on bodies, headers for browsers, HEAD."""
 
 from bench.service.middleware.body_limit import MAX_BODY_SIZE, BodyLimitMiddleware
+from bench.service.middleware.head import HeadMiddleware
 from bench.service.middleware.request_log import RequestLogMiddleware
 from bench.service.middleware.security_headers import SecurityHeadersMiddleware
 from bench.service.middleware.token_check import TokenCheckMiddleware
@@ -8,6 +9,7 @@ from bench.service.middleware.token_check import TokenCheckMiddleware
 __all__ = [
     "MAX_BODY_SIZE",
     "BodyLimitMiddleware",
+    "HeadMiddleware",
     "RequestLogMiddleware",
     "SecurityHeadersMiddleware",
     "TokenCheckMiddleware",

@@ -1,5 +1,7 @@
 """Limit on the size of the body of a request."""
 
+from collections.abc import Mapping
+
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -12,33 +14,44 @@ MAX_BODY_SIZE = 4 * 1024 * 1024
 class BodyLimitMiddleware:
     """ASGI middleware that refuses a body above a limit, and holds no more of it than the limit."""
 
-    def __init__(self, app: ASGIApp, *, limit: int = MAX_BODY_SIZE) -> None:
-        """Protect an application; the limit is in bytes."""
-        self._app, self._limit = app, limit
+    def __init__(
+        self, app: ASGIApp, *, limit: int = MAX_BODY_SIZE, paths: Mapping[str, int] | None = None
+    ) -> None:
+        """Protect an application.
+
+        Args:
+            app: application that receives the bodies.
+            limit: largest size [bytes].
+            paths: largest size of the paths with another limit, whose routes write the body to the disk.
+        """
+        self._app, self._limit, self._paths = app, limit, paths or {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Refuse a body by its declared size, otherwise count it while it is read."""
         if scope["type"] != "http":
             await self._app(scope, receive, send)
-        elif _read_declared_size(scope) > self._limit:
-            response = problems.make_response(problems.make_too_large(self._limit), problems.CLOSE)
+            return
+        limit = self._paths.get(scope["path"], self._limit)
+        if _read_declared_size(scope) > limit:
+            response = problems.make_response(problems.make_too_large(limit), problems.CLOSE)
             await response(scope, receive, send)
         else:
-            await self._app(scope, self._count(receive), send)
+            await self._app(scope, _count(receive, limit), send)
 
-    def _count(self, receive: Receive) -> Receive:
-        """Return a function that receives a body and raises an error once it exceeds the limit."""
-        size = 0
 
-        async def receive_counted() -> Message:
-            nonlocal size
-            message = await receive()
-            size += len(message.get("body", b""))
-            if size > self._limit:
-                raise problems.BodyTooLargeError(self._limit)
-            return message
+def _count(receive: Receive, limit: int) -> Receive:
+    """Return a function that receives a body and raises an error once it exceeds the limit."""
+    size = 0
 
-        return receive_counted
+    async def receive_counted() -> Message:
+        nonlocal size
+        message = await receive()
+        size += len(message.get("body", b""))
+        if size > limit:
+            raise problems.BodyTooLargeError(limit)
+        return message
+
+    return receive_counted
 
 
 def _read_declared_size(scope: Scope) -> int:

@@ -1,25 +1,28 @@
 """REST routes, one module for each resource."""
 
 from bench.service.routes import (
+    analyses,
     batches,
+    campaigns,
     continuation,
+    exchange,
     integrity,
     jobs,
     live,
-    methods,
-    previews,
+    planning,
+    recordings,
     results,
     rig,
     run_files,
     runs,
 )
+from bench.service.routes.unknown_paths import refuse_unknown_paths
 
 PUBLIC_ROUTERS = (rig.public_router, live.router)
 """Routers that need no token in the header; `live` checks its own."""
 PROTECTED_ROUTERS = (
     rig.router,
-    methods.router,
-    previews.router,
+    *planning.ROUTERS,
     runs.router,
     continuation.router,
     integrity.router,
@@ -27,7 +30,11 @@ PROTECTED_ROUTERS = (
     results.router,
     jobs.router,
     batches.router,
+    *exchange.ROUTERS,
+    *recordings.ROUTERS,
+    campaigns.router,
+    *analyses.ROUTERS,
 )
 """Routers that need the token."""
 
-__all__ = ["PROTECTED_ROUTERS", "PUBLIC_ROUTERS"]
+__all__ = ["PROTECTED_ROUTERS", "PUBLIC_ROUTERS", "refuse_unknown_paths"]

@@ -12,19 +12,22 @@ from pydantic import ValidationError
 
 from bench.catalogue import BatchRow, JobFilter, JobRow
 from bench.errors import BenchError
-from bench.jobs import DIAGNOSIS_FILE, FIT_FILE, BatchRequest, JobSettings, parse_settings
+from bench.jobs import DIAGNOSIS_FILE, FIT_FILE, PREDICTION_FILE, BatchRequest, JobSettings, parse_settings
 from bench.results import Batch, ResultChanges, compare_results, make_batch_view, write_csv
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_not_found
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.results import check_complete
 
-router = APIRouter(tags=["jobs"])
+router = APIRouter(tags=["jobs"], route_class=IdempotentRoute)
 _MAX_RESULTS = 200
 """Largest number of earlier results that are searched for one of another version."""
+_FILES = {"identify": FIT_FILE, "diagnose": DIAGNOSIS_FILE, "predict": PREDICTION_FILE}
+"""File with the answer of a job, by its kind."""
 _CSV: dict[int | str, dict[str, Any]] = {200: {"description": "the table", "content": {"text/csv": {}}}}
 
 
-@router.post("/batches", status_code=201)
+@router.post("/batches", status_code=201, dependencies=[IDEMPOTENT])
 async def start_batch(request: BatchRequest, context: Context, response: Response) -> Batch:
     """Queue the same job for several runs; the table names the reason for each run that is refused."""
     settings = _parse_settings(request)
@@ -114,7 +117,7 @@ def _find_older(context: ServiceContext, newer: JobRow) -> JobRow:
 
 
 def _read_document(context: ServiceContext, job: JobRow) -> Any:
-    name = DIAGNOSIS_FILE if job.kind == "diagnose" else FIT_FILE
+    name = _FILES[job.kind]
     path = context.catalogue.resolve_path(job.result or "") / name
     try:
         return json.loads(path.read_bytes())

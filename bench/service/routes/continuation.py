@@ -4,7 +4,7 @@ import asyncio
 from pathlib import Path
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Response
+from fastapi import APIRouter, Body, Request, Response
 
 from bench.agent_protocol import AgentStatus, PauseCommand
 from bench.catalogue import RunRow, read_plan
@@ -12,10 +12,11 @@ from bench.errors import LogError
 from bench.methods import Method, parse_method
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import make_conflict
+from bench.service.requests import IDEMPOTENT, IdempotentRoute, find_first_request
 from bench.service.routes.runs import begin_run, is_in_progress
 from bench.service.views import ResumeRunRequest, Run, StartRunRequest
 
-router = APIRouter(prefix="/runs", tags=["runs"])
+router = APIRouter(prefix="/runs", tags=["runs"], route_class=IdempotentRoute)
 
 
 @router.post("/{run_id}/pause")
@@ -29,10 +30,11 @@ def pause_run(run_id: str, context: Context) -> AgentStatus:
     return context.monitor.send_command(PauseCommand())
 
 
-@router.post("/{run_id}/resume", status_code=201)
+@router.post("/{run_id}/resume", status_code=201, dependencies=[IDEMPOTENT])
 async def resume_run(
     run_id: str,
     context: Context,
+    http: Request,
     response: Response,
     request: Annotated[ResumeRunRequest | None, Body()] = None,
 ) -> Run:
@@ -42,13 +44,15 @@ async def resume_run(
     """
     row = await asyncio.to_thread(context.get_run, run_id)
     method, checkpoint = await asyncio.to_thread(_find_continuation, context, row)
-    start = StartRunRequest(
+    start = StartRunRequest.model_construct(  # the first part was accepted with these values
         method=method.name,
         specimen=row.specimen,
         operator=row.operator,
         resume_after=(request.after if request else "") or checkpoint,
     )
-    return await begin_run(context, response, method, start, continues=run_id)
+    return await begin_run(
+        context, response, method, start, continues=run_id, first_request=find_first_request(http)
+    )
 
 
 def _find_continuation(context: ServiceContext, row: RunRow) -> tuple[Method, str]:

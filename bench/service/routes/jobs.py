@@ -9,8 +9,9 @@ from bench.catalogue import UNFINISHED_STATES, JobFilter, JobState
 from bench.jobs import Job, JobKind, JobPage, RetryRequest, make_job_view
 from bench.service.context import Context
 from bench.service.problems import make_conflict
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 
-router = APIRouter(prefix="/jobs", tags=["jobs"])
+router = APIRouter(prefix="/jobs", tags=["jobs"], route_class=IdempotentRoute)
 
 
 @router.get("")
@@ -49,7 +50,7 @@ async def cancel_job(job_id: str, context: Context) -> Job:
     return make_job_view(await context.job_manager.cancel(row))
 
 
-@router.post("/{job_id}/retry")
+@router.post("/{job_id}/retry", dependencies=[IDEMPOTENT])
 async def retry_job(job_id: str, context: Context, request: RetryRequest) -> Job:
     """Queue a failed or cancelled job again; it keeps its id, and its attempts are counted on."""
     row = await asyncio.to_thread(context.get_job, job_id)

@@ -10,22 +10,23 @@ from bench.catalogue import JobFilter, JobRow, RunRow
 from bench.jobs import (
     DIAGNOSIS_FILE,
     FIT_FILE,
-    REPORT_FILE,
     TWIN_FILE,
     DiagnoseSettings,
     IdentifySettings,
     Job,
     JobKind,
+    JobSettings,
+    get_kind,
     make_job_view,
 )
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse
 from bench.service.problems import ProblemError, make_conflict, make_not_found
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.run_registry import DAMAGED
 
-router = APIRouter(tags=["results"])
-_MEDIA_TYPES = {".json": "application/json", ".html": "text/html"}
-_VERBS: dict[JobKind, str] = {"identify": "identified", "diagnose": "diagnosed"}
+router = APIRouter(tags=["results"], route_class=IdempotentRoute)
+_VERBS: dict[JobKind, str] = {"identify": "identified", "diagnose": "diagnosed", "predict": "predicted"}
 _NOUNS: dict[JobKind, str] = {"identify": "fit", "diagnose": "diagnosis"}
 
 
@@ -33,13 +34,13 @@ def _describe_file(media_type: str) -> dict[int | str, dict[str, Any]]:
     return {200: {"description": "the file", "content": {media_type: {}}}}
 
 
-_JSON_FILE, _PAGE = _describe_file("application/json"), _describe_file("text/html")
-_SAME_JOB: dict[int | str, dict[str, Any]] = {
+JSON_FILE = _describe_file("application/json")
+SAME_JOB: dict[int | str, dict[str, Any]] = {
     200: {"description": "an equal job is unfinished or done, and is returned; nothing was queued", "model": Job}
 }
 
 
-@router.post("/runs/{run_id}/identify", status_code=201, responses=_SAME_JOB)
+@router.post("/runs/{run_id}/identify", status_code=201, responses=SAME_JOB, dependencies=[IDEMPOTENT])
 async def identify_run(
     run_id: str, context: Context, response: Response, settings: IdentifySettings | None = None
 ) -> Job:
@@ -47,10 +48,10 @@ async def identify_run(
 
     201: queued, also if an equal job had failed or was cancelled. 200: an equal job is unfinished or done.
     """
-    return await _request(context, run_id, settings or IdentifySettings(), response)
+    return await request_job(context, run_id, settings or IdentifySettings(), response)
 
 
-@router.post("/runs/{run_id}/diagnose", status_code=201, responses=_SAME_JOB)
+@router.post("/runs/{run_id}/diagnose", status_code=201, responses=SAME_JOB, dependencies=[IDEMPOTENT])
 async def diagnose_run(
     run_id: str, context: Context, response: Response, settings: DiagnoseSettings | None = None
 ) -> Job:
@@ -58,14 +59,18 @@ async def diagnose_run(
 
     201: queued, also if an equal job had failed or was cancelled. 200: an equal job is unfinished or done.
     """
-    return await _request(context, run_id, settings or DiagnoseSettings(), response)
+    return await request_job(context, run_id, settings or DiagnoseSettings(), response)
 
 
-async def _request(
-    context: ServiceContext, run_id: str, settings: IdentifySettings | DiagnoseSettings, response: Response
-) -> Job:
+async def request_job(context: ServiceContext, run_id: str, settings: JobSettings, response: Response) -> Job:
+    """Queue a job on a run, and name its address in the answer; 200 if an equal one is unfinished or done.
+
+    Raises:
+        ProblemError: there is no such run, or its log cannot be used.
+        JobError: the model of the job does not exist.
+    """
     row = await asyncio.to_thread(context.get_run, run_id)
-    check_complete(row, _VERBS["diagnose" if isinstance(settings, DiagnoseSettings) else "identify"])
+    check_complete(row, _VERBS[get_kind(settings)])
     job, is_queued = await context.job_manager.request(row, settings)
     if not is_queued:
         response.status_code = 200
@@ -77,8 +82,10 @@ def check_complete(row: RunRow, verb: str) -> None:
     """Refuse a run without a complete log, or with another one than was recorded.
 
     Raises:
-        ProblemError: its log has no end, was changed or is missing.
+        ProblemError: its log has no end, was changed or is missing, or the run is in the trash.
     """
+    if row.trashed is not None:
+        raise make_conflict("in-trash", "In the trash", f"run {row.id} is in the trash; restore it first")
     if row.log_sha256 is None:
         raise make_conflict(
             "run-not-ended", "No complete log", f"run {row.id} is {row.state}; only a complete log can be {verb}"
@@ -92,46 +99,44 @@ def check_complete(row: RunRow, verb: str) -> None:
         )
 
 
-@router.get("/runs/{run_id}/fit", response_class=FileResponse, responses=_JSON_FILE)
+@router.get("/runs/{run_id}/fit", response_class=FileResponse, responses=JSON_FILE)
 def get_newest_fit(run_id: str, context: Context) -> SnapshotResponse:
     """Return the newest fit of a run, `mrbench.fit/1`."""
-    return _make_response(context, _find_newest(context, run_id, "identify"), FIT_FILE)
+    return make_file_response(context, _find_newest(context, run_id, "identify"), FIT_FILE)
 
 
-@router.get("/runs/{run_id}/diagnosis", response_class=FileResponse, responses=_JSON_FILE)
+@router.get("/runs/{run_id}/diagnosis", response_class=FileResponse, responses=JSON_FILE)
 def get_newest_diagnosis(run_id: str, context: Context) -> SnapshotResponse:
     """Return the newest diagnosis of a run, `mrbench.diagnosis/1`."""
-    return _make_response(context, _find_newest(context, run_id, "diagnose"), DIAGNOSIS_FILE)
+    return make_file_response(context, _find_newest(context, run_id, "diagnose"), DIAGNOSIS_FILE)
 
 
-@router.get("/runs/{run_id}/report", response_class=FileResponse, responses=_PAGE)
-def get_newest_report(run_id: str, context: Context) -> SnapshotResponse:
-    """Return the report of the newest diagnosis with its fit, or of a fit that is newer, as one page."""
-    queue = context.catalogue.job_queue
-    found = [job for kind in _NOUNS if (job := queue.find_newest_done(run_id, kind))]
-    newest = max(found, key=lambda job: job.finished or job.created, default=None)
-    return _make_response(context, newest or _find_newest(context, run_id, "identify"), REPORT_FILE)
-
-
-@router.get("/fits/{fit_id}", response_class=FileResponse, responses=_JSON_FILE)
+@router.get("/fits/{fit_id}", response_class=FileResponse, responses=JSON_FILE)
 def get_fit(fit_id: str, context: Context) -> SnapshotResponse:
     """Return a fit, `mrbench.fit/1`; its id is that of its job."""
-    return _make_response(context, _get_done(context, fit_id, "identify", "fit"), FIT_FILE)
+    return make_file_response(context, get_done_job(context, fit_id, "identify", "fit"), FIT_FILE)
 
 
-@router.get("/diagnoses/{diagnosis_id}", response_class=FileResponse, responses=_JSON_FILE)
+@router.get("/diagnoses/{diagnosis_id}", response_class=FileResponse, responses=JSON_FILE)
 def get_diagnosis(diagnosis_id: str, context: Context) -> SnapshotResponse:
     """Return a diagnosis, `mrbench.diagnosis/1`; its id is that of its job."""
-    return _make_response(context, _get_done(context, diagnosis_id, "diagnose", "diagnosis"), DIAGNOSIS_FILE)
+    return make_file_response(
+        context, get_done_job(context, diagnosis_id, "diagnose", "diagnosis"), DIAGNOSIS_FILE
+    )
 
 
-@router.get("/twins/{diagnosis_id}", response_class=FileResponse, responses=_JSON_FILE)
+@router.get("/twins/{diagnosis_id}", response_class=FileResponse, responses=JSON_FILE)
 def get_twin(diagnosis_id: str, context: Context) -> SnapshotResponse:
     """Return the twin of a diagnosis, `mrbench.scenario/1`; it has the id of the diagnosis."""
-    return _make_response(context, _get_done(context, diagnosis_id, "diagnose", "twin"), TWIN_FILE)
+    return make_file_response(context, get_done_job(context, diagnosis_id, "diagnose", "twin"), TWIN_FILE)
 
 
-def _get_done(context: ServiceContext, job_id: str, kind: JobKind, noun: str) -> JobRow:
+def get_done_job(context: ServiceContext, job_id: str, kind: JobKind, noun: str) -> JobRow:
+    """Return a job of a kind that is done.
+
+    Raises:
+        ProblemError: there is none, or it is not done; the message says why.
+    """
     job = context.catalogue.get_job(job_id)
     if job is None or job.kind != kind:
         raise make_not_found(noun, job_id)
@@ -159,10 +164,15 @@ def _describe_state(job: JobRow) -> str:
     return f"its newest job is {job.state}{f': {job.error}' if job.error else ''}"
 
 
-def _make_response(context: ServiceContext, job: JobRow, name: str) -> SnapshotResponse:
+def make_file_response(context: ServiceContext, job: JobRow, name: str) -> SnapshotResponse:
+    """Return a file of the result of a job.
+
+    Raises:
+        ProblemError: the file was removed.
+    """
     path = context.catalogue.resolve_path(job.result or "") / name
     try:
-        return SnapshotResponse(path, _MEDIA_TYPES[path.suffix], f"{job.run_id}.{name}", inline=True)
+        return SnapshotResponse(path, "application/json", f"{job.run_id}.{name}", inline=True)
     except FileNotFoundError:
         what = f"{name} of run"
         raise make_not_found(what, f"{job.run_id}: {path} was removed; request the job again") from None

@@ -8,10 +8,11 @@ from fastapi import APIRouter
 from bench.agent_protocol import AbortCommand, AgentStatus, InstrumentStatus, PrepareCommand, StopCommand
 from bench.errors import BenchError
 from bench.service.context import Context
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.views import Health, SetupRequest
 
 public_router = APIRouter(tags=["service"])
-router = APIRouter(tags=["rig"])
+router = APIRouter(tags=["rig"], route_class=IdempotentRoute)
 
 
 @public_router.get("/health")
@@ -57,7 +58,7 @@ def abort_bench(context: Context) -> AgentStatus:
     return context.monitor.send_command(AbortCommand())
 
 
-@router.post("/agent/prepare")
+@router.post("/agent/prepare", dependencies=[IDEMPOTENT])
 def start_setup_step(context: Context, request: SetupRequest) -> AgentStatus:
     """Start a setup step; it continues if the returned state is `preparing`."""
     return context.monitor.send_command(PrepareCommand(step=request.step, position_m=request.position_m))

@@ -47,8 +47,10 @@ def _read_search(
     ] = None,
     text: Annotated[
         str | None,
-        Query(min_length=1, max_length=_MAX_TEXT, description="in specimen, method, operator or reason"),
+        Query(min_length=1, max_length=_MAX_TEXT, description="in specimen, method, operator, reason or a note"),
     ] = None,
+    tag: Annotated[_Text, Query(description="tag, exactly")] = None,
+    trash: Annotated[bool, Query(description="list the trash instead of all other runs")] = False,
 ) -> RunFilter:
     """Return the selection of runs that a request asks for.
 
@@ -68,6 +70,8 @@ def _read_search(
         parameter_min=parameter_min,
         parameter_max=parameter_max,
         text=text,
+        tag=tag,
+        is_trashed=trash,
     )
 
 

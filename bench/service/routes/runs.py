@@ -3,9 +3,11 @@
 import asyncio
 import time
 from datetime import UTC, datetime
-from typing import Annotated, Any
+from http import HTTPStatus
+from pathlib import Path
+from typing import Annotated
 
-from fastapi import APIRouter, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from bench.agent_protocol import AbortCommand, AgentStatus, RunCommand, RunStatus, StatusCommand, StopCommand
@@ -15,36 +17,81 @@ from bench.log import salvage_log
 from bench.methods import Method, compile_method, parse_method
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict
-from bench.service.routes.methods import load_shipped_method
+from bench.service.requests import IDEMPOTENT, IdempotentRoute, find_first_request
+from bench.service.routes.planning import find_method
 from bench.service.routes.run_search import RunSearch
 from bench.service.run_registry import make_run_row
-from bench.service.views import Run, RunPage, StartRunRequest, make_run_view
+from bench.service.views import Run, RunPage, StartRunRequest, make_run_tag, make_run_view
 
-router = APIRouter(prefix="/runs", tags=["runs"])
+router = APIRouter(prefix="/runs", tags=["runs"], route_class=IdempotentRoute)
 _START_TIMEOUT = 5.0
 """Time limit from an accepted command to the id of the run [s]."""
 
 
-@router.post("", status_code=201)
-async def start_run(request: StartRunRequest, context: Context, response: Response) -> Run:
+@router.post("", status_code=201, dependencies=[IDEMPOTENT])
+async def start_run(request: StartRunRequest, http: Request, context: Context, response: Response) -> Run:
     """Start a run; the agent executes and records it even if the service ends."""
-    method = await asyncio.to_thread(_check_method, request.method)
-    return await begin_run(context, response, method, request)
+    method = await asyncio.to_thread(_check_method, context, request)
+    return await begin_run(context, response, method, request, first_request=find_first_request(http))
 
 
 async def begin_run(
-    context: ServiceContext, response: Response, method: Method, request: StartRunRequest, continues: str = ""
+    context: ServiceContext,
+    response: Response,
+    method: Method,
+    request: StartRunRequest,
+    *,
+    continues: str = "",
+    first_request: datetime | None = None,
 ) -> Run:
-    """Start a run, and return its view with its address in the header; ``continues`` is the run that it continues.
+    """Start a run, and return its view with its address in the header.
+
+    Args:
+        context: objects of the service.
+        response: receives the address.
+        method: what to run.
+        request: specimen, operator and checkpoint.
+        continues: id of the run that it continues; empty without one.
+        first_request: UTC of the first request with the idempotency key; a run that it has started is returned.
 
     Raises:
         RunError: the agent refuses it.
         AgentUnreachableError: the agent does not answer.
+        ProblemError: the first request has started a run that is not in the catalogue yet.
     """
-    run, status = await asyncio.to_thread(_request_start, context, method, request, continues)
-    await context.registry.observe(status)
-    response.headers["Location"] = f"/api/v1/runs/{run.id}"
-    return await asyncio.to_thread(_make_started_view, context, run, status)
+    log = _choose_log(context, method, first_request)
+    present = await asyncio.to_thread(_find_started, context, log) if first_request else None
+    if present is None:
+        run, status = await asyncio.to_thread(_request_start, context, method, request, continues, log)
+        await context.registry.observe(status)
+        present = await asyncio.to_thread(_make_started_view, context, run, status)
+    response.headers["Location"] = f"/api/v1/runs/{present.id}"
+    return present
+
+
+def _choose_log(context: ServiceContext, method: Method, first_request: datetime | None) -> Path | None:
+    """Return the file of a new log, equal for each repetition of a request; None if the agent chooses it."""
+    if not context.has_local_logs:
+        return None
+    utc = first_request or datetime.now(UTC)
+    return context.data / f"{utc:%Y%m%dT%H%M%S}.{utc.microsecond // 1000:03d}Z-{method.name}.mcap"
+
+
+def _find_started(context: ServiceContext, log: Path | None) -> Run | None:
+    """Return the run that an earlier request with the same key has started; None if there is none."""
+    if log is None:
+        return None
+    row = context.catalogue.find_run_by_log(log)
+    if row is not None:
+        return context.make_run_views(row)[0]
+    status = context.monitor.send_command(StatusCommand())
+    known = (run for run in (status.run, *status.finished) if run is not None and Path(run.log) == log)
+    for run in known:
+        return make_run_view(make_run_row(run, context.catalogue), [], status)
+    if log.exists():
+        detail = f"the first request with this key has started a run, {log.name}; it is listed within 15 s"
+        raise make_conflict("run-not-listed-yet", "The run is not listed yet", detail)
+    return None
 
 
 def _make_started_view(context: ServiceContext, run: RunStatus, status: AgentStatus) -> Run:
@@ -62,34 +109,36 @@ def _make_view(context: ServiceContext, run_id: str) -> Run:
     return context.make_run_views(context.get_run(run_id))[0]
 
 
-def _check_method(method: str | dict[str, Any]) -> Method:
+def _check_method(context: ServiceContext, request: StartRunRequest) -> Method:
     """Return a method, by name or from its document, after it was compiled within its limits.
 
     Raises:
         MethodError: the document is invalid, or the method exceeds its limits.
-        ProblemError: there is no included method with this name.
+        ProblemError: there is no method with this name and version, or nothing names a specimen.
     """
-    if isinstance(method, str):
-        return load_shipped_method(method)
-    parsed = parse_method(method, "the request")
+    if request.specimen is None and not context.monitor.describe_bench().specimen:
+        detail = "specimen: give the serial number of the damper under test; bench.toml names none"
+        raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "Invalid request", detail)
+    if isinstance(request.method, str):
+        return find_method(context, request.method, request.method_version).method
+    parsed = parse_method(request.method, "the request")
     compile_method(parsed)
     return parsed
 
 
 def _request_start(
-    context: ServiceContext, method: Method, request: StartRunRequest, continues: str
+    context: ServiceContext, method: Method, request: StartRunRequest, continues: str, log: Path | None
 ) -> tuple[RunStatus, AgentStatus]:
     """Send the command, and wait until the agent reports the id of the new run."""
     # Until the new run has an id, the agent reports the previous run.
     before = context.monitor.get_status().run
-    stamp = f"{datetime.now(UTC):%Y%m%dT%H%M%S}.{time.time_ns() // 1_000_000 % 1000:03d}Z"
     command = RunCommand(
         method=method.model_dump(mode="json", by_alias=True, exclude_defaults=True),
-        specimen=request.specimen,
+        specimen=request.specimen or "",
         operator=request.operator,
         resume_after=request.resume_after,
         continues=continues,
-        log=str(context.data / f"{stamp}-{method.name}.mcap") if context.has_local_logs else None,
+        log=None if log is None else str(log),
     )
     status = context.monitor.send_command(command)
     deadline = time.monotonic() + _START_TIMEOUT
@@ -116,9 +165,14 @@ def list_runs(
 
 
 @router.get("/{run_id}")
-def get_run(run_id: str, context: Context) -> Run:
-    """Return one run with its progress, its jobs and the result of its newest fit."""
-    return _make_view(context, run_id)
+def get_run(run_id: str, context: Context, response: Response) -> Run:
+    """Return one run with its progress, its jobs and the result of its newest fit.
+
+    The header `ETag` names the state of what a person may change, for `If-Match` of `PATCH`.
+    """
+    row = context.get_run(run_id)
+    response.headers["ETag"] = make_run_tag(row)
+    return context.make_run_views(row)[0]
 
 
 @router.post("/{run_id}/stop")

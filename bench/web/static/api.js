@@ -1,5 +1,7 @@
 // Client of the REST interface: token, JSON requests, files, and errors with their messages.
 
+import { parseBatch } from "./live_batch.js";
+
 const BASE = new URL("api/v1/", document.baseURI);
 const TOKEN_KEY = "mrbench.token";
 const TIMEOUT_MS = 20_000;
@@ -7,15 +9,19 @@ const FILE_TIMEOUT_MS = 600_000;
 
 /** Error of a request, with the detail that the service returned; `message` is a sentence for a person. */
 export class Problem extends Error {
-  constructor(status, title, detail) {
+  constructor(status, title, detail, type = "") {
     super(detail || title);
-    this.status = status;
-    this.title = title;
+    Object.assign(this, { status, title, type });
   }
 
   /** Returns a sentence that begins with the consequence. */
   after(consequence) {
     return `${consequence}: ${this.message.replace(/\.$/, "")}.`;
+  }
+
+  /** True if the service was started without a rig, which is no failure. */
+  get hasNoRig() {
+    return this.type === "urn:mrbench:problem:no-rig";
   }
 
   get unauthorised() {
@@ -52,6 +58,30 @@ export function liveAddress() {
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
 
+/** Fetches recorded samples in binary batches; see `parseBatch`. */
+export async function samples(path) {
+  const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
+  const channels = JSON.parse(response.headers.get("x-mrbench-channels"));
+  const content = await response.arrayBuffer();
+  const batches = [];
+  for (let offset = 0; offset < content.byteLength; offset += batches.at(-1).bytes) batches.push(parseBatch(content, channels, offset));
+  return batches;
+}
+
+/** Makes a key for one request; `randomUUID` is missing on a page that was loaded without TLS from elsewhere. */
+const makeKey = () => crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
+
+/** Posts a request that starts something: with a key, so that it is repeated safely if its answer is lost. */
+export async function start(path, body) {
+  const headers = { "Idempotency-Key": makeKey() };
+  try {
+    return await call("POST", path, body, TIMEOUT_MS, headers);
+  } catch (problem) {
+    if (problem.status !== 0) throw problem;
+    return call("POST", path, body, TIMEOUT_MS, headers); // no answer: perhaps it was lost on its way
+  }
+}
+
 /** Fetches a file with the token in the header, which a plain link cannot send. */
 export async function file(path) {
   const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
@@ -59,13 +89,31 @@ export async function file(path) {
   return { blob: await response.blob(), name: match?.[1] ?? path.replaceAll("/", "-") };
 }
 
-async function call(method, path, body, timeout) {
-  const response = await send(method, path, body, timeout);
+/** Sends a form with files; `onProgress` receives the sent share. A plain fetch reports no progress. */
+export function upload(path, form, onProgress) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open("POST", new URL(path, BASE));
+    request.setRequestHeader("Authorization", `Bearer ${token() ?? ""}`);
+    request.setRequestHeader("Idempotency-Key", makeKey());
+    request.responseType = "json";
+    request.upload.addEventListener("progress", ({ loaded, total }) => onProgress(total ? loaded / total : 0));
+    request.addEventListener("error", () => reject(new Problem(0, "No answer", `The service at ${BASE.host} cannot be reached.`)));
+    request.addEventListener("load", () => {
+      if (request.status < 300) resolve(request.response);
+      else reject(makeProblem(request.status, request.statusText, request.response ?? {}));
+    });
+    request.send(form);
+  });
+}
+
+async function call(method, path, body, timeout, headers) {
+  const response = await send(method, path, body, timeout, headers);
   return response.status === 204 ? null : response.json();
 }
 
-async function send(method, path, body, timeout = TIMEOUT_MS) {
-  const headers = { Authorization: `Bearer ${token() ?? ""}` };
+async function send(method, path, body, timeout = TIMEOUT_MS, more = {}) {
+  const headers = { Authorization: `Bearer ${token() ?? ""}`, ...more };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   let response;
   try {
@@ -86,11 +134,13 @@ function describeFailure(error, timeout) {
 }
 
 async function readProblem(response) {
-  if (response.status === 401) {
+  return makeProblem(response.status, response.statusText, await response.json().catch(() => ({})));
+}
+
+function makeProblem(status, phrase, { title, detail, type }) {
+  if (status === 401) {
     document.dispatchEvent(new Event("unauthorised")); // one place asks for another token
     return new Problem(401, "Not signed in", "The service does not accept this token.");
   }
-  const { title, detail } = await response.json().catch(() => ({}));
-  const text = typeof detail === "string" ? detail : "";
-  return new Problem(response.status, title ?? `${response.status} ${response.statusText}`, text);
+  return new Problem(status, title ?? `${status} ${phrase}`, typeof detail === "string" ? detail : "", type);
 }

@@ -6,8 +6,10 @@ import { EventList } from "./events.js";
 import { byId, fixed, write } from "./format.js";
 import { HealthStrip } from "./health.js";
 import { greyInstruments, showInstruments, showWarnings } from "./instruments.js";
+import { Limits } from "./limits.js";
 import { LiveLink, fillCoilChannel } from "./live.js";
 import { PlanView } from "./plan.js";
+import { Playhead } from "./playhead.js";
 import { LivePlots, STRIP_SECONDS } from "./plots.js";
 import { Preparation } from "./prepare.js";
 import { FIELDS, QUANTITIES } from "./quantities.js";
@@ -21,6 +23,7 @@ import { ServiceClock } from "./service_clock.js";
 import { StartForm } from "./start.js";
 import { TopBar } from "./topbar.js";
 import { offerUnits } from "./units.js";
+import { UploadDialog } from "./upload.js";
 
 /** Silence [s] after which the status is requested by REST; the agent publishes it four times a second. */
 const REQUEST_AFTER = 0.9;
@@ -52,8 +55,11 @@ const preparation = new Preparation();
 const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
-new Readings(ring, byId("readings"), STRIP_SECONDS);
-const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: byId("strips") });
+new UploadDialog({ onRun: (run) => runs.update(run) });
+const limits = new Limits();
+new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
+const playhead = new Playhead(clock);
+const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: byId("strips") }, () => ring.revealUntil(playhead.utc));
 
 const router = new Router({
   bench: ({ query }) => query.has("method") && form.choose(query.get("method")),
@@ -69,13 +75,14 @@ offerUnits(() => {
 
 let requesting = false;
 let requestedAt = -Infinity;
+let withoutRig = false;
 let driveKind = "";
-let sampledUtc = null;
 
 const HANDLERS = {
   clock: ({ utc_s: utc }) => clock.update(utc),
   status(status) {
     bar.update(status);
+    limits.update(status);
     driveKind = status.drive_kind;
     if (status.drive_unit && status.drive_unit !== QUANTITIES.drive.unit) {
       QUANTITIES.drive.unit = status.drive_unit;
@@ -87,12 +94,6 @@ const HANDLERS = {
     health.showStatus(status);
     preparation.update(status);
   },
-  samples(samples) {
-    if (!samples.time_ns.length) return;
-    clock.update(samples.utc_s);
-    sampledUtc = samples.utc_s;
-    ring.push(fillCoilChannel(samples, driveKind));
-  },
   event: (event) => events.add(event),
   run: (run) => runs.update(run),
   job: (job) => runs.updateJob(job),
@@ -100,9 +101,19 @@ const HANDLERS = {
 
 const link = new LiveLink({
   onMessage: ({ topic, data }) => HANDLERS[topic]?.(data),
+  onBatch: addBatch,
   onClosed: requestStatus,
-  onReopened: () => runs.load(), // changes in the meantime were missed
+  onReopened: () => {
+    withoutRig = false; // the service may have been started again with one
+    runs.load(); // changes in the meantime were missed
+  },
 });
+
+function addBatch(batch) {
+  clock.update(batch.utc + (batch.count - 1) * batch.period);
+  if (ring.written) playhead.observe(ring.origin + ring.latest);
+  ring.push(fillCoilChannel(batch, driveKind));
+}
 
 /** Requests the agent's status by REST: its error explains why no live messages arrive. */
 async function requestStatus() {
@@ -112,18 +123,19 @@ async function requestStatus() {
   try {
     HANDLERS.status(await get("agent"));
   } catch (problem) {
-    if (!problem.unauthorised) bar.showFailure(problem.after("Trying again"));
+    withoutRig = problem.hasNoRig;
+    if (!problem.unauthorised) bar.showFailure(problem.after(withoutRig ? "No rig" : "Trying again"));
   } finally {
     requesting = false;
   }
 }
 
-/** Greys live values older than a second, and shows the time since the newest was taken. */
+/** Shows the age of the newest sample in view; live values older than a second are grey. */
 function showAge() {
-  const age = sampledUtc === null ? Infinity : clock.age(sampledUtc);
+  const age = ring.end ? clock.age(ring.origin + ring.newest) : Infinity;
   const live = byId("live");
   live.classList.toggle("stale", age > 1);
-  const text = age < 1 ? "" : Number.isFinite(age) ? `no samples for ${fixed(age, 0)} s` : "no samples yet";
+  const text = age < 1 ? `newest sample in view is ${fixed(1e3 * age, 0)} ms old` : Number.isFinite(age) ? `no samples for ${fixed(age, 0)} s` : "no samples yet";
   write(byId("live-age"), text);
 }
 
@@ -151,7 +163,7 @@ byId("token-form").addEventListener("submit", () => {
 setInterval(showAge, 250);
 setInterval(() => {
   const due = performance.now() - requestedAt > (bar.stale ? REQUEST_EVERY.stale : REQUEST_EVERY.fresh);
-  if (due && bar.age > REQUEST_AFTER && !byId("token-dialog").open) requestStatus();
+  if (due && !withoutRig && bar.age > REQUEST_AFTER && !byId("token-dialog").open) requestStatus();
 }, 200);
 document.addEventListener("unauthorised", () => askForToken("The service does not accept this token."));
 addEventListener("hashchange", () => location.hash.startsWith("#token=") && takeToken() && begin());

@@ -1,22 +1,25 @@
 // Websocket to the service.
 
 import { liveAddress, token } from "./api.js";
+import { parseBatch } from "./live_batch.js";
 
 const RETRY_MS = [500, 1_000, 2_000, 5_000];
 const SILENCE_LIMIT_MS = 6_000;
 
 /** Copies the drive to the coil voltage or current that it commands, if that has no separate channel. */
-export function fillCoilChannel(samples, driveKind) {
+export function fillCoilChannel(batch, driveKind) {
   const own = { coil_v: "coil_voltage", coil_a: "coil_current" }[driveKind];
-  const { coil_drive: drive } = samples.values;
-  if (!own || samples.values[own] || !drive) return samples;
-  return { ...samples, values: { ...samples.values, [own]: drive } };
+  const { coil_drive: drive } = batch.columns;
+  if (!own || batch.columns[own] || !drive) return batch;
+  return { ...batch, columns: { ...batch.columns, [own]: drive } };
 }
 
 /** Websocket that is opened again whenever it closes or is silent. */
 export class LiveLink {
-  constructor({ onMessage, onClosed, onReopened }) {
-    Object.assign(this, { onMessage, onClosed, onReopened });
+  /** Takes functions for text messages, batches of samples, the end of a connection and a new one. */
+  constructor({ onMessage, onBatch, onClosed, onReopened }) {
+    Object.assign(this, { onMessage, onBatch, onClosed, onReopened });
+    this.channels = [];
     this.failures = 0;
     this.lastMessageAt = 0;
   }
@@ -25,18 +28,32 @@ export class LiveLink {
     this.close();
     const socket = new WebSocket(liveAddress());
     this.socket = socket;
+    socket.binaryType = "arraybuffer";
     this.lastMessageAt = performance.now();
     socket.onopen = () => {
-      socket.send(JSON.stringify({ token: token() ?? "" })); // the first message; an address would be logged
+      socket.send(JSON.stringify({ token: token() ?? "", acknowledge: true })); // the first message; an address would be logged
       if (this.failures) this.onReopened();
     };
     socket.onmessage = ({ data }) => {
       this.failures = 0;
       this.lastMessageAt = performance.now();
-      this.onMessage(JSON.parse(data));
+      if (typeof data === "string") this.read(JSON.parse(data));
+      else this.readBatch(socket, data);
     };
     socket.onclose = () => this.socket === socket && this.closed();
     this.watch = setInterval(() => performance.now() - this.lastMessageAt > SILENCE_LIMIT_MS && this.closed(), 1_000);
+  }
+
+  read(message) {
+    if (message.topic === "channels") this.channels = message.data.channels;
+    else this.onMessage(message);
+  }
+
+  /** Passes a batch on and acknowledges it: a page that was held up then gets fresh samples instead of old ones. */
+  readBatch(socket, data) {
+    const batch = parseBatch(data, this.channels);
+    this.onBatch(batch);
+    if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify({ received: batch.sequence }));
   }
 
   closed() {

@@ -1,7 +1,8 @@
-// Plan: choose a method, see its strokes and limits, and preview motion and drive over time.
+// Plan: choose a method, see its strokes and limits, preview motion and drive over time, and forecast the run.
 
 import { get } from "./api.js";
 import { significant } from "./fit_tables.js";
+import { makeForecast } from "./forecast.js";
 import { byId, describeDriveKind, duration, element, fixed, write } from "./format.js";
 import { PlanPlot } from "./plan_plot.js";
 import { QUANTITIES } from "./quantities.js";
@@ -24,11 +25,13 @@ export class PlanView {
   }
 
   async list() {
-    const methods = (await get("methods")).sort((a, b) => a.duration_s - b.duration_s);
-    byId("plan-methods").replaceChildren(...methods.map(({ name, title, duration_s: length }) => {
-      const link = element("a", { href: `#/plan/${encodeURIComponent(name)}` }, element("strong", {}, name), ` ${duration(length)}`);
+    const methods = (await get("methods")).items.sort((a, b) => a.duration_s - b.duration_s);
+    byId("plan-methods").replaceChildren(...methods.map(({ name, title, duration_s: length, version, obstacle }) => {
+      const link = element("a", { href: `#/plan/${encodeURIComponent(name)}` }, element("strong", {}, name),
+        ` ${duration(length)}${version > 1 ? `, version ${version}` : ""}`);
       if (name === this.name) link.setAttribute("aria-current", "page");
-      return element("li", {}, link, element("small", {}, title));
+      const reason = obstacle ? element("small", { className: "attention" }, `Not on this bench: ${obstacle}`) : null;
+      return element("li", {}, link, element("small", {}, title), reason);
     }));
   }
 
@@ -47,7 +50,8 @@ export class PlanView {
     const places = element("div", { className: "previews" });
     byId("plan").replaceChildren(
       element("p", {}, method.description), facts(method, preview), element("p", { className: "actions" }, use),
-      element("h3", {}, "Preview"), places, element("h3", {}, "Segments"), segmentTable(method, preview));
+      element("h3", {}, "Preview"), places, makeForecast(method.name),
+      element("h3", {}, "Segments"), segmentTable(method, preview));
     const drive = { ...QUANTITIES.drive, unit: preview.drive_unit };
     for (const plot of this.plots) plot.destroy();
     this.plots = [

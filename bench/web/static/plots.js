@@ -7,7 +7,10 @@ import { envelope } from "./ring.js";
 export const STRIP_SECONDS = 10;
 const LOOP_SECONDS = 2;
 const LOOP_PIECES = 12;
+const LEAST_STEP_PX = 1; // shorter steps of a loop are not visible
 const SHRINK_AFTER_MS = 2_000;
+/** Pause after a frame as a share of its time, so that a slow device still has time for the person. */
+const REST_SHARE = 0.4;
 const MARGIN = 0.03; // share of an axis that stays free at each end
 
 /** Bounds of an axis that grow at once and shrink late, so that a moving plot stays readable. */
@@ -58,7 +61,16 @@ function roundStep(size) {
   return power * [1, 2, 5, 10].find((digit) => digit * power >= size * (1 - 1e-9));
 }
 
-export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const DARK = matchMedia("(prefers-color-scheme: dark)");
+const colours = new Map(); // kept, because reading a style many times in each frame is slow
+DARK.addEventListener("change", () => colours.clear());
+
+/** Value of a colour of the style sheet in the present scheme. */
+export function colour(name) {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(name).trim());
+  return colours.get(name);
+}
+
 const FONT = "11px system-ui, 'Segoe UI', Roboto, sans-serif";
 
 export function axis(more) {
@@ -148,27 +160,30 @@ class Loop {
     ctx.strokeStyle = ctx.fillStyle = colour(this.up.colour);
     ctx.lineWidth = 1.5 * devicePixelRatio;
     const first = this.ring.firstSince(this.ring.newest - LOOP_SECONDS);
-    const piece = Math.ceil((this.ring.written - first) / LOOP_PIECES);
+    const piece = Math.ceil((this.ring.end - first) / LOOP_PIECES);
     for (let k = 0; k < LOOP_PIECES; k++) {
       ctx.globalAlpha = 0.12 + 0.88 * ((k + 1) / LOOP_PIECES) ** 2;
-      this.stroke(u, first + k * piece, Math.min(first + (k + 1) * piece + 1, this.ring.written));
+      this.stroke(u, first + k * piece, Math.min(first + (k + 1) * piece + 1, this.ring.end));
     }
     this.dot(u);
     ctx.restore();
   }
 
   stroke(u, from, to) {
+    let [lastX, lastY] = [NaN, NaN];
     u.ctx.beginPath();
     for (let n = from; n < to; n++) {
       const [x, y] = this.position(u, n % this.ring.capacity);
+      if (n < to - 1 && Math.abs(x - lastX) + Math.abs(y - lastY) < LEAST_STEP_PX) continue;
       u.ctx.lineTo(x, y); // a canvas ignores points that are NaN
+      [lastX, lastY] = [x, y];
     }
     u.ctx.stroke();
   }
 
   dot(u) {
-    if (!this.ring.written) return;
-    const [x, y] = this.position(u, (this.ring.written - 1) % this.ring.capacity);
+    if (!this.ring.end) return;
+    const [x, y] = this.position(u, (this.ring.end - 1) % this.ring.capacity);
     u.ctx.beginPath();
     u.ctx.arc(x, y, 4 * devicePixelRatio, 0, 2 * Math.PI);
     u.ctx.fill();
@@ -185,18 +200,21 @@ class Loop {
 
 /** All live plots; they are drawn with the frames of the browser, and only after new samples. */
 export class LivePlots {
-  constructor(ring, quantities, { loops, strips }) {
-    this.ring = ring;
+  /** `reveal` is called before each frame and decides up to which sample the ring is shown. */
+  constructor(ring, quantities, { loops, strips }, reveal = () => {}) {
+    Object.assign(this, { ring, reveal, place: loops });
     this.drawn = -1;
+    this.restUntil = 0;
     const redraw = () => { this.drawn = -1; };
     const { force, displacement, velocity, drive, temperature } = quantities;
     const crossed = [displacement, velocity].map((across) => loop(ring, across, force, loops, redraw));
     const traced = [force, displacement, drive, temperature];
     this.plots = [...crossed, ...traced.map((one, k) => strip(ring, one, strips, k === traced.length - 1, redraw))];
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+    DARK.addEventListener("change", () => {
       for (const { plot } of this.plots) plot.redraw(false, true);
     });
     const onFrame = () => {
+      if (this.isDestroyed) return;
       this.draw();
       requestAnimationFrame(onFrame);
     };
@@ -204,9 +222,20 @@ export class LivePlots {
   }
 
   draw() {
-    if (!this.ring.written || this.drawn === this.ring.written) return;
-    this.drawn = this.ring.written;
+    this.reveal();
+    if (!this.place.checkVisibility()) return;
+    const began = performance.now();
+    if (!this.ring.end || this.drawn === this.ring.end || began < this.restUntil) return;
+    this.drawn = this.ring.end;
     for (const plot of this.plots) plot.draw();
+    const ended = performance.now();
+    this.restUntil = ended + REST_SHARE * (ended - began);
+  }
+
+  /** Ends the drawing and releases the plots. */
+  destroy() {
+    this.isDestroyed = true;
+    for (const { plot } of this.plots) plot.destroy();
   }
 
   /** Writes the captions again, after a unit has changed. */

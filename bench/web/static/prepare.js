@@ -1,6 +1,6 @@
 // Preparation of the bench as guided steps: tare, home, clamp, centre. Home and move move the rod; home asks first.
 
-import { post } from "./api.js";
+import { start } from "./api.js";
 import { onAnswer, openDialog } from "./dialogs.js";
 import { byId, write } from "./format.js";
 import { QUANTITIES } from "./quantities.js";
@@ -60,7 +60,7 @@ export class Preparation {
   async execute(step) {
     try {
       const position = step === "move" ? byId("move-to").valueAsNumber / QUANTITIES.displacement.scale : 0;
-      this.update(await post("agent/prepare", { step, position_m: position }));
+      this.update(await start("agent/prepare", { step, position_m: position }));
     } catch (problem) {
       write(byId("prepare-note"), problem.after("Nothing was done"));
     }

@@ -34,6 +34,7 @@ export const QUANTITIES = {
   force: quantity("force", "Force", "N", 1, 20, "--force"),
   displacement: quantity("displacement", "Displacement", "mm", 2, 2e-3, "--displacement"),
   velocity: quantity("velocity", "Velocity", "mm/s", 1, 20e-3, "--velocity"),
+  position: quantity("actuator_position", "Position of the rod", "mm", 2, 2e-3, "--displacement"),
   drive: quantity("coil_drive", "Drive", "V", 3, 0.1, "--drive"),
   voltage: quantity("coil_voltage", "Coil voltage", "V", 3, 0.1, "--drive"),
   current: quantity("coil_current", "Coil current", "A", 3, 0.1, "--drive"),
@@ -52,6 +53,7 @@ function applyUnits() {
   const { force, length } = chosenUnits();
   Object.assign(QUANTITIES.force, CHOICES.force[force]);
   for (const name of ["displacement", "velocity"]) Object.assign(QUANTITIES[name], CHOICES.length[length][name]);
+  Object.assign(QUANTITIES.position, CHOICES.length[length].displacement);
 }
 
 applyUnits();

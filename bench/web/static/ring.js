@@ -1,16 +1,23 @@
 // Ring buffer of the latest samples in typed arrays, with extremes and envelopes for the plots.
 
-/** Ring buffer of bench samples: time [s] since the first one and a value for each field, NaN if missing. */
+/** Time [s] by which a batch may begin before the newest sample; an earlier one belongs to a clock that went back. */
+const MAX_STEP_BACK = 1;
+
+/**
+ * Ring buffer of bench samples: time [s] since the first one and a value for each field, NaN if missing. Plots and
+ * readings show the samples up to `end`, a number counted from the start; later ones wait for their time.
+ */
 export class SampleRing {
-  constructor(fields, capacity = 1 << 14) {
+  constructor(fields, capacity = 1 << 15) {
     this.capacity = capacity;
     this.time = new Float64Array(capacity);
+    this.limit = Infinity;
     this.values = Object.fromEntries(fields.map((field) => [field, new Float32Array(capacity)]));
     this.clear();
   }
 
   clear() {
-    this.written = 0;
+    this.written = this.end = 0;
     this.origin = null;
   }
 
@@ -18,21 +25,40 @@ export class SampleRing {
     return Math.min(this.written, this.capacity);
   }
 
-  /** Time [s] of the newest sample; NaN without samples. */
+  /** Time [s] of the newest shown sample; NaN without samples. */
   get newest() {
+    return this.end ? this.time[(this.end - 1) % this.capacity] : NaN;
+  }
+
+  /** Time [s] of the newest sample that has arrived; NaN without samples. */
+  get latest() {
     return this.written ? this.time[(this.written - 1) % this.capacity] : NaN;
   }
 
-  /** Adds a batch of the agent. A clock that goes back belongs to a restarted agent: the buffer is cleared. */
-  push({ time_ns, values }) {
-    if (this.origin !== null && (time_ns[0] - this.origin) / 1e9 < this.newest) this.clear();
-    this.origin ??= time_ns[0];
-    const columns = Object.entries(this.values).map(([field, column]) => [column, values[field]]);
-    for (let k = 0; k < time_ns.length; k++) {
-      const at = this.written++ % this.capacity;
-      this.time[at] = (time_ns[k] - this.origin) / 1e9;
-      for (const [column, given] of columns) column[at] = given?.[k] ?? NaN;
+  /** Shows the samples up to a time on the clock of the batches [s]. */
+  revealUntil(utc) {
+    this.limit = utc;
+    this.end = this.origin === null ? 0 : this.firstSince(utc - this.origin);
+  }
+
+  /** Adds a live batch, and shows it if its time has come; one that is here already, as after a new connection, is left out. */
+  push({ utc, period, count, columns }) {
+    this.origin ??= utc;
+    const begin = utc - this.origin;
+    if (begin < this.latest - MAX_STEP_BACK) {
+      this.clear();
+      this.push({ utc, period, count, columns });
+      return;
     }
+    if (begin + (count - 1) * period <= this.latest) return;
+    const pairs = Object.entries(this.values).map(([field, column]) => [column, columns[field]]);
+    for (let k = 0; k < count; k++) {
+      const at = this.written % this.capacity;
+      this.time[at] = Math.max(begin + (columns.time ? columns.time[k] : k * period), this.written ? this.latest : -Infinity);
+      for (const [column, given] of pairs) column[at] = given ? given[k] : NaN;
+      this.written++;
+    }
+    this.revealUntil(this.limit);
   }
 
   /** Returns the number, counted from the start, of the first kept sample not before a time [s]. */
@@ -52,7 +78,7 @@ export class SampleRing {
     const column = this.values[field];
     let [low, high, last] = [Infinity, -Infinity, NaN];
     const freshFrom = this.firstSince(this.newest - fresh);
-    for (let n = this.firstSince(this.newest - seconds); n < this.written; n++) {
+    for (let n = this.firstSince(this.newest - seconds); n < this.end; n++) {
       const value = column[n % this.capacity];
       if (value < low) low = value;
       if (value > high) high = value;
@@ -90,7 +116,7 @@ export function envelope(ring, { field, scale, hole }, seconds, bins, out) {
     low = high = -1;
   };
 
-  for (let n = ring.firstSince(newest - seconds); n < ring.written; n++) {
+  for (let n = ring.firstSince(newest - seconds); n < ring.end; n++) {
     const at = n % ring.capacity;
     if (Number.isNaN(column[at])) continue;
     const now = Math.floor(ring.time[at] / width);

@@ -1,4 +1,5 @@
-// Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`.
+// Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
+// `#/runs/ID/replay`.
 
 import { byId } from "./format.js";
 

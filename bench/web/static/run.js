@@ -3,9 +3,10 @@
 import { get } from "./api.js";
 import { makeDriveTable, makeParameterTable } from "./fit_tables.js";
 import { byId, duration, element, instant, write } from "./format.js";
+import { Replay } from "./replay.js";
 import { makeReport } from "./report.js";
 import { RunActions } from "./run_actions.js";
-import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted } from "./run_facts.js";
+import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted, mayReport } from "./run_facts.js";
 import { runAddress } from "./router.js";
 
 export class RunView {
@@ -14,16 +15,17 @@ export class RunView {
     this.actions = new RunActions({ onRun: (run) => this.update(run), onNote: (id) => id === this.id && this.showFacts() });
   }
 
-  /** Shows the run of an address: all of it, or the part `report` alone. */
+  /** Shows the run of an address: all of it, or its part `report` or `replay` alone. */
   async show({ id, part }) {
-    Object.assign(this, { id, part, run: null });
+    this.replay?.destroy();
+    Object.assign(this, { id, part, run: null, replay: null });
     byId("run").replaceChildren();
     write(byId("run-note"), "Loading …");
     try {
       const run = await get(`runs/${encodeURIComponent(id)}`);
       if (id !== this.id || part !== this.part) return; // another address was opened meanwhile
       this.build(run);
-      await this.load();
+      await (part === "replay" ? this.openReplay(run) : this.load());
       write(byId("run-note"), "");
     } catch (problem) {
       write(byId("run-note"), problem.after("The run cannot be shown"));
@@ -36,7 +38,7 @@ export class RunView {
     const before = this.run;
     this.run = run;
     this.showFacts();
-    if (results(run) !== results(before)) this.load();
+    if (this.part !== "replay" && results(run) !== results(before)) this.load();
   }
 
   build(run) {
@@ -47,8 +49,9 @@ export class RunView {
     this.facts = element("section", { "aria-label": "Facts" });
     this.results = element("div", { className: "results" });
     this.report = element("section", { "aria-label": "Report" });
-    const only = this.part === "report";
-    byId("run").replaceChildren(this.navigation(), ...(only ? [this.report] : [this.facts, this.results, this.report]));
+    this.recording = element("section", { "aria-label": "Replay" });
+    const parts = { report: [this.report], replay: [this.recording] }[this.part] ?? [this.facts, this.results, this.report];
+    byId("run").replaceChildren(this.navigation(), ...parts);
     this.showFacts();
   }
 
@@ -58,7 +61,14 @@ export class RunView {
       if (part === this.part) made.setAttribute("aria-current", "page");
       return made;
     };
-    return element("nav", { className: "parts", "aria-label": "Parts of the run" }, link("Everything", ""), link("Report alone", "report"));
+    return element("nav", { className: "parts", "aria-label": "Parts of the run" }, link("Everything", ""), link("Replay", "replay"), link("Report alone", "report"));
+  }
+
+  async openReplay(run) {
+    const replay = new Replay(run, this.recording);
+    this.replay = replay;
+    await replay.open();
+    if (this.replay !== replay) replay.destroy(); // another address was opened meanwhile
   }
 
   showFacts() {
@@ -79,7 +89,7 @@ export class RunView {
     };
     const list = element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, content]) =>
       element("div", {}, element("dt", {}, name), element("dd", {}, ...content))));
-    const buttons = element("p", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), ...this.actions.more(run));
+    const buttons = element("p", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), ...this.actions.more(run), ...this.actions.exports(run));
     this.facts.replaceChildren(element("h2", {}, "Facts"), list, buttons, this.actions.answer(run));
     if (focused) this.facts.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
   }
@@ -88,12 +98,13 @@ export class RunView {
   async load() {
     const { run, part } = this;
     if (part !== "report" && isFitted(run)) await this.loadFit(run);
-    if (!hasReport(run)) {
-      this.report.replaceChildren(element("h2", {}, "Report"), element("p", { className: "soft" }, "A report is made with the first fit."));
+    if (!(part === "report" ? mayReport(run) : hasReport(run))) {
+      const text = mayReport(run) ? "Report alone shows the recording; a report with a fit is made by the identification." : "A report needs a complete log.";
+      this.report.replaceChildren(element("h2", {}, "Report"), element("p", { className: "soft" }, text));
       return;
     }
     const made = await makeReport(run);
-    if (run.id === this.id) this.report.replaceChildren(element("h2", {}, "Report: measured over simulated"), ...made);
+    if (run.id === this.id) this.report.replaceChildren(element("h2", {}, isFitted(run) ? "Report: measured over simulated" : "Report on the recording"), ...made);
   }
 
   async loadFit(run) {

@@ -1,11 +1,15 @@
 // Actions on a run: files, identification, diagnosis, repair. Each leaves a visible answer beside the run.
 
-import { file, get, post } from "./api.js";
+import { file, get, post, start } from "./api.js";
 import { element, instant } from "./format.js";
-import { canResume, hasEnded, hasReport, isFitted, isUnfinished, mayRetry } from "./run_facts.js";
+import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
 import { runAddress } from "./router.js";
 
 const encode = encodeURIComponent;
+const EXPORTS = [
+  ["CSV", "export?format=csv"], ["Parquet", "export?format=parquet"], ["MAT", "export?format=mat"],
+  ["PDF report", "report?format=pdf"], ["XLSX report", "report?format=xlsx"],
+];
 
 export class RunActions {
   /** Takes functions that receive a changed run, and the id of a run with a new note. */
@@ -21,12 +25,20 @@ export class RunActions {
 
   /** Links and buttons for the files of a run. */
   files(run) {
-    const report = hasReport(run)
+    const report = mayReport(run)
       ? element("a", { className: "button", href: runAddress(run.id, "report"), "aria-label": `Report of ${name(run)}` }, "Report")
       : null;
-    const made = [this.button(run, "log", "Log", () => this.save(run, "log"))];
+    const replay = hasEnded(run)
+      ? [element("a", { className: "button", href: runAddress(run.id, "replay"), "aria-label": `Replay of ${name(run)}` }, "Replay")]
+      : [];
+    const made = [...replay, this.button(run, "log", "Log", () => this.save(run, "log"))];
     if (isFitted(run)) made.push(this.button(run, "fit", "Fit", () => this.save(run, "fit")));
     return report ? [report, ...made] : made;
+  }
+
+  /** Buttons that save the samples and the report of a complete log in the formats of other tools. */
+  exports(run) {
+    return run.log_sha256 ? EXPORTS.map(([text, part]) => this.button(run, part, text, () => this.save(run, part))) : [];
   }
 
   /** Button that starts, cancels or repairs, by the state of the run. */
@@ -61,8 +73,9 @@ export class RunActions {
     this.onNote(run.id);
   }
 
-  /** Saves a file of a run. */
+  /** Saves a file of a run; some are made at their request. */
   async save(run, part) {
+    this.note(run, "The file is fetched …");
     try {
       const { blob, name: fileName } = await file(`runs/${encode(run.id)}/${part}`);
       const address = URL.createObjectURL(blob);
@@ -70,13 +83,13 @@ export class RunActions {
       setTimeout(() => URL.revokeObjectURL(address), 60_000);
       this.note(run, `${fileName} was saved.`);
     } catch (problem) {
-      this.note(run, problem.after(`No ${part}`));
+      this.note(run, problem.after("Not saved"));
     }
   }
 
   async identify(run) {
     await this.attempt(run, "Not requested", async () => {
-      const job = await post(`runs/${encode(run.id)}/identify`);
+      const job = await start(`runs/${encode(run.id)}/identify`);
       return job.state === "done"
         ? `This fit exists already, made ${instant(job.finished)}; nothing was computed again.`
         : "The identification was requested.";
@@ -85,7 +98,7 @@ export class RunActions {
 
   diagnose(run) {
     return this.attempt(run, "Not requested", async () => {
-      const job = await post(`runs/${encode(run.id)}/diagnose`);
+      const job = await start(`runs/${encode(run.id)}/diagnose`);
       return job.state === "done"
         ? `This diagnosis exists already, made ${instant(job.finished)}; nothing was computed again.`
         : "The diagnosis was requested.";
@@ -94,7 +107,7 @@ export class RunActions {
 
   retry(run, job) {
     return this.attempt(run, "Not requested", async () => {
-      await post(`jobs/${encode(job.id)}/retry`, { reason: "requested in the page" });
+      await start(`jobs/${encode(job.id)}/retry`, { reason: "requested in the page" });
       return `The job ${job.kind} was queued again.`;
     });
   }
@@ -108,7 +121,7 @@ export class RunActions {
 
   resume(run) {
     return this.attempt(run, "Not resumed", async () => {
-      const next = await post(`runs/${encode(run.id)}/resume`);
+      const next = await start(`runs/${encode(run.id)}/resume`);
       this.onRun(next);
       location.hash = "#/bench";
       return "The run was resumed; the new run continues it.";

@@ -14,7 +14,9 @@ export const isUnfinished = (job) => UNFINISHED.includes(job.state);
 export const mayRetry = (job) => ["failed", "cancelled"].includes(job.state);
 export const canResume = (run) => run.source === "run" && hasEnded(run) && run.ending !== "completed";
 export const isFitted = (run) => run.jobs.some((job) => job.state === "done" && job.kind === "identify");
+/** True if a report is stored; another one is made at its request, for any complete log. */
 export const hasReport = (run) => run.jobs.some((job) => job.state === "done");
+export const mayReport = (run) => hasReport(run) || Boolean(run.log_sha256);
 
 /** Outcome of the log as a mark, with its reason below. */
 export function describeOutcome(run) {

@@ -17,6 +17,11 @@ export class ServiceClock {
     this.offset = Math.max(this.offset, utc - this.now());
   }
 
+  /** Present UTC [s]; minus infinity before the first stamp has arrived. */
+  get present() {
+    return this.offset + this.now();
+  }
+
   /** Time [s] since a stamp; infinite before the first stamp has arrived. */
   age(utc) {
     return Number.isFinite(this.offset) ? Math.max(0, this.now() + this.offset - utc) : Infinity;

@@ -1,6 +1,6 @@
 // Form that starts a run: method, specimen and operator.
 
-import { get, post } from "./api.js";
+import { get, start } from "./api.js";
 import { byId, describeDriveKind, duration, element, write } from "./format.js";
 
 const OPERATOR = "mrbench.operator";
@@ -33,7 +33,7 @@ export class StartForm {
   /** Loads the methods, the shortest first; the selection is kept. */
   async load() {
     try {
-      const methods = await get("methods");
+      const methods = (await get("methods")).items;
       const chosen = this.method() ?? this.wanted;
       this.methods = methods.sort((a, b) => a.duration_s - b.duration_s);
       this.list(chosen);
@@ -93,7 +93,7 @@ export class StartForm {
     this.busy = true;
     this.show({ problem: "" });
     try {
-      const run = await post("runs", { method, specimen, operator }); // returns once the run has started
+      const run = await start("runs", { method, specimen, operator }); // returns once the run has started
       localStorage.setItem(OPERATOR, operator);
       this.onStarted(run);
     } catch (problem) {

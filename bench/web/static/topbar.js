@@ -114,7 +114,7 @@ export class TopBar {
     const run = MOVING.includes(state) ? this.run : null;
     const bar = byId("progress");
     bar.value = run ? Math.min(1, run.elapsed_s / run.duration_s) : 0;
-    write(byId("segment"), run ? run.segment || "Between segments" : "No run");
+    write(byId("segment"), run ? describeSegment(run) : "No run");
     const left = run && `${duration(run.duration_s - run.elapsed_s)} left of ${duration(run.duration_s)}`;
     write(byId("time-left"), left ?? "");
   }
@@ -165,4 +165,10 @@ export class TopBar {
       this.showDetail(problem.after("Not reset"), true);
     }
   }
+}
+
+/** Segment and cycle of a run: `sine_10mm_1Hz, cycle 3 of 10`. */
+function describeSegment({ segment, cycle, cycles }) {
+  if (!segment) return "Between segments";
+  return cycles ? `${segment}, cycle ${cycle} of ${cycles}` : segment;
 }

@@ -151,15 +151,18 @@ async function thin() {
     const { SampleRing, envelope } = await import("./ring.js");
     const ring = new SampleRing(["force"], 8192);
     const given = Array.from({ length: 20_000 }, (_, k) => (k === 15_123 ? 50 : Math.sin(k / 300)));
-    for (let k = 17_000; k < 18_000; k++) given[k] = null;
+    for (let k = 17_000; k < 18_000; k++) given[k] = NaN;
     for (let k = 0; k < given.length; k += 50) {
-      const numbers = Array.from({ length: 50 }, (_, j) => k + j);
-      ring.push({ time_ns: numbers.map((n) => n * 1e6), values: { force: numbers.map((n) => given[n]) } });
+      ring.push({ utc: 100 + k / 1000, period: 1e-3, count: 50, columns: { force: Float32Array.from(given.slice(k, k + 50)) } });
     }
     const [times, values] = envelope(ring, { field: "force", scale: 2, hole: 0.25 }, 6, 300, [[], []]);
     const recent = ring.recent("force", 6);
-    ring.push({ time_ns: [5], values: { force: [7] } });
-    return { given, times, values, recent, afterRestart: ring.count };
+    ring.push({ utc: 119.95, period: 1e-3, count: 50, columns: { force: new Float32Array(50) } });
+    const afterRepetition = ring.written;
+    ring.revealUntil(115);
+    const shown = [ring.end, ring.recent("force", 6).high];
+    ring.push({ utc: 5, period: 1e-3, count: 1, columns: { force: new Float32Array(1) } });
+    return { given, times, values, recent, shown, afterRepetition, afterRestart: ring.count };
   });
 }
 

@@ -16,7 +16,7 @@ const hasText = (selector, words) =>
   until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
 const shownTitle = () => page.evaluate(() => [...document.querySelectorAll("h1")].find((one) => one.checkVisibility()).innerText);
 const READY = {
-  "#/bench": ["#readings", "−10.00 … 10.00"], "#/plan/quick": ["#plan", "Preview"], "#/runs": ["#runs", "MR-0042"],
+  "#/bench": ["#readings", "−10.00 … 10.00"], "#/plan/quick": ["#plan", "k0 to 3 %"], "#/runs": ["#runs", "MR-0042"],
   "#/runs/run-1": ["#run", "Provenance"], "#/runs/run-1/report": ["#run", "Report: measured over simulated"],
 };
 
@@ -69,6 +69,36 @@ async function readReport() {
   seen.report = await report.locator("body").innerText();
 }
 
+/** Imports a recording by the file button, which is refused, and then two by dropping them onto the view. */
+async function importFiles() {
+  await page.goto(`${url}/#/plan/quick`);
+  await page.locator("#import").focus();
+  await page.keyboard.press("Enter");
+  await page.setInputFiles("#upload-files", { name: "bad.csv", mimeType: "text/csv", buffer: Buffer.from("force_n\nmuch\n") });
+  await page.locator("#upload-specimen").focus();
+  seen.violations.upload = await audit();
+  seen.small.upload = await findSmall();
+  await page.keyboard.press("Enter");
+  await hasText("#upload-note", "Not imported");
+  seen.refusedImport = await page.locator("#upload-note").innerText();
+  await page.keyboard.press("Escape");
+  seen.uploadLeft = await page.locator("#upload-dialog").evaluate((dialog) => !dialog.open);
+  await drop(["one.csv", "two.csv"]);
+  seen.dropped = await page.locator("#upload-list").innerText();
+  await page.fill("#upload-specimen", "MR-0099");
+  await page.click("#upload-start");
+  await hasText("#run", "import of a recording made elsewhere");
+  seen.imported = [await shownTitle(), new URL(page.url()).hash];
+}
+
+/** Drops files onto the middle of the view. */
+const drop = (names) => page.evaluate((all) => {
+  const dataTransfer = new DataTransfer();
+  for (const name of all) dataTransfer.items.add(new File(["time_s"], name));
+  const view = document.getElementById("main");
+  for (const type of ["dragover", "drop"]) view.dispatchEvent(new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true }));
+}, names);
+
 async function readRun() {
   await page.goto(`${url}/#/runs/run-1`);
   await hasText("#run", "Provenance");
@@ -82,6 +112,8 @@ async function readRun() {
 async function plan() {
   await page.goto(`${url}/#/plan/identification`);
   await hasText("#plan", "Preview");
+  await hasText("#plan", "k0 to 3 %");
+  seen.forecast = await page.locator("#plan .forecast").innerText();
   seen.planFacts = await page.locator("#plan .facts").innerText();
   await page.getByRole("link", { name: "Use on the bench" }).click();
   await until(() => document.querySelector("input[value=identification]")?.checked);
@@ -138,7 +170,7 @@ async function trip() {
 try {
   for (const step of [signIn, readReport]) await step();
   for (const hash of VIEWS) await openDirectly(hash);
-  for (const step of [readRun, plan, changeUnits, walk, trip]) await step();
+  for (const step of [readRun, plan, changeUnits, walk, importFiles, trip]) await step();
   await page.goto(`${url}/#/bench`);
   await page.reload();
   await hasText("#state-word", "Tripped");

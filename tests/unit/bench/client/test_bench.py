@@ -108,7 +108,7 @@ def test_a_truncated_log_has_no_arrays(service, bench):
     while not (runs := bench.list_runs()):
         assert time.monotonic() < deadline
         time.sleep(0.05)
-    with pytest.raises(Exception, match=r"run\.mcap"):
+    with pytest.raises(Exception, match="the log is truncated"):
         bench.run(runs[0].id).arrays()
 
 

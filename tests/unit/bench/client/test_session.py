@@ -106,3 +106,13 @@ def test_a_file_that_cannot_be_written_is_an_error(session, tmp_path):
 def test_a_certificate_that_cannot_be_read_is_an_error(tmp_path):
     with pytest.raises(ClientError, match="not a readable certificate"):
         Session("https://127.0.0.1:1", "abc", tmp_path / "missing.pem")
+
+
+def test_a_lost_answer_is_requested_once_more_with_the_same_key(session, server):
+    server.announced = 5000  # the connection ends before the announced length
+    with pytest.raises(ClientError, match="broke off"):
+        session.post("/runs", {}, key="k1")
+    assert [headers["Idempotency-Key"] for _, _, headers in server.requests] == ["k1", "k1"]
+    with pytest.raises(ClientError, match="broke off"):
+        session.post("/agent/stop")
+    assert len(server.requests) == 3

@@ -21,9 +21,10 @@ from bench.jobs.job_spec import (
     compute_content_key,
     get_result_folder,
 )
-from bench.jobs.settings import DiagnoseSettings, IdentifySettings
+from bench.jobs.settings import DiagnoseSettings, IdentifySettings, PredictSettings
 from bench.jobs.work import WATCHDOG_COMMAND, JobCallbacks, execute_job
-from tests.support.reports import diagnosis_document, fit_document
+from tests.support.logs import write_log
+from tests.support.reports import diagnosis_document, fit_document, prediction
 
 COMMAND = """
 import json, os, pathlib, sys, time
@@ -34,7 +35,7 @@ with (folder / "calls").open("a") as calls:
 print("half way", file=sys.stderr, flush=True)
 {act}
 out = pathlib.Path(arguments[arguments.index("--out") + 1])
-texts = {{"identify": "fit.json", "diagnose": "diagnosis.json"}}
+texts = {{"identify": "fit.json", "diagnose": "diagnosis.json", "predict": "prediction.json"}}
 name = texts.get(arguments[0])
 out.write_text((folder / name).read_text() if name else "<title>page</title>")
 if "--twin" in arguments:
@@ -224,3 +225,33 @@ subprocess.Popen({[*WATCHDOG_COMMAND, sys.executable, "-c", inner]!r}, stdin=sub
         assert all(is_running(pid) for pid in pids)
         os.kill(process.pid, number)
     wait_until(lambda: not any(is_running(pid) for pid in pids))
+
+
+def test_the_samples_of_the_log_are_stored_for_the_views(bench):
+    write_log(bench.folder / "run.mcap")
+    bench.execute(log_sha256="ab" * 32)
+    assert [path.name for path in (bench.folder / ".samples").iterdir()] == [f"{'ab' * 32}.npz"]
+
+
+def test_an_unreadable_log_is_left_to_the_command(bench):
+    assert bench.execute(log_sha256="ab" * 32)
+    assert not (bench.folder / ".samples").exists()
+
+
+def test_a_prediction_simulates_its_model_and_keeps_the_series(bench):
+    (bench.folder / "prediction.json").write_text(prediction().model_dump_json(by_alias=True))
+    settings = PredictSettings(model="job-1", free_offset=True)
+    key = compute_content_key("ab" * 32, settings, ["model:abc"])
+    result = bench.folder / "run.prediction-1"
+    summary = bench.execute(key=key, result=str(result), settings=settings, model="/data/twin.json")
+    assert summary == {"rmse_n": 2.0, "nrmse": 0.0162, "bias_n": -0.234, "noise_floor_n": 1.9, "before_n": None}
+    (call,) = bench.calls()
+    assert call[1:4] == ["predict", "/data/twin.json", bench.spec.log]
+    assert call[call.index("--free") + 1] == "offset"
+    assert call[call.index("--series") + 1].endswith("series.npz")
+
+
+def test_the_report_of_a_fit_keeps_its_series(bench):
+    bench.execute()
+    report = bench.calls()[-1]
+    assert report[report.index("--series") + 1].endswith("series.npz")

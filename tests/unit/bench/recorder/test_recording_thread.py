@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from bench.errors import LogError
+from bench.live import BatchMaker
 from bench.recorder.recording_thread import RecordingThread
 
 TIMEOUT = 10.0
+MAKER = BatchMaker({"force": "N"})
 
 
 def read_clock():
@@ -55,33 +57,24 @@ def test_internal_error_ends_the_run_but_not_the_thread(aligner, on_cycle, messa
             later.set()
         on_cycle()
 
-    with RecordingThread(aligner, 1000.0, read_clock, lambda samples: None, run_cycle, failures.append):
+    with RecordingThread(aligner, MAKER, read_clock, lambda samples: None, run_cycle, failures.append):
         assert later.wait(TIMEOUT)
     assert len(failures) == 1
     assert message in str(failures[0])
 
 
-def test_live_samples_name_their_segment():
+def test_live_batches_have_all_samples_with_the_utc_at_which_they_were_taken():
     published = []
-    thread = RecordingThread(IdleAligner(), 1000.0, read_clock, published.append, succeed, published.append)
-    for recording in (SimpleNamespace(segment="5mm_3Hz"), None):
-        thread._recording = recording
-        thread._live.append((SimpleNamespace(time_ns=np.arange(4)), {"force": np.ones(4)}))
-        thread._published_at = 0.0
-        thread._publish_live()
-    assert [(samples.segment, samples.values) for samples in published] == [
-        ("5mm_3Hz", {"force": [1.0]}),
-        ("", {"force": [1.0]}),
-    ]
-
-
-def test_live_samples_carry_the_utc_of_the_newest_one():
-    published = []
-    thread = RecordingThread(IdleAligner(), 100.0, read_clock, published.append, succeed, published.append)
+    thread = RecordingThread(IdleAligner(), MAKER, read_clock, published.append, succeed, published.append)
     time_ns = np.arange(0, 1_000_000_000, 10_000_000)
     thread._live.append((SimpleNamespace(time_ns=time_ns), {"force": np.ones(100)}))
+    before = time.time()
     thread._publish_live()
-    assert published[0].utc_s == pytest.approx(time.time() - (2.5 - 0.99), abs=1.0)
+    assert [(batch.count, batch.period_s, batch.channels) for batch in published] == [
+        (100, pytest.approx(0.01), (("force", "N"),))
+    ]
+    assert before - 2.5 - 1e-6 <= published[0].utc_s <= time.time() - 2.5
+    assert thread._live == []
 
 
 class FullDiskRecording:
@@ -103,7 +96,7 @@ def test_receiver_of_a_full_disk_can_count_the_lost_samples():
     failures = []
     thread = RecordingThread(
         ReadyAligner(),
-        1000.0,
+        MAKER,
         read_clock,
         lambda samples: None,
         succeed,
@@ -119,7 +112,7 @@ def test_receiver_of_a_full_disk_can_count_the_lost_samples():
 def test_only_losses_during_the_recording_are_counted():
     aligner = IdleAligner()
     aligner.lost = {"force": 5}
-    thread = RecordingThread(aligner, 1000.0, read_clock, lambda samples: None, succeed, lambda error: None)
+    thread = RecordingThread(aligner, MAKER, read_clock, lambda samples: None, succeed, lambda error: None)
     thread.start_recording(SimpleNamespace(finish=succeed))
     aligner.lost = {"force": 7, "temperature": 1}
     assert thread.count_lost() == {"force": 2, "temperature": 1}

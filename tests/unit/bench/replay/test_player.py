@@ -1,4 +1,4 @@
-"""Messages of a played log, and comparison of readings."""
+"""Playback of a log, choice of its samples, and comparison of readings."""
 
 import math
 
@@ -8,7 +8,8 @@ import pytest
 from bench.errors import LogError
 from bench.log import read_log
 from bench.replay.compare import ReplayResult
-from bench.replay.player import make_messages, parse_speed
+from bench.replay.player import parse_speed, play_log
+from bench.replay.selection import Selection
 from tests.support.logs import write_log
 
 
@@ -23,18 +24,61 @@ def test_speed_that_is_not_above_zero_is_refused(text):
         parse_speed(text)
 
 
-def test_messages_hold_a_tenth_of_a_second_and_are_due_at_their_last_sample(tmp_path):
+class StoppedClock:
+    """Clock that advances only while somebody waits."""
+
+    def __init__(self):
+        self.now = 5000.0
+
+    def time(self):
+        return self.now
+
+    def sleep(self, seconds):
+        self.now += seconds
+
+
+@pytest.fixture
+def log(tmp_path):
     write_log(tmp_path / "run.mcap")
-    log = read_log(tmp_path / "run.mcap")
-    due, messages = zip(*make_messages(log), strict=True)
-    assert sum(len(message.time_ns) for message in messages) == 1500
-    assert {len(message.time_ns) for message in messages} <= {49, 50, 51}
-    assert list(due[:2]) == pytest.approx([0.098, 0.198], abs=0.0021)
-    assert due[-1] == pytest.approx(2.998)
-    assert [one for message in messages for one in message.time_ns] == log.samples["time_ns"].tolist()
-    np.testing.assert_array_equal(messages[0].values["force"], log.samples["force"][: len(messages[0].time_ns)])
-    assert "segment" not in messages[0].values
-    assert [messages[k].segment for k in (0, 10, 25)] == ["", "10mm_1Hz_0.2V", ""]
+    return read_log(tmp_path / "run.mcap")
+
+
+def play(log, speed=1.0, **selected):
+    clock, batches = StoppedClock(), []
+    count = play_log(log, Selection(**selected), speed, batches.append, clock)
+    return count, batches, clock.now - 5000.0
+
+
+def test_a_log_is_played_in_real_time_with_stamps_of_the_playback(log):
+    count, batches, seconds = play(log)
+    assert (count, seconds) == (1500, pytest.approx(2.998))
+    force = [channel.name for channel in batches[0].channels].index("force")
+    values = np.concatenate([one.values[force] for one in batches])
+    np.testing.assert_array_equal(values, log.samples["force"].astype(np.float32))
+    assert batches[0].channels[force].unit == "N"
+    assert [one.sequence for one in batches] == list(range(len(batches)))
+    assert batches[-1].end_utc_s == pytest.approx(5000.0 + 2.998, abs=1e-6)
+    assert max(one.count * one.period_s for one in batches) < 0.06
+
+
+def test_the_speed_shortens_waiting_and_stamps_alike(log):
+    _, batches, seconds = play(log, speed=10.0)
+    assert seconds == pytest.approx(0.2998)
+    assert batches[-1].end_utc_s == pytest.approx(5000.2998, abs=1e-6)
+
+
+def test_times_and_segments_choose_what_is_played(log):
+    assert play(log, begin_s=1.0, end_s=1.5)[0] == pytest.approx(250, abs=1)
+    inside = int(np.sum(log.samples["segment"] == 0))
+    assert play(log, segment=log.segments[0].name[:4] + "*")[0] == inside
+    assert play(log, segment=log.segments[0].stretch)[0] == sum(one.stop - one.start for one in log.segments)
+
+
+def test_a_choice_without_samples_is_refused_with_what_the_log_has(log):
+    with pytest.raises(LogError, match=r"no sample from 9 s to inf s; the log has 3\.0 s and the segments"):
+        play(log, begin_s=9.0)
+    with pytest.raises(LogError, match=f"in a segment 'x'; .*{log.segments[0].name}"):
+        play(log, segment="x")
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,10 @@ class Service:
         assert answer.status_code == status, answer.text
         return answer.json()
 
+    def scan(self):
+        """Catalogue the logs in the data folder now."""
+        self.client.portal.call(self.client.app.state.context.registry.scan)
+
     def wait_for(self, path, wanted):
         """Return the answer at a path as soon as it is as wanted."""
         deadline = time.monotonic() + TIMEOUT

@@ -1,29 +1,33 @@
 """Websocket, and the messages that a slow client misses."""
 
-import asyncio
+import math
 import time
 from contextlib import contextmanager
 
+import numpy as np
 import orjson
 import pytest
 
-from bench.agent_protocol.messages import AgentEvent, RunCommand, Samples
+from bench.agent_protocol.messages import AgentEvent, RunCommand
 from bench.jobs.progress import JobProgress
+from bench.live import Channel, LiveBatch, decode_batch, parse_channels
+from bench.live.listener import MAX_QUEUED_BATCHES, MAX_UNACKNOWLEDGED
 from bench.service import run_registry
-from bench.service.agent_monitor import join_batches
-from bench.service.live import MAX_QUEUED_BATCHES, MAX_QUEUED_EVENTS, SubscriberQueue
 from tests.support.service_logs import write_complete_log
 
 LIVE = "ws://127.0.0.1:8600/api/v1/live"
 
 
-def samples(*time_ns, **values):
-    return Samples(time_ns=list(time_ns), values={name: list(column) for name, column in values.items()})
+def batch(sequence, *force, utc_s=100.0):
+    return LiveBatch(sequence, utc_s, 1e-3, (Channel("force", "N"),), np.array([force], np.float32))
 
 
 def messages(socket, topic):
     while True:
-        message = orjson.loads(socket.receive_text())
+        received = socket.receive()
+        if received.get("text") is None:
+            continue
+        message = orjson.loads(received["text"])
         assert set(message) == {"topic", "data"}
         if message["topic"] == topic:
             yield message["data"]
@@ -36,10 +40,20 @@ def wait_until(condition):
         time.sleep(0.001)
 
 
+def batches(socket):
+    channels = ()
+    while True:
+        received = socket.receive()
+        if received.get("bytes") is not None:
+            yield decode_batch(received["bytes"], channels)
+        elif (message := orjson.loads(received["text"]))["topic"] == "channels":
+            channels = parse_channels(message["data"]["channels"])
+
+
 @contextmanager
-def subscribe(service):
+def subscribe(service, **wishes):
     with service.client.websocket_connect(LIVE) as socket:
-        socket.send_json({"token": service.token})
+        socket.send_json({"token": service.token, **wishes})
         yield socket
 
 
@@ -49,24 +63,44 @@ def test_messages_of_the_agent_arrive_on_the_websocket(service):
         assert next(messages(socket, "status"))["state"] == "idle"
         service.agent.publish(AgentEvent(time_ns=5, kind="alarm", text="temperature 61 degC over 60 degC"))
         assert next(messages(socket, "event"))["kind"] == "alarm"
-        service.agent.publish(samples(1, 2, force=[3.0, None]))
-        found = next(messages(socket, "samples"))
-        assert found["time_ns"] == [1, 2]
-        assert found["values"] == {"force": [3.0, None]}
+        service.agent.publish(batch(7, 3.0, math.nan))
+        found = next(batches(socket))
+        assert (found.sequence, found.utc_s, found.channels) == (7, 100.0, (("force", "N"),))
+        np.testing.assert_array_equal(found.values, [[3.0, math.nan]])
 
 
-def test_samples_arrive_once_and_in_order_in_fewer_batches(service):
+def test_a_late_client_gets_the_latest_batch_with_its_age(service):
     with subscribe(service) as socket:
-        for k in range(50):
-            service.agent.publish(samples(2 * k, 2 * k + 1, force=[1.0, 2.0]))
-        times, batches = [], 0
-        for found in messages(socket, "samples"):
-            times += found["time_ns"]
-            batches += 1
-            if times[-1] == 99:
-                break
-        assert times == sorted(times)
-        assert batches < 50
+        service.agent.publish(batch(1, 2.0))
+        next(batches(socket))
+    with subscribe(service) as socket:
+        announced = next(messages(socket, "channels"))
+        assert announced["channels"] == [{"name": "force", "unit": "N"}]
+        assert announced["age_s"] == pytest.approx(time.time() - 100.0, abs=60.0)
+
+
+def test_a_client_gets_decimated_samples_on_request(service):
+    with subscribe(service, rate_hz=100.0) as socket:
+        service.agent.publish(batch(1, *range(40)))
+        found = next(batches(socket))
+        assert (found.values[0, 0], found.values[0, -1]) == (0.0, 39.0)
+        assert 1 / found.period_s == pytest.approx(100.0)
+
+
+def test_a_client_that_acknowledges_nothing_loses_batches_and_is_told_so_when_it_resumes(service):
+    with subscribe(service, acknowledge=True) as socket, subscribe(service) as other:
+        given, others = batches(socket), batches(other)
+        for k in range(60):
+            service.agent.publish(batch(k, 1.0))
+            assert next(others).sequence == k
+        for k in range(MAX_UNACKNOWLEDGED + 1):
+            assert next(given).sequence == k
+        socket.send_json({"something": "of a newer client"})
+        socket.send_json({"received": MAX_UNACKNOWLEDGED})
+        assert next(messages(socket, "lost"))["batches"] == 60 - MAX_QUEUED_BATCHES - MAX_UNACKNOWLEDGED - 1
+        channels = (Channel("force", "N"),)
+        first = next(found["bytes"] for found in iter(socket.receive, None) if found.get("bytes"))
+        assert decode_batch(first, channels).sequence == 60 - MAX_QUEUED_BATCHES
 
 
 def test_changes_of_runs_and_jobs_are_published(service):
@@ -119,36 +153,6 @@ def test_the_service_sends_its_clock_at_once_and_repeatedly(service):
         clock = messages(socket, "clock")
         first, second = next(clock)["utc_s"], next(clock)["utc_s"]
         assert first < second <= time.time()
-
-
-def test_joined_batches_have_the_stamp_of_the_newest():
-    batches = [samples(k, force=[1.0]).model_copy(update={"utc_s": 100.0 + k}) for k in range(3)]
-    assert join_batches(batches).utc_s == 102.0
-
-
-def test_a_slow_client_gets_a_limited_number_of_the_newest_messages():
-    async def slow():
-        subscriber = SubscriberQueue()
-        for k in range(1000):
-            subscriber.put("samples", "", f"samples {k}")
-            subscriber.put("event", "", f"event {k}")
-            subscriber.put("status", "", f"status {k}")
-            subscriber.put("job", f"job {k % 2}", f"job {k}")
-        return await subscriber.take()
-
-    found = asyncio.run(slow())
-    assert [text for text in found if text.startswith("status")] == ["status 999"]
-    assert sorted(text for text in found if text.startswith("job")) == ["job 998", "job 999"]
-    assert [text for text in found if text.startswith("samples")] == [
-        f"samples {k}" for k in range(1000 - MAX_QUEUED_BATCHES, 1000)
-    ]
-    assert len([text for text in found if text.startswith("event")]) == MAX_QUEUED_EVENTS
-
-
-def test_joined_batches_have_null_for_a_missing_field():
-    both = join_batches([samples(1, 2, force=[1.0, 2.0]), samples(3, force=[3.0], temperature=[20.0])])
-    assert both.time_ns == [1, 2, 3]
-    assert both.values == {"force": [1.0, 2.0, 3.0], "temperature": [None, None, 20.0]}
 
 
 def test_health_reports_a_missing_worker(service):

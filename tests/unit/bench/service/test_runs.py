@@ -35,7 +35,7 @@ def start(service, **more):
 
 
 def test_methods_are_listed_and_returned_as_documents(service):
-    quick = next(method for method in service.get("/methods") if method["name"] == "quick")
+    quick = next(method for method in service.get("/methods")["items"] if method["name"] == "quick")
     assert quick["drive_kind"] == "coil_v"
     assert quick["duration_s"] == pytest.approx(23.1)
     document = service.get("/methods/quick")
@@ -277,7 +277,7 @@ def test_what_cannot_be_paused_or_resumed_is_refused(service):
 
 
 def test_the_checkpoints_of_methods_are_listed(service):
-    methods = {method["name"]: method["checkpoints"] for method in service.get("/methods")}
+    methods = {method["name"]: method["checkpoints"] for method in service.get("/methods")["items"]}
     assert methods["quick"] == ["10mm_1Hz_0.2V", "5mm_2.5Hz_0.3V"]
     assert all(methods.values())
 

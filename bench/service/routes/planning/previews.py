@@ -1,33 +1,44 @@
-"""Route that previews a method: motion and drive over time, before anything moves."""
+"""Preview of a method: motion and drive over time, before anything moves."""
 
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
-from fastapi import APIRouter
+from fastapi import APIRouter, Query
 
-from bench.methods import Programme, compile_method
-from bench.service.routes.methods import load_shipped_method
-from bench.service.views import MethodPreview, PreviewSegment, PreviewSeries
+from bench.methods import Method, Programme, compile_method
+from bench.service.context import Context
+from bench.service.routes.planning.method_library import find_method
+from bench.service.routes.planning.views import MethodPreview, PreviewSegment, PreviewSeries
 
 router = APIRouter(prefix="/methods", tags=["methods"])
 _BINS = 600
 """Number of intervals of a preview; of each, the lowest and the highest value are kept."""
+_CACHED = 50
+"""Number of previews that are kept."""
 
 
 @router.get("/{name}/preview")
-def preview_method(name: str) -> MethodPreview:
+def preview_method(
+    name: str,
+    context: Context,
+    version: Annotated[int | None, Query(ge=1, description="by default the newest version")] = None,
+) -> MethodPreview:
     """Return motion and drive of a method as they will be commanded, reduced for a plot without losing a peak."""
-    load_shipped_method(name)
-    return _make_preview(name)
+    return _preview_document(find_method(context, name, version).method.to_json())
 
 
-@cache
-def _make_preview(name: str) -> MethodPreview:
-    programme = compile_method(load_shipped_method(name))
+@lru_cache(_CACHED)
+def _preview_document(document: str) -> MethodPreview:
+    return make_preview(compile_method(Method.model_validate_json(document)))
+
+
+def make_preview(programme: Programme) -> MethodPreview:
+    """Return the preview of a compiled method."""
     rate = programme.rate
     return MethodPreview(
-        name=name,
+        name=programme.method.name,
         duration_s=programme.duration,
         drive_unit=programme.method.drive_unit,
         displacement_m=_reduce(programme, programme.displacement),

@@ -1,0 +1,11 @@
+"""Errors of campaigns."""
+
+from bench.errors import BenchError
+
+
+class CampaignError(BenchError):
+    """A campaign is invalid, or a command is not possible in its present state."""
+
+
+class CampaignDocumentError(CampaignError):
+    """A campaign document, or a method in it, is invalid."""

@@ -1,0 +1,145 @@
+"""Steps of a campaign: each is an object with one key, the kind of the step."""
+
+from typing import Any, Literal, Self, TypeAlias
+
+from pydantic import Field, PositiveFloat, PositiveInt, model_validator
+
+from bench.validation import FrozenModel
+
+DEFAULT_TIMEOUT = 3600.0
+"""[s] Time limit of a condition without its own."""
+
+
+class RunSpec(FrozenModel):
+    """One run of a method on a specimen."""
+
+    specimen: str = Field(min_length=1, max_length=200, description="Serial number of the damper.")
+    method: str | dict[str, Any] = Field(description="Name of a shipped method, or a document mrbench.method/1.")
+    drive: float | None = Field(
+        default=None, ge=0, description="[V or A] constant drive of all segments, instead of the method's own."
+    )
+
+
+class RunStep(FrozenModel):
+    """Run of a method."""
+
+    run: RunSpec = Field(description="Run of a method on a specimen.")
+
+
+class RestSpec(FrozenModel):
+    """Rest for a time, or until the damper has cooled down."""
+
+    seconds: PositiveFloat | None = Field(default=None, description="[s] duration of the rest.")
+    until_temperature_c: float | None = Field(
+        default=None, description="[°C] the rest ends when the thermometer shows this or less."
+    )
+    timeout_s: PositiveFloat = Field(default=DEFAULT_TIMEOUT, description="[s] time limit of the condition.")
+
+    @model_validator(mode="after")
+    def _check_condition(self) -> Self:
+        if (self.seconds is None) == (self.until_temperature_c is None):
+            raise ValueError("a rest needs either seconds or until_temperature_c")
+        return self
+
+
+class RestStep(FrozenModel):
+    """Rest with the bench at standstill."""
+
+    rest: RestSpec = Field(description="Rest with zero drive.")
+
+
+class WarmUpSpec(FrozenModel):
+    """Strokes that warm the damper: some cycles, or until a temperature."""
+
+    cycles: PositiveInt | None = Field(default=None, description="[1] number of cycles.")
+    until_temperature_c: float | None = Field(
+        default=None, description="[°C] the warm-up ends when the thermometer shows this or more."
+    )
+    timeout_s: PositiveFloat = Field(default=DEFAULT_TIMEOUT, description="[s] time limit of the condition.")
+
+    @model_validator(mode="after")
+    def _check_condition(self) -> Self:
+        if (self.cycles is None) == (self.until_temperature_c is None):
+            raise ValueError("a warm-up needs either cycles or until_temperature_c")
+        return self
+
+
+class WarmUpStep(FrozenModel):
+    """Warm-up with the first sine strokes of the next run."""
+
+    warm_up: WarmUpSpec = Field(description="Warm-up with the first sine strokes of the next run.")
+
+
+class IntervalGoal(FrozenModel):
+    """Goal of a repetition: the 95 % interval of a parameter is narrow enough."""
+
+    parameter: str = Field(min_length=1, description="Parameter of the fit, such as k0.")
+    ci_percent: PositiveFloat = Field(
+        description="[%] half of the 95 % interval of all repetitions together, relative to the value."
+    )
+
+
+class DiagnosisGoal(FrozenModel):
+    """Goal of a repetition: the diagnosis proposes no further stroke."""
+
+    diagnosis: Literal["settled"] = Field(description="The diagnosis of the latest run proposes no stroke.")
+
+
+class RepeatSpec(FrozenModel):
+    """Repetition of a run until a goal is reached."""
+
+    step: RunStep = Field(description="Run to repeat.")
+    until: IntervalGoal | DiagnosisGoal = Field(description="Goal at which the repetition ends.")
+    at_most: PositiveInt = Field(le=100, description="[1] largest number of runs.")
+
+
+class RepeatStep(FrozenModel):
+    """Repetition of a run."""
+
+    repeat: RepeatSpec = Field(description="Repetition of a run until a goal is reached.")
+
+
+class NextStrokeSpec(FrozenModel):
+    """Runs with the strokes that the diagnosis proposes."""
+
+    at_most: PositiveInt = Field(le=20, description="[1] largest number of proposed strokes.")
+
+
+class NextStrokeStep(FrozenModel):
+    """Repetition of the preceding run with the proposed strokes, until its diagnosis is settled."""
+
+    next_stroke: NextStrokeSpec = Field(
+        description="Repeat the preceding run with the proposed strokes added, until its diagnosis is settled."
+    )
+
+
+class PromptSpec(FrozenModel):
+    """Question to the operator."""
+
+    text: str = Field(min_length=1, max_length=1000, description="Request to the operator.")
+    photo: bool = Field(default=False, description="Whether the answer needs a photo.")
+    note: bool = Field(default=False, description="Whether the answer needs a note.")
+
+
+class PromptStep(FrozenModel):
+    """Wait for a person, such as for the next specimen."""
+
+    prompt: PromptSpec = Field(description="Wait until a person answers.")
+
+
+Step: TypeAlias = RunStep | RestStep | WarmUpStep | RepeatStep | NextStrokeStep | PromptStep
+STEP_KINDS = ("run", "rest", "warm_up", "repeat", "next_stroke", "prompt")
+"""Keys of the kinds of steps."""
+
+
+def get_step_kind(step: Any) -> str:
+    """Return the kind of a step, or of the document of one; empty if it is neither."""
+    names = list(step) if isinstance(step, dict) else list(type(step).model_fields)
+    return names[0] if len(names) == 1 and names[0] in STEP_KINDS else ""
+
+
+def find_run(step: Step) -> RunSpec | None:
+    """Return the run of a step that runs a method of its own, or None."""
+    if isinstance(step, RepeatStep):
+        return step.repeat.step.run
+    return step.run if isinstance(step, RunStep) else None

@@ -1,0 +1,156 @@
+"""Campaigns in the catalogue as their models; every change of a state is one transaction."""
+
+import hashlib
+import json
+import uuid
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+from bench.campaigns.document import Campaign, CampaignError, Methods
+from bench.campaigns.engine import CampaignState, Message, start_campaign
+from bench.catalogue import CampaignChange, CampaignEventRow, CampaignRow, Catalogue
+from bench.methods import Method
+
+NOTIFIED_KINDS = ("person_needed", "held_back", "ended")
+"""Kinds of messages that the recipients of a campaign get."""
+Transition = Callable[[CampaignState], CampaignState]
+
+
+class StoredCampaign(NamedTuple):
+    """A campaign as the catalogue has it."""
+
+    id: str
+    bench: str
+    """`agent`, or `scenario NAME`."""
+    created: datetime
+    methods: dict[str, Method]
+    state: CampaignState
+
+
+class CampaignStore:
+    """Campaigns of one catalogue; safe from any thread and process."""
+
+    def __init__(self, catalogue: Catalogue) -> None:
+        self.catalogue = catalogue
+        self.table = catalogue.campaigns
+
+    def create(
+        self, campaign: Campaign, methods: Methods, bench: str, now: float, operator: str = ""
+    ) -> StoredCampaign:
+        """Add a campaign that has just started.
+
+        Args:
+            campaign: the document.
+            methods: all its methods by name.
+            bench: `agent`, or `scenario NAME`.
+            now: UTC [s].
+            operator: person who started it.
+        """
+        state = start_campaign(campaign, methods, now, operator)
+        created = datetime.fromtimestamp(now, UTC)
+        row = CampaignRow(
+            id=f"{campaign.name}-{created:%Y%m%dT%H%M%S}-{uuid.uuid4().hex[:6]}",
+            name=campaign.name,
+            key=compute_key(campaign, methods),
+            bench=bench,
+            status=state.status,
+            created=created,
+            methods={name: _dump_method(method) for name, method in methods.items()},
+            state=state.model_dump(mode="json", by_alias=True),
+        )
+        self.table.add(row, _make_events(row.id, state))
+        return _parse(row)
+
+    def get(self, campaign_id: str) -> StoredCampaign:
+        """Return a campaign.
+
+        Raises:
+            CampaignError: there is none with this id.
+        """
+        row = self.table.get(campaign_id)
+        if row is None:
+            raise CampaignError(f"there is no campaign {campaign_id[:120]}")
+        return _parse(row)
+
+    def list_campaigns(self, limit: int, before: str | None = None) -> list[StoredCampaign]:
+        """Return campaigns, newest first.
+
+        Raises:
+            CampaignError: there is no campaign ``before``.
+        """
+        last = None if before is None else self.table.get(before)
+        if before is not None and last is None:
+            raise CampaignError(f"there is no campaign {before[:120]}")
+        return [_parse(row) for row in self.table.list_campaigns(limit, last)]
+
+    def list_in_progress(self, bench: str | None = None) -> list[StoredCampaign]:
+        """Return the campaigns that have not ended, oldest first; only those of one bench if it is given."""
+        rows = self.table.list_in_progress()
+        return [_parse(row) for row in rows if bench is None or row.bench == bench]
+
+    def find_unfinished(self, campaign: Campaign, methods: Methods, bench: str) -> StoredCampaign | None:
+        """Return the campaign of an equal document that has not ended on a bench, or None."""
+        key = compute_key(campaign, methods)
+        rows = self.table.list_in_progress()
+        return next((_parse(row) for row in rows if (row.key, row.bench) == (key, bench)), None)
+
+    def update(self, campaign_id: str, transition: Transition, methods: Methods | None = None) -> StoredCampaign:
+        """Replace the state of a campaign by that after a transition.
+
+        Args:
+            campaign_id: id of the campaign.
+            transition: returns the new state, or raises an error that leaves the old one.
+            methods: methods to add to those of the campaign.
+
+        Raises:
+            CampaignError: there is no such campaign, or the transition refuses.
+        """
+        self.get(campaign_id)
+
+        def make_change(row: CampaignRow) -> CampaignChange | None:
+            before = CampaignState.model_validate(row.state)
+            after = transition(before)
+            if after == before and not methods:
+                return None
+            values = {"state": after.model_dump(mode="json", by_alias=True), "status": after.status}
+            if methods:
+                values["methods"] = {**row.methods, **{name: _dump_method(one) for name, one in methods.items()}}
+            return CampaignChange(values, _make_events(campaign_id, after))
+
+        return _parse(self.table.update(campaign_id, make_change))
+
+
+def compute_key(campaign: Campaign, methods: Methods) -> str:
+    """Return the hash of a campaign and its methods."""
+    content = {
+        "campaign": campaign.to_document(),
+        "methods": {name: _dump_method(method) for name, method in methods.items()},
+    }
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _dump_method(method: Method) -> object:
+    return method.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+
+
+def _parse(row: CampaignRow) -> StoredCampaign:
+    methods = {name: Method.model_validate(document) for name, document in row.methods.items()}
+    return StoredCampaign(row.id, row.bench, row.created, methods, CampaignState.model_validate(row.state))
+
+
+def _make_events(campaign_id: str, state: CampaignState) -> Sequence[CampaignEventRow]:
+    return [_make_event(campaign_id, state, message) for message in state.outbox]
+
+
+def _make_event(campaign_id: str, state: CampaignState, message: Message) -> CampaignEventRow:
+    is_due = bool(state.campaign.notify) and message.kind in NOTIFIED_KINDS
+    return CampaignEventRow(
+        campaign_id=campaign_id,
+        at=datetime.fromtimestamp(message.at, UTC),
+        kind=message.kind,
+        text=message.text,
+        who=message.who,
+        item=message.item,
+        notification="due" if is_due else "",
+    )

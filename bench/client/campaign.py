@@ -1,0 +1,104 @@
+"""One campaign of the service."""
+
+import base64
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bench.client.errors import ClientError
+from bench.client.session import Session, quote_name
+
+_POLL_PERIOD = 1.0
+"""Time [s] between two requests while a script waits."""
+_ENDED = ("done", "stopped")
+
+
+class Campaign:
+    """One campaign; each call requests its present state.
+
+    Args:
+        session: session with the service.
+        campaign_id: id of the campaign.
+    """
+
+    def __init__(self, session: Session, campaign_id: str) -> None:
+        self.id = campaign_id
+        self._session, self._path = session, f"/campaigns/{quote_name(campaign_id)}"
+
+    def __repr__(self) -> str:
+        return f"Campaign({self.id!r})"
+
+    def get_state(self) -> dict[str, Any]:
+        """Return state, queue, cells, trends and newest events.
+
+        Raises:
+            ClientError: there is no such campaign, or the service cannot be reached.
+        """
+        return dict(self._session.get(self._path))
+
+    def pause(self, who: str = "") -> dict[str, Any]:
+        """Pause at the next checkpoint; return the state.
+
+        Raises:
+            ClientError: the campaign is not running, or the service cannot be reached.
+        """
+        return self._post("pause", {"who": who})
+
+    def resume(self, who: str = "") -> dict[str, Any]:
+        """Continue a paused campaign; return the state.
+
+        Raises:
+            ClientError: the campaign is not paused, or the service cannot be reached.
+        """
+        return self._post("resume", {"who": who})
+
+    def stop(self, who: str = "", *, now: bool = False) -> dict[str, Any]:
+        """Stop after the run in progress, with ``now`` that run as well; return the state.
+
+        Raises:
+            ClientError: the campaign has ended, or the service cannot be reached.
+        """
+        return self._post("stop", {"who": who, "now": now})
+
+    def answer(self, note: str = "", who: str = "", choice: str | None = None, photo: Path | None = None) -> Any:
+        """Answer a prompt, or decide on a failed step by retry, skip or stop; return the state.
+
+        Raises:
+            ClientError: nothing is asked, the answer is refused, or the service cannot be reached.
+        """
+        content: dict[str, Any] = {"note": note, "who": who, "choice": choice}
+        if photo is not None:
+            content["photo"] = base64.b64encode(photo.read_bytes()).decode()
+        return self._post("answer", content)
+
+    def edit(self, edit: Mapping[str, Any], who: str = "") -> dict[str, Any]:
+        """Edit the queue, such as ``{"edit": "delete", "item": "s0004"}``; return the state.
+
+        Raises:
+            ClientError: the edit is refused, or the service cannot be reached.
+        """
+        return dict(self._session.patch(self._path, {"edit": edit, "who": who}))
+
+    def wait(self, timeout: float = 86_400.0) -> dict[str, Any]:
+        """Wait until the campaign ends or asks for a person, and return its state.
+
+        Args:
+            timeout: longest time to wait [s].
+
+        Raises:
+            ClientError: neither has happened in time, or the service cannot be reached.
+        """
+        deadline = time.monotonic() + timeout
+        while not _needs_attention(state := self.get_state()):
+            if time.monotonic() > deadline:
+                raise ClientError(f"campaign {self.id} is {state['status']} after {timeout:g} s")
+            time.sleep(_POLL_PERIOD)
+        return state
+
+    def _post(self, verb: str, content: Mapping[str, Any]) -> dict[str, Any]:
+        return dict(self._session.post(f"{self._path}/{verb}", content))
+
+
+def _needs_attention(state: Mapping[str, Any]) -> bool:
+    return state["status"] in (*_ENDED, "paused") or state["question"] is not None

@@ -1,0 +1,99 @@
+"""`mrbench campaign run --config`: a campaign on the instruments, executed by the service of the data folder."""
+
+import fcntl
+import time
+from pathlib import Path
+
+import typer
+
+from bench.campaigns import (
+    CampaignError,
+    CampaignStore,
+    StoredCampaign,
+    collect_methods,
+    load_campaign,
+    make_view,
+    plan_campaign,
+)
+from bench.commands.campaign.catalogue import open_store
+from bench.config import load_config
+
+AGENT_BENCH = "agent"
+"""Bench of the campaigns that the service executes."""
+_POLL_PERIOD = 0.5
+"""[s] Time between two looks at the catalogue."""
+_EVENTS = 200
+"""Number of events that are read at once."""
+
+
+def run_on_bench(path: Path, config: Path, data: Path, operator: str, *, as_json: bool) -> None:
+    """Start a campaign on the bench of a running service, or follow it, until it ends.
+
+    The campaign goes on if this command is ended.
+
+    Args:
+        path: file of the campaign.
+        config: ``bench.toml``.
+        data: data folder of the service.
+        operator: person, for the record.
+        as_json: print the final state as JSON.
+
+    Raises:
+        BenchError: configuration or campaign is invalid, no service runs, or the bench is held.
+    """
+    load_config(config)
+    check_served(data, config)
+    with open_store(data) as store:
+        campaign = find_or_create(store, path, operator)
+        ended = _follow(store, campaign, is_quiet=as_json)
+        if as_json:
+            events = store.table.list_newest_events(ended.id, _EVENTS)
+            typer.echo(make_view(ended, events).model_dump_json(indent=2))
+
+
+def check_served(data: Path, config: Path) -> None:
+    """Check that a service holds the lock of a data folder.
+
+    Raises:
+        CampaignError: none does.
+    """
+    path = data / "service.lock"
+    if path.is_file():
+        with path.open("rb") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except OSError:
+                return
+    raise CampaignError(f"no service uses {data}; start it: mrbench serve --config {config} --data {data}")
+
+
+def find_or_create(store: CampaignStore, path: Path, operator: str) -> StoredCampaign:
+    """Return the unfinished campaign of an equal document, or a new one.
+
+    Raises:
+        BenchError: the campaign is invalid or cannot be run, or another one holds the bench.
+    """
+    document = load_campaign(path)
+    methods = collect_methods(document, allow_files=True)
+    unfinished = store.find_unfinished(document, methods, AGENT_BENCH)
+    if unfinished is not None:
+        return unfinished
+    if held := store.list_in_progress(AGENT_BENCH):
+        raise CampaignError(f"campaign {held[0].id} holds the bench; stop it, or wait for its end")
+    if problems := plan_campaign(document, methods).problems:
+        raise CampaignError(f"the campaign cannot be run: {problems[0]}")
+    return store.create(document, methods, AGENT_BENCH, time.time(), operator)
+
+
+def _follow(store: CampaignStore, campaign: StoredCampaign, *, is_quiet: bool) -> StoredCampaign:
+    """Print the events of a campaign until it ends, and return it."""
+    latest = 0
+    while True:
+        present = store.get(campaign.id)
+        for event in store.table.list_events(campaign.id, _EVENTS, latest):
+            latest = event.id
+            if not is_quiet:
+                typer.echo(event.text, err=True)
+        if present.state.has_ended:
+            return present
+        time.sleep(_POLL_PERIOD)

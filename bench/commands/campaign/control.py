@@ -1,0 +1,82 @@
+"""`mrbench campaign status|pause|resume|stop`: on the catalogue of a data folder, also without a service.
+
+A command changes the stored state. The process that executes the campaign acts on it within a second.
+"""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import typer
+
+from bench.campaigns import (
+    CampaignError,
+    CampaignState,
+    CampaignStore,
+    StoredCampaign,
+    answer,
+    format_view,
+    make_view,
+    parse_choice,
+    pause,
+    resume,
+    stop,
+)
+from bench.commands.campaign.catalogue import open_store
+
+_EVENTS = 200
+"""Number of newest events that the JSON contains."""
+
+
+def control(
+    action: str, target: str, data: Path, operator: str, *, note: str | None, choice: str | None, as_json: bool
+) -> None:
+    """Show or change a campaign.
+
+    Args:
+        action: status, pause, resume or stop.
+        target: id of the campaign; empty for the only one in progress, or the newest.
+        data: data folder.
+        operator: person, for the record.
+        note: answer to a prompt, with resume.
+        choice: decision on a failed step, with resume.
+        as_json: print JSON instead of text.
+
+    Raises:
+        BenchError: there is no such campaign, or the command is not possible in its state.
+    """
+    with open_store(data) as store:
+        campaign = _find(store, target)
+        if action != "status":
+            now = max(time.time(), campaign.state.updated)
+            change = _make_change(action, campaign, operator, now, note, choice)
+            campaign = store.update(campaign.id, change)
+        view = make_view(campaign, store.table.list_newest_events(campaign.id, _EVENTS))
+        typer.echo(view.model_dump_json(indent=2) if as_json else "\n".join(format_view(view)))
+
+
+def _make_change(
+    action: str, campaign: StoredCampaign, who: str, now: float, note: str | None, choice: str | None
+) -> Callable[[CampaignState], CampaignState]:
+    if action == "pause":
+        return lambda state: pause(state, now, who)
+    if action == "stop":
+        return lambda state: stop(state, now, who)
+    is_answer = note is not None or choice is not None or campaign.state.needs_person
+    if is_answer and campaign.state.status == "running":
+        decision = parse_choice(choice)
+        return lambda state: answer(state, now, who, note or "", choice=decision)
+    return lambda state: resume(state, now, who)
+
+
+def _find(store: CampaignStore, target: str) -> StoredCampaign:
+    if target:
+        return store.get(target)
+    in_progress = store.list_in_progress()
+    if len(in_progress) > 1:
+        names = ", ".join(campaign.id for campaign in in_progress)
+        raise CampaignError(f"several campaigns are in progress: {names}; give the id of one")
+    found = in_progress or store.list_campaigns(1)
+    if not found:
+        raise CampaignError(f"{store.catalogue.folder} has no campaign; start one: mrbench campaign run FILE")
+    return found[0]

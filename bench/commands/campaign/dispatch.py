@@ -1,0 +1,98 @@
+"""Arguments of `mrbench campaign`, and the choice of the action."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Action(StrEnum):
+    """Actions on a campaign."""
+
+    PLAN = "plan"
+    RUN = "run"
+    STATUS = "status"
+    PAUSE = "pause"
+    RESUME = "resume"
+    STOP = "stop"
+
+
+def campaign(
+    action: Annotated[
+        Action,
+        typer.Argument(
+            help="plan: time, heat, disk, limits and identifiability. run: start or continue it. "
+            "status, pause (at the next checkpoint), resume, stop (after the run in progress)."
+        ),
+    ],
+    target: Annotated[
+        str, typer.Argument(help="File of the campaign for plan and run, else its id.", metavar="FILE|ID")
+    ] = "",
+    config: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="With run: on this bench.toml, by the service that uses --data."),
+    ] = None,
+    scenario: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="With run: on the simulated plant, faster than real time."),
+    ] = None,
+    out: Annotated[str, typer.Option(metavar="FILE", help="- prints JSON.")] = "",
+    data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder for logs and catalogue.")] = Path("runs"),
+    operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
+    quick: Annotated[
+        bool, typer.Option("--quick", help="With plan: leave out what the strokes can identify.")
+    ] = False,
+    identify: Annotated[
+        bool, typer.Option("--identify", help="With run --scenario: identify and diagnose every run.")
+    ] = False,
+    answer: Annotated[
+        str | None, typer.Option(metavar="NOTE", help="With resume: answer the prompt with this note.")
+    ] = None,
+    choice: Annotated[
+        str | None, typer.Option(metavar="retry|skip|stop", help="With resume: decide on a failed step.")
+    ] = None,
+    new: Annotated[
+        bool, typer.Option("--new", help="With run: start again, also if the campaign is not finished.")
+    ] = False,
+) -> None:
+    """Plan, run and control campaigns: ordered runs with rests and conditions between them.
+
+    A campaign that was interrupted continues with the same command: no finished run is repeated.
+    """
+    as_json = out == "-"
+    if action in (Action.PLAN, Action.RUN) and not target:
+        raise typer.BadParameter("give the file of the campaign")
+    if action is Action.PLAN:
+        from bench.commands.campaign.plan import plan
+
+        plan(Path(target), data, quick=quick, as_json=as_json)
+    elif action is Action.RUN:
+        if (scenario is None) == (config is None):
+            raise typer.BadParameter("give one of --config bench.toml and --scenario NAME or FILE")
+        _run(Path(target), config, scenario, data, operator, identify=identify, is_new=new, as_json=as_json)
+    else:
+        from bench.commands.campaign.control import control
+
+        control(action.value, target, data, operator, note=answer, choice=choice, as_json=as_json)
+
+
+def _run(
+    path: Path,
+    config: Path | None,
+    scenario: str | None,
+    data: Path,
+    operator: str,
+    *,
+    identify: bool,
+    is_new: bool,
+    as_json: bool,
+) -> None:
+    if config is not None:
+        from bench.commands.campaign.bench import run_on_bench
+
+        run_on_bench(path, config, data, operator, as_json=as_json)
+    else:
+        from bench.commands.campaign.run import run_on_plant
+
+        run_on_plant(path, str(scenario), data, operator, identify=identify, is_new=is_new, as_json=as_json)

@@ -1,0 +1,28 @@
+"""`mrbench campaign plan`: dry run of a whole campaign."""
+
+from pathlib import Path
+
+import typer
+
+from bench.campaigns import collect_methods, format_plan, load_campaign, plan_campaign
+from bench.disk import RESERVE, find_free_space
+from bench.runs import assess_design
+
+
+def plan(path: Path, data: Path, *, quick: bool, as_json: bool) -> None:
+    """Print the dry run of a campaign.
+
+    Args:
+        path: file of the campaign.
+        data: data folder, for the free space.
+        quick: leave out what the strokes can identify.
+        as_json: print JSON instead of text.
+
+    Raises:
+        BenchError: the campaign is invalid.
+    """
+    document = load_campaign(path)
+    free = find_free_space(data).free - RESERVE
+    methods = collect_methods(document, allow_files=True)
+    made = plan_campaign(document, methods, None if quick else assess_design, free)
+    typer.echo(made.model_dump_json(by_alias=True, indent=2) if as_json else "\n".join(format_plan(made)))

@@ -1,0 +1,89 @@
+"""Executor of campaigns on the rig agent: a thread of the service that continues what is in progress."""
+
+import logging
+import threading
+import time
+from types import TracebackType
+
+from bench.campaigns import (
+    AgentBench,
+    CampaignError,
+    CampaignRunner,
+    CampaignStore,
+    StoredCampaign,
+    Thermometer,
+    stop,
+)
+from bench.catalogue import Catalogue
+from bench.log_lines import RepeatedFailure
+from bench.service.agent_monitor import AgentMonitor
+
+AGENT_BENCH = "agent"
+"""Bench of the campaigns that the service executes."""
+PERIOD = 0.5
+"""[s] Time between two observations of a campaign, and between two looks for a new one."""
+_LOG = logging.getLogger(__name__)
+
+
+class CampaignExecutor:
+    """Thread that executes the campaigns of the agent, one after the other, oldest first."""
+
+    def __init__(self, catalogue: Catalogue, monitor: AgentMonitor, *, is_local: bool) -> None:
+        """Use a catalogue and an agent.
+
+        Args:
+            catalogue: catalogue of the data folder.
+            monitor: connection to the agent.
+            is_local: whether the agent writes into the data folder; else nothing is executed.
+        """
+        self.store = CampaignStore(catalogue)
+        self.thermometer = Thermometer()
+        self.is_local = is_local
+        self._stopping = threading.Event()
+        self._failures = RepeatedFailure(_LOG, "campaign_failed", "campaign_continues")
+        self.bench = AgentBench(catalogue, monitor, self.thermometer, lambda: self._stopping.wait(PERIOD))
+        self._thread = threading.Thread(target=self._execute, name="campaigns", daemon=True)
+
+    def __enter__(self) -> "CampaignExecutor":
+        """Start the thread."""
+        if self.is_local:
+            self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the thread; a run in progress goes on in the agent, and the next service continues the campaign."""
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def _execute(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                self._execute_oldest()
+            except Exception as error:  # the thread must not end, or the campaign would stand still without a word
+                self._failures.note(error)
+            else:
+                self._failures.clear()
+            self._stopping.wait(PERIOD)
+
+    def _execute_oldest(self) -> None:
+        in_progress = self.store.list_in_progress(AGENT_BENCH)
+        if not in_progress:
+            return
+        self._check_needs(in_progress[0])
+        ended = CampaignRunner(self.store, in_progress[0].id, self.bench).run(self._stopping.is_set)
+        _LOG.info("campaign_left", extra={"campaign": ended.id, "status": ended.state.status})
+
+    def _check_needs(self, campaign: StoredCampaign) -> None:
+        """Stop a campaign that has not begun and has a condition that can never be met."""
+        state = campaign.state
+        if state.active is not None or any(item.state != "pending" for item in state.items):
+            return
+        try:
+            self.bench.check_needs(state.campaign, [item.step for item in state.items])
+        except CampaignError as error:
+            reason = str(error)
+            now = max(time.time(), state.updated)
+            self.store.update(campaign.id, lambda present: stop(present, now, reason=reason))

@@ -1,0 +1,218 @@
+"""Routes of campaigns and of the queue of the bench."""
+
+import asyncio
+import time
+from collections.abc import Callable
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Response
+
+from bench.agent_protocol import StopCommand
+from bench.campaigns import (
+    CampaignError,
+    CampaignPlan,
+    CampaignState,
+    CampaignStore,
+    CampaignView,
+    Methods,
+    StoredCampaign,
+    answer,
+    apply_edit,
+    collect_edit_methods,
+    collect_methods,
+    collect_step_methods,
+    expand_campaign,
+    make_test_content,
+    make_view,
+    needs_results,
+    parse_campaign,
+    pause,
+    plan_campaign,
+    resume,
+    send_all,
+    stop,
+)
+from bench.disk import RESERVE, find_free_space
+from bench.service.campaigns import AGENT_BENCH
+from bench.service.context import Context, ServiceContext
+from bench.service.problems import make_conflict, make_not_found
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
+from bench.service.routes.campaigns.photos import save_photo
+from bench.service.routes.campaigns.views import (
+    AnswerRequest,
+    CampaignPage,
+    CommandRequest,
+    EditRequest,
+    PlanCampaignRequest,
+    QueueView,
+    StartCampaignRequest,
+    StopCampaignRequest,
+    TestMessageResult,
+    make_summary,
+)
+
+router = APIRouter(tags=["campaigns"], route_class=IdempotentRoute)
+_EVENTS = 200
+"""Number of newest events in a view."""
+
+
+@router.get("/campaigns")
+def list_campaigns(
+    context: Context,
+    limit: Annotated[int, Query(ge=1, le=200, description="largest number of items")] = 50,
+    before: Annotated[str | None, Query(description="`next` of the previous page")] = None,
+) -> CampaignPage:
+    """List the campaigns, newest first."""
+    store = context.campaigns.store
+    if before is not None:
+        _get(store, before)
+    found = store.list_campaigns(limit + 1, before)
+    items = tuple(make_summary(campaign) for campaign in found[:limit])
+    return CampaignPage(items=items, next=items[-1].id if len(found) > limit else None)
+
+
+@router.post("/campaigns", status_code=201, dependencies=[IDEMPOTENT])
+async def start_campaign(request: StartCampaignRequest, context: Context, response: Response) -> CampaignView:
+    """Start a campaign on the bench; it continues after any crash. Refused if a condition can never be met."""
+    worker = await context.engine.describe_state()
+    return await asyncio.to_thread(_start, context, request, worker, response)
+
+
+def _start(
+    context: ServiceContext, request: StartCampaignRequest, worker: str, response: Response
+) -> CampaignView:
+    executor = context.campaigns
+    document = parse_campaign(request.campaign, "the request")
+    methods = collect_methods(document)
+    plan = plan_campaign(document, methods)
+    if not executor.is_local:
+        raise CampaignError("the agent writes its logs on another machine; campaigns need them in the data folder")
+    if held := executor.store.list_in_progress(AGENT_BENCH):
+        raise make_conflict(
+            "bench-held",
+            "The bench is held",
+            f"campaign {held[0].id} is in progress; stop it, or wait for its end",
+        )
+    steps = expand_campaign(document)
+    if needs_results(document, steps) and worker != "ok":
+        raise CampaignError(f"a condition of the campaign needs identifications, but there is no worker: {worker}")
+    if document.methods == "approved":
+        raise CampaignError("methods cannot be approved on this bench; use methods: any")
+    if plan.problems:
+        raise CampaignError(f"the campaign cannot be run: {plan.problems[0]}")
+    executor.bench.check_needs(document, steps)
+    campaign = executor.store.create(document, methods, AGENT_BENCH, time.time(), request.operator)
+    response.headers["Location"] = f"/api/v1/campaigns/{campaign.id}"
+    return _show(executor.store, campaign)
+
+
+@router.post("/campaigns/plan")
+def plan(request: PlanCampaignRequest, context: Context) -> CampaignPlan:
+    """Return the dry run of a campaign: time, heat, disk and limits; nothing is started."""
+    document = parse_campaign(request.campaign, "the request")
+    free = find_free_space(context.data).free - RESERVE
+    return plan_campaign(document, collect_methods(document), None, free)
+
+
+@router.get("/campaigns/{campaign_id}")
+def get_campaign(campaign_id: str, context: Context) -> CampaignView:
+    """Return a campaign with its queue, its cells, its trends and its newest events."""
+    return _show(context.campaigns.store, _get(context.campaigns.store, campaign_id))
+
+
+@router.patch("/campaigns/{campaign_id}")
+def edit_campaign(campaign_id: str, request: EditRequest, context: Context) -> CampaignView:
+    """Edit the queue of a campaign while it runs; the edit is recorded with who made it and when."""
+    methods = collect_step_methods(collect_edit_methods(request.edit))
+    stored = _get(context.campaigns.store, campaign_id)
+    for name, method in methods.items():
+        if stored.methods.get(name, method) != method:
+            raise CampaignError(f"the campaign has another method {name}; give yours a name of its own")
+    known = stored.methods | methods
+    return _change(
+        context, campaign_id, lambda state, now: apply_edit(state, request.edit, known, now, request.who), methods
+    )
+
+
+@router.post("/campaigns/{campaign_id}/pause")
+def pause_campaign(campaign_id: str, request: CommandRequest, context: Context) -> CampaignView:
+    """Pause at the next checkpoint of the run in progress, or at once between runs."""
+    return _change(context, campaign_id, lambda state, now: pause(state, now, request.who))
+
+
+@router.post("/campaigns/{campaign_id}/resume")
+def resume_campaign(campaign_id: str, request: CommandRequest, context: Context) -> CampaignView:
+    """Continue a paused campaign, an interrupted run after its checkpoint with the method's warm-up."""
+    return _change(context, campaign_id, lambda state, now: resume(state, now, request.who))
+
+
+@router.post("/campaigns/{campaign_id}/stop")
+def stop_campaign(campaign_id: str, request: StopCampaignRequest, context: Context) -> CampaignView:
+    """Stop after the run in progress; with `now`, that run is stopped in a controlled way, too."""
+    view = _change(context, campaign_id, lambda state, now: stop(state, now, request.who))
+    if request.now and view.bench == AGENT_BENCH and view.phase in ("starting", "stroking"):
+        context.monitor.send_command(StopCommand())
+    return view
+
+
+@router.post("/campaigns/{campaign_id}/answer")
+def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context) -> CampaignView:
+    """Answer a prompt with a note and a photo, or decide on a failed step."""
+    stored = _get(context.campaigns.store, campaign_id)
+    active = stored.state.active
+    photo = ""
+    if request.photo and active is not None and stored.state.needs_person:
+        photo = save_photo(context.data, f"{campaign_id}-{active.item}-photo", request.photo)
+    return _change(
+        context,
+        campaign_id,
+        lambda state, now: answer(state, now, request.who, request.note, photo, request.choice),
+    )
+
+
+@router.post("/campaigns/{campaign_id}/test-message")
+def send_test_message(campaign_id: str, context: Context) -> TestMessageResult:
+    """Send a test message to the recipients of a campaign."""
+    campaign = _get(context.campaigns.store, campaign_id).state.campaign
+    if not campaign.notify:
+        raise CampaignError(f"campaign {campaign.name} has no recipients; give it notify")
+    return TestMessageResult(result=send_all(campaign.notify, make_test_content(campaign.name)))
+
+
+@router.get("/queue")
+def get_queue(context: Context) -> QueueView:
+    """Return the campaign that holds the bench, with its queue."""
+    store = context.campaigns.store
+    held = store.list_in_progress(AGENT_BENCH)
+    return QueueView(campaign=_show(store, held[0]) if held else None)
+
+
+@router.patch("/queue")
+def edit_queue(request: EditRequest, context: Context) -> CampaignView:
+    """Edit the queue of the campaign that holds the bench."""
+    held = context.campaigns.store.list_in_progress(AGENT_BENCH)
+    if not held:
+        raise make_not_found("campaign", "in progress; start one: POST /api/v1/campaigns")
+    return edit_campaign(held[0].id, request, context)
+
+
+def _get(store: CampaignStore, campaign_id: str) -> StoredCampaign:
+    if store.table.get(campaign_id) is None:
+        raise make_not_found("campaign", campaign_id)
+    return store.get(campaign_id)
+
+
+def _show(store: CampaignStore, campaign: StoredCampaign) -> CampaignView:
+    return make_view(campaign, store.table.list_newest_events(campaign.id, _EVENTS))
+
+
+def _change(
+    context: ServiceContext,
+    campaign_id: str,
+    transition: Callable[[CampaignState, float], CampaignState],
+    methods: Methods | None = None,
+) -> CampaignView:
+    """Change a stored campaign; its executor acts on it at its next step."""
+    store = context.campaigns.store
+    now = max(time.time(), _get(store, campaign_id).state.updated)
+    return _show(store, store.update(campaign_id, lambda state: transition(state, now), methods))

@@ -1,0 +1,100 @@
+"""Routes that list, return and store methods."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+
+from bench.catalogue import SHIPPED_VERSION, MethodRow
+from bench.methods import Method, compile_method, list_shipped_methods, load_method
+from bench.service.context import Context, ServiceContext
+from bench.service.requests import IDEMPOTENT, IdempotentRoute
+from bench.service.routes.planning.method_library import StoredMethod, describe_facts, find_method, list_methods
+from bench.service.routes.planning.views import MethodPage, MethodSummary
+
+router = APIRouter(prefix="/methods", tags=["methods"], route_class=IdempotentRoute)
+_SAME: dict[int | str, dict[str, Any]] = {
+    200: {"description": "a version with this content is stored, and is returned", "model": MethodSummary}
+}
+_DRIVE_WORDS = {"coil_v": "coil voltage", "coil_a": "coil current", "driver_command_v": "command of a driver"}
+
+
+@router.get("")
+def list_all_methods(
+    context: Context,
+    limit: Annotated[int, Query(ge=1, le=500, description="largest number of items")] = 200,
+    before: Annotated[str | None, Query(description="`next` of the previous page")] = None,
+) -> MethodPage:
+    """List the newest version of each method, in the order of the names; unusable ones say why."""
+    drive_kind = _find_drive_kind(context)
+    found = [one for one in list_methods(context) if before is None or one.method.name > before]
+    items = tuple(_summarise(one, drive_kind) for one in found[:limit])
+    return MethodPage(items=items, next=items[-1].name if len(found) > limit else None)
+
+
+@router.post("", status_code=201, responses=_SAME, dependencies=[IDEMPOTENT])
+def store_method(method: Method, context: Context, response: Response) -> MethodSummary:
+    """Store a method as the next version of its name; versions never change, and included ones stay version 1.
+
+    201: a new version. 200: the name has a version of equal content.
+    """
+    compile_method(method)  # a method that exceeds its own limits is refused
+    stored, is_new = _store(context, method)
+    if not is_new:
+        response.status_code = 200
+    response.headers["Location"] = f"/api/v1/methods/{method.name}/{stored.version}"
+    return _summarise(stored, _find_drive_kind(context))
+
+
+def _store(context: ServiceContext, method: Method) -> tuple[StoredMethod, bool]:
+    sha256, is_shipped = method.compute_sha256(), method.name in list_shipped_methods()
+    if is_shipped and load_method(method.name).compute_sha256() == sha256:
+        return StoredMethod(method, SHIPPED_VERSION, None), False
+    document = method.model_dump(mode="json", by_alias=True, exclude_defaults=True)
+    row = MethodRow(name=method.name, version=0, sha256=sha256, document=document, created=datetime.now(UTC))
+    stored, is_new = context.catalogue.methods.add(row, SHIPPED_VERSION + is_shipped)
+    return StoredMethod(method, stored.version, stored.created), is_new
+
+
+@router.get("/{name}", response_model_exclude_defaults=True)
+def get_method(name: str, context: Context) -> Method:
+    """Return the document of the newest version of a method."""
+    return find_method(context, name).method
+
+
+@router.get("/{name}/{version:int}", response_model_exclude_defaults=True)
+def get_method_version(name: str, version: int, context: Context) -> Method:
+    """Return the document of a version of a method."""
+    return find_method(context, name, version).method
+
+
+def _find_drive_kind(context: ServiceContext) -> str:
+    """Return the drive of this bench; empty if no bench answers."""
+    status = context.monitor.latest_status
+    return "" if status is None else status.drive_kind
+
+
+def _summarise(one: StoredMethod, drive_kind: str) -> MethodSummary:
+    facts, method = describe_facts(one.method), one.method
+    obstacle = describe_drive_obstacle(method, drive_kind)
+    return MethodSummary(
+        name=method.name,
+        version=one.version,
+        sha256=facts.sha256,
+        source="included" if one.created is None else "stored",
+        created=one.created,
+        title=method.title,
+        duration_s=facts.duration,
+        drive_kind=method.drive_kind,
+        checkpoints=facts.checkpoints,
+        usable=not obstacle,
+        obstacle=obstacle,
+    )
+
+
+def describe_drive_obstacle(method: Method, drive_kind: str) -> str:
+    """Return why a bench with a drive cannot run a method; empty if it can, or if the drive is not known."""
+    if not drive_kind or drive_kind == method.drive_kind:
+        return ""
+    own, other = _DRIVE_WORDS[method.drive_kind], _DRIVE_WORDS.get(drive_kind, drive_kind)
+    return f"the method sets the {own}, this bench the {other}"

@@ -1,0 +1,8 @@
+"""A campaign on the simulated plant whose process is killed: every finished run once, nothing lost."""
+
+from tests.support import killed_campaign
+
+
+def test_a_campaign_survives_kills_at_random_moments(tmp_path):
+    assert killed_campaign.kill_at_random(tmp_path, 3, seed=5) == 3
+    killed_campaign.check(tmp_path)

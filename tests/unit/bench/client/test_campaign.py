@@ -1,0 +1,23 @@
+"""Campaigns of a script, on a service with a rig agent under the control of the test."""
+
+import pytest
+
+from bench.client import ClientError
+
+REST = {"rest": {"seconds": 900}}
+PROMPT = {"prompt": {"text": "Mount the specimen", "note": True}}
+
+
+def test_a_script_starts_edits_answers_and_stops_a_campaign(bench):
+    campaign = bench.start_campaign({"name": "night", "steps": [PROMPT, REST]}, "M. Curie")
+    assert campaign.wait(20)["question"]["text"] == "Mount the specimen"
+    with pytest.raises(ClientError, match="needs a note"):
+        campaign.answer()
+    campaign.answer("12 N m", who="B")
+    assert campaign.edit({"edit": "add", "steps": [REST]}, "B")["items"][2]["state"] == "pending"
+    assert campaign.pause("B")["status"] == "paused"
+    assert campaign.resume("B")["status"] == "running"
+    assert campaign.stop("B")["status"] == "stopped"
+    assert [one["id"] for one in bench.list_campaigns()] == [campaign.id]
+    with pytest.raises(ClientError, match="at least one step"):
+        bench.start_campaign({"name": "night", "steps": []})

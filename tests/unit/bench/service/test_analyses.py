@@ -1,0 +1,121 @@
+"""Comparisons, predictions and series by the REST interface."""
+
+import json
+
+import numpy as np
+import pytest
+
+from tests.support.cyclic_logs import write_cyclic_log
+from tests.support.reports import fit_document, prediction
+
+API = "/api/v1"
+
+
+@pytest.fixture
+def service(service):
+    """Return a service with two recorded runs."""
+    for name, gain in (("a", 1.0), ("b", 1.3)):
+        write_cyclic_log(service.data / f"{name}.mcap", name, gain=gain)
+    service.scan()
+    return service
+
+
+def write_series(folder, width=5.0):
+    time = np.arange(2000) / 500.0
+    force = np.sin(time)
+    info = np.array(json.dumps({"stretches": ["quick"], "drive_unit": "V"}))
+    columns = dict.fromkeys(("displacement", "velocity", "drive", "force"), force)
+    band = {"lower": force - width, "upper": force + width}
+    held_out = np.zeros(2000, bool)
+    np.savez(
+        folder / "series.npz", time=time, info=info, held_out=held_out, simulated=force + 2.0, **columns, **band
+    )
+
+
+def identify(service, run):
+    """Complete the identification of a run, and return its job."""
+    (job,) = service.get(f"/runs/{run}")["jobs"][:1]
+    service.complete(job, {"rmse_n": 2.0, "noise_floor_n": 1.9}, {"fit.json": json.dumps(fit_document())})
+    return job
+
+
+def get_folder(service, job):
+    return service.data / service.client.app.state.context.catalogue.get_job(job["id"]).result
+
+
+def test_two_runs_are_compared_at_an_address_and_by_a_request(service):
+    found = service.get("/comparisons?run=a&run=b&reference=a&tolerance_percent=5")
+    assert [run["run"] for run in found["runs"]] == ["a", "b"]
+    assert [stroke["name"] for stroke in found["strokes"]] == ["0.1V", "0.3V"]
+    assert {verdict["result"] for verdict in found["verdicts"]} == {"fail"}
+    body = {"runs": ["a", "b"], "reference": "a", "tolerance_percent": 5}
+    assert service.post("/comparisons", body) == found
+
+
+def test_the_band_contains_the_uncertainty_of_the_fit(service):
+    job = identify(service, "a")
+    write_series(get_folder(service, job), width=500.0)
+    found = service.get("/comparisons?run=a&run=b&reference=a&tolerance_percent=5")
+    assert found["runs"][0]["fit"] == job["id"]
+    assert found["strokes"][0]["band"]["model_uncertainty_n"] == pytest.approx(500.0)
+    assert {verdict["result"] for verdict in found["verdicts"]} == {"pass"}
+
+
+@pytest.mark.parametrize(
+    ("query", "status", "message"),
+    [
+        ("run=a", 422, "run"),
+        ("run=a&run=a", 422, "named twice"),
+        ("run=a&run=b&reference=c", 422, "c is not among the runs"),
+        ("run=a&run=b&tolerance_percent=0", 422, "tolerance_percent"),
+        ("run=a&run=c", 404, "there is no run c"),
+    ],
+)
+def test_a_wrong_comparison_is_refused(service, query, status, message):
+    answer = service.client.get(f"{API}/comparisons?{query}")
+    assert answer.status_code == status
+    assert message in answer.json()["detail"]
+
+
+def test_the_series_of_a_fit_has_the_error_of_each_segment(service):
+    job = identify(service, "a")
+    write_series(get_folder(service, job))
+    found = service.get(f"/fits/{job['id']}/series?points=50")
+    assert (found["run"], found["samples"], found["decimated"]) == ("a", 2000, True)
+    assert [error["segment"] for error in found["errors"]] == ["0.1V", "0.3V"]
+    assert [error["rmse_n"] for error in found["errors"]] == [pytest.approx(2.0)] * 2
+    whole = service.get(f"/fits/{job['id']}/series?from=1&to=1.5&points=0")
+    assert (whole["time"][0], whole["time"][-1], len(whole["time"])) == (1.0, 1.5, 251)
+    assert set(whole["values"]) >= {"force", "simulated", "displacement", "velocity", "lower", "upper"}
+
+
+def test_a_fit_without_series_says_what_to_do(service):
+    job = identify(service, "a")
+    answer = service.client.get(f"{API}/fits/{job['id']}/series")
+    assert answer.status_code == 404
+    assert "/runs/a/predict" in answer.json()["detail"]
+
+
+def test_a_fit_is_predicted_on_another_run(service):
+    model = identify(service, "a")
+    job = service.post("/runs/b/predict", {"model": model["id"]}, 201)
+    assert (job["kind"], job["run"]) == ("predict", "b")
+    spec = (
+        service.wait_for("/jobs", lambda page: job["id"] in service.engine.specs)
+        and service.engine.specs[job["id"]]
+    )
+    assert spec.model.endswith("fit.json")
+    document = prediction().model_dump_json(by_alias=True)
+    service.complete(job, {"rmse_n": 2.0, "noise_floor_n": 1.9, "bias_n": 0.1}, {"prediction.json": document})
+    assert service.get(f"/predictions/{job['id']}")["rmse_n"] == 2.0
+    write_series(get_folder(service, job))
+    assert service.get(f"/predictions/{job['id']}/series?points=10")["run"] == "b"
+    assert service.get(f"/jobs/{job['id']}")["rmse_n"] == 2.0
+    assert "prediction" in {file["kind"] for file in service.get("/runs/b/files")["items"]}
+    assert service.client.get(f"{API}/fits/{job['id']}/series").status_code == 404
+
+
+def test_a_prediction_of_an_unknown_model_is_refused(service):
+    answer = service.client.post(f"{API}/runs/b/predict", json={"model": "nothing"})
+    assert answer.status_code == 409
+    assert "there is no fit or diagnosis nothing" in answer.json()["detail"]

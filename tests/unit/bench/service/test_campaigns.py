@@ -1,0 +1,171 @@
+"""Campaigns by the REST interface, executed on a rig agent under the control of the test."""
+
+import base64
+import time
+
+import pytest
+
+from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
+from bench.campaigns import parse_campaign
+from tests.support.service_logs import write_complete_log
+
+RUN = {"run": {"specimen": "MR-1", "method": "quick"}}
+PROMPT = {"prompt": {"text": "Mount the next specimen", "note": True, "photo": True}}
+COOL = {"rest": {"until_temperature_c": 25}}
+PHOTO = base64.b64encode(b"\xff\xd8\xff\xe0 a photo").decode()
+
+
+@pytest.fixture(autouse=True)
+def fast(monkeypatch):
+    monkeypatch.setattr("bench.service.campaigns.executor.PERIOD", 0.02)
+
+
+def start(service, steps, status=201, **more):
+    body = {"campaign": {"name": "night", "steps": steps, **more}, "operator": "M. Curie"}
+    return service.post("/campaigns", body, status)
+
+
+def wait(service, campaign, wanted):
+    return service.wait_for(f"/campaigns/{campaign['id']}", wanted)
+
+
+def finish(service, outcome="clean", ending="completed"):
+    """End the run of the agent, with its log."""
+    run = service.agent.status.run
+    write_complete_log(service.data / run.log.rpartition("/")[2], run.id, outcome)
+    service.agent.finish(outcome, ending=ending)
+
+
+def wait_for_command(service, kind, number=1):
+    deadline = time.monotonic() + 20
+    while len(found := [one for one in service.agent.commands if isinstance(one, kind)]) < number:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return found[number - 1]
+
+
+def test_a_campaign_is_executed_answered_and_listed(service):
+    campaign = start(service, [RUN, PROMPT, RUN])
+    command = wait_for_command(service, RunCommand)
+    assert (command.specimen, command.operator) == ("MR-1", "M. Curie")
+    wait(service, campaign, lambda found: found["phase"] == "stroking")
+    assert service.get("/queue")["campaign"]["id"] == campaign["id"]
+    finish(service)
+    asked = wait(service, campaign, lambda found: found["question"])
+    assert asked["question"]["text"] == "Mount the next specimen"
+    path = f"/campaigns/{campaign['id']}/answer"
+    assert "needs a note" in service.post(path, {"photo": PHOTO}, 409)["detail"]
+    assert "neither JPEG nor PNG" in service.post(path, {"note": "x", "photo": "AAAA"}, 409)["detail"]
+    answered = service.post(path, {"who": "B", "note": "12 N m", "photo": PHOTO})
+    assert answered["items"][1]["note"] == "12 N m"
+    assert (service.data / answered["items"][1]["photo"]).read_bytes().startswith(b"\xff\xd8\xff")
+    wait_for_command(service, RunCommand, 2)
+    finish(service)
+    ended = wait(service, campaign, lambda found: found["status"] == "done")
+    assert [item["state"] for item in ended["items"]] == ["done"] * 3
+    assert ended["cells"][0]["runs"] == ["run-1", "run-2"]
+    assert any(event["who"] == "B" for event in ended["events"])
+    listed = service.get("/campaigns")["items"]
+    assert [(one["id"], one["done"]) for one in listed] == [(campaign["id"], 3)]
+    assert service.get("/queue") == {"campaign": None}
+
+
+def test_a_pause_ends_the_run_at_its_checkpoint_and_the_rest_is_continued(service):
+    campaign = start(service, [RUN])
+    wait(service, campaign, lambda found: found["phase"] == "stroking")
+    path = f"/campaigns/{campaign['id']}"
+    assert service.post(f"{path}/pause", {"who": "B"})["status"] == "pausing"
+    wait_for_command(service, PauseCommand)
+    finish(service, "incomplete", "stopped")
+    wait(service, campaign, lambda found: found["status"] == "paused")
+    service.post(f"{path}/resume", {"who": "B"})
+    assert wait_for_command(service, RunCommand, 2).continues == "run-1"
+    service.post(f"{path}/stop", {"who": "B"})
+    finish(service)
+    stopped = wait(service, campaign, lambda found: found["status"] == "stopped")
+    assert stopped["items"][0]["parts"] == ["run-1"]
+
+
+def test_a_restarted_service_continues_and_repeats_no_finished_run(service):
+    campaign = start(service, [RUN, RUN])
+    wait(service, campaign, lambda found: found["phase"] == "stroking")
+    service.end()
+    finish(service)
+    service.start()
+    wait_for_command(service, RunCommand, 2)
+    finish(service)
+    done = wait(service, campaign, lambda found: found["status"] == "done")
+    assert [item["runs"] for item in done["items"]] == [["run-1"], ["run-2"]]
+
+
+def test_the_queue_is_edited_while_a_run_is_in_progress(service):
+    campaign = start(service, [RUN, RUN])
+    wait(service, campaign, lambda found: found["phase"] == "stroking")
+    path = f"/api/v1/campaigns/{campaign['id']}"
+
+    def edit(status, address=path, **given):
+        answer = service.client.patch(address, json={"who": "B", "edit": given})
+        assert answer.status_code == status, answer.text
+        return answer.json()
+
+    added = edit(200, edit="add", steps=[{"rest": {"seconds": 5}}], before="s0002")
+    assert [item["id"] for item in added["items"]] == ["s0001", "s0003", "s0002"]
+    assert "between two runs" in edit(409, edit="do_now", step={"rest": {"seconds": 5}})["detail"]
+    assert "s0001 is active" in edit(409, edit="delete", item="s0001")["detail"]
+    deleted = edit(200, "/api/v1/queue", edit="delete", item="s0002")
+    assert deleted["items"][2]["state"] == "skipped"
+    edit(422, edit="hope")
+    assert service.post("/campaigns", {"campaign": {"name": "b", "steps": [RUN]}}, 409)["type"].endswith("held")
+
+
+@pytest.mark.parametrize(
+    ("steps", "more", "status", "reason"),
+    [
+        ([], {}, 422, "at least one step"),
+        ([{"run": {"specimen": "a", "method": "nonsense"}}], {}, 422, "there is no method nonsense"),
+        ([COOL, RUN], {}, 409, "no thermometer"),
+        ([RUN], {"methods": "approved"}, 409, "methods: any"),
+    ],
+)
+def test_a_campaign_that_cannot_be_met_is_refused_at_the_start(service, steps, more, status, reason):
+    assert reason in start(service, steps, status, **more)["detail"]
+    assert service.get("/campaigns")["items"] == []
+
+
+def test_a_condition_on_results_needs_a_worker(service):
+    service.engine.state = "no worker is connected"
+    repeat = {"repeat": {"step": RUN, "until": {"parameter": "k0", "ci_percent": 2}, "at_most": 3}}
+    assert "no worker is connected" in start(service, [repeat], 409)["detail"]
+
+
+def test_a_thermometer_makes_a_condition_on_the_temperature_possible(service):
+    one = InstrumentStatus(
+        name="thermometer", driver="thermometer", address="", connected=True, received=1, lost=0, corrupted=0,
+        resynchronised=0, age_s=0.1, clock_error_bound_s=None, message="",
+    )  # fmt: skip
+    service.agent.status = service.agent.status.model_copy(update={"instruments": (one,)})
+    campaign = start(service, [COOL])
+    wait(service, campaign, lambda found: found["phase"] == "resting")
+    assert service.post(f"/campaigns/{campaign['id']}/stop", {})["status"] == "stopped"
+
+
+def test_a_plan_starts_nothing(service):
+    plan = service.post("/campaigns/plan", {"campaign": {"name": "night", "steps": [RUN, RUN]}})
+    assert plan["stroking_s"] == pytest.approx(46.2)
+    assert service.get("/campaigns")["items"] == []
+
+
+def test_unknown_campaigns_and_missing_recipients_are_told(service):
+    assert service.client.get("/api/v1/campaigns/none").status_code == 404
+    service.post("/campaigns/none/pause", {}, 404)
+    assert service.client.get("/api/v1/campaigns?before=none").status_code == 404
+    campaign = start(service, [{"rest": {"seconds": 500}}])
+    assert "no recipients" in service.post(f"/campaigns/{campaign['id']}/test-message", {}, 409)["detail"]
+
+
+def test_a_campaign_from_the_command_line_that_cannot_be_met_ends_with_the_reason(service):
+    document = parse_campaign({"name": "night", "steps": [COOL]}, "the test")
+    store = service.client.app.state.context.campaigns.store
+    campaign = store.create(document, {}, "agent", time.time())
+    ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
+    assert "no thermometer" in ended["reason"]

@@ -155,7 +155,7 @@ def check_results(service, data):
     assert run["rmse_n"] < 2 * run["noise_floor_n"]
     assert service.call(f"runs/{run['id']}/fit")["schema"] == "mrbench.fit/1"
     (results,) = data.glob("*.fit-*")
-    assert sorted(path.name for path in results.iterdir()) == ["fit.json", "report.html"]
+    assert sorted(path.name for path in results.iterdir()) == ["fit.json", "report.html", "series.npz"]
     assert not list(data.glob(".*.fit-*")), "the folder of an attempt still exists"
 
 

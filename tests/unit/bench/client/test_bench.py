@@ -118,5 +118,7 @@ def test_files_are_downloaded(service, bench, tmp_path):
     target.mkdir()
     copy = await_run(bench, "one").download_log(target / "copy.mcap")
     assert copy.read_bytes() == log.read_bytes()
-    with pytest.raises(ClientError, match="there is no fit of run one"):
-        bench.run("one").download_report(target / "report.html")
+    report = bench.run("one").download_report(target / "report.html")
+    assert report.read_text().startswith("<!doctype html>")
+    with pytest.raises(ClientError, match="there is no run two"):
+        bench.run("two").download_report(target / "none.html")

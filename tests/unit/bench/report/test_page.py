@@ -55,7 +55,7 @@ def log(tmp_path_factory):
 def made(log):
     """The report of a log with the fit made from it."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page, "predict", lambda fit, log: (prediction(), series(held_out=True)))
+        patch.setattr(page, "predict", lambda fit, log, series_path: (prediction(), series(held_out=True)))
         sha256 = hashlib.sha256(log.read_bytes()).hexdigest()
         return page.gather(log, write_fit(log.with_name("fit.json"), sha256))
 

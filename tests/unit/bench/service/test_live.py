@@ -12,6 +12,7 @@ from bench.agent_protocol.messages import AgentEvent, RunCommand
 from bench.jobs.progress import JobProgress
 from bench.live import Channel, LiveBatch, decode_batch, parse_channels
 from bench.live.listener import MAX_QUEUED_BATCHES, MAX_UNACKNOWLEDGED
+from bench.methods import load_method
 from bench.service import run_registry
 from tests.support.service_logs import write_complete_log
 
@@ -191,7 +192,7 @@ def test_a_status_that_cannot_be_recorded_is_logged_and_tried_again(service, cap
         return await add_run(run)
 
     monkeypatch.setattr(registry, "_add_run", fail_once)
-    service.agent.send(RunCommand(method={"name": "quick"}))
+    service.agent.send(RunCommand(method=load_method("quick").model_dump(mode="json", by_alias=True)))
     service.agent.publish()
     wait_until(lambda: "runs_not_recorded" in caplog.text)
     service.agent.publish()

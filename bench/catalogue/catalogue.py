@@ -84,6 +84,12 @@ class Catalogue:
         with self._sessions() as session:
             return session.scalars(query).all()
 
+    def count_runs(self) -> dict[str, int]:
+        """Return the number of runs in each state that occurs."""
+        query = select(RunRow.state, func.count()).group_by(RunRow.state)
+        with self._sessions() as session:
+            return {state: int(count) for state, count in session.execute(query)}
+
     def find_method_version(self, name: str, sha256: str) -> int | None:
         """Return the version of a method with a content; None if that content is not known under its name."""
         if name in list_shipped_methods() and load_method(name).compute_sha256() == sha256:

@@ -134,6 +134,12 @@ class JobQueue:
         with self._sessions() as session:
             return {job_id: place for place, job_id in enumerate(session.scalars(query), 1)}
 
+    def count_states(self) -> dict[str, int]:
+        """Return the number of jobs in each state that occurs."""
+        query = select(JobRow.state, func.count()).group_by(JobRow.state)
+        with self._sessions() as session:
+            return {state: int(count) for state, count in session.execute(query)}
+
     def list_unfinished(self) -> Sequence[JobRow]:
         """Return queued and running jobs in the order in which they were queued."""
         order = func.coalesce(JobRow.queued, JobRow.created)

@@ -40,7 +40,7 @@ class Bench:
         Raises:
             ClientError: the service or its agent cannot be reached.
         """
-        return str(self._session.get("/agent")["state"])
+        return str(self._session.get("/bench")["state"])
 
     def list_methods(self) -> list[dict[str, Any]]:
         """Return the newest version of each method: name, version, title, duration and kind of drive.
@@ -132,7 +132,7 @@ class Bench:
         Raises:
             ClientError: the service or its agent cannot be reached.
         """
-        self._session.post("/agent/stop")
+        self._session.post("/bench/stop")
 
     def _iterate_runs(self, page_size: int, conditions: Mapping[str, str | float]) -> Iterator[RunState]:
         before = None

@@ -51,7 +51,7 @@ def record(
             return _run(api, method, progress)
         except UncleanRunError as error:
             on_retry(f"{error}; attempt {attempt + 1} of {_MAX_ATTEMPTS}")
-            api.post("/agent/reset", {})
+            api.post("/bench/reset", {})
     return _run(api, method, progress)
 
 

@@ -45,6 +45,11 @@ class LiveBroadcaster:
         finally:
             self._listeners.discard(listener)
 
+    @property
+    def count(self) -> int:
+        """Number of listeners."""
+        return len(self._listeners)
+
     def publish(self, topic: str, text: str, key: str = "") -> None:
         """Send a text from `serialise_message` to all listeners; called in the event loop."""
         if topic == "status":

@@ -11,6 +11,7 @@ from typing import Any
 from fastapi import Depends, FastAPI
 from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
+from prometheus_client import CollectorRegistry
 from pydantic import BaseModel
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
@@ -29,6 +30,7 @@ from bench.service.middleware import (
     BodyLimitMiddleware,
     HeadMiddleware,
     RequestLogMiddleware,
+    RequestMetricsMiddleware,
     SecurityHeadersMiddleware,
     TokenCheckMiddleware,
 )
@@ -84,6 +86,8 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)
     app.add_middleware(RequestLogMiddleware)
+    app.state.request_metrics = CollectorRegistry()
+    app.add_middleware(RequestMetricsMiddleware, registry=app.state.request_metrics)
     app.add_middleware(SecurityHeadersMiddleware, api="/api/")
     app.add_middleware(TrustedHostMiddleware, allowed_hosts=list(settings.hosts if settings else ("*",)))
     for router in PUBLIC_ROUTERS:

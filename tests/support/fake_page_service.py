@@ -218,20 +218,21 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     """Create the routes of agent and methods; ``silence`` exists for tests and disconnects the agent."""
     router = APIRouter()
 
-    @router.get("/agent")
+    @router.get("/bench")
     async def agent() -> Any:
         return problem(503, "The rig agent does not answer", SILENCE) if bench.silent else bench.status()
 
     @router.get("/health")
     async def health() -> Any:
-        return {"version": "0.1.0", "agent": SILENCE if bench.silent else "ok", "worker": "ok"}
+        agent = SILENCE if bench.silent else "ok"
+        return {"version": "0.1.0", "agent": agent, "worker": "ok", "disk": "ok", "queue": "empty", "clocks": "ok"}
 
-    @router.post("/agent/reset")
+    @router.post("/bench/reset")
     async def reset() -> Any:
         bench.state, bench.trip = "idle", ""
         return bench.status()
 
-    @router.post("/agent/stop")
+    @router.post("/bench/stop")
     async def stop() -> Any:
         bench.state, bench.trip, bench.run = "tripped", TRIP, None
         return bench.status()
@@ -241,7 +242,7 @@ def rig_routes(bench: FakeBench) -> APIRouter:
         bench.state, bench.trip, bench.run = "tripped", "aborted on request", None
         return bench.status()
 
-    @router.post("/agent/prepare")
+    @router.post("/bench/prepare")
     async def prepare(wanted: dict[str, Any]) -> Any:
         if wanted["step"] == "home" and bench.reference_state == "mounted":
             return problem(409, "Not possible", CLAMPED)

@@ -125,7 +125,7 @@ class Containers:
 
     def record(self):
         """Record a run and wait for its fit."""
-        until(lambda: self.call("agent")["state"] == "idle", DEADLINE)
+        until(lambda: self.call("bench")["state"] == "idle", DEADLINE)
         run_id = self.call("runs", json.dumps({"method": TINY}).encode())["id"]
         until(lambda: self.call(f"runs/{run_id}")["jobs"][:1] != [], DEADLINE)
         until(lambda: any(job["state"] == "done" for job in self.call(f"runs/{run_id}")["jobs"]), DEADLINE)

@@ -102,7 +102,7 @@ def test_in_a_text_field_escape_stops_and_space_types(seen, bench):
 @browser_test
 def test_reset_needs_confirmation(seen, bench):
     assert seen["stateAfterKeeping"] == "Tripped"
-    assert [path for path, _ in bench.posted].count("agent/reset") == 1
+    assert [path for path, _ in bench.posted].count("bench/reset") == 1
 
 
 @browser_test
@@ -114,7 +114,7 @@ def test_a_cancelled_job_stays_in_the_list_and_the_answer_is_shown(seen, bench):
 
 @browser_test
 def test_setup_steps_are_sent_to_the_agent_and_homing_needs_confirmation(seen, bench):
-    steps = [json.loads(body) for path, body in bench.posted if path == "agent/prepare"]
+    steps = [json.loads(body) for path, body in bench.posted if path == "bench/prepare"]
     assert steps == [
         {"step": "move", "position_m": pytest.approx(0.0125)},
         {"step": "mount", "position_m": 0},

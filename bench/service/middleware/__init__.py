@@ -1,8 +1,9 @@
-"""ASGI middleware: log of requests, check of the token, limit on bodies, headers for browsers, HEAD."""
+"""ASGI middleware: log and metrics of requests, check of the token, limit on bodies, headers, HEAD."""
 
 from bench.service.middleware.body_limit import MAX_BODY_SIZE, BodyLimitMiddleware
 from bench.service.middleware.head import HeadMiddleware
 from bench.service.middleware.request_log import RequestLogMiddleware
+from bench.service.middleware.request_metrics import RequestMetricsMiddleware
 from bench.service.middleware.security_headers import SecurityHeadersMiddleware
 from bench.service.middleware.token_check import TokenCheckMiddleware
 
@@ -11,6 +12,7 @@ __all__ = [
     "BodyLimitMiddleware",
     "HeadMiddleware",
     "RequestLogMiddleware",
+    "RequestMetricsMiddleware",
     "SecurityHeadersMiddleware",
     "TokenCheckMiddleware",
 ]

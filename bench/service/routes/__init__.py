@@ -3,25 +3,28 @@
 from bench.service.routes import (
     analyses,
     batches,
+    bench_control,
     campaigns,
     continuation,
     exchange,
+    health,
     integrity,
     jobs,
     live,
+    metrics,
     planning,
     recordings,
     results,
-    rig,
     run_files,
     runs,
 )
 from bench.service.routes.unknown_paths import refuse_unknown_paths
 
-PUBLIC_ROUTERS = (rig.public_router, live.router)
+PUBLIC_ROUTERS = (health.router, live.router)
 """Routers that need no token in the header; `live` checks its own."""
 PROTECTED_ROUTERS = (
-    rig.router,
+    bench_control.router,
+    metrics.router,
     *planning.ROUTERS,
     runs.router,
     continuation.router,

@@ -121,7 +121,7 @@ async function requestStatus() {
   requesting = true;
   requestedAt = performance.now();
   try {
-    HANDLERS.status(await get("agent"));
+    HANDLERS.status(await get("bench"));
   } catch (problem) {
     withoutRig = problem.hasNoRig;
     if (!problem.unauthorised) bar.showFailure(problem.after(withoutRig ? "No rig" : "Trying again"));

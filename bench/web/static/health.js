@@ -1,10 +1,9 @@
-// Health of the service in one strip: agent, worker, queue, clocks. Each entry is a word, with the reason of a fault.
+// Health of the service in one strip: agent, worker, queue, disk, wires, clocks. Each entry is a word, with the reason of a fault.
 
 import { get } from "./api.js";
 import { byId, element, shortTime } from "./format.js";
 
 const PERIOD_MS = 5_000;
-const UNFINISHED = ["queued", "running"];
 /** Error of a clock [s] above which it is marked; a sample lasts a millisecond. */
 const CLOCK_ERROR_S = 1e-3;
 
@@ -23,8 +22,8 @@ export class HealthStrip {
 
   async request() {
     try {
-      const [{ agent, worker }, { items }] = await Promise.all([get("health"), get("jobs?state=queued&state=running&limit=200")]);
-      this.show({ Agent: entry(agent), Worker: entry(worker), Queue: queue(items) });
+      const { agent, worker, queue, disk } = await get("health");
+      this.show({ Agent: entry(agent), Worker: entry(worker), Queue: { kind: "good", text: queue }, Disk: entry(disk) });
     } catch (problem) {
       this.show({ Service: { kind: "bad", text: problem.message } });
     }
@@ -53,8 +52,3 @@ export class HealthStrip {
 }
 
 const entry = (state) => (state === "ok" ? { kind: "good", text: "ready" } : { kind: "bad", text: state });
-
-function queue(jobs) {
-  const waiting = jobs.filter(({ state }) => UNFINISHED.includes(state)).length;
-  return { kind: "good", text: waiting ? `${waiting} ${waiting === 1 ? "job" : "jobs"}` : "empty" };
-}

@@ -60,7 +60,7 @@ export class Preparation {
   async execute(step) {
     try {
       const position = step === "move" ? byId("move-to").valueAsNumber / QUANTITIES.displacement.scale : 0;
-      this.update(await start("agent/prepare", { step, position_m: position }));
+      this.update(await start("bench/prepare", { step, position_m: position }));
     } catch (problem) {
       write(byId("prepare-note"), problem.after("Nothing was done"));
     }

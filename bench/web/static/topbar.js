@@ -141,9 +141,9 @@ export class TopBar {
     this.showDetail("Stop was sent.");
     try {
       // The latest status may be old: another page may have started something since.
-      if (this.stale && !this.moving) this.update(await get("agent", STOP_TIMEOUT_MS));
+      if (this.stale && !this.moving) this.update(await get("bench", STOP_TIMEOUT_MS));
       if (!this.moving) return this.showDetail("Nothing to stop: no run or setup step is in progress.");
-      const target = this.run ? `runs/${encodeURIComponent(this.run.id)}` : "agent";
+      const target = this.run ? `runs/${encodeURIComponent(this.run.id)}` : "bench";
       await post(`${target}/stop`, undefined, STOP_TIMEOUT_MS);
       if (this.state === "running") this.showDetail("Stop was accepted: the motion fades out.");
     } catch (problem) {
@@ -159,7 +159,7 @@ export class TopBar {
   async reset() {
     this.showDetail("Reset was sent.");
     try {
-      await post("agent/reset");
+      await post("bench/reset");
       this.showDetail("");
     } catch (problem) {
       this.showDetail(problem.after("Not reset"), true);

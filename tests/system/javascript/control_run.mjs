@@ -39,7 +39,7 @@ try {
   await page.click("#abort");
   await hasState("Tripped");
   seen.buttons.tripped = await visible();
-  await post("agent/reset");
+  await post("bench/reset");
   await hasState("Idle");
 
   await page.goto(`${url}/#/runs/run-3`);

@@ -85,7 +85,7 @@ async function reset() {
   await page.click("#reset-dialog button[value=cancel]");
   seen.stateAfterKeeping = await text("#state-word");
   await page.click("#reset");
-  const request = posted("/agent/reset");
+  const request = posted("/bench/reset");
   await page.click("#reset-dialog button[value=reset]");
   await request;
   await hasText("#state-word", "Idle");

@@ -157,7 +157,7 @@ async function trip() {
     };
   });
   await page.click("#plan-title"); // sound is allowed after a click
-  await fetch(`${url}/api/v1/agent/stop`, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
+  await fetch(`${url}/api/v1/bench/stop`, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
   await page.locator("#trip").waitFor();
   await until(() => window.tones >= 4);
   seen.trip = await page.locator("#trip").innerText();

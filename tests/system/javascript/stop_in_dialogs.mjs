@@ -37,7 +37,7 @@ async function isStopped(act) {
 
 async function stopIn(id, way) {
   const { state, open } = OPENING[id];
-  if (state === "Idle") await post("agent/reset");
+  if (state === "Idle") await post("bench/reset");
   await hasState(state);
   await open();
   await post("runs", { method: "quick", specimen: "MR-0042", operator: "another person" });
@@ -53,7 +53,7 @@ async function stopIn(id, way) {
 async function stopWhileTokenIsAsked() {
   await post("runs", { method: "quick", specimen: "MR-0042", operator: "another person" });
   await hasState("Running");
-  await page.route("**/api/v1/agent", (route) => route.fulfill({ status: 401, json: { title: "Not allowed", detail: "" } }));
+  await page.route("**/api/v1/bench", (route) => route.fulfill({ status: 401, json: { title: "Not allowed", detail: "" } }));
   await post("silence");
   await page.waitForFunction(() => document.getElementById("token-dialog").open);
   seen.stops["token-dialog Escape"] = [await isStopped(WAYS.Escape), await isOpen("token-dialog")];

@@ -9,7 +9,7 @@ from bench.agent_protocol import AgentStatus, BenchChannel, BenchLimit, Instrume
 from bench.service.context import Context
 from bench.service.views import View
 
-router = APIRouter(prefix="/bench", tags=["rig"])
+router = APIRouter(prefix="/bench", tags=["bench"])
 
 
 class Lease(View):

@@ -47,10 +47,10 @@ def session(server):
 
 
 def test_every_request_has_the_token(session, server):
-    assert session.get("/agent") == {"state": "idle"}
+    assert session.get("/bench") == {"state": "idle"}
     assert session.post("/runs", {"method": "quick"}, key="k1") == {"state": "idle"}
     assert [(verb, path) for verb, path, _ in server.requests] == [
-        ("GET", "/api/v1/agent"),
+        ("GET", "/api/v1/bench"),
         ("POST", "/api/v1/runs"),
     ]
     assert {headers["Authorization"] for _, _, headers in server.requests} == {"Bearer abc"}
@@ -59,7 +59,7 @@ def test_every_request_has_the_token(session, server):
 
 
 def test_the_token_may_be_part_of_the_address(server):
-    Session(f"http://127.0.0.1:{server.server_port}/#token=xyz").get("/agent")
+    Session(f"http://127.0.0.1:{server.server_port}/#token=xyz").get("/bench")
     assert server.requests[0][2]["Authorization"] == "Bearer xyz"
 
 
@@ -75,20 +75,20 @@ def test_a_query_omits_what_is_not_given(session, server):
 
 def test_a_refusal_by_another_server_at_the_address_is_an_error(session, server):
     server.reply = 502, b"<html>Bad Gateway</html>"
-    with pytest.raises(ClientError, match="refused /agent: HTTP 502") as error:
-        session.get("/agent")
+    with pytest.raises(ClientError, match="refused /bench: HTTP 502") as error:
+        session.get("/bench")
     assert (error.value.status, error.value.kind) == (502, "")
 
 
 def test_a_reply_that_is_not_json_is_an_error(session, server):
     server.reply = 200, b"<html>"
-    with pytest.raises(ClientError, match="the reply to /agent is not JSON"):
-        session.get("/agent")
+    with pytest.raises(ClientError, match="the reply to /bench is not JSON"):
+        session.get("/bench")
 
 
 def test_a_missing_service_is_an_error():
-    with pytest.raises(ClientError, match=r"http://127\.0\.0\.1:9/api/v1 does not reply to /agent"):
-        Session("http://127.0.0.1:9", "abc").get("/agent")
+    with pytest.raises(ClientError, match=r"http://127\.0\.0\.1:9/api/v1 does not reply to /bench"):
+        Session("http://127.0.0.1:9", "abc").get("/bench")
 
 
 def test_a_download_that_breaks_off_is_an_error(session, server, tmp_path):
@@ -114,5 +114,5 @@ def test_a_lost_answer_is_requested_once_more_with_the_same_key(session, server)
         session.post("/runs", {}, key="k1")
     assert [headers["Idempotency-Key"] for _, _, headers in server.requests] == ["k1", "k1"]
     with pytest.raises(ClientError, match="broke off"):
-        session.post("/agent/stop")
+        session.post("/bench/stop")
     assert len(server.requests) == 3

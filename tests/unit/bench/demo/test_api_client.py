@@ -46,9 +46,9 @@ def api(server):
 
 
 def test_the_token_of_the_address_is_sent_with_every_call(api, server):
-    assert api.get("/agent") == {"state": "idle"}
+    assert api.get("/bench") == {"state": "idle"}
     assert api.post("/runs", {"method": "quick"}) == {"state": "idle"}
-    assert server.requests == [("GET", "/api/v1/agent", "Bearer abc"), ("POST", "/api/v1/runs", "Bearer abc")]
+    assert server.requests == [("GET", "/api/v1/bench", "Bearer abc"), ("POST", "/api/v1/runs", "Bearer abc")]
     assert json.loads(server.posted) == {"method": "quick"}
 
 
@@ -60,13 +60,13 @@ def test_a_refusal_carries_the_message_of_the_service(api, server):
 
 def test_a_refusal_by_another_server_on_that_port_is_an_error(api, server):
     server.reply = 502, b"<html>Bad Gateway</html>"
-    with pytest.raises(RunError, match="refused /agent: HTTP 502"):
-        api.get("/agent")
+    with pytest.raises(RunError, match="refused /bench: HTTP 502"):
+        api.get("/bench")
 
 
 def test_a_missing_service_is_an_error():
-    with pytest.raises(RunError, match="does not reply to /agent"):
-        ApiClient("http://127.0.0.1:9/#token=abc").get("/agent")
+    with pytest.raises(RunError, match="does not reply to /bench"):
+        ApiClient("http://127.0.0.1:9/#token=abc").get("/bench")
 
 
 def test_a_file_is_downloaded(api, server, tmp_path):

@@ -31,7 +31,7 @@ def test_a_clean_run_is_not_repeated():
 def test_an_unclean_run_is_repeated_after_a_reset_with_its_reason():
     service, messages = Service("incomplete", "clean"), []
     assert record(service, "quick", lambda share: None, messages.append) == "run2"
-    assert service.posted == ["/runs", "/agent/reset", "/runs"]
+    assert service.posted == ["/runs", "/bench/reset", "/runs"]
     assert messages == [
         "the run of quick is incomplete: following error 10 mm exceeds the limit of 8 mm; attempt 2 of 3"
     ]

@@ -50,5 +50,5 @@ def test_an_unchanged_file_is_not_sent_again(client, log):
 
 
 def test_a_service_without_a_rig_says_so_and_does_not_fail(service):
-    answer = service.start(link=NoAgent()).get("/api/v1/agent")
+    answer = service.start(link=NoAgent()).get("/api/v1/bench")
     assert (answer.status_code, answer.json()["type"]) == (404, "urn:mrbench:problem:no-rig")

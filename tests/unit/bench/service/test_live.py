@@ -122,7 +122,7 @@ def test_changes_of_runs_and_jobs_are_published(service):
 
 def test_a_new_client_gets_the_status_at_once(service):
     service.agent.publish()
-    service.wait_for("/agent", lambda found: found["state"] == "idle")
+    service.wait_for("/bench", lambda found: found["state"] == "idle")
     with subscribe(service) as socket:
         service.agent.publish()
         next(messages(socket, "status"))
@@ -146,7 +146,7 @@ def test_a_status_that_waited_in_a_queue_is_not_the_present_one(service):
     service.agent.publish(service.agent.status.model_copy(update={"utc_s": time.time() - 3.0}))
     wait_until(lambda: monitor.latest_status is None)
     service.agent.reachable = False
-    assert service.client.get("/api/v1/agent").status_code == 503
+    assert service.client.get("/api/v1/bench").status_code == 503
 
 
 def test_the_service_sends_its_clock_at_once_and_repeatedly(service):

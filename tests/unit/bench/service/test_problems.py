@@ -73,9 +73,9 @@ def test_the_name_of_a_method_is_never_a_file(service, client):
 def test_a_silent_agent_is_a_problem_with_a_remedy(service, client):
     service.agent.reachable = False
     for answer in (
-        client.get("/api/v1/agent"),
-        client.get("/api/v1/instruments"),
-        client.post("/api/v1/agent/reset"),
+        client.get("/api/v1/bench"),
+        client.get("/api/v1/bench/instruments"),
+        client.post("/api/v1/bench/reset"),
         client.post("/api/v1/runs", json={"method": "quick"}),
     ):
         assert "mrbench rig" in problem(answer, 503, "agent-unreachable")
@@ -89,7 +89,7 @@ def test_a_refusal_contains_the_message_of_the_agent(service, client):
 
 def test_an_internal_error_shows_no_internals(service, client):
     service.agent.defect = ZeroDivisionError("secret /root/path")
-    detail = problem(client.get("/api/v1/agent"), 500, "defect")
+    detail = problem(client.get("/api/v1/bench"), 500, "defect")
     assert "secret" not in detail
     assert "Zero" not in detail
 
@@ -99,4 +99,4 @@ def test_an_unknown_query_parameter_is_refused_and_the_known_ones_are_named(clie
     assert "specimen_name" in detail
     assert "before, " in detail
     assert "limit" in detail
-    assert "has none" in problem(client.get("/api/v1/instruments?limit=1"), 422, "invalid-request")
+    assert "has none" in problem(client.get("/api/v1/bench/instruments?limit=1"), 422, "invalid-request")

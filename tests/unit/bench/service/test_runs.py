@@ -408,12 +408,12 @@ def test_unfinished_jobs_are_submitted_again_under_their_key(service):
 
 
 def test_a_move_without_a_target_is_refused_and_not_sent(service):
-    answer = service.client.post("/api/v1/agent/prepare", json={"step": "move"})
+    answer = service.client.post("/api/v1/bench/prepare", json={"step": "move"})
     assert answer.status_code == 422
     assert "move needs position_m" in answer.json()["detail"]
     assert service.agent.commands == []
-    service.post("/agent/prepare", {"step": "move", "position_m": 0.0})
-    service.post("/agent/prepare", {"step": "tare"})
+    service.post("/bench/prepare", {"step": "move", "position_m": 0.0})
+    service.post("/bench/prepare", {"step": "tare"})
     assert [(one.step, one.position_m) for one in service.agent.commands] == [("move", 0.0), ("tare", None)]
 
 

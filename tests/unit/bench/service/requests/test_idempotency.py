@@ -45,7 +45,7 @@ def test_another_body_or_path_with_the_same_key_is_refused_with_a_sentence(servi
     other = post(service, "/runs", {**BODY, "specimen": "damper 8"}, "key-1", 422).json()
     assert other["type"] == "urn:mrbench:problem:idempotency-key-refused"
     assert "another body" in other["detail"]
-    elsewhere = post(service, "/agent/prepare", {"step": "tare"}, "key-1", 422).json()
+    elsewhere = post(service, "/bench/prepare", {"step": "tare"}, "key-1", 422).json()
     assert "belongs to POST /api/v1/runs" in elsewhere["detail"]
     assert count_starts(service) == 1
 
@@ -123,7 +123,7 @@ def test_an_answer_that_cannot_be_stored_is_given_all_the_same(service, monkeypa
 def test_a_stop_takes_no_key_and_always_acts(service):
     post(service, "/runs", BODY, "key-1")
     for _ in range(2):
-        post(service, "/agent/stop", None, "key-2", 200)
+        post(service, "/bench/stop", None, "key-2", 200)
     assert [command.command for command in service.agent.commands].count("stop") == 2
 
 
@@ -133,8 +133,8 @@ def test_the_description_names_the_header_of_what_starts_something(service):
         path for path, verbs in paths.items() for one in verbs.get("post", {}).get("parameters", [])
         if one["name"] == "idempotency-key"
     }  # fmt: skip
-    assert {"/api/v1/runs", "/api/v1/runs/{run_id}/identify", "/api/v1/agent/prepare"} <= names
-    assert "/api/v1/agent/stop" not in names
+    assert {"/api/v1/runs", "/api/v1/runs/{run_id}/identify", "/api/v1/bench/prepare"} <= names
+    assert "/api/v1/bench/stop" not in names
 
 
 def test_keys_expire_after_a_day(service):

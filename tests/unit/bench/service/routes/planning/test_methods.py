@@ -51,7 +51,7 @@ def test_a_run_records_version_and_hash_so_that_methods_of_one_name_differ(servi
 
 def test_methods_for_another_drive_say_why_they_cannot_run(service):
     service.agent.status = service.agent.status.model_copy(update={"drive_kind": "coil_v"})
-    service.get("/agent")
+    service.get("/bench")
     listed = {one["name"]: one for one in service.get("/methods")["items"]}
     assert listed["quick"]["usable"]
     assert listed["six_currents"]["obstacle"] == "the method sets the coil current, this bench the coil voltage"

@@ -1,0 +1,59 @@
+"""Route of the health of the service: agent, worker, disk, queue and clocks, each in words."""
+
+import asyncio
+from importlib.metadata import version
+
+from fastapi import APIRouter
+
+from bench.agent_protocol import AgentStatus
+from bench.errors import BenchError
+from bench.service.context import Context, ServiceContext
+from bench.service.views import Health
+
+router = APIRouter(tags=["service"])
+MAX_CLOCK_ERROR = 1e-3
+"""[s] Bound of a clock's error above which it is reported: one sample at 1 kHz."""
+_MILLISECONDS = 1e3
+
+
+@router.get("/health")
+async def get_health(context: Context) -> Health:
+    """Return the state of agent, worker, disk, queue and clocks in words; needs no token."""
+    agent, worker, disk, queue = await asyncio.gather(
+        asyncio.to_thread(_describe_agent, context),
+        context.engine.describe_state(),
+        asyncio.to_thread(context.space_monitor.describe),
+        asyncio.to_thread(_describe_queue, context),
+    )
+    clocks = describe_clocks(context.monitor.latest_status)
+    return Health(
+        version=version("mrbench"), agent=agent, worker=worker, disk=disk or "ok", queue=queue, clocks=clocks
+    )
+
+
+def _describe_agent(context: ServiceContext) -> str:
+    try:
+        status = context.monitor.get_status()
+    except BenchError as error:
+        return str(error)
+    trip = f"tripped: {status.trip}" if status.state == "tripped" else ""
+    return "; ".join(filter(None, (trip, status.notice))) or "ok"
+
+
+def _describe_queue(context: ServiceContext) -> str:
+    counts = context.catalogue.job_queue.count_states()
+    running, waiting = counts.get("running", 0), counts.get("queued", 0)
+    return f"{running} running, {waiting} waiting" if running or waiting else "empty"
+
+
+def describe_clocks(status: AgentStatus | None) -> str:
+    """Return ``ok``, or the instruments whose clock is not known well enough, with the bound of its error."""
+    if status is None:
+        return "not known without a rig agent"
+    bounds = {one.name: one.clock_error_bound_s for one in status.instruments}
+    wrong = [
+        f"{name} within {bound * _MILLISECONDS:.2g} ms only"
+        for name, bound in bounds.items()
+        if bound is not None and bound > MAX_CLOCK_ERROR
+    ]
+    return "; ".join(wrong) or "ok"

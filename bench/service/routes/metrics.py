@@ -1,0 +1,106 @@
+"""Route of the metrics for Prometheus: bench, instruments, jobs, disk, listeners, and requests."""
+
+import asyncio
+from collections.abc import Iterator
+from typing import cast
+
+from fastapi import APIRouter, Request, Response
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Metric, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily
+from prometheus_client.registry import Collector
+
+from bench.agent_protocol import AgentStatus, InstrumentStatus
+from bench.disk import find_free_space
+from bench.errors import RunError
+from bench.service.context import Context, ServiceContext
+
+router = APIRouter(tags=["service"])
+
+
+@router.get("/metrics", response_class=Response)
+async def get_metrics(request: Request, context: Context) -> Response:
+    """Return the metrics in the text format of Prometheus."""
+    worker = await context.engine.describe_state()
+    state = CollectorRegistry(auto_describe=False)
+    state.register(ServiceCollector(context, has_worker=worker == "ok"))
+    requests = cast(CollectorRegistry, request.app.state.request_metrics)
+    text = await asyncio.to_thread(lambda: generate_latest(state) + generate_latest(requests))
+    return Response(text, media_type=CONTENT_TYPE_LATEST)
+
+
+class ServiceCollector(Collector):
+    """Metrics of the present state, read when they are collected."""
+
+    def __init__(self, context: ServiceContext, *, has_worker: bool) -> None:
+        self._context, self._has_worker = context, has_worker
+
+    def collect(self) -> Iterator[Metric]:
+        """Yield the metrics; those of instruments only while the agent is known."""
+        context, status = self._context, self._context.monitor.latest_status
+        yield _make_gauge("mrbench_agent_up", "1 if the status of the rig agent is known", status is not None)
+        yield _make_gauge("mrbench_worker_up", "1 if a worker is connected", self._has_worker)
+        yield _make_gauge("mrbench_live_listeners", "Websocket clients of live data", context.live.count)
+        yield from _collect_disk(context)
+        yield _make_counts("mrbench_jobs", "Jobs by state", context.catalogue.job_queue.count_states())
+        yield _make_counts("mrbench_runs", "Runs by state", context.catalogue.count_runs())
+        if status is not None:
+            yield from _collect_bench(status)
+
+
+def _collect_disk(context: ServiceContext) -> Iterator[Metric]:
+    try:
+        free = find_free_space(context.data).free
+    except RunError:  # without a value the metric is absent, which an alert can test
+        return
+    yield _make_gauge("mrbench_disk_free_bytes", "Free space of the data folder's disk", free)
+
+
+def _collect_bench(status: AgentStatus) -> Iterator[Metric]:
+    state = GaugeMetricFamily("mrbench_bench_state", "1 for the present state of the bench", labels=["state"])
+    state.add_metric([status.state], 1)
+    yield state
+    yield _make_gauge("mrbench_status_timestamp_seconds", "UTC at which the agent made its status", status.utc_s)
+    for name, text, read in _INSTRUMENT_GAUGES:
+        yield _add_instruments(GaugeMetricFamily(name, text, labels=["instrument"]), status, read)
+    for name, text, read in _INSTRUMENT_COUNTERS:
+        yield _add_instruments(CounterMetricFamily(name, text, labels=["instrument"]), status, read)
+
+
+_INSTRUMENT_GAUGES = (
+    ("mrbench_instrument_connected", "1 if the instrument answers", "connected"),
+    ("mrbench_instrument_age_seconds", "Time since the last valid frame", "age_s"),
+    ("mrbench_clock_error_bound_seconds", "95 % bound of the error of the clock", "clock_error_bound_s"),
+)
+_INSTRUMENT_COUNTERS = (
+    ("mrbench_frames_received", "Frames or replies received since the start of the agent", "received"),
+    ("mrbench_samples_lost", "Samples that were taken and never received", "lost"),
+    ("mrbench_frames_corrupted", "Discarded frames", "corrupted"),
+    ("mrbench_resynchronisations", "Searches for the start of a frame", "resynchronised"),
+)
+"""Name, explanation, and field of `InstrumentStatus`."""
+
+
+def _add_instruments(
+    family: GaugeMetricFamily | CounterMetricFamily, status: AgentStatus, field: str
+) -> GaugeMetricFamily | CounterMetricFamily:
+    for one in status.instruments:
+        value = _read(one, field)
+        if value is not None:
+            family.add_metric([one.name], value)
+    return family
+
+
+def _read(instrument: InstrumentStatus, field: str) -> float | None:
+    value = getattr(instrument, field)
+    return None if value is None else float(value)
+
+
+def _make_gauge(name: str, text: str, value: float) -> Metric:
+    return GaugeMetricFamily(name, text, value=float(value))
+
+
+def _make_counts(name: str, text: str, counts: dict[str, int]) -> Metric:
+    family = GaugeMetricFamily(name, text, labels=["state"])
+    for state, count in sorted(counts.items()):
+        family.add_metric([state], count)
+    return family

@@ -55,7 +55,8 @@ class Triangle(FrozenModel):
     @model_validator(mode="after")
     def _check_corners(self) -> Self:
         # At this acceleration each corner takes a whole half cycle.
-        needed = 32 * self.amplitude_m * self.frequency_hz**2
+        # A product becomes infinite where a power would raise an OverflowError.
+        needed = 32 * self.amplitude_m * self.frequency_hz * self.frequency_hz
         if self.corner_acceleration_mps2 < needed:
             raise ValueError(
                 f"corner_acceleration_mps2 {self.corner_acceleration_mps2:g} m/s² leaves no straight part of the "

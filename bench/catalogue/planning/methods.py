@@ -12,6 +12,8 @@ from bench.catalogue.models import Base, UtcTime
 
 SHIPPED_VERSION = 1
 """Version of a method that comes with mrbench."""
+MAX_VERSION = 2**31 - 1
+"""Largest integer of a column."""
 _ATTEMPTS = 20
 """Number of attempts to store a version while others store versions of the same name."""
 
@@ -74,6 +76,8 @@ class MethodStore:
 
     def get(self, name: str, version: int | None = None) -> MethodRow | None:
         """Return a version of a stored method, or its newest one; None if there is none."""
+        if version is not None and version > MAX_VERSION:
+            return None
         query = select(MethodRow).where(MethodRow.name == name).order_by(MethodRow.version.desc())
         if version is not None:
             query = query.where(MethodRow.version == version)

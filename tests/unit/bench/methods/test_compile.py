@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from bench.errors import MethodError
 from bench.methods import Method, Programme, compile_method, list_shipped_methods, load_method
@@ -175,6 +176,12 @@ def test_a_triangle_without_straight_parts_is_continuous():
         method({"motion": {**SINE, "kind": "triangle", "corner_acceleration_mps2": needed}, "cycles": 2})
     )
     assert np.abs(np.diff(programme.velocity)).max() < 1e-2
+
+
+def test_a_triangle_whose_acceleration_no_number_can_hold_is_refused():
+    motion = {**SINE, "kind": "triangle", "frequency_hz": 1e200, "corner_acceleration_mps2": 3}
+    with pytest.raises(ValidationError, match="need at least inf m/s²"):
+        method({"motion": motion, "cycles": 2})
 
 
 def test_a_ramp_goes_from_rest_to_rest_at_constant_velocity():

@@ -61,6 +61,10 @@ def test_every_included_method_has_a_checkpoint(service):
     assert all(one["checkpoints"] for one in service.get("/methods")["items"])
 
 
+def test_a_version_that_no_column_can_hold_is_not_found(service):
+    assert service.client.get(f"/api/v1/methods/quick/{2**70}").status_code == 404
+
+
 def test_a_version_can_be_started(service):
     service.post("/methods", make_document(name="mine"), 201)
     service.post("/methods", make_document(name="mine", title="Changed"), 201)

@@ -11,6 +11,7 @@ MODULES = {
     "logs": "speed.logs",
     "commands": "speed.commands",
     "catalogue": "speed.catalogue",
+    "rest_load": "speed.rest_load",
     "interval_coverage": "accuracy.interval_coverage",
     "soak": "speed.soak",
     "choices": "accuracy.design_choices",

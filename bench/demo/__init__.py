@@ -2,8 +2,10 @@
 
 from bench.demo.demo import Demo
 from bench.demo.folder import DemoFolder
+from bench.demo.processes import start_processes
 
 __all__ = [
     "Demo",
     "DemoFolder",
+    "start_processes",
 ]

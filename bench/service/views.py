@@ -36,6 +36,7 @@ class SetupRequest(View):
     step: SetupStep = Field(description="home, move, mount, centre, unmount, tare or clear-tare")
     position_m: float | None = Field(
         default=None,
+        strict=True,  # true and "1" are no positions
         description="target of `move` [m], from the specimen's middle, or from home; unused by other steps",
     )
 

@@ -32,9 +32,13 @@ class MethodFacts:
 
 def list_methods(context: ServiceContext) -> list[StoredMethod]:
     """Return the newest version of each method, in the order of the names."""
-    found = {name: StoredMethod(load_method(name), SHIPPED_VERSION, None) for name in list_shipped_methods()}
-    found |= {row.name: _read(row) for row in context.catalogue.methods.list_newest()}
+    found = _load_shipped_methods() | {row.name: _read(row) for row in context.catalogue.methods.list_newest()}
     return [found[name] for name in sorted(found)]
+
+
+@cache
+def _load_shipped_methods() -> dict[str, StoredMethod]:
+    return {name: StoredMethod(load_method(name), SHIPPED_VERSION, None) for name in list_shipped_methods()}
 
 
 def find_method(context: ServiceContext, name: str, version: int | None = None) -> StoredMethod:
@@ -46,8 +50,9 @@ def find_method(context: ServiceContext, name: str, version: int | None = None) 
     row = context.catalogue.methods.get(name, version)
     if row is not None:
         return _read(row)
-    if name in list_shipped_methods() and version in (None, SHIPPED_VERSION):
-        return StoredMethod(load_method(name), SHIPPED_VERSION, None)
+    shipped = _load_shipped_methods().get(name)
+    if shipped is not None and version in (None, SHIPPED_VERSION):
+        return shipped
     raise make_not_found("method", name if version is None else f"{name} of version {version}")
 
 

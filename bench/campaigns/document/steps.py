@@ -134,7 +134,7 @@ STEP_KINDS = ("run", "rest", "warm_up", "repeat", "next_stroke", "prompt")
 
 def get_step_kind(step: Any) -> str:
     """Return the kind of a step, or of the document of one; empty if it is neither."""
-    names = list(step) if isinstance(step, dict) else list(type(step).model_fields)
+    names = list(step) if isinstance(step, dict) else list(getattr(type(step), "model_fields", ()))
     return names[0] if len(names) == 1 and names[0] in STEP_KINDS else ""
 
 

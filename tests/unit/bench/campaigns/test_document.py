@@ -34,6 +34,7 @@ def campaign(steps, **more):
     [
         ({"steps": []}, "the document", "at least one step"),
         ({"steps": [{"rest": {}}]}, "steps.0.rest", "either seconds or until_temperature_c"),
+        ({"steps": [4.5]}, "steps.0", "exactly one of the keys run, rest"),
         ({"steps": [{"rust": {}}]}, "steps.0", "exactly one of the keys run, rest"),
         ({"steps": [{"warm_up": {"cycles": 3, "until_temperature_c": 30}}]}, "steps.0.warm_up", "either cycles"),
         ({"steps": [{"next_stroke": {"at_most": 2}}]}, "the document", "no run precedes it"),

@@ -12,6 +12,8 @@ MODULES = {
     "commands": "speed.commands",
     "catalogue": "speed.catalogue",
     "rest_load": "speed.rest_load",
+    "live_page": "live.page",
+    "dead_bench": "live.dead_bench",
     "interval_coverage": "accuracy.interval_coverage",
     "soak": "speed.soak",
     "choices": "accuracy.design_choices",

@@ -2,7 +2,7 @@
 
 import uPlot from "./vendor/uPlot.esm.js";
 import { element } from "./format.js";
-import { QUIET, axis, colour, signed } from "./plots.js";
+import { QUIET, axis, colour, signed } from "./plot_style.js";
 
 const HEIGHT = 170;
 

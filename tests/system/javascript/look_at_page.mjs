@@ -26,7 +26,7 @@ const openView = async (name) => {
   await page.click(`.views a[data-view=${name}]`);
   await page.locator(`#view-${name}`).waitFor();
 };
-const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas")].map((canvas) => canvas.toDataURL()));
+const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas.trace")].map((canvas) => canvas.toDataURL()));
 const posted = (path) => page.waitForRequest((request) => request.method() === "POST" && request.url().endsWith(path));
 
 async function letIn() {
@@ -43,7 +43,7 @@ async function watch() {
   await hasText("#readings", "−10.00 … 10.00"); // a complete stroke has arrived, in millimetres
   const before = await canvases();
   await until(
-    (old) => [...document.querySelectorAll("canvas")].every((canvas, k) => canvas.toDataURL() !== old[k]), before);
+    (old) => [...document.querySelectorAll("canvas.trace")].every((canvas, k) => canvas.toDataURL() !== old[k]), before);
   seen.canvases = before.length;
   seen.readings = await page.locator("#readings > div").allInnerTexts();
   seen.instruments = await page.locator("#instruments tr").allInnerTexts();

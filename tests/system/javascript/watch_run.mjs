@@ -13,12 +13,12 @@ page.on("pageerror", (error) => seen.errors.push(String(error)));
 const until = (check, argument, timeout) => page.waitForFunction(check, argument, timeout && { timeout });
 const hasText = (selector, words, timeout) =>
   until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words], timeout);
-const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas")].map((canvas) => canvas.toDataURL()));
+const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas.trace")].map((canvas) => canvas.toDataURL()));
 
 async function allMoved() {
   const before = await canvases();
   await until(
-    (old) => [...document.querySelectorAll("canvas")].every((canvas, k) => canvas.toDataURL() !== old[k]), before);
+    (old) => [...document.querySelectorAll("canvas.trace")].every((canvas, k) => canvas.toDataURL() !== old[k]), before);
   return before.length;
 }
 

@@ -40,12 +40,13 @@ check: $(READY)
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/pytest -q tests/contracts/test_packages.py
 
+# Tests of processes run in real time: what a busy machine has made late is repeated alone, and named at the end.
+AGAIN := --last-failed --last-failed-no-failures none
 unit: $(READY)
 	@rm -rf $(RESULTS) && mkdir -p $(RESULTS)
-	$(BIN)/pytest -n 2 --junitxml=$(RESULTS)/unit.xml $(TEST_OPTIONS)
+	$(BIN)/pytest -n 2 --junitxml=$(RESULTS)/unit_1.xml $(TEST_OPTIONS) || \
+		$(BIN)/pytest --junitxml=$(RESULTS)/unit_2.xml $(AGAIN) $(TEST_OPTIONS)
 
-# In real time: what a busy machine has made late is tried twice more, alone.
-AGAIN := --last-failed --last-failed-no-failures none
 wire: $(READY)
 	@mkdir -p $(RESULTS) && rm -f $(RESULTS)/wire*.xml
 	$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
@@ -54,7 +55,7 @@ wire: $(READY)
 
 test: check unit wire
 	@$(BIN)/pytest -m slow --collect-only > $(RESULTS)/slow.txt || true
-	@$(BIN)/python -m tests.summary $(RESULTS)/unit.xml $(RESULTS)/wire*.xml --deselected $(RESULTS)/slow.txt
+	@$(BIN)/python -m tests.summary $(RESULTS)/unit_*.xml $(RESULTS)/wire_*.xml --deselected $(RESULTS)/slow.txt
 
 coverage: $(READY)
 	$(BIN)/python -m benchmarks.quality.branch_coverage

@@ -1,7 +1,7 @@
 """One closing line for several test runs: ``python -m tests.summary RESULTS.xml... [--deselected FILE]``.
 
-Each file holds the results of one run in JUnit format. A test that ran in several of them (a wire test that was
-repeated alone) counts with its last result.
+Each file holds the results of one run in JUnit format. A test that ran in several of them counts with its last
+result. One that passed only when it was repeated alone is named, because it may depend on the load of the machine.
 """
 
 import argparse
@@ -17,11 +17,13 @@ def main() -> int:
     parser.add_argument("results", nargs="+", type=Path)
     parser.add_argument("--deselected", type=Path, help="test ids that the runs left out, one a line")
     options = parser.parse_args()
-    outcomes, seconds = read_outcomes(options.results)
+    outcomes, repeated, seconds = read_outcomes(options.results)
     left_out = read_deselected(options.deselected)
     if left_out:
         print("left out (run them with `pytest -m slow`):", *left_out, sep="\n  ")
     counts = Counter(outcomes.values())
+    if repeated:
+        print("passed only when repeated alone:", *repeated, sep="\n  ")
     bad = [name for name, outcome in sorted(outcomes.items()) if outcome != "passed"]
     if bad:
         print("not passed:", *(f"{name}: {outcomes[name]}" for name in bad), sep="\n  ")
@@ -30,16 +32,20 @@ def main() -> int:
     return int(bool(bad) or not outcomes)
 
 
-def read_outcomes(paths: list[Path]) -> tuple[dict[str, str], float]:
-    """Outcome of every test by its name, and the duration [s] of all runs together."""
+def read_outcomes(paths: list[Path]) -> tuple[dict[str, str], list[str], float]:
+    """Outcome of every test by its name, tests that passed only later, and the duration [s] of all runs."""
     outcomes: dict[str, str] = {}
+    repeated = []
     seconds = 0.0
     for path in paths:
         for suite in ElementTree.parse(path).iter("testsuite"):
             seconds += float(suite.get("time", 0.0))
             for case in suite.iter("testcase"):
-                outcomes[f"{case.get('classname')}::{case.get('name')}"] = outcome_of(case)
-    return outcomes, seconds
+                name, outcome = f"{case.get('classname')}::{case.get('name')}", outcome_of(case)
+                if outcome == "passed" and outcomes.get(name) == "failed":
+                    repeated.append(name)
+                outcomes[name] = outcome
+    return outcomes, repeated, seconds
 
 
 def outcome_of(case: ElementTree.Element) -> str:

@@ -19,17 +19,20 @@ def results(folder, name, *cases):
 def summarise(monkeypatch, capsys, *words):
     monkeypatch.setattr(sys, "argv", ["summary", *map(str, words)])
     code = summary.main()
-    return code, capsys.readouterr().out.splitlines()[-1]
+    return code, capsys.readouterr().out.splitlines()
 
 
 def test_the_last_result_of_a_repeated_test_counts(tmp_path, monkeypatch, capsys):
     first = results(tmp_path, "a.xml", ("one", ""), ("two", "failure"))
     again = results(tmp_path, "b.xml", ("two", ""))
     assert summarise(monkeypatch, capsys, first)[0] == 1
-    assert summarise(monkeypatch, capsys, first, again) == (
-        0,
+    code, lines = summarise(monkeypatch, capsys, first, again)
+    assert code == 0
+    assert lines == [
+        "passed only when repeated alone:",
+        "  tests.unit::two",
         "==== 0 failed, 2 passed, 0 skipped, 0 deselected in 3.00s ====",
-    )
+    ]
 
 
 @pytest.mark.parametrize("outcome", ["skipped", "error", "failure"])

@@ -65,7 +65,10 @@ def test_without_a_trend_the_parameters_of_the_fits_are_shown_and_it_is_requeste
 def test_the_trend_names_its_cause_and_the_quantity_that_changes_most(seen):
     assert seen["cause"] == EXPLANATION
     assert seen["chosen"] == "gas_spring.preload"
-    interval = r"Drift −5\.9\d* N per run, 95 % interval −6\.\d+ … −5\.\d+ N per run, constant up to run 4, linear from there\."
+    interval = (
+        r"Drift −5\.9\d* N per run, 95 % interval −6\.\d+ … −5\.\d+ N per run, constant up to run 4, "
+        r"linear from there\."
+    )
     assert re.fullmatch(interval, seen["drift"])
     preload = seen["changes"][0].split("\t")
     assert preload[:4] == ["gas spring, preload", "falling", "run 5", "−5.9\u00a0N per run"]

@@ -20,6 +20,7 @@ from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import compile_method, compute_envelope, load_method
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_recording import recording_routes
+from tests.support.fake_specimens import add_history, specimen_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
@@ -119,6 +120,7 @@ class FakeBench:
     def __init__(self) -> None:
         self.posted: list[tuple[str, Any]] = []
         self.searches: list[dict[str, str]] = []
+        self.outbox: list[dict[str, Any]] = []
         self.state = "idle"
         self.trip = ""
         self.run: dict[str, Any] | None = None
@@ -207,6 +209,7 @@ def application(bench: FakeBench) -> FastAPI:
         result_routes,
         upload_routes,
         live_routes,
+        specimen_routes,
     ):
         app.include_router(routes(bench), prefix="/api/v1")
     app.include_router(recording_routes(), prefix="/api/v1")
@@ -419,9 +422,12 @@ async def publish(socket: WebSocket, bench: FakeBench) -> None:
     if bench.last_status is not None:
         await socket.send_json({"topic": "status", "data": bench.last_status})
     sent = round((time.monotonic() - bench.began) * RATE)
-    turn = 0
+    turn, published = 0, len(bench.outbox)
     while not bench.over:
         turn += 1
+        for message in bench.outbox[published:]:
+            published += 1
+            await socket.send_json(message)
         if turn % 10 == 0:
             await socket.send_json({"topic": "clock", "data": {"utc_s": time.time()}})
         if not bench.silent:
@@ -450,7 +456,9 @@ def served(bench: FakeBench) -> Any:
 
 
 if __name__ == "__main__":
-    with served(FakeBench()) as address:
+    shown = FakeBench()
+    add_history(shown)
+    with served(shown) as address:
         sys.stdout.write(f"{address}/#token={TOKEN}\n")
         sys.stdout.flush()
         threading.Event().wait()

@@ -58,6 +58,15 @@ export function liveAddress() {
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
 
+/** Changes what carries an ETag; refused with status 412 if it was changed since that ETag was read. */
+export const patch = (path, body, etag) => call("PATCH", path, body, undefined, { "If-Match": etag });
+
+/** Returns `{ data, etag }`; the ETag is for a later `patch`. */
+export async function getTag(path) {
+  const response = await send("GET", path);
+  return { data: await response.json(), etag: response.headers.get("etag") };
+}
+
 /** Fetches recorded samples in binary batches; see `parseBatch`. */
 export async function samples(path) {
   const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);

@@ -20,6 +20,8 @@ import { RunView } from "./run.js";
 import { RunList } from "./runs.js";
 import { RunSearch } from "./run_search.js";
 import { ServiceClock } from "./service_clock.js";
+import { SpecimenView } from "./specimen.js";
+import { SpecimenList } from "./specimens.js";
 import { StartForm } from "./start.js";
 import { TopBar } from "./topbar.js";
 import { offerUnits } from "./units.js";
@@ -32,9 +34,14 @@ const REQUEST_EVERY = { fresh: 400, stale: 3_000 };
 
 const ring = new SampleRing(FIELDS);
 const runView = new RunView();
+const specimens = new SpecimenList();
+const specimen = new SpecimenView();
 const runs = new RunList({
   onSpecimens: (names) => form.suggestSpecimens(names),
-  onRun: (run) => runView.update(run),
+  onRun: (run) => {
+    runView.update(run);
+    specimen.update(run);
+  },
 });
 const search = new RunSearch();
 const form = new StartForm({
@@ -66,11 +73,14 @@ const router = new Router({
   plan: (address) => plan.show(address),
   runs: ({ query }) => runs.search(search.read(query)),
   run: (address) => runView.show(address),
+  specimens: (address) => specimens.show(address),
+  specimen: (address) => specimen.show(address),
 });
 
 offerUnits(() => {
   plots.relabel();
   plan.relabel();
+  specimen.relabel();
 });
 
 let requesting = false;
@@ -96,7 +106,10 @@ const HANDLERS = {
   },
   event: (event) => events.add(event),
   run: (run) => runs.update(run),
-  job: (job) => runs.updateJob(job),
+  job: (job) => {
+    runs.updateJob(job);
+    specimen.updateJob(job);
+  },
 };
 
 const link = new LiveLink({
@@ -106,6 +119,7 @@ const link = new LiveLink({
   onReopened: () => {
     withoutRig = false; // the service may have been started again with one
     runs.load(); // changes in the meantime were missed
+    specimen.reload();
   },
 });
 

@@ -33,9 +33,10 @@ export function makeParameterTable(fit) {
 
 const percent = (share) => (share === null ? "–" : `${significant(100 * share, 3)} %`);
 
-function table(title, heads, rows) {
+/** Table with a caption; the first cell of each row is its name. */
+export function table(title, heads, rows) {
   const row = ([first, ...others]) => element("tr", {},
-    element("th", { scope: "row" }, first), ...others.map((text) => element("td", { className: "number" }, text)));
+    element("th", { scope: "row" }, first), ...others.map((content) => element("td", { className: "number" }, content)));
   return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": title },
     element("table", {},
       element("caption", {}, title),

@@ -15,7 +15,7 @@ const FONT = "11px system-ui, 'Segoe UI', Roboto, sans-serif";
 
 export function axis(more) {
   return {
-    stroke: () => colour("--soft"), font: FONT, gap: 4,
+    stroke: () => colour("--soft"), font: FONT, labelFont: FONT, gap: 4,
     grid: { stroke: () => colour("--line"), width: 1 }, ticks: { show: false }, ...more,
   };
 }

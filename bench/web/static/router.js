@@ -1,13 +1,16 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`.
+// `#/runs/ID/replay`, `#/specimens/SERIAL`.
 
 import { byId } from "./format.js";
+
+/** Views of one thing, by the view of their list. */
+const SINGLE = { runs: "run", specimens: "specimen" };
 
 /** Returns view, id, part and query of an address; an unknown view is the bench. */
 export function parseAddress(hash) {
   const [path, search = ""] = hash.replace(/^#\/?/, "").split("?");
   const [first, id = "", part = ""] = path.split("/").map(decode);
-  const name = first === "runs" && id ? "run" : first;
+  const name = (id && SINGLE[first]) || first;
   const view = byId(`view-${name}`) ? name : "bench";
   return { view, id, part, query: new URLSearchParams(search) };
 }
@@ -23,6 +26,9 @@ function decode(text) {
 /** Address of a run, or of one of its parts. */
 export const runAddress = (id, part = "") => `#/runs/${encodeURIComponent(id)}${part && `/${part}`}`;
 
+/** Address of a specimen. */
+export const specimenAddress = (serial) => `#/specimens/${encodeURIComponent(serial)}`;
+
 /** Shows the view of the address, and follows its changes. */
 export class Router {
   /** Takes the functions that show a view with its address, by name. */
@@ -36,7 +42,7 @@ export class Router {
     const address = parseAddress(location.hash);
     for (const section of document.querySelectorAll(".view")) section.hidden = section.id !== `view-${address.view}`;
     for (const link of document.querySelectorAll(".views a")) {
-      const isHere = link.dataset.view === address.view || (link.dataset.view === "runs" && address.view === "run");
+      const isHere = [link.dataset.view, SINGLE[link.dataset.view]].includes(address.view);
       if (isHere) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");
     }

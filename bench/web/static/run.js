@@ -7,7 +7,7 @@ import { Replay } from "./replay.js";
 import { makeReport } from "./report.js";
 import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted, mayReport } from "./run_facts.js";
-import { runAddress } from "./router.js";
+import { runAddress, specimenAddress } from "./router.js";
 
 export class RunView {
   constructor() {
@@ -76,6 +76,7 @@ export class RunView {
     const focused = document.activeElement?.dataset?.key;
     const jobs = run.jobs.toReversed().map((job) => element("li", {}, describeJob(job), element("small", {}, jobTimes(job))));
     const rows = {
+      ...(run.specimen && { Specimen: [element("a", { className: "link", href: specimenAddress(run.specimen) }, run.specimen)] }),
       Started: [instant(run.started)],
       Duration: [duration(run.duration_s)],
       Operator: [run.operator || "not given"],

@@ -4,7 +4,7 @@ import { get } from "./api.js";
 import { byId, duration, element, localTime, write, zone } from "./format.js";
 import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, isUnfinished } from "./run_facts.js";
-import { runAddress } from "./router.js";
+import { runAddress, specimenAddress } from "./router.js";
 
 const PAGE = 20;
 
@@ -85,12 +85,20 @@ export class RunList {
     this.onSpecimens([...new Set(runs.map(({ specimen }) => specimen).filter(Boolean))]);
   }
 
+  /** Link to the specimen of a run. */
+  specimen({ id, specimen }) {
+    if (!specimen) return "unnamed";
+    const link = element("a", { className: "link", href: specimenAddress(specimen) }, specimen);
+    link.dataset.key = `${id}/specimen`;
+    return link;
+  }
+
   row(run) {
     const link = element("a", { href: runAddress(run.id) }, localTime(run.started));
     link.dataset.key = `${run.id}/open`;
     return element("tr", {},
       element("th", { scope: "row", className: "number" }, link, element("small", {}, run.operator)),
-      element("td", {}, run.specimen || "unnamed", element("small", {}, `${run.method}, ${duration(run.duration_s)}`)),
+      element("td", {}, this.specimen(run), element("small", {}, `${run.method}, ${duration(run.duration_s)}`)),
       element("td", {}, ...describeOutcome(run)),
       element("td", {}, ...describeFit(run), run.diagnosis ? element("small", {}, `Gap ${describeVerdict(run.diagnosis)}`) : null),
       element("td", {}, ...run.jobs.toReversed().map((job) => element("small", { className: "job" }, describeJob(job)))),

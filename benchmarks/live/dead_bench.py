@@ -103,7 +103,8 @@ def measure(watch: StateWatch, name: str, draw: random.Random, prepare: Callable
 def _start_run(watch: StateWatch, address: str) -> None:
     """Bring the bench into a run; the suspension of the agent trips the drive, which needs a reset."""
     base, token = address.split("#token=")
-    word = watch.wait_for("Idle", "Running", "Tripped") and watch.seen[-1][1]
+    watch.wait_for("Idle", "Running", "Tripped")
+    word = watch.seen[-1][1]
     if word == "Running":
         return
     if word == "Tripped":

@@ -16,14 +16,16 @@ from fastapi import APIRouter, FastAPI, Form, Request, UploadFile, WebSocket, We
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
+from bench.errors import MethodError
 from bench.live import Channel, LiveBatch, describe_channels
-from bench.methods import compile_method, compute_envelope, load_method
+from bench.methods import Method, compile_method, compute_envelope, load_method, parse_method
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_recording import recording_routes
 from tests.support.fake_specimens import add_history, specimen_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
+OPENAPI = Path(__file__).parents[2] / "docs" / "reference" / "openapi.json"
 REPORT = "<!doctype html><html lang='en'><title>Report</title><h1>Damper report</h1><p>Simulated.</p></html>"
 TOKEN = "a-token"
 SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
@@ -121,6 +123,7 @@ class FakeBench:
         self.posted: list[tuple[str, Any]] = []
         self.searches: list[dict[str, str]] = []
         self.outbox: list[dict[str, Any]] = []
+        self.methods: dict[str, Method] = {}
         self.state = "idle"
         self.trip = ""
         self.run: dict[str, Any] | None = None
@@ -225,6 +228,10 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     async def agent() -> Any:
         return problem(503, "The rig agent does not answer", SILENCE) if bench.silent else bench.status()
 
+    @router.get("/openapi.json")
+    async def describe_interface() -> Any:
+        return FileResponse(OPENAPI)
+
     @router.get("/health")
     async def health() -> Any:
         agent = SILENCE if bench.silent else "ok"
@@ -264,21 +271,29 @@ def method_routes(bench: FakeBench) -> APIRouter:
     """Create the routes of methods; documents and previews are those of the service."""
     router = APIRouter(prefix="/methods")
 
+    def find(name: str) -> Method:
+        return bench.methods.get(name) or load_method(name)
+
     @router.get("")
     async def methods() -> Any:
         return {"items": METHODS, "next": None}
 
     @router.get("/{name}")
     async def method(name: str) -> Any:
-        return load_method(name).model_dump(mode="json", by_alias=True, exclude_defaults=True)
+        return find(name).model_dump(mode="json", by_alias=True, exclude_defaults=True)
 
     @router.get("/{name}/preview")
     async def preview(name: str) -> Any:
-        return make_preview(compile_method(load_method(name)))
+        return make_preview(compile_method(find(name)))
 
     @router.post("/dry-run")
     async def dry_run(wanted: dict[str, Any]) -> Any:
-        programme = compile_method(load_method(wanted["method"]))
+        try:
+            document = wanted["method"]
+            found = load_method(document) if isinstance(document, str) else parse_method(document, "the request")
+            programme = compile_method(found)
+        except MethodError as error:
+            return problem(422, "The method was refused", str(error))
         envelope = compute_envelope(programme).model_dump(mode="json", by_alias=True)
         words = {"messages": ["k0 to 3 % (standard deviation)"]} if wanted.get("identifiability", True) else None
         trip = {"unit": "N", "indicate": None, "hold": None, "controlled_stop": None, "trip": 5000.0}
@@ -286,7 +301,14 @@ def method_routes(bench: FakeBench) -> APIRouter:
         return {
             "envelope": envelope | {"design": words}, "mean_heat_w": envelope["heat_j"] / programme.duration,
             "bench": facts | {"free_bytes": 42_000_000_000}, "identifiability_error": "",
+            "preview": make_preview(programme),
         }  # fmt: skip
+
+    @router.post("", status_code=201)
+    async def store(wanted: dict[str, Any]) -> Any:
+        found = parse_method(wanted, "the request")
+        bench.methods[found.name] = found
+        return METHODS[-1] | {"name": found.name, "title": found.title, "version": 2, "source": "stored"}
 
     return router
 

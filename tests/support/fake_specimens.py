@@ -33,7 +33,7 @@ YIELD = (44.9, 45.1, 45.0, 44.9, 45.05, 45.0, 44.95, 45.1)
 STIFFNESS = (903.0, 899.0, 1010.0, 901.0, 897.0, 900.0, 902.0, 898.0)
 """Stiffness k0 [N/m]; the third run was recorded cold."""
 EXPLANATION = (
-    "Over 8 runs: gas_spring.preload falls by 5.9 N per run since age-5.mcap (101 to 76.1). "
+    "Over 8 runs: gas_spring.preload falls by 6.01 N per run since age-5.mcap (101 to 76.1). "
     "Check: the gas pressure of the accumulator."
 )
 CHANGED_MEANWHILE = "specimen MR-0100 was changed meanwhile; read it again and repeat the change"
@@ -63,7 +63,7 @@ def make_trend() -> Trend:
         ],
         effects=["gas_spring"],
         changes=[
-            _make_change("gas_spring.preload", "N", PRELOAD, 1.2, -5.9, logs[4]),
+            _make_change("gas_spring.preload", "N", PRELOAD, 1.2, -6.01, logs[4]),
             _make_change("F_a", "N", YIELD, 0.15),
             _make_change("k0", "N/m", STIFFNESS, 6.0),
             _make_change("eta", "1/s", (190.0,) * len(logs), math.inf),

@@ -64,7 +64,7 @@ export const patch = (path, body, etag) => call("PATCH", path, body, undefined, 
 /** Returns `{ data, etag }`; the ETag is for a later `patch`. */
 export async function getTag(path) {
   const response = await send("GET", path);
-  return { data: await response.json(), etag: response.headers.get("etag") };
+  return { data: await readJson(response), etag: response.headers.get("etag") };
 }
 
 /** Fetches recorded samples in binary batches; see `parseBatch`. */
@@ -118,7 +118,16 @@ export function upload(path, form, onProgress) {
 
 async function call(method, path, body, timeout, headers) {
   const response = await send(method, path, body, timeout, headers);
-  return response.status === 204 ? null : response.json();
+  return response.status === 204 ? null : readJson(response, timeout);
+}
+
+/** Reads a body, which on a slow connection may end later than its headers. */
+async function readJson(response, timeout = TIMEOUT_MS) {
+  try {
+    return await response.json();
+  } catch (error) {
+    throw new Problem(0, "No answer", describeFailure(error, timeout));
+  }
 }
 
 async function send(method, path, body, timeout = TIMEOUT_MS, more = {}) {

@@ -29,20 +29,25 @@ export function makeForecast(method) {
   return section;
 }
 
+/** Returns sentences on what the strokes of a method can identify; the method is a name or a document. */
+export async function assess(method) {
+  const { envelope, identifiability_error: error } = await post("methods/dry-run", { method }, ASSESSMENT_MS);
+  return envelope.design?.messages ?? [`Not known: ${error}`];
+}
+
 async function fill(method, section, numbers, words) {
   try {
     const forecast = await post("methods/dry-run", { method, identifiability: false });
     numbers.replaceChildren(...describeNumbers(forecast));
     if (!section.isConnected) return; // another method was chosen meanwhile
-    const { envelope, identifiability_error: error } = await post("methods/dry-run", { method }, ASSESSMENT_MS);
-    const lines = envelope.design?.messages ?? [`Not known: ${error}`];
-    words.replaceChildren(...lines.map((line) => element("li", {}, line)));
+    words.replaceChildren(...(await assess(method)).map((line) => element("li", {}, line)));
   } catch (problem) {
     words.replaceChildren(element("li", { className: "problem" }, problem.after("There is no forecast")));
   }
 }
 
-function describeNumbers({ envelope, bench, mean_heat_w: flow }) {
+/** Peaks beside the limits, heat and disk of a dry run, with the obstacles on this bench. */
+export function describeNumbers({ envelope, bench, mean_heat_w: flow }) {
   const obstacles = bench.unknown ? [`Limits of the bench are not known: ${bench.unknown}`] : bench.obstacles;
   return [
     element("ul", { className: "warnings", "aria-label": "Obstacles" }, ...obstacles.map((text) => element("li", {}, text))),

@@ -4,21 +4,30 @@ import { get } from "./api.js";
 import { significant } from "./fit_tables.js";
 import { makeForecast } from "./forecast.js";
 import { byId, describeDriveKind, duration, element, fixed, write } from "./format.js";
+import { MethodEditor } from "./method_editor.js";
 import { PlanPlot } from "./plan_plot.js";
 import { QUANTITIES } from "./quantities.js";
+
+/** Address of a new method; a method of this name is edited at `#/plan/new/edit`. */
+const NEW = "new";
 
 export class PlanView {
   constructor() {
     this.name = "";
     this.plots = [];
+    this.editor = null;
   }
 
-  /** Shows the method of an address; without one, only the list. */
-  async show({ id }) {
-    this.name = id;
+  /** Shows the method of an address, or its editor; without one, only the list. */
+  async show({ id, part }) {
+    const isNew = id === NEW && !part;
+    this.editor?.destroy();
+    Object.assign(this, { name: isNew ? "" : id, editor: isNew || part === "edit" ? new MethodEditor((stored) => this.showStored(stored)) : null });
     try {
       await this.list();
-      if (id) await this.load(id);
+      if (this.editor) await this.edit(this.editor);
+      else if (id) await this.load(id);
+      else this.close("Choose a method");
     } catch (problem) {
       write(byId("plan-note"), problem.after("The method cannot be shown"));
     }
@@ -35,21 +44,46 @@ export class PlanView {
     }));
   }
 
+  /** Opens the editor on a copy of the method of the address, or on a new one. */
+  async edit(editor) {
+    this.close(this.name ? `Edit a copy of ${this.name}` : "New method");
+    write(byId("plan-note"), "Loading …");
+    const place = await editor.open(this.name);
+    if (editor !== this.editor) return; // another address was opened meanwhile
+    write(byId("plan-note"), "");
+    byId("plan").replaceChildren(place);
+  }
+
+  showStored({ name, version }) {
+    this.answer = `Stored as version ${version} of ${name}.`;
+    location.hash = `#/plan/${encodeURIComponent(name)}`;
+  }
+
+  close(title) {
+    for (const plot of this.plots) plot.destroy();
+    this.plots = [];
+    byId("plan").replaceChildren();
+    write(byId("plan-note"), "");
+    write(byId("plan-title"), title);
+  }
+
   async load(name) {
     write(byId("plan-note"), "Loading …");
     const path = `methods/${encodeURIComponent(name)}`;
     const [method, preview] = await Promise.all([get(path), get(`${path}/preview`)]);
     if (name !== this.name) return; // another method was chosen meanwhile
     write(byId("plan-title"), method.title);
-    write(byId("plan-note"), "");
+    write(byId("plan-note"), this.answer ?? "");
+    this.answer = "";
     this.build(method, preview);
   }
 
   build(method, preview) {
     const use = element("a", { className: "button primary", href: `#/bench?method=${encodeURIComponent(method.name)}` }, "Use on the bench");
+    const copy = element("a", { className: "button", href: `#/plan/${encodeURIComponent(method.name)}/edit` }, "Edit a copy");
     const places = element("div", { className: "previews" });
     byId("plan").replaceChildren(
-      element("p", {}, method.description), facts(method, preview), element("p", { className: "actions" }, use),
+      element("p", {}, method.description), facts(method, preview), element("p", { className: "actions" }, use, copy),
       element("h3", {}, "Preview"), places, makeForecast(method.name),
       element("h3", {}, "Segments"), segmentTable(method, preview));
     const drive = { ...QUANTITIES.drive, unit: preview.drive_unit };
@@ -62,7 +96,8 @@ export class PlanView {
 
   /** Shows the method again, in changed units. */
   relabel() {
-    if (this.name) this.load(this.name).catch((problem) => write(byId("plan-note"), problem.message));
+    if (this.editor) this.editor.relabel();
+    else if (this.name) this.load(this.name).catch((problem) => write(byId("plan-note"), problem.message));
   }
 }
 

@@ -1,4 +1,4 @@
-// Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
+// Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/plan/METHOD/edit`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
 // `#/runs/ID/replay`, `#/specimens/SERIAL`.
 
 import { byId } from "./format.js";

@@ -106,22 +106,28 @@ function describeTrend(trend, changes) {
 
 function describeDrift({ series, placed, line, outliers, isTime, change }, found) {
   const unit = `${series.unit === "1" ? "" : `${series.unit} `}per ${isTime ? "day" : "run"}`;
-  const lines = [];
-  if (!line) lines.push(`No drift can be stated: it needs 3 runs that determine ${nameOf(series)}.`);
-  else {
-    const interval = `95 % interval ${line.ci95.map((bound) => significant(bound, 3)).join(" … ")} ${unit}`;
-    const isZero = line.ci95[0] <= 0 && line.ci95[1] >= 0;
-    const bend = change === undefined ? "" : `, constant up to run ${placed.find(({ x }) => x === change)?.number}, linear from there`;
-    lines.push(isZero ? `No drift shows: ${significant(line.slope, 3)} ${unit}, and its ${interval} contains zero.`
-      : `Drift ${significant(line.slope, 3)} ${unit}, ${interval}${bend}.`);
-  }
+  const bend = change === undefined ? "" : `, constant up to run ${placed.find(({ x }) => x === change)?.number}, linear from there`;
+  const lines = [describeLine(line, unit, bend) ?? `No drift can be stated: it needs 3 runs that determine ${nameOf(series)}.`];
   for (const { number, run, name } of outliers) {
     lines.push(`Outlier: run ${number}${run ? ` of ${instant(run.started)}` : ` (${name})`} is farther from the line through the other runs than chance allows.`);
+  }
+  if (outliers.length) {
+    const without = describeLine(fitLine(placed.filter((point) => !outliers.includes(point)), change), unit, bend);
+    if (without) lines.push(`Without ${outliers.length > 1 ? "the outliers" : "it"}: ${without.replace(/^./, (first) => first.toLowerCase())}`);
   }
   if (found) lines.push(`The trend calls ${nameOf(series)} ${found.direction}.`);
   const lost = series.points.length - placed.length;
   if (lost) lines.push(`${lost} runs are no longer in the catalogue, so that their time is not known.`);
   return lines.map((text, k) => element("p", { className: k ? "" : "drift" }, text));
+}
+
+/** Drift of a line in words with its interval; null without a line. */
+function describeLine(line, unit, bend) {
+  if (!line) return null;
+  const interval = `95 % interval ${line.ci95.map((bound) => significant(bound, 3)).join(" … ")} ${unit}`;
+  const isZero = line.ci95[0] <= 0 && line.ci95[1] >= 0;
+  return isZero ? `No drift shows: ${significant(line.slope, 3)} ${unit}, and its ${interval} contains zero${bend}.`
+    : `Drift ${significant(line.slope, 3)} ${unit}, ${interval}${bend}.`;
 }
 
 function makeValueTable({ series, placed, line, outliers }) {

@@ -126,7 +126,7 @@ function drawMark(u, { at, value, ci95, number, isOutlier }) {
   if (ci95) ctx.fill();
   ctx.stroke();
   if (isOutlier) {
-    ctx.font = `${12 * devicePixelRatio}px system-ui, sans-serif`;
-    ctx.fillText(`run ${number}`, x + 2.4 * radius, y + radius);
+    Object.assign(ctx, { font: `${12 * devicePixelRatio}px system-ui, sans-serif`, textAlign: "left", textBaseline: "middle" });
+    ctx.fillText(`run ${number}`, x + 2.4 * radius, y);
   }
 }

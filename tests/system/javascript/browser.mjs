@@ -8,6 +8,6 @@ export async function openPage(executablePath, { width = 1280, height = 800, col
   const browser = await chromium.launch({ executablePath, args: ["--no-sandbox"] });
   const context = await browser.newContext({ viewport: { width, height }, colorScheme, reducedMotion: "reduce" });
   const page = await context.newPage();
-  page.setDefaultTimeout(20_000);
+  page.setDefaultTimeout(Number(process.env.PAGE_TIMEOUT_MS ?? 20_000)); // longer on a machine that is busy
   return { page, close: () => browser.close() };
 }

@@ -8,7 +8,7 @@ const [url, token, chromium] = process.argv.slice(2);
 const SERIAL = "MR-0100";
 const seen = { errors: [], findings: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
-page.on("pageerror", (error) => seen.errors.push(String(error)));
+page.on("pageerror", (error) => seen.errors.push(error.stack));
 
 const until = (check, argument) => page.waitForFunction(check, argument);
 const hasText = (selector, words) =>

@@ -31,7 +31,7 @@ from bench.campaigns.engine import (
     resume,
     stop,
 )
-from bench.campaigns.notifications import make_test_content, send_all
+from bench.campaigns.notifications import NotificationSender, make_test_content, send_all, send_due
 from bench.campaigns.runner import CampaignRunner, lock_campaign
 from bench.campaigns.store import CampaignStore, StoredCampaign
 from bench.campaigns.view import CampaignView, ItemView, format_view, make_view
@@ -53,6 +53,7 @@ __all__ = [
     "ItemView",
     "Message",
     "Methods",
+    "NotificationSender",
     "PlantBench",
     "QueueEdit",
     "StoredCampaign",
@@ -76,5 +77,6 @@ __all__ = [
     "plan_campaign",
     "resume",
     "send_all",
+    "send_due",
     "stop",
 ]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from bench.campaigns.document import Campaign, CampaignError, Methods
 from bench.campaigns.engine import CampaignState, Message, start_campaign
-from bench.catalogue import CampaignChange, CampaignEventRow, CampaignRow, Catalogue
+from bench.catalogue import CampaignChange, CampaignEventRow, CampaignNotificationRow, CampaignRow, Catalogue
 from bench.methods import Method
 
 NOTIFIED_KINDS = ("person_needed", "held_back", "ended")
@@ -144,7 +144,9 @@ def _make_events(campaign_id: str, state: CampaignState) -> Sequence[CampaignEve
 
 
 def _make_event(campaign_id: str, state: CampaignState, message: Message) -> CampaignEventRow:
-    is_due = bool(state.campaign.notify) and message.kind in NOTIFIED_KINDS
+    recipients = state.campaign.notify if message.kind in NOTIFIED_KINDS else ()
+    # The clock of this machine decides when a message is due; that of a simulated plant runs faster.
+    due = datetime.now(UTC)
     return CampaignEventRow(
         campaign_id=campaign_id,
         at=datetime.fromtimestamp(message.at, UTC),
@@ -152,5 +154,7 @@ def _make_event(campaign_id: str, state: CampaignState, message: Message) -> Cam
         text=message.text,
         who=message.who,
         item=message.item,
-        notification="due" if is_due else "",
+        notifications=[
+            CampaignNotificationRow(recipient=one.model_dump(mode="json"), next_attempt=due) for one in recipients
+        ],
     )

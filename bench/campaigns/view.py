@@ -5,10 +5,11 @@ from datetime import UTC, datetime
 
 from pydantic import Field
 
+from bench.campaigns.delivery import RECIPIENT, name_recipient
 from bench.campaigns.document import find_run, get_method_name, get_step_kind
 from bench.campaigns.engine import CampaignState, Item, RunFact, RunResult, Times, get_half_width, group_runs
 from bench.campaigns.store import StoredCampaign
-from bench.catalogue import CampaignEventRow
+from bench.catalogue import CampaignEventRow, CampaignNotificationRow
 from bench.validation import FrozenModel
 
 MAX_TRENDS = 200
@@ -76,6 +77,16 @@ class TrendView(FrozenModel):
     points: tuple[TrendPoint, ...]
 
 
+class NotificationView(FrozenModel):
+    """Message on an event to one recipient."""
+
+    recipient: str = Field(description="e-mail address, or host of the webhook")
+    state: str = Field(description="due: an attempt is to follow; sent; failed: none is to follow")
+    attempts: int = Field(description="[1] number of attempts that have begun")
+    next_attempt: datetime | None = Field(description="UTC of the next attempt; null without one")
+    reason: str = Field(description="reason why the latest attempt has failed; empty if none has")
+
+
 class EventView(FrozenModel):
     """Event of a campaign."""
 
@@ -85,7 +96,7 @@ class EventView(FrozenModel):
     text: str
     who: str = Field(description="person or program; empty for the campaign itself")
     item: str = Field(description="id of the step; empty for the campaign as a whole")
-    notification: str = Field(description="due, sent, or the reason of a failure; empty where none is needed")
+    notifications: tuple[NotificationView, ...] = Field(description="one for each recipient who is told")
 
 
 class CampaignView(FrozenModel):
@@ -246,7 +257,17 @@ def _make_event(event: CampaignEventRow) -> EventView:
         text=event.text,
         who=event.who,
         item=event.item,
-        notification=event.notification,
+        notifications=tuple(_make_notification(one) for one in event.notifications),
+    )
+
+
+def _make_notification(row: CampaignNotificationRow) -> NotificationView:
+    return NotificationView(
+        recipient=name_recipient(RECIPIENT.validate_python(row.recipient)),
+        state=row.state,
+        attempts=row.attempts,
+        next_attempt=row.next_attempt,
+        reason=row.reason,
     )
 
 

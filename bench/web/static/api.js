@@ -57,6 +57,7 @@ export function liveAddress() {
 
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
+export const patch = (path, body, timeout) => call("PATCH", path, body, timeout);
 
 /** Fetches recorded samples in binary batches; see `parseBatch`. */
 export async function samples(path) {

@@ -1,6 +1,7 @@
 // Entry point: creates the parts of the page and distributes the messages of the service to them.
 
 import { get, keepToken, takeToken } from "./api.js";
+import { CampaignView } from "./campaigns.js";
 import { openDialog } from "./dialogs.js";
 import { EventList } from "./events.js";
 import { byId, fixed, write } from "./format.js";
@@ -55,6 +56,7 @@ const preparation = new Preparation();
 const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
+const campaigns = new CampaignView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -66,6 +68,7 @@ const router = new Router({
   plan: (address) => plan.show(address),
   runs: ({ query }) => runs.search(search.read(query)),
   run: (address) => runView.show(address),
+  campaigns: (address) => campaigns.show(address),
 });
 
 offerUnits(() => {

@@ -1,5 +1,5 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`.
+// `#/runs/ID/replay`, `#/campaigns`, `#/campaigns/ID`.
 
 import { byId } from "./format.js";
 

@@ -27,11 +27,12 @@ from bench.campaigns.engine import (
     collect_edit_methods,
     needs_results,
     parse_choice,
+    parse_edit,
     pause,
     resume,
     stop,
 )
-from bench.campaigns.notifications import NotificationSender, make_test_content, send_all, send_due
+from bench.campaigns.notifications import NotificationSender, send_due, send_test
 from bench.campaigns.runner import CampaignRunner, lock_campaign
 from bench.campaigns.store import CampaignStore, StoredCampaign
 from bench.campaigns.view import CampaignView, ItemView, format_view, make_view
@@ -68,15 +69,15 @@ __all__ = [
     "format_view",
     "load_campaign",
     "lock_campaign",
-    "make_test_content",
     "make_view",
     "needs_results",
     "parse_campaign",
     "parse_choice",
+    "parse_edit",
     "pause",
     "plan_campaign",
     "resume",
-    "send_all",
     "send_due",
+    "send_test",
     "stop",
 ]

@@ -15,7 +15,7 @@ from typing import Any
 
 from bench.campaigns.delivery import RECIPIENT, TIMEOUT, deliver
 from bench.campaigns.document import CampaignError, Recipient
-from bench.campaigns.store import CampaignStore
+from bench.campaigns.store import CampaignStore, StoredCampaign
 from bench.catalogue import ClaimedNotification
 from bench.log_lines import RepeatedFailure
 
@@ -107,6 +107,18 @@ def _make_content(store: CampaignStore, claimed: ClaimedNotification) -> dict[st
         "at": event.at.isoformat(),
         "status": store.get(event.campaign_id).state.status,
     }
+
+
+def send_test(campaign: StoredCampaign) -> str:
+    """Send a test message to the recipients of a campaign; return `sent`, or the reasons of failures.
+
+    Raises:
+        CampaignError: it has no recipients.
+    """
+    document = campaign.state.campaign
+    if not document.notify:
+        raise CampaignError(f"campaign {document.name} has no recipients; give it notify")
+    return send_all(document.notify, make_test_content(document.name))
 
 
 def make_test_content(name: str) -> dict[str, Any]:

@@ -7,8 +7,15 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from bench.campaigns.document import Campaign, CampaignError, Methods
-from bench.campaigns.engine import CampaignState, Message, start_campaign
+from bench.campaigns.document import Campaign, CampaignError, Methods, collect_step_methods
+from bench.campaigns.engine import (
+    CampaignState,
+    Message,
+    QueueEdit,
+    apply_edit,
+    collect_edit_methods,
+    start_campaign,
+)
 from bench.catalogue import CampaignChange, CampaignEventRow, CampaignNotificationRow, CampaignRow, Catalogue
 from bench.methods import Method
 
@@ -119,6 +126,26 @@ class CampaignStore:
             return CampaignChange(values, _make_events(campaign_id, after))
 
         return _parse(self.table.update(campaign_id, make_change))
+
+    def edit(self, campaign_id: str, edit: QueueEdit, now: float, who: str = "") -> StoredCampaign:
+        """Edit the queue of a campaign; the edit is recorded with who made it and when.
+
+        Args:
+            campaign_id: id of the campaign.
+            edit: the edit; methods of its steps are added to those of the campaign.
+            now: UTC [s].
+            who: person or program.
+
+        Raises:
+            CampaignError: there is no such campaign, or the edit is not possible in its present state.
+        """
+        methods = collect_step_methods(collect_edit_methods(edit))
+        present = self.get(campaign_id).methods
+        for name, method in methods.items():
+            if present.get(name, method) != method:
+                raise CampaignError(f"the campaign has another method {name}; give yours a name of its own")
+        known = present | dict(methods)
+        return self.update(campaign_id, lambda state: apply_edit(state, edit, known, now, who), methods)
 
 
 def compute_key(campaign: Campaign, methods: Methods) -> str:

@@ -19,6 +19,7 @@ from fastapi.staticfiles import StaticFiles
 from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import compile_method, compute_envelope, load_method
 from bench.service.routes.planning.previews import make_preview
+from tests.support.fake_campaigns import FakeCampaigns, campaign_routes
 from tests.support.fake_recording import recording_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
@@ -194,7 +195,7 @@ def application(bench: FakeBench) -> FastAPI:
         allowed = request.headers.get("authorization") == f"Bearer {TOKEN}"
         if request.url.path.startswith("/api/") and not allowed:
             return problem(401, "Not allowed", "the token is missing or wrong")
-        if request.method == "POST":
+        if request.method in ("POST", "PATCH"):
             body = await request.body()
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
@@ -210,6 +211,7 @@ def application(bench: FakeBench) -> FastAPI:
     ):
         app.include_router(routes(bench), prefix="/api/v1")
     app.include_router(recording_routes(), prefix="/api/v1")
+    app.include_router(campaign_routes(FakeCampaigns()), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 

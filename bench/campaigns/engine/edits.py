@@ -2,7 +2,7 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, NonNegativeInt
+from pydantic import Field, NonNegativeInt, TypeAdapter, ValidationError
 
 from bench.campaigns.document import (
     AnyStep,
@@ -16,7 +16,7 @@ from bench.campaigns.document import (
 from bench.campaigns.engine.changes import change, change_item, make_items, say
 from bench.campaigns.engine.executions import find_spec
 from bench.campaigns.engine.state import CampaignState, Item
-from bench.validation import FrozenModel
+from bench.validation import FrozenModel, describe_validation_error
 
 
 class AddEdit(FrozenModel):
@@ -70,6 +70,19 @@ QueueEdit = Annotated[
     AddEdit | MoveEdit | DeleteEdit | PauseEdit | DoNowEdit | ReleaseEdit, Field(discriminator="edit")
 ]
 """One edit of the queue."""
+
+
+def parse_edit(text: str, origin: str) -> QueueEdit:
+    """Return the edit of a JSON text; ``origin`` names the text in messages.
+
+    Raises:
+        CampaignError: it is no edit; the message names the position.
+    """
+    try:
+        edit: QueueEdit = TypeAdapter(QueueEdit).validate_json(text)
+    except ValidationError as error:
+        raise CampaignError(f"{origin} is not an edit: {describe_validation_error(error)}") from None
+    return edit
 
 
 def apply_edit(

@@ -4,9 +4,10 @@ import time
 
 import pytest
 
-from bench.campaigns import CampaignError, delivery, make_test_content, send_all
+from bench.campaigns import CampaignError, delivery
 from bench.campaigns.delivery import deliver, name_recipient
 from bench.campaigns.document import Mail, Webhook
+from bench.campaigns.notifications import make_test_content, send_all
 from tests.support.message_servers import (
     find_closed_port,
     make_server_context,

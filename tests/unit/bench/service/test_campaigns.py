@@ -113,8 +113,16 @@ def test_the_queue_is_edited_while_a_run_is_in_progress(service):
     assert [item["id"] for item in added["items"]] == ["s0001", "s0003", "s0002"]
     assert "between two runs" in edit(409, edit="do_now", step={"rest": {"seconds": 5}})["detail"]
     assert "s0001 is active" in edit(409, edit="delete", item="s0001")["detail"]
+    edit(200, "/api/v1/queue", edit="move", item="s0002", position=0)
+    paused = edit(200, "/api/v1/queue", edit="pause", before="s0003", text="Check the clevis")
+    assert [item["id"] for item in paused["items"]] == ["s0001", "s0002", "s0004", "s0003"]
     deleted = edit(200, "/api/v1/queue", edit="delete", item="s0002")
-    assert deleted["items"][2]["state"] == "skipped"
+    assert deleted["items"][1]["state"] == "skipped"
+    kept = [event for event in service.get(path.removeprefix("/api/v1"))["events"] if event["kind"] == "edit"]
+    assert [(event["who"], event["text"].split()[0]) for event in kept] == [
+        ("B", "added"), ("B", "moved"), ("B", "added"), ("B", "deleted"),
+    ]  # fmt: skip
+    assert all(event["at"] for event in kept)
     edit(422, edit="hope")
     assert service.post("/campaigns", {"campaign": {"name": "b", "steps": [RUN]}}, 409)["type"].endswith("held")
 

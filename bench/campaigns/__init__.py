@@ -35,7 +35,8 @@ from bench.campaigns.engine import (
 from bench.campaigns.notifications import NotificationSender, send_due, send_test
 from bench.campaigns.runner import CampaignRunner, lock_campaign
 from bench.campaigns.store import CampaignStore, StoredCampaign
-from bench.campaigns.view import CampaignView, ItemView, format_view, make_view
+from bench.campaigns.view import CampaignView, ItemView, make_view
+from bench.campaigns.view_text import format_view
 
 __all__ = [
     "WARM_UP_METHOD",

@@ -108,9 +108,14 @@ export function upload(path, form, onProgress) {
   });
 }
 
-async function call(method, path, body, timeout, headers) {
+async function call(method, path, body, timeout = TIMEOUT_MS, headers) {
   const response = await send(method, path, body, timeout, headers);
-  return response.status === 204 ? null : response.json();
+  if (response.status === 204) return null;
+  try {
+    return await response.json();
+  } catch (error) {
+    throw new Problem(0, "No answer", describeFailure(error, timeout)); // it broke off
+  }
 }
 
 async function send(method, path, body, timeout = TIMEOUT_MS, more = {}) {

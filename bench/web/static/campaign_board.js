@@ -16,9 +16,9 @@ export class CampaignBoard {
 
   /** Shows a campaign; a part whose facts have not changed stays as it is. */
   show(campaign) {
-    const { items, cells, events, bench } = campaign;
+    const { items, events } = campaign;
     refresh(byId("campaign-facts"), listFacts(campaign), () => makeFacts(campaign));
-    refresh(byId("campaign-matrix"), [cells, items], () => makeMatrix(items, bench));
+    refresh(byId("campaign-matrix"), items, () => makeMatrix(items));
     refresh(byId("campaign-messages"), events, () => events.toReversed().map(makeMessage));
     this.trends.show(campaign);
   }
@@ -53,15 +53,15 @@ function makeFacts(campaign) {
 }
 
 /** Matrix of the steps that run a method of their own: a row for each specimen, a column for each method with its drive. */
-function makeMatrix(items, bench) {
+function makeMatrix(items) {
   const runs = items.filter(({ method }) => method);
   if (!runs.length) return [element("caption", {}, "This campaign has no runs of a method.")];
-  const column = ({ method, drive }) => JSON.stringify([method, drive]);
+  const column = ({ method, drive, drive_unit: unit }) => JSON.stringify([method, drive, unit]);
   const columns = [...new Set(runs.map(column))];
   const specimens = [...new Set(runs.map(({ specimen }) => specimen))];
   const heads = columns.map((key) => {
-    const [method, drive] = JSON.parse(key);
-    return element("th", { scope: "col" }, method, element("small", {}, describeDrive(drive, bench)));
+    const [method, drive, unit] = JSON.parse(key);
+    return element("th", { scope: "col" }, method, element("small", {}, describeDrive(drive, unit)));
   });
   const rows = specimens.map((specimen) => element("tr", {}, element("th", { scope: "row" }, specimen),
     ...columns.map((key) => makeCell(runs.filter((item) => item.specimen === specimen && column(item) === key)))));

@@ -96,7 +96,7 @@ function describePlan(plan) {
 function makeMethodTable(methods) {
   const { scale, unit } = QUANTITIES.force;
   return makeTable("Methods", ["Method", "Runs", "One run", "Force, at most", "Limits", "Checkpoints"], methods.map((one) => [
-    `${one.method}, ${describeDrive(one.drive)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, one.verdict, one.checkpoints,
+    `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, one.verdict, one.checkpoints,
   ]));
 }
 

@@ -42,7 +42,7 @@ export class CampaignTrends {
 
   figure(trend) {
     const name = `${trend.parameter.replaceAll("_", " ")}${trend.unit === "1" ? "" : ` [${trend.unit}]`}`;
-    const title = `${trend.specimen}, ${trend.method}, ${describeDrive(trend.drive, this.campaign.bench)}`;
+    const title = `${trend.specimen}, ${trend.method}, ${describeDrive(trend.drive, trend.drive_unit)}`;
     const place = element("div", { className: "plot", role: "img", "aria-label": `${name} over time, ${title}; the table has the values` });
     requestAnimationFrame(() => place.isConnected && this.plots.push(draw(trend, new Date(this.campaign.created), place)));
     return element("figure", {}, element("figcaption", {}, `${title}: ${name} over hours since the start [h]`), place, makeTable(trend, title, name));

@@ -1,7 +1,6 @@
 // Campaigns in words: states with their marks, steps, drives and cells.
 
 import { element } from "./format.js";
-import { QUANTITIES } from "./quantities.js";
 
 const ENDED = ["done", "stopped"];
 const STATUSES = { running: "good", pausing: "fair", paused: "fair", stopping: "fair", done: "good", stopped: "bad" };
@@ -25,11 +24,8 @@ export const markStatus = ({ status }) => element("span", { className: `mark ${S
 /** State of a step as a mark: each state has a shape of its own. */
 export const markStep = (state) => element("span", { className: "step-state", "data-state": state }, words(state));
 
-/** Constant drive of a run with its unit; that of a simulated plant depends on its scenario. */
-export function describeDrive(drive, bench = "agent") {
-  if (drive === null) return "the method's own drive";
-  return `drive ${drive} ${bench === "agent" ? QUANTITIES.drive.unit : "V or A"}`;
-}
+/** Constant drive of a run with its unit. */
+export const describeDrive = (drive, unit) => (drive === null ? "the method's own drive" : `drive ${drive} ${unit}`);
 
 /** Counts states: `3 done, 2 pending`. */
 export function countStates(states) {

@@ -21,10 +21,10 @@ const hasState = (word) => page.waitForFunction((wanted) => document.getElementB
 async function check(name) {
   for (const width of [1400, 820, 390]) {
     await page.setViewportSize({ width, height: 1000 });
-    seen.violations[`${name} ${width}`] = await audit(page);
     seen.small[`${name} ${width}`] = await findSmall(page);
     seen.overflow[`${name} ${width}`] = await findOverflow(page);
   }
+  seen.violations[name] = await audit(page);
   await page.emulateMedia({ colorScheme: "dark" });
   seen.violations[`${name} dark`] = await audit(page);
   await page.emulateMedia({ colorScheme: "light" });
@@ -188,7 +188,10 @@ async function readEnded() {
 }
 
 try {
-  for (const step of [walk, readBoard, answerPrompt, editQueue, sendTest, stopInDialog, control, begin, readEnded]) await step();
+  for (const step of [walk, readBoard, answerPrompt, editQueue, sendTest, stopInDialog, control, begin, readEnded]) {
+    await step();
+    if (process.env.DEBUG_STEPS) console.error(step.name, Math.round(performance.now()));
+  }
   console.log(JSON.stringify(seen));
 } finally {
   await close();

@@ -188,10 +188,7 @@ async function readEnded() {
 }
 
 try {
-  for (const step of [walk, readBoard, answerPrompt, editQueue, sendTest, stopInDialog, control, begin, readEnded]) {
-    await step();
-    if (process.env.DEBUG_STEPS) console.error(step.name, Math.round(performance.now()));
-  }
+  for (const step of [walk, readBoard, answerPrompt, editQueue, sendTest, stopInDialog, control, begin, readEnded]) await step();
   console.log(JSON.stringify(seen));
 } finally {
   await close();

@@ -27,14 +27,16 @@ from bench.campaigns.engine import (
     collect_edit_methods,
     needs_results,
     parse_choice,
+    parse_edit,
     pause,
     resume,
     stop,
 )
-from bench.campaigns.notifications import make_test_content, send_all
+from bench.campaigns.notifications import NotificationSender, send_due, send_test
 from bench.campaigns.runner import CampaignRunner, lock_campaign
 from bench.campaigns.store import CampaignStore, StoredCampaign
-from bench.campaigns.view import CampaignView, ItemView, format_view, make_view
+from bench.campaigns.view import CampaignView, ItemView, make_view
+from bench.campaigns.view_text import format_view
 
 __all__ = [
     "WARM_UP_METHOD",
@@ -53,6 +55,7 @@ __all__ = [
     "ItemView",
     "Message",
     "Methods",
+    "NotificationSender",
     "PlantBench",
     "QueueEdit",
     "StoredCampaign",
@@ -67,14 +70,15 @@ __all__ = [
     "format_view",
     "load_campaign",
     "lock_campaign",
-    "make_test_content",
     "make_view",
     "needs_results",
     "parse_campaign",
     "parse_choice",
+    "parse_edit",
     "pause",
     "plan_campaign",
     "resume",
-    "send_all",
+    "send_due",
+    "send_test",
     "stop",
 ]

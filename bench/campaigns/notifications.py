@@ -1,55 +1,124 @@
-"""Notifications of a campaign by webhook and e-mail: on its end, on a stop, and when a person is needed.
+"""Notifications of campaigns: on the end, on a stop, and when a person is needed.
 
-``MRBENCH_SMTP`` names the mail server as ``smtp://USER:PASSWORD@HOST:PORT``, or ``smtps://`` for TLS
-from the start. ``MRBENCH_SMTP_FROM`` is the sender.
+An event and its messages are stored in one transaction. A sender delivers them in a thread of its own, so that
+no campaign waits for a server. An attempt that fails is repeated with growing waits. The last failure stays on
+record. A message may arrive twice if a process is killed while it sends; its `id` tells.
 """
 
-import json
-import os
-import smtplib
-import ssl
+import logging
+import threading
 from collections.abc import Sequence
-from email.message import EmailMessage
-from http.client import HTTPException
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
+from types import TracebackType
 from typing import Any
-from urllib.error import URLError
-from urllib.parse import unquote, urlsplit
-from urllib.request import Request, urlopen
 
-from bench.campaigns.document import CampaignError, Mail, Recipient, Webhook
-from bench.campaigns.store import CampaignStore
+from bench.campaigns.delivery import RECIPIENT, TIMEOUT, deliver
+from bench.campaigns.document import CampaignError, Recipient
+from bench.campaigns.store import CampaignStore, StoredCampaign
+from bench.catalogue import ClaimedNotification
+from bench.log_lines import RepeatedFailure
 
-SERVER_VARIABLE, SENDER_VARIABLE = "MRBENCH_SMTP", "MRBENCH_SMTP_FROM"
-_TIMEOUT = 10.0
-"""[s] Time limit of one message."""
+RETRY_AFTER = (10.0, 60.0, 300.0, 1800.0)
+"""[s] Waits after each attempt that has failed; after the attempt that follows the last wait there is none."""
+PERIOD = 1.0
+"""[s] Time between two looks for messages that are due."""
+MAX_ATTEMPTS = len(RETRY_AFTER) + 1
+_CLAIM = timedelta(seconds=6 * TIMEOUT)
+"""Time after which an attempt counts as lost with its process."""
+_LOG = logging.getLogger(__name__)
 
 
-def send_due(store: CampaignStore, campaign_id: str) -> None:
-    """Send the messages of a campaign that are due; a failure is recorded and does not stop the campaign."""
-    due = store.table.list_due(campaign_id)
-    if not due:
+class NotificationSender:
+    """Thread that sends the messages of all campaigns of a catalogue."""
+
+    def __init__(self, store: CampaignStore) -> None:
+        self._store = store
+        self._stopping = threading.Event()
+        self._failures = RepeatedFailure(_LOG, "notifications_failed", "notifications_continue")
+        self._thread = threading.Thread(target=self._run, name="notifications", daemon=True)
+
+    def __enter__(self) -> "NotificationSender":
+        """Start the thread."""
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the thread; an attempt in progress has its time limit."""
+        self._stopping.set()
+        self._thread.join()
+
+    def _run(self) -> None:
+        while not self._stopping.is_set():
+            try:
+                while not self._stopping.is_set() and send_one(self._store):
+                    pass
+            except Exception as error:  # the thread must not end, or nobody would be told of anything
+                self._failures.note(error)
+            else:
+                self._failures.clear()
+            self._stopping.wait(PERIOD)
+
+
+def send_due(store: CampaignStore) -> None:
+    """Send the messages that are due now, each once."""
+    while send_one(store):
+        pass
+
+
+def send_one(store: CampaignStore) -> bool:
+    """Send the message that is due longest and record the result; return whether there was one."""
+    now = datetime.now(UTC)
+    claimed = store.table.claim_notification(now, now + _CLAIM)
+    if claimed is None:
+        return False
+    row = claimed.notification
+    if row.attempts > MAX_ATTEMPTS:
+        store.table.record_attempt(row.id, "failed", "each attempt ended with its process")
+        return True
+    try:
+        deliver(RECIPIENT.validate_python(row.recipient), _make_content(store, claimed))
+    except CampaignError as error:
+        _record_failure(store, claimed, str(error))
+    else:
+        store.table.record_attempt(row.id, "sent")
+    return True
+
+
+def _record_failure(store: CampaignStore, claimed: ClaimedNotification, reason: str) -> None:
+    row = claimed.notification
+    if row.attempts == MAX_ATTEMPTS:
+        store.table.record_attempt(row.id, "failed", reason)
+        _LOG.error("notification_failed", extra={"campaign": claimed.event.campaign_id, "why": reason})
         return
-    campaign = store.get(campaign_id)
-    for event in due:
-        content = {
-            "campaign": campaign_id,
-            "kind": event.kind,
-            "text": event.text,
-            "at": event.at.isoformat(),
-            "status": campaign.state.status,
-        }
-        store.table.set_notification(event.id, send_all(campaign.state.campaign.notify, content))
+    wait = timedelta(seconds=RETRY_AFTER[row.attempts - 1])
+    store.table.record_attempt(row.id, "due", reason, datetime.now(UTC) + wait)
 
 
-def send_all(recipients: Sequence[Recipient], content: dict[str, Any]) -> str:
-    """Send one message to all recipients; return `sent`, or the reasons of failures."""
-    failures = []
-    for recipient in recipients:
-        try:
-            send_message(recipient, content)
-        except CampaignError as error:
-            failures.append(str(error))
-    return "; ".join(failures) or "sent"
+def _make_content(store: CampaignStore, claimed: ClaimedNotification) -> dict[str, Any]:
+    event = claimed.event
+    return {
+        "campaign": event.campaign_id,
+        "id": claimed.notification.id,
+        "kind": event.kind,
+        "text": event.text,
+        "at": event.at.isoformat(),
+        "status": store.get(event.campaign_id).state.status,
+    }
+
+
+def send_test(campaign: StoredCampaign) -> str:
+    """Send a test message to the recipients of a campaign; return `sent`, or the reasons of failures.
+
+    Raises:
+        CampaignError: it has no recipients.
+    """
+    document = campaign.state.campaign
+    if not document.notify:
+        raise CampaignError(f"campaign {document.name} has no recipients; give it notify")
+    return send_all(document.notify, make_test_content(document.name))
 
 
 def make_test_content(name: str) -> dict[str, Any]:
@@ -57,45 +126,16 @@ def make_test_content(name: str) -> dict[str, Any]:
     return {"campaign": name, "kind": "test", "text": f"test message of campaign {name}; nothing has happened"}
 
 
-def send_message(recipient: Recipient, content: dict[str, Any]) -> None:
-    """Send one message.
+def send_all(recipients: Sequence[Recipient], content: dict[str, Any]) -> str:
+    """Send one message to all recipients at once, and once; return `sent`, or the reasons of failures."""
+    with ThreadPoolExecutor(max_workers=min(len(recipients), 32) or 1) as pool:
+        failures = [failure for failure in pool.map(lambda one: _try(one, content), recipients) if failure]
+    return "; ".join(failures) or "sent"
 
-    Raises:
-        CampaignError: it cannot be sent; the message names the recipient and the reason.
-    """
+
+def _try(recipient: Recipient, content: dict[str, Any]) -> str:
     try:
-        if isinstance(recipient, Webhook):
-            _post(recipient.webhook, content)
-        else:
-            _mail(recipient, content)
-    except (URLError, HTTPException, smtplib.SMTPException, OSError, ValueError) as error:
-        name = recipient.webhook if isinstance(recipient, Webhook) else recipient.mailto
-        raise CampaignError(f"{name} was not notified: {error}") from None
-
-
-def _post(address: str, content: dict[str, Any]) -> None:
-    request = Request(address, json.dumps(content).encode(), {"Content-Type": "application/json"}, method="POST")
-    with urlopen(request, timeout=_TIMEOUT) as reply:
-        reply.read()
-
-
-def _mail(recipient: Mail, content: dict[str, Any]) -> None:
-    server = urlsplit(os.environ.get(SERVER_VARIABLE, ""))
-    if not server.hostname:
-        raise CampaignError(
-            f"{recipient.mailto} was not notified: no mail server; set {SERVER_VARIABLE}=smtp://HOST:PORT"
-        )
-    message = EmailMessage()
-    message["Subject"] = f"mrbench: campaign {content['campaign']}: {content['kind'].replace('_', ' ')}"
-    message["From"] = os.environ.get(SENDER_VARIABLE, f"mrbench@{server.hostname}")
-    message["To"] = recipient.mailto
-    message.set_content("\n".join(f"{key}: {value}" for key, value in content.items()))
-    is_tls = server.scheme == "smtps"
-    connect = smtplib.SMTP_SSL if is_tls else smtplib.SMTP
-    with connect(server.hostname, server.port or (465 if is_tls else 25), timeout=_TIMEOUT) as session:
-        session.ehlo()
-        if not is_tls and session.has_extn("starttls"):
-            session.starttls(context=ssl.create_default_context())
-        if server.username:
-            session.login(unquote(server.username), unquote(server.password or ""))
-        session.send_message(message)
+        deliver(recipient, content)
+    except CampaignError as error:
+        return str(error)
+    return ""

@@ -9,7 +9,6 @@ from pathlib import Path
 from bench.campaigns.benches import CampaignBench
 from bench.campaigns.document import CampaignError
 from bench.campaigns.engine import CampaignState, ExecutionReport, Message, Observation, advance, recover
-from bench.campaigns.notifications import send_due
 from bench.campaigns.store import CampaignStore, StoredCampaign
 from bench.errors import BenchError
 
@@ -38,7 +37,6 @@ class CampaignRunner:
         campaign = self.take_over()
         while not campaign.state.has_ended and not is_stopping():
             campaign = self.step(campaign)
-        send_due(self._store, self._id)
         return campaign
 
     def take_over(self) -> StoredCampaign:
@@ -56,7 +54,6 @@ class CampaignRunner:
             campaign = self._start(campaign)
         elif active is not None and active.phase == "stroking" and campaign.state.status == "pausing":
             self._request_pause(campaign)
-        send_due(self._store, self._id)
         self._bench.wait(campaign)
         return self._store.get(self._id)
 

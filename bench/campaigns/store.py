@@ -7,9 +7,16 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from bench.campaigns.document import Campaign, CampaignError, Methods
-from bench.campaigns.engine import CampaignState, Message, start_campaign
-from bench.catalogue import CampaignChange, CampaignEventRow, CampaignRow, Catalogue
+from bench.campaigns.document import Campaign, CampaignError, Methods, collect_step_methods
+from bench.campaigns.engine import (
+    CampaignState,
+    Message,
+    QueueEdit,
+    apply_edit,
+    collect_edit_methods,
+    start_campaign,
+)
+from bench.catalogue import CampaignChange, CampaignEventRow, CampaignNotificationRow, CampaignRow, Catalogue
 from bench.methods import Method
 
 NOTIFIED_KINDS = ("person_needed", "held_back", "ended")
@@ -120,6 +127,26 @@ class CampaignStore:
 
         return _parse(self.table.update(campaign_id, make_change))
 
+    def edit(self, campaign_id: str, edit: QueueEdit, now: float, who: str = "") -> StoredCampaign:
+        """Edit the queue of a campaign; the edit is recorded with who made it and when.
+
+        Args:
+            campaign_id: id of the campaign.
+            edit: the edit; methods of its steps are added to those of the campaign.
+            now: UTC [s].
+            who: person or program.
+
+        Raises:
+            CampaignError: there is no such campaign, or the edit is not possible in its present state.
+        """
+        methods = collect_step_methods(collect_edit_methods(edit))
+        present = self.get(campaign_id).methods
+        for name, method in methods.items():
+            if present.get(name, method) != method:
+                raise CampaignError(f"the campaign has another method {name}; give yours a name of its own")
+        known = present | dict(methods)
+        return self.update(campaign_id, lambda state: apply_edit(state, edit, known, now, who), methods)
+
 
 def compute_key(campaign: Campaign, methods: Methods) -> str:
     """Return the hash of a campaign and its methods."""
@@ -144,7 +171,9 @@ def _make_events(campaign_id: str, state: CampaignState) -> Sequence[CampaignEve
 
 
 def _make_event(campaign_id: str, state: CampaignState, message: Message) -> CampaignEventRow:
-    is_due = bool(state.campaign.notify) and message.kind in NOTIFIED_KINDS
+    recipients = state.campaign.notify if message.kind in NOTIFIED_KINDS else ()
+    # The clock of this machine decides when a message is due; that of a simulated plant runs faster.
+    due = datetime.now(UTC)
     return CampaignEventRow(
         campaign_id=campaign_id,
         at=datetime.fromtimestamp(message.at, UTC),
@@ -152,5 +181,7 @@ def _make_event(campaign_id: str, state: CampaignState, message: Message) -> Cam
         text=message.text,
         who=message.who,
         item=message.item,
-        notification="due" if is_due else "",
+        notifications=[
+            CampaignNotificationRow(recipient=one.model_dump(mode="json"), next_attempt=due) for one in recipients
+        ],
     )

@@ -1,14 +1,15 @@
 """Campaigns as programs and persons see them: state, queue, cells of the matrix, trends, messages."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 
 from pydantic import Field
 
+from bench.campaigns.delivery import RECIPIENT, name_recipient
 from bench.campaigns.document import find_run, get_method_name, get_step_kind
 from bench.campaigns.engine import CampaignState, Item, RunFact, RunResult, Times, get_half_width, group_runs
 from bench.campaigns.store import StoredCampaign
-from bench.catalogue import CampaignEventRow
+from bench.catalogue import CampaignEventRow, CampaignNotificationRow
 from bench.validation import FrozenModel
 
 MAX_TRENDS = 200
@@ -24,7 +25,8 @@ class ItemView(FrozenModel):
     state: str = Field(description="pending, active, done, skipped, failed or held_back")
     specimen: str = Field(description="empty for a step without a run of its own")
     method: str = Field(description="empty for a step without a run of its own")
-    drive: float | None = Field(description="constant drive [V or A]; null for the method's own")
+    drive: float | None = Field(description="constant drive in the unit of the drive; null for the method's own")
+    drive_unit: str = Field(description="V or A; empty for a step without a run of its own")
     runs: tuple[str, ...] = Field(description="ids of the complete runs")
     parts: tuple[str, ...] = Field(description="ids of incomplete runs, each continued or repeated by a later one")
     crashes: int = Field(description="number of times that the bench ended in the middle of this step")
@@ -50,7 +52,8 @@ class CellView(FrozenModel):
 
     specimen: str
     method: str
-    drive: float | None = Field(description="constant drive [V or A]; null for the method's own")
+    drive: float | None = Field(description="constant drive in the unit of the drive; null for the method's own")
+    drive_unit: str = Field(description="V or A")
     states: tuple[str, ...] = Field(description="state of each step of the cell, in order")
     runs: tuple[str, ...] = Field(description="ids of the complete runs")
 
@@ -71,9 +74,20 @@ class TrendView(FrozenModel):
     specimen: str
     method: str
     drive: float | None
+    drive_unit: str = Field(description="V or A")
     parameter: str
     unit: str
     points: tuple[TrendPoint, ...]
+
+
+class NotificationView(FrozenModel):
+    """Message on an event to one recipient."""
+
+    recipient: str = Field(description="e-mail address, or host of the webhook")
+    state: str = Field(description="due: an attempt is to follow; sent; failed: none is to follow")
+    attempts: int = Field(description="[1] number of attempts that have begun")
+    next_attempt: datetime | None = Field(description="UTC of the next attempt; null without one")
+    reason: str = Field(description="reason why the latest attempt has failed; empty if none has")
 
 
 class EventView(FrozenModel):
@@ -85,7 +99,7 @@ class EventView(FrozenModel):
     text: str
     who: str = Field(description="person or program; empty for the campaign itself")
     item: str = Field(description="id of the step; empty for the campaign as a whole")
-    notification: str = Field(description="due, sent, or the reason of a failure; empty where none is needed")
+    notifications: tuple[NotificationView, ...] = Field(description="one for each recipient who is told")
 
 
 class CampaignView(FrozenModel):
@@ -116,6 +130,7 @@ class CampaignView(FrozenModel):
 def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ()) -> CampaignView:
     """Return the view of a campaign with some of its events."""
     state = campaign.state
+    units = {name: method.drive_unit for name, method in campaign.methods.items()}
     active = state.active
     current = None if active is None else state.get_item(active.item)
     return CampaignView(
@@ -127,17 +142,17 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
         created=campaign.created,
         updated=_at(state.updated),
         operator=state.operator,
-        current=None if current is None else _make_item(current),
+        current=None if current is None else _make_item(current, units),
         phase="" if active is None else active.phase,
-        next=next((_make_item(item) for item in state.pending), None),
+        next=next((_make_item(item, units) for item in state.pending), None),
         waits_for=state.waits_for,
         question=_make_question(state, current),
         expected_end=None if state.has_ended else _at(state.updated + _estimate_remaining(state)),
         times=state.times,
         temperature_c=state.temperature_c,
-        items=tuple(_make_item(item) for item in state.items),
-        cells=_make_cells(state),
-        trends=make_trends(state),
+        items=tuple(_make_item(item, units) for item in state.items),
+        cells=_make_cells(state, units),
+        trends=make_trends(state, units),
         events=tuple(_make_event(event) for event in events),
     )
 
@@ -147,14 +162,14 @@ def _at(seconds: float) -> datetime:
 
 
 def _estimate_remaining(state: CampaignState) -> float:
-    remaining = sum(item.expected_s for item in state.pending)
+    remaining = 0.0 if state.status == "stopping" else sum(item.expected_s for item in state.pending)
     if state.active is not None:
         expected = state.get_item(state.active.item).expected_s
         remaining += max(0.0, expected - (state.updated - state.active.since))
     return remaining
 
 
-def _make_item(item: Item) -> ItemView:
+def _make_item(item: Item, units: Mapping[str, str]) -> ItemView:
     run = find_run(item.step)
     return ItemView(
         id=item.id,
@@ -164,6 +179,7 @@ def _make_item(item: Item) -> ItemView:
         specimen=run.specimen if run else "",
         method=get_method_name(run) if run else "",
         drive=run.drive if run else None,
+        drive_unit=units[get_method_name(run)] if run else "",
         runs=item.runs,
         parts=item.parts,
         crashes=item.crashes,
@@ -193,7 +209,7 @@ def _make_question(state: CampaignState, item: Item | None) -> Question | None:
     )
 
 
-def _make_cells(state: CampaignState) -> tuple[CellView, ...]:
+def _make_cells(state: CampaignState, units: Mapping[str, str]) -> tuple[CellView, ...]:
     cells: dict[tuple[str, str, float | None], list[Item]] = {}
     for item in state.items:
         if (run := find_run(item.step)) is not None:
@@ -203,6 +219,7 @@ def _make_cells(state: CampaignState) -> tuple[CellView, ...]:
             specimen=specimen,
             method=method,
             drive=drive,
+            drive_unit=units[method],
             states=tuple(item.state for item in items),
             runs=tuple(run for item in items for run in item.runs),
         )
@@ -210,8 +227,8 @@ def _make_cells(state: CampaignState) -> tuple[CellView, ...]:
     )
 
 
-def make_trends(state: CampaignState) -> tuple[TrendView, ...]:
-    """Return each identified parameter over the runs of each cell, oldest first."""
+def make_trends(state: CampaignState, units: Mapping[str, str]) -> tuple[TrendView, ...]:
+    """Return each identified parameter over the runs of each cell, oldest first; ``units`` of drives by method."""
     trends = []
     for (specimen, method, drive), facts in group_runs(state).items():
         found = [(fact, state.results[fact.run]) for fact in facts if fact.run in state.results]
@@ -220,7 +237,13 @@ def make_trends(state: CampaignState) -> tuple[TrendView, ...]:
             unit = next(result.parameters[name].unit for _, result in found if name in result.parameters)
             trends.append(
                 TrendView(
-                    specimen=specimen, method=method, drive=drive, parameter=name, unit=unit, points=tuple(points)
+                    specimen=specimen,
+                    method=method,
+                    drive=drive,
+                    drive_unit=units[method],
+                    parameter=name,
+                    unit=unit,
+                    points=tuple(points),
                 )
             )
     return tuple(trends[:MAX_TRENDS])
@@ -246,29 +269,15 @@ def _make_event(event: CampaignEventRow) -> EventView:
         text=event.text,
         who=event.who,
         item=event.item,
-        notification=event.notification,
+        notifications=tuple(_make_notification(one) for one in event.notifications),
     )
 
 
-def format_view(view: CampaignView) -> list[str]:
-    """Format a campaign as lines of text."""
-    counts = {name: sum(item.state == name for item in view.items) for name in dict.fromkeys(_STATES)}
-    summary = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counts.items() if count)
-    times = view.times
-    lines = [
-        f"{view.id}: {view.status}{f' ({view.reason})' if view.reason else ''}; {summary}",
-        f"in motion {times.stroking_s:.0f} s, at rest {times.rest_s:.0f} s, held {times.held_s:.0f} s",
-    ]
-    if view.current is not None:
-        lines.append(f"current: {view.current.id} {view.current.label}, {view.phase}")
-    if view.question is not None:
-        lines.append(f"asks: {view.question.text}")
-    if view.next is not None and view.expected_end is not None:
-        lines.append(
-            f"next: {view.next.id} {view.next.label}; expected end {view.expected_end:%Y-%m-%d %H:%M} UTC"
-        )
-    return lines
-
-
-_STATES = ("done", "active", "pending", "failed", "skipped", "held_back")
-"""States of items in the order in which they are counted."""
+def _make_notification(row: CampaignNotificationRow) -> NotificationView:
+    return NotificationView(
+        recipient=name_recipient(RECIPIENT.validate_python(row.recipient)),
+        state=row.state,
+        attempts=row.attempts,
+        next_attempt=row.next_attempt,
+        reason=row.reason,
+    )

@@ -1,7 +1,7 @@
 """The catalogue: runs, their logs, and the jobs on them, in a database."""
 
 from bench.catalogue.backup import Copied, back_up, restore_backup
-from bench.catalogue.campaign_table import CampaignChange, CampaignTable
+from bench.catalogue.campaign_table import CampaignChange, CampaignTable, ClaimedNotification
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
@@ -11,6 +11,7 @@ from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
     CampaignEventRow,
+    CampaignNotificationRow,
     CampaignRow,
     EventRow,
     JobRow,
@@ -44,10 +45,12 @@ __all__ = [
     "BatchRow",
     "CampaignChange",
     "CampaignEventRow",
+    "CampaignNotificationRow",
     "CampaignRow",
     "CampaignTable",
     "Catalogue",
     "ClaimedKey",
+    "ClaimedNotification",
     "Copied",
     "EventRow",
     "IdempotencyKeys",

@@ -1,12 +1,13 @@
 """Campaigns and their events in the catalogue: each change reads and writes the state in one transaction."""
 
 from collections.abc import Callable, Sequence
+from datetime import datetime
 from typing import Any, NamedTuple
 
 from sqlalchemy import Engine, select, tuple_
 from sqlalchemy.orm import Session, sessionmaker
 
-from bench.catalogue.models import CampaignEventRow, CampaignRow
+from bench.catalogue.models import CampaignEventRow, CampaignNotificationRow, CampaignRow, NotificationState
 
 
 class CampaignChange(NamedTuple):
@@ -15,6 +16,13 @@ class CampaignChange(NamedTuple):
     values: dict[str, Any]
     """Value by column of the campaign."""
     events: Sequence[CampaignEventRow]
+
+
+class ClaimedNotification(NamedTuple):
+    """Message of which an attempt has begun."""
+
+    notification: CampaignNotificationRow
+    event: CampaignEventRow
 
 
 class CampaignTable:
@@ -86,18 +94,38 @@ class CampaignTable:
             newest = session.scalars(query.order_by(CampaignEventRow.id.desc()).limit(limit)).all()
         return newest[::-1]
 
-    def list_due(self, campaign_id: str) -> Sequence[CampaignEventRow]:
-        """Return the events of a campaign whose notification is due."""
-        query = select(CampaignEventRow).where(
-            CampaignEventRow.campaign_id == campaign_id, CampaignEventRow.notification == "due"
-        )
-        with self._sessions() as session:
-            return session.scalars(query.order_by(CampaignEventRow.id)).all()
+    def claim_notification(self, now: datetime, until: datetime) -> ClaimedNotification | None:
+        """Begin an attempt to send a message that is due; no other process begins one before ``until``.
 
-    def set_notification(self, event_id: int, result: str) -> None:
-        """Record the result of a notification."""
+        Args:
+            now: UTC.
+            until: UTC at which the message is due again, should this process end before it records the result.
+
+        Returns:
+            The message that is due longest, with its event, or None.
+        """
+        row = CampaignNotificationRow
+        due = select(row).where(row.state == "due", row.next_attempt <= now).order_by(row.next_attempt).limit(1)
+        with self._sessions() as session:
+            if session.scalars(due).first() is None:
+                return None
+        with self._begin_write() as session:
+            claimed = session.scalars(due.with_for_update(skip_locked=True)).first()
+            if claimed is None:
+                return None
+            claimed.attempts += 1
+            claimed.next_attempt = until
+            event = session.get_one(CampaignEventRow, claimed.event_id)
+            session.commit()
+            return ClaimedNotification(claimed, event)
+
+    def record_attempt(
+        self, notification_id: int, state: NotificationState, reason: str = "", again: datetime | None = None
+    ) -> None:
+        """Record the result of an attempt to send a message, and when it is made again."""
         with self._sessions.begin() as session:
-            session.get_one(CampaignEventRow, event_id).notification = result
+            row = session.get_one(CampaignNotificationRow, notification_id)
+            row.state, row.reason, row.next_attempt = state, reason, again
 
     def _begin_write(self) -> Session:
         session = self._sessions()

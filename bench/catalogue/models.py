@@ -4,7 +4,7 @@ from datetime import UTC, datetime
 from typing import Any, Literal, TypeAlias, get_args
 
 from sqlalchemy import JSON, BigInteger, DateTime, Dialect, Enum, ForeignKey, Index, Text
-from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
+from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 from sqlalchemy.types import TypeDecorator
 
 from bench.endings import RunEnding
@@ -15,6 +15,8 @@ LogIntegrity: TypeAlias = Literal["intact", "changed", "missing"]
 """Comparison of a log with its stored hash; missing: the file does not exist."""
 RunOutcome: TypeAlias = Literal["clean", "lossy", "truncated", "incomplete"]
 JobState: TypeAlias = Literal["queued", "running", "done", "failed", "cancelled"]
+NotificationState: TypeAlias = Literal["due", "sent", "failed"]
+"""due: an attempt is to follow; failed: none is."""
 NoteKind: TypeAlias = Literal["note", "tags"]
 """A text of a person, or the record of changed tags."""
 UNFINISHED_STATES: tuple[JobState, ...] = ("queued", "running")
@@ -218,5 +220,25 @@ class CampaignEventRow(Base):
     who: Mapped[str] = mapped_column(Text, default="")
     item: Mapped[str] = mapped_column(Text, default="")
     """Id of the step; empty for the campaign as a whole."""
-    notification: Mapped[str] = mapped_column(Text, default="")
-    """`due`, `sent`, or the reason of a failure; empty where none is needed."""
+    notifications: Mapped[list["CampaignNotificationRow"]] = relationship(
+        lazy="selectin", order_by="CampaignNotificationRow.id"
+    )
+    """One for each recipient; empty where nobody is told."""
+
+
+class CampaignNotificationRow(Base):
+    """Event of a campaign as a message to one recipient."""
+
+    __tablename__ = "campaign_notifications"
+
+    id: Mapped[int] = mapped_column(primary_key=True, autoincrement=True)
+    event_id: Mapped[int] = mapped_column(ForeignKey("campaign_events.id"), index=True)
+    recipient: Mapped[dict[str, Any]] = mapped_column(JSON)
+    """Recipient as the campaign names it."""
+    state: Mapped[NotificationState] = mapped_column(Text, default="due", index=True)
+    attempts: Mapped[int] = mapped_column(default=0)
+    """Number of attempts that have begun."""
+    next_attempt: Mapped[datetime | None] = mapped_column(UtcTime)
+    """UTC from which the next attempt may begin; None if there is none."""
+    reason: Mapped[str] = mapped_column(Text, default="")
+    """Reason why the latest attempt has failed."""

@@ -103,6 +103,23 @@ class Bench:
         request = {"campaign": campaign, "operator": operator}
         return self.campaign(str(self._session.post("/campaigns", request, key=uuid.uuid4().hex)["id"]))
 
+    def plan_campaign(self, campaign: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the dry run of a campaign: time, heat, disk and limits; nothing is started.
+
+        Raises:
+            ClientError: the campaign is invalid, or the service cannot be reached.
+        """
+        return dict(self._session.post("/campaigns/plan", {"campaign": campaign}))
+
+    def find_campaign(self) -> Campaign | None:
+        """Return the campaign that holds the bench, or None.
+
+        Raises:
+            ClientError: the service cannot be reached.
+        """
+        held = self._session.get("/queue")["campaign"]
+        return None if held is None else self.campaign(str(held["id"]))
+
     def campaign(self, campaign_id: str) -> Campaign:
         """Return a campaign by its id; nothing is requested yet."""
         return Campaign(self._session, campaign_id)

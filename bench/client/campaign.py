@@ -80,6 +80,14 @@ class Campaign:
         """
         return dict(self._session.patch(self._path, {"edit": edit, "who": who}))
 
+    def send_test_message(self) -> str:
+        """Send a test message to all recipients; return `sent`, or the reasons of failures.
+
+        Raises:
+            ClientError: the campaign has no recipients, or the service cannot be reached.
+        """
+        return str(self._post("test-message", {})["result"])
+
     def wait(self, timeout: float = 86_400.0) -> dict[str, Any]:
         """Wait until the campaign ends or asks for a person, and return its state.
 

@@ -20,6 +20,7 @@ from bench.errors import MethodError
 from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import Method, compile_method, compute_envelope, load_method, parse_method
 from bench.service.routes.planning.previews import make_preview
+from tests.support.fake_campaigns import FakeCampaigns, campaign_routes
 from tests.support.fake_recording import recording_routes
 from tests.support.fake_specimens import add_history, specimen_routes
 
@@ -199,7 +200,7 @@ def application(bench: FakeBench) -> FastAPI:
         allowed = request.headers.get("authorization") == f"Bearer {TOKEN}"
         if request.url.path.startswith("/api/") and not allowed:
             return problem(401, "Not allowed", "the token is missing or wrong")
-        if request.method == "POST":
+        if request.method in ("POST", "PATCH"):
             body = await request.body()
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
@@ -216,6 +217,7 @@ def application(bench: FakeBench) -> FastAPI:
     ):
         app.include_router(routes(bench), prefix="/api/v1")
     app.include_router(recording_routes(), prefix="/api/v1")
+    app.include_router(campaign_routes(FakeCampaigns()), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 

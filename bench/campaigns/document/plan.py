@@ -45,7 +45,8 @@ class PlannedMethod(FrozenModel):
     """One method with one drive, as often as the campaign runs it."""
 
     method: str = Field(description="Name of the method.")
-    drive: float | None = Field(description="[V or A] constant drive; null for the method's own.")
+    drive: float | None = Field(description="Constant drive in the unit of the drive; null for the method's own.")
+    drive_unit: str = Field(description="Unit of the drive: V or A.")
     runs: int = Field(description="[1] number of runs.")
     duration_s: float = Field(description="[s] duration of one run.")
     force_n: float = Field(description="[N] largest expected force.")
@@ -104,14 +105,15 @@ def plan_campaign(
     )
 
 
-def describe_step(step: Step) -> str:
-    """Describe a step for a person, with units."""
+def describe_step(step: Step, methods: Methods) -> str:
+    """Describe a step for a person, with units; ``methods`` has the method of each run by name."""
     if isinstance(step, NextStrokeStep):
         return f"at most {step.next_stroke.at_most} proposed strokes"
     run = find_run(step)
     if run is not None:
-        drive = "" if run.drive is None else f" at drive {run.drive:g}"
-        text = f"{get_method_name(run)}{drive} on {run.specimen}"
+        name = get_method_name(run)
+        drive = "" if run.drive is None else f" at {run.drive:g} {methods[name].drive_unit}"
+        text = f"{name}{drive} on {run.specimen}"
         return f"{text}, at most {step.repeat.at_most} times" if isinstance(step, RepeatStep) else text
     if isinstance(step, RestStep):
         seconds, target = step.rest.seconds, step.rest.until_temperature_c
@@ -185,7 +187,7 @@ def _plan_steps(steps: tuple[Step, ...], methods: Methods) -> tuple[PlannedStep,
             PlannedStep(
                 number=index + 1,
                 kind=kind,
-                label=describe_step(step),
+                label=describe_step(step, methods),
                 duration_s=expected,
                 longest_s=None if kind == "prompt" else longest,
                 heat_j=heat,
@@ -217,6 +219,7 @@ def _plan_method(
     return PlannedMethod(
         method=name,
         drive=drive,
+        drive_unit=method.drive_unit,
         runs=count,
         duration_s=programme.duration,
         force_n=envelope.total.force_n,
@@ -263,7 +266,7 @@ def format_plan(plan: CampaignPlan) -> list[str]:
 
 
 def _format_method(method: PlannedMethod) -> list[str]:
-    drive = "" if method.drive is None else f" at drive {method.drive:g}"
+    drive = "" if method.drive is None else f" at {method.drive:g} {method.drive_unit}"
     head = (
         f"method {method.method}{drive}: {method.runs} runs of {method.duration_s:.1f} s, expected"
         f" {method.force_n:.0f} N, {method.verdict}, {method.checkpoints} checkpoints"

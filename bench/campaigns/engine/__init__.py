@@ -10,7 +10,7 @@ from bench.campaigns.engine.conditions import (
     needs_results,
     needs_thermometer,
 )
-from bench.campaigns.engine.edits import QueueEdit, apply_edit, collect_edit_methods
+from bench.campaigns.engine.edits import QueueEdit, apply_edit, collect_edit_methods, parse_edit
 from bench.campaigns.engine.evaluation import find_awaited_run, is_awaiting_diagnosis
 from bench.campaigns.engine.executions import find_spec, make_method
 from bench.campaigns.engine.machine import advance, recover
@@ -58,6 +58,7 @@ __all__ = [
     "needs_results",
     "needs_thermometer",
     "parse_choice",
+    "parse_edit",
     "pause",
     "recover",
     "resume",

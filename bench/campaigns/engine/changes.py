@@ -28,7 +28,7 @@ def make_items(
     """Return new items with ids of their own, and the state that has counted them."""
     durations = estimate_durations(steps, methods)
     items = tuple(
-        Item(id=f"s{number:04d}", step=step, label=describe_step(step), expected_s=duration)
+        Item(id=f"s{number:04d}", step=step, label=describe_step(step, methods), expected_s=duration)
         for number, (step, duration) in enumerate(zip(steps, durations, strict=True), state.numbered + 1)
     )
     return state.model_copy(update={"numbered": state.numbered + len(items)}), items

@@ -2,13 +2,21 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, NonNegativeInt
+from pydantic import Field, NonNegativeInt, TypeAdapter, ValidationError
 
-from bench.campaigns.document import AnyStep, CampaignError, Methods, find_run, get_method_name
+from bench.campaigns.document import (
+    AnyStep,
+    CampaignError,
+    Methods,
+    PromptSpec,
+    PromptStep,
+    find_run,
+    get_method_name,
+)
 from bench.campaigns.engine.changes import change, change_item, make_items, say
 from bench.campaigns.engine.executions import find_spec
 from bench.campaigns.engine.state import CampaignState, Item
-from bench.validation import FrozenModel
+from bench.validation import FrozenModel, describe_validation_error
 
 
 class AddEdit(FrozenModel):
@@ -34,8 +42,18 @@ class DeleteEdit(FrozenModel):
     item: str = Field(description="Id of the pending item.")
 
 
+class PauseEdit(FrozenModel):
+    """Insertion of a pause; the campaign waits there until a person answers."""
+
+    edit: Literal["pause"]
+    before: str | None = Field(default=None, description="Pending item before which it is put; null: the end.")
+    text: str = Field(
+        default="Pause: answer to continue", min_length=1, max_length=1000, description="Request to the person."
+    )
+
+
 class DoNowEdit(FrozenModel):
-    """One step between two runs; refused while a run is in progress."""
+    """One step between two runs, refused during a run; a rest or prompt in progress begins again afterwards."""
 
     edit: Literal["do_now"]
     step: AnyStep = Field(description="Step to begin next.")
@@ -48,8 +66,23 @@ class ReleaseEdit(FrozenModel):
     item: str = Field(description="Id of the item.")
 
 
-QueueEdit = Annotated[AddEdit | MoveEdit | DeleteEdit | DoNowEdit | ReleaseEdit, Field(discriminator="edit")]
+QueueEdit = Annotated[
+    AddEdit | MoveEdit | DeleteEdit | PauseEdit | DoNowEdit | ReleaseEdit, Field(discriminator="edit")
+]
 """One edit of the queue."""
+
+
+def parse_edit(text: str, origin: str) -> QueueEdit:
+    """Return the edit of a JSON text; ``origin`` names the text in messages.
+
+    Raises:
+        CampaignError: it is no edit; the message names the position.
+    """
+    try:
+        edit: QueueEdit = TypeAdapter(QueueEdit).validate_json(text)
+    except ValidationError as error:
+        raise CampaignError(f"{origin} is not an edit: {describe_validation_error(error)}") from None
+    return edit
 
 
 def apply_edit(
@@ -71,7 +104,10 @@ def apply_edit(
         raise CampaignError(f"campaign {state.campaign.name} is {state.status}; its queue cannot be edited")
     match edit:
         case AddEdit():
-            state, text = _add(state, edit, methods)
+            state, text = _add(state, edit.steps, edit.before, methods)
+        case PauseEdit():
+            step = PromptStep(prompt=PromptSpec(text=edit.text))
+            state, text = _add(state, (step,), edit.before, methods)
         case MoveEdit():
             state, text = _move(state, edit)
         case DeleteEdit():
@@ -93,11 +129,13 @@ def collect_edit_methods(edit: QueueEdit) -> tuple[Any, ...]:
     return (edit.step,) if isinstance(edit, DoNowEdit) else ()
 
 
-def _add(state: CampaignState, edit: AddEdit, methods: Methods) -> tuple[CampaignState, str]:
+def _add(
+    state: CampaignState, steps: tuple[AnyStep, ...], before: str | None, methods: Methods
+) -> tuple[CampaignState, str]:
     index = len(state.items)
-    if edit.before is not None:
-        index = state.items.index(_get_pending(state, edit.before))
-    state, added = _insert(state, edit.steps, methods, index)
+    if before is not None:
+        index = state.items.index(_get_pending(state, before))
+    state, added = _insert(state, steps, methods, index)
     labels = ", ".join(f"{item.id} {item.label}" for item in added)
     return state, f"added {labels}"
 
@@ -124,16 +162,27 @@ def _move(state: CampaignState, edit: MoveEdit) -> tuple[CampaignState, str]:
 
 
 def _do_now(state: CampaignState, edit: DoNowEdit, methods: Methods) -> tuple[CampaignState, str]:
-    if state.active is not None:
-        active = state.get_item(state.active.item)
-        raise CampaignError(
-            f"step {active.id}, {active.label}, is in progress; one thing now is possible between two runs: "
-            "pause the campaign, or wait for the end of the run"
-        )
+    state = _interrupt(state)
     pending = state.pending
     index = state.items.index(pending[0]) if pending else len(state.items)
     state, added = _insert(state, (edit.step,), methods, index)
     return state, f"now: {added[0].id} {added[0].label}"
+
+
+def _interrupt(state: CampaignState) -> CampaignState:
+    """Put back a rest or a prompt in progress, which then begins again; refuse while anything else is."""
+    active = state.active
+    if active is None:
+        return state
+    item = state.get_item(active.item)
+    if active.is_question:
+        raise CampaignError(f"step {item.id}, {item.label}, has failed and waits for an answer; answer it first")
+    if active.phase not in ("resting", "asking"):
+        raise CampaignError(
+            f"step {item.id}, {item.label}, is in progress; one thing now is possible between two runs: "
+            "pause the campaign, or wait for the end of the run"
+        )
+    return change(change_item(state, item.id, state="pending"), active=None)
 
 
 def _release(state: CampaignState, item_id: str) -> tuple[CampaignState, str]:

@@ -1,4 +1,4 @@
-"""`mrbench campaign status|pause|resume|stop`: on the catalogue of a data folder, also without a service.
+"""Commands of `mrbench campaign` on the catalogue of a data folder, also without a service.
 
 A command changes the stored state. The process that executes the campaign acts on it within a second.
 """
@@ -18,8 +18,11 @@ from bench.campaigns import (
     format_view,
     make_view,
     parse_choice,
+    parse_edit,
     pause,
     resume,
+    send_due,
+    send_test,
     stop,
 )
 from bench.commands.campaign.catalogue import open_store
@@ -29,17 +32,26 @@ _EVENTS = 200
 
 
 def control(
-    action: str, target: str, data: Path, operator: str, *, note: str | None, choice: str | None, as_json: bool
+    action: str,
+    target: str,
+    data: Path,
+    operator: str,
+    *,
+    note: str | None,
+    choice: str | None,
+    edit: str,
+    as_json: bool,
 ) -> None:
     """Show or change a campaign.
 
     Args:
-        action: status, pause, resume or stop.
+        action: status, pause, resume, stop, edit or test-message.
         target: id of the campaign; empty for the only one in progress, or the newest.
         data: data folder.
         operator: person, for the record.
         note: answer to a prompt, with resume.
         choice: decision on a failed step, with resume.
+        edit: edit of the queue as JSON, with edit.
         as_json: print JSON instead of text.
 
     Raises:
@@ -47,12 +59,19 @@ def control(
     """
     with open_store(data) as store:
         campaign = _find(store, target)
-        if action != "status":
-            now = max(time.time(), campaign.state.updated)
+        if action == "test-message":
+            typer.echo(send_test(campaign))
+            return
+        now = max(time.time(), campaign.state.updated)
+        if action == "edit":
+            campaign = store.edit(campaign.id, parse_edit(edit, "--edit"), now, operator)
+        elif action != "status":
             change = _make_change(action, campaign, operator, now, note, choice)
             campaign = store.update(campaign.id, change)
         view = make_view(campaign, store.table.list_newest_events(campaign.id, _EVENTS))
         typer.echo(view.model_dump_json(indent=2) if as_json else "\n".join(format_view(view)))
+        if action == "stop":
+            send_due(store)  # without a service nobody else would send them
 
 
 def _make_change(

@@ -16,6 +16,8 @@ class Action(StrEnum):
     PAUSE = "pause"
     RESUME = "resume"
     STOP = "stop"
+    EDIT = "edit"
+    TEST_MESSAGE = "test-message"
 
 
 def campaign(
@@ -23,7 +25,8 @@ def campaign(
         Action,
         typer.Argument(
             help="plan: time, heat, disk, limits and identifiability. run: start or continue it. "
-            "status, pause (at the next checkpoint), resume, stop (after the run in progress)."
+            "status, pause (at the next checkpoint), resume, stop (after the run in progress), "
+            "edit (the queue), test-message (to all recipients)."
         ),
     ],
     target: Annotated[
@@ -52,6 +55,9 @@ def campaign(
     choice: Annotated[
         str | None, typer.Option(metavar="retry|skip|stop", help="With resume: decide on a failed step.")
     ] = None,
+    edit: Annotated[
+        str, typer.Option(metavar="JSON", help='With edit: such as {"edit": "delete", "item": "s0004"}.')
+    ] = "",
     new: Annotated[
         bool, typer.Option("--new", help="With run: start again, also if the campaign is not finished.")
     ] = False,
@@ -63,6 +69,8 @@ def campaign(
     as_json = out == "-"
     if action in (Action.PLAN, Action.RUN) and not target:
         raise typer.BadParameter("give the file of the campaign")
+    if (action is Action.EDIT) != bool(edit):
+        raise typer.BadParameter("edit needs --edit JSON, and no other action takes it")
     if action is Action.PLAN:
         from bench.commands.campaign.plan import plan
 
@@ -74,7 +82,7 @@ def campaign(
     else:
         from bench.commands.campaign.control import control
 
-        control(action.value, target, data, operator, note=answer, choice=choice, as_json=as_json)
+        control(action.value, target, data, operator, note=answer, choice=choice, edit=edit, as_json=as_json)
 
 
 def _run(

@@ -10,6 +10,7 @@ from bench.campaigns import (
     CampaignRunner,
     CampaignStore,
     Message,
+    NotificationSender,
     PlantBench,
     StoredCampaign,
     collect_methods,
@@ -17,6 +18,7 @@ from bench.campaigns import (
     load_campaign,
     lock_campaign,
     make_view,
+    send_due,
 )
 from bench.commands.campaign.catalogue import open_store
 from bench.processes import set_on_signals
@@ -46,7 +48,9 @@ def run_on_plant(
         with lock_campaign(store.catalogue.folder, campaign.id), set_on_signals(stopping):
             bench.check_needs(campaign.state.campaign, [item.step for item in campaign.state.items])
             runner = CampaignRunner(store, campaign.id, bench, None if as_json else _print_message)
-            ended = runner.run(stopping.is_set)
+            with NotificationSender(store):
+                ended = runner.run(stopping.is_set)
+            send_due(store)
         if as_json:
             typer.echo(make_view(ended, store.table.list_newest_events(ended.id, 200)).model_dump_json(indent=2))
         elif not ended.state.has_ended:

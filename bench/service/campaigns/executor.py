@@ -10,6 +10,7 @@ from bench.campaigns import (
     CampaignError,
     CampaignRunner,
     CampaignStore,
+    NotificationSender,
     StoredCampaign,
     Thermometer,
     stop,
@@ -43,9 +44,11 @@ class CampaignExecutor:
         self._failures = RepeatedFailure(_LOG, "campaign_failed", "campaign_continues")
         self.bench = AgentBench(catalogue, monitor, self.thermometer, lambda: self._stopping.wait(PERIOD))
         self._thread = threading.Thread(target=self._execute, name="campaigns", daemon=True)
+        self._sender = NotificationSender(self.store)
 
     def __enter__(self) -> "CampaignExecutor":
-        """Start the thread."""
+        """Start the thread, and the sender of messages."""
+        self._sender.__enter__()
         if self.is_local:
             self._thread.start()
         return self
@@ -57,6 +60,7 @@ class CampaignExecutor:
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
+        self._sender.__exit__(kind, error, trace)
 
     def _execute(self) -> None:
         while not self._stopping.is_set():

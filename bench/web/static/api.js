@@ -58,8 +58,8 @@ export function liveAddress() {
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
 
-/** Changes what carries an ETag; refused with status 412 if it was changed since that ETag was read. */
-export const patch = (path, body, etag) => call("PATCH", path, body, undefined, { "If-Match": etag });
+/** Changes something; with an ETag refused, with status 412, if it was changed since that ETag was read. */
+export const patch = (path, body, etag) => call("PATCH", path, body, undefined, etag ? { "If-Match": etag } : {});
 
 /** Returns `{ data, etag }`; the ETag is for a later `patch`. */
 export async function getTag(path) {
@@ -116,7 +116,7 @@ export function upload(path, form, onProgress) {
   });
 }
 
-async function call(method, path, body, timeout, headers) {
+async function call(method, path, body, timeout = TIMEOUT_MS, headers) {
   const response = await send(method, path, body, timeout, headers);
   return response.status === 204 ? null : readJson(response, timeout);
 }

@@ -1,6 +1,7 @@
 // Entry point: creates the parts of the page and distributes the messages of the service to them.
 
 import { get, keepToken, takeToken } from "./api.js";
+import { CampaignView } from "./campaigns.js";
 import { openDialog } from "./dialogs.js";
 import { EventList } from "./events.js";
 import { byId, fixed, write } from "./format.js";
@@ -62,6 +63,7 @@ const preparation = new Preparation();
 const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
+const campaigns = new CampaignView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -75,6 +77,7 @@ const router = new Router({
   run: (address) => runView.show(address),
   specimens: (address) => specimens.show(address),
   specimen: (address) => specimen.show(address),
+  campaigns: (address) => campaigns.show(address),
 });
 
 offerUnits(() => {

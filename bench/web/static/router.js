@@ -1,5 +1,5 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/plan/METHOD/edit`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`, `#/specimens/SERIAL`.
+// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`.
 
 import { byId } from "./format.js";
 

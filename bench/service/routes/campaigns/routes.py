@@ -14,22 +14,17 @@ from bench.campaigns import (
     CampaignState,
     CampaignStore,
     CampaignView,
-    Methods,
     StoredCampaign,
     answer,
-    apply_edit,
-    collect_edit_methods,
     collect_methods,
-    collect_step_methods,
     expand_campaign,
-    make_test_content,
     make_view,
     needs_results,
     parse_campaign,
     pause,
     plan_campaign,
     resume,
-    send_all,
+    send_test,
     stop,
 )
 from bench.disk import RESERVE, find_free_space
@@ -123,15 +118,9 @@ def get_campaign(campaign_id: str, context: Context) -> CampaignView:
 @router.patch("/campaigns/{campaign_id}")
 def edit_campaign(campaign_id: str, request: EditRequest, context: Context) -> CampaignView:
     """Edit the queue of a campaign while it runs; the edit is recorded with who made it and when."""
-    methods = collect_step_methods(collect_edit_methods(request.edit))
-    stored = _get(context.campaigns.store, campaign_id)
-    for name, method in methods.items():
-        if stored.methods.get(name, method) != method:
-            raise CampaignError(f"the campaign has another method {name}; give yours a name of its own")
-    known = stored.methods | methods
-    return _change(
-        context, campaign_id, lambda state, now: apply_edit(state, request.edit, known, now, request.who), methods
-    )
+    store = context.campaigns.store
+    now = max(time.time(), _get(store, campaign_id).state.updated)
+    return _show(store, store.edit(campaign_id, request.edit, now, request.who))
 
 
 @router.post("/campaigns/{campaign_id}/pause")
@@ -173,10 +162,7 @@ def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context) 
 @router.post("/campaigns/{campaign_id}/test-message")
 def send_test_message(campaign_id: str, context: Context) -> TestMessageResult:
     """Send a test message to the recipients of a campaign."""
-    campaign = _get(context.campaigns.store, campaign_id).state.campaign
-    if not campaign.notify:
-        raise CampaignError(f"campaign {campaign.name} has no recipients; give it notify")
-    return TestMessageResult(result=send_all(campaign.notify, make_test_content(campaign.name)))
+    return TestMessageResult(result=send_test(_get(context.campaigns.store, campaign_id)))
 
 
 @router.get("/queue")
@@ -207,12 +193,9 @@ def _show(store: CampaignStore, campaign: StoredCampaign) -> CampaignView:
 
 
 def _change(
-    context: ServiceContext,
-    campaign_id: str,
-    transition: Callable[[CampaignState, float], CampaignState],
-    methods: Methods | None = None,
+    context: ServiceContext, campaign_id: str, transition: Callable[[CampaignState, float], CampaignState]
 ) -> CampaignView:
     """Change a stored campaign; its executor acts on it at its next step."""
     store = context.campaigns.store
     now = max(time.time(), _get(store, campaign_id).state.updated)
-    return _show(store, store.update(campaign_id, lambda state: transition(state, now), methods))
+    return _show(store, store.update(campaign_id, lambda state: transition(state, now)))

@@ -50,7 +50,7 @@ class EditRequest(View):
     """Edit of the queue."""
 
     who: str = _WHO
-    edit: QueueEdit = Field(description="add, move, delete, do_now or release")
+    edit: QueueEdit = Field(description="add, move, delete, pause, do_now or release")
 
 
 class CampaignSummary(View):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from bench.campaigns import CampaignError
 from bench.campaigns.document import collect_methods
 from bench.campaigns.engine import Observation, advance, answer, apply_edit, compute_interval, pause, resume, stop
-from bench.campaigns.engine.edits import AddEdit, DeleteEdit, DoNowEdit, MoveEdit, ReleaseEdit
+from bench.campaigns.engine.edits import AddEdit, DeleteEdit, DoNowEdit, MoveEdit, PauseEdit, ReleaseEdit
 from tests.unit.bench.campaigns.simulated_bench import ID, SimulatedBench, result, start
 
 RUN = {"run": {"specimen": "MR-1", "method": "quick"}}
@@ -247,6 +247,42 @@ def test_the_queue_is_edited_and_every_edit_is_recorded():
     assert all(message.who == "B" for message in bench.messages if message.kind == "edit")
 
 
+@pytest.mark.parametrize("step", [REST, PROMPT])
+def test_one_thing_now_is_done_before_a_rest_or_prompt_in_progress_which_then_begins_again(step):
+    bench = SimulatedBench(start([step, OTHER]))
+    bench.store(advance(bench.state, Observation(), bench.now, ID))
+    assert bench.state.active.phase in ("resting", "asking")
+    methods = collect_methods(bench.state.campaign)
+    bench.store(apply_edit(bench.state, DoNowEdit(edit="do_now", step=RUN), methods, bench.now, "B"))
+    assert [item.id for item in bench.state.pending] == ["s0003", "s0001", "s0002"]
+    bench.run()
+    if bench.state.needs_person:
+        bench.store(answer(bench.state, bench.now, "B", "done"))
+    assert bench.run().status == "done"
+    assert [fact.item for fact in bench.state.facts] == ["s0003", "s0002"]
+
+
+def test_one_thing_now_waits_for_the_answer_to_a_failure():
+    bench = SimulatedBench(start([RUN]))
+    bench.outcomes[0] = {"outcome": "incomplete", "ending": "tripped", "reason": "force"}
+    bench.run()
+    with pytest.raises(CampaignError, match="answer it first"):
+        apply_edit(bench.state, DoNowEdit(edit="do_now", step=REST), {}, bench.now)
+
+
+def test_a_pause_in_the_queue_waits_there_for_a_person():
+    bench = SimulatedBench(start([RUN, OTHER]))
+    edit = PauseEdit(edit="pause", before="s0002", text="Check the clevis")
+    bench.store(apply_edit(bench.state, edit, {}, bench.now, "B"))
+    assert bench.run().needs_person
+    assert [fact.item for fact in bench.state.facts] == ["s0001"]
+    assert bench.texts("person_needed") == ["Check the clevis"]
+    bench.store(answer(bench.state, bench.now, "B"))
+    assert bench.run().status == "done"
+    edit = next(one for one in bench.messages if one.kind == "edit")
+    assert (edit.who, edit.text) == ("B", "added s0003 Check the clevis")
+
+
 @pytest.mark.parametrize(
     ("edit", "reason"),
     [
@@ -268,7 +304,7 @@ EVENTS = st.lists(
     st.one_of(
         st.tuples(st.just("step"), st.integers(1, 6)),
         st.tuples(st.just("kill"), st.booleans()),
-        st.tuples(st.sampled_from(["pause", "resume", "add", "delete", "move"]), st.integers(0, 5)),
+        st.tuples(st.sampled_from(["pause", "resume", "add", "delete", "move", "do_now"]), st.integers(0, 5)),
     ),
     max_size=40,
 )
@@ -278,6 +314,8 @@ def edit_at_random(bench, methods, kind, number):
     pending = bench.state.pending
     if kind == "add":
         return apply_edit(bench.state, AddEdit(edit="add", steps=[OTHER]), methods, bench.now)
+    if kind == "do_now":
+        return apply_edit(bench.state, DoNowEdit(edit="do_now", step=OTHER), methods, bench.now)
     if kind in ("pause", "resume"):
         return {"pause": pause, "resume": resume}[kind](bench.state, bench.now)
     chosen = pending[number % len(pending)].id if pending else "none"

@@ -15,9 +15,14 @@ def test_a_script_starts_edits_answers_and_stops_a_campaign(bench):
         campaign.answer()
     campaign.answer("12 N m", who="B")
     assert campaign.edit({"edit": "add", "steps": [REST]}, "B")["items"][2]["state"] == "pending"
+    assert bench.find_campaign().id == campaign.id
+    with pytest.raises(ClientError, match="no recipients"):
+        campaign.send_test_message()
     assert campaign.pause("B")["status"] == "paused"
     assert campaign.resume("B")["status"] == "running"
     assert campaign.stop("B")["status"] == "stopped"
     assert [one["id"] for one in bench.list_campaigns()] == [campaign.id]
+    assert bench.find_campaign() is None
+    assert bench.plan_campaign({"name": "night", "steps": [REST]})["duration_s"] == 900
     with pytest.raises(ClientError, match="at least one step"):
         bench.start_campaign({"name": "night", "steps": []})

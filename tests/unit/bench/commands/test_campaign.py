@@ -8,6 +8,8 @@ import pytest
 from bench.campaigns import CampaignError
 from bench.commands.campaign.bench import check_served, find_or_create
 from bench.commands.campaign.catalogue import open_store
+from bench.commands.campaign.control import control
+from tests.support.message_servers import serve_webhook
 
 
 def write(path, **more):
@@ -31,3 +33,23 @@ def test_an_equal_campaign_is_followed_and_another_one_is_refused(tmp_path):
         assert find_or_create(store, tmp_path / "a.json", "B").id == first.id
         with pytest.raises(CampaignError, match=f"{first.id} holds the bench"):
             find_or_create(store, write(tmp_path / "b.json", seed=4), "B")
+
+
+def test_the_queue_is_edited_and_stopped_by_the_command_line_also_without_a_service(tmp_path, capsys):
+    def act(action, **more):
+        given = {"note": None, "choice": None, "edit": "", "as_json": True} | more
+        control(action, "", tmp_path / "data", "B", **given)
+        return capsys.readouterr().out
+
+    with serve_webhook() as (address, received):
+        with open_store(tmp_path / "data", is_created=True) as store:
+            find_or_create(store, write(tmp_path / "a.json", notify=[{"webhook": address}]), "B")
+        edit = '{"edit": "do_now", "step": {"rest": {"seconds": 7}}}'
+        view = json.loads(act("edit", edit=edit))
+        assert [item["label"] for item in view["items"]] == ["rest 7 s", "rest 5 s"]
+        assert (view["events"][-1]["kind"], view["events"][-1]["who"]) == ("edit", "B")
+        with pytest.raises(CampaignError, match="--edit is not an edit"):
+            act("edit", edit='{"edit": "hope"}')
+        assert act("test-message").strip() == "sent"
+        act("stop")
+    assert [one["kind"] for one in received] == ["test", "ended"]

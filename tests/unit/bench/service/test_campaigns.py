@@ -7,6 +7,7 @@ import pytest
 
 from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
 from bench.campaigns import parse_campaign
+from tests.support.message_servers import find_closed_port, serve_webhook
 from tests.support.service_logs import write_complete_log
 
 RUN = {"run": {"specimen": "MR-1", "method": "quick"}}
@@ -112,8 +113,16 @@ def test_the_queue_is_edited_while_a_run_is_in_progress(service):
     assert [item["id"] for item in added["items"]] == ["s0001", "s0003", "s0002"]
     assert "between two runs" in edit(409, edit="do_now", step={"rest": {"seconds": 5}})["detail"]
     assert "s0001 is active" in edit(409, edit="delete", item="s0001")["detail"]
+    edit(200, "/api/v1/queue", edit="move", item="s0002", position=0)
+    paused = edit(200, "/api/v1/queue", edit="pause", before="s0003", text="Check the clevis")
+    assert [item["id"] for item in paused["items"]] == ["s0001", "s0002", "s0004", "s0003"]
     deleted = edit(200, "/api/v1/queue", edit="delete", item="s0002")
-    assert deleted["items"][2]["state"] == "skipped"
+    assert deleted["items"][1]["state"] == "skipped"
+    kept = [event for event in service.get(path.removeprefix("/api/v1"))["events"] if event["kind"] == "edit"]
+    assert [(event["who"], event["text"].split()[0]) for event in kept] == [
+        ("B", "added"), ("B", "moved"), ("B", "added"), ("B", "deleted"),
+    ]  # fmt: skip
+    assert all(event["at"] for event in kept)
     edit(422, edit="hope")
     assert service.post("/campaigns", {"campaign": {"name": "b", "steps": [RUN]}}, 409)["type"].endswith("held")
 
@@ -161,6 +170,26 @@ def test_unknown_campaigns_and_missing_recipients_are_told(service):
     assert service.client.get("/api/v1/campaigns?before=none").status_code == 404
     campaign = start(service, [{"rest": {"seconds": 500}}])
     assert "no recipients" in service.post(f"/campaigns/{campaign['id']}/test-message", {}, 409)["detail"]
+
+
+def test_a_message_that_cannot_be_sent_is_shown_and_stops_nothing(service):
+    refused = {"webhook": f"http://127.0.0.1:{find_closed_port()}/"}
+    with serve_webhook() as (address, received):
+        campaign = start(service, [PROMPT, RUN], notify=[refused, {"webhook": address}])
+        told = wait(service, campaign, lambda found: found["question"] and list_messages(found, "sent"))
+        assert received[0]["text"] == "Mount the next specimen"
+        result = service.post(f"/campaigns/{campaign['id']}/test-message")["result"]
+        assert "the connection was refused" in result
+        assert received[-1]["kind"] == "test"
+    (due,) = list_messages(told, "due")
+    assert (due["attempts"], "the connection was refused" in due["reason"]) == (1, True)
+    service.post(f"/campaigns/{campaign['id']}/answer", {"note": "done", "photo": PHOTO})
+    wait(service, campaign, lambda found: found["phase"] == "stroking")
+
+
+def list_messages(campaign, state):
+    found = [one for event in campaign["events"] for one in event["notifications"]]
+    return [one for one in found if one["state"] == state]
 
 
 def test_a_campaign_from_the_command_line_that_cannot_be_met_ends_with_the_reason(service):

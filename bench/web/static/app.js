@@ -71,6 +71,7 @@ const router = new Router({
 offerUnits(() => {
   plots.relabel();
   plan.relabel();
+  runView.relabel();
 });
 
 let requesting = false;

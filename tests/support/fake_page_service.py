@@ -12,14 +12,15 @@ from typing import Annotated, Any
 
 import numpy as np
 import uvicorn
-from fastapi import APIRouter, FastAPI, Form, Request, UploadFile, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, FastAPI, Form, Request, Response, UploadFile, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
 from bench.live import Channel, LiveBatch, describe_channels
-from bench.methods import compile_method, compute_envelope, load_method
+from bench.methods import Method, compile_method, compute_envelope, load_method
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_recording import recording_routes
+from tests.support.fake_results import Records, analysis_routes, make_summary, record_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
@@ -113,6 +114,18 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
     } | more  # fmt: skip
 
 
+def done_jobs(run_id: str, found: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return a fit, a diagnosis and a prediction that are done."""
+    ended = {"finished": "2025-03-04T09:22:00Z"}
+    return [
+        fit_job(run_id, "done", **found, **ended),
+        fit_job(run_id, "done", id=f"diagnosis-{run_id}", kind="diagnose", **ended),
+        fit_job(
+            run_id, "done", id=f"prediction-{run_id}", kind="predict", settings={"model": "job-run-7"}, **ended
+        ),
+    ]
+
+
 class FakeBench:
     """State of the fake bench; all requests that change something are kept in ``posted``."""
 
@@ -128,15 +141,18 @@ class FakeBench:
         self.silent = False
         self.last_status: dict[str, Any] | None = None
         self.over = False
+        self.stored: dict[str, Method] = {}
         found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
         activity = "identify: refine, start 3 of 8"
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost", ending="stopped", log_sha256=HASH,
                          jobs=[fit_job("run-3", "failed", error="the worker was killed")]),
             "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity=activity)]),
-            "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
+            "run-1": run(1, "clean", jobs=done_jobs("run-1", found), log_sha256=HASH,
+                         diagnosis=make_summary("diagnosis-run-1"), **found),
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
+        self.records = Records(self.runs)
         self.began, self.began_utc = time.monotonic(), time.time()
 
     def status(self) -> dict[str, Any]:
@@ -194,7 +210,7 @@ def application(bench: FakeBench) -> FastAPI:
         allowed = request.headers.get("authorization") == f"Bearer {TOKEN}"
         if request.url.path.startswith("/api/") and not allowed:
             return problem(401, "Not allowed", "the token is missing or wrong")
-        if request.method == "POST":
+        if request.method != "GET":
             body = await request.body()
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
@@ -209,7 +225,8 @@ def application(bench: FakeBench) -> FastAPI:
         live_routes,
     ):
         app.include_router(routes(bench), prefix="/api/v1")
-    app.include_router(recording_routes(), prefix="/api/v1")
+    for other in (recording_routes(), analysis_routes(), record_routes(bench.records, problem)):
+        app.include_router(other, prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 
@@ -266,8 +283,15 @@ def method_routes(bench: FakeBench) -> APIRouter:
         return {"items": METHODS, "next": None}
 
     @router.get("/{name}")
+    @router.get("/{name}/{version:int}")
     async def method(name: str) -> Any:
         return load_method(name).model_dump(mode="json", by_alias=True, exclude_defaults=True)
+
+    @router.post("", status_code=201)
+    async def store(wanted: Method) -> Any:
+        bench.stored[wanted.name] = wanted
+        length = compile_method(wanted).duration
+        return METHODS[-1] | {"name": wanted.name, "title": wanted.title, "duration_s": length, "source": "stored"}
 
     @router.get("/{name}/preview")
     async def preview(name: str) -> Any:
@@ -275,7 +299,8 @@ def method_routes(bench: FakeBench) -> APIRouter:
 
     @router.post("/dry-run")
     async def dry_run(wanted: dict[str, Any]) -> Any:
-        programme = compile_method(load_method(wanted["method"]))
+        named = wanted["method"]
+        programme = compile_method(load_method(named) if isinstance(named, str) else Method.model_validate(named))
         envelope = compute_envelope(programme).model_dump(mode="json", by_alias=True)
         words = {"messages": ["k0 to 3 % (standard deviation)"]} if wanted.get("identifiability", True) else None
         trip = {"unit": "N", "indicate": None, "hold": None, "controlled_stop": None, "trip": 5000.0}
@@ -302,7 +327,8 @@ def run_routes(bench: FakeBench) -> APIRouter:
         return {"items": sorted(found, key=lambda one: one["started"], reverse=True), "next": None}
 
     @router.get("/runs/{run_id}")
-    async def one_run(run_id: str) -> Any:
+    async def one_run(run_id: str, response: Response) -> Any:
+        response.headers["ETag"] = bench.records.make_tag(run_id)
         return bench.runs[run_id]
 
     @router.post("/runs", status_code=201)
@@ -373,7 +399,7 @@ def result_routes(bench: FakeBench) -> APIRouter:
 
     @router.post("/runs/{run_id}/identify")
     async def identify(run_id: str) -> Any:
-        return bench.runs[run_id]["jobs"][-1]
+        return next(job for job in bench.runs[run_id]["jobs"] if job["kind"] == "identify")
 
     return router
 

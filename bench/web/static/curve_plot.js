@@ -30,7 +30,7 @@ function widen([low, high], margin) {
 /**
  * Figure of curves over x, which need not be functions of x: a loop is drawn in the order of its points.
  *
- * Each curve has `name`, `colour` (of the style sheet), `x`, `y`, and perhaps `dashed`. The band has `name`, `colour`,
+ * Each curve has `name`, `colour` (of the style sheet), `x`, `y`, and perhaps `dashed` or `wide`. The band has `name`, `colour`,
  * `x`, `low` and `high`. uPlot draws the axes; they have the labels `across` and `up` with their units.
  */
 export class CurvePlot {
@@ -38,17 +38,18 @@ export class CurvePlot {
     Object.assign(this, { curves, band });
     this.place = element("div", { className: "plot", role: "img", "aria-label": `${title}: ${up} over ${across}` });
     this.figure = element("figure", { className: "curves" },
-      element("figcaption", {}, element("strong", {}, title), ` ${up}, over ${across} `, ...this.legend()), this.place);
+      element("figcaption", {}, element("strong", {}, title), ` ${up}, over ${across}`, element("span", { className: "legends" }, ...this.legend())), this.place);
     const horizontal = findBounds([...curves.map(({ x }) => x), band?.x ?? []]);
     const vertical = findBounds([...curves.map(({ y }) => y), band?.low ?? [], band?.high ?? []]);
     this.bounds = { x: widen(horizontal, 0), y: widen(vertical, MARGIN) };
   }
 
-  /** Names of curves and band with samples of their lines, for more than one of them. */
+  /** Names of curves and band with samples of their lines. */
   legend() {
     const all = [...this.curves, ...(this.band ? [{ ...this.band, isBand: true }] : [])];
-    return all.map(({ name, colour: of, dashed, isBand }) => {
-      const sample = element("i", { className: isBand ? "sample band" : dashed ? "sample dashed" : "sample", "aria-hidden": "true" });
+    return all.map(({ name, colour: of, dashed, wide, isBand }) => {
+      const kind = isBand ? "band" : dashed ? "dashed" : wide ? "wide" : "";
+      const sample = element("i", { className: `sample ${kind}`, "aria-hidden": "true" });
       sample.style.color = `var(${of})`;
       return element("span", { className: "legend" }, sample, name);
     });
@@ -100,12 +101,14 @@ export class CurvePlot {
     ctx.globalAlpha = 1;
   }
 
-  stroke(u, { x, y, colour: of, dashed }) {
+  stroke(u, { x, y, colour: of, dashed, wide }) {
     const { ctx } = u;
     ctx.beginPath();
     for (let n = 0; n < x.length; n++) ctx.lineTo(...position(u, x[n], y[n]));
     ctx.strokeStyle = colour(of);
-    ctx.lineWidth = 1.5 * devicePixelRatio;
+    ctx.lineWidth = (wide ? 5 : 1.5) * devicePixelRatio;
+    ctx.globalAlpha = wide ? 0.5 : 1;
+    ctx.lineJoin = "round"; // a mitre would show noise as long spikes
     ctx.setLineDash(dashed ? [5 * devicePixelRatio, 3 * devicePixelRatio] : []);
     ctx.stroke();
   }

@@ -86,6 +86,7 @@ async function startMethod(run, method) {
   const { name, version } = await post("methods", method);
   const operator = localStorage.getItem(OPERATOR) ?? "";
   await start("runs", { method: name, method_version: version, operator, ...(run.specimen && { specimen: run.specimen }) });
+  // The next key can stop a run that was started here. The router moves the focus to the title of the view before.
+  addEventListener("hashchange", () => byId("stop").focus(), { once: true });
   location.hash = "#/bench";
-  byId("stop").focus(); // the next key can stop a run that was started here
 }

@@ -63,12 +63,15 @@ export class DiagnosisPart {
 }
 
 function effectTable(effects) {
+  const isNoted = effects.some(({ note }) => note);
   const rows = effects.map((one) => [
     spaced(one.name), spaced(one.stage) + (one.place && one.place !== one.stage ? `, ${spaced(one.place)}` : ""), percent(one.probability),
     percent(one.share) + (one.share_ci95 ? ` (${percent(one.share_ci95[0])} … ${percent(one.share_ci95[1])})` : ""),
-    lines(Object.entries(one.parameters).map(([name, value]) => `${spaced(name)} ${interval(value)}`)), element("span", { className: "wrapped" }, one.note),
+    lines(Object.entries(one.parameters).map(([name, value]) => `${spaced(name)} ${interval(value)}`)),
+    ...(isNoted ? [element("span", { className: "wrapped" }, one.note)] : []),
   ]);
-  return table("Effects that the simulation lacks", ["Effect", "Place in the chain", "Probability", "Share of the gap (95 % interval)", "Size (95 % interval)", "Note"], rows);
+  const heads = ["Effect", "Place in the chain", "Probability", "Share of the gap (95 % interval)", "Size (95 % interval)"];
+  return table("Effects that the simulation lacks", isNoted ? [...heads, "Note"] : heads, rows);
 }
 
 const lines = (texts) => element("span", {}, ...texts.map((text) => element("span", { className: "line" }, text)));
@@ -142,7 +145,7 @@ function effectCurve({ place, curve }, driveUnit) {
   const x = inUnit(VARIABLE_UNITS[curve.variable] ?? "", driveUnit);
   const y = inUnit(curve.unit, driveUnit);
   const isRelative = ["drive", "field"].includes(place) && curve.unit !== "{drive}" && curve.unit !== driveUnit;
-  const up = `${PLACE_QUANTITIES[place] ?? spaced(place)}${isRelative ? " over drive" : ""} [${y.unit}]`;
+  const up = `${PLACE_QUANTITIES[place] ?? spaced(place)}${isRelative ? " over drive" : ""}${y.unit === "1" ? "" : ` [${y.unit}]`}`;
   const across = curve.x.map((value) => value * x.scale);
   const convert = (values) => values.map((value) => value * y.scale);
   const band = curve.lo && curve.hi && { name: "95 % band", colour: "--force", x: across, low: convert(curve.lo), high: convert(curve.hi) };

@@ -116,8 +116,8 @@ export class ForceComparison {
   curves(x) {
     const { force, simulated } = this.series.values;
     return [
-      { name: "measured", colour: "--force", x, y: scaled(force) },
-      { name: "simulated", colour: "--drive", x, y: scaled(simulated), dashed: true },
+      { name: "measured", colour: "--force", x, y: scaled(force), wide: true },
+      { name: "simulated", colour: "--drive", x, y: scaled(simulated) },
     ];
   }
 

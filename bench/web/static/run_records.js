@@ -125,8 +125,9 @@ class Notebook {
 
   async attempt(failure, act) {
     try {
-      write(this.answer, await act());
+      const words = await act();
       await this.load();
+      write(this.answer, words);
       return true;
     } catch (problem) {
       write(this.answer, problem.after(failure));

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import uvicorn
-from fastapi import APIRouter, FastAPI, Form, Request, UploadFile, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, FastAPI, Form, Request, Response, UploadFile, WebSocket, WebSocketDisconnect
 from fastapi.responses import FileResponse, HTMLResponse, JSONResponse
 from fastapi.staticfiles import StaticFiles
 
@@ -22,6 +22,7 @@ from bench.methods import Method, compile_method, compute_envelope, load_method,
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_campaigns import FakeCampaigns, campaign_routes
 from tests.support.fake_recording import recording_routes
+from tests.support.fake_results import Records, analysis_routes, make_summary, record_routes
 from tests.support.fake_specimens import add_history, specimen_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
@@ -117,6 +118,18 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
     } | more  # fmt: skip
 
 
+def done_jobs(run_id: str, found: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return a fit, a diagnosis and a prediction that are done."""
+    ended = {"finished": "2025-03-04T09:22:00Z"}
+    return [
+        fit_job(run_id, "done", **found, **ended),
+        fit_job(run_id, "done", id=f"diagnosis-{run_id}", kind="diagnose", **ended),
+        fit_job(
+            run_id, "done", id=f"prediction-{run_id}", kind="predict", settings={"model": "job-run-7"}, **ended
+        ),
+    ]
+
+
 class FakeBench:
     """State of the fake bench; all requests that change something are kept in ``posted``."""
 
@@ -134,15 +147,18 @@ class FakeBench:
         self.silent = False
         self.last_status: dict[str, Any] | None = None
         self.over = False
+        self.stored: dict[str, Method] = {}
         found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
         activity = "identify: refine, start 3 of 8"
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost", ending="stopped", log_sha256=HASH,
                          jobs=[fit_job("run-3", "failed", error="the worker was killed")]),
             "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity=activity)]),
-            "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
+            "run-1": run(1, "clean", jobs=done_jobs("run-1", found), log_sha256=HASH,
+                         diagnosis=make_summary("diagnosis-run-1"), **found),
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
+        self.records = Records(self.runs)
         self.began, self.began_utc = time.monotonic(), time.time()
 
     def status(self) -> dict[str, Any]:
@@ -200,7 +216,7 @@ def application(bench: FakeBench) -> FastAPI:
         allowed = request.headers.get("authorization") == f"Bearer {TOKEN}"
         if request.url.path.startswith("/api/") and not allowed:
             return problem(401, "Not allowed", "the token is missing or wrong")
-        if request.method in ("POST", "PATCH"):
+        if request.method != "GET":
             body = await request.body()
             bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
         return await call_next(request)
@@ -216,8 +232,14 @@ def application(bench: FakeBench) -> FastAPI:
         specimen_routes,
     ):
         app.include_router(routes(bench), prefix="/api/v1")
-    app.include_router(recording_routes(), prefix="/api/v1")
-    app.include_router(campaign_routes(FakeCampaigns()), prefix="/api/v1")
+    others = (
+        recording_routes(),
+        analysis_routes(),
+        record_routes(bench.records, problem),
+        campaign_routes(FakeCampaigns()),
+    )
+    for other in others:
+        app.include_router(other, prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 
@@ -281,8 +303,15 @@ def method_routes(bench: FakeBench) -> APIRouter:
         return {"items": METHODS, "next": None}
 
     @router.get("/{name}")
+    @router.get("/{name}/{version:int}")
     async def method(name: str) -> Any:
         return find(name).model_dump(mode="json", by_alias=True, exclude_defaults=True)
+
+    @router.post("", status_code=201)
+    async def store(wanted: Method) -> Any:
+        bench.stored[wanted.name] = wanted
+        length = compile_method(wanted).duration
+        return METHODS[-1] | {"name": wanted.name, "title": wanted.title, "duration_s": length, "source": "stored"}
 
     @router.get("/{name}/preview")
     async def preview(name: str) -> Any:
@@ -329,7 +358,8 @@ def run_routes(bench: FakeBench) -> APIRouter:
         return {"items": sorted(found, key=lambda one: one["started"], reverse=True), "next": None}
 
     @router.get("/runs/{run_id}")
-    async def one_run(run_id: str) -> Any:
+    async def one_run(run_id: str, response: Response) -> Any:
+        response.headers["ETag"] = bench.records.make_tag(run_id)
         return bench.runs[run_id]
 
     @router.post("/runs", status_code=201)
@@ -400,7 +430,7 @@ def result_routes(bench: FakeBench) -> APIRouter:
 
     @router.post("/runs/{run_id}/identify")
     async def identify(run_id: str) -> Any:
-        return bench.runs[run_id]["jobs"][-1]
+        return next(job for job in bench.runs[run_id]["jobs"] if job["kind"] == "identify")
 
     return router
 

@@ -48,8 +48,11 @@ def test_a_run_shows_its_facts_with_the_zone_of_times_and_the_tables_of_its_fit(
     assert re.search(r"2025-03-04 \d\d:11:30 UTC", seen["facts"])
     assert "1.04 times the noise floor" in seen["facts"]
     assert seen["tables"] == [
-        "Force error by drive; noise floor 2.49 N",
+        "Effects that the simulation lacks",
+        "Where the gap appears: force error beyond the noise",
+        "Residual by condition; noise floor 2.49 N",
         "Parameters of the modified Bouc-Wen law",
+        "Force error by drive; noise floor 2.49 N",
     ]
     assert seen["drives"] == ["0", "0.1", "0.2", "0.3", "0.4", "0.5"]
 

@@ -1,5 +1,6 @@
 // Client of the REST interface: token, JSON requests, files, and errors with their messages.
 
+import { element } from "./format.js";
 import { parseBatch } from "./live_batch.js";
 
 const BASE = new URL("api/v1/", document.baseURI);
@@ -58,6 +59,9 @@ export function liveAddress() {
 export const get = (path, timeout) => call("GET", path, undefined, timeout);
 export const post = (path, body, timeout) => call("POST", path, body, timeout);
 
+/** Deletes something; what the service returns says what became of it. */
+export const remove = (path) => call("DELETE", path);
+
 /** Changes something; with an ETag refused, with status 412, if it was changed since that ETag was read. */
 export const patch = (path, body, etag) => call("PATCH", path, body, undefined, etag ? { "If-Match": etag } : {});
 
@@ -96,6 +100,15 @@ export async function file(path) {
   const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
   const match = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
   return { blob: await response.blob(), name: match?.[1] ?? path.replaceAll("/", "-") };
+}
+
+/** Fetches a file and lets the browser save it, under a given name or that of the service; returns the name. */
+export async function saveFile(path, wanted) {
+  const { blob, name } = await file(path);
+  const address = URL.createObjectURL(blob);
+  element("a", { href: address, download: wanted ?? name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 60_000);
+  return wanted ?? name;
 }
 
 /** Sends a form with files; `onProgress` receives the sent share. A plain fetch reports no progress. */

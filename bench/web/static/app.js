@@ -84,6 +84,7 @@ offerUnits(() => {
   plots.relabel();
   plan.relabel();
   specimen.relabel();
+  runView.relabel();
 });
 
 let requesting = false;

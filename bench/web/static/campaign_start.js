@@ -2,8 +2,7 @@
 
 import { post, start } from "./api.js";
 import { describeDrive, describeKind } from "./campaign_words.js";
-import { significant } from "./fit_tables.js";
-import { byId, duration, element, write } from "./format.js";
+import { duration, element, significant, write, byId } from "./format.js";
 import { QUANTITIES } from "./quantities.js";
 
 const PLAN_TIMEOUT_MS = 120_000;

@@ -2,9 +2,8 @@
 
 import uPlot from "./vendor/uPlot.esm.js";
 import { describeDrive } from "./campaign_words.js";
-import { significant } from "./fit_tables.js";
-import { element, instant } from "./format.js";
-import { QUIET, axis, colour, signed } from "./plots.js";
+import { element, instant, significant } from "./format.js";
+import { QUIET, axis, colour, signed } from "./plot_style.js";
 import { refresh } from "./refresh.js";
 import { runAddress } from "./router.js";
 

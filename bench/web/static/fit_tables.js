@@ -1,14 +1,20 @@
-// Tables of a fit: force error by drive, and parameters with their intervals.
+// Tables of a fit: force error by drive and by condition, and parameters with their intervals.
 
-import { element } from "./format.js";
+import { significant } from "./format.js";
+import { QUANTITIES } from "./quantities.js";
+import { table } from "./tables.js";
 
-/** Formats a number with significant digits and a true minus sign, in exponents only where they are needed. */
-export function significant(value, digits = 4) {
-  if (value === null || value === undefined || !Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
-  const text = size && (size >= 1e6 || size < 1e-3) ? value.toExponential(digits - 1) : String(Number(value.toPrecision(digits)));
-  return text.replaceAll("-", "−").replace("e+", "e");
-}
+/** Force [N] in the chosen unit, without the unit. */
+export const inForceUnit = (newtons, digits = 3) => significant(newtons === null ? null : newtons * QUANTITIES.force.scale, digits);
+
+/** Force [N] with the chosen unit. */
+export const forceText = (newtons, digits = 3) => (newtons === null ? "not known" : `${inForceUnit(newtons, digits)} ${QUANTITIES.force.unit}`);
+
+/** Share as a percentage. */
+export const percent = (share, digits = 3) => (share === null || share === undefined ? "–" : `${significant(100 * share, digits)} %`);
+
+/** 95 % interval of a share in words, with a space before it; empty without one. */
+export const shareInterval = (interval) => (interval ? ` (95 % interval ${percent(interval[0])} to ${percent(interval[1])})` : "");
 
 /** Force error at each drive beside the noise floor. */
 export function makeDriveTable(fit) {
@@ -17,9 +23,30 @@ export function makeDriveTable(fit) {
   const quantum = 10 ** Math.floor(Math.log10((Math.max(...drives) - Math.min(...drives)) / 500 || 1e-4));
   // Measured drives, rounded to a five-hundredth of their span.
   const rounded = (drive) => significant(Math.round(drive / quantum) * quantum + 0, 3);
-  const rows = fit.per_drive.map((one) => [rounded(one.drive), significant(one.rmse_n, 3), percent(one.nrmse), String(one.samples)]);
-  const floor = significant(fit.noise_floor_n, 3);
-  return table(`Force error by drive; noise floor ${floor} N`, [`Drive [${unit}]`, "RMSE [N]", "NRMSE", "Samples"], rows);
+  const rows = fit.per_drive.map((one) => [rounded(one.drive), inForceUnit(one.rmse_n), percent(one.nrmse), String(one.samples)]);
+  return table(`Force error by drive; noise floor ${forceText(fit.noise_floor_n)}`,
+    [`Drive [${unit}]`, `RMSE [${QUANTITIES.force.unit}]`, "NRMSE", "Samples"], rows);
+}
+
+/** Force error of each segment beside the noise floor. */
+export function makeConditionTable(errors, driveUnit, floor) {
+  const { unit } = QUANTITIES.force;
+  const rows = errors.map((one) => [
+    one.segment, ...describeCondition(one, driveUnit), inForceUnit(one.rmse_n), floor > 0 ? significant(one.rmse_n / floor, 3) : "–",
+    inForceUnit(one.bias_n), one.held_out ? "no" : "yes", String(one.samples),
+  ]);
+  return table(`Residual by condition; noise floor ${forceText(floor)}`,
+    ["Segment", "Amplitude", "Frequency", "Drive", `RMSE [${unit}]`, "RMSE / noise floor", `Mean of simulated − measured [${unit}]`, "Used by a fit", "Samples"], rows);
+}
+
+/** Amplitude, frequency and drive of a condition as texts with their units. */
+export function describeCondition({ amplitude_m: amplitude, frequency_hz: frequency, drive_value: drive }, driveUnit) {
+  const { scale, unit } = QUANTITIES.displacement;
+  return [
+    amplitude ? `${significant(amplitude * scale, 3)} ${unit}` : "varies",
+    frequency ? `${significant(frequency, 3)} Hz` : "not periodic",
+    drive === null ? "varies" : `${significant(drive, 3)} ${driveUnit}`,
+  ];
 }
 
 /** Parameters of the modified Bouc-Wen law with 95 % intervals. */
@@ -29,17 +56,4 @@ export function makeParameterTable(fit) {
     unit === "1" ? "–" : unit, note,
   ]);
   return table("Parameters of the modified Bouc-Wen law", ["Parameter", "Value", "95 % interval", "Unit", "Note"], rows);
-}
-
-const percent = (share) => (share === null ? "–" : `${significant(100 * share, 3)} %`);
-
-/** Table with a caption; the first cell of each row is its name. */
-export function table(title, heads, rows) {
-  const row = ([first, ...others]) => element("tr", {},
-    element("th", { scope: "row" }, first), ...others.map((content) => element("td", { className: "number" }, content)));
-  return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": title },
-    element("table", {},
-      element("caption", {}, title),
-      element("thead", {}, element("tr", {}, ...heads.map((text) => element("th", { scope: "col" }, text)))),
-      element("tbody", {}, ...rows.map(row))));
 }

@@ -1,8 +1,7 @@
 // Forecast of a run by its dry run: peaks beside the limits, heat, disk, and what the strokes can identify.
 
 import { post } from "./api.js";
-import { significant } from "./fit_tables.js";
-import { duration, element } from "./format.js";
+import { duration, element, significant } from "./format.js";
 import { QUANTITIES } from "./quantities.js";
 
 /** Time [ms] that the assessment of the strokes may take. */

@@ -1,9 +1,8 @@
 // Plan: choose a method, see its strokes and limits, preview motion and drive over time, and forecast the run.
 
 import { get } from "./api.js";
-import { significant } from "./fit_tables.js";
 import { makeForecast } from "./forecast.js";
-import { byId, describeDriveKind, duration, element, fixed, write } from "./format.js";
+import { byId, describeDriveKind, duration, element, fixed, significant, write } from "./format.js";
 import { MethodEditor } from "./method_editor.js";
 import { PlanPlot } from "./plan_plot.js";
 import { QUANTITIES } from "./quantities.js";

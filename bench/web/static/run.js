@@ -1,13 +1,15 @@
-// View of one run at an address of its own: facts, diagnosis, fit, jobs, files and report.
+// View of one run at an address of its own: facts, results, records and report, the most important first.
 
 import { get } from "./api.js";
-import { makeDriveTable, makeParameterTable } from "./fit_tables.js";
 import { byId, duration, element, instant, write } from "./format.js";
 import { Replay } from "./replay.js";
 import { makeReport } from "./report.js";
 import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted, mayReport } from "./run_facts.js";
+import { RunRecords } from "./run_records.js";
+import { RunResults } from "./run_results.js";
 import { runAddress, specimenAddress } from "./router.js";
+import { factList, foldedSection } from "./tables.js";
 
 export class RunView {
   constructor() {
@@ -18,7 +20,8 @@ export class RunView {
   /** Shows the run of an address: all of it, or its part `report` or `replay` alone. */
   async show({ id, part }) {
     this.replay?.destroy();
-    Object.assign(this, { id, part, run: null, replay: null });
+    this.results?.destroy();
+    Object.assign(this, { id, part, run: null, replay: null, results: null, records: null });
     byId("run").replaceChildren();
     write(byId("run-note"), "Loading …");
     try {
@@ -38,7 +41,8 @@ export class RunView {
     const before = this.run;
     this.run = run;
     this.showFacts();
-    if (this.part !== "replay" && results(run) !== results(before)) this.load();
+    this.records?.update(run);
+    if (this.part !== "replay" && progress(run) !== progress(before)) this.load();
   }
 
   build(run) {
@@ -46,13 +50,28 @@ export class RunView {
     const title = `${run.specimen || "Unnamed specimen"}, ${run.method}`;
     write(byId("view-run").querySelector("h1"), title);
     document.body.dataset.title = title;
-    this.facts = element("section", { "aria-label": "Facts" });
-    this.results = element("div", { className: "results" });
-    this.report = element("section", { "aria-label": "Report" });
-    this.recording = element("section", { "aria-label": "Replay" });
-    const parts = { report: [this.report], replay: [this.recording] }[this.part] ?? [this.facts, this.results, this.report];
-    byId("run").replaceChildren(this.navigation(), ...parts);
+    const parts = { report: () => [this.makeReportPlace()], replay: () => [this.makeReplayPlace()] }[this.part] ?? (() => this.makeEverything(run));
+    byId("run").replaceChildren(this.navigation(), ...parts());
     this.showFacts();
+  }
+
+  makeEverything(run) {
+    this.facts = element("section", { "aria-label": "Facts" });
+    this.results = new RunResults();
+    this.records = new RunRecords(run);
+    const { section, body } = foldedSection("Report", { whenOpened: () => this.loadReport() });
+    this.report = body;
+    return [this.facts, ...this.results.sections, ...this.records.sections, section];
+  }
+
+  makeReportPlace() {
+    this.report = element("section", { "aria-label": "Report" });
+    return this.report;
+  }
+
+  makeReplayPlace() {
+    this.recording = element("section", { "aria-label": "Replay" });
+    return this.recording;
   }
 
   navigation() {
@@ -72,52 +91,53 @@ export class RunView {
   }
 
   showFacts() {
+    if (!this.records) return;
     const { run } = this;
     const focused = document.activeElement?.dataset?.key;
     const jobs = run.jobs.toReversed().map((job) => element("li", {}, describeJob(job), element("small", {}, jobTimes(job))));
-    const rows = {
+    const list = factList({
       ...(run.specimen && { Specimen: [element("a", { className: "link", href: specimenAddress(run.specimen) }, run.specimen)] }),
+      ...(run.trashed && { Trash: [element("strong", { className: "attention" }, `In the trash since ${instant(run.trashed)}. Restore moves it back.`)] }),
       Started: [instant(run.started)],
       Duration: [duration(run.duration_s)],
       Operator: [run.operator || "not given"],
       Source: [run.source === "import" ? "import of a recording made elsewhere" : "run on this bench"],
       Outcome: describeOutcome(run),
       "Fit RMSE / noise floor": describeFit(run),
-      Diagnosis: run.diagnosis ? [describeVerdict(run.diagnosis), element("small", {}, run.diagnosis.explanation)] : ["–"],
+      Diagnosis: [run.diagnosis ? describeVerdict(run.diagnosis) : "–"],
       Jobs: [jobs.length ? element("ol", {}, ...jobs) : "none"],
       Log: [element("span", { className: "path" }, run.log || "none"), ...describeIntegrity(run)],
       ...(run.continues && { Continues: [element("a", { href: runAddress(run.continues) }, `run ${run.continues}`)] }),
-    };
-    const list = element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, content]) =>
-      element("div", {}, element("dt", {}, name), element("dd", {}, ...content))));
+    });
     const buttons = element("p", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), ...this.actions.more(run), ...this.actions.exports(run));
     this.facts.replaceChildren(element("h2", {}, "Facts"), list, buttons, this.actions.answer(run));
     if (focused) this.facts.querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
   }
 
-  /** Loads fit and report; what does not exist yet is named. */
+  /** Loads what a change of the jobs can have changed. */
   async load() {
-    const { run, part } = this;
-    if (part !== "report" && isFitted(run)) await this.loadFit(run);
-    if (!(part === "report" ? mayReport(run) : hasReport(run))) {
-      const text = mayReport(run) ? "Report alone shows the recording; a report with a fit is made by the identification." : "A report needs a complete log.";
-      this.report.replaceChildren(element("h2", {}, "Report"), element("p", { className: "soft" }, text));
-      return;
-    }
-    const made = await makeReport(run);
-    if (run.id === this.id) this.report.replaceChildren(element("h2", {}, isFitted(run) ? "Report: measured over simulated" : "Report on the recording"), ...made);
+    const { run, results, records } = this;
+    if (this.part === "report") await this.loadReport();
+    else await Promise.all([results.load(run), records.load()]);
+    if (this.report?.closest("details")?.open) await this.loadReport();
   }
 
-  async loadFit(run) {
-    const fit = await get(`runs/${encodeURIComponent(run.id)}/fit`);
-    if (run.id !== this.id) return;
-    const { version, seed, logs } = fit.provenance;
-    const origin = [`Made by version ${version}, seed ${seed}.`, ...Object.entries(logs).map(([name, hash]) => `${name}: SHA-256 ${hash}`)];
-    this.results.replaceChildren(
-      element("section", { "aria-label": "Force error" }, makeDriveTable(fit)),
-      element("section", { "aria-label": "Parameters" }, makeParameterTable(fit)),
-      element("section", { "aria-label": "Provenance" }, element("h2", {}, "Provenance"),
-        ...origin.map((text) => element("p", { className: "path" }, text))));
+  /** Loads the report; what does not exist yet is named. */
+  async loadReport() {
+    const { run, part, report } = this;
+    if (!(part === "report" ? mayReport(run) : hasReport(run))) {
+      const text = mayReport(run) ? "Report alone shows the recording; a report with a fit is made by the identification." : "A report needs a complete log.";
+      report.replaceChildren(element("p", { className: "soft" }, text));
+      return;
+    }
+    const heading = element("h2", {}, isFitted(run) ? "Report: measured over simulated" : "Report on the recording");
+    const made = await makeReport(run);
+    report.replaceChildren(...(part === "report" ? [heading] : []), ...made);
+  }
+
+  /** Shows the results in changed units. */
+  relabel() {
+    this.results?.relabel();
   }
 }
 
@@ -129,8 +149,8 @@ function describeIntegrity({ integrity, log_sha256: hash }) {
   return [found, element("small", { className: "path" }, `SHA-256 ${hash}`)];
 }
 
-/** Identifies the results of a run, to find out whether there is a new one. */
-const results = (run) => run.jobs.filter(({ state }) => state === "done").map(({ id }) => id).join();
+/** Identifies states of the run and its jobs, to find out whether there is a new result or another reason why not. */
+const progress = (run) => [run.state, run.trashed, ...run.jobs.map(({ id, state }) => `${id} ${state}`)].join();
 
 function jobTimes({ created, finished, attempts }) {
   const end = finished ? `, ended ${instant(finished)}` : "";

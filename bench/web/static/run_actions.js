@@ -1,6 +1,7 @@
 // Actions on a run: files, identification, diagnosis, repair. Each leaves a visible answer beside the run.
 
-import { file, get, post, start } from "./api.js";
+import { get, post, remove, saveFile, start } from "./api.js";
+import { ask } from "./dialogs.js";
 import { element, instant } from "./format.js";
 import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
 import { runAddress } from "./router.js";
@@ -43,6 +44,7 @@ export class RunActions {
 
   /** Button that starts, cancels or repairs, by the state of the run. */
   work(run) {
+    if (run.trashed) return [this.button(run, "restore", "Restore", () => this.restore(run))];
     const unfinished = run.jobs.filter(isUnfinished);
     if (unfinished.length) return unfinished.map((job) => this.button(run, `cancel-${job.id}`, "Cancel", () => this.cancel(run, job)));
     if (run.state === "truncated") return [this.button(run, "repair", "Repair log", () => this.repair(run))];
@@ -52,12 +54,14 @@ export class RunActions {
     return made;
   }
 
-  /** Further buttons of the view of one run: resumption, retry of failed jobs, check of the log. */
+  /** Further buttons of the view of one run: resumption, retry of failed jobs, check of the log, trash. */
   more(run) {
+    if (run.trashed) return [];
     const made = run.jobs.filter((job) => mayRetry(job)).map((job) =>
       this.button(run, `retry-${job.id}`, `Retry ${job.kind}`, () => this.retry(run, job)));
     if (run.log_sha256) made.push(this.button(run, "integrity", "Check log", () => this.checkLog(run)));
     if (canResume(run)) made.push(this.button(run, "resume", "Resume", () => this.resume(run)));
+    if (run.state !== "running") made.push(this.button(run, "trash", "Move to trash …", () => this.trash(run)));
     return made;
   }
 
@@ -77,11 +81,7 @@ export class RunActions {
   async save(run, part) {
     this.note(run, "The file is fetched …");
     try {
-      const { blob, name: fileName } = await file(`runs/${encode(run.id)}/${part}`);
-      const address = URL.createObjectURL(blob);
-      element("a", { href: address, download: fileName }).click();
-      setTimeout(() => URL.revokeObjectURL(address), 60_000);
-      this.note(run, `${fileName} was saved.`);
+      this.note(run, `${await saveFile(`runs/${encode(run.id)}/${part}`)} was saved.`);
     } catch (problem) {
       this.note(run, problem.after("Not saved"));
     }
@@ -139,6 +139,26 @@ export class RunActions {
     return this.attempt(run, "Not repaired", async () => {
       await post(`runs/${encode(run.id)}/salvage`);
       return "The log was repaired; the original is kept beside it.";
+    });
+  }
+
+  /** Moves a run to the trash after a question; nothing is deleted. */
+  async trash(run) {
+    const texts = [
+      `The ${name(run)} of ${run.specimen || "an unnamed specimen"} and its log move to the trash, and its jobs are cancelled.`,
+      "Nothing is deleted. Restore in this view moves it back.",
+    ];
+    if (!(await ask({ title: "Move this run to the trash?", texts, action: "Move to trash" }))) return;
+    await this.attempt(run, "Not moved", async () => {
+      await remove(`runs/${encode(run.id)}`);
+      return "The run is in the trash.";
+    });
+  }
+
+  restore(run) {
+    return this.attempt(run, "Not restored", async () => {
+      await post(`runs/${encode(run.id)}/restore`);
+      return "The run was restored.";
     });
   }
 

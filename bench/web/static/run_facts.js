@@ -13,7 +13,9 @@ export const hasEnded = (run) => Boolean(run.outcome);
 export const isUnfinished = (job) => UNFINISHED.includes(job.state);
 export const mayRetry = (job) => ["failed", "cancelled"].includes(job.state);
 export const canResume = (run) => run.source === "run" && hasEnded(run) && run.ending !== "completed";
-export const isFitted = (run) => run.jobs.some((job) => job.state === "done" && job.kind === "identify");
+export const isFitted = (run) => Boolean(findDone(run, "identify"));
+/** Newest job of a kind that is done; undefined without one. */
+export const findDone = (run, kind) => run.jobs.findLast((job) => job.kind === kind && job.state === "done");
 /** True if a report is stored; another one is made at its request, for any complete log. */
 export const hasReport = (run) => run.jobs.some((job) => job.state === "done");
 export const mayReport = (run) => hasReport(run) || Boolean(run.log_sha256);
@@ -35,6 +37,19 @@ export function describeFit(run) {
   const ratio = floor > 0 ? `${fixed(rmse / floor, 2)} times the noise floor` : "noise floor not known";
   return [element("span", { className: "number" }, `${newtons(rmse)} / ${newtons(floor)}`),
     element("small", {}, run.result === "converged" ? ratio : `${ratio}; ${run.result}`)];
+}
+
+/** Sentence that says why a run has no result of a kind of job, and what to do. */
+export function describeMissing(run, kind) {
+  const [noun, button] = { identify: ["fit", "Identify"], diagnose: ["diagnosis", "Diagnose"] }[kind];
+  const newest = run.jobs.findLast((job) => job.kind === kind);
+  if (run.state === "running") return `The run is in progress; its ${noun} follows after its end.`;
+  if (run.state === "truncated") return `No ${noun}: the log has no end. Repair log keeps what was recorded.`;
+  if (run.trashed) return `No ${noun}: the run is in the trash.`;
+  if (newest && isUnfinished(newest)) return `No ${noun} yet: ${describeJob(newest)}.`;
+  if (newest) return `No ${noun}: ${describeJob(newest)}. ${button} requests it again.`;
+  if (kind === "diagnose" && !isFitted(run)) return "No diagnosis: it follows the fit.";
+  return `No ${noun} yet: ${button} requests one.`;
 }
 
 /** Verdict of a diagnosis with its effects, such as `explained: gas spring`. */

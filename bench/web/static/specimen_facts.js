@@ -1,8 +1,7 @@
 // Facts on a specimen, and the form that changes them without losing a change by someone else.
 
 import { getTag, patch } from "./api.js";
-import { significant } from "./fit_tables.js";
-import { describeDriveKind, element, instant, write } from "./format.js";
+import { element, instant, significant, write, describeDriveKind } from "./format.js";
 import { QUANTITIES } from "./quantities.js";
 
 const CHANGED_MEANWHILE = 412;

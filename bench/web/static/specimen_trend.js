@@ -1,9 +1,9 @@
 // Trend of a specimen: a chosen quantity over its runs, its drift and outliers, and the cause in words.
 
 import { findOutliers, fitLine } from "./drift.js";
-import { significant, table } from "./fit_tables.js";
-import { element, instant, localTime, zone } from "./format.js";
+import { element, instant, localTime, significant, zone } from "./format.js";
 import { runAddress } from "./router.js";
+import { table } from "./tables.js";
 import { TrendPlot } from "./trend_plot.js";
 import { describeQuantity, listSeries, placePoints, readChanges } from "./trend_series.js";
 

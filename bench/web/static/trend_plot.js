@@ -1,8 +1,7 @@
 // Figure of a quantity over the runs: values with 95 % intervals, the line of the drift, and outliers.
 
 import uPlot from "./vendor/uPlot.esm.js";
-import { significant } from "./fit_tables.js";
-import { element, localTime, zone } from "./format.js";
+import { element, localTime, significant, zone } from "./format.js";
 import { QUIET, axis, colour } from "./plot_style.js";
 
 const HEIGHT = 280;

@@ -1,15 +1,15 @@
 // Opens each view of the page by its address, like a person with bookmarks, and prints the observations as JSON:
 //   node open_views.mjs URL TOKEN CHROMIUM
 
-import { createRequire } from "node:module";
 import { openPage } from "./browser.mjs";
+import { checksOf } from "./checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
-const AXE = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
 const VIEWS = ["#/bench", "#/plan/quick", "#/runs", "#/runs/run-1", "#/runs/run-1/report"];
 const seen = { errors: [], titles: {}, violations: {}, small: {}, overflow: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
 page.on("pageerror", (error) => seen.errors.push(String(error)));
+const { audit, findSmall, findOverflow } = checksOf(page);
 
 const until = (check, argument) => page.waitForFunction(check, argument);
 const hasText = (selector, words) =>
@@ -17,21 +17,8 @@ const hasText = (selector, words) =>
 const shownTitle = () => page.evaluate(() => [...document.querySelectorAll("h1")].find((one) => one.checkVisibility()).innerText);
 const READY = {
   "#/bench": ["#readings", "−10.00 … 10.00"], "#/plan/quick": ["#plan", "k0 to 3 %"], "#/runs": ["#runs", "MR-0042"],
-  "#/runs/run-1": ["#run", "Provenance"], "#/runs/run-1/report": ["#run", "Report: measured over simulated"],
+  "#/runs/run-1": ["#run", "Residual by condition"], "#/runs/run-1/report": ["#run", "Report: measured over simulated"],
 };
-
-/** Counts what axe-core finds on the page as it is. */
-async function audit() {
-  if (!(await page.evaluate(() => "axe" in window))) await page.addScriptTag({ path: AXE });
-  const { violations } = await page.evaluate(() => window.axe.run(document, { iframes: false }));
-  return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(", ")}`);
-}
-
-/** Lists visible controls that are lower than a gloved thumb needs. */
-const findSmall = () => page.evaluate(() =>
-  [...document.querySelectorAll("button, select, nav a, a.button, input:not([type=radio], [type=checkbox]), label.choice, label.check")]
-    .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < 44)
-    .map((one) => one.id || one.innerText));
 
 async function openDirectly(hash) {
   await page.goto("about:blank");
@@ -43,7 +30,7 @@ async function openDirectly(hash) {
     await page.setViewportSize({ width, height: 1180 });
     seen.violations[`${hash} ${width}`] = await audit();
     seen.small[`${hash} ${width}`] = await findSmall();
-    seen.overflow[`${hash} ${width}`] = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
+    seen.overflow[`${hash} ${width}`] = await findOverflow();
   }
   await page.emulateMedia({ colorScheme: "dark" });
   seen.violations[`${hash} dark`] = await audit();
@@ -101,10 +88,10 @@ const drop = (names) => page.evaluate((all) => {
 
 async function readRun() {
   await page.goto(`${url}/#/runs/run-1`);
-  await hasText("#run", "Provenance");
-  seen.facts = await page.locator("#run .facts").innerText();
+  await hasText("#run", "Residual by condition");
+  seen.facts = await page.locator("#run .facts").first().innerText();
   seen.tables = await page.locator("#run caption").allInnerTexts();
-  seen.drives = await page.locator("#run table").first().locator("tbody th").allInnerTexts();
+  seen.drives = await page.locator("#run table", { hasText: "Force error by drive" }).locator("tbody th").allInnerTexts();
   await page.getByRole("button", { name: /^Identify/ }).click();
   await hasText("#run", "nothing was computed again");
 }

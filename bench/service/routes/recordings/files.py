@@ -1,5 +1,6 @@
 """Route that lists the files of a run."""
 
+import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
@@ -26,7 +27,7 @@ _RESULTS = {
 
 @router.get("/{run_id}/files")
 def list_files(run_id: str, context: Context) -> RunFileList:
-    """List the files of a run with their sizes and addresses: log, results, exports and reports."""
+    """List the files of a run with sizes, hashes and addresses: log, results, exports and reports."""
     row = context.get_run(run_id)
     jobs = context.catalogue.job_queue.list_jobs(JobFilter(("done",), None, run_id), _MAX_JOBS)
     results = [file for job in jobs for file in _list_results(context, job)]
@@ -43,23 +44,28 @@ def _list_offers(row: RunRow) -> Iterator[RunFile]:
 def _list_log(context: ServiceContext, row: RunRow) -> Iterator[RunFile]:
     path = context.catalogue.resolve_path(row.log)
     if path.is_file():
-        yield _make_file(path, "log", f"runs/{quote(row.id, safe='')}/log", "application/octet-stream", None)
+        address = f"runs/{quote(row.id, safe='')}/log"
+        yield _make_file(path, "log", address, "application/octet-stream", row.log_sha256)
 
 
 def _list_results(context: ServiceContext, job: JobRow) -> Iterator[RunFile]:
     folder = context.catalogue.resolve_path(job.result or "")
     for name, (kind, address, media_type) in _RESULTS.items():
         if job.result is not None and (folder / name).is_file():
-            yield _make_file(folder / name, kind, address.format(job.id), media_type, job)
+            sha256 = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+            yield _make_file(folder / name, kind, address.format(job.id), media_type, sha256, job)
 
 
-def _make_file(path: Path, kind: str, address: str, media_type: str, job: JobRow | None) -> RunFile:
+def _make_file(
+    path: Path, kind: str, address: str, media_type: str, sha256: str | None, job: JobRow | None = None
+) -> RunFile:
     return RunFile(
         name=path.name,
         kind=kind,
         path=f"{_API}/{address}",
         media_type=media_type,
         size=path.stat().st_size,
+        sha256=sha256,
         job=job.id if job else None,
         made=job.finished if job else None,
     )

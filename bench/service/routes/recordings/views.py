@@ -63,6 +63,9 @@ class RunFile(View):
     path: str = Field(description="address below the service that returns it")
     media_type: str
     size: int | None = Field(default=None, description="[bytes]; null for a file that is made at its request")
+    sha256: str | None = Field(
+        default=None, description="hash of its content, of a log as it was recorded; null if it is not known"
+    )
     job: str | None = Field(default=None, description="id of the job that made it; null without one")
     made: datetime | None = Field(default=None, description="UTC at which the job ended; null without one")
 

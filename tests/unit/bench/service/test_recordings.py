@@ -1,5 +1,6 @@
 """Samples, segments, events, files, notes, tags and trash by the REST interface."""
 
+import hashlib
 import os
 
 import numpy as np
@@ -114,12 +115,15 @@ def test_an_event_during_a_run_belongs_to_it(service):
     assert found["items"][0]["run"] == run
 
 
-def test_files_are_listed_with_size_and_address(service):
+def test_files_are_listed_with_size_hash_and_address(service):
     (job,) = service.wait_for("/runs/run-1", lambda run: run["jobs"])["jobs"]
     service.complete(job, {"rmse_n": 1.0, "noise_floor_n": 1.0}, {"fit.json": "{}", "report.html": "<p>"})
     log, fit, *offers = service.get("/runs/run-1/files")["items"]
     assert (log["kind"], log["size"]) == ("log", (service.data / "one.mcap").stat().st_size)
     assert (fit["kind"], fit["path"]) == ("fit", f"{API}/fits/{job['id']}")
+    assert log["sha256"] == hashlib.sha256((service.data / "one.mcap").read_bytes()).hexdigest()
+    assert fit["sha256"] == hashlib.sha256(b"{}").hexdigest()
+    assert {file["sha256"] for file in offers} == {None}
     assert [file["kind"] for file in offers] == ["export"] * 3 + ["report"] * 3
     assert all(service.client.get(file["path"]).status_code == 200 for file in (log, fit))
 

@@ -114,7 +114,7 @@ def test_a_run_outside_fails_and_says_by_how_much(first, tmp_path):
     assert {one.result for one in comparison.verdicts} == {"fail"}
     (test,) = comparison.strokes[0].band.tests
     assert test.largest_excess_n == pytest.approx(0.15 * PEAK, rel=0.05)
-    assert test.inside < 0.95
+    assert (test.margin_n, test.inside < 0.95) == (-test.largest_excess_n, True)
 
 
 def test_the_band_contains_the_uncertainty_of_the_model(tmp_path):

@@ -12,6 +12,7 @@ MODULES = {
     "commands": "speed.commands",
     "catalogue": "speed.catalogue",
     "rest_load": "speed.rest_load",
+    "overlay": "speed.overlay",
     "interval_coverage": "accuracy.interval_coverage",
     "soak": "speed.soak",
     "choices": "accuracy.design_choices",

@@ -19,6 +19,7 @@ from fastapi.staticfiles import StaticFiles
 from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import compile_method, compute_envelope, load_method
 from bench.service.routes.planning.previews import make_preview
+from tests.support.fake_comparison import comparison_routes
 from tests.support.fake_recording import recording_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
@@ -133,8 +134,8 @@ class FakeBench:
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost", ending="stopped", log_sha256=HASH,
                          jobs=[fit_job("run-3", "failed", error="the worker was killed")]),
-            "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity=activity)]),
-            "run-1": run(1, "clean", jobs=[fit_job("run-1", "done", **found)], **found),
+            "run-2": run(2, "clean", log_sha256=HASH, jobs=[fit_job("run-2", "running", activity=activity)]),
+            "run-1": run(1, "clean", log_sha256=HASH, jobs=[fit_job("run-1", "done", **found)], **found),
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
         self.began, self.began_utc = time.monotonic(), time.time()
@@ -210,6 +211,7 @@ def application(bench: FakeBench) -> FastAPI:
     ):
         app.include_router(routes(bench), prefix="/api/v1")
     app.include_router(recording_routes(), prefix="/api/v1")
+    app.include_router(comparison_routes(), prefix="/api/v1")
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 

@@ -1,6 +1,7 @@
 // Entry point: creates the parts of the page and distributes the messages of the service to them.
 
 import { get, keepToken, takeToken } from "./api.js";
+import { CompareView } from "./compare.js";
 import { openDialog } from "./dialogs.js";
 import { EventList } from "./events.js";
 import { byId, fixed, write } from "./format.js";
@@ -55,6 +56,7 @@ const preparation = new Preparation();
 const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
+const comparison = new CompareView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -64,13 +66,18 @@ const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: by
 const router = new Router({
   bench: ({ query }) => query.has("method") && form.choose(query.get("method")),
   plan: (address) => plan.show(address),
-  runs: ({ query }) => runs.search(search.read(query)),
+  runs: ({ query }) => {
+    runs.selection.read(query);
+    runs.search(search.read(query));
+  },
+  compare: (address) => comparison.show(address),
   run: (address) => runView.show(address),
 });
 
 offerUnits(() => {
   plots.relabel();
   plan.relabel();
+  comparison.relabel();
 });
 
 let requesting = false;

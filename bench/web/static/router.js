@@ -1,5 +1,5 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`.
+// `#/runs/ID/replay`, `#/compare?run=A&run=B`.
 
 import { byId } from "./format.js";
 
@@ -36,7 +36,7 @@ export class Router {
     const address = parseAddress(location.hash);
     for (const section of document.querySelectorAll(".view")) section.hidden = section.id !== `view-${address.view}`;
     for (const link of document.querySelectorAll(".views a")) {
-      const isHere = link.dataset.view === address.view || (link.dataset.view === "runs" && address.view === "run");
+      const isHere = link.dataset.view === address.view || (link.dataset.view === "runs" && ["run", "compare"].includes(address.view));
       if (isHere) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");
     }

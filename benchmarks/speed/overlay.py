@@ -3,11 +3,14 @@
 python -m benchmarks overlay
 
 The first request reads the logs, which are stored as columns then; later requests read the columns. The first run
-is the reference, with the band of its fit. The fits of the others are cancelled, so that nothing else is computed.
+is the reference, with the band of its fit. All other jobs are cancelled, so that nothing else is computed.
+``python -m benchmarks.speed.overlay --keep FOLDER`` keeps the logs for a later call.
 """
 
+import argparse
 import os
 import re
+import shutil
 import statistics
 import subprocess
 import time
@@ -24,7 +27,7 @@ from bench.log import Identity
 from bench.processes import MRBENCH_COMMAND, terminate
 from bench.runs import run_from_plant
 from bench.samples import SampleStore
-from benchmarks.common import lengthen_method, print_line
+from benchmarks.common import lengthen_method, open_folder, print_line
 
 RUNS = 10
 LENGTHENING = 6
@@ -40,12 +43,28 @@ _ADDRESS = re.compile(r"http://[\d.:]+")
 
 def run() -> None:
     """Print the time of the first and of later comparisons, and that of reading the samples alone."""
-    with TemporaryDirectory() as path:
-        data = Path(path)
-        logs = [record_run(data, number) for number in range(RUNS)]
+    with TemporaryDirectory() as folder:
+        measure_overlay(Path(folder))
+
+
+def main() -> None:
+    """Print the same, with logs that may be kept."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--keep", type=Path, help="folder for the logs")
+    with open_folder(parser.parse_args().keep) as kept:
+        measure_overlay(kept)
+
+
+def measure_overlay(kept: Path) -> None:
+    """Print the times for the logs of a folder; those that are missing are recorded first."""
+    recorded = [record_run(kept, number) for number in range(RUNS)]
+    with TemporaryDirectory() as folder:
+        data = Path(folder)
+        logs = [Path(shutil.copy(log, data)) for log in recorded]
         with serve(data) as client:
             rows = wait_for_runs(client)
-            settle_jobs(client, rows)
+            cancel_jobs(client, rows)
+            fit(client, rows[0])
             query = "&".join(f"run={one['id']}" for one in rows) + f"&reference={rows[0]['id']}"
             first, found = time_once(lambda: get(client, f"comparisons?{query}"))
             later = measure(lambda: get(client, f"comparisons?{query}"))
@@ -71,8 +90,10 @@ def print_results(found: dict[str, Any], first: float, later: float, base: float
 
 
 def record_run(data: Path, number: int) -> Path:
-    """Record two minutes on the default simulated rig."""
+    """Record two minutes on the default simulated rig, unless the log exists."""
     log = data / f"{number}.mcap"
+    if log.exists():
+        return log
     identity = Identity("MR-0042", "", _FIRST + timedelta(hours=number))
     run_from_plant(lengthen_method("quick", LENGTHENING), "default", log, identity, seed=number)
     return log
@@ -106,13 +127,21 @@ def list_runs(client: httpx2.Client) -> list[dict[str, Any]] | None:
     return rows if len(rows) == RUNS and all(one["log_sha256"] and one["jobs"] for one in rows) else None
 
 
-def settle_jobs(client: httpx2.Client, rows: list[dict[str, Any]]) -> None:
-    """Cancel the jobs of all runs but the first, and wait for the fit of the first."""
-    for row in rows[1:]:
+def cancel_jobs(client: httpx2.Client, rows: list[dict[str, Any]]) -> None:
+    """Cancel all unfinished jobs of runs."""
+    for row in rows:
         for job in row["jobs"]:
-            client.post(f"jobs/{job['id']}/cancel").raise_for_status()
-    (job,) = rows[0]["jobs"][:1]
+            if job["state"] in ("queued", "running"):
+                client.post(f"jobs/{job['id']}/cancel").raise_for_status()
+
+
+def fit(client: httpx2.Client, row: dict[str, Any]) -> None:
+    """Fit the law to a run without the network, and cancel the diagnosis that follows."""
+    path = f"runs/{row['id']}"
+    job = client.post(f"{path}/identify", json={"stages": ["refine"]}).raise_for_status().json()
     wait_for(lambda: get(client, f"jobs/{job['id']}")["state"] == "done")
+    wait_for(lambda: any(one["kind"] == "diagnose" for one in get(client, path)["jobs"]))
+    cancel_jobs(client, [get(client, path)])
 
 
 def get(client: httpx2.Client, path: str) -> Any:
@@ -143,4 +172,4 @@ def measure(action: Callable[[], Any]) -> float:
 
 
 if __name__ == "__main__":
-    run()
+    main()

@@ -17,6 +17,8 @@ _MIN_SAMPLES = 2 * PHASES
 """Number of samples in all cycles below which a mean cycle has empty phases."""
 _WHOLE = 0.98
 """Share of its samples that a cycle needs to count as whole."""
+_ROUNDING = 1e-9
+"""Rounding errors of a phase [cycles], which must not decide where a sample at an edge belongs."""
 _FULL_STROKE = 0.95
 """Share of the median stroke that a cycle needs; others belong to fades."""
 
@@ -54,16 +56,22 @@ class PhasedRows:
     rows: npt.NDArray[np.int64]
     cycle: npt.NDArray[np.int64]
     """Number of the cycle of each sample, from 0."""
-    phase: npt.NDArray[np.int64]
-    """Phase of each sample, 0 to PHASES - 1."""
+    phase: Array
+    """Phase of each sample, 0 to PHASES."""
     frequency: float
     """[Hz]"""
 
     def average(self, values: Array) -> Array:
-        """Return the mean at each phase, shape (PHASES,), of values at the samples."""
-        count = np.bincount(self.phase, minlength=PHASES)
-        mean = np.bincount(self.phase, values, PHASES) / np.maximum(count, 1)
-        return _fill(mean, count > 0)
+        """Return the mean at the middle of each phase, shape (PHASES,), of values at the samples.
+
+        Samples of two runs are at different places within a phase. So means are interpolated from where they are.
+        """
+        place = self.phase.astype(np.int64) % PHASES
+        count = np.bincount(place, minlength=PHASES)
+        given = count > 0
+        sums = (np.bincount(place, each, PHASES)[given] for each in (values, self.phase % PHASES))
+        mean, middle = (one / count[given] for one in sums)
+        return np.interp(np.arange(PHASES) + 0.5, middle, mean, period=PHASES)
 
 
 def average_cycles(table: SampleTable, segment: SegmentRange) -> MeanCycle | None:
@@ -75,15 +83,15 @@ def average_cycles(table: SampleTable, segment: SegmentRange) -> MeanCycle | Non
         table.columns[name][phased.rows].astype(np.float64)
         for name in ("displacement", "force", "velocity", "coil_drive")
     )
-    cycles = [np.flatnonzero(phased.cycle == number) for number in range(int(phased.cycle.max()) + 1)]
-    peaks = [(force[rows].min(), force[rows].max(), np.abs(speed[rows]).max()) for rows in cycles]
+    first = _find_starts(phased.cycle)
+    peaks = [np.minimum.reduceat(force, first), np.maximum.reduceat(force, first)]
     return MeanCycle(
         displacement=phased.average(position),
         velocity=phased.average(speed),
         force=phased.average(force),
-        strokes=np.array([np.ptp(position[rows]) / 2 for rows in cycles]),
-        peaks=np.array(peaks).T,
-        energies=np.array([float(np.trapezoid(force[rows], position[rows])) for rows in cycles]),
+        strokes=_find_strokes(position, first),
+        peaks=np.array([*peaks, np.maximum.reduceat(np.abs(speed), first)]),
+        energies=_integrate(force, position, phased.cycle),
         frequency=phased.frequency,
         drive=float(drive.mean()),
         temperature=_average_given(table, phased),
@@ -99,20 +107,37 @@ def find_phases(table: SampleTable, segment: SegmentRange) -> PhasedRows | None:
     frequency, phase = _fit_phase(time, position, segment.frequency_hz)
     turns = phase / (2 * np.pi)
     # Counted from the first sample, at whatever phase it is: every turn is then a whole cycle, except the last.
-    cycle = np.floor(turns - turns[0]).astype(np.int64)
+    cycle = np.floor(turns - turns[0] + _ROUNDING).astype(np.int64)
     whole = _WHOLE / float(np.median(np.diff(turns)))
-    kept = [number for number in np.unique(cycle) if (cycle == number).sum() >= whole]
-    if not kept:
+    first = _find_starts(cycle)
+    is_whole = np.diff(first, append=len(cycle)) >= whole
+    if not is_whole.any():
         return None
-    strokes = np.array([np.ptp(position[cycle == number]) for number in kept])
-    full = [n for n, stroke in zip(kept, strokes, strict=True) if stroke >= _FULL_STROKE * np.median(strokes)]
-    full = full[1:] or full  # the first cycle begins in the state that the stroke before has left
-    inside = np.isin(cycle, full)
+    strokes = _find_strokes(position, first)
+    full = cycle[first[is_whole & (strokes >= _FULL_STROKE * np.median(strokes[is_whole]))]]
+    full = full[1:] if len(full) > 1 else full  # the first begins in the state that the stroke before has left
+    number = np.minimum(np.searchsorted(full, cycle), len(full) - 1)
+    inside = full[number] == cycle
     if inside.sum() < _MIN_SAMPLES:
         return None
-    number = np.searchsorted(np.array(full), cycle[inside])
-    place = np.minimum((turns[inside] % 1.0 * PHASES).astype(np.int64), PHASES - 1)
-    return PhasedRows(segment.first + np.flatnonzero(inside), number, place, frequency)
+    phase = (turns[inside] + _ROUNDING) % 1.0 * PHASES
+    return PhasedRows(segment.first + np.flatnonzero(inside), number[inside], phase, frequency)
+
+
+def _find_starts(cycle: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return the first sample of each cycle; the cycles are numbered in the order of the samples."""
+    return np.flatnonzero(np.diff(cycle, prepend=cycle[0] - 1))
+
+
+def _find_strokes(position: Array, first: npt.NDArray[np.int64]) -> Array:
+    """Return half of the stroke of each cycle [m]."""
+    return (np.maximum.reduceat(position, first) - np.minimum.reduceat(position, first)) / 2
+
+
+def _integrate(force: Array, position: Array, cycle: npt.NDArray[np.int64]) -> Array:
+    """Return the integral of the force over the displacement in each cycle [J], by the trapezoidal rule."""
+    work = (force[1:] + force[:-1]) / 2 * np.diff(position)
+    return np.bincount(cycle[1:], np.where(np.diff(cycle) == 0, work, 0.0))
 
 
 def _fit_phase(time: Array, position: Array, frequency: float) -> tuple[float, Array]:
@@ -132,14 +157,9 @@ def _find_offset(time: Array, position: Array, frequency: float) -> float:
     """Return the phase [rad] at time 0 of the sine that fits the displacement best."""
     angle = 2 * np.pi * frequency * time
     basis = np.column_stack([np.sin(angle), np.cos(angle), np.ones_like(angle)])
-    sine, cosine, _ = np.linalg.lstsq(basis, position, rcond=None)[0]
+    # Over whole cycles the columns are nearly orthogonal, so that the normal equations are exact enough, and fast.
+    sine, cosine, _ = np.linalg.lstsq(basis.T @ basis, basis.T @ position, rcond=None)[0]
     return float(np.arctan2(cosine, sine))
-
-
-def _fill(values: Array, is_given: npt.NDArray[np.bool_]) -> Array:
-    """Return values in which empty phases are interpolated around the cycle."""
-    places = np.arange(len(values))
-    return np.interp(places, places[is_given], values[is_given], period=len(values))
 
 
 def _average_given(table: SampleTable, phased: PhasedRows) -> float | None:

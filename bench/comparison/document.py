@@ -83,6 +83,7 @@ class BandTest(FrozenModel):
     result: Verdict
     inside: float = Field(description="share of the phases inside the band, 0 to 1")
     largest_excess_n: float = Field(description="largest distance outside the band [N]; 0 inside")
+    margin_n: float = Field(description="smallest distance to the edge of the band [N]; negative outside")
 
 
 class Band(FrozenModel):

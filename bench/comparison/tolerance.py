@@ -43,13 +43,15 @@ def make_band(
 
 
 def _test(other: Stroke, force: Array, half: Array) -> BandTest:
-    excess = np.abs(np.array(other.curve.force_n) - force) - half
-    inside = float((excess <= 0).mean())
+    margins = half - np.abs(np.array(other.curve.force_n) - force)
+    inside = float((margins >= 0).mean())
+    margin = float(margins.min())
     return BandTest(
         run=other.run,
         result="pass" if inside >= MIN_INSIDE else "fail",
         inside=inside,
-        largest_excess_n=max(0.0, float(excess.max())),
+        largest_excess_n=max(0.0, -margin),
+        margin_n=margin,
     )
 
 

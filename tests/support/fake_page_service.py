@@ -21,6 +21,7 @@ from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import Method, compile_method, compute_envelope, load_method, parse_method
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_campaigns import FakeCampaigns, campaign_routes
+from tests.support.fake_comparison import comparison_routes
 from tests.support.fake_recording import recording_routes
 from tests.support.fake_results import Records, analysis_routes, make_summary, record_routes
 from tests.support.fake_specimens import add_history, specimen_routes
@@ -153,7 +154,7 @@ class FakeBench:
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost", ending="stopped", log_sha256=HASH,
                          jobs=[fit_job("run-3", "failed", error="the worker was killed")]),
-            "run-2": run(2, "clean", jobs=[fit_job("run-2", "running", activity=activity)]),
+            "run-2": run(2, "clean", log_sha256=HASH, jobs=[fit_job("run-2", "running", activity=activity)]),
             "run-1": run(1, "clean", jobs=done_jobs("run-1", found), log_sha256=HASH,
                          diagnosis=make_summary("diagnosis-run-1"), **found),
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
@@ -234,6 +235,7 @@ def application(bench: FakeBench) -> FastAPI:
         app.include_router(routes(bench), prefix="/api/v1")
     others = (
         recording_routes(),
+        comparison_routes(),
         analysis_routes(),
         record_routes(bench.records, problem),
         campaign_routes(FakeCampaigns()),

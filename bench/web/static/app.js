@@ -2,6 +2,7 @@
 
 import { get, keepToken, takeToken } from "./api.js";
 import { CampaignView } from "./campaigns.js";
+import { CompareView } from "./compare.js";
 import { openDialog } from "./dialogs.js";
 import { EventList } from "./events.js";
 import { byId, fixed, write } from "./format.js";
@@ -64,6 +65,7 @@ const health = new HealthStrip();
 const events = new EventList();
 const plan = new PlanView();
 const campaigns = new CampaignView();
+const comparison = new CompareView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -73,7 +75,11 @@ const plots = new LivePlots(ring, QUANTITIES, { loops: byId("loops"), strips: by
 const router = new Router({
   bench: ({ query }) => query.has("method") && form.choose(query.get("method")),
   plan: (address) => plan.show(address),
-  runs: ({ query }) => runs.search(search.read(query)),
+  runs: ({ query }) => {
+    runs.selection.read(query);
+    runs.search(search.read(query));
+  },
+  compare: (address) => comparison.show(address),
   run: (address) => runView.show(address),
   specimens: (address) => specimens.show(address),
   specimen: (address) => specimen.show(address),
@@ -85,6 +91,7 @@ offerUnits(() => {
   plan.relabel();
   specimen.relabel();
   runView.relabel();
+  comparison.relabel();
 });
 
 let requesting = false;

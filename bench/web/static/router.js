@@ -1,10 +1,12 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/plan/METHOD/edit`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`.
+// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`, `#/compare?run=A&run=B`.
 
 import { byId } from "./format.js";
 
 /** Views of one thing, by the view of their list. */
 const SINGLE = { runs: "run", specimens: "specimen" };
+/** View of the navigation to which another view belongs. */
+const PARENT = { run: "runs", compare: "runs", specimen: "specimens" };
 
 /** Returns view, id, part and query of an address; an unknown view is the bench. */
 export function parseAddress(hash) {
@@ -42,7 +44,7 @@ export class Router {
     const address = parseAddress(location.hash);
     for (const section of document.querySelectorAll(".view")) section.hidden = section.id !== `view-${address.view}`;
     for (const link of document.querySelectorAll(".views a")) {
-      const isHere = [link.dataset.view, SINGLE[link.dataset.view]].includes(address.view);
+      const isHere = (PARENT[address.view] ?? address.view) === link.dataset.view;
       if (isHere) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");
     }

@@ -1,6 +1,7 @@
 // Actions on a run: files, identification, diagnosis, repair. Each leaves a visible answer beside the run.
 
 import { get, post, remove, saveFile, start } from "./api.js";
+import { selectionAddress } from "./compare_address.js";
 import { ask } from "./dialogs.js";
 import { element, instant } from "./format.js";
 import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
@@ -59,6 +60,7 @@ export class RunActions {
     if (run.trashed) return [];
     const made = run.jobs.filter((job) => mayRetry(job)).map((job) =>
       this.button(run, `retry-${job.id}`, `Retry ${job.kind}`, () => this.retry(run, job)));
+    if (run.log_sha256) made.push(element("a", { className: "button", href: selectionAddress([run.id]) }, "Compare with …"));
     if (run.log_sha256) made.push(this.button(run, "integrity", "Check log", () => this.checkLog(run)));
     if (canResume(run)) made.push(this.button(run, "resume", "Resume", () => this.resume(run)));
     if (run.state !== "running") made.push(this.button(run, "trash", "Move to trash …", () => this.trash(run)));

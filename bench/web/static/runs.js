@@ -5,6 +5,7 @@ import { byId, duration, element, localTime, write, zone } from "./format.js";
 import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, isUnfinished } from "./run_facts.js";
 import { runAddress, specimenAddress } from "./router.js";
+import { RunSelection } from "./run_selection.js";
 
 const PAGE = 20;
 
@@ -15,6 +16,7 @@ export class RunList {
     this.runs = new Map();
     this.next = null;
     this.conditions = {};
+    this.selection = new RunSelection();
     this.actions = new RunActions({ onRun: (run) => this.update(run), onNote: () => this.show() });
     byId("older").addEventListener("click", () => this.load(this.next));
   }
@@ -78,6 +80,7 @@ export class RunList {
     const focused = document.activeElement?.dataset?.key;
     byId("runs").replaceChildren(...runs.map((run) => this.row(run)));
     if (focused) byId("runs").querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
+    this.selection.show();
     write(byId("runs-zone"), `(${zone()})`);
     write(byId("runs-note"), runs.length ? "" : this.isSearch ? "No run meets all conditions." : "No runs yet.");
     write(byId("runs-title"), this.isSearch ? "Found, newest first" : "Newest first");
@@ -97,6 +100,7 @@ export class RunList {
     const link = element("a", { href: runAddress(run.id) }, localTime(run.started));
     link.dataset.key = `${run.id}/open`;
     return element("tr", {},
+      element("td", {}, this.selection.box(run)),
       element("th", { scope: "row", className: "number" }, link, element("small", {}, run.operator)),
       element("td", {}, this.specimen(run), element("small", {}, `${run.method}, ${duration(run.duration_s)}`)),
       element("td", {}, ...describeOutcome(run)),

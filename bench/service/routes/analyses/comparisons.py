@@ -19,6 +19,7 @@ from bench.comparison import (
 )
 from bench.errors import LogError
 from bench.jobs import FIT_FILE, SERIES_FILE
+from bench.samples import SampleTable
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, shorten
 from bench.service.routes.recordings import load_samples
@@ -61,7 +62,7 @@ def _refuse(detail: str) -> ProblemError:
 
 def _load(context: ServiceContext, run_id: str) -> RecordedRun:
     row = context.get_run(run_id)
-    table = load_samples(context, run_id)
+    table = _load_table(context, run_id)
     job = context.catalogue.job_queue.find_newest_done(run_id, "identify")
     facts = ComparedRun(
         run=run_id,
@@ -71,6 +72,13 @@ def _load(context: ServiceContext, run_id: str) -> RecordedRun:
         fit=job.id if job else None,
     )
     return RecordedRun(facts, table, _read_fit(context, job), _read_series(context, job))
+
+
+def _load_table(context: ServiceContext, run_id: str) -> SampleTable:
+    try:
+        return load_samples(context, run_id)
+    except LogError as error:
+        raise LogError(f"run {shorten(run_id)}: {error}; or compare without this run") from error
 
 
 def _read_fit(context: ServiceContext, job: JobRow | None) -> dict[str, Any] | None:

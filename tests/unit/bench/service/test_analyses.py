@@ -1,12 +1,14 @@
 """Comparisons, predictions and series by the REST interface."""
 
 import json
+import os
 
 import numpy as np
 import pytest
 
 from tests.support.cyclic_logs import write_cyclic_log
 from tests.support.reports import fit_document, prediction
+from tests.support.service_logs import write_truncated_log
 
 API = "/api/v1"
 
@@ -59,6 +61,17 @@ def test_the_band_contains_the_uncertainty_of_the_fit(service):
     assert found["runs"][0]["fit"] == job["id"]
     assert found["strokes"][0]["band"]["model_uncertainty_n"] == pytest.approx(500.0)
     assert {verdict["result"] for verdict in found["verdicts"]} == {"pass"}
+
+
+def test_a_run_with_a_truncated_log_is_named_and_the_answer_says_what_to_do(service):
+    log = write_truncated_log(service.data / "c.mcap", "c")
+    os.utime(log, (1.0, 1.0))  # nobody is writing it
+    service.scan()
+    answer = service.client.get(f"{API}/comparisons?run=a&run=b&run=c")
+    assert answer.status_code == 409
+    assert answer.json()["detail"].startswith("run c: ")
+    assert "salvage" in answer.json()["detail"]
+    assert answer.json()["detail"].endswith("or compare without this run")
 
 
 @pytest.mark.parametrize(

@@ -148,7 +148,6 @@ class FakeBench:
         self.silent = False
         self.last_status: dict[str, Any] | None = None
         self.over = False
-        self.stored: dict[str, Method] = {}
         found = {"rmse_n": 1.31, "noise_floor_n": 1.26, "result": "converged"}
         activity = "identify: refine, start 3 of 8"
         self.runs = {
@@ -309,12 +308,6 @@ def method_routes(bench: FakeBench) -> APIRouter:
     async def method(name: str) -> Any:
         return find(name).model_dump(mode="json", by_alias=True, exclude_defaults=True)
 
-    @router.post("", status_code=201)
-    async def store(wanted: Method) -> Any:
-        bench.stored[wanted.name] = wanted
-        length = compile_method(wanted).duration
-        return METHODS[-1] | {"name": wanted.name, "title": wanted.title, "duration_s": length, "source": "stored"}
-
     @router.get("/{name}/preview")
     async def preview(name: str) -> Any:
         return make_preview(compile_method(find(name)))
@@ -341,7 +334,9 @@ def method_routes(bench: FakeBench) -> APIRouter:
     async def store(wanted: dict[str, Any]) -> Any:
         found = parse_method(wanted, "the request")
         bench.methods[found.name] = found
-        return METHODS[-1] | {"name": found.name, "title": found.title, "version": 2, "source": "stored"}
+        length = compile_method(found).duration
+        known = {"name": found.name, "title": found.title, "duration_s": length}
+        return METHODS[-1] | known | {"version": 2, "source": "stored"}
 
     return router
 

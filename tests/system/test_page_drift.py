@@ -15,7 +15,7 @@ from tests.support.fake_specimens import DAYS, PRELOAD, STIFFNESS
 ROOT = Path(__file__).parents[2]
 NODE = shutil.which("node")
 SCRIPT = ROOT / "tests" / "system" / "javascript" / "fit_drift.mjs"
-DRIFT = ROOT / "bench" / "web" / "static" / "drift.js"
+DRIFT = ROOT / "bench" / "web" / "static" / "specimens" / "drift.js"
 Z95 = stats.norm.ppf(0.975)
 pytestmark = pytest.mark.skipif(NODE is None, reason="Node is not installed; it runs the modules of the page")
 

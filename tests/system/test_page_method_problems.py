@@ -14,7 +14,7 @@ from bench.methods import compile_method, load_method, parse_method
 ROOT = Path(__file__).parents[2]
 NODE = shutil.which("node")
 SCRIPT = ROOT / "tests" / "system" / "javascript" / "locate_problems.mjs"
-PROBLEMS = ROOT / "bench" / "web" / "static" / "method_problems.js"
+PROBLEMS = ROOT / "bench" / "web" / "static" / "plan" / "method_problems.js"
 pytestmark = pytest.mark.skipif(NODE is None, reason="Node is not installed; it runs the modules of the page")
 RAMP = {"kind": "ramp", "start_m": 0.0, "end_m": 0.01, "corner_acceleration_mps2": 1e-6}
 TABLE = {"kind": "table", "time_s": [0, 1], "displacement_m": [0, 0.001]}

@@ -73,7 +73,7 @@ def test_the_proposed_stroke_is_started_after_a_question_and_a_refusal_says_why(
     assert "The rod moves: the specimen MR-0042 has to be clamped" in seen["startQuestion"]
     assert seen["refusedStart"] == f"Not started: {REFUSAL}."
     assert seen["afterStart"] == ["#/bench", "stop"]
-    method = bench.stored["quick_extended"]
+    method = bench.methods["quick_extended"]
     assert method.segments[-1].name == "next_stroke_1"
     assert method.segments[:-1] == load_method("quick").segments
     started = [json.loads(body) for path, body in bench.posted if path == "runs"][-1]

@@ -1,0 +1,54 @@
+// Health of the service in one strip: agent, worker, queue, disk, wires, clocks. Each entry is a word, with the reason of a fault.
+
+import { get } from "../common/api.js";
+import { byId, element, shortTime } from "../common/format.js";
+
+const PERIOD_MS = 5_000;
+/** Error of a clock [s] above which it is marked; a sample lasts a millisecond. */
+const CLOCK_ERROR_S = 1e-3;
+
+export class HealthStrip {
+  constructor() {
+    this.entries = {};
+    this.shown = "";
+  }
+
+  /** Requests the health now and from then on. */
+  open() {
+    clearInterval(this.timer);
+    this.timer = setInterval(() => this.request(), PERIOD_MS);
+    this.request();
+  }
+
+  async request() {
+    try {
+      const { agent, worker, queue, disk } = await get("health");
+      this.show({ Agent: entry(agent), Worker: entry(worker), Queue: { kind: "good", text: queue }, Disk: entry(disk) });
+    } catch (problem) {
+      this.show({ Service: { kind: "bad", text: problem.message } });
+    }
+  }
+
+  /** Shows the state of the clocks and wires in a status of the agent. */
+  showStatus({ instruments }) {
+    const absent = instruments.filter(({ connected }) => !connected).map(({ name }) => name);
+    const bounds = instruments.map((one) => one.clock_error_bound_s).filter((bound) => bound !== null);
+    const worst = Math.max(0, ...bounds);
+    this.show({
+      Wires: absent.length ? { kind: "bad", text: `${absent.join(", ")} not connected` } : { kind: "good", text: "ready" },
+      Clocks: { kind: worst > CLOCK_ERROR_S ? "fair" : "good", text: bounds.length ? `within ${shortTime(worst)}` : "none" },
+    });
+  }
+
+  show(entries) {
+    this.entries = entries.Service ? entries : { ...this.entries, ...entries };
+    if (entries.Agent) delete this.entries.Service;
+    const text = JSON.stringify(this.entries);
+    if (text === this.shown) return;
+    this.shown = text;
+    byId("health").replaceChildren(...Object.entries(this.entries).map(([name, { kind, text: words }]) =>
+      element("li", {}, element("span", { className: `mark ${kind}` }, name), ` ${words}`)));
+  }
+}
+
+const entry = (state) => (state === "ok" ? { kind: "good", text: "ready" } : { kind: "bad", text: state });

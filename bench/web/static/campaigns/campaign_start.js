@@ -1,0 +1,115 @@
+// Start of a campaign from its document: pasted or from a file; the dry run is shown before it can be started.
+
+import { post, start } from "../common/api.js";
+import { describeDrive, describeKind } from "./campaign_words.js";
+import { duration, element, significant, write, byId } from "../common/format.js";
+import { QUANTITIES } from "../common/quantities.js";
+
+const PLAN_TIMEOUT_MS = 120_000;
+/** Largest number of steps of a dry run that are listed. */
+const MAX_STEPS = 100;
+
+export class CampaignStart {
+  /** Takes a function that receives the campaign that was started. */
+  constructor({ onStarted }) {
+    this.onStarted = onStarted;
+    byId("campaign-document").addEventListener("input", () => this.forget());
+    byId("campaign-file").addEventListener("change", ({ target }) => this.read(target.files[0]));
+    byId("campaign-plan-button").addEventListener("click", () => this.plan());
+    byId("campaign-form").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.start();
+    });
+    byId("campaign-operator").value = localStorage.getItem("mrbench.operator") ?? "";
+    this.forget();
+  }
+
+  async read(file) {
+    if (!file) return;
+    byId("campaign-document").value = await file.text();
+    this.forget();
+    this.plan();
+  }
+
+  /** A changed document needs another dry run. */
+  forget(text = "A dry run shows time, heat, disk and limits; nothing moves. Start becomes possible after it.") {
+    this.planned = null;
+    byId("campaign-begin").disabled = true;
+    byId("campaign-plan").replaceChildren();
+    this.note(text);
+  }
+
+  note(text, isProblem = false) {
+    write(byId("campaign-start-note"), text);
+    byId("campaign-start-note").classList.toggle("problem", isProblem);
+  }
+
+  async plan() {
+    const text = byId("campaign-document").value;
+    this.forget("Computing the dry run …");
+    try {
+      const campaign = JSON.parse(text);
+      const plan = await post("campaigns/plan", { campaign }, PLAN_TIMEOUT_MS);
+      if (text !== byId("campaign-document").value) return; // it was changed meanwhile
+      byId("campaign-plan").replaceChildren(...describePlan(plan));
+      this.planned = campaign;
+      byId("campaign-begin").disabled = plan.problems.length > 0;
+      this.note(plan.problems.length ? "The campaign cannot be started; see the problems." : "Dry run of this document; it can be started.", plan.problems.length > 0);
+    } catch (problem) {
+      this.note(problem instanceof SyntaxError ? `The document is not JSON: ${problem.message}.` : problem.after("There is no dry run"), true);
+    }
+  }
+
+  async start() {
+    if (!this.planned) return;
+    byId("campaign-begin").disabled = true;
+    try {
+      const campaign = await start("campaigns", { campaign: this.planned, operator: byId("campaign-operator").value.trim() });
+      this.forget();
+      this.onStarted(campaign);
+    } catch (problem) {
+      this.note(problem.after("Not started"), true);
+      byId("campaign-begin").disabled = false;
+    }
+  }
+}
+
+function describePlan(plan) {
+  const { duration_s: expected, longest_s: longest, stroking_s: moving, heat_j: heat, log_bytes: size, free_bytes: free } = plan;
+  const rows = {
+    Steps: `${plan.steps.length}`,
+    "Expected time": duration(expected),
+    "Longest time": `${duration(longest)}, and the time of persons`,
+    "In motion": duration(moving),
+    "Heat, at most": `${significant(heat / 1e3, 3)} kJ`,
+    "Logs, at most": `${significant(size / 1e6, 3)} MB${free === null ? "" : `; the disk has ${significant(free / 1e9, 3)} GB free`}`,
+  };
+  return [
+    element("h3", {}, `Dry run of ${plan.campaign}`),
+    element("ul", { className: "warnings", "aria-label": "Problems" }, ...plan.problems.map((text) => element("li", {}, `Problem: ${text}`))),
+    element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, text]) => element("div", {}, element("dt", {}, name), element("dd", {}, text)))),
+    makeMethodTable(plan.methods), makeStepTable(plan.steps),
+  ];
+}
+
+function makeMethodTable(methods) {
+  const { scale, unit } = QUANTITIES.force;
+  return makeTable("Methods", ["Method", "Runs", "One run", "Force, at most", "Limits", "Checkpoints"], methods.map((one) => [
+    `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, one.verdict, one.checkpoints,
+  ]));
+}
+
+function makeStepTable(steps) {
+  const rows = steps.slice(0, MAX_STEPS).map((step) => [
+    `${step.number}. ${step.label}`, describeKind(step.kind), step.longest_s === null ? "a person decides" : duration(step.duration_s),
+    step.longest_s === null ? "–" : duration(step.longest_s), step.heat_j ? `${significant(step.heat_j / 1e3, 3)} kJ` : "–",
+  ]);
+  const more = steps.length > MAX_STEPS ? `, the first ${MAX_STEPS} of ${steps.length}` : "";
+  return element("details", {}, element("summary", {}, `Steps in order${more}`), makeTable("Steps in order", ["Step", "Kind", "Expected", "Longest", "Heat, at most"], rows));
+}
+
+function makeTable(title, heads, rows) {
+  const row = ([first, ...others]) => element("tr", {}, element("th", { scope: "row" }, first), ...others.map((text) => element("td", { className: "number" }, String(text))));
+  return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": title }, element("table", {}, element("caption", {}, title),
+    element("thead", {}, element("tr", {}, ...heads.map((text) => element("th", { scope: "col" }, text)))), element("tbody", {}, ...rows.map(row))));
+}

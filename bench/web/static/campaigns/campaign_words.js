@@ -1,0 +1,35 @@
+// Campaigns in words: states with their marks, steps, drives and cells.
+
+import { element } from "../common/format.js";
+
+const ENDED = ["done", "stopped"];
+const STATUSES = { running: "good", pausing: "fair", paused: "fair", stopping: "fair", done: "good", stopped: "bad" };
+const PHASES = {
+  starting: "a run is about to begin", stroking: "a run is in progress", evaluating: "results are awaited",
+  resting: "at rest", asking: "waits for a person",
+};
+const KINDS = {
+  run: "run", rest: "rest", warm_up: "warm-up", repeat: "repeated run", next_stroke: "proposed strokes", prompt: "prompt",
+};
+
+export const hasEnded = ({ status }) => ENDED.includes(status);
+export const campaignAddress = (id) => `#/campaigns/${encodeURIComponent(id)}`;
+export const words = (name) => name.replaceAll("_", " ");
+export const describePhase = (phase) => PHASES[phase] ?? "";
+export const describeKind = (kind) => KINDS[kind] ?? words(kind);
+
+/** State of a campaign as a mark: a shape, and the word. */
+export const markStatus = ({ status }) => element("span", { className: `mark ${STATUSES[status] ?? "plain"}` }, status);
+
+/** State of a step as a mark: each state has a shape of its own. */
+export const markStep = (state) => element("span", { className: "step-state", "data-state": state }, words(state));
+
+/** Constant drive of a run with its unit. */
+export const describeDrive = (drive, unit) => (drive === null ? "the method's own drive" : `drive ${drive} ${unit}`);
+
+/** Counts states: `3 done, 2 pending`. */
+export function countStates(states) {
+  const counts = new Map();
+  for (const state of states) counts.set(state, (counts.get(state) ?? 0) + 1);
+  return [...counts].map(([state, count]) => `${count} ${words(state)}`).join(", ");
+}

@@ -1,0 +1,21 @@
+// Report of a run inside the page, so that it has an address that can be reloaded, kept and sent.
+
+import { file } from "../common/api.js";
+import { element } from "../common/format.js";
+
+/**
+ * Creates the frame of a report and its buttons.
+ *
+ * The report is fetched with the token in the header, so that no address contains it. It runs no script.
+ */
+export async function makeReport(run) {
+  const { blob, name } = await file(`runs/${encodeURIComponent(run.id)}/report`);
+  const frame = element("iframe", { className: "report", title: `Report of run ${run.id}`, srcdoc: await blob.text() });
+  frame.setAttribute("sandbox", "allow-same-origin allow-modals");
+  // As high as its content, so that there is only one scroll bar.
+  frame.addEventListener("load", () => { frame.style.height = `${frame.contentDocument.documentElement.scrollHeight + 16}px`; });
+  const print = element("button", { type: "button" }, "Print …");
+  print.addEventListener("click", () => frame.contentWindow.print());
+  const save = element("a", { className: "button", href: URL.createObjectURL(blob), download: name }, "Save");
+  return [element("p", { className: "actions" }, print, save), frame];
+}

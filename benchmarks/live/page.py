@@ -43,11 +43,11 @@ def _measure_run(address: str, log_path: Path) -> None:
     recorded = Bench(address).start(METHOD, specimen="live")
     output, _ = script.communicate(timeout=300)
     seen = json.loads(output)
-    print_line("  frames of the browser", seen["frames"] / seen["seconds"], "1/s")
+    print_line("  frames of the browser", seen["frames"] / seen["seconds"], "1/s", "")
     print_line("  drawn frames", seen["drawn"] / seen["seconds"], "1/s", "at least 50")
     ages = [age for age in seen["ages"] if age is not None]
     print_line("  age of the newest sample in view, median", statistics.median(ages), "ms", "at most 150")
-    print_line("  the same, largest", max(ages), "ms")
+    print_line("  the same, largest", max(ages), "ms", "")
     recorded.wait()
     log = read_log(recorded.download_log(log_path))
     lost = json.loads(log.metadata["outcome"]["lost"])

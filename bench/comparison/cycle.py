@@ -71,7 +71,8 @@ class PhasedRows:
         given = count > 0
         sums = (np.bincount(place, each, PHASES)[given] for each in (values, self.phase % PHASES))
         mean, middle = (one / count[given] for one in sums)
-        return np.interp(np.arange(PHASES) + 0.5, middle, mean, period=PHASES)
+        curve: Array = np.interp(np.arange(PHASES) + 0.5, middle, mean, period=PHASES)
+        return curve
 
 
 def average_cycles(table: SampleTable, segment: SegmentRange) -> MeanCycle | None:
@@ -137,7 +138,8 @@ def _find_strokes(position: Array, first: npt.NDArray[np.int64]) -> Array:
 def _integrate(force: Array, position: Array, cycle: npt.NDArray[np.int64]) -> Array:
     """Return the integral of the force over the displacement in each cycle [J], by the trapezoidal rule."""
     work = (force[1:] + force[:-1]) / 2 * np.diff(position)
-    return np.bincount(cycle[1:], np.where(np.diff(cycle) == 0, work, 0.0))
+    energies: Array = np.bincount(cycle[1:], np.where(np.diff(cycle) == 0, work, 0.0)).astype(np.float64)
+    return energies
 
 
 def _fit_phase(time: Array, position: Array, frequency: float) -> tuple[float, Array]:

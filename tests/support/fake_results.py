@@ -61,7 +61,10 @@ def _make_curved_discovery() -> Any:
     x = [0.001 * k for k in range(-12, 13)]
     value = [2e3 * one**2 for one in x]
     band = {"lo": [v - 0.03 for v in value], "hi": [v + 0.03 for v in value]}
-    return found.model_copy(update={"curve": found.curve.model_copy(update={"x": x, "value": value, **band})})
+    inertia = found.further[0]
+    further = [inertia.model_copy(update={"curve": inertia.curve.model_copy(update={"unit": "N"})})]
+    curve = found.curve.model_copy(update={"x": x, "value": value, **band})
+    return found.model_copy(update={"curve": curve, "further": further})
 
 
 def make_summary(identifier: str) -> dict[str, Any]:

@@ -45,8 +45,8 @@ export function makeNextStroke(run, { next_stroke: proposal }, driveUnit) {
   });
   return [
     element("p", {}, element("strong", {}, `Proposed next stroke: ${text}.`)),
-    element("p", {}, `It separates ${sets}: their forces differ there by ${inForceUnit(proposal.expected_n)} ${QUANTITIES.force.unit} (RMS), `
-      + `${significant(proposal.detectability, 2)} times what noise and form error hide.`),
+    element("p", {}, `It separates ${sets}: their forces differ there by ${inForceUnit(proposal.expected_n)} ${QUANTITIES.force.unit} (RMS). `
+      + `Detectability ${significant(proposal.detectability, 2)}: the part that no refit removes, over noise and form error, times the root of the number of samples.`),
     element("p", { className: "actions" }, button), answer,
   ];
 }

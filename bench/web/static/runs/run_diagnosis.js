@@ -77,7 +77,7 @@ function effectTable(effects) {
 const lines = (texts) => element("span", {}, ...texts.map((text) => element("span", { className: "line" }, text)));
 
 function interval({ value, unit, ci95: [low, high] }) {
-  return `${significant(value, 3)}${unit === "1" ? "" : ` ${unit}`} (${significant(low, 3)} … ${significant(high, 3)})`;
+  return `${significant(value, 3)}${unit === "1" ? "" : ` ${raised(unit)}`} (${significant(low, 3)} … ${significant(high, 3)})`;
 }
 
 /** Bars of the force error on strokes that no fit has read: without the effects, with them, and the noise. */
@@ -158,5 +158,8 @@ function effectCurve({ place, curve }, driveUnit) {
 /** Scale and name of the unit in which a person reads an SI unit. */
 function inUnit(unit, driveUnit) {
   const chosen = { N: QUANTITIES.force, m: QUANTITIES.displacement, "m/s": QUANTITIES.velocity }[unit];
-  return chosen ?? { scale: 1, unit: unit.replace("{drive}", driveUnit).replace("^2", "²") };
+  return chosen ?? { scale: 1, unit: raised(unit.replace("{drive}", driveUnit)) };
 }
+
+/** Unit with squares and cubes as a person writes them. */
+const raised = (unit) => unit.replaceAll("^2", "²").replaceAll("^3", "³");

@@ -170,7 +170,7 @@ def test_a_decimated_trace_keeps_all_extremes_and_shows_gaps(seen):
 
 def schemes():
     """Return the colours of the style sheet in the light and in the dark scheme."""
-    blocks = re.findall(r":root \{(.*?)\n *\}", (STATIC / "style.css").read_text("utf-8"), re.DOTALL)
+    blocks = re.findall(r":root \{(.*?)\n *\}", (STATIC / "styles" / "style.css").read_text("utf-8"), re.DOTALL)
     light, dark = (dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6})", block)) for block in blocks)
     return {"light": light, "dark": light | dark}
 

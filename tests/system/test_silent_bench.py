@@ -22,7 +22,7 @@ def seen():
 
 @pytest.mark.skipif(NODE is None, reason="Node is not installed; it runs the modules of the page")
 def test_the_age_of_a_stamp_does_not_depend_on_its_arrival():
-    command = [NODE, str(JUDGE_AGE), str(STATIC / "service_clock.js")]
+    command = [NODE, str(JUDGE_AGE), str(STATIC / "live" / "service_clock.js")]
     ages = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     assert ages["before"]
     assert ages["fresh"] == 0

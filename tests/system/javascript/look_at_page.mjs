@@ -148,7 +148,7 @@ async function measureWidths() {
 /** Returns a known signal with one spike and one hole, and its envelope. */
 async function thin() {
   return page.evaluate(async () => {
-    const { SampleRing, envelope } = await import("./ring.js");
+    const { SampleRing, envelope } = await import("./live/ring.js");
     const ring = new SampleRing(["force"], 8192);
     const given = Array.from({ length: 20_000 }, (_, k) => (k === 15_123 ? 50 : Math.sin(k / 300)));
     for (let k = 17_000; k < 18_000; k++) given[k] = NaN;

@@ -22,6 +22,8 @@ from bench.service.routes.planning.views import (
 )
 from identification.documents import Provenance, QuantityTrend, Trend, TrendRun, TrendValue
 
+WITH_ONE_RUN = "MR-0050"
+"""Specimen with a single run."""
 SERIAL = "MR-0100"
 FIRST = datetime(2025, 2, 3, 9, 15, tzinfo=UTC)
 DAYS = (0.0, 1.0, 4.0, 7.0, 9.0, 14.0, 16.0, 21.0)
@@ -50,6 +52,12 @@ def add_history(bench: Any) -> None:
             "started": (FIRST + timedelta(days=days)).isoformat(), "diagnosis": diagnosis.model_dump(mode="json"),
             "jobs": [bench.runs["run-1"]["jobs"][0] | {"id": f"job-{run_id}", "run": run_id}],
         }  # fmt: skip
+    bench.runs["only"] = bench.runs["run-1"] | {
+        "id": "only",
+        "specimen": WITH_ONE_RUN,
+        "diagnosis": None,
+        "jobs": [],
+    }
 
 
 def make_trend() -> Trend:

@@ -77,7 +77,7 @@ def test_the_proposed_stroke_is_started_after_a_question_and_a_refusal_says_why(
     assert method.segments[-1].name == "next_stroke_1"
     assert method.segments[:-1] == load_method("quick").segments
     started = [json.loads(body) for path, body in bench.posted if path == "runs"][-1]
-    wanted = {"method": "quick_extended", "method_version": 1, "specimen": "MR-0042", "operator": "E. Noether"}
+    wanted = {"method": "quick_extended", "method_version": 2, "specimen": "MR-0042", "operator": "E. Noether"}
     assert started == wanted
 
 

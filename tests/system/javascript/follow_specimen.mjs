@@ -121,7 +121,7 @@ async function followLinks() {
   await page.locator("#run .facts a", { hasText: SERIAL }).click();
   await hasText("#specimen-parts", "Runs, newest first");
   seen.fromRun = hash();
-  await open("#/specimens/MR-0042", ".request", "needs 3 runs");
+  await open("#/specimens/MR-0050", ".request", "needs 3 runs");
   seen.tooFew = await page.locator(".request").innerText();
   seen.noButton = await page.locator(".request button").isHidden();
   await open("#/specimens/none", "#specimen-note", "cannot be shown");

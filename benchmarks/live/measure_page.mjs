@@ -1,5 +1,6 @@
 // Measures the Bench view for some seconds and prints the figures as JSON:
 //   node measure_page.mjs ADDRESS CHROMIUM SECONDS
+// It prints `ready` once the page shows the bench at rest, and measures after the start of a run.
 // A frame counts as drawn if it clears a canvas. The age of the newest sample in view is the one that the page states.
 
 import { openPage } from "../../tests/system/javascript/browser.mjs";
@@ -37,8 +38,11 @@ function measure(duration) {
 }
 
 try {
+  const shows = (word) => page.waitForFunction((it) => document.getElementById("state-word").innerText === it, word, { timeout: 60_000 });
   await page.goto(address);
-  await page.waitForFunction(() => document.getElementById("state-word").innerText === "Running", null, { timeout: 60_000 });
+  await shows("Idle");
+  console.log("ready");
+  await shows("Running");
   console.log(JSON.stringify(await page.evaluate(measure, 1000 * Number(seconds))));
 } finally {
   await close();

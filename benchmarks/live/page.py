@@ -40,6 +40,8 @@ def run() -> None:
 
 def _measure_run(address: str, log_path: Path) -> None:
     script = start_script("measure_page.mjs", address, str(SECONDS))
+    assert script.stdout is not None
+    assert script.stdout.readline() == "ready\n"
     recorded = Bench(address).start(METHOD, specimen="live")
     output, _ = script.communicate(timeout=300)
     seen = json.loads(output)

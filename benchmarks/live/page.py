@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from bench.client import Bench
@@ -84,6 +85,10 @@ def _read(address: str, counts: list[int], k: int, stopping: threading.Event) ->
 def _stall(address: str) -> Iterator[None]:
     """Keep a connection that signs in, acknowledges nothing, and whose buffer fills."""
     base, token = address.split("#token=")
-    with connect(f"{base.replace('http', 'ws')}api/v1/live", max_queue=1) as socket:
+    # The service has given up the connection by then, so that it does not answer the closing frame.
+    with (
+        contextlib.suppress(ConnectionClosed, TimeoutError),
+        connect(f"{base.replace('http', 'ws')}api/v1/live", max_queue=1, close_timeout=1) as socket,
+    ):
         socket.send(json.dumps({"token": token}))
         yield

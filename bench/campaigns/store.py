@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import time
 import uuid
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
@@ -33,6 +34,10 @@ class StoredCampaign(NamedTuple):
     created: datetime
     methods: dict[str, Method]
     state: CampaignState
+
+    def read_time(self) -> float:
+        """Return the UTC [s]; where the clock has gone back, the time of the latest change of the campaign."""
+        return max(time.time(), self.state.updated)
 
 
 class CampaignStore:

@@ -8,7 +8,7 @@ _STATES = ("done", "active", "pending", "failed", "skipped", "held_back")
 
 def format_view(view: CampaignView) -> list[str]:
     """Format a campaign as lines of text."""
-    counts = {name: sum(item.state == name for item in view.items) for name in dict.fromkeys(_STATES)}
+    counts = {name: sum(item.state == name for item in view.items) for name in _STATES}
     summary = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in counts.items() if count)
     times = view.times
     lines = [

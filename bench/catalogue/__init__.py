@@ -6,7 +6,7 @@ from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
 from bench.catalogue.job_queue import REPEATABLE_STATES, JobFilter, JobQueue
-from bench.catalogue.log_summary import LogSummary, is_complete, read_log_summary
+from bench.catalogue.log_summary import LogSummary, compute_sha256, is_complete, read_log_summary
 from bench.catalogue.models import (
     UNFINISHED_STATES,
     BatchRow,
@@ -75,6 +75,7 @@ __all__ = [
     "catalogue_log",
     "check_all",
     "check_integrity",
+    "compute_sha256",
     "find_catalogue",
     "is_complete",
     "make_sqlite_url",

@@ -16,6 +16,7 @@ from pydantic import BaseModel
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from bench.agent_protocol import AgentEvent, AgentStatus
+from bench.campaigns import NotificationSender
 from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
@@ -124,6 +125,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         stack.push_async_callback(engine.close)
         await engine.start(context.job_manager)
         stack.enter_context(context.monitor)
+        stack.enter_context(NotificationSender(context.campaigns.store))
         stack.enter_context(context.campaigns)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.live.publish_clock()))

@@ -24,7 +24,7 @@ import psutil
 from bench.client import Bench
 from bench.demo import DemoFolder, start_processes
 from benchmarks.common import print_line
-from benchmarks.live.browser import start_script
+from benchmarks.live.browser import WATCH_STATE, start_script
 
 SEED, REPEATS, LONGEST = 21, 10, 60.0
 """Seed of the moments, repeats of each case, longest wait for a state [s]."""
@@ -71,7 +71,7 @@ def run() -> None:
     print(f"Dead bench: time until the page shows {LOST!r}, {REPEATS} random moments each")
     draw = random.Random(SEED)
     with TemporaryDirectory() as path, start_processes(DemoFolder(Path(path), METHOD, None, 1)) as address:
-        watch = StateWatch(start_script("watch_state.mjs", address))
+        watch = StateWatch(start_script(WATCH_STATE, address))
         try:
             watch.wait_for("Idle")
             for name, word in (("rig", "agent"), ("serve", "service")):

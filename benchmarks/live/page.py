@@ -21,7 +21,7 @@ from bench.client import Bench
 from bench.demo import DemoFolder, start_processes
 from bench.log import read_log
 from benchmarks.common import print_line
-from benchmarks.live.browser import start_script
+from benchmarks.live.browser import MEASURE_PAGE, start_script
 
 METHOD, SECONDS, READERS = "quick", 12.0, 18
 """Recorded method, measured time [s], clients that read beside the page and the one that does not."""
@@ -40,7 +40,7 @@ def run() -> None:
 
 
 def _measure_run(address: str, log_path: Path) -> None:
-    script = start_script("measure_page.mjs", address, str(SECONDS))
+    script = start_script(MEASURE_PAGE, address, str(SECONDS))
     assert script.stdout is not None
     assert script.stdout.readline() == "ready\n"
     recorded = Bench(address).start(METHOD, specimen="live")

@@ -1,9 +1,6 @@
 """Drift of a quantity as the page computes it, against scipy and against the trend of the identification."""
 
-import json
-import shutil
-import subprocess
-from pathlib import Path
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -11,24 +8,14 @@ from scipy import stats
 
 from identification.gap.trend import find_change_point
 from tests.support.fake_specimens import DAYS, PRELOAD, STIFFNESS
+from tests.support.page_in_browser import node_test, run_module
 
-ROOT = Path(__file__).parents[2]
-NODE = shutil.which("node")
-SCRIPT = ROOT / "tests" / "system" / "javascript" / "fit_drift.mjs"
-DRIFT = ROOT / "bench" / "web" / "static" / "specimens" / "drift.js"
 Z95 = stats.norm.ppf(0.975)
-pytestmark = pytest.mark.skipif(NODE is None, reason="Node is not installed; it runs the modules of the page")
+pytestmark = node_test
 
 
 def ask(*questions):
-    result = subprocess.run(
-        [str(NODE), str(SCRIPT), str(DRIFT)],
-        input=json.dumps(questions),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return json.loads(result.stdout)
+    return run_module("fit_drift.mjs", "specimens/drift.js", questions)
 
 
 def series(places, values, deviation, start=None):
@@ -91,7 +78,7 @@ def test_an_outlier_is_found_and_rarely_one_that_is_none():
 
 def test_runs_without_an_interval_do_not_count():
     full = series(range(1, 9), STIFFNESS, 3.0)
-    without = json.loads(json.dumps(full))
+    without = deepcopy(full)
     without["points"][2]["ci95"] = None
     (found,) = ask(without)
     assert found["line"]["points"] == 7

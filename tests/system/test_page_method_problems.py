@@ -1,21 +1,14 @@
 """Each message on an invalid method leads to the field that is to be changed."""
 
-import json
-import shutil
-import subprocess
 from copy import deepcopy
-from pathlib import Path
 
 import pytest
 
 from bench.errors import MethodError
 from bench.methods import compile_method, load_method, parse_method
+from tests.support.page_in_browser import node_test, run_module
 
-ROOT = Path(__file__).parents[2]
-NODE = shutil.which("node")
-SCRIPT = ROOT / "tests" / "system" / "javascript" / "locate_problems.mjs"
-PROBLEMS = ROOT / "bench" / "web" / "static" / "plan" / "method_problems.js"
-pytestmark = pytest.mark.skipif(NODE is None, reason="Node is not installed; it runs the modules of the page")
+pytestmark = node_test
 RAMP = {"kind": "ramp", "start_m": 0.0, "end_m": 0.01, "corner_acceleration_mps2": 1e-6}
 TABLE = {"kind": "table", "time_s": [0, 1], "displacement_m": [0, 0.001]}
 LAST = "segments.2.motion"
@@ -75,17 +68,8 @@ def found():
     questions = [
         {"method": document, "message": explain(document)} for document in (change(case) for case, _ in CASES)
     ]
-    result = subprocess.run(
-        [str(NODE), str(SCRIPT), str(PROBLEMS)],
-        input=json.dumps(questions),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return [
-        (question["message"], answer)
-        for question, answer in zip(questions, json.loads(result.stdout), strict=True)
-    ]
+    answers = run_module("locate_problems.mjs", "plan/method_problems.js", questions)
+    return [(question["message"], answer) for question, answer in zip(questions, answers, strict=True)]
 
 
 @pytest.mark.parametrize("index", range(len(CASES)), ids=[place or "method" for _, place in CASES])

@@ -1,18 +1,11 @@
 """Page of a bench whose agent is silent: its state follows the age of the last stamp."""
 
-import json
 import re
-import shutil
-import subprocess
-from pathlib import Path
 
 import pytest
 
-from tests.support.fake_page_service import STATIC, FakeBench
-from tests.support.page_in_browser import browser_test, operate_page
-
-NODE = shutil.which("node")
-JUDGE_AGE = Path(__file__).with_name("javascript") / "judge_age.mjs"
+from tests.support.fake_page_service import FakeBench
+from tests.support.page_in_browser import browser_test, node_test, operate_page, run_module
 
 
 @pytest.fixture(scope="module")
@@ -20,10 +13,9 @@ def seen():
     return operate_page(FakeBench(), "silent_bench.mjs")
 
 
-@pytest.mark.skipif(NODE is None, reason="Node is not installed; it runs the modules of the page")
+@node_test
 def test_the_age_of_a_stamp_does_not_depend_on_its_arrival():
-    command = [NODE, str(JUDGE_AGE), str(STATIC / "live" / "service_clock.js")]
-    ages = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    ages = run_module("judge_age.mjs", "live/service_clock.js")
     assert ages["before"]
     assert ages["fresh"] == 0
     assert ages["silent"] == 33

@@ -37,8 +37,8 @@ def wait_for(condition, message):
 class Page:
     """Page in a browser, and the states that it has shown."""
 
-    def __init__(self, url, token):
-        command = [NODE, str(FOLDER / "watch_state.mjs"), url, token, CHROMIUM]
+    def __init__(self, address):
+        command = [NODE, str(FOLDER / "watch_state.mjs"), address, CHROMIUM]
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         self.words, self.times = [], []
         self._reader = threading.Thread(target=self._read)
@@ -77,7 +77,7 @@ def bench(tmp_path_factory):
         words = ["serve", "--config", "bench.toml", "--port", "0", "--data", "runs"]
         processes.append(start(words, folder, "service"))
         url, token = wait_for(lambda: find_address(folder), (folder / "service.log").read_text)
-        page = Page(url, token)
+        page = Page(f"{url}/#token={token}")
         yield processes[1], processes[2], page, Bench(url, token)
     finally:
         if page is not None:

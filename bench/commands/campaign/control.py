@@ -3,7 +3,6 @@
 A command changes the stored state. The process that executes the campaign acts on it within a second.
 """
 
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -62,7 +61,7 @@ def control(
         if action == "test-message":
             typer.echo(send_test(campaign))
             return
-        now = max(time.time(), campaign.state.updated)
+        now = campaign.read_time()
         if action == "edit":
             campaign = store.edit(campaign.id, parse_edit(edit, "--edit"), now, operator)
         elif action != "status":

@@ -2,7 +2,6 @@
 
 import logging
 import threading
-import time
 from types import TracebackType
 
 from bench.campaigns import (
@@ -10,7 +9,6 @@ from bench.campaigns import (
     CampaignError,
     CampaignRunner,
     CampaignStore,
-    NotificationSender,
     StoredCampaign,
     Thermometer,
     stop,
@@ -44,11 +42,9 @@ class CampaignExecutor:
         self._failures = RepeatedFailure(_LOG, "campaign_failed", "campaign_continues")
         self.bench = AgentBench(catalogue, monitor, self.thermometer, lambda: self._stopping.wait(PERIOD))
         self._thread = threading.Thread(target=self._execute, name="campaigns", daemon=True)
-        self._sender = NotificationSender(self.store)
 
     def __enter__(self) -> "CampaignExecutor":
-        """Start the thread, and the sender of messages."""
-        self._sender.__enter__()
+        """Start the thread."""
         if self.is_local:
             self._thread.start()
         return self
@@ -60,7 +56,6 @@ class CampaignExecutor:
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
-        self._sender.__exit__(kind, error, trace)
 
     def _execute(self) -> None:
         while not self._stopping.is_set():
@@ -88,6 +83,5 @@ class CampaignExecutor:
         try:
             self.bench.check_needs(state.campaign, [item.step for item in state.items])
         except CampaignError as error:
-            reason = str(error)
-            now = max(time.time(), state.updated)
+            reason, now = str(error), campaign.read_time()
             self.store.update(campaign.id, lambda present: stop(present, now, reason=reason))

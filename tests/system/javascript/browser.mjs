@@ -1,4 +1,4 @@
-// Headless chromium with one page.
+// Headless chromium with one page, and waits on it.
 
 import { chromium } from "playwright-core";
 
@@ -10,4 +10,12 @@ export async function openPage(executablePath, { width = 1280, height = 800, col
   const page = await context.newPage();
   page.setDefaultTimeout(Number(process.env.PAGE_TIMEOUT_MS ?? 20_000)); // longer on a machine that is busy
   return { page, close: () => browser.close() };
+}
+
+/** Returns waits on a page: for a function that becomes true in it, and for words in an element. */
+export function makeWaits(page) {
+  const until = (check, argument, timeout) => page.waitForFunction(check, argument, timeout && { timeout });
+  const hasText = (selector, words, timeout) =>
+    until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words], timeout);
+  return { until, hasText };
 }

@@ -1,19 +1,17 @@
 // Compares recorded runs like a person with keyboard and mouse, and prints the observations as JSON:
 //   node compare_runs.mjs URL TOKEN CHROMIUM
 
-import { createRequire } from "node:module";
-import { openPage } from "./browser.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
+import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
-const AXE = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
 const ALL = "#/compare?run=run-1&run=run-2&run=run-3&reference=run-1";
 const seen = { errors: [], findings: {}, problems: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 1000 });
 page.on("pageerror", (error) => seen.errors.push(String(error)));
 
-const until = (check, argument) => page.waitForFunction(check, argument);
-const hasText = (selector, words) =>
-  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { until, hasText } = makeWaits(page);
+const { inspect } = makeChecks(page);
 const hash = () => new URL(page.url()).hash;
 const texts = (selector) => page.locator(selector).allInnerTexts();
 const box = (run) => page.locator(`#runs input[data-run=${run}]`);
@@ -129,18 +127,7 @@ async function audit() {
     await page.goto("about:blank");
     await page.goto(`${url}/${address}`);
     await hasText("main", "MR-0042");
-    await page.addScriptTag({ path: AXE });
-    for (const [width, colorScheme] of [[1400, "light"], [820, "dark"], [390, "light"]]) {
-      await page.setViewportSize({ width, height: 1180 });
-      await page.emulateMedia({ colorScheme });
-      seen.findings[`${address} ${width} ${colorScheme}`] = await page.evaluate(async () => {
-        const { violations } = await window.axe.run(document);
-        const small = [...document.querySelectorAll("main :is(button, select, a.button, summary, label.check, .compared a)")]
-          .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < 44).map((one) => `low: ${one.innerText}`);
-        const wide = document.documentElement.scrollWidth > innerWidth ? ["too wide"] : [];
-        return [...violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(", ")}`), ...small, ...wide];
-      });
-    }
+    seen.findings[address] = await inspect();
   }
 }
 

@@ -1,17 +1,16 @@
 // Edits a copy of a method in the form and as JSON, and stores it; prints the observations as JSON:
 //   node edit_method.mjs URL TOKEN CHROMIUM
 
-import { openPage } from "./browser.mjs";
-import { inspect } from "./page_checks.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
+import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
 const seen = { errors: [], findings: {}, problems: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
 page.on("pageerror", (error) => seen.errors.push(error.stack));
 
-const until = (check, argument) => page.waitForFunction(check, argument);
-const hasText = (selector, words) =>
-  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { until, hasText } = makeWaits(page);
+const { inspect } = makeChecks(page);
 const hash = () => new URL(page.url()).hash;
 /** Field of a label inside the part of the form with a title. */
 const field = (label, part = "1: ") => page.locator(`.form details:has(> summary:text-matches("^${part}"))`).getByLabel(label, { exact: false }).first();
@@ -34,7 +33,7 @@ async function openCopy() {
   await top("Name").fill("quick_wide");
   await field("Amplitude [mm]").fill("15");
   await hasText(".editor .forecast", "15 mm");
-  seen.findings.form = await inspect(page);
+  seen.findings.form = await inspect();
 }
 
 async function makeMistakes() {
@@ -43,7 +42,7 @@ async function makeMistakes() {
   seen.problems.limit = await marked();
   await page.getByRole("button", { name: "Store as a version" }).click();
   await until(() => document.activeElement.matches("[aria-invalid]"));
-  seen.findings.problem = await inspect(page);
+  seen.findings.problem = await inspect();
   await field("Amplitude [mm]").fill("15");
   await until(() => !document.querySelector(".form [aria-invalid]"));
   await field("Kind").selectOption("triangle");
@@ -80,7 +79,7 @@ async function editJson() {
   await hasText(".editor > .problem", "Not JSON");
   await page.getByRole("button", { name: "Edit as a form" }).click();
   seen.problems.json = await page.locator(".editor > .problem").innerText();
-  seen.findings.json = await inspect(page);
+  seen.findings.json = await inspect();
   await page.locator(".editor > textarea").fill(text.replace('"rate_hz": 1000', '"rate_hz": 2000'));
   await until(() => document.querySelector(".editor > .problem").innerText === "");
   await page.getByRole("button", { name: "Edit as a form" }).click();

@@ -1,8 +1,8 @@
 // Follows a specimen over its runs like a person with a keyboard, and prints the observations as JSON:
 //   node follow_specimen.mjs URL TOKEN CHROMIUM
 
-import { openPage } from "./browser.mjs";
-import { inspect } from "./page_checks.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
+import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
 const SERIAL = "MR-0100";
@@ -10,9 +10,8 @@ const seen = { errors: [], findings: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
 page.on("pageerror", (error) => seen.errors.push(error.stack));
 
-const until = (check, argument) => page.waitForFunction(check, argument);
-const hasText = (selector, words) =>
-  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { until, hasText } = makeWaits(page);
+const { inspect } = makeChecks(page);
 const hash = () => new URL(page.url()).hash;
 const ask = (method, path, body, headers = {}) => fetch(`${url}/api/v1/${path}`, {
   method, body: body && JSON.stringify(body), headers: { Authorization: `Bearer ${token}`, "Content-Type": "application/json", ...headers },
@@ -30,7 +29,7 @@ async function walk() {
   await page.keyboard.press("Enter");
   await hasText("#specimens", SERIAL);
   seen.list = await page.locator("#specimens tr").allInnerTexts();
-  seen.findings.list = await inspect(page);
+  seen.findings.list = await inspect();
   await page.locator("#specimens a", { hasText: SERIAL }).focus();
   await page.keyboard.press("Enter");
   await hasText("#specimen-parts", "k0");
@@ -54,7 +53,7 @@ async function computeTrend() {
   await hasText(".request", "run 4 of 8");
   seen.progress = await page.locator(".request progress").evaluate(({ value }) => value);
   seen.mayCancel = await page.getByRole("button", { name: "Cancel the computation" }).isVisible();
-  seen.findings.running = await inspect(page);
+  seen.findings.running = await inspect();
   await ask("POST", `specimens/${SERIAL}/finish-trend`);
   await hasText("#specimen-parts", "Cause");
   seen.request = await page.locator(".request").innerText();
@@ -75,7 +74,7 @@ async function readTrend() {
   await page.locator("summary", { hasText: "Values as a table" }).click();
   seen.values = await page.locator("[aria-label='k0 over the runs'] tbody tr").allInnerTexts();
   seen.figure = await page.locator(".plot.trend").getAttribute("aria-label");
-  seen.findings.trend = await inspect(page);
+  seen.findings.trend = await inspect();
   await page.reload();
   await hasText(".drift", "per day");
   seen.reloaded = await page.locator("select[name=quantity]").inputValue();
@@ -92,14 +91,14 @@ async function edit() {
   await page.getByRole("button", { name: "Edit facts" }).focus();
   await page.keyboard.press("Enter");
   seen.formFocus = await page.evaluate(() => document.activeElement.name);
-  seen.findings.form = await inspect(page);
+  seen.findings.form = await inspect();
   await ask("PATCH", `specimens/${SERIAL}`, { damper_kind: "RD-8041" }, { "If-Match": '"1"' });
   await page.fill("textarea[name=description]", "Second service in March");
   await page.fill("input[name=stroke_m]", "20");
   await page.getByRole("button", { name: "Save" }).click();
   await hasText(".form .note", "someone else");
   seen.conflict = await page.locator(".form .note").innerText();
-  seen.findings.conflict = await inspect(page);
+  seen.findings.conflict = await inspect();
   seen.rebased = await page.inputValue("input[name=damper_kind]");
   await page.getByRole("button", { name: "Save" }).click();
   await hasText("#specimen-parts", "Saved.");

@@ -2,7 +2,7 @@
 //   node look_at_page.mjs URL TOKEN CHROMIUM
 // Every wait has playwright's time limit, and its error names the condition.
 
-import { openPage } from "./browser.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
 const { page, close } = await openPage(chromium);
@@ -19,9 +19,7 @@ await page.addInitScript(() => {
 });
 
 const text = (selector) => page.locator(selector).innerText();
-const until = (check, argument) => page.waitForFunction(check, argument);
-const hasText = (selector, words) =>
-  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { until, hasText } = makeWaits(page);
 const openView = async (name) => {
   await page.click(`.views a[data-view=${name}]`);
   await page.locator(`#view-${name}`).waitFor();

@@ -1,19 +1,17 @@
 // Opens each view of the page by its address, like a person with bookmarks, and prints the observations as JSON:
 //   node open_views.mjs URL TOKEN CHROMIUM
 
-import { openPage } from "./browser.mjs";
-import { checksOf } from "./checks.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
+import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
 const VIEWS = ["#/bench", "#/plan/quick", "#/runs", "#/runs/run-1", "#/runs/run-1/report"];
 const seen = { errors: [], titles: {}, violations: {}, small: {}, overflow: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
 page.on("pageerror", (error) => seen.errors.push(String(error)));
-const { audit, findSmall, findOverflow } = checksOf(page);
+const { audit, findSmall, findOverflow } = makeChecks(page);
 
-const until = (check, argument) => page.waitForFunction(check, argument);
-const hasText = (selector, words) =>
-  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { until, hasText } = makeWaits(page);
 const shownTitle = () => page.evaluate(() => [...document.querySelectorAll("h1")].find((one) => one.checkVisibility()).innerText);
 const READY = {
   "#/bench": ["#readings", "−10.00 … 10.00"], "#/plan/quick": ["#plan", "k0 to 3 %"], "#/runs": ["#runs", "MR-0042"],

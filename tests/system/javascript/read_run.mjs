@@ -1,17 +1,16 @@
 // Reads the results of a run in the page, keeps records on it and starts its next stroke; prints the observations as JSON:
 //   node read_run.mjs URL TOKEN CHROMIUM
 
-import { openPage } from "./browser.mjs";
-import { checksOf } from "./checks.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
+import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
 const seen = { errors: [], violations: {}, small: {}, overflow: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
 page.on("pageerror", (error) => seen.errors.push(String(error)));
-const { audit, findSmall, findOverflow } = checksOf(page);
+const { audit, findSmall, findOverflow } = makeChecks(page);
 
-const hasText = (selector, words) =>
-  page.waitForFunction(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { hasText } = makeWaits(page);
 
 async function readResults() {
   await page.goto(`${url}/#token=${token}`);

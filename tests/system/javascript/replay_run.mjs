@@ -1,18 +1,16 @@
 // Replays a recorded run like a person with mouse and keyboard, and prints the observations as JSON:
 //   node replay_run.mjs URL TOKEN CHROMIUM
 
-import { createRequire } from "node:module";
-import { openPage } from "./browser.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
+import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
-const AXE = createRequire(import.meta.url).resolve("axe-core/axe.min.js");
 const seen = { errors: [] };
 const { page, close } = await openPage(chromium, { width: 1400, height: 1000 });
 page.on("pageerror", (error) => seen.errors.push(String(error)));
 
-const until = (check, argument) => page.waitForFunction(check, argument);
-const hasText = (selector, words) =>
-  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { until, hasText } = makeWaits(page);
+const { inspect } = makeChecks(page);
 const slider = page.locator(".timeline input");
 const time = async () => Number(await slider.inputValue());
 const displacement = () => page.locator("#run .readings > div").nth(1).innerText();
@@ -74,15 +72,7 @@ async function checkFrames() {
 }
 
 async function audit() {
-  await page.addScriptTag({ path: AXE });
-  const found = {};
-  for (const [name, width] of [["wide", 1400], ["tablet", 820]]) {
-    await page.setViewportSize({ width, height: 1180 });
-    const { violations } = await page.evaluate(() => window.axe.run(document));
-    const overflow = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
-    found[name] = [...violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(", ")}`), ...(overflow ? [`overflow ${overflow}`] : [])];
-  }
-  seen.findings = found;
+  seen.findings = await inspect();
   seen.stopIsThere = await page.locator("#stop").isVisible();
 }
 

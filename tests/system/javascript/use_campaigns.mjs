@@ -1,8 +1,8 @@
 // Uses the campaigns of the page like a person, and prints the observations as JSON:
 //   node use_campaigns.mjs URL TOKEN CHROMIUM
 
-import { audit, findOverflow, findSmall } from "./audit.mjs";
-import { openPage } from "./browser.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
+import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium] = process.argv.slice(2);
 const seen = { errors: [], violations: {}, small: {}, overflow: {}, sent: [] };
@@ -14,19 +14,19 @@ page.on("request", (request) => {
 });
 
 const text = (selector) => page.locator(selector).innerText();
-const hasText = (selector, words) =>
-  page.waitForFunction(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words]);
+const { hasText } = makeWaits(page);
+const { audit, findOverflow, findSmall } = makeChecks(page);
 const hasState = (word) => page.waitForFunction((wanted) => document.getElementById("state-word").innerText === wanted, word);
 
 async function check(name) {
   for (const width of [1400, 820, 390]) {
     await page.setViewportSize({ width, height: 1000 });
-    seen.small[`${name} ${width}`] = await findSmall(page);
-    seen.overflow[`${name} ${width}`] = await findOverflow(page);
+    seen.small[`${name} ${width}`] = await findSmall();
+    seen.overflow[`${name} ${width}`] = await findOverflow();
   }
-  seen.violations[name] = await audit(page);
+  seen.violations[name] = await audit();
   await page.emulateMedia({ colorScheme: "dark" });
-  seen.violations[`${name} dark`] = await audit(page);
+  seen.violations[`${name} dark`] = await audit();
   await page.emulateMedia({ colorScheme: "light" });
   await page.setViewportSize({ width: 1400, height: 900 });
 }
@@ -119,7 +119,7 @@ async function stopInDialog() {
   });
   await send("runs", {}); // the first start is refused
   await page.click("#campaign-stop");
-  seen.violations.dialog = await audit(page);
+  seen.violations.dialog = await audit();
   await send("runs", { method: "quick", specimen: "MR-0042", operator: "another person" });
   await hasState("Running");
   const stopped = page.waitForRequest((one) => one.method() === "POST" && one.url().endsWith("/stop"), { timeout: 5_000 });

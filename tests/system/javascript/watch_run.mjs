@@ -2,7 +2,7 @@
 //   node watch_run.mjs URL TOKEN CHROMIUM PICTURE.png
 // Every wait has playwright's time limit; that of the fit is longer.
 
-import { openPage } from "./browser.mjs";
+import { makeWaits, openPage } from "./browser.mjs";
 
 const [url, token, chromium, picture] = process.argv.slice(2);
 const FIT_WITHIN = 240_000;
@@ -10,9 +10,7 @@ const { page, close } = await openPage(chromium, { height: 1100 });
 const seen = { errors: [] };
 page.on("pageerror", (error) => seen.errors.push(String(error)));
 
-const until = (check, argument, timeout) => page.waitForFunction(check, argument, timeout && { timeout });
-const hasText = (selector, words, timeout) =>
-  until(([at, what]) => document.querySelector(at)?.innerText.includes(what), [selector, words], timeout);
+const { until, hasText } = makeWaits(page);
 const canvases = () => page.evaluate(() => [...document.querySelectorAll("canvas.trace")].map((canvas) => canvas.toDataURL()));
 
 async function allMoved() {

@@ -119,7 +119,7 @@ def get_campaign(campaign_id: str, context: Context) -> CampaignView:
 def edit_campaign(campaign_id: str, request: EditRequest, context: Context) -> CampaignView:
     """Edit the queue of a campaign while it runs; the edit is recorded with who made it and when."""
     store = context.campaigns.store
-    now = max(time.time(), _get(store, campaign_id).state.updated)
+    now = _get(store, campaign_id).read_time()
     return _show(store, store.edit(campaign_id, request.edit, now, request.who))
 
 
@@ -197,5 +197,5 @@ def _change(
 ) -> CampaignView:
     """Change a stored campaign; its executor acts on it at its next step."""
     store = context.campaigns.store
-    now = max(time.time(), _get(store, campaign_id).state.updated)
+    now = _get(store, campaign_id).read_time()
     return _show(store, store.update(campaign_id, lambda state: transition(state, now)))

@@ -1,13 +1,12 @@
 """Route that lists the files of a run."""
 
-import hashlib
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import quote
 
 from fastapi import APIRouter
 
-from bench.catalogue import JobFilter, JobRow, RunRow
+from bench.catalogue import JobFilter, JobRow, RunRow, compute_sha256
 from bench.jobs import DIAGNOSIS_FILE, FIT_FILE, PREDICTION_FILE, TWIN_FILE
 from bench.service.context import Context, ServiceContext
 from bench.service.routes.exchange import list_offers
@@ -52,7 +51,7 @@ def _list_results(context: ServiceContext, job: JobRow) -> Iterator[RunFile]:
     folder = context.catalogue.resolve_path(job.result or "")
     for name, (kind, address, media_type) in _RESULTS.items():
         if job.result is not None and (folder / name).is_file():
-            sha256 = hashlib.sha256((folder / name).read_bytes()).hexdigest()
+            sha256 = compute_sha256(folder / name)
             yield _make_file(folder / name, kind, address.format(job.id), media_type, sha256, job)
 
 

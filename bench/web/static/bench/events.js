@@ -1,6 +1,6 @@
 // List of the events of the bench. It is kept in this tab, so that a reload loses nothing.
 
-import { byId, clock, element, zone } from "../common/format.js";
+import { byId, clock, element, spaced, zone } from "../common/format.js";
 
 const KEY = "mrbench.events";
 const KEPT = 200;
@@ -27,7 +27,7 @@ export class EventList {
     const date = new Date(at);
     list.prepend(element("li", { className: URGENT.includes(kind) ? "attention" : "" },
       element("time", { className: "number", dateTime: at }, `${clock(date)} ${zone(date)}`),
-      ` ${kind.replaceAll("_", " ")}: ${text}`));
+      ` ${spaced(kind)}: ${text}`));
     while (list.children.length > KEPT) list.lastChild.remove();
   }
 }

@@ -2,11 +2,11 @@
 
 import { post } from "../common/api.js";
 import { CampaignQueue } from "./campaign_queue.js";
-import { hasEnded, words } from "./campaign_words.js";
+import { hasEnded } from "./campaign_words.js";
 import { openDialog } from "../common/dialogs.js";
-import { byId, element, write } from "../common/format.js";
-import { encodePhoto } from "../common/photo.js";
-import { keep, refresh } from "../common/refresh.js";
+import { byId, element, spaced, write } from "../common/format.js";
+import { encodePhoto } from "./photo.js";
+import { keep, refresh } from "./refresh.js";
 
 const OPERATOR = "mrbench.operator";
 const TEST_TIMEOUT_MS = 30_000;
@@ -127,7 +127,7 @@ function makeForm({ text, needs_note: needsNote, needs_photo: needsPhoto, choice
   const photo = element("input", { name: "photo", type: "file", accept: "image/jpeg,image/png", required: needsPhoto });
   const label = (name, isNeeded, field) => element("label", {}, name, element("span", { className: "soft" }, isNeeded ? " (needed)" : " (optional)"), field);
   const buttons = choices.map((choice) => {
-    const button = keep(element("button", { type: "button" }, choice === "stop" ? "Stop the campaign" : `${words(choice)} the step`), choice);
+    const button = keep(element("button", { type: "button" }, choice === "stop" ? "Stop the campaign" : `${spaced(choice)} the step`), choice);
     button.addEventListener("click", () => choose(choice));
     return button;
   });

@@ -1,9 +1,9 @@
 // Board of one campaign: state, times, matrix of specimens and methods, trends and messages.
 
 import { CampaignTrends } from "./campaign_trends.js";
-import { countStates, describeDrive, describePhase, hasEnded, markStatus, markStep, words } from "./campaign_words.js";
-import { byId, duration, element, fixed, instant } from "../common/format.js";
-import { keep, refresh } from "../common/refresh.js";
+import { countStates, describeDrive, describePhase, hasEnded, markStatus, markStep } from "./campaign_words.js";
+import { byId, duration, element, fixed, instant, spaced } from "../common/format.js";
+import { keep, refresh } from "./refresh.js";
 import { runAddress } from "../common/router.js";
 
 /** Largest number of steps of one cell that are shown one by one. */
@@ -96,7 +96,7 @@ function makeMessage({ at, kind, text, who, notifications }) {
   const isUrgent = ["person_needed", "held_back", "failed"].includes(kind);
   return element("li", {},
     element("time", { className: "number", dateTime: at }, instant(at)),
-    element("span", { className: isUrgent ? "attention" : "" }, ` ${words(kind)}: ${text}`), who ? ` (${who})` : "",
+    element("span", { className: isUrgent ? "attention" : "" }, ` ${spaced(kind)}: ${text}`), who ? ` (${who})` : "",
     ...notifications.map((one) => element("small", { className: one.state === "failed" ? "problem" : "" }, describeNotification(one))));
 }
 

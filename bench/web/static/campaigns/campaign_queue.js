@@ -3,7 +3,7 @@
 import { patch } from "../common/api.js";
 import { countStates, describeKind, hasEnded, markStep } from "./campaign_words.js";
 import { byId, element, instant, write } from "../common/format.js";
-import { keep, refresh } from "../common/refresh.js";
+import { keep, refresh } from "./refresh.js";
 
 const FIRST = 30;
 const ENDED = ["done", "skipped", "failed", "held_back"];

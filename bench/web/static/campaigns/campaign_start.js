@@ -4,6 +4,7 @@ import { post, start } from "../common/api.js";
 import { describeDrive, describeKind } from "./campaign_words.js";
 import { duration, element, significant, write, byId } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { factList, table } from "../common/tables.js";
 
 const PLAN_TIMEOUT_MS = 120_000;
 /** Largest number of steps of a dry run that are listed. */
@@ -87,14 +88,14 @@ function describePlan(plan) {
   return [
     element("h3", {}, `Dry run of ${plan.campaign}`),
     element("ul", { className: "warnings", "aria-label": "Problems" }, ...plan.problems.map((text) => element("li", {}, `Problem: ${text}`))),
-    element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, text]) => element("div", {}, element("dt", {}, name), element("dd", {}, text)))),
+    factList(rows),
     makeMethodTable(plan.methods), makeStepTable(plan.steps),
   ];
 }
 
 function makeMethodTable(methods) {
   const { scale, unit } = QUANTITIES.force;
-  return makeTable("Methods", ["Method", "Runs", "One run", "Force, at most", "Limits", "Checkpoints"], methods.map((one) => [
+  return table("Methods", ["Method", "Runs", "One run", "Force, at most", "Limits", "Checkpoints"], methods.map((one) => [
     `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, one.verdict, one.checkpoints,
   ]));
 }
@@ -105,11 +106,5 @@ function makeStepTable(steps) {
     step.longest_s === null ? "–" : duration(step.longest_s), step.heat_j ? `${significant(step.heat_j / 1e3, 3)} kJ` : "–",
   ]);
   const more = steps.length > MAX_STEPS ? `, the first ${MAX_STEPS} of ${steps.length}` : "";
-  return element("details", {}, element("summary", {}, `Steps in order${more}`), makeTable("Steps in order", ["Step", "Kind", "Expected", "Longest", "Heat, at most"], rows));
-}
-
-function makeTable(title, heads, rows) {
-  const row = ([first, ...others]) => element("tr", {}, element("th", { scope: "row" }, first), ...others.map((text) => element("td", { className: "number" }, String(text))));
-  return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": title }, element("table", {}, element("caption", {}, title),
-    element("thead", {}, element("tr", {}, ...heads.map((text) => element("th", { scope: "col" }, text)))), element("tbody", {}, ...rows.map(row))));
+  return element("details", {}, element("summary", {}, `Steps in order${more}`), table("Steps in order", ["Step", "Kind", "Expected", "Longest", "Heat, at most"], rows));
 }

@@ -1,11 +1,12 @@
 // Trends: each identified parameter over the runs of a campaign, with its 95 % intervals.
 
-import uPlot from "../vendor/uPlot.esm.js";
+import { AxesPlot, clearPlots, position } from "../common/axes_plot.js";
 import { describeDrive } from "./campaign_words.js";
-import { element, instant, significant } from "../common/format.js";
-import { QUIET, axis, colour, signed } from "../common/plot_style.js";
-import { refresh } from "../common/refresh.js";
+import { element, instant, significant, spaced } from "../common/format.js";
+import { axis, colour, signed } from "../common/plot_style.js";
+import { refresh } from "./refresh.js";
 import { runAddress } from "../common/router.js";
+import { rowTable } from "../common/tables.js";
 
 const HEIGHT = 150;
 const HOUR_MS = 3_600_000;
@@ -25,7 +26,7 @@ export class CampaignTrends {
     this.campaign = campaign;
     const names = [...new Set(campaign.trends.map(({ parameter }) => parameter))];
     const chosen = names.includes(this.choice.value) ? this.choice.value : names.includes("k0") ? "k0" : names[0];
-    refresh(this.choice, names, () => names.map((value) => element("option", { value }, value.replaceAll("_", " "))));
+    refresh(this.choice, names, () => names.map((value) => element("option", { value }, spaced(value))));
     this.label.hidden = !names.length;
     if (names.length) this.choice.value = chosen;
     const trends = campaign.trends.filter(({ parameter }) => parameter === chosen);
@@ -33,14 +34,13 @@ export class CampaignTrends {
   }
 
   make(trends) {
-    for (const destroy of this.plots) destroy();
-    this.plots = [];
+    clearPlots(this.plots);
     if (!trends.length) return [element("p", { className: "soft" }, "No run of this campaign has been identified yet.")];
     return trends.map((trend) => this.figure(trend));
   }
 
   figure(trend) {
-    const name = `${trend.parameter.replaceAll("_", " ")}${trend.unit === "1" ? "" : ` [${trend.unit}]`}`;
+    const name = `${spaced(trend.parameter)}${trend.unit === "1" ? "" : ` [${trend.unit}]`}`;
     const title = `${trend.specimen}, ${trend.method}, ${describeDrive(trend.drive, trend.drive_unit)}`;
     const place = element("div", { className: "plot", role: "img", "aria-label": `${name} over time, ${title}; the table has the values` });
     requestAnimationFrame(() => place.isConnected && this.plots.push(draw(trend, new Date(this.campaign.created), place)));
@@ -53,14 +53,12 @@ function makeTable({ points }, title, name) {
     element("th", { scope: "row" }, element("a", { href: runAddress(run) }, instant(at))),
     element("td", { className: "number" }, significant(value)),
     element("td", { className: "number" }, half === null ? "not determined" : `± ${significant(half, 2)}`),
-    element("td", {}, verdict ? verdict.replaceAll("_", " ") : "–")));
-  const heads = ["End of the run", name, "95 % interval", "Diagnosis"].map((text) => element("th", { scope: "col" }, text));
-  return element("details", {}, element("summary", {}, "Values"),
-    element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": `Values, ${title}` },
-      element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows))));
+    element("td", {}, verdict ? spaced(verdict) : "–")));
+  const heads = ["End of the run", name, "95 % interval", "Diagnosis"];
+  return element("details", {}, element("summary", {}, "Values"), rowTable(`Values, ${title}`, heads, rows));
 }
 
-/** Draws values as points with their intervals; returns a function that removes the plot. */
+/** Draws values as points with their intervals. */
 function draw({ points }, start, place) {
   const hours = points.map(({ at }) => (new Date(at) - start) / HOUR_MS);
   const values = points.map(({ value }) => value);
@@ -68,21 +66,14 @@ function draw({ points }, start, place) {
   const low = Math.min(...values.map((value, k) => value - halves[k]));
   const high = Math.max(...values.map((value, k) => value + halves[k]));
   const margin = 0.1 * (high - low) || 0.05 * Math.abs(high) || 1;
-  const width = () => Math.max(160, place.clientWidth);
   const last = Math.max(...hours, 1e-3);
-  const plot = new uPlot({
-    ...QUIET, width: width(), height: HEIGHT, padding: [8, 16, 0, 0],
+  return new AxesPlot(place, {
+    least: { width: 160 }, height: HEIGHT, padding: [8, 16, 0, 0],
     scales: { x: { time: false, range: () => [Math.min(0, ...hours), last * 1.05] }, y: { range: () => [low - margin, high + margin] } },
     axes: [axis({ size: 28, space: 60, values: (u, all) => all.map((h) => `${h} h`) }), axis({ size: 64, space: 26, values: signed })],
     series: [{}, { stroke: () => colour("--accent"), width: 1, points: { show: true, size: 7, fill: () => colour("--accent") } }],
     hooks: { draw: [(u) => drawIntervals(u, hours, values, halves)] },
-  }, [hours, values], place);
-  const watch = new ResizeObserver(() => plot.setSize({ width: width(), height: HEIGHT }));
-  watch.observe(place);
-  return () => {
-    watch.disconnect();
-    plot.destroy();
-  };
+  }, [hours, values]);
 }
 
 function drawIntervals(u, hours, values, halves) {
@@ -93,9 +84,8 @@ function drawIntervals(u, hours, values, halves) {
   ctx.beginPath();
   hours.forEach((hour, k) => {
     if (!halves[k]) return;
-    const x = u.valToPos(hour, "x", true);
-    ctx.moveTo(x, u.valToPos(values[k] - halves[k], "y", true));
-    ctx.lineTo(x, u.valToPos(values[k] + halves[k], "y", true));
+    ctx.moveTo(...position(u, hour, values[k] - halves[k]));
+    ctx.lineTo(...position(u, hour, values[k] + halves[k]));
   });
   ctx.stroke();
   ctx.restore();

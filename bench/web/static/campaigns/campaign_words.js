@@ -1,6 +1,6 @@
 // Campaigns in words: states with their marks, steps, drives and cells.
 
-import { element } from "../common/format.js";
+import { element, spaced } from "../common/format.js";
 
 const ENDED = ["done", "stopped"];
 const STATUSES = { running: "good", pausing: "fair", paused: "fair", stopping: "fair", done: "good", stopped: "bad" };
@@ -14,15 +14,14 @@ const KINDS = {
 
 export const hasEnded = ({ status }) => ENDED.includes(status);
 export const campaignAddress = (id) => `#/campaigns/${encodeURIComponent(id)}`;
-export const words = (name) => name.replaceAll("_", " ");
 export const describePhase = (phase) => PHASES[phase] ?? "";
-export const describeKind = (kind) => KINDS[kind] ?? words(kind);
+export const describeKind = (kind) => KINDS[kind] ?? spaced(kind);
 
 /** State of a campaign as a mark: a shape, and the word. */
 export const markStatus = ({ status }) => element("span", { className: `mark ${STATUSES[status] ?? "plain"}` }, status);
 
 /** State of a step as a mark: each state has a shape of its own. */
-export const markStep = (state) => element("span", { className: "step-state", "data-state": state }, words(state));
+export const markStep = (state) => element("span", { className: "step-state", "data-state": state }, spaced(state));
 
 /** Constant drive of a run with its unit. */
 export const describeDrive = (drive, unit) => (drive === null ? "the method's own drive" : `drive ${drive} ${unit}`);
@@ -31,5 +30,5 @@ export const describeDrive = (drive, unit) => (drive === null ? "the method's ow
 export function countStates(states) {
   const counts = new Map();
   for (const state of states) counts.set(state, (counts.get(state) ?? 0) + 1);
-  return [...counts].map(([state, count]) => `${count} ${words(state)}`).join(", ");
+  return [...counts].map(([state, count]) => `${count} ${spaced(state)}`).join(", ");
 }

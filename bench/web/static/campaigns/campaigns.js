@@ -6,7 +6,7 @@ import { CampaignBoard } from "./campaign_board.js";
 import { CampaignStart } from "./campaign_start.js";
 import { campaignAddress, markStatus } from "./campaign_words.js";
 import { byId, clock, element, localTime, write, zone } from "../common/format.js";
-import { keep, refresh } from "../common/refresh.js";
+import { keep, refresh } from "./refresh.js";
 
 const PERIOD_MS = 2_000;
 const PAGE = 20;

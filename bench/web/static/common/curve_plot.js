@@ -1,12 +1,11 @@
 // A figure with a few curves that do not move: legend, units, bands, in both colour schemes.
 
-import uPlot from "../vendor/uPlot.esm.js";
+import { AxesPlot, OWN_CONTENT, drawInside, position } from "./axes_plot.js";
 import { element } from "./format.js";
-import { QUIET, axis, colour, signed } from "./plot_style.js";
+import { axis, colour, signed } from "./plot_style.js";
 
 const HEIGHT = 240;
 const MARGIN = 0.06; // share of the span that stays free at each end of the vertical axis
-const DARK = matchMedia("(prefers-color-scheme: dark)");
 
 /** Smallest and largest finite value of some lists; `low` is `high` if all are equal. */
 function findBounds(lists) {
@@ -58,36 +57,22 @@ export class CurvePlot {
   /** Draws the figure, which has to be in the page, because it has the width of its place. */
   draw() {
     const { x, y } = this.bounds;
-    const size = () => ({ width: Math.max(160, this.place.clientWidth), height: HEIGHT });
-    this.plot = new uPlot({
-      ...QUIET, ...size(), padding: [8, 14, 0, 0],
+    this.plot = new AxesPlot(this.place, {
+      least: { width: 160 }, height: HEIGHT, padding: [8, 14, 0, 0],
       scales: { x: { time: false, range: () => x }, y: { range: () => y } },
       axes: [axis({ size: 26, space: 60, values: signed }), axis({ size: 60, space: 30, values: signed })],
-      series: [{}, { paths: () => null, points: { show: false } }],
-      hooks: { draw: [(u) => this.trace(u)] },
-    }, [x, y], this.place);
-    this.watch = new ResizeObserver(() => this.plot.setSize(size()));
-    this.watch.observe(this.place);
-    this.onScheme = () => this.plot.redraw(false, true);
-    DARK.addEventListener("change", this.onScheme);
+      series: OWN_CONTENT,
+      hooks: { draw: [(u) => drawInside(u, () => this.trace(u))] },
+    }, [x, y]);
   }
 
   destroy() {
-    if (!this.plot) return;
-    DARK.removeEventListener("change", this.onScheme);
-    this.watch.disconnect();
-    this.plot.destroy();
+    this.plot?.destroy();
   }
 
   trace(u) {
-    const { ctx, bbox } = u;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
     if (this.band) this.fill(u, this.band);
     for (const curve of this.curves) this.stroke(u, curve);
-    ctx.restore();
   }
 
   fill(u, { x, low, high, colour: of }) {
@@ -112,11 +97,4 @@ export class CurvePlot {
     ctx.setLineDash(dashed ? [5 * devicePixelRatio, 3 * devicePixelRatio] : []);
     ctx.stroke();
   }
-}
-
-const position = (u, x, y) => [u.valToPos(x, "x", true), u.valToPos(y, "y", true)];
-
-/** Destroys figures and forgets them. */
-export function clearPlots(plots) {
-  for (const plot of plots.splice(0)) plot.destroy();
 }

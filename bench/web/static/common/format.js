@@ -15,6 +15,9 @@ export function significant(value, digits = 4) {
   return text.replaceAll("-", "−").replace("e+", "e");
 }
 
+/** Writes a name of a document, such as `seal_friction`, with spaces. */
+export const spaced = (name) => name.replaceAll("_", " ");
+
 /** Formats a duration [s]: `42 s`, `2 min 14 s`, `1 h 05 min`. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";

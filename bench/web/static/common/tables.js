@@ -2,22 +2,25 @@
 
 import { element } from "./format.js";
 
-/** Table with a caption; the first cell of each row is its head. A long one scrolls in itself. */
-export function table(caption, heads, rows) {
-  const row = ([first, ...others]) => element("tr", {},
-    element("th", { scope: "row" }, first), ...others.map((content) => element("td", { className: "number" }, content)));
-  const className = rows.length > 16 ? "scroll tall" : "scroll";
-  return element("div", { className, tabIndex: 0, role: "group", "aria-label": caption },
-    element("table", {},
-      element("caption", {}, caption),
-      element("thead", {}, element("tr", {}, ...heads.map((text) => element("th", { scope: "col" }, text)))),
-      element("tbody", {}, ...rows.map(row))));
+/** Table of rows that are elements; each head is a text or an element. A wide one scrolls in itself. */
+export function rowTable(label, heads, rows, { caption = null, className = "scroll" } = {}) {
+  const head = heads.map((one) => (one instanceof Element ? one : element("th", { scope: "col" }, one)));
+  return element("div", { className, tabIndex: 0, role: "group", "aria-label": label },
+    element("table", {}, caption, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...rows)));
 }
 
-/** List of names with their contents; each content is a list of texts and elements. */
+/** Table with a caption; the first cell of each row is its head. Cells are texts, elements, or lists of them. */
+export function table(caption, heads, rows) {
+  const row = ([first, ...others]) => element("tr", {},
+    element("th", { scope: "row" }, ...[first].flat()), ...others.map((content) => element("td", { className: "number" }, ...[content].flat())));
+  const className = rows.length > 16 ? "scroll tall" : "scroll";
+  return rowTable(caption, heads, rows.map(row), { caption: element("caption", {}, caption), className });
+}
+
+/** List of names with their contents: texts, elements, or lists of them. */
 export function factList(rows) {
   return element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, content]) =>
-    element("div", {}, element("dt", {}, name), element("dd", {}, ...content))));
+    element("div", {}, element("dt", {}, name), element("dd", {}, ...[content].flat()))));
 }
 
 /** Section that a person opens and closes; `whenOpened` is called each time that it is opened. */

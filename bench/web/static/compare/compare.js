@@ -29,9 +29,6 @@ export class CompareView {
   constructor() {
     this.comparison = null;
     this.plots = new Map();
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-      for (const plot of [...this.plots.values()].flat()) plot.redraw();
-    });
   }
 
   /** Shows the comparison of an address. */

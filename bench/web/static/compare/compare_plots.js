@@ -1,8 +1,9 @@
 // Plots of a comparison. uPlot draws the axes; lines, markers and band are drawn here, because a loop crosses itself.
 
 import uPlot from "../vendor/uPlot.esm.js";
+import { AxesPlot, OWN_CONTENT, drawInside, position } from "../common/axes_plot.js";
 import { element } from "../common/format.js";
-import { QUIET, axis, colour, signed } from "../common/plot_style.js";
+import { axis, colour, signed } from "../common/plot_style.js";
 import { runStyle } from "./run_styles.js";
 
 const LINE_PX = 1.75;
@@ -23,38 +24,23 @@ export class RunPlot {
     Object.assign(this, { lines, band, labels });
     const place = element("div", { className: "plot", role: "img", "aria-label": caption });
     figures.append(element("figure", {}, element("figcaption", {}, caption), place));
-    const size = () => ({ width: Math.max(200, place.clientWidth), height: Math.max(120, place.clientHeight) });
-    this.plot = new uPlot({
-      ...QUIET, ...size(), padding: [10, 14, 0, 0],
+    this.plot = new AxesPlot(place, {
+      least: { width: 200, height: 120 }, padding: [10, 14, 0, 0],
       scales: { x: { time: false, range: x.range ? () => x.range : padded }, y: { range: padded } },
       axes: [axis({ size: 26, space: 40, values: signed, ...x.axis }), axis({ size: 56, space: 30, values: signed })],
-      series: [{}, { paths: () => null, points: { show: false } }],
-      hooks: { draw: [(u) => this.draw(u)] },
-    }, findExtent(lines, band), place);
-    this.watch = new ResizeObserver(() => this.plot.setSize(size()));
-    this.watch.observe(place);
-  }
-
-  /** Draws again, after the colours have changed. */
-  redraw() {
-    this.plot.redraw(false, true);
+      series: OWN_CONTENT,
+      hooks: { draw: [(u) => drawInside(u, () => this.draw(u))] },
+    }, findExtent(lines, band));
   }
 
   destroy() {
-    this.watch.disconnect();
     this.plot.destroy();
   }
 
   draw(u) {
-    const { ctx, bbox } = u;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
     if (this.band) fillBand(u, this.band);
     for (const line of this.lines) drawLine(u, line);
     for (const label of this.labels) writeLabel(u, label);
-    ctx.restore();
   }
 }
 
@@ -65,8 +51,6 @@ function findExtent(lines, band) {
   const edges = band ? [...band.lower, ...band.upper] : [];
   return [bounds(lines.flatMap(({ x }) => x)), bounds([...edges, ...lines.flatMap((line) => [...spread(line, -1), ...spread(line, 1)])])];
 }
-
-const position = (u, x, y) => [u.valToPos(x, "x", true), u.valToPos(y, "y", true)];
 
 function fillBand(u, { place, x, lower, upper, closed }) {
   const path = new Path2D();

@@ -1,8 +1,9 @@
 // Tables of a comparison: verdicts, peak forces, energies and parameters, with a column for each run.
 
 import { describeDrive } from "./compare_curves.js";
-import { element, fixed, significant } from "../common/format.js";
+import { element, fixed, significant, spaced } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { table } from "../common/tables.js";
 import { letter } from "./run_styles.js";
 
 const RESULTS = { pass: "good", fail: "bad" };
@@ -77,7 +78,7 @@ export function makeParameterDifferences({ runs, parameters }) {
   const isFitted = ({ run }) => parameters.some(({ values }) => run in values);
   const fitted = runs.map((run, place) => ({ ...run, head: `Run ${letter(place)}` })).filter(isFitted);
   const rows = parameters.map((one) => [
-    [one.name.replaceAll("_", " ")], [one.unit === "1" ? "–" : one.unit], ...fitted.map(({ run }) => describeValue(one, run)),
+    [spaced(one.name)], [one.unit === "1" ? "–" : one.unit], ...fitted.map(({ run }) => describeValue(one, run)),
     [element("span", { className: `mark ${one.differs ? "fair" : "good"}` }, one.differs ? "differs" : "agrees")],
   ]);
   return table("Identified parameters with 95 % intervals", ["Parameter", "Unit", ...fitted.map(({ head }) => head), "Comparison"], rows);
@@ -100,13 +101,3 @@ const others = (runs, reference) => runs.filter(({ run }) => run !== reference);
 const heads = (runs, reference) => others(runs, reference).map((run) => `Run ${letter(runs.indexOf(run))}`);
 const mark = (result) => element("span", { className: `mark ${RESULTS[result]}` }, result);
 const small = (text) => element("small", {}, text);
-
-function table(caption, names, rows) {
-  const row = ([first, ...cells]) => element("tr", {},
-    element("th", { scope: "row" }, ...first), ...cells.map((cell) => element("td", { className: "number" }, ...cell)));
-  return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": caption },
-    element("table", {},
-      element("caption", {}, caption),
-      element("thead", {}, element("tr", {}, ...names.map((name) => element("th", { scope: "col" }, name)))),
-      element("tbody", {}, ...rows.map(row))));
-}

@@ -1,7 +1,6 @@
 // Frame of a live plot: uPlot draws the axes when their bounds change, a canvas above them the traces with each frame.
 
-import uPlot from "../vendor/uPlot.esm.js";
-import { DARK, QUIET } from "../common/plot_style.js";
+import { AxesPlot, OWN_CONTENT } from "../common/axes_plot.js";
 
 /** Axes and a canvas for traces, which follow the size of their container. */
 export class PlotFrame {
@@ -9,21 +8,12 @@ export class PlotFrame {
   constructor(place, options, bounds, onResize) {
     this.bounds = bounds;
     const scale = (k) => ({ time: false, range: () => this.bounds[k] });
-    const series = [{}, { paths: () => null, points: { show: false } }];
-    this.plot = new uPlot({ ...QUIET, ...options, scales: { x: scale(0), y: scale(1) }, series, ...sizeOf(place) }, this.data, place);
+    const content = { scales: { x: scale(0), y: scale(1) }, series: OWN_CONTENT };
+    this.axes = new AxesPlot(place, { least: { width: 120, height: 60 }, ...options, ...content }, this.data, onResize);
+    this.plot = this.axes.plot;
     this.canvas = document.createElement("canvas");
     this.canvas.className = "trace";
     this.plot.over.append(this.canvas);
-    this.observer = new ResizeObserver(() => {
-      this.plot.setSize(sizeOf(place));
-      onResize();
-    });
-    this.observer.observe(place);
-    this.onScheme = () => {
-      this.plot.redraw(false, true);
-      onResize();
-    };
-    DARK.addEventListener("change", this.onScheme);
   }
 
   /** Values that make uPlot draw its axes again, and nothing else. */
@@ -57,10 +47,6 @@ export class PlotFrame {
   }
 
   destroy() {
-    this.observer.disconnect();
-    DARK.removeEventListener("change", this.onScheme);
-    this.plot.destroy();
+    this.axes.destroy();
   }
 }
-
-const sizeOf = (place) => ({ width: Math.max(120, place.clientWidth), height: Math.max(60, place.clientHeight) });

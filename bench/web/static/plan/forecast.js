@@ -3,6 +3,7 @@
 import { post } from "../common/api.js";
 import { duration, element, significant } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { rowTable } from "../common/tables.js";
 
 /** Time [ms] that the assessment of the strokes may take. */
 const ASSESSMENT_MS = 300_000;
@@ -70,10 +71,9 @@ function makeTable({ total, limits, drive_unit: unit }, fixture) {
     const values = [total[peak], limits[limit], findEnd(fixture[key])];
     return element("tr", {}, element("th", { scope: "row" }, name), ...values.map((value) => element("td", { className: "number right" }, of(value))));
   });
-  const heads = ["Quantity", "Peak", "Limit of the method", "Limit of the bench"];
-  return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": "Peaks and limits" },
-    element("table", {}, element("thead", {}, element("tr", {}, ...heads.map((text, k) =>
-      element("th", { scope: "col", className: k ? "right" : "" }, text)))), element("tbody", {}, ...rows)));
+  const heads = ["Quantity", "Peak", "Limit of the method", "Limit of the bench"].map((text, k) =>
+    element("th", { scope: "col", className: k ? "right" : "" }, text));
+  return rowTable("Peaks and limits", heads, rows);
 }
 
 /** Lowest value at which the bench ends a motion; null without one. */

@@ -1,12 +1,12 @@
 // Editor of a method: form or JSON, preview and forecast after each change, problems beside their fields, storage as a version.
 
 import { get, post, start } from "../common/api.js";
+import { clearPlots } from "../common/axes_plot.js";
 import { assess, describeNumbers } from "./forecast.js";
 import { element, write } from "../common/format.js";
 import { makeFirstMethod, makeMethodForm } from "./method_form.js";
 import { locateProblem } from "./method_problems.js";
-import { PlanPlot } from "./plan_plot.js";
-import { QUANTITIES } from "../common/quantities.js";
+import { plotPreview } from "./plan_plot.js";
 
 /** Pause [ms] after a change, after which the method is checked. */
 const PAUSE_MS = 700;
@@ -130,13 +130,10 @@ export class MethodEditor {
 
   showForecast(forecast) {
     const { preview } = forecast;
-    this.clearPlots();
+    clearPlots(this.plots);
     this.previews.replaceChildren();
     this.words.replaceChildren();
-    this.plots = [
-      new PlanPlot(QUANTITIES.displacement, preview.displacement_m, preview, this.previews),
-      new PlanPlot({ ...QUANTITIES.drive, unit: preview.drive_unit }, preview.drive, preview, this.previews),
-    ];
+    this.plots = plotPreview(preview, this.previews);
     this.numbers.replaceChildren(...describeNumbers(forecast));
   }
 
@@ -189,11 +186,6 @@ export class MethodEditor {
   destroy() {
     clearTimeout(this.timer);
     this.isClosed = true;
-    this.clearPlots();
-  }
-
-  clearPlots() {
-    for (const plot of this.plots) plot.destroy();
-    this.plots = [];
+    clearPlots(this.plots);
   }
 }

@@ -1,11 +1,13 @@
 // Plan: choose a method, see its strokes and limits, preview motion and drive over time, and forecast the run.
 
 import { get } from "../common/api.js";
+import { clearPlots } from "../common/axes_plot.js";
 import { makeForecast } from "./forecast.js";
 import { byId, describeDriveKind, duration, element, fixed, significant, write } from "../common/format.js";
 import { MethodEditor } from "./method_editor.js";
-import { PlanPlot } from "./plan_plot.js";
+import { plotPreview } from "./plan_plot.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { factList, rowTable } from "../common/tables.js";
 
 /** Address of a new method; a method of this name is edited at `#/plan/new/edit`. */
 const NEW = "new";
@@ -59,8 +61,7 @@ export class PlanView {
   }
 
   close(title) {
-    for (const plot of this.plots) plot.destroy();
-    this.plots = [];
+    clearPlots(this.plots);
     byId("plan").replaceChildren();
     write(byId("plan-note"), "");
     write(byId("plan-title"), title);
@@ -85,12 +86,8 @@ export class PlanView {
       element("p", {}, method.description), facts(method, preview), element("p", { className: "actions" }, use, copy),
       element("h3", {}, "Preview"), places, makeForecast(method.name),
       element("h3", {}, "Segments"), segmentTable(method, preview));
-    const drive = { ...QUANTITIES.drive, unit: preview.drive_unit };
-    for (const plot of this.plots) plot.destroy();
-    this.plots = [
-      new PlanPlot(QUANTITIES.displacement, preview.displacement_m, preview, places),
-      new PlanPlot(drive, preview.drive, preview, places),
-    ];
+    clearPlots(this.plots);
+    this.plots = plotPreview(preview, places);
   }
 
   /** Shows the method again, in changed units. */
@@ -116,8 +113,7 @@ function facts(method, preview) {
     "Limit of drive": `${limits.drive} ${preview.drive_unit}`,
     Checkpoints: checkpoints.join(", ") || "none",
   };
-  return element("dl", { className: "facts" }, ...Object.entries(rows).map(([name, text]) =>
-    element("div", {}, element("dt", {}, name), element("dd", {}, text))));
+  return factList(rows);
 }
 
 /** Segments as they will be logged: a staircase of drives becomes one segment for each level. */
@@ -128,8 +124,7 @@ function segmentTable(method, preview) {
     element("td", { className: "number right" }, `${fixed(start, 1)} s`), element("td", { className: "number right" }, `${fixed(end - start, 1)} s`)));
   const heads = ["Segment", "Motion", "Starts", "Lasts"].map((text, k) =>
     element("th", { scope: "col", className: k > 1 ? "right" : "" }, text));
-  return element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": "Segments" },
-    element("table", {}, element("thead", {}, element("tr", {}, ...heads)), element("tbody", {}, ...rows)));
+  return rowTable("Segments", heads, rows);
 }
 
 function describeMotion(segment) {

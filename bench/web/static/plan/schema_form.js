@@ -1,6 +1,6 @@
 // Form for a JSON document, made from its JSON Schema: every key with its unit, whatever kind of object it belongs to.
 
-import { element, write } from "../common/format.js";
+import { element, spaced, write } from "../common/format.js";
 
 const UNIT = /^\[([^\]]+)\] (.*)$/;
 const SUFFIX = /_(m|s|hz|n|mps|mps2)$/;
@@ -13,7 +13,7 @@ const getAt = (document, path) => path.reduce((value, key) => value?.[key], docu
 const capitalised = (text) => text.replace(/^./, (first) => first.toUpperCase());
 
 /** Name of a key without the suffix of its unit: `corner_acceleration_mps2` is `Corner acceleration`. */
-export const describeKey = (key) => capitalised(String(key).replace(SUFFIX, "").replaceAll("_", " "));
+export const describeKey = (key) => capitalised(spaced(String(key).replace(SUFFIX, "")));
 
 export class SchemaForm {
   /**

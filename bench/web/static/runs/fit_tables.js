@@ -1,6 +1,6 @@
 // Tables of a fit: force error by drive and by condition, and parameters with their intervals.
 
-import { significant } from "../common/format.js";
+import { significant, spaced } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { table } from "../common/tables.js";
 
@@ -52,7 +52,7 @@ export function describeCondition({ amplitude_m: amplitude, frequency_hz: freque
 /** Parameters of the modified Bouc-Wen law with 95 % intervals. */
 export function makeParameterTable(fit) {
   const rows = Object.entries(fit.parameters).map(([name, { value, unit, ci95, note }]) => [
-    name.replaceAll("_", " "), significant(value), ci95 ? `${significant(ci95[0])} … ${significant(ci95[1])}` : "not determined",
+    spaced(name), significant(value), ci95 ? `${significant(ci95[0])} … ${significant(ci95[1])}` : "not determined",
     unit === "1" ? "–" : unit, note,
   ]);
   return table("Parameters of the modified Bouc-Wen law", ["Parameter", "Value", "95 % interval", "Unit", "Note"], rows);

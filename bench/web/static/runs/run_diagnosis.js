@@ -1,8 +1,9 @@
 // Diagnosis of a run in words and pictures: what the simulation lacks, where, how sure, and what remains.
 
-import { CurvePlot, clearPlots } from "../common/curve_plot.js";
+import { clearPlots } from "../common/axes_plot.js";
+import { CurvePlot } from "../common/curve_plot.js";
 import { forceText, inForceUnit, percent, shareInterval } from "./fit_tables.js";
-import { element, significant } from "../common/format.js";
+import { element, significant, spaced } from "../common/format.js";
 import { gapOverStroke, makeGapTable } from "./gap_map.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { factList, table } from "../common/tables.js";
@@ -25,7 +26,6 @@ const VARIABLE_UNITS = {
   drive: "{drive}", drive_history: "{drive}", temperature: "K", time: "s", dissipated_energy: "J",
 };
 
-export const spaced = (name) => name.replaceAll("_", " ");
 /** Names of a set of effects in words. */
 export const joinEffects = (names) => names.map(spaced).join(" and ") || "the law alone";
 

@@ -1,6 +1,6 @@
 // Facts on a run in words: outcome, fit, diagnosis and jobs.
 
-import { element, fixed } from "../common/format.js";
+import { element, fixed, spaced } from "../common/format.js";
 
 const OUTCOMES = { clean: "good", lossy: "fair", truncated: "fair", incomplete: "bad" };
 const UNFINISHED = ["queued", "running"];
@@ -24,7 +24,7 @@ export const mayReport = (run) => hasReport(run) || Boolean(run.log_sha256);
 export function describeOutcome(run) {
   const name = run.outcome ?? run.state;
   const ending = run.ending && run.ending !== "completed" ? `, ${run.ending}` : "";
-  const mark = element("span", { className: `mark ${OUTCOMES[name] ?? "plain"}` }, name.replaceAll("_", " ") + ending);
+  const mark = element("span", { className: `mark ${OUTCOMES[name] ?? "plain"}` }, spaced(name) + ending);
   const reason = run.state === "truncated" ? CUT_OFF : run.reason;
   const alarms = (run.alarms ?? []).map((text) => element("small", { className: "attention" }, `Alarm: ${text}`));
   return [mark, element("small", {}, reason ?? ""), ...alarms];
@@ -54,7 +54,7 @@ export function describeMissing(run, kind) {
 
 /** Verdict of a diagnosis with its effects, such as `explained: gas spring`. */
 export function describeVerdict({ verdict, effects }) {
-  return [VERDICTS[verdict] ?? verdict, effects.map((name) => name.replaceAll("_", " ")).join(", ")].filter(Boolean).join(": ");
+  return [VERDICTS[verdict] ?? verdict, effects.map((name) => spaced(name)).join(", ")].filter(Boolean).join(": ");
 }
 
 /** State of a job in one line: kind, state, activity or error. */

@@ -1,7 +1,8 @@
 // Measured over simulated force of a run: figures of one segment, and the residual of each condition.
 
 import { get } from "../common/api.js";
-import { CurvePlot, clearPlots } from "../common/curve_plot.js";
+import { clearPlots } from "../common/axes_plot.js";
+import { CurvePlot } from "../common/curve_plot.js";
 import { describeCondition, forceText, makeConditionTable } from "./fit_tables.js";
 import { element, instant, write } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";

@@ -20,9 +20,9 @@ function fileSize(bytes) {
 export class RunRecords {
   constructor(run) {
     this.run = run;
-    this.notebook = new Notebook(run);
+    this.notes = new RunNotes(run);
     const notes = foldedSection("Notes and tags", { open: true });
-    notes.body.append(...this.notebook.content);
+    notes.body.append(...this.notes.content);
     this.files = foldedSection("Files", { whenOpened: () => showFiles(this.files.body, this.run) });
     this.sections = [notes.section, this.files.section];
   }
@@ -30,17 +30,17 @@ export class RunRecords {
   /** Loads what is open; new results are new files. */
   async load() {
     const isOpen = this.files.section.querySelector("details").open;
-    await Promise.all([this.notebook.load(), isOpen ? showFiles(this.files.body, this.run) : null]);
+    await Promise.all([this.notes.load(), isOpen ? showFiles(this.files.body, this.run) : null]);
   }
 
   update(run) {
     this.run = run;
-    this.notebook.update(run);
+    this.notes.update(run);
   }
 }
 
 /** Notes and tags with the forms that add them. A change does not touch what a person is writing. */
-class Notebook {
+class RunNotes {
   constructor(run) {
     this.run = run;
     this.author = field("Your name", { maxLength: 200, required: true, autocomplete: "off", value: localStorage.getItem(AUTHOR) ?? "" });

@@ -2,7 +2,7 @@
 
 import { get } from "../common/api.js";
 import { makeDriveTable, makeParameterTable } from "./fit_tables.js";
-import { element } from "../common/format.js";
+import { element, spaced } from "../common/format.js";
 import { makeNextStroke } from "./next_stroke.js";
 import { DiagnosisPart } from "./run_diagnosis.js";
 import { describeMissing, findDone, isFitted } from "./run_facts.js";
@@ -98,7 +98,7 @@ export class RunResults {
 const missing = (run, kind) => element("p", { className: "soft" }, describeMissing(run, kind));
 
 function describeOrigin(name, { provenance: { version, seed, logs, settings } }) {
-  const chosen = Object.entries(settings).filter(([, value]) => value !== null).map(([key, value]) => `${key.replaceAll("_", " ")}: ${value}`);
+  const chosen = Object.entries(settings).filter(([, value]) => value !== null).map(([key, value]) => `${spaced(key)}: ${value}`);
   const lines = [`Made by version ${version} of mrbench, seed ${seed}.`, ...Object.entries(logs).map(([log, hash]) => `${log}: SHA-256 ${hash}`), `Settings: ${chosen.join("; ") || "those by default"}.`];
   return [element("h3", {}, name), ...lines.map((text) => element("p", { className: "path" }, text))];
 }

@@ -3,6 +3,7 @@
 import { get, getTag } from "../common/api.js";
 import { byId, duration, element, localTime, write, zone } from "../common/format.js";
 import { runAddress, specimenAddress } from "../common/router.js";
+import { rowTable } from "../common/tables.js";
 import { describeFit, describeOutcome, describeVerdict, isUnfinished } from "../runs/run_facts.js";
 import { SpecimenFacts } from "./specimen_facts.js";
 import { SpecimenTrend } from "./specimen_trend.js";
@@ -119,9 +120,7 @@ export class SpecimenView {
     const note = this.hasOlder ? element("p", { className: "note" }, `Only the newest ${MOST_RUNS} runs are shown.`) : null;
     const title = "Runs, newest first";
     this.parts.history.replaceChildren(element("h2", {}, title), ...(note ? [note] : []),
-      element("div", { className: "scroll", tabIndex: 0, role: "group", "aria-label": title }, element("table", {},
-        element("thead", {}, element("tr", {}, ...heads.map((text) => element("th", { scope: "col" }, text)))),
-        element("tbody", {}, ...rows))),
+      rowTable(title, heads, rows),
       element("p", { className: "actions" }, all));
   }
 

@@ -3,6 +3,7 @@
 import { getTag, patch } from "../common/api.js";
 import { element, instant, significant, write, describeDriveKind } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { factList } from "../common/tables.js";
 
 const CHANGED_MEANWHILE = 412;
 const DRIVE_KINDS = ["coil_v", "coil_a", "driver_command_v"];
@@ -55,8 +56,7 @@ export class SpecimenFacts {
       ["Runs", String(runs)], ["Last run", instant(last)],
       ["Described first", registered ? instant(registered) : "not yet; only runs name it"],
     ];
-    const list = element("dl", { className: "facts" }, ...rows.map(([name, text]) =>
-      element("div", {}, element("dt", {}, name), element("dd", {}, text))));
+    const list = factList(Object.fromEntries(rows));
     this.edit = element("button", { type: "button" }, "Edit facts");
     this.edit.addEventListener("click", () => this.open());
     this.place.replaceChildren(element("h2", {}, "Facts"), list, this.edit, element("p", { className: "note", role: "status" }, answer));

@@ -1,7 +1,7 @@
 // Trend of a specimen: a chosen quantity over its runs, its drift and outliers, and the cause in words.
 
 import { findOutliers, fitLine } from "./drift.js";
-import { element, instant, localTime, significant, zone } from "../common/format.js";
+import { element, instant, localTime, significant, spaced, zone } from "../common/format.js";
 import { runAddress } from "../common/router.js";
 import { table } from "../common/tables.js";
 import { TrendPlot } from "./trend_plot.js";
@@ -95,7 +95,7 @@ function describeTrend(trend, changes) {
     since ? `${withUnit(slope, unit)} per run` : "–", significant(deviations, 2),
     `${withUnit(values[0].value, unit)} … ${withUnit(values.at(-1).value, unit)}`,
   ]);
-  const effects = trend.effects.map((name) => name.replaceAll("_", " ")).join(", ") || "none";
+  const effects = trend.effects.map((name) => spaced(name)).join(", ") || "none";
   const heads = ["Quantity", "Direction", "Since", "Change", "Change / standard deviation", "First … last value"];
   return [
     element("h3", {}, "Cause"), element("p", { className: "cause" }, trend.explanation),

@@ -1,8 +1,8 @@
 // Figure of a quantity over the runs: values with 95 % intervals, the line of the drift, and outliers.
 
-import uPlot from "../vendor/uPlot.esm.js";
+import { AxesPlot, OWN_CONTENT, drawInside, position } from "../common/axes_plot.js";
 import { element, localTime, significant, zone } from "../common/format.js";
-import { QUIET, axis, colour } from "../common/plot_style.js";
+import { axis, colour } from "../common/plot_style.js";
 
 const HEIGHT = 280;
 const DAY = 86_400;
@@ -17,30 +17,22 @@ export class TrendPlot {
    * `at` is UTC in seconds if `isTime`, else the number of the run.
    */
   constructor(place, { label, description, marks, corners, isTime }) {
-    this.box = element("div", { className: "plot trend", role: "img", "aria-label": description });
-    place.replaceChildren(element("figcaption", {}, label), this.box);
+    const box = element("div", { className: "plot trend", role: "img", "aria-label": description });
+    place.replaceChildren(element("figcaption", {}, label), box);
     const times = marks.map(({ at }) => at);
-    const width = () => Math.max(200, this.box.clientWidth);
-    this.plot = new uPlot({
-      ...QUIET, width: width(), height: HEIGHT, padding: [14, 16, 0, 0],
+    this.plot = new AxesPlot(box, {
+      least: { width: 200 }, height: HEIGHT, padding: [14, 16, 0, 0],
       scales: { x: { time: isTime, range: () => pad(times, isTime) }, y: { range: () => findRange(marks, corners) } },
       axes: [
         axis({ size: 28, labelSize: 18, ...(isTime ? timeAxis(times) : numberAxis) }),
         axis({ size: 76, space: 30, values: (u, splits) => splits.map((value) => significant(value)) }),
       ],
-      series: [{}, { paths: () => null, points: { show: false } }],
-      hooks: { draw: [(u) => draw(u, marks, corners)] },
-    }, [times, marks.map(({ value }) => value)], this.box);
-    this.watch = new ResizeObserver(() => this.plot.setSize({ width: width(), height: HEIGHT }));
-    this.watch.observe(this.box);
-    this.scheme = matchMedia("(prefers-color-scheme: dark)");
-    this.redraw = () => this.plot.redraw(false, true);
-    this.scheme.addEventListener("change", this.redraw);
+      series: OWN_CONTENT,
+      hooks: { draw: [(u) => drawInside(u, () => draw(u, marks, corners))] },
+    }, [times, marks.map(({ value }) => value)]);
   }
 
   destroy() {
-    this.watch.disconnect();
-    this.scheme.removeEventListener("change", this.redraw);
     this.plot.destroy();
   }
 }
@@ -81,14 +73,8 @@ function findRange(marks, corners) {
 }
 
 function draw(u, marks, corners) {
-  const { ctx, bbox } = u;
-  ctx.save();
-  ctx.beginPath();
-  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-  ctx.clip();
   drawLine(u, corners);
   for (const mark of marks) drawMark(u, mark);
-  ctx.restore();
 }
 
 function drawLine(u, corners) {
@@ -97,7 +83,7 @@ function drawLine(u, corners) {
   ctx.lineWidth = 2 * devicePixelRatio;
   ctx.setLineDash([8 * devicePixelRatio, 5 * devicePixelRatio]);
   ctx.beginPath();
-  for (const [at, value] of corners) ctx.lineTo(u.valToPos(at, "x", true), u.valToPos(value, "y", true));
+  for (const [at, value] of corners) ctx.lineTo(...position(u, at, value));
   ctx.stroke();
   ctx.setLineDash([]);
 }
@@ -105,7 +91,8 @@ function drawLine(u, corners) {
 /** Draws a value: filled with its interval, hollow where the run does not determine it, an outlier as a named square. */
 function drawMark(u, { at, value, ci95, number, isOutlier }) {
   const { ctx } = u;
-  const [x, y, radius] = [u.valToPos(at, "x", true), u.valToPos(value, "y", true), RADIUS * devicePixelRatio];
+  const [x, y] = position(u, at, value);
+  const radius = RADIUS * devicePixelRatio;
   ctx.strokeStyle = ctx.fillStyle = colour(isOutlier ? "--bad" : "--force");
   ctx.lineWidth = 1.5 * devicePixelRatio;
   ctx.beginPath();

@@ -1,5 +1,7 @@
 // Series of a specimen: quantities of its trend, and parameters of the fits of its runs.
 
+import { spaced } from "../common/format.js";
+
 const FORMER_DIRECTIONS = { grows: "rising", falls: "falling" };
 const DAY_MS = 86_400_000;
 
@@ -9,7 +11,7 @@ export const readChanges = (trend) => trend.changes.map(({ way, per_run: slope, 
 }));
 
 /** Name of a quantity for a person: `gas spring, preload`. */
-export const describeQuantity = (name) => name.replaceAll("_", " ").replace(".", ", ");
+export const describeQuantity = (name) => spaced(name).replace(".", ", ");
 
 /** Returns all series: those of the trend first, then those of the fits. */
 export function listSeries(trend, parameters, runs) {

@@ -8,6 +8,7 @@ from sqlalchemy import Engine, func, select, tuple_, update
 from sqlalchemy.orm import sessionmaker
 
 from bench.catalogue.campaign_table import CampaignTable
+from bench.catalogue.change_counter import ChangeCounter
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
 from bench.catalogue.planning import SHIPPED_VERSION, IdempotencyKeys, MethodStore, SpecimenStore
@@ -32,6 +33,7 @@ class Catalogue:
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
         self.campaigns = CampaignTable(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
+        self.change_counter = ChangeCounter(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.
         self._sessions = sessionmaker(engine, expire_on_commit=False)
@@ -39,6 +41,7 @@ class Catalogue:
 
     def close(self) -> None:
         """Close all connections."""
+        self.change_counter.close()
         self._engine.dispose()
 
     def make_name(self, path: Path) -> str:

@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -26,6 +27,8 @@ _RELEASE_TIMEOUT = 10.0
 """Time [s] within which a cancelled job must have stopped."""
 _REPORT_PAUSE = 5.0
 """Time [s] before the end of a job is reported again, if the catalogue could not be written."""
+_STATE_LIFETIME = 1.0
+"""Time [s] for which the state of the workers is kept, because each question goes to the scheduler."""
 _LOG = logging.getLogger(__name__)
 _CLIENT: Any = Client
 _EVENT: Any = Event
@@ -100,6 +103,7 @@ class DaskEngine:
         self._listener: JobListener | None = None
         self._submissions: dict[str, _Submission] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+        self._asking, self._asked_at, self._worker_state = asyncio.Lock(), float("-inf"), ""
 
     async def start(self, listener: JobListener) -> None:
         """Connect, and reconnect whenever the scheduler is restarted."""
@@ -139,11 +143,18 @@ class DaskEngine:
             raise JobError(f"job {job_id} has not stopped within {_RELEASE_TIMEOUT:g} s; try again later")
 
     async def describe_state(self) -> str:
-        """Return ``ok`` if a worker is connected, otherwise what is missing."""
+        """Return ``ok`` if a worker is connected, otherwise what is missing; asked for at most once a second."""
         if self._client is None:
             return f"no scheduler at {self._address}"
+        async with self._asking:
+            if time.monotonic() - self._asked_at > _STATE_LIFETIME:
+                self._worker_state = await self._ask_for_workers(self._client)
+                self._asked_at = time.monotonic()
+            return self._worker_state
+
+    async def _ask_for_workers(self, client: Any) -> str:
         try:
-            workers = await asyncio.wait_for(self._client.nthreads(), 1.0)
+            workers = await asyncio.wait_for(client.nthreads(), 1.0)
         except (TimeoutError, OSError, ValueError):
             return f"the scheduler at {self._address} does not reply"
         return "ok" if workers else "no worker; start one: mrbench worker"

@@ -82,6 +82,7 @@ class AgentMonitor:
         self._link, self._publish, self._observe = link, publish, observe
         self._status: AgentStatus | None = None
         self._status_at = float("-inf")
+        self._description: tuple[str, BenchDescription] | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._listen, name="agent-monitor", daemon=True)
 
@@ -116,16 +117,21 @@ class AgentMonitor:
         return self.latest_status or self.send_command(StatusCommand(), timeout)
 
     def describe_bench(self) -> BenchDescription:
-        """Return what the agent's configuration says about the bench.
+        """Return what the agent's configuration says about the bench; asked for once for each configuration.
 
         Raises:
             AgentUnreachableError: the agent does not answer, or is of an older version.
         """
+        status, kept = self.latest_status, self._description
+        identity = status.config_identity if status else ""
+        if kept is not None and identity and kept[0] == identity:
+            return kept[1]
         description = self._link.send(DescribeCommand()).description
         if description is None:
             raise AgentUnreachableError(
                 "the rig agent cannot describe the bench; it must have the service's version"
             )
+        self._description = identity, description
         return description
 
     def reset(self) -> AgentStatus:

@@ -30,6 +30,7 @@ from bench.service.context import ServiceContext
 from bench.service.middleware import (
     BodyLimitMiddleware,
     HeadMiddleware,
+    KeptAnswerMiddleware,
     RequestLogMiddleware,
     RequestMetricsMiddleware,
     SecurityHeadersMiddleware,
@@ -43,6 +44,11 @@ from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers
 API = "/api/v1"
 PUBLIC_PATHS = (f"{API}/health", f"{API}/openapi.json")
 """Paths below `/api/` that need no token."""
+_LISTS = ("events", "jobs", "methods", "runs")
+KEPT_PATHS = frozenset(
+    f"{API}/{name}" for name in ("bench", "bench/channels", "bench/instruments", "bench/limits", *_LISTS)
+)
+"""Paths whose answers depend only on the catalogue, the agent's status and the query."""
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]", "::1")
 PAGE_FOLDER = Path(__file__).parent.parent / "web" / "static"
 """Files of the web page."""
@@ -83,6 +89,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
     # The middleware that is added last sees a request first.
+    app.add_middleware(KeptAnswerMiddleware, paths=KEPT_PATHS)
     app.add_middleware(HeadMiddleware, below="/api/")
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)

@@ -1,6 +1,7 @@
 """Objects shared by all routes, created when the service starts."""
 
 import asyncio
+from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +10,7 @@ from weakref import WeakValueDictionary
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from bench.agent_protocol import AgentStatus
 from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
@@ -23,6 +25,19 @@ from bench.service.views import Run, make_run_view
 
 MAX_JOBS = 50
 """Largest number of newest jobs in the view of a run; its newest results are shown however old they are."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """State that lists show: one state of the catalogue, and one status of the agent."""
+
+    changes: int
+    """Number of the catalogue's state, from `ChangeCounter`."""
+    status: AgentStatus | None
+
+    def is_same(self, other: "Shown") -> bool:
+        """Return whether both are the same state and the same message of the agent."""
+        return self.changes == other.changes and self.status is other.status
 
 
 @dataclass(frozen=True)
@@ -49,6 +64,11 @@ class ServiceContext:
         """Data folder."""
         return self.catalogue.folder
 
+    def find_shown(self) -> Shown | None:
+        """Return what lists show at present; None if the database cannot tell a change."""
+        changes = self.catalogue.change_counter.read()
+        return None if changes is None else Shown(changes, self.monitor.latest_status)
+
     def get_run(self, run_id: str) -> RunRow:
         """Return the run with this id.
 
@@ -73,11 +93,10 @@ class ServiceContext:
 
     def make_run_views(self, *rows: RunRow) -> list[Run]:
         """Return the views of runs, each with its jobs."""
-        jobs = self.catalogue.list_jobs_of_runs([row.id for row in rows], MAX_JOBS)
-        return [
-            make_run_view(row, [job for job in jobs if job.run_id == row.id], self.monitor.latest_status)
-            for row in rows
-        ]
+        status, jobs = self.monitor.latest_status, defaultdict(list)
+        for job in self.catalogue.list_jobs_of_runs([row.id for row in rows], MAX_JOBS):
+            jobs[job.run_id].append(job)
+        return [make_run_view(row, jobs[row.id], status) for row in rows]
 
 
 def _get_context(connection: HTTPConnection) -> ServiceContext:

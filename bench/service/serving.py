@@ -5,6 +5,7 @@ import logging
 import signal
 import socket
 import ssl
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractAsyncContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
@@ -34,6 +35,8 @@ from bench.service.processes import (
 )
 
 _LOG = logging.getLogger(__name__)
+_SWITCH_INTERVAL = 2e-4
+"""Time after which a computing thread yields the interpreter to the one that answers requests [s]."""
 _SHUTDOWN_TIMEOUT = 5
 """Time for open requests to finish at shutdown [s]."""
 
@@ -230,6 +233,7 @@ def check_tls(files: TlsFiles) -> None:
 
 def _run_server(app: object, listener: socket.socket, tls: TlsFiles | None) -> None:
     # Uvicorn's own log would contain the token that a browser sends in the URL of the websocket.
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     settings = uvicorn.Config(
         app,  # type: ignore[arg-type]
         log_config=None,

@@ -109,7 +109,11 @@ def _make_rows() -> Iterator[tuple[dict[str, Any], tuple[dict[str, Any], ...]]]:
             name: float(value) for name, value in zip(_PARAMETERS, random.uniform(500, 1500, 14), strict=True)
         }
         fit = {"rmse_n": 1.3, "noise_floor_n": 1.2, "result": "converged", "parameters": values}
-        gap = {"verdict": "explained", "effects": [_EFFECTS[number % 5]], "explanation": 30 * "Words. "}
+        gap = {
+            "verdict": "explained", "effects": [_EFFECTS[number % 5]], "explanation": 30 * "Words. ",
+            "probability": 0.97, "before_n": 3.1, "after_n": 1.3, "noise_floor_n": 1.2,
+            "shrinkage": 0.95, "shrinkage_ci95": [0.91, 0.97],
+        }  # fmt: skip
         yield made, (_make_job(number, "identify", started, fit), _make_job(number, "diagnose", started, gap))
 
 

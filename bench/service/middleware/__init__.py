@@ -1,7 +1,8 @@
-"""ASGI middleware: log and metrics of requests, check of the token, limit on bodies, headers, HEAD."""
+"""ASGI middleware: log, metrics, check of the token, limit on bodies, headers, HEAD, kept answers."""
 
 from bench.service.middleware.body_limit import MAX_BODY_SIZE, BodyLimitMiddleware
 from bench.service.middleware.head import HeadMiddleware
+from bench.service.middleware.kept_answers import KeptAnswerMiddleware
 from bench.service.middleware.request_log import RequestLogMiddleware
 from bench.service.middleware.request_metrics import RequestMetricsMiddleware
 from bench.service.middleware.security_headers import SecurityHeadersMiddleware
@@ -11,6 +12,7 @@ __all__ = [
     "MAX_BODY_SIZE",
     "BodyLimitMiddleware",
     "HeadMiddleware",
+    "KeptAnswerMiddleware",
     "RequestLogMiddleware",
     "RequestMetricsMiddleware",
     "SecurityHeadersMiddleware",

@@ -1,6 +1,7 @@
 """Route of the health of the service: agent, worker, disk, queue and clocks, each in words."""
 
 import asyncio
+from functools import cache
 from importlib.metadata import version
 
 from fastapi import APIRouter
@@ -19,16 +20,24 @@ _MILLISECONDS = 1e3
 @router.get("/health")
 async def get_health(context: Context) -> Health:
     """Return the state of agent, worker, disk, queue and clocks in words; needs no token."""
-    agent, worker, disk, queue = await asyncio.gather(
-        asyncio.to_thread(_describe_agent, context),
-        context.engine.describe_state(),
-        asyncio.to_thread(context.space_monitor.describe),
-        asyncio.to_thread(_describe_queue, context),
+    worker, parts = await asyncio.gather(
+        context.engine.describe_state(), asyncio.to_thread(_describe_parts, context)
     )
-    clocks = describe_clocks(context.monitor.latest_status)
-    return Health(
-        version=version("mrbench"), agent=agent, worker=worker, disk=disk or "ok", queue=queue, clocks=clocks
-    )
+    return Health(version=_read_version(), worker=worker, **parts)
+
+
+@cache
+def _read_version() -> str:
+    return version("mrbench")  # reads files
+
+
+def _describe_parts(context: ServiceContext) -> dict[str, str]:
+    return {
+        "agent": _describe_agent(context),
+        "disk": context.space_monitor.describe() or "ok",
+        "queue": _describe_queue(context),
+        "clocks": describe_clocks(context.monitor.latest_status),
+    }
 
 
 def _describe_agent(context: ServiceContext) -> str:

@@ -2,6 +2,7 @@
 
 import base64
 import time
+import uuid
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -70,7 +71,16 @@ class Campaign:
         content: dict[str, Any] = {"note": note, "who": who, "choice": choice}
         if photo is not None:
             content["photo"] = base64.b64encode(photo.read_bytes()).decode()
-        return self._post("answer", content)
+        return self._post("answer", content, key=uuid.uuid4().hex)
+
+    def download_photo(self, item: str, to: Path) -> Path:
+        """Download the photo of a step's answer, and return its path.
+
+        Raises:
+            ClientError: the step has no photo, or the service cannot be reached.
+            LogError: the file cannot be written.
+        """
+        return self._session.download(f"{self._path}/photos/{quote_name(item)}", to)
 
     def edit(self, edit: Mapping[str, Any], who: str = "") -> dict[str, Any]:
         """Edit the queue, such as ``{"edit": "delete", "item": "s0004"}``; return the state.
@@ -78,7 +88,8 @@ class Campaign:
         Raises:
             ClientError: the edit is refused, or the service cannot be reached.
         """
-        return dict(self._session.patch(self._path, {"edit": edit, "who": who}))
+        content = {"edit": edit, "who": who}
+        return dict(self._session.patch(self._path, content, key=uuid.uuid4().hex))
 
     def send_test_message(self) -> str:
         """Send a test message to all recipients; return `sent`, or the reasons of failures.
@@ -86,7 +97,7 @@ class Campaign:
         Raises:
             ClientError: the campaign has no recipients, or the service cannot be reached.
         """
-        return str(self._post("test-message", {})["result"])
+        return str(self._post("test-message", {}, key=uuid.uuid4().hex)["result"])
 
     def wait(self, timeout: float = 86_400.0) -> dict[str, Any]:
         """Wait until the campaign ends or asks for a person, and return its state.
@@ -104,8 +115,8 @@ class Campaign:
             time.sleep(_POLL_PERIOD)
         return state
 
-    def _post(self, verb: str, content: Mapping[str, Any]) -> dict[str, Any]:
-        return dict(self._session.post(f"{self._path}/{verb}", content))
+    def _post(self, verb: str, content: Mapping[str, Any], key: str | None = None) -> dict[str, Any]:
+        return dict(self._session.post(f"{self._path}/{verb}", content, key))
 
 
 def _needs_attention(state: Mapping[str, Any]) -> bool:

@@ -77,25 +77,15 @@ class Session:
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        body = b"" if content is None else json.dumps(content).encode()
-        if key is None:
-            return self._post(path, body, {})
-        headers = {"Idempotency-Key": key}
-        try:
-            return self._post(path, body, headers)
-        except ClientError as error:
-            if error.status is not None:
-                raise
-            return self._post(path, body, headers)
+        return self._send("POST", path, b"" if content is None else json.dumps(content).encode(), key)
 
-    def patch(self, path: str, content: Mapping[str, Any]) -> Any:
-        """Return the reply to PATCH, decoded from JSON.
+    def patch(self, path: str, content: Mapping[str, Any], key: str | None = None) -> Any:
+        """Return the reply to PATCH, decoded from JSON; path, content and key as for `post`.
 
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        with self._request("PATCH", path, json.dumps(content).encode()) as reply:
-            return _decode(path, reply.read())
+        return self._send("PATCH", path, json.dumps(content).encode(), key)
 
     def download(self, path: str, to: Path) -> Path:
         """Download a file, which appears complete or not at all, and return its path.
@@ -115,8 +105,19 @@ class Session:
                 raise ClientError(f"{to}: {received} of {announced} bytes of {path} arrived; repeat the download")
         return to
 
-    def _post(self, path: str, body: bytes, headers: Mapping[str, str]) -> Any:
-        with self._request("POST", path, body, headers) as reply:
+    def _send(self, method: str, path: str, body: bytes, key: str | None) -> Any:
+        if key is None:
+            return self._send_once(method, path, body, {})
+        headers = {"Idempotency-Key": key}
+        try:
+            return self._send_once(method, path, body, headers)
+        except ClientError as error:
+            if error.status is not None:
+                raise
+            return self._send_once(method, path, body, headers)
+
+    def _send_once(self, method: str, path: str, body: bytes, headers: Mapping[str, str]) -> Any:
+        with self._request(method, path, body, headers) as reply:
             try:
                 content: bytes = reply.read()
             except (OSError, HTTPException) as error:

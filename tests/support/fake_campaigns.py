@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from fastapi import APIRouter
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 
 from bench.campaigns import (
     CampaignError,
@@ -242,6 +242,10 @@ def add_commands(router: APIRouter, campaigns: FakeCampaigns) -> None:
             campaign_id, lambda state, now: answer(state, now, wanted.who, wanted.note, photo, wanted.choice)
         )
         return campaigns.known[campaign_id].proceed() if isinstance(changed, CampaignView) else changed
+
+    @router.get("/{campaign_id}/photos/{item_id}")
+    async def get_photo(campaign_id: str, item_id: str) -> Response:
+        return Response(f"photo of {campaign_id} {item_id}", media_type="image/jpeg")
 
     @router.post("/{campaign_id}/test-message")
     async def test(campaign_id: str) -> TestMessageResult:

@@ -95,6 +95,11 @@ def test_an_answer_needs_its_note_keeps_what_was_typed_and_sends_note_and_photo(
 
 
 @browser_test
+def test_the_photo_of_an_answer_is_saved_from_the_queue(seen):
+    assert seen["photo"] == "photo.jpg"
+
+
+@browser_test
 def test_the_queue_is_edited_with_the_name_of_the_person(seen):
     edits = [body for method, _, body in seen["sent"] if method == "PATCH"]
     assert {one["who"] for one in edits} == {"A. Meyer"}

@@ -77,6 +77,11 @@ async function answerPrompt() {
   await page.keyboard.press("Enter");
   await hasText("#campaign-facts", "a run is in progress");
   seen.questionIsGone = await page.locator("#campaign-question").isHidden();
+  await page.click("#view-campaigns details summary");
+  const download = page.waitForEvent("download");
+  await page.getByRole("button", { name: /^Save photo of step/ }).click();
+  seen.photo = (await download).suggestedFilename();
+  await hasText("#campaign-result", "photo.jpg was saved");
 }
 
 async function editQueue() {
@@ -99,7 +104,6 @@ async function editQueue() {
   await page.selectOption("#step-place", "");
   await page.click("#step-form button");
   await hasText("#campaign-result", "was added");
-  await page.click("#view-campaigns details summary");
   await page.locator("#ended-steps tr", { hasText: "s0013" }).getByRole("button", { name: /^Release/ }).click();
   await hasText("#campaign-result", "s0013 is tried again");
   seen.queue = await page.locator("#queue tr").evaluateAll((rows) => rows.map((one) => one.cells[0].innerText));

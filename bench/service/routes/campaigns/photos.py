@@ -10,6 +10,7 @@ from bench.log import write_atomically
 
 _BEGINNINGS = {b"\xff\xd8\xff": ".jpg", b"\x89PNG\r\n\x1a\n": ".png"}
 """Extension by the first bytes of a file."""
+_MEDIA_TYPES = {".jpg": "image/jpeg", ".png": "image/png"}
 
 
 def save_photo(folder: Path, name: str, encoded: str) -> str:
@@ -37,3 +38,8 @@ def save_photo(folder: Path, name: str, encoded: str) -> str:
     except LogError as error:
         raise CampaignError(str(error)) from None
     return path.name
+
+
+def get_media_type(path: Path) -> str:
+    """Return the media type of a stored photo."""
+    return _MEDIA_TYPES[path.suffix]

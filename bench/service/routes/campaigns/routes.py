@@ -3,9 +3,10 @@
 import asyncio
 import time
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
+from fastapi.responses import FileResponse
 
 from bench.agent_protocol import StopCommand
 from bench.campaigns import (
@@ -30,9 +31,10 @@ from bench.campaigns import (
 from bench.disk import RESERVE, find_free_space
 from bench.service.campaigns import AGENT_BENCH
 from bench.service.context import Context, ServiceContext
+from bench.service.files import SnapshotResponse
 from bench.service.problems import make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
-from bench.service.routes.campaigns.photos import save_photo
+from bench.service.routes.campaigns.photos import get_media_type, save_photo
 from bench.service.routes.campaigns.views import (
     AnswerRequest,
     CampaignPage,
@@ -47,6 +49,9 @@ from bench.service.routes.campaigns.views import (
 )
 
 router = APIRouter(tags=["campaigns"], route_class=IdempotentRoute)
+_PHOTO: dict[int | str, dict[str, Any]] = {
+    200: {"description": "the file", "content": {"image/jpeg": {}, "image/png": {}}}
+}
 _EVENTS = 200
 """Number of newest events in a view."""
 
@@ -115,7 +120,7 @@ def get_campaign(campaign_id: str, context: Context) -> CampaignView:
     return _show(context.campaigns.store, _get(context.campaigns.store, campaign_id))
 
 
-@router.patch("/campaigns/{campaign_id}")
+@router.patch("/campaigns/{campaign_id}", dependencies=[IDEMPOTENT])
 def edit_campaign(campaign_id: str, request: EditRequest, context: Context) -> CampaignView:
     """Edit the queue of a campaign while it runs; the edit is recorded with who made it and when."""
     store = context.campaigns.store
@@ -144,7 +149,7 @@ def stop_campaign(campaign_id: str, request: StopCampaignRequest, context: Conte
     return view
 
 
-@router.post("/campaigns/{campaign_id}/answer")
+@router.post("/campaigns/{campaign_id}/answer", dependencies=[IDEMPOTENT])
 def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context) -> CampaignView:
     """Answer a prompt with a note and a photo, or decide on a failed step."""
     stored = _get(context.campaigns.store, campaign_id)
@@ -159,7 +164,18 @@ def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context) 
     )
 
 
-@router.post("/campaigns/{campaign_id}/test-message")
+@router.get("/campaigns/{campaign_id}/photos/{item_id}", response_class=FileResponse, responses=_PHOTO)
+def get_photo(campaign_id: str, item_id: str, context: Context) -> SnapshotResponse:
+    """Return the photo that a person has added to the answer of a step."""
+    items = _get(context.campaigns.store, campaign_id).state.items
+    photo = next((item.photo for item in items if item.id == item_id), "")
+    path = context.data / photo
+    if not photo or not path.is_file():
+        raise make_not_found("photo", f"of step {item_id}")
+    return SnapshotResponse(path, get_media_type(path), path.name, inline=True)
+
+
+@router.post("/campaigns/{campaign_id}/test-message", dependencies=[IDEMPOTENT])
 def send_test_message(campaign_id: str, context: Context) -> TestMessageResult:
     """Send a test message to the recipients of a campaign."""
     return TestMessageResult(result=send_test(_get(context.campaigns.store, campaign_id)))
@@ -173,7 +189,7 @@ def get_queue(context: Context) -> QueueView:
     return QueueView(campaign=_show(store, held[0]) if held else None)
 
 
-@router.patch("/queue")
+@router.patch("/queue", dependencies=[IDEMPOTENT])
 def edit_queue(request: EditRequest, context: Context) -> CampaignView:
     """Edit the queue of the campaign that holds the bench."""
     held = context.campaigns.store.list_in_progress(AGENT_BENCH)

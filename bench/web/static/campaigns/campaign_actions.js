@@ -1,6 +1,6 @@
 // Commands on one campaign: pause, resume, stop, test message, answers. Each is recorded with the name of the person.
 
-import { post } from "../common/api.js";
+import { post, saveFile, start } from "../common/api.js";
 import { CampaignQueue } from "./campaign_queue.js";
 import { hasEnded } from "./campaign_words.js";
 import { openDialog } from "../common/dialogs.js";
@@ -21,7 +21,7 @@ export class CampaignActions {
   /** Takes a function that receives a changed campaign. */
   constructor({ onChanged }) {
     this.onChanged = onChanged;
-    this.queue = new CampaignQueue({ act: (...given) => this.act(...given), who: () => this.who });
+    this.queue = new CampaignQueue({ act: (...given) => this.act(...given), save: (...given) => this.save(...given), who: () => this.who });
     byId("campaign-who").value = localStorage.getItem(OPERATOR) ?? "";
     byId("campaign-who").addEventListener("change", () => localStorage.setItem(OPERATOR, this.who));
     for (const verb of Object.keys(QUESTIONS)) byId(`campaign-${verb}`).addEventListener("click", () => this.ask(verb));
@@ -87,6 +87,14 @@ export class CampaignActions {
     }
   }
 
+  async save(path, name) {
+    try {
+      this.note(`${await saveFile(path, name)} was saved.`);
+    } catch (problem) {
+      this.note(problem.after("Not saved"), true);
+    }
+  }
+
   note(text, isProblem = false) {
     write(byId("campaign-result"), text);
     byId("campaign-result").classList.toggle("problem", isProblem);
@@ -114,7 +122,7 @@ export class CampaignActions {
     const photo = form.querySelector("[name=photo]")?.files[0];
     try {
       const body = { who: this.who, note: form.querySelector("[name=note]").value, choice, photo: photo ? await encodePhoto(photo) : "" };
-      if (await this.act("Not answered", "answer", body, "The answer was taken.")) byId("campaign-question-title").focus();
+      if (await this.act("Not answered", "answer", body, "The answer was taken.", start)) byId("campaign-question-title").focus();
     } catch (error) {
       this.note(`Not answered: ${error.message}`, true);
     }

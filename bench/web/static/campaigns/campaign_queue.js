@@ -1,6 +1,6 @@
 // Queue of a campaign: its steps, and edits while it runs. Each edit is recorded with who made it and when.
 
-import { patch } from "../common/api.js";
+import { start } from "../common/api.js";
 import { countStates, describeKind, hasEnded, markStep } from "./campaign_words.js";
 import { byId, element, instant, write } from "../common/format.js";
 import { keep, refresh } from "./refresh.js";
@@ -10,9 +10,9 @@ const ENDED = ["done", "skipped", "failed", "held_back"];
 const RELEASABLE = ["held_back", "failed", "skipped"];
 
 export class CampaignQueue {
-  /** Takes the function that sends an edit, and one that returns the name of the person. */
-  constructor({ act, who }) {
-    Object.assign(this, { act, who });
+  /** Takes the functions that send an edit, save a file, and return the name of the person. */
+  constructor({ act, save, who }) {
+    Object.assign(this, { act, save, who });
     this.showsAll = false;
     byId("queue-all").addEventListener("click", () => {
       this.showsAll = true;
@@ -61,11 +61,19 @@ export class CampaignQueue {
   row(item) {
     const { id, kind, label, state, reason, note, ended } = item;
     const answer = note ? element("small", {}, `Answer: ${note}`) : null;
+    const photo = item.photo ? this.photoButton(item) : null;
     const time = ended ? element("small", { className: "number" }, instant(ended)) : null;
     return element("tr", {},
-      element("th", { scope: "row" }, id), element("td", {}, label, element("small", {}, describeKind(kind)), answer),
+      element("th", { scope: "row" }, id), element("td", {}, label, element("small", {}, describeKind(kind)), answer, photo),
       element("td", {}, markStep(state), element("small", {}, reason), time),
       element("td", { className: "actions" }, ...(hasEnded(this.campaign) ? [] : this.buttons(item))));
+  }
+
+  photoButton({ id, photo }) {
+    const button = keep(element("button", { type: "button", "aria-label": `Save photo of step ${id}` }, "Save photo"), `${id}/photo`);
+    const path = `campaigns/${encodeURIComponent(this.campaign.id)}/photos/${encodeURIComponent(id)}`;
+    button.addEventListener("click", () => this.save(path, photo));
+    return button;
   }
 
   buttons(item) {
@@ -92,7 +100,7 @@ export class CampaignQueue {
   }
 
   edit(edit, done) {
-    return this.act("Not edited", "", { who: this.who(), edit }, done, patch);
+    return this.act("Not edited", "", { who: this.who(), edit }, done, (path, body) => start(path, body, "PATCH"));
   }
 
   add() {

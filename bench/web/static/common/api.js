@@ -84,14 +84,14 @@ export async function samples(path) {
 /** Makes a key for one request; `randomUUID` is missing on a page that was loaded without TLS from elsewhere. */
 const makeKey = () => crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
 
-/** Posts a request that starts something: with a key, so that it is repeated safely if its answer is lost. */
-export async function start(path, body) {
+/** Sends a request that starts something: with a key, so that it is repeated safely if its answer is lost. */
+export async function start(path, body, method = "POST") {
   const headers = { "Idempotency-Key": makeKey() };
   try {
-    return await call("POST", path, body, TIMEOUT_MS, headers);
+    return await call(method, path, body, TIMEOUT_MS, headers);
   } catch (problem) {
     if (problem.status !== 0) throw problem;
-    return call("POST", path, body, TIMEOUT_MS, headers); // no answer: perhaps it was lost on its way
+    return call(method, path, body, TIMEOUT_MS, headers); // no answer: perhaps it was lost on its way
   }
 }
 

@@ -6,6 +6,17 @@ from bench.client import ClientError
 
 REST = {"rest": {"seconds": 900}}
 PROMPT = {"prompt": {"text": "Mount the specimen", "note": True}}
+PHOTO = b"\xff\xd8\xff\xe0 a photo"
+
+
+def test_a_script_adds_a_photo_to_its_answer_and_downloads_it(bench, tmp_path):
+    campaign = bench.start_campaign({"name": "night", "steps": [PROMPT, REST]})
+    assert campaign.wait(20)["question"]["item"] == "s0001"
+    with pytest.raises(ClientError, match="photo of step s0001"):
+        campaign.download_photo("s0001", tmp_path / "none.jpg")
+    (tmp_path / "given.jpg").write_bytes(PHOTO)
+    campaign.answer("12 N m", photo=tmp_path / "given.jpg")
+    assert campaign.download_photo("s0001", tmp_path / "photo.jpg").read_bytes() == PHOTO
 
 
 def test_a_script_starts_edits_answers_and_stops_a_campaign(bench):

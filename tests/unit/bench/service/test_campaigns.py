@@ -127,6 +127,44 @@ def test_the_queue_is_edited_while_a_run_is_in_progress(service):
     assert service.post("/campaigns", {"campaign": {"name": "b", "steps": [RUN]}}, 409)["type"].endswith("held")
 
 
+def test_an_edit_that_is_repeated_with_its_key_adds_one_step(service):
+    campaign = start(service, [{"rest": {"seconds": 500}}])
+    edit = {"who": "B", "edit": {"edit": "add", "steps": [{"rest": {"seconds": 5}}]}}
+    for path in (f"/api/v1/campaigns/{campaign['id']}", "/api/v1/queue"):
+        key = {"Idempotency-Key": path}
+        before = len(service.get(f"/campaigns/{campaign['id']}")["items"])
+        first, second = (service.client.patch(path, json=edit, headers=key) for _ in range(2))
+        assert first.json() == second.json()
+        assert len(first.json()["items"]) == before + 1
+        assert second.headers["Idempotency-Replayed"] == "true"
+        assert len(service.get(f"/campaigns/{campaign['id']}")["items"]) == before + 1
+
+
+def test_a_repeated_answer_does_not_answer_the_next_question(service):
+    campaign = start(service, [PROMPT, PROMPT])
+    wait(service, campaign, lambda found: found["question"] is not None)
+    path, key = f"/api/v1/campaigns/{campaign['id']}/answer", {"Idempotency-Key": "answer-1"}
+    body = {"note": "torque 12 N m", "photo": PHOTO}
+    assert service.client.post(path, json=body, headers=key).status_code == 200
+    wait(service, campaign, lambda found: found["question"] and found["question"]["item"] == "s0002")
+    assert service.client.post(path, json=body, headers=key).headers["Idempotency-Replayed"] == "true"
+    assert service.get(f"/campaigns/{campaign['id']}")["question"]["item"] == "s0002"
+
+
+def test_the_photo_of_an_answer_is_returned_as_it_was_sent(service):
+    campaign = start(service, [PROMPT, {"rest": {"seconds": 500}}])
+    wait(service, campaign, lambda found: found["question"] is not None)
+    path = f"/api/v1/campaigns/{campaign['id']}"
+    assert service.client.get(f"{path}/photos/s0001").status_code == 404
+    service.post(f"/campaigns/{campaign['id']}/answer", {"note": "done", "photo": PHOTO})
+    answer = service.client.get(f"{path}/photos/s0001")
+    assert answer.content == base64.b64decode(PHOTO)
+    assert answer.headers["content-type"] == "image/jpeg"
+    for item in ("s0002", "..%2Fcatalogue.db"):
+        assert service.client.get(f"{path}/photos/{item}").status_code == 404
+    assert service.client.get("/api/v1/campaigns/none/photos/s0001").status_code == 404
+
+
 @pytest.mark.parametrize(
     ("steps", "more", "status", "reason"),
     [

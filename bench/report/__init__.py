@@ -2,8 +2,8 @@
 
 from bench.report.diagnosis import VERDICTS, read_diagnosis
 from bench.report.documents import Fit, Prediction, read_fit, read_prediction
+from bench.report.layout import save_figures
 from bench.report.page import gather, make_figures, render
-from bench.report.plots import save_figures
 from bench.report.truth import Truth, judge, make_answer_rows, make_truth_rows, read_truth
 from bench.report.values import format_force, format_percent, format_quantity, format_ratio
 

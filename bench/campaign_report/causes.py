@@ -81,7 +81,7 @@ def describe_trend(specimen: str, trend: TrendDocument | None) -> str:
         return f"Trend of {specimen}, all runs fitted with the same effects: {trend.explanation}"
     return (
         f"The trend of {specimen} was not computed. It fits the same effects to all runs and states which one"
-        " changes: `Compute the trend` in the view of the specimen, or `mrbench trend LOG...`."
+        " changes: Compute the trend in the view of the specimen, or mrbench trend with its logs."
     )
 
 

@@ -65,9 +65,8 @@ def _describe_drift(cell: Cell) -> list[Finding]:
     names = [name for name, line in lines.items() if line.is_significant]
     if not names:
         return [Finding("good", f"{cell.title}: no parameter drifts significantly.")]
-    return [
-        Finding("warning", f"{cell.title}: {', '.join(names)} drift over the runs, of {len(lines)} parameters.")
-    ]
+    text = f"{cell.title}: {len(names)} of {len(lines)} parameters drift over the runs: {', '.join(names)}."
+    return [Finding("warning", text)]
 
 
 def _describe_outliers(cell: Cell) -> list[Finding]:

@@ -59,7 +59,7 @@ def make_conditions(report: CampaignReport) -> Section:
     """Make the section on the conditions of each complete run."""
     rows = [_make_run_row(report, fact) for fact in report.state.facts]
     header = ("Run", "Specimen", "Method", "Drive", "Mounting", "Temperature", "Start", "Length", "Outcome")
-    widths = (2, 4, 4, 3, 3, 4, 6, 3, 3)
+    widths = (2, 4, 4, 4, 4, 5, 6, 3, 4)
     names = [(str(report.numbers[fact.run]), fact.item, fact.run) for fact in report.state.facts]
     return Section(
         "Conditions of the runs",
@@ -97,7 +97,7 @@ def make_steps(report: CampaignReport) -> Section:
     rows = [(item.id, item.label, format_name(item.state), item.reason or "no reason given") for item in ended]
     parts = [_make_part_row(item) for item in interrupted]
     tables = [
-        Table(rows, ("Step", "Content", "State", "Reason"), (1, 4, 2, 5), "Steps that were not done"),
+        Table(rows, ("Step", "Content", "State", "Reason"), (1, 4, 2, 5), "Skipped, failed and held-back steps"),
         Table(parts, ("Step", "Content", "Incomplete runs", "Crashes"), (1, 4, 6, 1), "Interrupted steps"),
     ]
     texts = [] if rows else ["No step was skipped, has failed or was held back."]
@@ -114,7 +114,7 @@ def make_answers(report: CampaignReport) -> Section:
     """Make the section on the questions to persons and their answers."""
     rows = list(_list_answers(report))
     header = ("Step", "Question", "Asked", "Answered", "By", "Note", "Photo")
-    table = Table(rows, header, (2, 5, 4, 4, 3, 5, 3), "Questions and answers")
+    table = Table(rows, header, (2, 5, 4, 4, 3, 5, 3), "Answers of persons")
     texts = [] if rows else ["No person was asked."]
     return Section("Questions and answers", texts, [table] if rows else [])
 

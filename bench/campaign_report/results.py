@@ -14,12 +14,18 @@ from bench.report.layout import Section, Table
 Row = tuple[str, ...]
 _RUNS_PER_TABLE = 4
 """Largest number of runs in one table, so that it fits on a page of paper."""
+_PLAIN_RANGE = (1e-2, 1e5)
+"""Range of the numbers that are written without a power of ten."""
 NO_FIT = "No run of this campaign has been identified, so that there are no parameters."
 
 
 def format_number(value: float | None, digits: int = 3) -> str:
     """Format a number without its unit, with significant digits and a power of ten where it is needed."""
-    return "–" if value is None else format_quantity(float(f"{value:.{digits - 1}e}"), None, "").value
+    if value is None:
+        return "–"
+    if value == 0 or _PLAIN_RANGE[0] <= abs(value) < _PLAIN_RANGE[1]:
+        return format_significant(value, digits)
+    return format_quantity(float(f"{value:.{digits - 1}e}"), None, "").value
 
 
 def make_errors(report: CampaignReport) -> Section:
@@ -73,7 +79,8 @@ def _make_result_tables(report: CampaignReport, cell: Cell) -> Iterator[Table]:
             )
             for one in cell.series
         ]
-        yield Table(rows, header, (2, 2, *(4 for _ in part)), cell.title)
+        shown = ", ".join(str(report.numbers[fact.run]) for fact, _ in part)
+        yield Table(rows, header, (2, 2, *(4 for _ in part)), f"Parameters, {cell.title}: run {shown}")
 
 
 def _format_parameter(result: RunResult, name: str) -> str:
@@ -90,8 +97,8 @@ def make_trends(report: CampaignReport) -> Section:
     specimens = dict.fromkeys(cell.specimen for cell in cells)
     texts = [
         "The drift is the slope of a straight line through the values, weighted by their intervals, with its 95 %"
-        " interval. The interval is wider where the values scatter more than their own intervals say. It excludes"
-        " zero by chance for 1 parameter in 20. A remount between the runs can look like a drift.",
+        " interval. The interval is wider where the values scatter more than their own intervals say. By chance it"
+        " excludes zero for 1 parameter in 20. A remount between the runs can look like a drift.",
         f"A drift needs {MIN_RUNS} runs with an interval, an outlier {MIN_OUTLIER_RUNS}. An outlier is farther"
         " from the line through the other runs than chance allows, at 5 % for the whole series.",
         *(f"{cell.title}: {_describe_causes(report, cell)}." for cell in cells),
@@ -202,8 +209,7 @@ def _make_scatter_row(one: Series, scatter: Scatter) -> Row:
 def _format_repeatability(scatter: Scatter) -> str:
     if scatter.repeatability is None or scatter.repeatability_ci95 is None:
         return "–"
-    low, high = scatter.repeatability_ci95
-    return f"{format_number(scatter.repeatability)} ({format_number(low, 2)} … {format_number(high, 2)})"
+    return format_quantity(scatter.repeatability, scatter.repeatability_ci95, "").value
 
 
 def compute_fit_ratio(one: Series) -> float | None:

@@ -18,6 +18,8 @@ _FONT_FILES = {"": "DejaVuSans.ttf", "B": "DejaVuSans-Bold.ttf"}
 """Fonts of matplotlib, which has all symbols of a report."""
 _MARGIN, _LINE = 16.0, 4.6
 """[mm]"""
+_KEPT_HEIGHT = 30.0
+"""[mm] Smallest height below a caption on the same page."""
 _TEXT_SIZE, _TABLE_SIZE, _HEADING_SIZE, _TITLE_SIZE = 9, 8, 13, 19
 """[pt]"""
 _HEAD_STYLE = FontFace(emphasis="BOLD", fill_color=(232, 236, 240))
@@ -114,6 +116,8 @@ def _write_text(document: _Document, text: str, size: int, *, bold: bool = False
 
 def _write_table(document: _Document, table: Table) -> None:
     if table.caption:
+        if document.will_page_break(_KEPT_HEIGHT):
+            document.add_page()
         _write_text(document, table.caption, _TEXT_SIZE, bold=True)
     document.set_font(_FONT, size=_TABLE_SIZE)
     lines = [table.header, *table.rows] if table.header else table.rows

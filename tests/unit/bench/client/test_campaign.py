@@ -8,7 +8,7 @@ REST = {"rest": {"seconds": 900}}
 PROMPT = {"prompt": {"text": "Mount the specimen", "note": True}}
 
 
-def test_a_script_starts_edits_answers_and_stops_a_campaign(bench):
+def test_a_script_starts_edits_answers_and_stops_a_campaign(bench, tmp_path):
     campaign = bench.start_campaign({"name": "night", "steps": [PROMPT, REST]}, "M. Curie")
     assert campaign.wait(20)["question"]["text"] == "Mount the specimen"
     with pytest.raises(ClientError, match="needs a note"):
@@ -21,6 +21,9 @@ def test_a_script_starts_edits_answers_and_stops_a_campaign(bench):
     assert campaign.pause("B")["status"] == "paused"
     assert campaign.resume("B")["status"] == "running"
     assert campaign.stop("B")["status"] == "stopped"
+    assert campaign.download_report(tmp_path / "report.pdf", "pdf").read_bytes().startswith(b"%PDF-")
+    with pytest.raises(ClientError, match="format"):
+        campaign.download_report(tmp_path / "report.doc", "doc")
     assert [one["id"] for one in bench.list_campaigns()] == [campaign.id]
     assert bench.find_campaign() is None
     assert bench.plan_campaign({"name": "night", "steps": [REST]})["duration_s"] == 900

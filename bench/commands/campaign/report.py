@@ -33,9 +33,7 @@ def report(target: str, data: Path, out: str) -> None:
     command = shlex.join(["mrbench", "campaign", "report", campaign.id, "--data", str(data), "--out", out])
     with write_atomically(path) as partial:
         write_campaign_report(content, report_format, partial, command, datetime.now(UTC))
-    typer.echo(
-        f"{path}: {path.stat().st_size / 1e6:.1f} MB, {len(content.numbers)} runs of {campaign.id}", err=True
-    )
+    typer.echo(f"{path}: {path.stat().st_size / 1e6:.1f} MB, report on {campaign.id}", err=True)
 
 
 def _find(store: CampaignStore, target: str) -> StoredCampaign:

@@ -1,7 +1,7 @@
 """Plots of a campaign: each parameter over the runs of a specimen, with intervals, drift, outliers, remounts."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import islice, pairwise
 from math import floor, log10
 
 from matplotlib.axes import Axes
@@ -9,15 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from bench.campaign_report.content import CampaignReport, Cell, Series
-from bench.campaign_report.results import name_picture
+from bench.campaign_report.results import MAX_PICTURES, name_picture
 from bench.report import FAINT_COLOUR, INK_COLOUR, format_unit, make_figure, style_axes
 from bench.report.layout import Picture, render_png
 
 _COLUMNS = 3
 _WIDTH, _HEIGHT = 9.0, 1.75
 """[inch] Width of a figure, and height of one row of axes."""
-_MAX_FIGURES = 24
-"""Largest number of plots in one report."""
 _VALUE_COLOUR, _DRIFT_COLOUR, _OUTLIER_COLOUR = "#2f6db5", "#6b7480", "#c04b2d"
 _DASHES = (0, (4, 3))
 _CAPTION = (
@@ -28,11 +26,11 @@ _CAPTION = (
 
 def make_pictures(report: CampaignReport) -> dict[str, Picture]:
     """Make the plots of all cells with at least two identified runs, by the names that the sections use."""
-    figures = {name_picture(number): (cell, plot_cell(cell)) for number, cell in enumerate(report.cells)}
-    drawn = [(name, cell, figure) for name, (cell, figure) in figures.items() if figure is not None]
+    drawn = ((name_picture(number), cell, plot_cell(cell)) for number, cell in enumerate(report.cells))
+    figures = ((name, cell, figure) for name, cell, figure in drawn if figure is not None)
     return {
         name: Picture(f"Parameters over the campaign: {cell.title}", _CAPTION, render_png(figure))
-        for name, cell, figure in drawn[:_MAX_FIGURES]
+        for name, cell, figure in islice(figures, MAX_PICTURES)
     }
 
 

@@ -16,6 +16,8 @@ _RUNS_PER_TABLE = 4
 """Largest number of runs in one table, so that it fits on a page of paper."""
 _PLAIN_RANGE = (1e-2, 1e5)
 """Range of the numbers that are written without a power of ten."""
+MAX_PICTURES = 24
+"""Largest number of plots in one report."""
 NO_FIT = "No run of this campaign has been identified, so that there are no parameters."
 
 
@@ -105,6 +107,8 @@ def make_trends(report: CampaignReport) -> Section:
         *(describe_trend(specimen, report.trends.get(specimen)) for specimen in specimens),
     ]
     tables = [Table(*_make_drift_rows(cell), f"Drift, {cell.title}") for cell in cells]
+    if len(cells) > MAX_PICTURES:
+        texts.append(f"Plots are shown for the first {MAX_PICTURES} of {len(cells)} groups of runs.")
     pictures = [name_picture(number) for number, _ in enumerate(report.cells)]
     return Section("Trends, drift and outliers", texts if cells else [NO_FIT], tables, pictures)
 

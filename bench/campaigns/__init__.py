@@ -1,6 +1,6 @@
 """Campaigns: ordered runs with rests and conditions between them, resumed after anything."""
 
-from bench.campaigns.benches import AgentBench, CampaignBench, PlantBench, Thermometer
+from bench.campaigns.benches import AgentBench, CampaignBench, PlantBench, Thermometer, read_result
 from bench.campaigns.document import (
     WARM_UP_METHOD,
     AnyStep,
@@ -13,6 +13,7 @@ from bench.campaigns.document import (
     collect_step_methods,
     expand_campaign,
     format_plan,
+    get_step_kind,
     load_campaign,
     parse_campaign,
     plan_campaign,
@@ -20,11 +21,16 @@ from bench.campaigns.document import (
 from bench.campaigns.engine import (
     CampaignState,
     Choice,
+    Item,
     Message,
+    ParameterResult,
     QueueEdit,
+    RunFact,
+    RunResult,
     answer,
     apply_edit,
     collect_edit_methods,
+    group_runs,
     needs_results,
     parse_choice,
     parse_edit,
@@ -35,7 +41,7 @@ from bench.campaigns.engine import (
 from bench.campaigns.notifications import NotificationSender, send_due, send_test
 from bench.campaigns.runner import CampaignRunner, lock_campaign
 from bench.campaigns.store import CampaignStore, StoredCampaign
-from bench.campaigns.view import CampaignView, ItemView, make_view
+from bench.campaigns.view import CampaignView, ItemView, TrendPoint, TrendView, make_trends, make_view
 from bench.campaigns.view_text import format_view
 
 __all__ = [
@@ -52,14 +58,20 @@ __all__ = [
     "CampaignStore",
     "CampaignView",
     "Choice",
+    "Item",
     "ItemView",
     "Message",
     "Methods",
     "NotificationSender",
+    "ParameterResult",
     "PlantBench",
     "QueueEdit",
+    "RunFact",
+    "RunResult",
     "StoredCampaign",
     "Thermometer",
+    "TrendPoint",
+    "TrendView",
     "answer",
     "apply_edit",
     "collect_edit_methods",
@@ -68,8 +80,11 @@ __all__ = [
     "expand_campaign",
     "format_plan",
     "format_view",
+    "get_step_kind",
+    "group_runs",
     "load_campaign",
     "lock_campaign",
+    "make_trends",
     "make_view",
     "needs_results",
     "parse_campaign",
@@ -77,6 +92,7 @@ __all__ = [
     "parse_edit",
     "pause",
     "plan_campaign",
+    "read_result",
     "resume",
     "send_due",
     "send_test",

@@ -152,7 +152,7 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
         temperature_c=state.temperature_c,
         items=tuple(_make_item(item, units) for item in state.items),
         cells=_make_cells(state, units),
-        trends=make_trends(state, units),
+        trends=make_trends(state, units)[:MAX_TRENDS],
         events=tuple(_make_event(event) for event in events),
     )
 
@@ -246,7 +246,7 @@ def make_trends(state: CampaignState, units: Mapping[str, str]) -> tuple[TrendVi
                     points=tuple(points),
                 )
             )
-    return tuple(trends[:MAX_TRENDS])
+    return tuple(trends)
 
 
 def _make_point(fact: RunFact, result: RunResult, name: str) -> TrendPoint:

@@ -99,6 +99,14 @@ class Campaign:
         """
         return str(self._post("test-message", {}, key=uuid.uuid4().hex)["result"])
 
+    def download_report(self, to: Path, report_format: str = "html") -> Path:
+        """Download the report, as html or pdf, and return its path; the campaign need not have ended.
+
+        Raises:
+            ClientError: the report is not available, the format is unknown, or the download breaks off.
+        """
+        return self._session.download(f"{self._path}/report?format={quote_name(report_format)}", to)
+
     def wait(self, timeout: float = 86_400.0) -> dict[str, Any]:
         """Wait until the campaign ends or asks for a person, and return its state.
 

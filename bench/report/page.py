@@ -1,6 +1,5 @@
 """Page of a report: one self-contained HTML file."""
 
-import base64
 import hashlib
 import math
 from dataclasses import dataclass
@@ -9,7 +8,6 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from bench.errors import ReportError
@@ -17,6 +15,7 @@ from bench.log import Log, read_log
 from bench.report import content, diagnosis, diagnosis_plots, plots
 from bench.report.diagnosis import Diagnosis, read_diagnosis
 from bench.report.documents import Fit, Prediction, read_fit, read_prediction
+from bench.report.layout import Picture, make_environment, render_png
 from bench.report.recording import Recording, make_recording
 from bench.report.series import predict
 from bench.report.summary import make_findings
@@ -54,16 +53,6 @@ CAPTIONS = {
     ),
 }
 """Title and caption of each plot."""
-
-
-@dataclass(frozen=True)
-class Picture:
-    """One plot in the page."""
-
-    title: str
-    caption: str
-    data: str
-    """PNG in base64."""
 
 
 @dataclass(frozen=True)
@@ -153,19 +142,14 @@ def render(report: Report, figures: dict[str, Figure], command: str, created_at:
         command: command line that wrote the page.
         created_at: time at which the page is written.
     """
-    environment = Environment(
-        loader=PackageLoader("bench.report", "."),
-        autoescape=True,
-        undefined=StrictUndefined,  # an unknown name in the template is an error
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    pictures = {
-        name: Picture(*CAPTIONS[name], base64.b64encode(plots.render_png(figure)).decode())
-        for name, figure in figures.items()
-    }
     values = make_context(report, command, created_at)
-    return environment.get_template("report.html").render(pictures=pictures, **values)
+    template = make_environment("bench.report").get_template("report.html")
+    return template.render(pictures=make_pictures(figures), **values)
+
+
+def make_pictures(figures: dict[str, Figure]) -> dict[str, Picture]:
+    """Render the plots of a report with their titles and captions."""
+    return {name: Picture(*CAPTIONS[name], render_png(figure)) for name, figure in figures.items()}
 
 
 def make_context(report: Report, command: str, created_at: datetime) -> dict[str, Any]:

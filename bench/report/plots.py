@@ -1,11 +1,7 @@
 """Plots of a recording and of a fit on it, as separate figures."""
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
-from io import BytesIO
-from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -122,35 +118,6 @@ def plot_error_by_drive(errors: Sequence[DriveError], floor: float, recording: R
     axes.grid(visible=False, axis="x")
     axes.legend(loc="upper right", fontsize=8.5, frameon=False)
     return figure
-
-
-@lru_cache(maxsize=16)
-def render_png(figure: Figure, dpi: int = 160) -> bytes:
-    """Render a figure as PNG with the resolution of a dense screen; cached, as page and file use the same."""
-    buffer = BytesIO()
-    figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": "mrbench"})
-    # Computing the layout takes as long as drawing, and the SVG has the same layout.
-    figure.set_layout_engine("none")
-    return buffer.getvalue()
-
-
-def save_figures(figures: dict[str, Figure], folder: Path) -> None:
-    """Write every figure as SVG and PNG under its name.
-
-    Raises:
-        ReportError: the folder cannot be written to.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        # A fixed salt and no date make equal figures equal files.
-        with matplotlib.rc_context({"svg.hashsalt": "mrbench"}):
-            for name, figure in figures.items():
-                (folder / f"{name}.png").write_bytes(render_png(figure))
-                figure.savefig(folder / f"{name}.svg", format="svg", metadata={"Date": None})
-    except OSError as error:
-        raise ReportError(
-            f"{folder}: the plots cannot be written ({error.strerror}); give another --plots"
-        ) from error
 
 
 def _plot_strokes(

@@ -101,7 +101,9 @@ def format_quantity(value: float, interval: tuple[float, float] | None, unit: st
 
 def _choose_multiple(value: float, interval: tuple[float, float] | None, unit: str) -> tuple[float, str, int]:
     """Return scale, prefix and power of ten of a suitable multiple."""
-    size = abs(value) or max((abs(end) for end in interval or ()), default=0.0)
+    # A value that is small against its interval has the multiple of the interval.
+    half = (max(interval) - min(interval)) / 2 if interval else 0.0
+    size = max(abs(value), half if math.isfinite(half) else 0.0)
     if size == 0:
         return 1.0, "", 0
     if unit in _PREFIXED_UNITS:

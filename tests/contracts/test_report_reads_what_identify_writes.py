@@ -5,10 +5,11 @@ import typing
 import pytest
 from pydantic import BaseModel
 
+from bench.campaign_report import causes
 from bench.report import diagnosis, discovery, documents, truth
 from identification.damper.effects import Place, Variable
 from identification.documents import diagnosis as gap_documents
-from identification.documents import fit
+from identification.documents import fit, trend
 from sim_rig import hidden_effect
 
 
@@ -32,6 +33,10 @@ def test_every_key_that_a_report_reads_is_written(name):
 
 def test_every_key_of_a_diagnosis_that_a_report_reads_is_written():
     assert_within(diagnosis.Diagnosis, gap_documents.Diagnosis)
+
+
+def test_every_key_of_a_trend_that_a_campaign_report_reads_is_written():
+    assert_within(causes.TrendDocument, trend.Trend)
 
 
 def test_every_key_of_a_truth_that_a_report_reads_is_written():

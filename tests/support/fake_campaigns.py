@@ -208,6 +208,13 @@ def campaign_routes(campaigns: FakeCampaigns) -> APIRouter:
     async def one(campaign_id: str) -> CampaignView:
         return campaigns.known[campaign_id].view()
 
+    @router.get("/{campaign_id}/report")
+    async def report(campaign_id: str, format: str = "html") -> Response:
+        if campaign_id == "short-1":
+            return refuse(CampaignError("the disk is full"))
+        name = f'inline; filename="{campaign_id}.report.{format}"'
+        return Response(f"report as {format}", headers={"Content-Disposition": name})
+
     add_commands(router, campaigns)
     return router
 

@@ -122,6 +122,15 @@ def test_the_queue_is_edited_with_the_name_of_the_person(seen):
 
 
 @browser_test
+def test_the_report_is_saved_as_page_or_pdf_and_a_refusal_is_named(seen):
+    assert seen["reports"] == [
+        [f"night-1.report.{one}", f"report as {one}", f"night-1.report.{one} was saved."]
+        for one in ("html", "pdf")
+    ]
+    assert "the disk is full" in seen["refusedReport"]
+
+
+@browser_test
 def test_stop_of_the_bench_stays_usable_while_a_command_is_confirmed(seen):
     assert seen["stopped"].endswith("/stop")
     assert "campaigns" not in seen["stopped"]

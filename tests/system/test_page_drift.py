@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from bench.campaign_report.drift import find_outliers, fit_drift
 from identification.gap.trend import find_change_point
 from tests.support.fake_specimens import DAYS, PRELOAD, STIFFNESS
 from tests.support.page_in_browser import node_test, run_module
@@ -74,6 +75,20 @@ def test_an_outlier_is_found_and_rarely_one_that_is_none():
     assert false_alarms <= 0.05
     (found,) = ask(series(range(1, 9), STIFFNESS, 3.0))
     assert found["outliers"] == [2]
+
+
+def test_the_campaign_report_has_the_drift_and_the_outliers_of_the_page():
+    draws = np.random.default_rng(9)
+    cases = [(DAYS, list(900 + draws.normal(0, spread, 8) + 40 * (k == 3) * np.eye(8)[5]), 5.0)
+             for k, spread in enumerate((1.0, 4.0, 12.0, 6.0))]  # fmt: skip
+    answers = ask(*(series(*case) for case in cases))
+    for (places, values, deviation), one in zip(cases, answers, strict=True):
+        halves = [Z95 * deviation] * len(values)
+        line = fit_drift(places, values, halves)
+        assert line.slope == pytest.approx(one["line"]["slope"], rel=1e-6)
+        assert line.interval == pytest.approx(one["line"]["ci95"], rel=5e-3)
+        assert find_outliers(places, values, halves) == one["outliers"]
+    assert answers[3]["outliers"] == [5]
 
 
 def test_runs_without_an_interval_do_not_count():

@@ -62,6 +62,7 @@ def _take_complete(state: CampaignState, report: ExecutionReport, now: float, ca
         ended=now,
         duration_s=report.duration_s,
         outcome=report.outcome,
+        temperature_c=state.temperature_c,
     )
     state = change_item(state, item.id, runs=(*item.runs, report.run), resume_after="", continues="")
     state = change(state, facts=(*state.facts, fact))

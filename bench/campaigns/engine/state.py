@@ -120,6 +120,8 @@ class RunFact(FrozenModel):
     ended: float
     duration_s: float
     outcome: str
+    temperature_c: float | None = None
+    """Reading of the thermometer at the end of the run; None without one, and in campaigns of older versions."""
 
 
 class Message(FrozenModel):

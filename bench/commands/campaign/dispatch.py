@@ -18,6 +18,7 @@ class Action(StrEnum):
     STOP = "stop"
     EDIT = "edit"
     TEST_MESSAGE = "test-message"
+    REPORT = "report"
 
 
 def campaign(
@@ -26,7 +27,7 @@ def campaign(
         typer.Argument(
             help="plan: time, heat, disk, limits and identifiability. run: start or continue it. "
             "status, pause (at the next checkpoint), resume, stop (after the run in progress), "
-            "edit (the queue), test-message (to all recipients)."
+            "edit (the queue), test-message (to all recipients), report (as .html or .pdf)."
         ),
     ],
     target: Annotated[
@@ -40,7 +41,9 @@ def campaign(
         str | None,
         typer.Option(metavar="NAME|FILE", help="With run: on the simulated plant, faster than real time."),
     ] = None,
-    out: Annotated[str, typer.Option(metavar="FILE", help="- prints JSON.")] = "",
+    out: Annotated[
+        str, typer.Option(metavar="FILE", help="- prints JSON; with report: file to write, .html or .pdf.")
+    ] = "",
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder for logs and catalogue.")] = Path("runs"),
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
     quick: Annotated[
@@ -62,13 +65,15 @@ def campaign(
         bool, typer.Option("--new", help="With run: start again, also if the campaign is not finished.")
     ] = False,
 ) -> None:
-    """Plan, run and control campaigns: ordered runs with rests and conditions between them.
+    """Plan, run, control and report campaigns: ordered runs with rests and conditions between them.
 
     A campaign that was interrupted continues with the same command: no finished run is repeated.
     """
     as_json = out == "-"
     if action in (Action.PLAN, Action.RUN) and not target:
         raise typer.BadParameter("give the file of the campaign")
+    if action is Action.REPORT and out in ("", "-"):
+        raise typer.BadParameter("a report cannot be printed; give a file: --out report.html or report.pdf")
     if (action is Action.EDIT) != bool(edit):
         raise typer.BadParameter("edit needs --edit JSON, and no other action takes it")
     if action is Action.PLAN:
@@ -79,6 +84,10 @@ def campaign(
         if (scenario is None) == (config is None):
             raise typer.BadParameter("give one of --config bench.toml and --scenario NAME or FILE")
         _run(Path(target), config, scenario, data, operator, identify=identify, is_new=new, as_json=as_json)
+    elif action is Action.REPORT:
+        from bench.commands.campaign.report import report
+
+        report(target, data, out)
     else:
         from bench.commands.campaign.control import control
 

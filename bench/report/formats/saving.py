@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 
 from bench.report.formats.pdf import write_pdf
 from bench.report.formats.workbook import write_workbook
-from bench.report.page import CAPTIONS, Report, make_context, render
-from bench.report.plots import render_png
+from bench.report.page import Report, make_context, make_pictures, render
 
 ReportFormat: TypeAlias = Literal["html", "pdf", "xlsx"]
 REPORT_FORMATS: tuple[ReportFormat, ...] = get_args(ReportFormat)
@@ -49,8 +48,8 @@ class ReportWriter:
         path.write_text(page, encoding="utf-8")
 
     def _write_pdf(self, path: Path) -> None:
-        pictures = {name: (*CAPTIONS[name], render_png(figure)) for name, figure in self._figures.items()}
-        write_pdf(make_context(self._report, self._command, self._created_at), pictures, path)
+        context = make_context(self._report, self._command, self._created_at)
+        write_pdf(context, make_pictures(self._figures), path)
 
     def _write_workbook(self, path: Path) -> None:
         context = make_context(self._report, self._command, self._created_at)

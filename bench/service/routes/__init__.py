@@ -35,7 +35,7 @@ PROTECTED_ROUTERS = (
     batches.router,
     *exchange.ROUTERS,
     *recordings.ROUTERS,
-    campaigns.router,
+    *campaigns.ROUTERS,
     *analyses.ROUTERS,
 )
 """Routers that need the token."""

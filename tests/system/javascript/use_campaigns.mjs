@@ -1,6 +1,8 @@
 // Uses the campaigns of the page like a person, and prints the observations as JSON:
 //   node use_campaigns.mjs URL TOKEN CHROMIUM
 
+import { readFileSync } from "node:fs";
+
 import { makeWaits, openPage } from "./browser.mjs";
 import { makeChecks } from "./page_checks.mjs";
 
@@ -116,6 +118,16 @@ async function sendTest() {
   seen.test = await text("#campaign-result");
 }
 
+/** Saves the report in both formats, and returns names and contents. */
+async function saveReports() {
+  seen.reports = [];
+  for (const format of ["HTML", "PDF"]) {
+    const [saved] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: `Report: ${format}` }).click()]);
+    await hasText("#campaign-result", "was saved");
+    seen.reports.push([saved.suggestedFilename(), readFileSync(await saved.path(), "utf8"), await text("#campaign-result")]);
+  }
+}
+
 /** Opens the question before a stop while somebody else starts a run: Escape stops the run, and the next one closes. */
 async function stopInDialog() {
   const send = (path, body) => fetch(`${url}/api/v1/${path}`, {
@@ -184,6 +196,9 @@ async function readEnded() {
   seen.endedMessages = await page.locator("#campaign-messages li").first().innerText();
   seen.endedControls = await page.evaluate(() => ["pause", "resume", "stop"].map((verb) => document.getElementById(`campaign-${verb}`).disabled));
   await check("ended");
+  await page.click("#campaign-report-html");
+  await hasText("#campaign-result", "No report was made");
+  seen.refusedReport = await text("#campaign-result");
   await page.goto(`${url}/#/campaigns/none`);
   await hasText("#campaign-note", "Campaigns cannot be shown");
   await page.click(".views a[data-view=campaigns]");
@@ -192,7 +207,7 @@ async function readEnded() {
 }
 
 try {
-  for (const step of [walk, readBoard, answerPrompt, editQueue, sendTest, stopInDialog, control, begin, readEnded]) await step();
+  for (const step of [walk, readBoard, answerPrompt, editQueue, sendTest, saveReports, stopInDialog, control, begin, readEnded]) await step();
   console.log(JSON.stringify(seen));
 } finally {
   await close();

@@ -1,5 +1,8 @@
 """Routes of campaigns and of the queue of the bench, with their models."""
 
-from bench.service.routes.campaigns.routes import router
+from bench.service.routes.campaigns import reports, routes
 
-__all__ = ["router"]
+ROUTERS = (routes.router, reports.router)
+"""Routers of campaigns."""
+
+__all__ = ["ROUTERS"]

@@ -1,4 +1,4 @@
-// Commands on one campaign: pause, resume, stop, test message, answers. Each is recorded with the name of the person.
+// Commands on one campaign: pause, resume, stop, test message, answers, report. Each command is recorded with the name of the person.
 
 import { post, saveFile, start } from "../common/api.js";
 import { CampaignQueue } from "./campaign_queue.js";
@@ -10,6 +10,7 @@ import { keep, refresh } from "./refresh.js";
 
 const OPERATOR = "mrbench.operator";
 const TEST_TIMEOUT_MS = 30_000;
+const REPORT_FORMATS = ["html", "pdf"];
 const QUESTIONS = {
   pause: ["Pause the campaign?", "A run in progress ends at its next checkpoint. Between two runs the pause begins at once.", ["pause", "Pause"]],
   resume: ["Resume the campaign?", "The next run may begin at once, and the rod moves. No person may be within its reach.", ["resume", "Resume"]],
@@ -26,6 +27,7 @@ export class CampaignActions {
     byId("campaign-who").addEventListener("change", () => localStorage.setItem(OPERATOR, this.who));
     for (const verb of Object.keys(QUESTIONS)) byId(`campaign-${verb}`).addEventListener("click", () => this.ask(verb));
     byId("campaign-test").addEventListener("click", () => this.test());
+    for (const format of REPORT_FORMATS) byId(`campaign-report-${format}`).addEventListener("click", () => this.saveReport(format));
     byId("campaign-dialog").addEventListener("close", ({ target }) => this.command(target.returnValue));
     byId("campaign-answer").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -108,6 +110,18 @@ export class CampaignActions {
       this.note(result === "sent" ? "The test message was sent to all recipients." : result, result !== "sent");
     } catch (problem) {
       this.note(problem.after("No test message was sent"), true);
+    }
+  }
+
+  /** Saves the report on the present state; it is made at its request, in some seconds. */
+  async saveReport(format) {
+    const { id } = this.campaign;
+    const answer = (...given) => id === this.campaign.id && this.note(...given);
+    answer("The report is made …");
+    try {
+      answer(`${await saveFile(`campaigns/${encodeURIComponent(id)}/report?format=${format}`)} was saved.`);
+    } catch (problem) {
+      answer(problem.after("No report was made"), true);
     }
   }
 

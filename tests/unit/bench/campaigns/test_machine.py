@@ -50,6 +50,15 @@ def test_a_prompt_waits_for_its_answer_and_the_time_is_held():
         answer(bench.state, bench.now, note="x")
 
 
+def test_a_run_keeps_the_temperature_at_its_end():
+    bench = SimulatedBench(start([RUN, RUN]))
+    bench.step()
+    bench.temperature = 24.5
+    bench.run()
+    assert [fact.temperature_c for fact in bench.state.facts] == [24.5, 24.5]
+    assert SimulatedBench(start([RUN])).run().facts[0].temperature_c is None
+
+
 def test_a_rest_ends_at_its_temperature():
     bench = SimulatedBench(start([COOL]))
     bench.temperature = 24.0

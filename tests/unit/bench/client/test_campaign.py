@@ -19,7 +19,7 @@ def test_a_script_adds_a_photo_to_its_answer_and_downloads_it(bench, tmp_path):
     assert campaign.download_photo("s0001", tmp_path / "photo.jpg").read_bytes() == PHOTO
 
 
-def test_a_script_starts_edits_answers_and_stops_a_campaign(bench):
+def test_a_script_starts_edits_answers_and_stops_a_campaign(bench, tmp_path):
     campaign = bench.start_campaign({"name": "night", "steps": [PROMPT, REST]}, "M. Curie")
     assert campaign.wait(20)["question"]["text"] == "Mount the specimen"
     with pytest.raises(ClientError, match="needs a note"):
@@ -32,6 +32,9 @@ def test_a_script_starts_edits_answers_and_stops_a_campaign(bench):
     assert campaign.pause("B")["status"] == "paused"
     assert campaign.resume("B")["status"] == "running"
     assert campaign.stop("B")["status"] == "stopped"
+    assert campaign.download_report(tmp_path / "report.pdf", "pdf").read_bytes().startswith(b"%PDF-")
+    with pytest.raises(ClientError, match="format"):
+        campaign.download_report(tmp_path / "report.doc", "doc")
     assert [one["id"] for one in bench.list_campaigns()] == [campaign.id]
     assert bench.find_campaign() is None
     assert bench.plan_campaign({"name": "night", "steps": [REST]})["duration_s"] == 900

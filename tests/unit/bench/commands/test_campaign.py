@@ -4,11 +4,15 @@ import fcntl
 import json
 
 import pytest
+from typer import BadParameter
 
+from bench import cli
 from bench.campaigns import CampaignError
 from bench.commands.campaign.bench import check_served, find_or_create
 from bench.commands.campaign.catalogue import open_store
 from bench.commands.campaign.control import control
+from bench.commands.campaign.report import report
+from tests.support.campaign_reports import STARTED, make_result, run_step, store_campaign
 from tests.support.message_servers import serve_webhook
 
 
@@ -53,3 +57,36 @@ def test_the_queue_is_edited_and_stopped_by_the_command_line_also_without_a_serv
         assert act("test-message").strip() == "sent"
         act("stop")
     assert [one["kind"] for one in received] == ["test", "ended"]
+
+
+def test_the_newest_campaign_is_reported_without_a_service(tmp_path, capsys):
+    data = tmp_path / "data"
+    with open_store(data, is_created=True) as store:
+        first = store_campaign(store, [run_step("MR-9")], [make_result(2600.0)])
+        second = store_campaign(store, [run_step()], [make_result(2600.0)], started=STARTED + 9e4, name="morning")
+    for ending in ("html", "pdf"):
+        report("", data, str(tmp_path / f"report.{ending}"))
+        assert f"report on {second.id}" in capsys.readouterr().err
+    report(first.id, data, str(tmp_path / "first.html"))
+    page = (tmp_path / "first.html").read_text()
+    assert f"mrbench campaign report {first.id} --data {data} --out {tmp_path / 'first.html'}" in page
+    assert "MR-9" in page
+    assert "MR-9" not in (tmp_path / "report.html").read_text()
+    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF-")
+
+
+def test_a_report_without_a_campaign_or_in_another_format_is_refused_and_writes_nothing(tmp_path, capsys):
+    with open_store(tmp_path / "data", is_created=True):
+        pass
+    out = tmp_path / "report.html"
+    with pytest.raises(CampaignError, match="has no campaign"):
+        report("", tmp_path / "data", str(out))
+    with pytest.raises(CampaignError, match="there is no campaign night-1"):
+        report("night-1", tmp_path / "data", str(out))
+    with pytest.raises(BadParameter, match=r"does not end with one of \.html, \.pdf"):
+        report("", tmp_path / "data", str(tmp_path / "report.xlsx"))
+    with pytest.raises(SystemExit) as end:
+        cli.main(["campaign", "report", "--data", str(tmp_path / "data")])
+    assert end.value.code == 2
+    assert "cannot be printed" in " ".join(capsys.readouterr().err.split())
+    assert not out.exists()

@@ -5,7 +5,7 @@ import pytest
 
 from bench.errors import ReportError
 from bench.log.reader import read_log
-from bench.report import plots
+from bench.report import plots, save_figures
 from bench.report.drawing import (
     MAX_POINTS,
     DriveColours,
@@ -136,7 +136,7 @@ def test_a_log_without_a_shown_channel_is_refused_by_its_name(log):
 
 
 def test_plots_are_saved_as_png_and_svg(recording, tmp_path):
-    plots.save_figures({"whole": plots.plot_recording(recording)}, tmp_path / "plots")
+    save_figures({"whole": plots.plot_recording(recording)}, tmp_path / "plots")
     assert (tmp_path / "plots" / "whole.png").read_bytes().startswith(b"\x89PNG")
     assert "<svg" in (tmp_path / "plots" / "whole.svg").read_text()
 
@@ -144,7 +144,7 @@ def test_plots_are_saved_as_png_and_svg(recording, tmp_path):
 def test_plots_that_cannot_be_saved_give_one_message(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ReportError, match="plots cannot be written"):
-        plots.save_figures({}, tmp_path / "file")
+        save_figures({}, tmp_path / "file")
 
 
 def test_a_segment_shorter_than_a_cycle_is_shown_as_it_is(recording):

@@ -2,9 +2,11 @@
 
 import base64
 import time
+from contextlib import suppress
 
 import pytest
 
+from bench import cli
 from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
 from bench.campaigns import parse_campaign
 from tests.support.message_servers import find_closed_port, serve_webhook
@@ -223,6 +225,44 @@ def test_a_message_that_cannot_be_sent_is_shown_and_stops_nothing(service):
     assert (due["attempts"], "the connection was refused" in due["reason"]) == (1, True)
     service.post(f"/campaigns/{campaign['id']}/answer", {"note": "done", "photo": PHOTO})
     wait(service, campaign, lambda found: found["phase"] == "stroking")
+
+
+@pytest.mark.parametrize(
+    ("query", "ending", "beginning"), [("", "html", b"<!doctype html>"), ("?format=pdf", "pdf", b"%PDF-")]
+)
+def test_the_report_of_a_campaign_in_progress_is_a_page_or_a_pdf(service, monkeypatch, query, ending, beginning):
+    def run_here(arguments, error):
+        with suppress(SystemExit):
+            cli.main(arguments)
+
+    monkeypatch.setattr("bench.service.routes.campaigns.reports.run_command", run_here)
+    campaign = start(service, [PROMPT, RUN])
+    answer = service.client.get(f"/api/v1/campaigns/{campaign['id']}/report{query}")
+    assert answer.status_code == 200, answer.text
+    assert answer.content.startswith(beginning)
+    assert answer.headers["content-disposition"] == f'inline; filename="{campaign["id"]}.report.{ending}"'
+    assert list(service.data.glob(".transfer-*")) == []
+
+
+def test_a_report_of_an_unknown_campaign_or_in_another_format_is_refused(service):
+    campaign = start(service, [PROMPT])
+    unknown = service.client.get("/api/v1/campaigns/none/report")
+    assert (unknown.status_code, unknown.json()["type"]) == (404, "urn:mrbench:problem:not-found")
+    other = service.client.get(f"/api/v1/campaigns/{campaign['id']}/report?format=xlsx")
+    assert other.status_code == 422
+    assert "format" in other.json()["detail"]
+
+
+def test_a_report_that_cannot_be_made_is_a_problem_with_the_reason(service, monkeypatch):
+    def fail(arguments, error):
+        raise error("the disk is full")
+
+    monkeypatch.setattr("bench.service.routes.campaigns.reports.run_command", fail)
+    campaign = start(service, [PROMPT])
+    answer = service.client.get(f"/api/v1/campaigns/{campaign['id']}/report")
+    assert answer.status_code == 409
+    assert "the disk is full" in answer.json()["detail"]
+    assert list(service.data.glob(".transfer-*")) == []
 
 
 def list_messages(campaign, state):

@@ -14,6 +14,7 @@ MODULES = {
     "rest_load": "speed.rest_load",
     "live_page": "live.page",
     "dead_bench": "live.dead_bench",
+    "campaign": "live.campaign",
     "overlay": "speed.overlay",
     "interval_coverage": "accuracy.interval_coverage",
     "soak": "speed.soak",

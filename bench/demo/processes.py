@@ -22,11 +22,12 @@ _POLL_PERIOD = 0.1
 
 
 @contextlib.contextmanager
-def start_processes(folder: DemoFolder) -> Iterator[str]:
-    """Run simulated rig with a hidden effect, agent, service and worker while the context lasts.
+def start_processes(folder: DemoFolder, scenario: Path | None = None) -> Iterator[str]:
+    """Run simulated rig, agent, service and worker while the context lasts.
 
     Args:
         folder: folder for their files and output.
+        scenario: file with the simulated damper; by default one with the hidden effect of the folder's seed.
 
     Yields:
         Address of the page, with the token.
@@ -38,7 +39,8 @@ def start_processes(folder: DemoFolder) -> Iterator[str]:
         # The file of an earlier demo contains closed ports. If it cannot be deleted, the rig reports that itself.
         with contextlib.suppress(OSError):
             folder.config.unlink(missing_ok=True)
-        sim = ["sim", "--draw", str(folder.seed), "--truth", str(folder.truth), "--out", str(folder.config)]
+        hidden = ["--draw", str(folder.seed), "--truth", str(folder.truth)]
+        sim = ["sim", "--out", str(folder.config), *(["--scenario", str(scenario)] if scenario else hidden)]
         rig = stack.enter_context(_start_process(sim, folder.path / "rig.log"))
         _wait_until_ready(rig, folder.path / "rig.log", folder.config.is_file)
         stack.callback(_shut_down_agent, folder.config)

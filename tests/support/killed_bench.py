@@ -122,20 +122,21 @@ def restart(bench):
 
 def await_ready(bench):
     """Wait until a run can be started; reset trips, and end an agent whose rig is another one now."""
-    wait_for(lambda: _try_to_make_ready(bench), lambda: f"not ready: {bench.get('/bench')} {bench.get('/health')}")
+    handled = 0.0
 
+    def is_ready():
+        nonlocal handled
+        status = bench.get("/bench")
+        # An older status says nothing about what was done since.
+        if status is None or status["utc_s"] < handled:
+            return False
+        if status["state"] == "tripped":
+            _handle_trip(bench, status)
+            handled = time.time()
+        is_connected = all(one["connected"] for one in status["instruments"])
+        return status["state"] == "idle" and not status["notice"] and is_connected
 
-def _try_to_make_ready(bench):
-    status = bench.get("/bench")
-    if status is not None and status["state"] == "tripped":
-        _handle_trip(bench, status)
-        return False
-    return (
-        status is not None
-        and status["state"] == "idle"
-        and not status["notice"]
-        and all(one["connected"] for one in status["instruments"])
-    )
+    wait_for(is_ready, lambda: f"not ready: {bench.get('/bench')} {bench.get('/health')}")
 
 
 def _handle_trip(bench, status):

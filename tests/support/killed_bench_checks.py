@@ -24,7 +24,7 @@ LOG_STATES = ("complete", "salvaged", "without a sample", "no log")
 
 @dataclass
 class Records:
-    """What the catalogue and the data folder contain after kills."""
+    """Content of the catalogue and the data folder after kills."""
 
     outcomes: Counter = field(default_factory=Counter)
     logs: Counter = field(default_factory=Counter)

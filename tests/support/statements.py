@@ -1,4 +1,4 @@
-"""What a service states about its bench while processes are killed, compared with which of them lived.
+"""Statements of a service about its bench while processes are killed, compared with which of them lived.
 
 Each answer is kept with the times of its request, and judged afterwards by the stamp that it contains. A busy
 machine makes answers late, but never untrue. Times are UTC [s] of one machine.

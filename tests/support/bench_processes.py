@@ -30,12 +30,12 @@ _WORDS = {"agent": "rig", "worker": "worker"}
 """Word of the command line of what the service starts."""
 
 
-def wait_for(condition, describe):
-    """Return what a condition returns as soon as it holds."""
+def wait_for(condition, describe, pause=0.1):
+    """Return what a condition returns as soon as it holds; it is checked again after a pause [s]."""
     end = time.monotonic() + DEADLINE
     while not (found := condition()):
         assert time.monotonic() < end, describe()
-        time.sleep(0.1)
+        time.sleep(pause)
     return found
 
 

@@ -63,12 +63,22 @@ def check_records(bench, accepted):
 
 
 def await_records(bench):
-    """Wait until every run has ended and every job that follows is finished; return the runs."""
-    for run in _list_runs(bench):
+    """Wait until every run has ended and every job that follows is finished; return the runs.
+
+    The queue may be long on a busy machine, so that only a queue without any progress is an error.
+    """
+    while not all(map(_is_settled, runs := _list_runs(bench))):
+        before = _list_states(runs)
         wait_for(
-            lambda run=run: _is_settled(run["id"], _list_runs(bench)), lambda: f"not settled: {_list_runs(bench)}"
+            lambda before=before: _list_states(_list_runs(bench)) != before,
+            lambda before=before: f"stuck: {before}",
+            1.0,
         )
-    return _list_runs(bench)
+    return runs
+
+
+def _list_states(runs):
+    return [(run["id"], run["state"], *(f"{job['kind']} {job['state']}" for job in run["jobs"])) for run in runs]
 
 
 def _list_runs(bench):
@@ -76,8 +86,7 @@ def _list_runs(bench):
     return page["items"]
 
 
-def _is_settled(run_id, runs):
-    run = next(one for one in runs if one["id"] == run_id)
+def _is_settled(run):
     jobs = {job["kind"]: job for job in run["jobs"]}
     awaits_job = run["outcome"] in ANALYSED and not ("diagnose" in jobs or _has_failed(jobs.get("identify")))
     return run["state"] != "running" and not awaits_job and all(job["finished"] for job in run["jobs"])

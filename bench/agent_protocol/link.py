@@ -9,6 +9,7 @@ The second publishes and never waits: a slow subscriber loses messages, but the 
 import contextlib
 import socket as unix_socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Final, Self, TypeAlias
@@ -28,6 +29,7 @@ from bench.agent_protocol.messages import (
     Command,
     Message,
     Reply,
+    TimedCommand,
 )
 from bench.errors import AgentUnreachableError, ConfigError, RunError, SecretFileError
 from bench.live import LiveBatch, decode_batch, describe_channels, parse_channels
@@ -139,7 +141,7 @@ class AgentClient:
         # One socket per command, because a request socket without its reply cannot be used again.
         with _open_socket(zmq.REQ) as socket:
             _connect(socket, self._commands, self._key)
-            socket.send(command.model_dump_json().encode())
+            socket.send(_limit_validity(command, timeout).model_dump_json().encode())
             if not socket.poll(round(timeout * 1e3)):
                 key = f", or check that {self._key} is its key" if self._commands.startswith("tcp://") else ""
                 raise AgentUnreachableError(
@@ -253,11 +255,33 @@ def _connect(socket: "zmq.Socket[bytes]", address: str, key: Path | None) -> Non
         ) from error
 
 
+def _limit_validity(command: Message, timeout: float) -> Message:
+    """Return a command that is not executed after its sender has given up."""
+    if not isinstance(command, TimedCommand):
+        return command
+    return command.model_copy(update={"valid_until_utc_s": time.time() + timeout})
+
+
+def _find_refusal(command: Command) -> str:
+    """Return why a command is no longer executed; empty if it is."""
+    if not isinstance(command, TimedCommand) or command.valid_until_utc_s is None:
+        return ""
+    delay = time.time() - command.valid_until_utc_s
+    if delay <= 0:
+        return ""
+    return (
+        f"{command.command} was read {delay:.1f} s after its sender gave up; nothing was done; repeat it, and "
+        "check the clocks if the sender is on another machine"
+    )
+
+
 def _handle_request(request: bytes, handle: CommandHandler) -> Reply:
     try:
         command = _COMMAND_ADAPTER.validate_json(request)
     except ValidationError as error:
         return Reply(ok=False, error=f"invalid command: {describe_validation_error(error, 'the message')}")
+    if refusal := _find_refusal(command):
+        return Reply(ok=False, error=refusal)
     try:
         return handle(command)
     except Exception as error:  # one faulty command must not end the agent

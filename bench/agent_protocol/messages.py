@@ -27,6 +27,18 @@ class Message(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+class TimedCommand(Message):
+    """Command that begins something, clears a trip or ends the agent: refused when its sender no longer waits.
+
+    A command may lie in the queue of an agent that is suspended or starts. Executed later, it would move the rod
+    although its sender was told that no agent replied. A stop, an abort and a pause act whenever they arrive.
+    """
+
+    valid_until_utc_s: float | None = Field(
+        default=None, description="UTC until which it may be executed [s since 1970]; null for any time"
+    )
+
+
 class StatusCommand(Message):
     """Request of the `AgentStatus`."""
 
@@ -39,7 +51,7 @@ class DescribeCommand(Message):
     command: Literal["describe"] = "describe"
 
 
-class RunCommand(Message):
+class RunCommand(TimedCommand):
     """Start of a run; refused unless the agent is idle. The reply comes as soon as the run is accepted."""
 
     command: Literal["run"] = "run"
@@ -76,13 +88,13 @@ class AbortCommand(Message):
     command: Literal["abort"] = "abort"
 
 
-class ResetCommand(Message):
+class ResetCommand(TimedCommand):
     """Reset of a trip whose cause is removed; nothing moves."""
 
     command: Literal["reset"] = "reset"
 
 
-class PrepareCommand(Message):
+class PrepareCommand(TimedCommand):
     """Start of a setup step; refused unless the agent is idle.
 
     The reply comes when the step is done, or soon while it continues. ``home`` and ``move`` move the rod, and a
@@ -107,7 +119,7 @@ class PrepareCommand(Message):
         return self
 
 
-class ShutDownCommand(Message):
+class ShutDownCommand(TimedCommand):
     """End of the agent, with everything at rest."""
 
     command: Literal["shut_down"] = "shut_down"

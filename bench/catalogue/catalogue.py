@@ -10,7 +10,7 @@ from sqlalchemy.orm import sessionmaker
 from bench.catalogue.campaign_table import CampaignTable
 from bench.catalogue.change_counter import ChangeCounter
 from bench.catalogue.job_queue import JobQueue
-from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunRow
+from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunOutcome, RunRow
 from bench.catalogue.planning import SHIPPED_VERSION, IdempotencyKeys, MethodStore, SpecimenStore
 from bench.catalogue.records import EventJournal, Notebook
 from bench.catalogue.run_filter import RunFilter
@@ -110,6 +110,10 @@ class Catalogue:
         self._skipped[path] = why
         return is_new
 
+    def is_skipped(self, path: Path) -> bool:
+        """Return whether a file was found that cannot be catalogued."""
+        return path in self._skipped
+
     def list_running(self) -> Sequence[RunRow]:
         """Return the runs in state `running`."""
         with self._sessions() as session:
@@ -127,6 +131,22 @@ class Catalogue:
         query = select(RunRow.id, RunRow.log).where(RunRow.log_sha256.is_not(None), ~is_missing)
         with self._sessions() as session:
             return [(run_id, log) for run_id, log in session.execute(query)]
+
+    def list_without_job(self, outcomes: Sequence[RunOutcome]) -> Sequence[RunRow]:
+        """Return the runs of the bench with a complete log, one of some outcomes and no job, the oldest first.
+
+        A kill between the end of a run and the request of its first job leaves such a run.
+        """
+        has_job = select(JobRow.id).where(JobRow.run_id == RunRow.id).exists()
+        query = select(RunRow).where(
+            RunRow.source == "run",
+            RunRow.outcome.in_(outcomes),
+            RunRow.log_sha256.is_not(None),
+            RunRow.trashed.is_(None),
+            ~has_job,
+        )
+        with self._sessions() as session:
+            return session.scalars(query.order_by(RunRow.started, RunRow.id)).all()
 
     def list_unread(self, limit: int) -> Sequence[RunRow]:
         """Return runs with a complete log whose losses and events were not read, the newest first."""

@@ -16,6 +16,7 @@ TRUNCATED_MESSAGE = (
     "the log has no end, its recorder was killed; repair it with `mrbench salvage` or POST /runs/{id}/salvage"
 )
 NO_LOG_MESSAGE = "the rig agent ended before it wrote a log"
+EMPTY_LOG_MESSAGE = "the rig agent ended before it described the run in its log; the file contains no recording"
 _MAX_READ = 20
 """Number of older logs whose events are read in one scan."""
 _LOG = logging.getLogger(__name__)
@@ -154,8 +155,10 @@ def _scan_log(catalogue: Catalogue, path: Path, is_being_written: WriteCheck) ->
 
 
 def _end_runs_without_log(catalogue: Catalogue, is_being_written: WriteCheck) -> Iterator[RunRow]:
-    """End the runs in state `running` whose log does not exist and is not being written."""
+    """End the runs in state `running` whose log is not being written, and does not exist or describes no run."""
     for row in catalogue.list_running():
         path = catalogue.resolve_path(row.log)
-        if not path.exists() and not is_being_written(path):
-            yield catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=NO_LOG_MESSAGE)
+        exists = path.exists()
+        if (not exists or catalogue.is_skipped(path)) and not is_being_written(path):
+            reason = EMPTY_LOG_MESSAGE if exists else NO_LOG_MESSAGE
+            yield catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=reason)

@@ -1,7 +1,8 @@
 """Runs a command and kills it, with all processes that it started, when the parent process ends.
 
-``python -m bench.jobs.parent_watchdog COMMAND...``, with standard input held open by the parent. A killed parent
-cannot stop its children, but the end of its pipe is detected on any system.
+``python -P parent_watchdog.py COMMAND...``, with standard input held open by the parent. A killed parent cannot
+stop its children, but the end of its pipe is detected on any system. Only the standard library is imported: every
+command of a job starts a watchdog.
 """
 
 import os

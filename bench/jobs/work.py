@@ -40,8 +40,8 @@ POLL_PERIOD = 0.25
 """Time [s] between two checks for cancellation."""
 SINGLE_THREAD_ENVIRONMENT = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment that keeps a job on one core, so that the rig agent has the others."""
-WATCHDOG_COMMAND = (sys.executable, "-m", "bench.jobs.parent_watchdog")
-"""Command that ends a job's processes when the worker ends."""
+WATCHDOG_COMMAND = (sys.executable, "-P", str(Path(__file__).with_name("parent_watchdog.py")))
+"""Command that ends a job's processes when the worker ends; as a file, because the package would import dask."""
 _ANALYSIS_SHARE = 0.95
 """Completed share of a job when only its report is missing."""
 

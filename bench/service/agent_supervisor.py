@@ -156,8 +156,10 @@ class SupervisedAgent:
 
 
 def describe_end(process: "subprocess.Popen[bytes]", log: Path) -> str:
-    """Return why an ended process has ended: its signal, or the last line of its output."""
+    """Return why an ended process has ended: its signal, a request, or the last line of its output."""
     if process.returncode < 0:
         return f"killed by {signal.Signals(-process.returncode).name}"
+    if process.returncode == 0:
+        return "it was asked to end"  # its last line says where it listened
     lines = log.read_text("utf-8", errors="replace").strip().splitlines() if log.is_file() else []
     return lines[-1].removeprefix("mrbench: ") if lines else f"exit status {process.returncode}"

@@ -11,7 +11,7 @@ from sqlalchemy.exc import SQLAlchemyError
 
 from bench.agent_protocol import AgentEvent, AgentStatus, RunStatus
 from bench.campaigns import WARM_UP_METHOD
-from bench.catalogue import Catalogue, LogIntegrity, RunRow, catalogue_log, is_complete, scan_logs
+from bench.catalogue import Catalogue, LogIntegrity, RunOutcome, RunRow, catalogue_log, is_complete, scan_logs
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
 
@@ -21,7 +21,7 @@ SETTLING_TIME = 10.0
 """Time without growth after which a log counts as no longer written, if the agent does not report it [s]."""
 DAMAGED: tuple[LogIntegrity, ...] = ("changed", "missing")
 """Results of an integrity check after which a log is not identified."""
-IDENTIFIED_OUTCOMES = ("clean", "lossy")
+IDENTIFIED_OUTCOMES: tuple[RunOutcome, ...] = ("clean", "lossy")
 """Outcomes after which a run is identified automatically."""
 _LOG = logging.getLogger(__name__)
 
@@ -86,10 +86,12 @@ class RunRegistry:
             self._failures.note(error)
 
     async def scan(self) -> None:
-        """Scan the data folder once."""
+        """Scan the data folder once; identify also what a kill has left without an identification."""
         async with self.lock:
             for row in await asyncio.to_thread(scan_logs, self._catalogue, self._is_being_written):
                 await self._handle_change(row)
+            for row in await asyncio.to_thread(self._catalogue.list_without_job, IDENTIFIED_OUTCOMES):
+                await self._identify(row)
 
     async def scan_periodically(self) -> None:
         """Scan the data folder periodically."""
@@ -154,6 +156,10 @@ class RunRegistry:
         """Publish a changed run and identify it if it is complete; an import only if a person has asked for it."""
         _LOG.info("run_" + row.state, extra={"run": row.id, "outcome": row.outcome, "reason": row.reason})
         await self._on_changed(row)
+        await self._identify(row, is_wanted=is_wanted)
+
+    async def _identify(self, row: RunRow, *, is_wanted: bool = False) -> None:
+        """Queue the identification of a complete run without jobs."""
         is_complete_run = (
             (is_wanted or row.source == "run")
             and row.outcome in IDENTIFIED_OUTCOMES

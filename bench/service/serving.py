@@ -99,6 +99,9 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
     link, commands = _make_agent_link(options)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
         supervisor = _supervise_agent(options, link, data)
+        # Until now a client is refused at once; it would wait in vain for as long as the agent takes to start.
+        with _explain_address_error(options.host, options.port):
+            listener.listen()
         access, token = open_access(data, new=options.new_token)
         loopback = options.host in LOOPBACK_NAMES
         app = create_app(
@@ -152,14 +155,25 @@ def _lock_data_folder(data: Path) -> Iterator[None]:
 
 @contextmanager
 def _open_listener(host: str, port: int) -> Iterator[socket.socket]:
+    """Reserve an address without listening there yet."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family, socket.SOCK_STREAM) as listener:
+        # The connections of a killed service may still be closing.
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        if family == socket.AF_INET6:
+            listener.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 1)
+        with _explain_address_error(host, port):
+            listener.bind((host, port))
+        yield listener
+
+
+@contextmanager
+def _explain_address_error(host: str, port: int) -> Iterator[None]:
     try:
-        listener = socket.create_server((host, port), family=family)
+        yield
     except OSError as error:
         reason = error.strerror or str(error)
         raise ServiceError(f"{host} port {port}: {reason.lower()}; use another --port") from error
-    with listener:
-        yield listener
 
 
 def _make_agent_link(options: ServeOptions) -> tuple[AgentLink, str | None]:

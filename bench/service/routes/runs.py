@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from contextlib import suppress
 from datetime import UTC, datetime
 from http import HTTPStatus
 from pathlib import Path
@@ -26,6 +27,8 @@ from bench.service.views import Run, RunPage, StartRunRequest, make_run_tag, mak
 router = APIRouter(prefix="/runs", tags=["runs"], route_class=IdempotentRoute)
 _START_TIMEOUT = 5.0
 """Time limit from an accepted command to the id of the run [s]."""
+_RECORD_TIMEOUT = 5.0
+"""Time for which an answer waits until a started run is recorded [s]; a scan of many logs may take longer."""
 
 
 @router.post("", status_code=201, dependencies=[IDEMPOTENT])
@@ -63,10 +66,18 @@ async def begin_run(
     present = await asyncio.to_thread(_find_started, context, log) if first_request else None
     if present is None:
         run, status = await asyncio.to_thread(_request_start, context, method, request, continues, log)
-        await context.registry.observe(status)
+        await _record(context, status)
         present = await asyncio.to_thread(_make_started_view, context, run, status)
     response.headers["Location"] = f"/api/v1/runs/{present.id}"
     return present
+
+
+async def _record(context: ServiceContext, status: AgentStatus) -> None:
+    """Record a started run. The next status records it as well, so that the answer need not wait for ever."""
+    with suppress(TimeoutError):
+        async with asyncio.timeout(_RECORD_TIMEOUT):
+            # Not cancelled, because a thread that writes cannot be.
+            await asyncio.shield(context.registry.observe(status))
 
 
 def _choose_log(context: ServiceContext, method: Method, first_request: datetime | None) -> Path | None:

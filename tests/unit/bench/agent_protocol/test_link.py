@@ -9,7 +9,18 @@ import pytest
 import zmq
 
 from bench.agent_protocol.link import AgentClient, CommandServer, Publisher
-from bench.agent_protocol.messages import AgentEvent, AgentStatus, Reply, RunCommand, StatusCommand, StopCommand
+from bench.agent_protocol.messages import (
+    AbortCommand,
+    AgentEvent,
+    AgentStatus,
+    PrepareCommand,
+    Reply,
+    ResetCommand,
+    RunCommand,
+    ShutDownCommand,
+    StatusCommand,
+    StopCommand,
+)
 from bench.errors import AgentUnreachableError, RunError
 
 ANY_PORT = "tcp://127.0.0.1:*"
@@ -71,6 +82,47 @@ def test_invalid_command_is_answered_with_its_error_and_the_next_one_works(serve
     assert not reply.ok
     assert "invalid command" in reply.error
     assert AgentClient(server.address, "").send(StopCommand()).ok
+
+
+@pytest.mark.parametrize(
+    ("late", "executed"),
+    [
+        (RunCommand(method={"name": "polka"}), False),
+        (PrepareCommand(step="home"), False),
+        (ResetCommand(), False),
+        (ShutDownCommand(), False),
+        (StopCommand(), True),
+        (AbortCommand(), True),
+    ],
+)
+def test_what_nobody_waits_for_any_more_is_not_begun_but_a_stop_acts(stopping, address, late, executed):
+    """The agent reads the command only after its sender was told that no agent replied."""
+    handled = []
+
+    def handle(command):
+        handled.append(command.command)
+        return Reply(ok=True, status=AgentStatus(state="idle"))
+
+    with CommandServer(address) as server:
+        with pytest.raises(AgentUnreachableError):
+            AgentClient(server.address, "").send(late, timeout=0.1)
+        thread = threading.Thread(target=server.serve, args=(handle, stopping))
+        thread.start()
+        assert AgentClient(server.address, "").send(StatusCommand()).ok
+        stopping.set()
+        thread.join()
+    assert handled == [*[late.command] * executed, "status"]
+
+
+def test_a_command_that_comes_too_late_is_answered_with_the_reason(server):
+    with zmq.Context.instance().socket(zmq.REQ) as client:
+        client.linger = 0
+        client.connect(server.address)
+        client.send(RunCommand(method={"name": "polka"}, valid_until_utc_s=1.0).model_dump_json().encode())
+        assert client.poll(5000)
+        reply = Reply.model_validate_json(client.recv())
+    assert not reply.ok
+    assert "nothing was done; repeat it" in reply.error
 
 
 def test_missing_agent_is_reported_in_time(address):

@@ -207,6 +207,16 @@ def test_a_watched_command_ends_with_its_own_status(status):
         assert process.wait(60) == status
 
 
+def test_the_watchdog_of_a_command_imports_the_standard_library_only():
+    with subprocess.Popen(
+        [*WATCHDOG_COMMAND, sys.executable, "-c", ""], stdin=subprocess.PIPE, env={"PYTHONPROFILEIMPORTTIME": "1"},
+        stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        _, imported = process.communicate(timeout=60)
+    assert "threading" in imported
+    assert "distributed" not in imported
+
+
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
 def test_a_watched_command_ends_with_its_parent(tmp_path, number):
     mark = tmp_path / "pids"

@@ -68,6 +68,16 @@ def agent(bench):
     return SupervisedAgent(bench.config, bench, bench.log, bench.start, process)
 
 
+def test_an_agent_that_a_person_has_ended_is_not_explained_by_its_last_line(bench, agent):
+    bench.code, bench.status = "print('agent of bench: commands ipc:///a')", None
+    agent._process.wait()
+    bench.wait_and_check(agent)
+    bench.processes[-1].wait()
+    bench.wait_and_check(agent)
+    with pytest.raises(AgentUnreachableError, match="ended: it was asked to end; it is started again within 30 s"):
+        agent.send(StatusCommand())
+
+
 def test_a_dead_agent_is_started_again_and_its_death_logged_with_the_reason(bench, agent, caplog):
     caplog.set_level(logging.INFO, "bench.service.agent_supervisor")
     agent._process.wait()

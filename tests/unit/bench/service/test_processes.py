@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import errno
 import logging
 import socket
 import sys
@@ -123,6 +124,42 @@ class TestServing:
                 serving._open_listener("127.0.0.1", port),
             ):
                 pass
+
+    def test_a_client_is_refused_until_the_agent_has_started(self, tmp_path, monkeypatch):
+        """Without a refusal it would wait for as long as an agent takes to start."""
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        refusals = []
+
+        def supervise(*_):
+            with socket.socket() as client:
+                refusals.append(client.connect_ex(("127.0.0.1", port)))
+
+        def run_server(app, listener, tls):
+            with socket.create_connection(listener.getsockname()):
+                refusals.append(0)
+
+        monkeypatch.setattr(serving, "_supervise_agent", supervise)
+        monkeypatch.setattr(serving, "_run_server", run_server)
+        monkeypatch.setattr(serving, "log_to_stderr", lambda: None)
+        serving.serve(ServeOptions(tmp_path, port=port), lambda line: None)
+        assert refusals == [errno.ECONNREFUSED, 0]
+
+    def test_a_port_that_is_taken_while_the_agent_starts_is_named(self, tmp_path, monkeypatch):
+        """Two sockets may have one address until one of them listens."""
+        with socket.create_server(("127.0.0.1", 0)) as free:
+            port = free.getsockname()[1]
+        with socket.socket() as other:
+            other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+
+            def supervise(*_):
+                other.bind(("127.0.0.1", port))
+                other.listen()
+
+            monkeypatch.setattr(serving, "_supervise_agent", supervise)
+            monkeypatch.setattr(serving, "log_to_stderr", lambda: None)
+            with pytest.raises(ServiceError, match=f"port {port}: address already in use; use another --port"):
+                serving.serve(ServeOptions(tmp_path, port=port), lambda line: None)
 
     @pytest.mark.parametrize("address", ["5570", "tcp://host", "http://host:1", "tcp://host:port"])
     def test_an_invalid_address_of_the_agent_is_refused(self, address, tmp_path):

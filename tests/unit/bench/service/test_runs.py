@@ -10,6 +10,7 @@ from bench.catalogue import JobRow, RunRow
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.scan import catalogue_log
 from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
+from bench.service.routes import runs
 from tests.support.service_logs import STARTED, write_complete_log, write_truncated_log
 
 PAGE = "<!doctype html><title>report</title>"
@@ -212,6 +213,18 @@ def test_a_run_that_the_catalogue_cannot_record_is_started_nevertheless(service,
     assert sum("runs_recorded_again" in record.message for record in caplog.records) == 1
 
 
+def test_a_start_is_answered_while_a_scan_holds_the_records(service, monkeypatch):
+    """The rig moves already, and a scan of many logs may take minutes."""
+    monkeypatch.setattr(runs, "_RECORD_TIMEOUT", 0.05)
+    lock = service.client.app.state.context.registry.lock
+    service.client.portal.call(lock.acquire)
+    try:
+        assert (start(service)["id"], service.get("/runs")["items"]) == ("run-1", [])
+    finally:
+        service.client.portal.call(lock.release)
+    assert service.wait_for("/runs", lambda found: found["items"])["items"][0]["id"] == "run-1"
+
+
 def test_the_agents_reason_is_kept_although_the_log_has_no_end(service):
     """The disk was full, so the recorder could not write the end of the log."""
     run = start(service)
@@ -353,6 +366,18 @@ def test_a_run_that_ended_while_the_service_was_down_is_found(service):
     assert get_last_job(service, run["id"])["state"] == "queued"
 
 
+def test_a_run_whose_service_was_killed_before_it_was_identified_is_identified(service):
+    run = start(service)
+    write_complete_log(service.data / run["log"], run["id"])
+    context = service.client.app.state.context
+    service.agent.forget()
+    assert catalogue_log(context.catalogue, service.data / run["log"]).outcome == "clean"
+    service.start()
+    assert get_last_job(service, run["id"])["state"] == "queued"
+    service.scan()
+    assert len(service.get(f"/runs/{run['id']}")["jobs"]) == 1
+
+
 def test_a_log_from_elsewhere_is_found(service):
     service.end()
     write_complete_log(service.data / "from_elsewhere.mcap", "foreign", first_s=3600.0)
@@ -391,6 +416,17 @@ def test_a_run_without_a_log_counts_as_ended(service):
     found = service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
     assert found["outcome"] == "incomplete"
     assert "before it wrote a log" in found["reason"]
+
+
+def test_a_run_whose_log_was_not_begun_counts_as_ended(service):
+    run = start(service)
+    (service.data / run["log"]).write_bytes(b"")
+    os.utime(service.data / run["log"], ns=(1, 1))
+    service.agent.forget()
+    service.start()
+    found = service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
+    assert found["outcome"] == "incomplete"
+    assert "before it described the run in its log" in found["reason"]
 
 
 def test_unfinished_jobs_are_submitted_again_under_their_key(service):

@@ -47,7 +47,7 @@ def run() -> None:
         engine = open_database(make_sqlite_url(Path(folder) / "catalogue.db"))
         catalogue = Catalogue(engine, Path(folder))
         with engine.begin() as connection:
-            runs, jobs = zip(*_make_rows(), strict=True)
+            runs, jobs = zip(*make_rows(), strict=True)
             connection.execute(insert(RunRow), list(runs))
             connection.execute(insert(JobRow), [job for pair in jobs for job in pair])
         with engine.connect() as connection:
@@ -94,10 +94,10 @@ def _make_searches() -> dict[str, RunFilter]:
     }
 
 
-def _make_rows() -> Iterator[tuple[dict[str, Any], tuple[dict[str, Any], ...]]]:
+def make_rows(count: int = RUN_COUNT) -> Iterator[tuple[dict[str, Any], tuple[dict[str, Any], ...]]]:
     """Yield runs with their two jobs."""
     random = np.random.default_rng(77)
-    for number in range(RUN_COUNT):
+    for number in range(count):
         started = _FIRST + timedelta(hours=number)
         made = {
             "id": f"run-{number:05}", "method": "quick", "specimen": f"MR-{number % 500:04}",

@@ -4,7 +4,8 @@ python -m benchmarks rest_load
 
 Twenty clients send ten requests a second each, at fixed times, by connections that are open already. A latency
 counts from the time at which its request was due, so that a slow answer also delays the later ones in the result.
-The empty route is measured twice: on the idle machine, and beside a run.
+The empty route is measured twice: on the idle machine, and beside a run. So is the service: without a rig, with
+runs and results of a catalogue, and during a run. The simulated rig needs more than one core of the same machine.
 """
 
 import asyncio
@@ -21,17 +22,22 @@ from tempfile import TemporaryDirectory
 from urllib.parse import SplitResult, urlsplit
 
 import numpy as np
+from sqlalchemy import insert
 
+from bench.catalogue import CATALOGUE_FILE, JobRow, RunRow, make_sqlite_url, open_database
 from bench.client import Bench
 from bench.demo import DemoFolder, start_processes
 from bench.log import read_log
 from benchmarks.common import print_line
+from benchmarks.speed.catalogue import make_rows
+from benchmarks.speed.overlay import serve
 
 CLIENTS, RATE, SECONDS = 20, 200.0, 15.0
 """Number of clients, requests of all clients [1/s], duration [s]."""
 ROUTES = ("/bench", "/runs?limit=50", "/jobs", "/bench/limits", "/methods", "/events?limit=50", "/health")
-_NAMES = " ".join(route.split("?")[0] for route in ROUTES)
 METHOD = "quick"
+RUNS = 60
+"""Number of runs in the catalogue of the service without a rig."""
 _EMPTY = """
 import uvicorn, fastapi
 app = fastapi.FastAPI()
@@ -47,13 +53,32 @@ def run() -> None:
     print(f"REST: {CLIENTS} clients, {RATE:g} requests/s for {SECONDS:g} s")
     with start_empty_server() as empty, TemporaryDirectory() as path:
         _print_load("empty route of FastAPI, idle machine", empty, ("/empty",), {})
+        _measure_without_rig(Path(path) / "idle")
         with start_processes(DemoFolder(Path(path), METHOD, None, 1)) as address:
             base, token = address.split("#token=")
             headers = {"Authorization": f"Bearer {token}"}
             with _record_run(Bench(address), Path(path)):
                 _print_load("empty route of FastAPI, beside a run at 1 kHz", empty, ("/empty",), {})
             with _record_run(Bench(address), Path(path)):
-                _print_load(f"mrbench during a run, {_NAMES}", f"{base}api/v1", ROUTES, headers, "at most 50")
+                _print_load(
+                    f"mrbench during a run, {_name(ROUTES)}", f"{base}api/v1", ROUTES, headers, "at most 50"
+                )
+
+
+def _measure_without_rig(data: Path) -> None:
+    """Print the latencies of a service on a catalogue of runs with their results, and without a rig."""
+    data.mkdir()
+    engine = open_database(make_sqlite_url(data / CATALOGUE_FILE))
+    runs, jobs = zip(*make_rows(RUNS), strict=True)
+    with engine.begin() as connection:
+        connection.execute(insert(RunRow), list(runs))
+        connection.execute(insert(JobRow), [job for pair in jobs for job in pair])
+    engine.dispose()
+    with serve(data) as client:
+        headers = {"Authorization": client.headers["Authorization"]}
+        routes = tuple(route for route in ROUTES if not route.startswith("/bench"))
+        name = f"mrbench, {RUNS} runs, idle machine, {_name(routes)}"
+        _print_load(name, str(client.base_url).rstrip("/"), routes, headers, "at most 50")
 
 
 @contextmanager
@@ -121,6 +146,10 @@ async def _read_answer(reader: asyncio.StreamReader, route: str) -> None:
     if not head.startswith(b"HTTP/1.1 200") or size is None:
         raise RuntimeError(f"{route}: {head.decode()}")
     await reader.readexactly(int(size[1]))
+
+
+def _name(routes: tuple[str, ...]) -> str:
+    return " ".join(route.split("?")[0] for route in routes)
 
 
 def _print_load(

@@ -3,7 +3,7 @@
 import contextlib
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from bench.agent_protocol import AgentClient, ShutDownCommand, StatusCommand, find_agent
@@ -22,12 +22,13 @@ _POLL_PERIOD = 0.1
 
 
 @contextlib.contextmanager
-def start_processes(folder: DemoFolder, scenario: Path | None = None) -> Iterator[str]:
+def start_processes(folder: DemoFolder, rig_options: Sequence[str] = ()) -> Iterator[str]:
     """Run simulated rig, agent, service and worker while the context lasts.
 
     Args:
         folder: folder for their files and output.
-        scenario: file with the simulated damper; by default one with the hidden effect of the folder's seed.
+        rig_options: options of ``mrbench sim`` that choose damper and wires; by default the damper has the
+            hidden effect of the folder's seed.
 
     Yields:
         Address of the page, with the token.
@@ -39,8 +40,8 @@ def start_processes(folder: DemoFolder, scenario: Path | None = None) -> Iterato
         # The file of an earlier demo contains closed ports. If it cannot be deleted, the rig reports that itself.
         with contextlib.suppress(OSError):
             folder.config.unlink(missing_ok=True)
-        hidden = ["--draw", str(folder.seed), "--truth", str(folder.truth)]
-        sim = ["sim", "--out", str(folder.config), *(["--scenario", str(scenario)] if scenario else hidden)]
+        hidden_effect = ["--draw", str(folder.seed), "--truth", str(folder.truth)]
+        sim = ["sim", "--out", str(folder.config), *(rig_options or hidden_effect)]
         rig = stack.enter_context(_start_process(sim, folder.path / "rig.log"))
         _wait_until_ready(rig, folder.path / "rig.log", folder.config.is_file)
         stack.callback(_shut_down_agent, folder.config)

@@ -26,6 +26,8 @@ STROKES = {"slow": (0.012, 0.8), "middle": (0.01, 1.25), "fast": (0.008, 2.0), "
 """Amplitude [m] and frequency [Hz] of the methods."""
 SECONDS_PER_DRIVE, DRIVES = 2.5, (0.0, 0.2, 0.4, 0.1)
 """Time of each coil voltage [s], and the voltages [V]."""
+WIRES = ("--load-cell", "tcp")
+"""The bytes of a pseudo terminal wait for a thread of the kernel that has no real-time priority."""
 CAPACITY, LOSS, REST_C, TIMEOUT = 40.0, 2.0, 24.0, 120
 """Heat capacity [J/K], heat loss [W/K], temperature that a rest waits for [°C], its time-out [s]."""
 
@@ -37,7 +39,8 @@ def run() -> None:
         thermal = {"capacity": CAPACITY, "loss": LOSS}
         plain = load_scenario("default").model_dump(mode="json", exclude_unset=True)
         scenario.write_text(json.dumps(plain | {"thermal": plain.get("thermal", {}) | thermal}), "utf-8")
-        with start_processes(DemoFolder(folder, "night", None, 1), scenario) as address:
+        options = ("--scenario", str(scenario), *WIRES)
+        with start_processes(DemoFolder(folder, "night", None, 1), options) as address:
             bench = Bench(address)
             campaign = bench.start_campaign(make_campaign(), "benchmark")
             answered = _answer_prompts(campaign)

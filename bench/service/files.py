@@ -2,6 +2,7 @@
 
 from http import HTTPStatus
 from pathlib import Path
+from typing import Any
 
 from fastapi.responses import FileResponse, Response
 from starlette.datastructures import Headers
@@ -45,6 +46,11 @@ class SnapshotResponse(FileResponse):
             )
             return
         await super().__call__(scope, receive, _limit_length(send))
+
+
+def describe_file(*media_types: str) -> dict[int | str, dict[str, Any]]:
+    """Describe a file as the answer of a route, for OpenAPI."""
+    return {HTTPStatus.OK: {"description": "the file", "content": {media_type: {} for media_type in media_types}}}
 
 
 def _is_known(known: str, tag: str) -> bool:

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from sqlalchemy import insert, text
+from sqlalchemy import Engine, insert, text
 
 from bench.catalogue import Catalogue, JobRow, RunFilter, RunRow, make_sqlite_url, open_database
 from benchmarks.common import print_line
@@ -46,10 +46,7 @@ def run() -> None:
     with TemporaryDirectory() as folder:
         engine = open_database(make_sqlite_url(Path(folder) / "catalogue.db"))
         catalogue = Catalogue(engine, Path(folder))
-        with engine.begin() as connection:
-            runs, jobs = zip(*make_rows(), strict=True)
-            connection.execute(insert(RunRow), list(runs))
-            connection.execute(insert(JobRow), [job for pair in jobs for job in pair])
+        fill_catalogue(engine, RUN_COUNT)
         with engine.connect() as connection:
             empty = _measure(lambda: connection.execute(text("select 1")).all())
         print(f"catalogue: pages of {PAGE} of {RUN_COUNT} runs with their jobs, two each; without HTTP")
@@ -94,7 +91,15 @@ def _make_searches() -> dict[str, RunFilter]:
     }
 
 
-def make_rows(count: int = RUN_COUNT) -> Iterator[tuple[dict[str, Any], tuple[dict[str, Any], ...]]]:
+def fill_catalogue(engine: Engine, count: int) -> None:
+    """Add runs with a fit and a diagnosis each to an open database."""
+    runs, jobs = zip(*_make_rows(count), strict=True)
+    with engine.begin() as connection:
+        connection.execute(insert(RunRow), list(runs))
+        connection.execute(insert(JobRow), [job for pair in jobs for job in pair])
+
+
+def _make_rows(count: int) -> Iterator[tuple[dict[str, Any], tuple[dict[str, Any], ...]]]:
     """Yield runs with their two jobs."""
     random = np.random.default_rng(77)
     for number in range(count):

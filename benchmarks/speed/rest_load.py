@@ -22,14 +22,13 @@ from tempfile import TemporaryDirectory
 from urllib.parse import SplitResult, urlsplit
 
 import numpy as np
-from sqlalchemy import insert
 
-from bench.catalogue import CATALOGUE_FILE, JobRow, RunRow, make_sqlite_url, open_database
+from bench.catalogue import CATALOGUE_FILE, make_sqlite_url, open_database
 from bench.client import Bench
 from bench.demo import DemoFolder, start_processes
 from bench.log import read_log
 from benchmarks.common import print_line
-from benchmarks.speed.catalogue import make_rows
+from benchmarks.speed.catalogue import fill_catalogue
 from benchmarks.speed.overlay import serve
 
 CLIENTS, RATE, SECONDS = 20, 200.0, 15.0
@@ -69,10 +68,7 @@ def _measure_without_rig(data: Path) -> None:
     """Print the latencies of a service on a catalogue of runs with their results, and without a rig."""
     data.mkdir()
     engine = open_database(make_sqlite_url(data / CATALOGUE_FILE))
-    runs, jobs = zip(*make_rows(RUNS), strict=True)
-    with engine.begin() as connection:
-        connection.execute(insert(RunRow), list(runs))
-        connection.execute(insert(JobRow), [job for pair in jobs for job in pair])
+    fill_catalogue(engine, RUNS)
     engine.dispose()
     with serve(data) as client:
         headers = {"Authorization": client.headers["Authorization"]}

@@ -24,7 +24,8 @@ def make_environment(package: str) -> Environment:
     """Return the environment of the templates of a package; every value is escaped.
 
     Args:
-        package: name of the package that contains the template. `macros.html` and `report.css` are common to all.
+        package: name of the package that contains the template. `base.html`, `macros.html` and
+            `report.css` are common to all.
     """
     return Environment(
         loader=ChoiceLoader([PackageLoader(package, "."), PackageLoader("bench.report.layout", ".")]),

@@ -65,7 +65,7 @@ class KeptAnswerMiddleware:
                 return
         scope["endpoint"] = kept.endpoint  # for the metrics
         for message in kept.messages:
-            await send({**message, "headers": list(message["headers"])} if "headers" in message else message)
+            await send(_copy(message))
 
     async def _make(
         self, key: tuple[str, bytes], shown: Shown, scope: Scope, receive: Receive, send: Send
@@ -73,10 +73,7 @@ class KeptAnswerMiddleware:
         answer = _Answer(shown)
 
         async def send_and_keep(message: Message) -> None:
-            # Outer middleware adds to the headers of what it is sent.
-            answer.messages.append(
-                {**message, "headers": list(message["headers"])} if "headers" in message else message
-            )
+            answer.messages.append(_copy(message))
             await send(message)
 
         await self._app(scope, receive, send_and_keep)
@@ -86,6 +83,11 @@ class KeptAnswerMiddleware:
             self._answers.move_to_end(key)
             if len(self._answers) > _MAX_ANSWERS:
                 self._answers.popitem(last=False)
+
+
+def _copy(message: Message) -> Message:
+    """Return a message with headers of its own, because outer middleware adds to those that it is sent."""
+    return {**message, "headers": list(message["headers"])} if "headers" in message else message
 
 
 def _find_shown(scope: Scope) -> Shown | None:

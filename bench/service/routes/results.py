@@ -20,7 +20,7 @@ from bench.jobs import (
     make_job_view,
 )
 from bench.service.context import Context, ServiceContext
-from bench.service.files import SnapshotResponse
+from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import ProblemError, make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.run_registry import DAMAGED
@@ -30,11 +30,7 @@ _VERBS: dict[JobKind, str] = {"identify": "identified", "diagnose": "diagnosed",
 _NOUNS: dict[JobKind, str] = {"identify": "fit", "diagnose": "diagnosis"}
 
 
-def _describe_file(media_type: str) -> dict[int | str, dict[str, Any]]:
-    return {200: {"description": "the file", "content": {media_type: {}}}}
-
-
-JSON_FILE = _describe_file("application/json")
+JSON_FILE = describe_file("application/json")
 SAME_JOB: dict[int | str, dict[str, Any]] = {
     200: {"description": "an equal job is unfinished or done, and is returned; nothing was queued", "model": Job}
 }

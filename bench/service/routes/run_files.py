@@ -1,22 +1,16 @@
 """Route that returns the log of a run."""
 
-from typing import Any
-
 from fastapi import APIRouter
 from fastapi.responses import FileResponse
 
 from bench.service.context import Context
-from bench.service.files import SnapshotResponse
+from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_not_found
 
 router = APIRouter(prefix="/runs", tags=["runs"])
 
 
-def _describe_file(media_type: str) -> dict[int | str, dict[str, Any]]:
-    return {200: {"description": "the file", "content": {media_type: {}}}}
-
-
-@router.get("/{run_id}/log", response_class=FileResponse, responses=_describe_file("application/octet-stream"))
+@router.get("/{run_id}/log", response_class=FileResponse, responses=describe_file("application/octet-stream"))
 def get_log(run_id: str, context: Context) -> SnapshotResponse:
     """Return the log as MCAP; during the run, the part written until the request. Ranges are supported."""
     path = context.catalogue.resolve_path(context.get_run(run_id).log)

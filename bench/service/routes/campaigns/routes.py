@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
@@ -31,7 +31,7 @@ from bench.campaigns import (
 from bench.disk import RESERVE, find_free_space
 from bench.service.campaigns import AGENT_BENCH
 from bench.service.context import Context, ServiceContext
-from bench.service.files import SnapshotResponse
+from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.campaigns.photos import get_media_type, save_photo
@@ -49,9 +49,7 @@ from bench.service.routes.campaigns.views import (
 )
 
 router = APIRouter(tags=["campaigns"], route_class=IdempotentRoute)
-_PHOTO: dict[int | str, dict[str, Any]] = {
-    200: {"description": "the file", "content": {"image/jpeg": {}, "image/png": {}}}
-}
+_PHOTO = describe_file("image/jpeg", "image/png")
 _EVENTS = 200
 """Number of newest events in a view."""
 

@@ -11,7 +11,7 @@ from fastapi.responses import FileResponse
 from bench.catalogue import JobFilter, RunRow
 from bench.jobs import FIT_FILE, TREND_FILE, Job, TrendSettings, make_job_view
 from bench.service.context import Context, ServiceContext
-from bench.service.files import SnapshotResponse
+from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.planning.views import ParameterValue, RunParameters, SpecimenParameters
@@ -24,7 +24,7 @@ _MOST_RUNS = 50
 """Largest number of runs of a trend, the newest ones."""
 _OUTCOMES = ("clean", "lossy")
 """Outcomes of the runs that a trend reads."""
-_FILE: dict[int | str, dict[str, Any]] = {200: {"description": "the file", "content": {"application/json": {}}}}
+_FILE = describe_file("application/json")
 _SAME_JOB: dict[int | str, dict[str, Any]] = {
     200: {"description": "an equal job is unfinished or done, and is returned; nothing was queued", "model": Job}
 }

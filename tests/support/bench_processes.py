@@ -13,6 +13,7 @@ import subprocess
 import sys
 import time
 from http.client import HTTPException
+from pathlib import Path
 from urllib.request import Request, urlopen
 
 import psutil
@@ -21,8 +22,8 @@ from bench.client import Bench
 from tests.support.quick_jobs import COMMAND as SERVICE_COMMAND
 
 MRBENCH = (sys.executable, "-m", "bench.cli")
-ENVIRONMENT = os.environ | {"MRBENCH_NICE": "0"}
-"""Workers at normal priority: at the lowest they would wait for all other tests."""
+ENVIRONMENT = os.environ | {"MRBENCH_NICE": "0", "PYTHONPATH": str(Path(__file__).parents[2])}
+"""Workers at normal priority: at the lowest they would wait for all other tests. The path is that of `tests`."""
 DEADLINE = 180.0
 """Longest time [s] for what has to happen at some time, on a busy machine."""
 PARTS = ("rig", "agent", "worker", "service")

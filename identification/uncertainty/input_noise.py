@@ -94,7 +94,8 @@ def resample_input_noise(
     cutoffs = [estimate_motion(s).cutoff for s in simulated]
     plain, biased = np.zeros((2, REPLICAS, len(interior)))
     for number in range(REPLICAS):
-        replica = replace(fitted, pieces=tuple(_draw_replica(fitted, simulated, cutoffs, [seed, number])))
+        pieces = _draw_replica(fitted, simulated, cutoffs, [seed, number])
+        replica = replace(fitted, pieces=tuple(_limit_drive(fitted, minimum.unknowns, p) for p in pieces))
         plain[number, interior], biased[number, interior] = _solve_steps(replica, minimum, sensitivities, interior)
     scatter = np.asarray(_STUDENT_FACTOR * (plain.T @ plain) / REPLICAS)
     return InputNoiseStatistics(scatter, (biased - plain).mean(axis=0))
@@ -143,6 +144,19 @@ def _draw_replica(
             drive=s.drive + _estimate_level_noise(stretch.drive) * random.standard_normal(count),
         )
         yield replace_motion(piece, noisy, cutoff)
+
+
+def _limit_drive(problem: Problem, unknowns: Array, piece: Piece) -> Piece:
+    """Return a piece whose drive stays within the recorded range where a coefficient of the law is not positive.
+
+    The bounds of a fit keep yield force and damping positive in this range only. A little beyond it, a negative
+    damping would let the simulation diverge.
+    """
+    c, drive = problem.space.to_coordinates(unknowns[problem.layout.coordinates]), piece.excitation.drive
+    lines = ((c.F_a, c.F_b), (c.c0_a, c.c0_b), (c.c1_a, c.c1_b))
+    negative = np.any([at_zero + slope * drive <= 0.0 for at_zero, slope in lines], axis=0)
+    inside = np.clip(drive, problem.space.lowest_drive, problem.space.highest_drive)
+    return replace(piece, excitation=replace(piece.excitation, drive=np.where(negative, inside, drive)))
 
 
 def _estimate_level_noise(drive: Array) -> Array:

@@ -73,6 +73,24 @@ def _compile_uncached(function: Function, signature: Any = None) -> Function:
     return cast(Function, numba.njit(signature, nogil=True, error_model="numpy")(function))
 
 
+class FixedAddress:
+    """A compiled function with a fixed address; numba looks those of other arguments up at each call."""
+
+    def __init__(self, function: Any, kind: Any) -> None:
+        """Find the address of a function of a type: `BINARY_TYPE`, `QUATERNARY_TYPE` or `SCALE_TYPE`."""
+        self._function, self._numba_type_ = function, kind
+        compiled = function.get_compile_result(kind.signature)
+        self._address = int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))
+
+    def __call__(self, *arguments: float) -> Any:
+        """Call the function."""
+        return self._function(*arguments)
+
+    def __wrapper_address__(self) -> int:
+        """Return the address; numba asks for it by this name."""
+        return self._address
+
+
 def bind_values(function: Callable[..., Any], values: Sequence[float]) -> BinaryFunction:
     """Fix the parameters of a form of two numbers."""
     form, fixed = _compile_uncached(function), tuple(values)

@@ -24,7 +24,7 @@ from sim_rig.plant.defined_effects import (
     start_variables,
 )
 from sim_rig.plant.effects import EffectFunctions
-from sim_rig.plant.jit import Array
+from sim_rig.plant.jit import BINARY_TYPE, QUATERNARY_TYPE, SCALE_TYPE, Array, FixedAddress
 from sim_rig.scenario import Scenario
 
 _MAX_SUBSTEP = 1.25e-4
@@ -72,9 +72,11 @@ class Plant:
         """
         effects = EffectFunctions(scenario)
         self._law = np.array(scenario.parameters)
-        self._parallel_force, self._follower = effects.make_parallel_force(), effects.make_follower()
-        self._scale_factors = effects.make_scale_factors()
-        self._field_map, self._field_memory = effects.make_field_map(), effects.make_field_memory()
+        self._parallel_force = FixedAddress(effects.make_parallel_force(), QUATERNARY_TYPE)
+        self._follower = FixedAddress(effects.make_follower(), BINARY_TYPE)
+        self._scale_factors = FixedAddress(effects.make_scale_factors(), SCALE_TYPE)
+        self._field_map = FixedAddress(effects.make_field_map(), BINARY_TYPE)
+        self._field_memory = FixedAddress(effects.make_field_memory(), BINARY_TYPE)
         self._defined = make_defined_functions(effects)
         # Here and not at the first sample, because the first compilation takes seconds.
         self._integrate = integrator.choose_integrator(self._defined)

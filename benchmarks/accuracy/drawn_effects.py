@@ -23,7 +23,7 @@ from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, m
 from benchmarks.common.drawn_table import list_seeds, make_parser
 from identification.arrays import Array
 from identification.damper import Coordinates, DamperSize
-from identification.damper.effects import EFFECTS
+from identification.damper.effects import EFFECTS, Stage
 from identification.documents import Diagnosis
 from identification.gap import diagnose
 from identification.logs import Recording
@@ -33,8 +33,12 @@ KINDS = ("none", "one", "one", "one", "two", "unknown")
 """Kinds of cases, in turn."""
 SMALLEST_CHANGE, LARGEST_CHANGE = 2.0, 30.0
 """Change of the force by an effect, over the noise [1]; a refit of the law removes a part of it."""
-UNKNOWN_CAUSES = ("gain over displacement", "drive over time", "load cell over force")
-"""Causes outside the library."""
+UNKNOWN_CAUSES: dict[str, Stage] = {
+    "gain over displacement": "damper",
+    "drive over time": "coil",
+    "load cell over force": "force_channel",
+}
+"""Causes outside the library, with their stages."""
 _CALIBRATIONS = 4
 """Steps in which the strength of an effect is set."""
 
@@ -46,6 +50,8 @@ class Case(NamedTuple):
     kind: str
     effects: frozenset[str]
     label: str
+    stages: frozenset[Stage]
+    """Stages of its cause."""
 
 
 class Outcome(NamedTuple):
@@ -56,6 +62,8 @@ class Outcome(NamedTuple):
     truth: frozenset[str]
     named: frozenset[str]
     verdict: str
+    stage: str | None
+    """Most probable stage."""
     blamed: bool
     """True if an effect that is not at work is named with confidence, or the answer explains an unknown cause."""
     ratio: float
@@ -87,12 +95,11 @@ def judge(case: Case, diagnosis: Diagnosis) -> Outcome:
     confident = {e.name for e in diagnosis.effects if e.probability > 0.9 and e.share > 0.5}
     explained_unknown = case.kind == "unknown" and diagnosis.verdict == "explained"
     sets = [named, *(frozenset(a.effects) for a in diagnosis.alternatives)]
-    stages = {EFFECTS[n].stage for n in case.effects}
     return Outcome(
-        case.label, case.kind, case.effects, named, diagnosis.verdict,
+        case.label, case.kind, case.effects, named, diagnosis.verdict, diagnosis.where.stage,
         bool(confident - case.effects) or explained_unknown,
         diagnosis.gap.before_n / diagnosis.gap.noise_floor_n, diagnosis.gap.after_n / diagnosis.gap.noise_floor_n,
-        case.effects in sets, diagnosis.where.stage in stages if stages else True,
+        case.effects in sets, not case.stages or diagnosis.where.stage in case.stages,
     )  # fmt: skip
 
 
@@ -108,7 +115,7 @@ def draw_case(seed: int, kind: str) -> Case:
     velocity = np.gradient(x) * rate
     stroke = Excitation(rate, x, velocity, np.gradient(velocity) * rate, drive)
     names = draw_names(random, {"one": 1, "two": 2}.get(kind, 0))
-    cause = UNKNOWN_CAUSES[random.integers(0, len(UNKNOWN_CAUSES))] if kind == "unknown" else ""
+    cause = tuple(UNKNOWN_CAUSES)[random.integers(0, len(UNKNOWN_CAUSES))] if kind == "unknown" else ""
     clean = (
         _add_unknown(damper, stroke, cause, random) if cause else _add_effects(damper, stroke, names, size, random)
     )
@@ -120,7 +127,8 @@ def draw_case(seed: int, kind: str) -> Case:
     metadata = {"run": {"source": "import", "specimen": f"drawn {seed}"}}
     recording = Recording(Path(f"drawn-{seed}.mcap"), "0" * 64, "coil_v", "V", (stretch,), metadata)
     label = f"{seed}: {size.name}, {spectrum}, {' and '.join(sorted(names)) or cause or 'none'}"
-    return Case(recording, kind, frozenset(names), label)
+    stages = {UNKNOWN_CAUSES[cause]} if cause else {EFFECTS[n].stage for n in names}
+    return Case(recording, kind, frozenset(names), label, frozenset(stages))
 
 
 def draw_names(random: np.random.Generator, count: int) -> list[str]:
@@ -228,8 +236,10 @@ def format_summary(outcomes: Sequence[Outcome]) -> list[str]:
 def format_row(o: Outcome) -> str:
     """Return one case as a row."""
     named = " and ".join(sorted(o.named)) or "-"
+    stage = (o.stage or "-") + ("" if o.stage_right else " (**no**)")
     return (
-        f"| {o.case} | {o.ratio:.2f} | {o.verdict} | {named} | {o.after:.2f} | {'yes' if o.right else '**no**'} |"
+        f"| {o.case} | {o.ratio:.2f} | {o.verdict} | {named} | {stage} | {o.after:.2f} "
+        f"| {'yes' if o.right else '**no**'} |"
     )
 
 
@@ -240,8 +250,8 @@ def main() -> None:
     options = parser.parse_args()
     kinds = options.kinds.split(",")
     jobs = [(seed, kinds[n % len(kinds)]) for n, seed in enumerate(list_seeds(options))]
-    lines = ["| case | error of the law over the floor | verdict | named | with them | right |"]
-    lines.append("| --- | --- | --- | --- | --- | --- |")
+    lines = ["| case | error of the law over the floor | verdict | named | stage | with them | right |"]
+    lines.append("| --- | --- | --- | --- | --- | --- | --- |")
     print("\n".join(lines), flush=True)
     outcomes = []
     with ProcessPoolExecutor(options.jobs) as pool:

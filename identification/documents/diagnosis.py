@@ -154,7 +154,7 @@ class Remainder(Document):
         description="part of its variance that differs between cycles of a segment; null where no cycles repeat"
     )
     stage: Stage | None = Field(
-        description="stage of the effect with the largest expected gain; null where none is expected to gain"
+        description="stage of the curve, or else the known effect, that describes most of it; null where none does"
     )
     map: list[GapMapEntry] = Field(description="by drive, amplitude, frequency and phase of the stroke")
     variables: list[Variable] = Field(description="variables that the regression needs, the strongest first")

@@ -7,11 +7,16 @@ one of them leaves least, the cause may be that effect in another form, which is
 
 from collections.abc import Mapping
 
-from identification.damper.effects import Action, Effect, Place, Variable
+import numpy as np
+
+from identification.damper.definitions import STAGE_OF
+from identification.damper.effects import STAGES, Action, Effect, Place, Stage, Variable
 from identification.gap.discovery.curve_effects import CurvePlace
+from identification.gap.discovery.curve_evidence import estimate_correlation_length
 from identification.gap.discovery.curve_fit import fit_best_curves, screen_curves
 from identification.gap.fits import Candidate
-from identification.gap.selection import CandidatePool, Posterior
+from identification.gap.selection import CandidatePool, Posterior, normalise_scores
+from identification.threads import use_one_thread
 
 _STATIC_ACTIONS: frozenset[Action] = frozenset(
     {
@@ -72,3 +77,22 @@ def find_unlisted_cause(pool: CandidatePool) -> Candidate | None:
     if not curves or not is_unlisted(curves[0].curve.at, pool.library):
         return None
     return curves[0].candidate
+
+
+def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage, float]:
+    """Return the probability of each stage for a cause outside the library, in addition to a set of effects.
+
+    The linear evidence of the best curve at each stage decides, over the correlation length of the residual: the
+    errors of neighbouring samples are alike. A cause that no curve resembles is equally probable at all stages.
+    """
+    problem = pool.screening_problem.replace_effects(parent.fit.effects)
+    with use_one_thread():
+        screened = screen_curves(pool, parent)
+        unknowns = parent.fit.minimum.unknowns
+        errors = [problem.compute_residuals(unknowns, i)[0] for i in range(len(problem.pieces))]
+    odds: dict[Stage, float] = dict.fromkeys(STAGES, 0.0)
+    for curve, evidence in screened:
+        stage = STAGE_OF[curve.at.place]
+        odds[stage] = max(odds[stage], evidence.log_odds)
+    scores = np.array([odds[stage] for stage in STAGES]) / estimate_correlation_length(errors)
+    return dict(zip(STAGES, map(float, normalise_scores(scores)), strict=True))

@@ -6,6 +6,7 @@ from identification.arrays import Array
 from identification.damper.effects import Stage
 from identification.documents import Remainder
 from identification.gap.data import NEAR_FLOOR_RATIO, Cycles, EvaluationData, Indices, Residual, map_gap
+from identification.gap.discovery import locate_unlisted_cause
 from identification.gap.fits import Candidate
 from identification.gap.outcome.explainable_share import FEATURE_VARIABLES, ResidualRegression
 from identification.gap.selection import CandidatePool, compute_expected_gain
@@ -14,6 +15,8 @@ _MIN_VARIABLE_SHARE = 0.05
 """Smallest part of the remainder's variance that is lost without a variable for it to be listed."""
 _MIN_STAGE_GAIN = 0.05
 """Smallest expected gain of an effect, relative to the remaining excess, that points to a stage."""
+_LIKELY_STAGE = 0.5
+"""Probability above which the stage of a curve is that of the remainder."""
 _MIN_CYCLES = 2
 """Smallest number of cycles of one segment of which the repetition can be judged."""
 
@@ -90,7 +93,14 @@ def _find_nearest(phase: Array, wanted: Array) -> Indices:
 
 
 def _find_stage(pool: CandidatePool, named: Candidate) -> Stage | None:
-    """Return the stage of the effect with the largest expected gain in addition to a set."""
+    """Return the stage of the curve that most probably describes what a set leaves, else of a known effect.
+
+    A known effect counts where no stage is probable by its curves. It is the one with the largest expected gain.
+    """
+    stages = locate_unlisted_cause(pool, named)
+    likeliest = max(stages, key=stages.__getitem__)
+    if stages[likeliest] > _LIKELY_STAGE:
+        return likeliest
     best = max(pool.screen(named, named.names), key=compute_expected_gain, default=None)
     if best is None or compute_expected_gain(best) < _MIN_STAGE_GAIN:
         return None

@@ -29,7 +29,7 @@ from identification.gap.data import (
     estimate_drift,
     map_gap,
 )
-from identification.gap.discovery import DiscoveredEffect, discover_effect
+from identification.gap.discovery import DiscoveredEffect, discover_effect, locate_unlisted_cause
 from identification.gap.fits import Candidate
 from identification.gap.outcome.diagnosis_result import DiagnosisResult
 from identification.gap.outcome.discovery_document import build_discovery
@@ -54,6 +54,7 @@ from identification.gap.outcome.verdict import (
     list_likely_sets,
 )
 from identification.gap.selection import (
+    UNKNOWN_THRESHOLD,
     CandidatePool,
     Posterior,
     compute_stage_probabilities,
@@ -285,7 +286,9 @@ class ReportBuilder:
 
     def _locate_gap(self, posterior: Posterior) -> GapLocation:
         baseline, floor, cycles = self.pool.baseline, self.pool.floor, self.evaluation.cycles
-        stages = compute_stage_probabilities(posterior, STAGES, self.pool.library)
+        is_unlisted = self.posterior.unknown > UNKNOWN_THRESHOLD
+        unlisted = locate_unlisted_cause(self.pool, baseline) if is_unlisted else None
+        stages = compute_stage_probabilities(posterior, STAGES, self.pool.library, unlisted)
         no_stage = baseline.held_out_rmse <= floor or max(stages.values()) < _MIN_STAGE_PROBABILITY
         return GapLocation(
             stage=None if no_stage else sorted(STAGES, key=stages.__getitem__)[-1],

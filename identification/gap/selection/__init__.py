@@ -10,6 +10,7 @@ from identification.gap.selection.posterior import (
     UNKNOWN_THRESHOLD,
     Posterior,
     compute_stage_probabilities,
+    normalise_scores,
 )
 from identification.gap.selection.screening import compute_expected_gain
 from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
@@ -27,5 +28,6 @@ __all__ = [
     "compute_final_posterior",
     "compute_stage_probabilities",
     "find_partial_sets",
+    "normalise_scores",
     "search_forward",
 ]

@@ -203,10 +203,21 @@ def normalise_scores(scores: Array) -> Array:
 
 
 def compute_stage_probabilities(
-    posterior: Posterior, stages: Sequence[Stage], library: Mapping[str, Effect] = MappingProxyType(EFFECTS)
+    posterior: Posterior,
+    stages: Sequence[Stage],
+    library: Mapping[str, Effect] = MappingProxyType(EFFECTS),
+    unlisted: Mapping[Stage, float] | None = None,
 ) -> dict[Stage, float]:
-    """Return the probability of a missing effect at each stage; that of an unknown cause is spread evenly."""
-    shares: dict[Stage, float] = dict.fromkeys(stages, posterior.unknown / len(stages))
+    """Return the probability of a missing effect at each stage.
+
+    Args:
+        posterior: probabilities of the sets of effects and of an unknown cause.
+        stages: all stages.
+        library: effects of these sets.
+        unlisted: probability of each stage if the cause is unknown; equal ones if None.
+    """
+    unlisted = unlisted or dict.fromkeys(stages, 1.0 / len(stages))
+    shares: dict[Stage, float] = {stage: posterior.unknown * unlisted[stage] for stage in stages}
     for names, probability in posterior.sets.items():
         for stage in {library[name].stage for name in names}:
             shares[stage] += probability

@@ -5,9 +5,14 @@ import pytest
 from identification.damper.effects import EFFECTS
 from identification.gap.discovery import compare_with_curves
 from identification.gap.discovery.curve_effects import CURVE_PLACES, CurvePlace
-from identification.gap.discovery.unlisted_cause import find_unlisted_cause, is_unlisted, list_pairs
+from identification.gap.discovery.unlisted_cause import (
+    find_unlisted_cause,
+    is_unlisted,
+    list_pairs,
+    locate_unlisted_cause,
+)
 from identification.gap.selection import Posterior
-from tests.support.discoveries import GAIN, SPRING, pool_with
+from tests.support.discoveries import GAIN, MOUNTING, SPRING, pool_with
 
 
 @pytest.mark.parametrize(
@@ -48,3 +53,17 @@ def test_without_named_effects_nothing_is_compared():
     pool, posterior = pool_with(GAIN), Posterior({frozenset(): 0.4}, 0.6)
     assert compare_with_curves(pool, posterior) is posterior
     assert pool.unlisted is None
+
+
+@pytest.mark.parametrize(("cause", "stage"), [(GAIN, "damper"), (MOUNTING, "mounting")])
+def test_the_stage_of_an_unknown_cause_is_that_of_the_curve_that_resembles_it(cause, stage):
+    pool = pool_with(cause)
+    stages = locate_unlisted_cause(pool, pool.baseline)
+    assert sum(stages.values()) == pytest.approx(1.0)
+    assert stages[stage] > 0.9
+
+
+def test_without_a_gap_every_stage_is_about_equally_probable():
+    pool = pool_with()
+    stages = locate_unlisted_cause(pool, pool.baseline)
+    assert max(stages.values()) < 0.6

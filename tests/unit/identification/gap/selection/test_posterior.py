@@ -182,6 +182,10 @@ def test_a_stage_has_the_probability_of_its_effects_and_a_share_of_the_unknown()
     assert stages == pytest.approx({"coil": 0.3, "damper": 0.6, "mounting": 0.1, "force_channel": 0.1})
     full = compute_stage_probabilities(Posterior({frozenset({"coil_lag"}): 0.9}, 0.4), ("coil", "damper"))
     assert full == pytest.approx({"coil": 1.0, "damper": 0.2})
+    located = compute_stage_probabilities(
+        Posterior({frozenset({"coil_lag"}): 0.3}, 0.7), ("coil", "damper"), unlisted={"coil": 0.1, "damper": 0.9}
+    )
+    assert located == pytest.approx({"coil": 0.37, "damper": 0.63})
 
 
 def name_with_held_out_evidence(log_odds):

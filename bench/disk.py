@@ -1,5 +1,6 @@
-"""Free space of the disk that takes the logs: size of a run's log, refusal of a start, and a warning."""
+"""Disk that takes the logs: free space, write protection, size of a run's log, refusal of a start, and a warning."""
 
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterable
@@ -29,6 +30,8 @@ class FreeSpace(NamedTuple):
     folder: Path
     free: int
     """[byte]"""
+    obstacle: str = ""
+    """Reason why nothing can be written there; empty if it can."""
 
 
 def find_free_space(folder: Path) -> FreeSpace:
@@ -39,9 +42,18 @@ def find_free_space(folder: Path) -> FreeSpace:
     """
     existing = next(one for one in (folder, *folder.absolute().parents) if one.exists())
     try:
-        return FreeSpace(folder, shutil.disk_usage(existing).free)
+        return FreeSpace(folder, shutil.disk_usage(existing).free, _find_obstacle(existing))
     except OSError as error:
         raise RunError(f"{existing}: the free space is not known ({error.strerror}); check the disk") from None
+
+
+def _find_obstacle(folder: Path) -> str:
+    """Return the reason why nothing can be written to a folder; empty if it can."""
+    if os.statvfs(folder).f_flag & os.ST_RDONLY:
+        return f"{folder} is on a read-only file system; mount it for writing"
+    if not os.access(folder, os.W_OK | os.X_OK):
+        return f"{folder} cannot be written by this user; change its owner or its rights"
+    return ""
 
 
 def estimate_log_size(duration: float, rates: Iterable[float]) -> int:
@@ -55,15 +67,17 @@ def estimate_log_size(duration: float, rates: Iterable[float]) -> int:
 
 
 def check_space(space: FreeSpace, needed: int) -> None:
-    """Check that a log fits on the disk and leaves the reserve free.
+    """Check that a log can be written, fits on the disk, and leaves the reserve free.
 
     Args:
         space: free space.
         needed: size of the log [byte].
 
     Raises:
-        RunError: it does not fit.
+        RunError: it cannot be written, or does not fit.
     """
+    if space.obstacle:
+        raise RunError(f"{space.obstacle}, or choose another folder in bench.toml; nothing was started")
     if space.free < needed + RESERVE:
         raise RunError(
             f"the disk of {space.folder} has {_format(space.free)} free, but the log of this run needs up to "
@@ -73,7 +87,9 @@ def check_space(space: FreeSpace, needed: int) -> None:
 
 
 def describe_low_space(space: FreeSpace) -> str:
-    """Return a warning if there is little space left, else an empty text."""
+    """Return a warning if nothing can be written or there is little space left, else an empty text."""
+    if space.obstacle:
+        return f"{space.obstacle}; no run can be recorded"
     if space.free >= LOW_SPACE:
         return ""
     return (

@@ -22,6 +22,8 @@ from sim_rig.server.server import RigServer, TransportOptions
 
 COMMAND = Path(sys.executable).parent / "mrbench"
 DEADLINE = 90.0
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(__file__).parents[2])}
+"""Environment of processes; the path is that of `tests`."""
 
 
 TCP = TransportOptions(load_cell="tcp")
@@ -131,14 +133,14 @@ def live_bench(folder, choices=TCP, faults=None, limits=""):
 
 
 @contextlib.contextmanager
-def served_agent(bench):
-    """Start a rig agent on a bench and return its client.
+def served_agent(bench, command=(COMMAND,)):
+    """Start a rig agent on a bench, by another command if one is given, and return its client.
 
     The agent has a process of its own, as in use: together with the simulated rig it would share one interpreter
     lock, and a slow machine could not keep the instruments' time limits.
     """
-    words = [COMMAND, "rig", "--config", bench.toml]
-    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    words = [*command, "rig", "--config", bench.toml]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
     with ended(process):
         assert "commands ipc://" in process.stdout.readline()
         agent = AgentClient(*find_agent(bench.toml))

@@ -1,5 +1,6 @@
 """Free space: estimate of a log's size, refusal, and warning."""
 
+import os
 import shutil
 from types import SimpleNamespace
 
@@ -61,3 +62,25 @@ def test_a_disk_that_cannot_be_asked_is_a_warning(tmp_path, monkeypatch):
 
     monkeypatch.setattr(shutil, "disk_usage", fail)
     assert "the free space is not known (Input/output error)" in SpaceMonitor(tmp_path).describe()
+
+
+def make_read_only(path):
+    return SimpleNamespace(f_flag=os.ST_RDONLY, f_bavail=9, f_bfree=9, f_blocks=9, f_frsize=LOW_SPACE)
+
+
+@pytest.mark.parametrize(
+    ("name", "replacement", "reason"),
+    [
+        ("statvfs", make_read_only, "is on a read-only file system; mount it for writing"),
+        ("access", lambda path, mode: False, "cannot be written by this user"),
+    ],
+)
+def test_a_folder_that_cannot_be_written_refuses_a_run_and_is_a_warning(
+    tmp_path, monkeypatch, name, replacement, reason
+):
+    assert find_free_space(tmp_path).obstacle == ""
+    monkeypatch.setattr(os, name, replacement)
+    space = find_free_space(tmp_path)
+    with pytest.raises(RunError, match=f"{reason}.*or choose another folder in bench.toml; nothing was started"):
+        check_space(space, 0)
+    assert reason in SpaceMonitor(tmp_path).describe()

@@ -1,4 +1,4 @@
-"""Disk that takes the logs: free space, write protection, size of a run's log, refusal of a start, and a warning."""
+"""Disk of the logs: free space, write protection, size of a run's log, refusal of a start, and a warning."""
 
 import os
 import shutil

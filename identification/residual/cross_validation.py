@@ -20,8 +20,8 @@ _RIDGES = tuple(10.0**k for k in np.arange(-3.0, 3.0, 0.5))
 _ROUNDS = 2
 """Rounds over all variables."""
 _MIN_GAIN = 1e-3
-"""Smallest reduction of the error for which a length scale is changed, and largest rise for which a variable is
-left out, over the error without a residual [1]."""
+"""Smallest reduction of the error for which a length scale is changed or a variable is left out, over the error
+without a residual [1]."""
 _USUAL_RATE = 0.5
 """Reciprocal length scale at which a variable enters [1]."""
 _FACTORS = (0.5, 2.0, 0.0)
@@ -91,14 +91,17 @@ class CrossValidation:
         return float(prior), float(rest)
 
     def _improve(self, best: Choice, column: int) -> Choice:
-        """Return the best of a choice and those with another length scale of one variable."""
+        """Return the best of a choice and those with another length scale of one variable.
+
+        A variable is left out only where that reduces the error. Without it a residual is the same at all its
+        values, also where nothing was recorded.
+        """
         for factor in _FACTORS:
             rates = best.rates.copy()
             rates[column] = rates[column] * factor if rates[column] else (_USUAL_RATE if factor > 1.0 else 0.0)
             if rates[column] != best.rates[column] and rates.any():
                 other = self._evaluate(rates)
-                limit = best.error + (_MIN_GAIN if rates[column] == 0.0 else -_MIN_GAIN)
-                best = other if other.error < limit else best
+                best = other if other.error < best.error - _MIN_GAIN else best
         return best
 
     def _make_basis(self, rates: Array) -> Basis:

@@ -1,13 +1,15 @@
 """State of a damper on which its residual may depend, without units.
 
 Velocity, acceleration and travel since the last reversal are compressed: a residual changes fastest near a
-reversal, where all three are small or change their sign.
+reversal, where all three are small or change their sign. The recent speed tells a reversal from rest, and a slow
+stroke from the turn of a fast one, which are alike in all other variables.
 """
 
 from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import lfilter
 
 from identification.arrays import Array
 from identification.simulate import Excitation, apply_deadband, trace_last_reversal
@@ -16,7 +18,11 @@ _TRAVEL, _VELOCITY, _ACCELERATION = 0.01, 0.03, 0.1
 """Travel over half the stroke, velocity and acceleration over their peaks [1], from which each is compressed."""
 _DEADBAND = 1e-3
 """Half width, over half the stroke [1], of the deadband within which a change of direction is no reversal."""
-VARIABLES = ("travel_since_reversal", "velocity", "drive", "law_force", "displacement", "acceleration")
+_RECENT = 2.0
+"""Time constant of the recent speed, over half the stroke at the peak speed [1]."""
+VARIABLES = (
+    "travel_since_reversal", "velocity", "drive", "law_force", "recent_speed", "displacement", "acceleration",
+)  # fmt: skip
 """Names of the variables of a state, the likeliest first."""
 
 State = Mapping[str, Array]
@@ -57,9 +63,20 @@ def compute_state(excitation: Excitation, law_force: Array, units: StateUnits) -
         "velocity": _compress(v / units.velocity, _VELOCITY),
         "drive": 2.0 * drive,
         "law_force": law_force / units.force,
+        "recent_speed": _compress(_average_speed(v, excitation.rate, units) / units.velocity, _VELOCITY),
         "displacement": 2.0 * (x - units.centre) / units.length,
         "acceleration": _compress(a * units.length / units.velocity**2, _ACCELERATION),
     }
+
+
+def _average_speed(velocity: Array, rate: float, units: StateUnits) -> Array:
+    """Return the speed (N,) [m/s] averaged over the recent past, with weights that fall exponentially."""
+    samples = _RECENT * units.length / units.velocity * rate
+    weight, speed = 1.0 / (1.0 + samples), np.abs(velocity)
+    # As if the first stretch of this length had lasted for long before.
+    before = speed[: max(1, round(samples))].mean()
+    average, _ = lfilter([weight], [1.0, weight - 1.0], speed, zi=[(1.0 - weight) * before])
+    return np.asarray(average)
 
 
 def _compress(values: Array, threshold: float) -> Array:

@@ -1,7 +1,7 @@
 """Command line in place of mrbench, with a disk that stalls or becomes read-only while a log is written.
 
-``python -m tests.support.faulty_disk stalls|read_only rig ...``. Both begin some syncs after the start of a log. The
-fault is injected where logs are passed to the disk, because a mounted file system does not stall when asked to.
+``python -m tests.support.faulty_disk stalls|read_only rig ...``. Both begin some syncs after the start of a log.
+The fault is injected where logs are passed to the disk: a mounted file system does not stall when asked to.
 """
 
 import errno

@@ -1,7 +1,7 @@
 """Runs on a bad disk: nearly full, full, read-only, or so slow that a second of the log takes eight.
 
-The full disk is a small tmpfs, and the read-only one a mounted tmpfs or a file layer that fails during the run. A
-mounted file system does not stall when asked to, so the slow disk is a file layer too (`tests.support.faulty_disk`).
+The full disk is a small tmpfs. The read-only one is a mounted tmpfs, or a file layer that fails during the run.
+The slow one is a file layer too (`tests.support.faulty_disk`): a mounted file system does not stall when asked to.
 """
 
 import contextlib

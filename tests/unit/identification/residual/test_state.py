@@ -1,5 +1,7 @@
 """State of the damper on which a residual depends."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -33,6 +35,21 @@ def test_the_travel_starts_at_each_reversal_and_has_the_sign_of_the_velocity():
     assert travel[450] == pytest.approx(x[450] - x.min(), abs=2.1e-5)
     assert travel[624] == pytest.approx(0.02, abs=2.1e-5)
     assert travel[650] < 0.0
+
+
+def test_the_recent_speed_tells_rest_from_a_reversal():
+    moving = make_excitation()
+    stopped = np.arange(2000) >= 1000
+    velocity = np.where(stopped, 0.0, moving.velocity)
+    excitation = replace(moving, velocity=velocity)
+    speed = np.sinh(compute_state(excitation, np.zeros(2000), UNITS)["recent_speed"]) * 0.03 * UNITS.velocity
+    reversal = int(np.argmin(np.abs(moving.velocity[500:900]))) + 500
+    mean = np.abs(moving.velocity[:1000]).mean()
+    assert speed[reversal] == pytest.approx(mean, rel=0.3)
+    assert speed[0] == pytest.approx(mean, rel=0.3)
+    # Half the stroke lasts 0.1 s at the peak speed, and the speed is forgotten within 0.2 s.
+    assert speed[1200] == pytest.approx(speed[1000] * np.exp(-1.0), rel=0.02)
+    assert speed[-1] < 0.02 * mean
 
 
 def test_dampers_of_different_size_and_speed_have_the_same_state():

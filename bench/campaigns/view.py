@@ -8,6 +8,7 @@ from pydantic import Field
 from bench.campaigns.delivery import RECIPIENT, name_recipient
 from bench.campaigns.document import find_run, get_method_name, get_step_kind
 from bench.campaigns.engine import CampaignState, Item, RunFact, RunResult, Times, get_half_width, group_runs
+from bench.campaigns.expected_end import estimate_remaining
 from bench.campaigns.store import StoredCampaign
 from bench.catalogue import CampaignEventRow, CampaignNotificationRow
 from bench.validation import FrozenModel
@@ -147,7 +148,7 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
         next=next((_make_item(item, units) for item in state.pending), None),
         waits_for=state.waits_for,
         question=_make_question(state, current),
-        expected_end=None if state.has_ended else _at(state.updated + _estimate_remaining(state)),
+        expected_end=None if state.has_ended else _at(state.updated + estimate_remaining(state)),
         times=state.times,
         temperature_c=state.temperature_c,
         items=tuple(_make_item(item, units) for item in state.items),
@@ -159,14 +160,6 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
 
 def _at(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
-
-
-def _estimate_remaining(state: CampaignState) -> float:
-    remaining = 0.0 if state.status == "stopping" else sum(item.expected_s for item in state.pending)
-    if state.active is not None:
-        expected = state.get_item(state.active.item).expected_s
-        remaining += max(0.0, expected - (state.updated - state.active.since))
-    return remaining
 
 
 def _make_item(item: Item, units: Mapping[str, str]) -> ItemView:

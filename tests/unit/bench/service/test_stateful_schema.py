@@ -1,0 +1,107 @@
+"""Sequences of drawn requests: later ones use ids of earlier answers, and every answer is as described.
+
+`MRBENCH_DRAWN_SEQUENCES` is the number of sequences. Links from an answer to the operations that take its id are
+added to the description here. Each sequence begins on a service of its own, with three runs, a fit, a specimen,
+jobs and a campaign.
+"""
+
+import itertools
+import json
+import os
+from collections import Counter
+
+import schemathesis
+from hypothesis import HealthCheck, Phase, settings
+from schemathesis import Response
+
+from bench.service.application import create_app
+from tests.support.reports import fit_document
+from tests.support.service_logs import write_complete_log
+from tests.unit.bench.service.conftest import Service
+from tests.unit.bench.service.test_schema import CHECKS, send
+
+DRAWN = int(os.environ.get("MRBENCH_DRAWN_SEQUENCES", "12"))
+LENGTH = 10
+"""Number of requests of a sequence."""
+UPLOADS = "/api/v1/logs"
+CAMPAIGN = {"name": "night", "steps": [{"prompt": {"text": "Mount"}}, {"rest": {"seconds": 100}}]}
+SOURCES = [
+    # path, method, status and pointer of an answer, and the parameter that takes the value there
+    ("/runs", "get", "200", "/items/0/id", "run_id"),
+    ("/runs", "get", "200", "/items/1/id", "run_id"),
+    ("/jobs", "get", "200", "/items/0/id", "job_id"),
+    ("/runs/{run_id}/identify", "post", "201", "/id", "job_id"),
+    ("/runs/{run_id}/fit", "get", "200", "/id", "fit_id"),
+    ("/methods", "get", "200", "/items/0/name", "name"),
+    ("/specimens", "get", "200", "/items/0/serial", "serial"),
+    ("/campaigns", "get", "200", "/items/0/id", "campaign_id"),
+    ("/batches", "post", "201", "/id", "batch_id"),
+]
+
+
+def make_description():
+    """Return the description with a link from each source to each operation that takes its value."""
+    document = create_app().openapi()
+    del document["paths"][UPLOADS]
+    operations = [one for path in document["paths"].values() for one in path.values()]
+    for operation in operations:
+        operation.pop("security", None)
+    for number, (path, method, status, pointer, name) in enumerate(SOURCES):
+        links = document["paths"][f"/api/v1{path}"][method]["responses"][status].setdefault("links", {})
+        for operation in operations:
+            required = [p["name"] for p in operation.get("parameters", ()) if p["in"] == "path"]
+            if required == [name]:
+                links[f"{number} {operation['operationId']}"] = {
+                    "operationId": operation["operationId"],
+                    "parameters": {name: f"$response.body#{pointer}"},
+                }
+    return document
+
+
+def prepare(service):
+    """Record runs, identify one of them, and start a campaign."""
+    for number in range(3):
+        write_complete_log(service.data / f"{number}.mcap", run=f"run-{number}")
+    service.start()
+    service.scan()
+    fitted = service.get("/jobs")["items"][0]
+    service.complete(fitted, {"rmse_n": 2.0, "noise_floor_n": 1.9}, {"fit.json": json.dumps(fit_document())})
+    service.post("/campaigns", {"campaign": CAMPAIGN, "operator": "M. Curie"}, status=201)
+
+
+def test_answers_to_sequences_of_requests_are_as_described(tmp_path):
+    answers, numbers = Counter(), itertools.count()
+
+    class Sequence(schemathesis.openapi.from_dict(make_description()).as_state_machine()):
+        def setup(self):
+            folder = tmp_path / str(next(numbers))
+            folder.mkdir()
+            self.service = Service(folder)
+            prepare(self.service)
+
+        def teardown(self):
+            self.service.end()
+
+        def call(self, case, **given):
+            answer = send(self.service, case)
+            answers[case.operation.label, answer.status_code] += 1
+            return Response.from_any(answer)
+
+        def validate_response(self, response, case, **given):
+            case.validate_response(response, checks=CHECKS)
+
+    Sequence.run(
+        settings=settings(
+            max_examples=DRAWN,
+            stateful_step_count=LENGTH,
+            deadline=None,
+            database=None,
+            derandomize=True,
+            phases=[Phase.generate],
+            suppress_health_check=list(HealthCheck),
+        )
+    )
+    assert sum(answers.values()) > 4 * DRAWN
+    # Without the links an id is never known, and every such answer is 404.
+    linked = {label for label, status in answers if "{" in label and status < 300}
+    assert len(linked) >= 5, answers

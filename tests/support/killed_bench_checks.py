@@ -120,6 +120,8 @@ def _check_log(bench, run, records):
     state = "complete"
     if run["state"] == "truncated":
         state = "salvaged" if bench.post(f"/runs/{run['id']}/salvage") else _find_obstacle(path)
+    elif run["outcome"] != "clean" and _is_without_sample(path):
+        state = "without a sample"  # it ended while the bench moved to the first position
     records.logs[state] += 1
     if state not in LOG_STATES:
         yield state
@@ -134,6 +136,14 @@ def _find_obstacle(path):
     except LogError as error:
         return "without a sample" if NO_SAMPLE in str(error) else str(error)
     return "the service refused to repair the log"
+
+
+def _is_without_sample(path):
+    try:
+        read_log(path)
+    except LogError as error:
+        return NO_SAMPLE in str(error)
+    return False
 
 
 def _check_samples(path, run):

@@ -17,7 +17,7 @@ ANALYSED = ("clean", "lossy")
 """Outcomes of runs that the service identifies and diagnoses by itself."""
 FOLDERS = {"identify": "fit", "diagnose": "diagnosis"}
 """Kinds of the jobs of a run, and how their folders are named."""
-NO_SAMPLE = "before it wrote a sample"
+NO_SAMPLE, EMPTY_LOG = "before it wrote a sample", "contains no sample"
 """Part of the refusal to repair a log that contains nothing to keep."""
 LOG_STATES = ("complete", "salvaged", "without a sample", "no log")
 
@@ -142,7 +142,7 @@ def _is_without_sample(path):
     try:
         read_log(path)
     except LogError as error:
-        return NO_SAMPLE in str(error)
+        return EMPTY_LOG in str(error)
     return False
 
 

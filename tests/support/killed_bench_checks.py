@@ -18,7 +18,7 @@ ANALYSED = ("clean", "lossy")
 FOLDERS = {"identify": "fit", "diagnose": "diagnosis"}
 """Kinds of the jobs of a run, and how their folders are named."""
 NO_SAMPLE, EMPTY_LOG = "before it wrote a sample", "contains no sample"
-"""Part of the refusal to repair a log that contains nothing to keep."""
+"""Parts of messages: of the refusal to repair a log that contains nothing to keep, and of reading an empty one."""
 LOG_STATES = ("complete", "salvaged", "without a sample", "no log")
 
 

@@ -20,9 +20,8 @@ def main(command: list[str]) -> int:
     Returns:
         Its exit status; 128 plus the signal's number if a signal ended it.
     """
-    # In a separate process group, so that its own child processes can be killed with it. A session of its own
-    # would not have the low priority of the worker's session.
-    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, process_group=0)
+    # In a separate process group, so that its own child processes can be killed with it.
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, start_new_session=True)
 
     def end(number: int = 0, frame: FrameType | None = None) -> None:
         # The group has the number of its first process, which is invalid once `wait` below has returned.

@@ -1,12 +1,10 @@
 """Worker process: executes one job at a time, at the lowest priority, until its scheduler ends."""
 
 import asyncio
-import contextlib
 import logging
 import os
 import signal
 from collections.abc import Callable
-from pathlib import Path
 
 import dask
 from distributed import Worker
@@ -17,8 +15,6 @@ from bench.jobs.errors import WorkerError
 from bench.jobs.tls import SchedulerLocation
 
 _LOG = logging.getLogger(__name__)
-AUTOGROUP = Path("/proc/self/autogroup")
-"""Niceness of the session of this process, see sched(7)."""
 _CONNECT_TIMEOUT = "10 s"
 
 
@@ -32,26 +28,10 @@ def run_worker(scheduler: SchedulerLocation, nice: int) -> None:
     Raises:
         WorkerError: no scheduler replies.
     """
-    lower_priority(nice)
+    os.nice(nice)
     asyncio.run(_run(scheduler))
     # The thread of a job cannot be joined; its commands end when the pipe from this process closes.
     os._exit(0)
-
-
-def lower_priority(nice: int, autogroup: Path = AUTOGROUP) -> None:
-    """Set the niceness of this process, and that of its session where it leads one.
-
-    Linux divides the processor between sessions first, and niceness counts only within one. A worker with a
-    session of its own would take as much as the service, whatever its niceness.
-
-    Args:
-        nice: niceness, 0 to 19.
-        autogroup: file of the session's niceness; it is missing on systems without such groups.
-    """
-    os.nice(nice)
-    if os.getsid(0) == os.getpid():
-        with contextlib.suppress(OSError):
-            autogroup.write_text(str(nice))
 
 
 def _find_worker_address(scheduler: str) -> str:

@@ -82,17 +82,37 @@ def find_unlisted_cause(pool: CandidatePool) -> Candidate | None:
 def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage, float]:
     """Return the probability of each stage for a cause outside the library, in addition to a set of effects.
 
-    The linear evidence of the best curve at each stage decides, over the correlation length of the residual: the
-    errors of neighbouring samples are alike. A cause that no curve resembles is equally probable at all stages.
+    The evidence of the best curve or fitted set at each stage decides, over the correlation length of the
+    residual: the errors of neighbouring samples are alike. It counts as far as the best one closes the gap. A
+    cause that nothing resembles is equally probable at all stages.
     """
     problem = pool.screening_problem.replace_effects(parent.fit.effects)
     with use_one_thread():
         screened = screen_curves(pool, parent)
         unknowns = parent.fit.minimum.unknowns
         errors = [problem.compute_residuals(unknowns, i)[0] for i in range(len(problem.pieces))]
-    odds: dict[Stage, float] = dict.fromkeys(STAGES, 0.0)
+    odds = dict.fromkeys(STAGES, 0.0) | _compare_sets(pool, parent, problem.samples)
     for curve, evidence in screened:
         stage = STAGE_OF[curve.at.place]
         odds[stage] = max(odds[stage], evidence.log_odds)
     scores = np.array([odds[stage] for stage in STAGES]) / estimate_correlation_length(errors)
-    return dict(zip(STAGES, map(float, normalise_scores(scores)), strict=True))
+    cost = float(sum(r @ r for r in errors))
+    excess = max(cost - problem.samples, 1.0)
+    closed = min(2.0 * max(odds.values()) * cost / problem.samples / excess, 1.0)
+    shares = closed * normalise_scores(scores) + (1.0 - closed) / len(STAGES)
+    return dict(zip(STAGES, map(float, shares), strict=True))
+
+
+def _compare_sets(pool: CandidatePool, parent: Candidate, samples: int) -> dict[Stage, float]:
+    """Return the log odds of the best fitted extension of a set at each stage at which there is one.
+
+    A connection or a delay is no curve of one variable, so only the effects of the library stand for it.
+    """
+    odds: dict[Stage, float] = {}
+    before = pool.compute_excess(parent)
+    for names, candidate in pool.candidates.items():
+        stages = {pool.library[name].stage for name in names - parent.names}
+        if names > parent.names and len(stages) == 1:
+            stage, after = stages.pop(), max(pool.compute_excess(candidate), 0.0)
+            odds[stage] = max(odds.get(stage, 0.0), 0.5 * samples * (before - after) / (1.0 + after))
+    return odds

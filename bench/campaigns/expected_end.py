@@ -37,17 +37,17 @@ def _measure_durations(state: CampaignState) -> Durations:
 
 
 def _expect_duration(item: Item, known: Durations) -> float:
-    return 0.0 if _is_prompt(item) else known.get(_describe_content(item), item.expected_s)
-
-
-def _is_prompt(item: Item) -> bool:
-    return get_step_kind(item.step) == "prompt"
+    if get_step_kind(item.step) == "prompt":
+        return 0.0
+    return known.get(_describe_content(item), item.expected_s)
 
 
 def _describe_content(item: Item) -> str:
-    """Return what determines the duration of a step: its planned one, and its content without the specimen."""
+    """Return what determines the duration of a step: its content without the specimen, and the planned duration.
+
+    The content is not enough: a warm-up has the strokes of the next run.
+    """
     content = item.step.model_dump(mode="json")
-    # A warm-up has the strokes of the next run, so that equal ones may last differently.
     for part in content.values():
         if isinstance(part, dict):
             part.pop("specimen", None)

@@ -1,5 +1,7 @@
 """Remainder: part of the gap that the named effects leave, and the variables that it depends on."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from identification.arrays import Array
@@ -16,13 +18,17 @@ _MIN_VARIABLE_SHARE = 0.05
 _MIN_STAGE_GAIN = 0.05
 """Smallest expected gain of an effect, relative to the remaining excess, that points to a stage."""
 _LIKELY_STAGE = 0.5
-"""Probability above which the stage of a curve is that of the remainder."""
+"""Probability above which a stage is likely."""
 _MIN_CYCLES = 2
 """Smallest number of cycles of one segment of which the repetition can be judged."""
 
 
 def describe_remainder(
-    pool: CandidatePool, named: Candidate, regression: ResidualRegression, floor: float
+    pool: CandidatePool,
+    named: Candidate,
+    regression: ResidualRegression,
+    floor: float,
+    stages: Mapping[Stage, float] | None = None,
 ) -> Remainder | None:
     """Describe what a set of effects leaves on held-out strokes; None if it is at the noise floor.
 
@@ -31,6 +37,7 @@ def describe_remainder(
         named: the named set; the baseline if none is named.
         regression: regression on the residuals of this recording.
         floor: noise of the force [N].
+        stages: probability of each stage for what is left, where it is known.
     """
     if named.held_out_rmse < NEAR_FLOOR_RATIO * floor:
         return None
@@ -40,7 +47,7 @@ def describe_remainder(
         gap_n=float(np.sqrt(named.held_out_rmse**2 - floor**2)),
         explainable=explained.share,
         not_repeating=estimate_not_repeating(named.residual, evaluation, floor),
-        stage=_find_stage(pool, named),
+        stage=_find_stage(pool, named, stages or locate_unlisted_cause(pool, named)),
         map=map_gap(named.residual, evaluation.cycles, floor),
         variables=[v for v in strongest if explained.losses[v] > _MIN_VARIABLE_SHARE],
     )
@@ -92,12 +99,11 @@ def _find_nearest(phase: Array, wanted: Array) -> Indices:
     return np.asarray(rows[nearer])
 
 
-def _find_stage(pool: CandidatePool, named: Candidate) -> Stage | None:
-    """Return the stage of the curve that most probably describes what a set leaves, else of a known effect.
+def _find_stage(pool: CandidatePool, named: Candidate, stages: Mapping[Stage, float]) -> Stage | None:
+    """Return the stage that is likely for what a set leaves, else that of a known effect.
 
-    A known effect counts where no stage is probable by its curves. It is the one with the largest expected gain.
+    A known effect counts where no stage is likely. It is the one with the largest expected gain.
     """
-    stages = locate_unlisted_cause(pool, named)
     likeliest = max(stages, key=stages.__getitem__)
     if stages[likeliest] > _LIKELY_STAGE:
         return likeliest

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.damper.effects import STAGES
+from identification.damper.effects import STAGES, Stage
 from identification.documents import (
     Diagnosis,
     Discovery,
@@ -103,6 +103,11 @@ class ReportBuilder:
         """Regression on the residuals of the sets."""
         return ResidualRegression(self.evaluation, self.pool.floor)
 
+    @cached_property
+    def unlisted_stages(self) -> dict[Stage, float]:
+        """Probability of each stage for a cause outside the library, in addition to the law alone."""
+        return locate_unlisted_cause(self.pool, self.pool.baseline)
+
     def build_result(self) -> DiagnosisResult:
         """Build the documents."""
         verdict, named, shrinkage, posterior = self._choose_named_set()
@@ -115,7 +120,8 @@ class ReportBuilder:
         alternatives = list_alternatives(self.posterior, named.names)
         remainder: Remainder | None = None
         if verdict != "no_gap":
-            remainder = describe_remainder(self.pool, named, self.regression, gap.noise_floor_n)
+            stages = None if named.names else self.unlisted_stages
+            remainder = describe_remainder(self.pool, named, self.regression, gap.noise_floor_n, stages)
         provenance = self._make_provenance()
         discovery = self._build_discovery(found, named)
         diagnosis = Diagnosis(
@@ -286,8 +292,7 @@ class ReportBuilder:
 
     def _locate_gap(self, posterior: Posterior) -> GapLocation:
         baseline, floor, cycles = self.pool.baseline, self.pool.floor, self.evaluation.cycles
-        is_unlisted = self.posterior.unknown > UNKNOWN_THRESHOLD
-        unlisted = locate_unlisted_cause(self.pool, baseline) if is_unlisted else None
+        unlisted = self.unlisted_stages if self.posterior.unknown > UNKNOWN_THRESHOLD else None
         stages = compute_stage_probabilities(posterior, STAGES, self.pool.library, unlisted)
         no_stage = baseline.held_out_rmse <= floor or max(stages.values()) < _MIN_STAGE_PROBABILITY
         return GapLocation(

@@ -36,11 +36,30 @@ OWN_HEADERS = ("authorization", "user-agent", "accept-encoding")
 UPLOAD = "POST /api/v1/logs"
 
 
-def read_operations():
+def read_description():
+    """Return the description without the token, which is sent with every request."""
     document = create_app().openapi()
     for path in document["paths"].values():
         for operation in path.values():
             operation.pop("security", None)
+    return document
+
+
+def make_settings(drawn, **more):
+    """Return settings that draw the same examples each time."""
+    return settings(
+        max_examples=drawn,
+        deadline=None,
+        database=None,
+        derandomize=True,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+        **more,
+    )
+
+
+def read_operations():
+    document = read_description()
     found = [result.ok() for result in schemathesis.openapi.from_dict(document).get_all_operations()]
     return [operation for operation in found if operation.label != UPLOAD]
 
@@ -65,14 +84,7 @@ def send(service, case):
 
 
 def check(service, operation, mode):
-    @settings(
-        max_examples=DRAWN,
-        deadline=None,
-        database=None,
-        derandomize=True,
-        phases=[Phase.generate],
-        suppress_health_check=list(HealthCheck),
-    )
+    @make_settings(DRAWN)
     @hypothesis.given(case=operation.as_strategy(generation_mode=mode))
     def check_case(case):
         case.validate_response(send(service, case), checks=CHECKS)

@@ -11,14 +11,12 @@ import os
 from collections import Counter
 
 import schemathesis
-from hypothesis import HealthCheck, Phase, settings
 from schemathesis import Response
 
-from bench.service.application import create_app
 from tests.support.reports import fit_document
 from tests.support.service_logs import write_complete_log
 from tests.unit.bench.service.conftest import Service
-from tests.unit.bench.service.test_schema import CHECKS, send
+from tests.unit.bench.service.test_schema import CHECKS, make_settings, read_description, send
 
 DRAWN = int(os.environ.get("MRBENCH_DRAWN_SEQUENCES", "12"))
 LENGTH = 10
@@ -41,11 +39,9 @@ SOURCES = [
 
 def make_description():
     """Return the description with a link from each source to each operation that takes its value."""
-    document = create_app().openapi()
+    document = read_description()
     del document["paths"][UPLOADS]
     operations = [one for path in document["paths"].values() for one in path.values()]
-    for operation in operations:
-        operation.pop("security", None)
     for number, (path, method, status, pointer, name) in enumerate(SOURCES):
         links = document["paths"][f"/api/v1{path}"][method]["responses"][status].setdefault("links", {})
         for operation in operations:
@@ -90,17 +86,7 @@ def test_answers_to_sequences_of_requests_are_as_described(tmp_path):
         def validate_response(self, response, case, **given):
             case.validate_response(response, checks=CHECKS)
 
-    Sequence.run(
-        settings=settings(
-            max_examples=DRAWN,
-            stateful_step_count=LENGTH,
-            deadline=None,
-            database=None,
-            derandomize=True,
-            phases=[Phase.generate],
-            suppress_health_check=list(HealthCheck),
-        )
-    )
+    Sequence.run(settings=make_settings(DRAWN, stateful_step_count=LENGTH))
     assert sum(answers.values()) > 4 * DRAWN
     # Without the links an id is never known, and every such answer is 404.
     linked = {label for label, status in answers if "{" in label and status < 300}

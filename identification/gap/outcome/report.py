@@ -47,6 +47,7 @@ from identification.gap.outcome.twin_residual import learn_twin_residual
 from identification.gap.outcome.verdict import (
     Share,
     build_named_effects,
+    closes_part,
     decide_unnamed_verdict,
     decide_verdict,
     is_ambiguous,
@@ -211,21 +212,13 @@ class ReportBuilder:
         verdict = decide_verdict(baseline, named, floor, self.pool.no_gap_limit, posterior)
         shrinkage = self._estimate_shrinkage(named)
         benefit = shrinkage.expected_benefit
-        if verdict == "partly_explained" and not self._closes_gap(named):
+        if verdict == "partly_explained" and not closes_part(shrinkage):
             verdict = "unexplained"
         if named.names and benefit is not None and benefit < 0.0:
             verdict = decide_unnamed_verdict(baseline, floor, self.pool.no_gap_limit)
         if named.names and verdict in ("no_gap", "unexplained"):
             return NamedSet(verdict, baseline, self._estimate_shrinkage(baseline), posterior)
         return NamedSet(verdict, named, shrinkage, posterior)
-
-    def _closes_gap(self, named: Candidate) -> bool:
-        """Return True if the interval of the gap that a set closes on held-out strokes is above zero."""
-        baseline, noise = self.pool.baseline.residual, self.pool.noise_model.estimate_noise(named)
-        closed = self.evaluation.estimate_shares(
-            baseline, named.residual, {"all": baseline}, named.held_out_rmse, noise
-        )
-        return closed["all"][1][0] > 0.0
 
     def _describe_nearest(self, verdict: Verdict) -> list[str]:
         """Return the note on the most similar known effects where none is named."""

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
+from identification.gap.data import Shrinkage
 from identification.gap.fits import EXPLAINED_RATIO, Candidate
 from identification.gap.outcome.interval import compute_interval
 from identification.gap.selection import UNKNOWN_THRESHOLD, Posterior
@@ -62,6 +63,12 @@ def _compute_closed_part(baseline: Candidate, named: Candidate, floor: float) ->
     if gap <= 0.0 or named.train_rmse > baseline.train_rmse:
         return 0.0
     return 1.0 - (named.held_out_rmse**2 - floor**2) / gap
+
+
+def closes_part(shrinkage: Shrinkage) -> bool:
+    """Return True if effects close enough of the gap on another run, and the interval excludes none of it."""
+    value, interval = shrinkage.value, shrinkage.ci95
+    return value is not None and interval is not None and value >= _MIN_NAMED_SHARE and interval[0] > 0.0
 
 
 def decide_unnamed_verdict(baseline: Candidate, floor: float, no_gap_limit: float) -> Verdict:

@@ -40,6 +40,7 @@ def make_builder(
     sets=None,
     unknown=0.05,
     partial=None,
+    value=0.9,
     low=0.8,
 ):
     candidates = {
@@ -62,12 +63,12 @@ def make_builder(
     )
 
     def estimate_shrinkage(before, after, noise, input_noise):
-        return Shrinkage(6.0, float(np.mean(input_noise)), 0.9, (0.8, 0.95), benefit)
+        return Shrinkage(6.0, float(np.mean(input_noise)), value, (low, 0.95), benefit)
 
     evaluation = SimpleNamespace(
         force=np.zeros(8), estimate_shrinkage=estimate_shrinkage, cycles=CYCLES, pieces=(),
         select_fitted_pieces=lambda: (1.0, 2.0), compute_residual=lambda forces: forces,
-        estimate_shares=lambda before, after, without, rmse, noise: {"all": (0.5, (low, 0.9))},
+        estimate_shares=lambda before, after, without, rmse, noise: {"all": (0.5, (0.4, 0.9))},
         compute_rmse=lambda forces: (sum(forces), 10 * sum(forces)),
     )  # fmt: skip
     posterior = Posterior(sets or {NONE: 0.15, SPRING: 0.8}, unknown)
@@ -89,6 +90,7 @@ def make_builder(
         ({"named": 2.9}, "unexplained", NONE, 0.0),
         ({"named": 2.0, "unknown": 0.9}, "partly_explained", SPRING, 1.0),
         ({"named": 2.0, "low": 0.0}, "unexplained", NONE, 0.0),
+        ({"named": 2.0, "value": 0.19}, "unexplained", NONE, 0.0),
         ({"named": 2.0, "sets": {NONE: 0.1, SPRING: 0.05}, "unknown": 0.8}, "unexplained", NONE, 0.0),
         (
             {"named": 2.0, "sets": {NONE: 0.1, SPRING: 0.05}, "unknown": 0.8, "partial": {NONE: 0.1, SPRING: 0.6}},

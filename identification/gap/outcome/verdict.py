@@ -66,7 +66,7 @@ def _compute_closed_part(baseline: Candidate, named: Candidate, floor: float) ->
 
 
 def closes_part(shrinkage: Shrinkage) -> bool:
-    """Return True if effects close enough of the gap on another run, and the interval excludes none of it."""
+    """Return True if effects close a fifth of the gap on another run, and the interval is above zero."""
     value, interval = shrinkage.value, shrinkage.ci95
     return value is not None and interval is not None and value >= _MIN_NAMED_SHARE and interval[0] > 0.0
 

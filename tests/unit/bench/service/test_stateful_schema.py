@@ -66,5 +66,5 @@ def test_answers_to_sequences_of_requests_are_as_described(tmp_path):
 
     Sequence.run(settings=make_settings(DRAWN, stateful_step_count=LENGTH))
     assert sum(answers.values()) > 4 * DRAWN
-    # A drawn id is never known. How many known ids a set of sequences uses differs (2 to 11 of 120 requests).
+    # A drawn id is never known. How many known ids a set of sequences uses differs between processes.
     assert any("{" in label and status < 300 for label, status in answers), answers

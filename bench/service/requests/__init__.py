@@ -2,5 +2,13 @@
 
 from bench.service.requests.idempotency import IDEMPOTENT, IdempotentRoute, find_first_request
 from bench.service.requests.query_check import refuse_unknown_parameters
+from bench.service.requests.sender import Sender, require_right
 
-__all__ = ["IDEMPOTENT", "IdempotentRoute", "find_first_request", "refuse_unknown_parameters"]
+__all__ = [
+    "IDEMPOTENT",
+    "IdempotentRoute",
+    "Sender",
+    "find_first_request",
+    "refuse_unknown_parameters",
+    "require_right",
+]

@@ -34,6 +34,8 @@ from bench.catalogue.people import (
 )
 from bench.catalogue.planning import (
     SHIPPED_VERSION,
+    ApprovalRow,
+    ApprovalStore,
     ClaimedKey,
     IdempotencyKeys,
     MethodRow,
@@ -51,6 +53,8 @@ __all__ = [
     "REPEATABLE_STATES",
     "SHIPPED_VERSION",
     "UNFINISHED_STATES",
+    "ApprovalRow",
+    "ApprovalStore",
     "BatchRow",
     "CampaignChange",
     "CampaignEventRow",

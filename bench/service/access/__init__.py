@@ -3,7 +3,7 @@
 from bench.service.access.authenticator import Authenticator, CredentialKind, PeopleStores
 from bench.service.access.bench_token import PLAIN_TOKEN_FILE, TOKEN_FILE, Access, open_access, save_token
 from bench.service.access.cookie import get_cookie_name, read_cookie
-from bench.service.access.identity import Identity, compute_csrf, compute_sha256
+from bench.service.access.identity import Identity, compute_csrf
 from bench.service.access.operation_rights import OPERATION_RIGHTS, OperationRights
 
 __all__ = [
@@ -17,7 +17,6 @@ __all__ = [
     "OperationRights",
     "PeopleStores",
     "compute_csrf",
-    "compute_sha256",
     "get_cookie_name",
     "open_access",
     "read_cookie",

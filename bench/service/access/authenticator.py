@@ -8,9 +8,9 @@ from threading import Lock
 from typing import Literal, TypeAlias
 
 from bench.catalogue import SessionRow, SessionStore, TokenStore, UserRow, UserStore
-from bench.people import compute_rights
+from bench.people import compute_rights, compute_sha256
 from bench.service.access.bench_token import Access
-from bench.service.access.identity import Identity, compute_sha256, make_bench_identity
+from bench.service.access.identity import Identity, make_bench_identity
 
 CredentialKind: TypeAlias = Literal["token", "session"]
 """A token, or the secret in the cookie of a session."""

@@ -5,10 +5,9 @@ It is shown once on a terminal, or kept in a file that only its owner can read.
 
 import hmac
 import os
-import secrets
 from pathlib import Path
 
-from bench.service.access.identity import compute_sha256
+from bench.people import compute_sha256, new_secret
 
 TOKEN_FILE = "token.sha256"
 """File in the data folder with the hash of the token, not the token itself."""
@@ -47,10 +46,10 @@ def open_access(data: Path, *, new: bool = False) -> tuple[Access, str | None]:
     path = data / TOKEN_FILE
     if path.exists() and not new:
         return Access(path.read_text("ascii").strip()), None
-    token = secrets.token_urlsafe(32)
+    token, sha256 = new_secret()
     (data / PLAIN_TOKEN_FILE).unlink(missing_ok=True)  # it contains the old one
-    _write_privately(path, compute_sha256(token))
-    return Access(compute_sha256(token)), token
+    _write_privately(path, sha256)
+    return Access(sha256), token
 
 
 def save_token(data: Path, token: str) -> Path:

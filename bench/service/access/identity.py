@@ -41,11 +41,6 @@ def make_bench_identity(sha256: str) -> Identity:
     return Identity("bench", "bench", "Holder of the bench's token", role, compute_rights(role), sha256)
 
 
-def compute_sha256(secret: str) -> str:
-    """Return the hash of a random secret; one with 256 bits needs no slow hash."""
-    return hashlib.sha256(secret.encode()).hexdigest()
-
-
 def compute_csrf(secret: str) -> str:
     """Return the value that requests with the session of this cookie send in ``X-CSRF-Token``.
 

@@ -42,6 +42,8 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /logs": "operate",
     "POST /methods": "manage_methods",
     "POST /methods/dry-run": "view",
+    "POST /methods/{name}/{version:int}/approval": "approve_methods",
+    "DELETE /methods/{name}/{version:int}/approval": "approve_methods",
     "POST /specimens": "operate",
     "PATCH /specimens/{serial:path}": "operate",
     "POST /specimens/{serial:path}/trend": "analyse",

@@ -20,6 +20,16 @@ Sender = Annotated[Identity, Depends(_get_sender)]
 """Parameter of a route: who sends the request."""
 
 
+def get_author(sender: Identity, given: str) -> str:
+    """Return the name of who makes a record: that of the signed-in person, else the given one."""
+    return sender.full_name if sender.kind == "user" else given
+
+
+def get_operator(sender: Identity, given: str) -> str:
+    """Return the given name of an operator, who may be another person; by default the signed-in one."""
+    return given or get_author(sender, "")
+
+
 def require_right(sender: Identity, right: Right) -> None:
     """Check that a sender has a right.
 

@@ -1,4 +1,4 @@
-"""Tables `users`, `tokens` and `sessions`."""
+"""Tables `users`, `tokens`, `sessions` and `method_approvals`."""
 
 import sqlalchemy as sa
 from alembic import op
@@ -43,9 +43,15 @@ def upgrade() -> None:
         sa.Column("created", UtcTime(), nullable=False),
         sa.Column("expires", UtcTime(), nullable=False),
     )
+    op.create_table(
+        "method_approvals",
+        sa.Column("sha256", sa.Text(), primary_key=True),
+        sa.Column("approved", UtcTime(), nullable=False),
+        sa.Column("approved_by", sa.Text(), nullable=False),
+    )
 
 
 def downgrade() -> None:
     """Drop the tables."""
-    for table in ("sessions", "tokens", "users"):
+    for table in ("method_approvals", "sessions", "tokens", "users"):
         op.drop_table(table)

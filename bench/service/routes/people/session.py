@@ -2,7 +2,6 @@
 
 import asyncio
 import math
-import secrets
 from datetime import UTC, datetime, timedelta
 from http import HTTPStatus
 from typing import Any
@@ -10,10 +9,9 @@ from typing import Any
 import segno
 from fastapi import APIRouter, Request, Response
 
-from bench.catalogue import SessionRow
-from bench.people import CODE_LIFETIME, is_password
+from bench.people import CODE_LIFETIME, is_password, new_secret
 from bench.service import problems
-from bench.service.access import Identity, compute_csrf, compute_sha256, get_cookie_name, read_cookie
+from bench.service.access import Identity, compute_csrf, get_cookie_name, read_cookie
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError
 from bench.service.requests import Sender
@@ -33,8 +31,8 @@ _RESPONSES: dict[int | str, dict[str, Any]] = {
 async def sign_in(request: SignInRequest, http: Request, response: Response, context: Context) -> SessionView:
     """Sign in; the session is in a cookie that scripts cannot read."""
     identity = await _check_credentials(context, request, http)
-    secret = secrets.token_urlsafe(32)
-    row = await asyncio.to_thread(_add_session, context, identity, secret)
+    secret, sha256 = new_secret()
+    row = await asyncio.to_thread(context.catalogue.sessions.add, sha256, identity.kind, identity.subject)
     response.set_cookie(
         get_cookie_name(http.scope),
         secret,
@@ -135,10 +133,6 @@ def _check_wait(wait: float) -> None:
             detail,
             headers={"Retry-After": str(seconds)},
         )
-
-
-def _add_session(context: ServiceContext, identity: Identity, secret: str) -> SessionRow:
-    return context.catalogue.sessions.add(compute_sha256(secret), identity.kind, identity.subject)
 
 
 def _make_view(identity: Identity, secret: str | None) -> SessionView:

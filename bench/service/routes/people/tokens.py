@@ -1,14 +1,12 @@
 """Tokens of programs."""
 
-import secrets
 from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 from fastapi import APIRouter
 
 from bench.catalogue import TokenRow
-from bench.people import ROLES, compute_rights
-from bench.service.access import compute_sha256
+from bench.people import ROLES, compute_rights, new_secret
 from bench.service.context import Context
 from bench.service.problems import make_not_found
 from bench.service.requests import Sender, require_right
@@ -30,9 +28,9 @@ def add_token(request: TokenRequest, context: Context, sender: Sender) -> NewTok
     """Create a token for a program, with the role of the sender at most; the token is in this answer only."""
     if ROLES.index(request.role) > ROLES.index(sender.role):
         require_right(sender, "administer")
-    token = secrets.token_urlsafe(32)
+    token, sha256 = new_secret()
     lifetime = timedelta(days=request.expires_in_days)
-    row = context.catalogue.tokens.add(compute_sha256(token), request.label, request.role, sender.actor, lifetime)
+    row = context.catalogue.tokens.add(sha256, request.label, request.role, sender.actor, lifetime)
     return NewTokenView(**_make_view(row).model_dump(), token=token)
 
 

@@ -23,18 +23,18 @@ from bench.jobs import JobEngine, JobManager, make_job_view
 from bench.live import LiveBatch, LiveBroadcaster, serialise_message
 from bench.samples import SampleStore
 from bench.service import problems
-from bench.service.access import Access
+from bench.service.access import Access, Authenticator, PeopleStores
 from bench.service.agent_monitor import AgentLink, AgentMonitor
 from bench.service.campaigns import CampaignExecutor
 from bench.service.context import ServiceContext
 from bench.service.middleware import (
+    AccessCheckMiddleware,
     BodyLimitMiddleware,
     HeadMiddleware,
     KeptAnswerMiddleware,
     RequestLogMiddleware,
     RequestMetricsMiddleware,
     SecurityHeadersMiddleware,
-    TokenCheckMiddleware,
 )
 from bench.service.requests import refuse_unknown_parameters
 from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS, refuse_unknown_paths
@@ -42,8 +42,8 @@ from bench.service.run_registry import RunRegistry
 from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers
 
 API = "/api/v1"
-PUBLIC_PATHS = (f"{API}/health", f"{API}/openapi.json")
-"""Paths below `/api/` that need no token."""
+PUBLIC_OPERATIONS = (f"GET {API}/health", f"GET {API}/openapi.json", f"POST {API}/session")
+"""Operations that need no sign-in."""
 _LISTS = ("events", "jobs", "methods", "runs")
 KEPT_PATHS = frozenset(
     f"{API}/{name}" for name in ("bench", "bench/channels", "bench/instruments", "bench/limits", *_LISTS)
@@ -92,7 +92,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.add_middleware(KeptAnswerMiddleware, paths=KEPT_PATHS)
     app.add_middleware(HeadMiddleware, below="/api/")
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
-    app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)
+    app.add_middleware(AccessCheckMiddleware, below=API, public=PUBLIC_OPERATIONS)
     app.add_middleware(RequestLogMiddleware)
     app.state.request_metrics = CollectorRegistry()
     app.add_middleware(RequestMetricsMiddleware, registry=app.state.request_metrics)
@@ -113,8 +113,8 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     return app
 
 
-_BEARER = HTTPBearer(auto_error=False, description="token that `mrbench serve` prints at its first start")
-"""Description of the token for OpenAPI; `TokenCheckMiddleware` checks it."""
+_BEARER = HTTPBearer(auto_error=False, description="token of the bench or of a program")
+"""Description of the token for OpenAPI; `AccessCheckMiddleware` checks it, or the cookie of a session."""
 
 
 @asynccontextmanager
@@ -168,7 +168,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
     campaigns = CampaignExecutor(catalogue, monitor, is_local=settings.has_local_logs)
     registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
-        settings.access,
+        Authenticator(settings.access, PeopleStores(catalogue.users, catalogue.tokens, catalogue.sessions)),
         catalogue,
         monitor,
         broadcaster,

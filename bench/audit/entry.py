@@ -34,7 +34,6 @@ class Source(FrozenModel):
 
     chain: str = Field(description="id of that chain, from its first entry")
     seq: int = Field(description="number of the entry there")
-    utc: str = Field(description="its time there, UTC, ISO 8601")
     prev: str = Field(description="its `prev` there")
     sha256: str = Field(description="its `sha256` there")
 
@@ -42,7 +41,9 @@ class Source(FrozenModel):
 class Act(FrozenModel):
     """Act that is to be recorded; it gets its place in the chain when it is written."""
 
-    utc: str = Field(default_factory=_make_utc, description="UTC, ISO 8601")
+    utc: str = Field(
+        default_factory=_make_utc, description="time of the act, UTC, ISO 8601; numbers give the order"
+    )
     actor: str = Field(description="who: `user:NAME`, `token:LABEL`, `local:ACCOUNT`, `campaign:ID`, `bench`, ...")
     origin: str = Field(default=LOCAL, description="where from: address of the client, or `local`")
     peer: str = Field(default="", description="sender as the rig agent itself has seen it; empty elsewhere")

@@ -1,7 +1,8 @@
 """Search in an audit trail: pages of entries that meet all conditions."""
 
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -58,17 +59,53 @@ def list_newest(
     return list(islice(filter(condition.accepts, entries), limit))
 
 
-def list_oldest(path: Path, limit: int, after: int = 0) -> list[AuditEntry]:
-    """Return the entries with a greater number than ``after``, the oldest first; arguments as `list_newest`."""
-    found = []
-    for entry in _read_newest(path):
-        if entry.seq <= after:
+def read_after(path: Path, after: int, limit: int) -> list[str]:
+    """Return the lines of the entries with a greater number, the oldest first; arguments as `list_newest`.
+
+    Only lines from the end up to that number are read, and only their numbers are looked at.
+    """
+    found: list[str] = []
+    for line in _read_lines(path):
+        try:
+            seq = json.loads(line)["seq"]
+        except (ValueError, KeyError, TypeError):
+            continue
+        if seq <= after:
             break
-        found.append(entry)
+        found.append(line.decode("ascii", "replace"))
     return found[: -limit - 1 : -1]
 
 
+def read_chain_id(path: Path) -> str:
+    """Return the id of a chain, from its first entry; empty before it.
+
+    Raises:
+        AuditError: the file cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            first = parse_entry(file.readline())
+    except FileNotFoundError:
+        return ""
+    except OSError as error:
+        raise AuditError(f"{path}: the audit trail cannot be read ({error.strerror})") from error
+    return "" if first is None else str(first.new)
+
+
+def find_entry(path: Path, condition: Callable[[AuditEntry], bool]) -> AuditEntry | None:
+    """Return the newest entry that meets a condition; None without one.
+
+    Raises:
+        AuditError: the file cannot be read.
+    """
+    return next(filter(condition, _read_newest(path)), None)
+
+
 def _read_newest(path: Path) -> Iterator[AuditEntry]:
+    return (entry for line in _read_lines(path) if (entry := parse_entry(line)) is not None)
+
+
+def _read_lines(path: Path) -> Iterator[bytes]:
     try:
         file = path.open("rb")
     except FileNotFoundError:
@@ -78,4 +115,4 @@ def _read_newest(path: Path) -> Iterator[AuditEntry]:
     with file:
         lines = read_backwards(file.fileno(), os.fstat(file.fileno()).st_size)
         next(lines)  # incomplete, or empty
-        yield from (entry for line in lines if (entry := parse_entry(line)) is not None)
+        yield from lines

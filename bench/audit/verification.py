@@ -20,7 +20,7 @@ from bench.errors import AuditError
 
 _MAX_LINE = 1 << 22
 """Largest size of a line [bytes]; a longer one was not written by mrbench."""
-_COPIED = FIELDS - {"seq", "utc", "prev", "sha256", "source"}
+_COPIED = FIELDS - {"seq", "prev", "sha256", "source"}
 """Fields that an imported entry has as in its own chain."""
 
 
@@ -125,7 +125,7 @@ class _Verifier:
         if source is None:
             return ""
         own = {**entry.model_dump(include=set(_COPIED)), "source": None}
-        if compute_sha256({**own, "seq": source.seq, "utc": source.utc, "prev": source.prev}) != source.sha256:
+        if compute_sha256({**own, "seq": source.seq, "prev": source.prev}) != source.sha256:
             return f"its content is not that of entry {source.seq} of the rig agent"
         before = self._last_imported.get(source.chain)
         if before is not None and (source.seq != before.seq + 1 or source.prev != before.sha256):

@@ -89,10 +89,10 @@ class AuditWriter:
             with self._changed:
                 while not self._waiting and not self._is_ending:
                     self._changed.wait()
-                batch = list(self._waiting)
+                batch, is_last = list(self._waiting), self._is_ending
             if batch:
                 self._write(batch)
-            if self._is_ending and (self._failure or not self._waiting):
+            if is_last and (self._failure or not self._waiting):
                 return
 
     def _write(self, batch: "list[tuple[Act, Future[AuditEntry], float]]") -> None:

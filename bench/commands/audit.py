@@ -32,7 +32,7 @@ def audit(
     ] = "",
     config: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="With verify: also the rig agent's own trail, beside this bench.toml."),
+        typer.Option(metavar="FILE", help="With verify: also the own trail of the rig agent of this bench.toml."),
     ] = None,
     out: Annotated[
         str, typer.Option(metavar="FILE", help="With export: file to write, .json or .csv; - prints JSON.")
@@ -58,13 +58,13 @@ def audit(
 
 
 def _verify(path: Path, head: str, config: Path | None) -> None:
-    from bench.audit import compare_imports, get_agent_trail, verify_chain
+    from bench.audit import compare_imports, find_agent_trail, verify_chain
     from bench.errors import AuditError
 
     result = verify_chain(path, _read_head(head) if head else None)
     fault, place = result.fault, path
     if not fault and config is not None:
-        place = get_agent_trail(config)
+        place = find_agent_trail(config)
         own = verify_chain(place)
         fault = own.fault or compare_imports(result, place)
         typer.echo(f"{place}: {own.entries} entries, head {own.head}")

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from bench.audit import Act, AuditChain
+from bench.audit import Act, AuditChain, list_newest
 
 COMMAND = (sys.executable, "-m", "tests.support.audit_trails")
 
@@ -21,6 +21,11 @@ def write_trail(path, count=12):
     for number in range(count):
         chain.append(make_act(number))
     return chain
+
+
+def list_all(path):
+    """Return all entries, the oldest first."""
+    return list_newest(path, 10_000)[::-1]
 
 
 def main(path, name):

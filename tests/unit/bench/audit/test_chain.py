@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.audit import AuditChain, AuditWriter, list_newest, list_oldest, verify_chain
+from bench.audit import AuditChain, AuditWriter, list_newest, read_after, verify_chain
 from bench.audit.lines import read_backwards
 from bench.errors import AuditError
 from tests.support.audit_trails import COMMAND, make_act, write_trail
@@ -50,9 +50,9 @@ def test_pages_are_read_from_either_end(path):
     write_trail(path, 9)
     assert [one.seq for one in list_newest(path, 3)] == [10, 9, 8]
     assert [one.seq for one in list_newest(path, 3, before=8)] == [7, 6, 5]
-    assert [one.seq for one in list_oldest(path, 3)] == [1, 2, 3]
-    assert [one.seq for one in list_oldest(path, 3, after=8)] == [9, 10]
-    assert list_oldest(path, 3, after=10) == []
+    assert [json.loads(line)["seq"] for line in read_after(path, 0, 3)] == [1, 2, 3]
+    assert [json.loads(line)["seq"] for line in read_after(path, 8, 3)] == [9, 10]
+    assert read_after(path, 10, 3) == []
     assert list_newest(path.with_name("none"), 3) == []
 
 

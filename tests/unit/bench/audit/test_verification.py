@@ -5,10 +5,10 @@ import random
 
 import pytest
 
-from bench.audit import AuditChain, Head, Source, compare_imports, list_oldest, parse_head, verify_chain
+from bench.audit import AuditChain, Head, Source, compare_imports, parse_head, verify_chain
 from bench.audit.entry import compute_sha256, encode_canonically
 from bench.errors import AuditError
-from tests.support.audit_trails import make_act, write_trail
+from tests.support.audit_trails import list_all, make_act, write_trail
 
 FIELDS = (
     "seq",
@@ -123,7 +123,7 @@ def test_rewritten_entries_with_new_hashes_are_found_by_the_head(path):
     chain = write_trail(path, 12)
     head = chain.get_head()
     other = path.with_name("other")
-    for entry in list_oldest(path, 99)[1:]:
+    for entry in list_all(path)[1:]:
         changed = entry.model_copy(update={"actor": "user:other"} if entry.seq == 5 else {})
         AuditChain(other).append(make_act(1, **changed.model_dump(include={"actor", "utc", "target"})))
     assert not verify_chain(other).fault
@@ -155,15 +155,15 @@ def import_entries(own, entries):
     chain = AuditChain(own)
     identity = str(entries[0].new)
     for entry in entries:
-        source = Source(chain=identity, seq=entry.seq, utc=entry.utc, prev=entry.prev, sha256=entry.sha256)
-        copied = entry.model_dump(exclude={"seq", "utc", "prev", "sha256", "source"})
+        source = Source(chain=identity, seq=entry.seq, prev=entry.prev, sha256=entry.sha256)
+        copied = entry.model_dump(exclude={"seq", "prev", "sha256", "source"})
         chain.append(make_act(1, **copied, source=source))
 
 
 def test_imported_entries_are_verified_within_their_own_chain(path, tmp_path):
     other = tmp_path / "agent.jsonl"
     write_trail(other, 6)
-    entries = list_oldest(other, 99)
+    entries = list_all(other)
     import_entries(path, entries)
     result = verify_chain(path)
     assert (result.fault, len(result.imported)) == ("", 7)
@@ -179,7 +179,7 @@ def test_imported_entries_are_verified_within_their_own_chain(path, tmp_path):
 def test_a_cut_or_rewritten_trail_of_the_agent_differs_from_what_was_imported(path, tmp_path):
     other = tmp_path / "agent.jsonl"
     write_trail(other, 6)
-    import_entries(path, list_oldest(other, 99))
+    import_entries(path, list_all(other))
     lines = other.read_bytes().splitlines(keepends=True)
     other.write_bytes(b"".join(lines[:5]))
     assert "entry 6 of the rig agent was imported, but is missing there" in compare_imports(

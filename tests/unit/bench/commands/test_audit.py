@@ -7,11 +7,12 @@ from importlib.metadata import EntryPoint
 import pytest
 from typer.testing import CliRunner
 
-from bench.audit import Act, AuditChain, list_oldest, verify_chain
+from bench.audit import Act, AuditChain, find_agent_trail, verify_chain
 from bench.catalogue import Catalogue, back_up, make_sqlite_url, open_database
 from bench.cli import _make_application
 from bench.errors import AuditError
-from tests.support.audit_trails import make_act, write_trail
+from tests.support.audit_trails import list_all, make_act, write_trail
+from tests.support.fake_rig import BENCH_TOML
 
 APPLICATION = _make_application([EntryPoint("audit", "bench.commands.audit:audit", "mrbench.commands")])
 
@@ -89,14 +90,17 @@ def test_options_that_do_not_belong_to_an_action_are_refused(data):
         assert call(*arguments, "--data", data).exit_code == 2
 
 
-def test_the_trail_of_the_agent_is_verified_beside_its_configuration(data, tmp_path):
-    agent = tmp_path / "agent-audit.jsonl"
+def test_the_trail_of_the_agent_is_verified_by_its_configuration(data, tmp_path):
+    config = tmp_path / "bench.toml"
+    config.write_text(BENCH_TOML)
+    agent = find_agent_trail(config)
+    assert agent == tmp_path / "runs" / "bench.audit.jsonl"
     AuditChain(agent).append(Act(actor="local:ada", action="stop"))
-    answer = call("verify", "--data", data, "--config", tmp_path / "bench.toml")
-    assert answer.exit_code == 0
+    answer = call("verify", "--data", data, "--config", config)
+    assert answer.exit_code == 0, answer.output
     assert f"{agent}: 2 entries" in answer.output
     agent.write_bytes(agent.read_bytes().replace(b"ada", b"bob"))
-    answer = call("verify", "--data", data, "--config", tmp_path / "bench.toml")
+    answer = call("verify", "--data", data, "--config", config)
     assert f"{agent}: the audit trail was altered" in str(answer.exception)
 
 
@@ -104,5 +108,5 @@ def test_a_backup_contains_the_trail(data, tmp_path):
     Catalogue(open_database(make_sqlite_url(data / "catalogue.db")), data).close()
     back_up(data, tmp_path / "backup")
     copied = tmp_path / "backup" / "audit.jsonl"
-    assert list_oldest(copied, 99) == list_oldest(data / "audit.jsonl", 99)
+    assert list_all(copied) == list_all(data / "audit.jsonl")
     assert not verify_chain(copied).fault

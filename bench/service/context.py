@@ -18,6 +18,7 @@ from bench.live import LiveBroadcaster
 from bench.samples import SampleStore
 from bench.service.access import Access
 from bench.service.agent_monitor import AgentMonitor
+from bench.service.audit import AuditTrail
 from bench.service.campaigns import CampaignExecutor
 from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
@@ -56,6 +57,7 @@ class ServiceContext:
     space_monitor: SpaceMonitor
     sample_store: SampleStore
     campaigns: CampaignExecutor
+    audit: AuditTrail
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
     """Locks of the idempotency keys of requests in progress."""
 

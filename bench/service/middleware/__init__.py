@@ -1,5 +1,6 @@
-"""ASGI middleware: log, metrics, check of the token, limit on bodies, headers, HEAD, kept answers."""
+"""ASGI middleware: log, audit trail, metrics, check of the token, limit on bodies, headers, HEAD, kept answers."""
 
+from bench.service.middleware.audit_record import AuditMiddleware
 from bench.service.middleware.body_limit import MAX_BODY_SIZE, BodyLimitMiddleware
 from bench.service.middleware.head import HeadMiddleware
 from bench.service.middleware.kept_answers import KeptAnswerMiddleware
@@ -10,6 +11,7 @@ from bench.service.middleware.token_check import TokenCheckMiddleware
 
 __all__ = [
     "MAX_BODY_SIZE",
+    "AuditMiddleware",
     "BodyLimitMiddleware",
     "HeadMiddleware",
     "KeptAnswerMiddleware",

@@ -2,6 +2,7 @@
 
 from bench.service.routes import (
     analyses,
+    audit,
     batches,
     bench_control,
     campaigns,
@@ -37,6 +38,7 @@ PROTECTED_ROUTERS = (
     *recordings.ROUTERS,
     *campaigns.ROUTERS,
     *analyses.ROUTERS,
+    audit.router,
 )
 """Routers that need the token."""
 

@@ -140,7 +140,9 @@ class CommandServer(_SocketOwner):
             self._send(reply)
 
     def _send(self, reply: Reply) -> None:
-        self._socket.send(reply.model_dump_json().encode())
+        # Clients of an older version refuse a field that they do not know, also that of a stop.
+        unknown = {"audit"} if reply.audit is None else None
+        self._socket.send(reply.model_dump_json(exclude=unknown).encode())
 
 
 class Publisher(_SocketOwner):

@@ -1,6 +1,7 @@
 """Audit trails for tests: small ones, and a process that appends until it is killed."""
 
 import sys
+import time
 from pathlib import Path
 
 from bench.audit import Act, AuditChain, list_newest
@@ -26,6 +27,24 @@ def write_trail(path, count=12):
 def list_all(path):
     """Return all entries, the oldest first."""
     return list_newest(path, 10_000)[::-1]
+
+
+def list_requests(service):
+    """Return the entries of requests to a service, the oldest first."""
+    return [one for one in list_all(service.data / "audit.jsonl") if " /" in one.action]
+
+
+def find_last_request(service):
+    return list_requests(service)[-1]
+
+
+def wait_for(condition):
+    """Return what a condition returns as soon as it holds."""
+    deadline = time.monotonic() + 10
+    while not (found := condition()):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return found
 
 
 def main(path, name):

@@ -4,7 +4,6 @@ import errno
 import os
 import pwd
 import threading
-import time
 
 import pytest
 import zmq
@@ -29,7 +28,7 @@ from bench.agent_protocol import (
     send_as,
 )
 from bench.audit import verify_chain
-from tests.support.audit_trails import list_all
+from tests.support.audit_trails import list_all, wait_for
 
 ACCOUNT = pwd.getpwuid(os.getuid()).pw_name
 COMMANDS = (
@@ -72,13 +71,6 @@ class Bench:
     def list_acts(self):
         """Return the entries without the first one, and without those of start and end."""
         return [one for one in list_all(self.path)[1:] if not one.action.startswith("agent ")]
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + 10
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 @pytest.fixture

@@ -9,34 +9,10 @@ import pytest
 from bench.agent_protocol import StopCommand, get_sender
 from bench.audit import verify_chain
 from bench.service.audit.trail import _REFUSALS_PER_MINUTE
-from tests.support.audit_trails import list_all
-from tests.support.service_logs import write_complete_log
+from tests.support.audit_trails import find_last_request as find_last
+from tests.support.audit_trails import list_all, list_requests, wait_for
 
 API = "/api/v1"
-
-
-def list_requests(service):
-    """Return the entries of requests, the oldest first."""
-    return [one for one in list_all(service.data / "audit.jsonl") if " /" in one.action]
-
-
-def find_last(service):
-    return list_requests(service)[-1]
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + 10
-    while not (found := condition()):
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    return found
-
-
-@pytest.fixture
-def run(service, client):
-    write_complete_log(service.data / "one.mcap", "run-1")
-    service.scan()
-    return "run-1"
 
 
 def test_a_request_is_on_the_disk_when_it_is_answered(service, client):

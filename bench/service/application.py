@@ -25,10 +25,12 @@ from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access, Authenticator, PeopleStores
 from bench.service.agent_monitor import AgentLink, AgentMonitor
+from bench.service.audit import AuditTrail, RecordedConnection
 from bench.service.campaigns import CampaignExecutor
 from bench.service.context import ServiceContext
 from bench.service.middleware import (
     AccessCheckMiddleware,
+    AuditMiddleware,
     BodyLimitMiddleware,
     HeadMiddleware,
     KeptAnswerMiddleware,
@@ -49,6 +51,8 @@ KEPT_PATHS = frozenset(
     f"{API}/{name}" for name in ("bench", "bench/channels", "bench/instruments", "bench/limits", *_LISTS)
 )
 """Paths whose answers depend only on the catalogue, the agent's status and the query."""
+COMPUTATIONS = frozenset((f"{API}/methods/dry-run", f"{API}/campaigns/plan"))
+"""Paths whose POST only computes an answer; nothing of it is recorded."""
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]", "::1")
 PAGE_FOLDER = Path(__file__).parent.parent / "web" / "static"
 """Files of the web page."""
@@ -93,6 +97,8 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.add_middleware(HeadMiddleware, below="/api/")
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(AccessCheckMiddleware, below=API, public=PUBLIC_OPERATIONS)
+    routes = tuple(route for router in PROTECTED_ROUTERS for route in router.routes)
+    app.add_middleware(AuditMiddleware, api=API, routes=routes, unrecorded=COMPUTATIONS)
     app.add_middleware(RequestLogMiddleware)
     app.state.request_metrics = CollectorRegistry()
     app.add_middleware(RequestMetricsMiddleware, registry=app.state.request_metrics)
@@ -132,6 +138,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         stack.push_async_callback(engine.close)
         await engine.start(context.job_manager)
         stack.enter_context(context.monitor)
+        stack.enter_context(context.audit)
         stack.enter_context(NotificationSender(context.campaigns.store))
         stack.enter_context(context.campaigns)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
@@ -165,7 +172,9 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
 
     job_manager = JobManager(catalogue, engine, on_job_changed)
     monitor = AgentMonitor(settings.link, on_message, on_status)
-    campaigns = CampaignExecutor(catalogue, monitor, is_local=settings.has_local_logs)
+    audit = AuditTrail(settings.data, settings.link.send)
+    recorded = RecordedConnection(monitor, audit.record)
+    campaigns = CampaignExecutor(catalogue, recorded, is_local=settings.has_local_logs)
     registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
         Authenticator(settings.access, PeopleStores(catalogue.users, catalogue.tokens, catalogue.sessions)),
@@ -179,6 +188,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         SpaceMonitor(settings.data),
         SampleStore(settings.data),
         campaigns,
+        audit,
     )
     return context
 

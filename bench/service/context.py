@@ -19,6 +19,7 @@ from bench.people import AttemptCounter, SignInCodes
 from bench.samples import SampleStore
 from bench.service.access import Authenticator
 from bench.service.agent_monitor import AgentMonitor
+from bench.service.audit import AuditTrail
 from bench.service.campaigns import CampaignExecutor
 from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
@@ -57,6 +58,7 @@ class ServiceContext:
     space_monitor: SpaceMonitor
     sample_store: SampleStore
     campaigns: CampaignExecutor
+    audit: AuditTrail
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
     """Locks of the idempotency keys of requests in progress."""
     attempts: AttemptCounter = field(default_factory=AttemptCounter)

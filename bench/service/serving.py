@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 import uvicorn
 
-from bench.agent_protocol import AgentClient, AgentEndpoint, derive_samples_address, find_agent
+from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samples_address, find_agent
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr
 from bench.processes import open_privately
@@ -184,7 +184,7 @@ def _make_agent_link(options: ServeOptions) -> tuple[AgentLink, str | None]:
         endpoint = find_agent(options.config)
     else:
         return NoAgent(), None
-    return AgentClient(*endpoint), endpoint.commands
+    return AgentClient(*endpoint, sender=Sender(actor="service")), endpoint.commands
 
 
 def _is_local(address: str) -> bool:

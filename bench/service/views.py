@@ -20,13 +20,14 @@ class View(BaseModel):
 
 
 class Health(View):
-    """State of agent, worker, disk, queue and clocks, each in words."""
+    """State of agent, worker, disk, queue, audit trail and clocks, each in words."""
 
     version: str
     agent: str = Field(description="`ok`, or the reason why it is not available")
     worker: str = Field(description="`ok`, or the reason why it is not available")
     disk: str = Field(description="`ok`, or the free space of the data folder where it is little")
     queue: str = Field(description="`empty`, or the numbers of running and waiting jobs")
+    audit: str = Field(description="`ok`, or why the audit trail cannot be written, or that it was altered")
     clocks: str = Field(description="`ok`, or the instruments whose clock has an error above 1 ms, with its bound")
 
 

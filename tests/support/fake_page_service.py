@@ -260,7 +260,15 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     @router.get("/health")
     async def health() -> Any:
         agent = SILENCE if bench.silent else "ok"
-        return {"version": "0.1.0", "agent": agent, "worker": "ok", "disk": "ok", "queue": "empty", "clocks": "ok"}
+        return {
+            "version": "0.1.0",
+            "agent": agent,
+            "worker": "ok",
+            "disk": "ok",
+            "queue": "empty",
+            "audit": "ok",
+            "clocks": "ok",
+        }
 
     @router.post("/bench/reset")
     async def reset() -> Any:

@@ -6,6 +6,8 @@ import time
 from bench.agent_protocol.messages import (
     AbortCommand,
     AgentStatus,
+    AuditCommand,
+    AuditPage,
     BenchChannel,
     BenchDescription,
     BenchLimit,
@@ -31,6 +33,8 @@ class FakeAgent:
         self.refuses = ""
         self.commands = []
         self.defect = None
+        self.audit = AuditPage(chain="", before="", lines=())
+        self.trail = None
         self.description = BenchDescription(
             name="bench",
             specimen="mounted damper",
@@ -47,8 +51,8 @@ class FakeAgent:
             raise AgentUnreachableError(
                 "no rig agent answered at tcp://127.0.0.1:5570 within 1 s; start one: mrbench rig"
             )
-        if isinstance(command, DescribeCommand):
-            return Reply(ok=True, description=self.description)
+        if isinstance(command, DescribeCommand | AuditCommand):
+            return self._answer(command)
         self.commands.append(command)
         if self.refuses:
             return Reply(ok=False, error=self.refuses, status=self.status)
@@ -65,6 +69,11 @@ class FakeAgent:
             case ResetCommand():
                 self._set(state="idle", trip="")
         return Reply(ok=True, status=self._stamped_status())
+
+    def _answer(self, question):
+        if isinstance(question, DescribeCommand):
+            return Reply(ok=True, description=self.description)
+        return Reply(ok=True, audit=self.trail.read_page(question) if self.trail else self.audit)
 
     def subscribe(self, stopping):
         while not stopping.is_set():

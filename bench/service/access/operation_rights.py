@@ -11,6 +11,10 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /users": "administer",
     "PATCH /users/{name}": "view",  # one's own password; the route checks the rest
     "DELETE /users/{name}": "administer",
+    "GET /audit": "administer",
+    "GET /audit/head": "administer",
+    "GET /audit/export": "administer",
+    "POST /audit/verify": "administer",
     "GET /tokens": "view",  # one's own; the route adds those of others
     "POST /tokens": "view",  # with one's own role at most
     "DELETE /tokens/{token_id}": "view",

@@ -1,6 +1,7 @@
-"""ASGI middleware: log, metrics, check of access, limit on bodies, headers, HEAD, kept answers."""
+"""ASGI middleware: log, audit trail, metrics, check of access, limit on bodies, headers, HEAD, kept answers."""
 
 from bench.service.middleware.access_check import CSRF_HEADER, AccessCheckMiddleware
+from bench.service.middleware.audit_record import AuditMiddleware
 from bench.service.middleware.body_limit import MAX_BODY_SIZE, BodyLimitMiddleware
 from bench.service.middleware.head import HeadMiddleware
 from bench.service.middleware.kept_answers import KeptAnswerMiddleware
@@ -12,6 +13,7 @@ __all__ = [
     "CSRF_HEADER",
     "MAX_BODY_SIZE",
     "AccessCheckMiddleware",
+    "AuditMiddleware",
     "BodyLimitMiddleware",
     "HeadMiddleware",
     "KeptAnswerMiddleware",

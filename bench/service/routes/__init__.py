@@ -2,6 +2,7 @@
 
 from bench.service.routes import (
     analyses,
+    audit,
     batches,
     bench_control,
     campaigns,
@@ -39,6 +40,7 @@ PROTECTED_ROUTERS = (
     *recordings.ROUTERS,
     *campaigns.ROUTERS,
     *analyses.ROUTERS,
+    audit.router,
 )
 """Routers that need a sign-in."""
 

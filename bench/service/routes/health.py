@@ -19,7 +19,7 @@ _MILLISECONDS = 1e3
 
 @router.get("/health")
 async def get_health(context: Context) -> Health:
-    """Return the state of agent, worker, disk, queue and clocks in words; needs no token."""
+    """Return the state of agent, worker, disk, queue, audit trail and clocks in words; needs no token."""
     worker, parts = await asyncio.gather(
         context.engine.describe_state(), asyncio.to_thread(_describe_parts, context)
     )
@@ -36,6 +36,7 @@ def _describe_parts(context: ServiceContext) -> dict[str, str]:
         "agent": _describe_agent(context),
         "disk": context.space_monitor.describe() or "ok",
         "queue": _describe_queue(context),
+        "audit": context.audit.describe_state(),
         "clocks": describe_clocks(context.monitor.latest_status),
     }
 

@@ -30,6 +30,7 @@ from bench.campaigns import (
     stop,
 )
 from bench.disk import RESERVE, find_free_space
+from bench.service.audit import note_old
 from bench.service.campaigns import AGENT_BENCH
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse, describe_file
@@ -126,6 +127,7 @@ def edit_campaign(campaign_id: str, request: EditRequest, context: Context, send
     """Edit the queue of a campaign while it runs; the edit is recorded with who made it and when."""
     store = context.campaigns.store
     stored = _get(store, campaign_id)
+    note_old(_describe(stored))
     check_approvals(context, stored.state.campaign, collect_edit_methods(request.edit))
     now = stored.read_time()
     return _show(store, store.edit(campaign_id, request.edit, now, get_author(sender, request.who)))
@@ -210,6 +212,12 @@ def _get(store: CampaignStore, campaign_id: str) -> StoredCampaign:
     return store.get(campaign_id)
 
 
+def _describe(campaign: StoredCampaign) -> dict[str, object]:
+    """Return the state of a campaign before a change, for the audit trail: its status and its queue."""
+    state = campaign.state
+    return {"status": state.status, "queue": [f"{item.id} {item.state}" for item in state.items]}
+
+
 def _show(store: CampaignStore, campaign: StoredCampaign) -> CampaignView:
     return make_view(campaign, store.table.list_newest_events(campaign.id, _EVENTS))
 
@@ -219,5 +227,7 @@ def _change(
 ) -> CampaignView:
     """Change a stored campaign; its executor acts on it at its next step."""
     store = context.campaigns.store
-    now = _get(store, campaign_id).read_time()
+    stored = _get(store, campaign_id)
+    note_old(_describe(stored))
+    now = stored.read_time()
     return _show(store, store.update(campaign_id, lambda state: transition(state, now)))

@@ -7,6 +7,7 @@ from fastapi import APIRouter
 
 from bench.catalogue import TokenRow
 from bench.people import ROLES, compute_rights, new_secret
+from bench.service.audit import note_old
 from bench.service.context import Context
 from bench.service.problems import make_not_found
 from bench.service.requests import Sender, require_right
@@ -42,6 +43,7 @@ def revoke_token(token_id: str, context: Context, sender: Sender) -> None:
         raise make_not_found("token", token_id)
     if row.created_by != sender.actor:
         require_right(sender, "administer")
+    note_old(_make_view(row).model_dump(mode="json"))
     context.catalogue.tokens.revoke(token_id)
     context.authenticator.forget()
 

@@ -9,6 +9,7 @@ from pydantic import SecretStr
 
 from bench.catalogue import UserRow
 from bench.people import check_password, compute_rights, hash_password, is_password
+from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict, make_not_found
 from bench.service.requests import Sender, require_right
@@ -53,6 +54,7 @@ def change_user(name: str, change: UserChange, context: Context, sender: Sender)
     if not is_own or not given <= _OWN_CHANGES:
         require_right(sender, "administer")
     row = _get_user(context, name)
+    note_old(_make_view(context, row).model_dump(mode="json"))
     if is_own and change.password is not None:
         _check_current_password(context, row, change.current_password)
     values: dict[str, Any] = change.model_dump(include=given - _OWN_CHANGES, exclude_none=True, mode="json")
@@ -68,8 +70,8 @@ def change_user(name: str, change: UserChange, context: Context, sender: Sender)
 @router.delete("/{name}", status_code=204)
 def remove_user(name: str, context: Context) -> None:
     """Remove a user with the sessions and tokens; what the user has done stays recorded."""
-    if not context.catalogue.users.remove(name):
-        raise make_not_found("user", name)
+    note_old(_make_view(context, _get_user(context, name)).model_dump(mode="json"))
+    context.catalogue.users.remove(name)
     context.catalogue.sessions.end_all("user", name)
     context.catalogue.tokens.revoke_all(f"user:{name}")
     context.authenticator.forget()

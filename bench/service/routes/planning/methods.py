@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Response
 
 from bench.catalogue import SHIPPED_VERSION, ApprovalRow, MethodRow
 from bench.methods import Method, compile_method, list_shipped_methods, load_method
+from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
 from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender
 from bench.service.routes.planning.method_library import StoredMethod, describe_facts, find_method, list_methods
@@ -41,11 +42,22 @@ def store_method(method: Method, context: Context, response: Response) -> Method
     201: a new version. 200: the name has a version of equal content.
     """
     compile_method(method)  # a method that exceeds its own limits is refused
+    note_old(_describe_newest(context, method.name))
     stored, is_new = _store(context, method)
     if not is_new:
         response.status_code = 200
     response.headers["Location"] = f"/api/v1/methods/{method.name}/{stored.version}"
     return _show(context, stored)
+
+
+def _describe_newest(context: ServiceContext, name: str) -> dict[str, Any] | None:
+    """Return version and hash of the newest version of a method before another one; None for a new name."""
+    row = context.catalogue.methods.get(name)
+    if row is not None:
+        return {"version": row.version, "sha256": row.sha256}
+    if name not in list_shipped_methods():
+        return None
+    return {"version": SHIPPED_VERSION, "sha256": load_method(name).compute_sha256()}
 
 
 def _store(context: ServiceContext, method: Method) -> tuple[StoredMethod, bool]:

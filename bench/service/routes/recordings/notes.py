@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Response
 
 from bench.catalogue import NoteRow
+from bench.service.audit import note_old
 from bench.service.context import Context
 from bench.service.problems import MEDIA_TYPE, ProblemError
 from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, get_author
@@ -53,6 +54,7 @@ def change_run(
     if if_match is None:
         detail = "PATCH needs the header If-Match with the ETag of GET /runs/{id}; read the run first"
         raise ProblemError(HTTPStatus.PRECONDITION_REQUIRED, "if-match-missing", "If-Match is missing", detail)
+    note_old({"tags": row.tags})
     is_current = if_match in ("*", make_run_tag(row))
     notebook = context.catalogue.notebook
     author = get_author(sender, change.author)

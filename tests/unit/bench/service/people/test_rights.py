@@ -29,7 +29,10 @@ LOWEST = {
         DELETE /runs/{run_id}, POST /runs/{run_id}/restore, POST /runs/{run_id}/salvage, POST /methods,
         POST /methods/{name}/{version}/approval, DELETE /methods/{name}/{version}/approval
     """,
-    "administrator": "GET /users, POST /users, DELETE /users/{name}",
+    "administrator": """
+        GET /users, POST /users, DELETE /users/{name}, GET /audit, GET /audit/head, GET /audit/export,
+        POST /audit/verify
+    """,
 }
 """Lowest role for each operation; reading needs a viewer."""
 BY_CONTENT = {"POST /session", "PATCH /users/{name}", "POST /tokens"}

@@ -20,6 +20,7 @@ from bench.campaigns import Campaign, CampaignPlan
 from bench.config import BenchConfig
 from bench.log import MESSAGES, TOPIC_FAMILIES, make_message_schema
 from bench.methods import Envelope, Method
+from bench.oidc import OidcConfig
 from bench.service.application import create_app
 from identification.damper import COORDINATES, PARAMETERS, Quantity
 from identification.damper.definitions import STAGE_OF, VARIABLES_AT, EffectFile
@@ -54,6 +55,7 @@ DOCUMENTS: dict[str, type[BaseModel]] = {
     "forecast": Forecast,
     "foresight": DesignReport,
     "method": Method,
+    "oidc": OidcConfig,
     "prediction": Prediction,
     "scenario": Scenario,
     "trend": Trend,

@@ -21,6 +21,7 @@ from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqli
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
 from bench.live import LiveBatch, LiveBroadcaster, serialise_message
+from bench.oidc import OidcConfig, Provider
 from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access, Authenticator, PeopleStores
@@ -44,7 +45,14 @@ from bench.service.run_registry import RunRegistry
 from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers
 
 API = "/api/v1"
-PUBLIC_OPERATIONS = (f"GET {API}/health", f"GET {API}/openapi.json", f"POST {API}/session")
+PUBLIC_OPERATIONS = (
+    f"GET {API}/health",
+    f"GET {API}/openapi.json",
+    f"POST {API}/session",
+    f"GET {API}/session/ways",
+    f"GET {API}/session/oidc",
+    f"GET {API}/session/oidc/callback",
+)
 """Operations that need no sign-in."""
 _LISTS = ("events", "jobs", "methods", "runs")
 KEPT_PATHS = frozenset(
@@ -73,6 +81,8 @@ class AppSettings:
     """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
     database: str | None = None
     """URL of the catalogue's database; by default an SQLite file in the data folder."""
+    oidc: OidcConfig | None = None
+    """Provider by which persons sign in; None for local users and tokens only."""
 
 
 def create_app(settings: AppSettings | None = None) -> FastAPI:
@@ -189,6 +199,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         SampleStore(settings.data),
         campaigns,
         audit,
+        provider=None if settings.oidc is None else Provider(settings.oidc),
     )
     return context
 

@@ -15,6 +15,7 @@ from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.live import LiveBroadcaster
+from bench.oidc import Provider
 from bench.people import AttemptCounter, SignInCodes
 from bench.samples import SampleStore
 from bench.service.access import Authenticator
@@ -65,6 +66,8 @@ class ServiceContext:
     """Failed sign-ins by user name, and by client address for tokens and codes."""
     codes: "SignInCodes[tuple[str, str]]" = field(default_factory=SignInCodes)
     """Codes for another device; the owner is kind and subject of a session."""
+    provider: Provider | None = None
+    """Provider by which persons sign in; None without one."""
 
     @property
     def data(self) -> Path:

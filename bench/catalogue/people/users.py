@@ -1,4 +1,4 @@
-"""Local users of the service."""
+"""Users of the service: local ones, and those of a provider."""
 
 import re
 from collections.abc import Sequence
@@ -26,6 +26,8 @@ class UserRow(Base):
     """Rights beyond those of the role."""
     password_hash: Mapped[str | None] = mapped_column(Text, default=None)
     """Argon2id; None for a user who cannot sign in by a password."""
+    external_id: Mapped[str | None] = mapped_column(Text, unique=True, default=None)
+    """Issuer and subject of a person who signs in by a provider only; None for a local user."""
     disabled: Mapped[bool] = mapped_column(default=False)
     created: Mapped[datetime] = mapped_column(UtcTime)
     last_seen: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
@@ -56,6 +58,11 @@ class UserStore:
         """Return a user, or None."""
         with self._sessions() as session:
             return session.get(UserRow, name)
+
+    def find_external(self, external_id: str) -> UserRow | None:
+        """Return the user of a person of the provider, or None."""
+        with self._sessions() as session:
+            return session.scalar(select(UserRow).where(UserRow.external_id == external_id))
 
     def list_users(self) -> Sequence[UserRow]:
         """Return all users in the order of their names."""

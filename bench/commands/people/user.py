@@ -72,7 +72,8 @@ def user(
 
 def _list_users(store: "UserStore") -> None:
     for row in store.list_users():
-        state = "disabled" if row.disabled else "no password" if row.password_hash is None else ""
+        without = "no password" if row.external_id is None else "signs in by the provider"
+        state = "disabled" if row.disabled else without if row.password_hash is None else ""
         typer.echo("  ".join(filter(None, (f"{row.name:<16}", f"{row.role:<13}", row.full_name, state))))
 
 
@@ -90,7 +91,10 @@ def _add(store: "UserStore", name: str, role: str, full_name: str) -> None:
 
 
 def _change(store: "UserStore", name: str, values: dict[str, Any]) -> None:
-    _get(store, name)
+    from bench.errors import RunError
+
+    if _get(store, name).external_id is not None and not values.keys() <= {"disabled"}:
+        raise RunError(f"user {name} signs in by the provider; change role, full name and password there")
     store.change(name, values)
 
 

@@ -18,6 +18,7 @@ def upgrade() -> None:
         sa.Column("role", sa.Text(), nullable=False),
         sa.Column("extra_rights", sa.JSON(), nullable=False),
         sa.Column("password_hash", sa.Text()),
+        sa.Column("external_id", sa.Text(), unique=True),
         sa.Column("disabled", sa.Boolean(), nullable=False),
         sa.Column("created", UtcTime(), nullable=False),
         sa.Column("last_seen", UtcTime()),

@@ -1,8 +1,8 @@
 """Routes of people: sessions of browsers, users, tokens of programs."""
 
-from bench.service.routes.people import session, tokens, users
+from bench.service.routes.people import oidc, session, tokens, users
 
-PUBLIC_ROUTERS = (session.public_router,)
+PUBLIC_ROUTERS = (session.public_router, oidc.public_router)
 """Routers that need no sign-in."""
 ROUTERS = (session.router, users.router, tokens.router)
 """Routers that need it."""

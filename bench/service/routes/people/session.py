@@ -31,6 +31,13 @@ _RESPONSES: dict[int | str, dict[str, Any]] = {
 async def sign_in(request: SignInRequest, http: Request, response: Response, context: Context) -> SessionView:
     """Sign in; the session is in a cookie that scripts cannot read."""
     identity = await _check_credentials(context, request, http)
+    secret = await begin_session(context, identity, http, response)
+    signed_in = await asyncio.to_thread(context.authenticator.identify, "session", secret)
+    return _make_view(signed_in or identity, secret)
+
+
+async def begin_session(context: ServiceContext, identity: Identity, http: Request, response: Response) -> str:
+    """Begin a session, set its cookie, and return the secret in it."""
     secret, sha256 = new_secret()
     row = await asyncio.to_thread(context.catalogue.sessions.add, sha256, identity.kind, identity.subject)
     response.set_cookie(
@@ -42,8 +49,7 @@ async def sign_in(request: SignInRequest, http: Request, response: Response, con
         samesite="strict",
         secure=http.url.scheme == "https",
     )
-    signed_in = await asyncio.to_thread(context.authenticator.identify, "session", secret)
-    return _make_view(signed_in or identity, secret)
+    return secret
 
 
 @router.get("")

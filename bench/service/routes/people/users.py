@@ -1,4 +1,4 @@
-"""Local users."""
+"""Users."""
 
 from datetime import UTC, datetime, timedelta
 from http import HTTPStatus
@@ -18,6 +18,8 @@ from bench.service.routes.people.views import UserChange, UserList, UserRequest,
 router = APIRouter(prefix="/users", tags=["people"])
 _OWN_CHANGES = {"password", "current_password"}
 """Fields that persons change of themselves without the right to administer."""
+_OF_PROVIDER = {"role", "full_name", *_OWN_CHANGES}
+"""Fields that cannot be changed here for a user who signs in by the provider."""
 
 
 @router.get("")
@@ -47,6 +49,8 @@ def add_user(request: UserRequest, context: Context) -> UserView:
 def change_user(name: str, change: UserChange, context: Context, sender: Sender) -> UserView:
     """Change a user; everybody changes their own password, with the present one.
 
+    Role, full name and password of a user of the provider are changed there.
+
     A changed password or a disabled user ends all sessions of this user but that of the sender.
     """
     given = change.model_fields_set
@@ -55,6 +59,9 @@ def change_user(name: str, change: UserChange, context: Context, sender: Sender)
         require_right(sender, "administer")
     row = _get_user(context, name)
     note_old(_make_view(context, row).model_dump(mode="json"))
+    if row.external_id is not None and given & _OF_PROVIDER:
+        detail = f"user {name} signs in by the provider; change {', '.join(sorted(given & _OF_PROVIDER))} there"
+        raise make_conflict("external-user", "The provider administers this user", detail)
     if is_own and change.password is not None:
         _check_current_password(context, row, change.current_password)
     values: dict[str, Any] = change.model_dump(include=given - _OWN_CHANGES, exclude_none=True, mode="json")
@@ -115,6 +122,7 @@ def _make_view(context: ServiceContext, row: UserRow) -> UserView:
         rights=sort_rights(compute_rights(row.role, row.extra_rights)),
         disabled=row.disabled,
         has_password=row.password_hash is not None,
+        external=row.external_id is not None,
         created=row.created,
         last_seen=row.last_seen,
         locked_until=datetime.now(UTC) + timedelta(seconds=wait) if wait else None,

@@ -56,6 +56,19 @@ class SessionView(View):
     expired_in_s: float | None = Field(description="time until then [s]")
 
 
+class ProviderView(View):
+    """Provider by which persons sign in."""
+
+    name: str = Field(description="name for the button")
+
+
+class SignInWays(View):
+    """Ways to sign in."""
+
+    password: bool = Field(description="whether local users sign in by a password; true")
+    oidc: ProviderView | None = Field(description="provider behind GET /session/oidc; null without one")
+
+
 class CodeView(View):
     """Code by which another device signs in as the same person, once."""
 
@@ -76,6 +89,7 @@ class UserView(View):
     rights: tuple[Right, ...]
     disabled: bool
     has_password: bool
+    external: bool = Field(description="signs in by the provider only, which gives the role and the full name")
     created: datetime = Field(description="UTC")
     last_seen: datetime | None = Field(description="UTC of the latest sign-in")
     locked_until: datetime | None = Field(description="UTC until which failed sign-ins lock the user out")

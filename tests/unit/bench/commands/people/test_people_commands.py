@@ -5,7 +5,7 @@ import io
 import pytest
 import typer
 
-from bench.catalogue import CATALOGUE_FILE, Catalogue, make_sqlite_url, open_database
+from bench.catalogue import CATALOGUE_FILE, Catalogue, UserRow, make_sqlite_url, open_database
 from bench.commands.people import token, user
 from bench.commands.people.token import TokenAction
 from bench.commands.people.user import RoleName, UserAction
@@ -73,6 +73,19 @@ def test_a_mistake_changes_nothing(act, call, error, reason):
     with pytest.raises(error, match=reason):
         act(**call)
     assert act("list").split() == ["taken", "engineer"]
+
+
+def test_a_user_of_the_provider_is_only_disabled_and_removed_here(act, catalogue):
+    row = UserRow(name="mcurie", role="viewer", extra_rights=[], external_id="https://login 4711", disabled=False)
+    assert catalogue.users.add(row)
+    for call in ({"action": "password"}, {"action": "change", "role": RoleName.ADMINISTRATOR}):
+        with pytest.raises(RunError, match="user mcurie signs in by the provider"):
+            act(name="mcurie", **call)
+    assert act("list").split() == ["mcurie", "viewer", "signs", "in", "by", "the", "provider"]
+    act("change", "mcurie", disabled=True)
+    assert act("list").split() == ["mcurie", "viewer", "disabled"]
+    act("remove", "mcurie")
+    assert act("list") == ""
 
 
 def test_a_token_is_printed_once_and_revoked(tmp_path, catalogue, capsys):

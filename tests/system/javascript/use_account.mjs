@@ -5,6 +5,7 @@ import { makeWaits, openPage } from "./browser.mjs";
 import { makeChecks } from "./page_checks.mjs";
 
 const [url, token, chromium, folder] = process.argv.slice(2);
+const WIDTHS = [1400, 390]; // between them, nothing of these dialogs and views changes its order
 const PASSWORD = "correct horse battery";
 const seen = { errors: [], findings: {}, described: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
@@ -19,7 +20,7 @@ const stored = () => page.evaluate(() => JSON.stringify([{ ...localStorage }, { 
 
 /** Inspects the page as it is, and keeps pictures of it if a folder is given. */
 async function look(name) {
-  seen.findings[name] = await inspect();
+  seen.findings[name] = await inspect(WIDTHS);
   if (!folder) return;
   for (const [width, colorScheme] of [[1400, "light"], [1400, "dark"], [820, "light"], [390, "dark"]]) {
     await page.setViewportSize({ width, height: 1000 });

@@ -212,7 +212,8 @@ def problem(status: int, title: str, detail: str, name: str = "", retry_after: i
 
 def find_refusal(bench: FakeBench, request: Request) -> JSONResponse | None:
     """Return why a request is refused: without sign-in, or with a cookie that another site may have used."""
-    is_sign_in = request.method == "POST" and request.url.path == "/api/v1/session"
+    operation = f"{request.method} {request.url.path}"
+    is_sign_in = operation in ("POST /api/v1/session", "GET /api/v1/session/ways")
     if not request.url.path.startswith("/api/") or is_sign_in:
         return None
     session = bench.people.identify(request)

@@ -154,6 +154,10 @@ def add_session_routes(router: APIRouter, people: FakePeople, problem: Problem) 
     async def sign_out(request: Request) -> None:
         people.sessions.pop(request.cookies.get(COOKIE, ""), None)
 
+    @router.get("/session/ways")
+    async def list_ways() -> dict[str, Any]:
+        return {"password": True, "oidc": None}
+
     @router.post("/session/codes", status_code=201)
     async def code(request: Request) -> Any:
         people.made_codes += 1

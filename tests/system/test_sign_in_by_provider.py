@@ -73,6 +73,7 @@ def test_a_browser_signs_in_on_another_site_and_returns_to_its_view(tmp_path, pr
     assert seen["height"] >= 44  # px, a target for a finger
     assert seen["refused"]["problem"].startswith("The sign-in provider refused")
     assert seen["refused"]["hash"] == "#/runs?specimen=S%201"
+    assert seen["view"] == "#/runs?specimen=S%201"
     assert (seen["person"]["name"], seen["person"]["role"]) == ("mcurie", "engineer")
     assert seen["cookies"] == ""
     assert seen["unknown"] == {

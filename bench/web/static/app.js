@@ -24,6 +24,7 @@ import { RunView } from "./runs/run.js";
 import { RunList } from "./runs/runs.js";
 import { RunSearch } from "./runs/run_search.js";
 import { ServiceClock } from "./live/service_clock.js";
+import { takeSignInProblem } from "./common/sign_in_ways.js";
 import { SignIn, isAsking, takeCredentials } from "./account/sign_in.js";
 import { SpecimenView } from "./specimens/specimen.js";
 import { SpecimenList } from "./specimens/specimens.js";
@@ -185,13 +186,14 @@ function askToSignIn(reason) {
 
 /** Signs in with what the address contains, or goes on with the session of the cookie. */
 async function arrive() {
+  const failure = takeSignInProblem();
   const given = takeCredentials();
   if (given) return signIn.attempt(given);
   try {
     await readSession();
     begin();
   } catch (problem) {
-    if (problem.unauthorised) return askToSignIn("");
+    if (problem.unauthorised) return askToSignIn(failure);
     bar.showFailure(problem.after("Trying again"));
     setTimeout(arrive, ASK_AGAIN_MS);
   }

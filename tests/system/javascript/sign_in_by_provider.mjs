@@ -9,40 +9,36 @@ import { openPage } from "./browser.mjs";
 const [, , address, executable, folder] = process.argv;
 const { page, close } = await openPage(executable, { width: 390, height: 844 });
 
-/** Opens a view with the button in a container of its own, and returns the sentence on the sign-in before. */
-async function showButton(view) {
-  await page.goto(`${address}${view}`);
-  return addButton();
+/** Returns the reason in the dialog of the page once it has the button, and the address behind it. */
+async function readDialog() {
+  await button.waitFor();
+  return page.evaluate(() => ({
+    problem: document.querySelector("#sign-in-reason").textContent,
+    hash: location.hash,
+  }));
 }
-
-const addButton = () =>
-  page.evaluate(async () => {
-    const { addSignInWays, takeSignInProblem } = await import("/common/sign_in_ways.js");
-    const container = document.createElement("p");
-    container.id = "ways";
-    const problem = takeSignInProblem();
-    document.body.replaceChildren(problem, container);
-    await addSignInWays(container);
-    return { problem, hash: location.hash };
-  });
 
 const session = () => page.evaluate(async () => (await fetch("/api/v1/session")).json());
 
-const seen = {};
-await showButton("#/runs?specimen=S%201");
 const button = page.getByRole("link", { name: "Sign in with Lab account" });
+const seen = {};
+await page.goto(`${address}#/runs?specimen=S%201`);
+await readDialog();
 seen.height = (await button.boundingBox()).height;
 await page.screenshot({ path: `${folder}/button.png` });
 await button.click();
-await page.waitForURL(/problem=/);
-seen.refused = await addButton();
+await page.waitForURL((url) => url.port === new URL(address).port);
+seen.refused = await readDialog();
 await page.screenshot({ path: `${folder}/problem.png` });
 await button.click();
-await page.waitForURL((url) => url.hash === "#/runs?specimen=S%201");
+await page.getByRole("button", { name: /M. Curie|mcurie|Marie/ }).first().waitFor();
+seen.view = await page.evaluate(() => location.hash);
 seen.person = (await session()).person;
 seen.cookies = await page.evaluate(() => document.cookie);
+await page.evaluate(() => fetch("/api/v1/session").then((answer) => answer.json()).then(({ csrf }) =>
+  fetch("/api/v1/session", { method: "DELETE", headers: { "X-CSRF-Token": csrf } })));
+await page.goto("about:blank");
 await page.goto(`${address}#problem=%3Cb%3E&view=/plan`);
-await page.reload();
-seen.unknown = await addButton();
+seen.unknown = await readDialog();
 await close();
 console.log(JSON.stringify(seen));

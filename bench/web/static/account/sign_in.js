@@ -4,6 +4,7 @@ import { signIn } from "../common/api.js";
 import { Countdown } from "./countdown.js";
 import { openDialog } from "../common/dialogs.js";
 import { byId, duration, write } from "../common/format.js";
+import { addSignInWays } from "../common/sign_in_ways.js";
 
 const DIALOG = "sign-in-dialog";
 
@@ -44,6 +45,7 @@ export class SignIn {
     if (isAsking()) return;
     this.showReason(reason);
     openDialog(DIALOG);
+    addSignInWays(byId("sign-in-provider"));
     this.showWay();
   }
 

@@ -25,12 +25,15 @@ from bench.catalogue.models import (
 )
 from bench.catalogue.planning import (
     SHIPPED_VERSION,
+    CertificateStore,
     ClaimedKey,
     IdempotencyKeys,
     MethodRow,
     MethodStore,
     Specimen,
     SpecimenStore,
+    StoredCertificate,
+    find_stored_state,
 )
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
@@ -49,6 +52,7 @@ __all__ = [
     "CampaignRow",
     "CampaignTable",
     "Catalogue",
+    "CertificateStore",
     "ClaimedKey",
     "ClaimedNotification",
     "Copied",
@@ -71,12 +75,14 @@ __all__ = [
     "RunState",
     "Specimen",
     "SpecimenStore",
+    "StoredCertificate",
     "back_up",
     "catalogue_log",
     "check_all",
     "check_integrity",
     "compute_sha256",
     "find_catalogue",
+    "find_stored_state",
     "is_complete",
     "make_sqlite_url",
     "move_to_trash",

@@ -11,7 +11,13 @@ from bench.catalogue.campaign_table import CampaignTable
 from bench.catalogue.change_counter import ChangeCounter
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunOutcome, RunRow
-from bench.catalogue.planning import SHIPPED_VERSION, IdempotencyKeys, MethodStore, SpecimenStore
+from bench.catalogue.planning import (
+    SHIPPED_VERSION,
+    CertificateStore,
+    IdempotencyKeys,
+    MethodStore,
+    SpecimenStore,
+)
 from bench.catalogue.records import EventJournal, Notebook
 from bench.catalogue.run_filter import RunFilter
 from bench.methods import list_shipped_methods, load_method
@@ -31,6 +37,7 @@ class Catalogue:
         self.job_queue = JobQueue(engine)
         self.idempotency_keys = IdempotencyKeys(engine)
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
+        self.certificates = CertificateStore(engine)
         self.campaigns = CampaignTable(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
         self.change_counter = ChangeCounter(engine)

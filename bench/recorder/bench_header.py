@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import orjson
 
-from bench.config import AsciiLoadCellSection, BenchConfig, ChannelSection, LoadCellSection
+from bench.config import CHANNEL_UNITS, AsciiLoadCellSection, BenchConfig, ChannelSection, LoadCellSection
 from bench.errors import RunError
 from bench.log import DECODERS_FILE, ChannelInfo, Identity, RunHeader
 from bench.methods import Method
@@ -24,14 +24,6 @@ RESAMPLING_NOTE = (
     "cubic, drive and actuator position linearly, temperature holds its latest reading"
 )
 NO_CALIBRATION = "none given"
-_UNITS = {
-    "displacement": "m",
-    "force": "N",
-    "actuator_position": "m",
-    "coil_voltage": "V",
-    "coil_current": "A",
-    "temperature": "degC",
-}
 
 
 class Attachment(NamedTuple):
@@ -169,7 +161,7 @@ def make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
     rates = _find_rates(config, rig)
     return {
         name: ChannelInfo(
-            unit=rig.drive_unit if name == "coil_drive" else _UNITS[name],
+            unit=rig.drive_unit if name == "coil_drive" else CHANNEL_UNITS[name],
             rate_hz=rates[name],
             filter=None
             if section.filter is None
@@ -182,7 +174,7 @@ def make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
 
 def _find_channel_sections(config: BenchConfig, rig: Rig) -> dict[str, ChannelSection]:
     """Return the configuration of each recorded channel; the drive has that of the channel that measures it."""
-    recorded = [name for name in _UNITS if name != "temperature" or rig.thermometer is not None]
+    recorded = [name for name in CHANNEL_UNITS if name != "temperature" or rig.thermometer is not None]
     configured: Mapping[str, ChannelSection] = {str(name): section for name, section in config.channels.items()}
     sections = {name: configured.get(name, ChannelSection()) for name in recorded}
     return {**sections, "coil_drive": sections[rig.drive_channel]}

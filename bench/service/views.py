@@ -28,6 +28,9 @@ class Health(View):
     disk: str = Field(description="`ok`, or the free space of the data folder where it is little")
     queue: str = Field(description="`empty`, or the numbers of running and waiting jobs")
     clocks: str = Field(description="`ok`, or the instruments whose clock has an error above 1 ms, with its bound")
+    calibration: str = Field(
+        description="`ok`, or the channels whose calibration is overdue or due within 14 days, with the date"
+    )
 
 
 class SetupRequest(View):

@@ -2,7 +2,7 @@
 
 from bench.catalogue.backup import Copied, back_up, restore_backup
 from bench.catalogue.campaign_table import CampaignChange, CampaignTable, ClaimedNotification
-from bench.catalogue.catalogue import Catalogue
+from bench.catalogue.catalogue import Catalogue, open_catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
 from bench.catalogue.job_queue import REPEATABLE_STATES, JobFilter, JobQueue
@@ -86,6 +86,7 @@ __all__ = [
     "is_complete",
     "make_sqlite_url",
     "move_to_trash",
+    "open_catalogue",
     "open_database",
     "read_log_summary",
     "read_plan",

@@ -67,6 +67,7 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
         "log_bytes": stat.st_size,
         "log_modified_ns": stat.st_mtime_ns,
         "log_sha256": sha256,
+        "calibration_overdue": summary.calibration_overdue,
     }
     if known is not None:
         return _read_content(catalogue, catalogue.update_run(known.id, **values | _keep_report(known, summary)))

@@ -3,10 +3,13 @@
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 from bench.agent import Agent, acquire_agent_lock, handle_command
 from bench.agent_protocol import CommandServer, RunCommand, RunStatus, make_endpoint
+from bench.calibration import IssuedCertificate
+from bench.catalogue import CATALOGUE_FILE, open_catalogue
 from bench.config import load_config
 from bench.errors import RunError
 from bench.methods import Method
@@ -39,7 +42,7 @@ def run_on_rig(
         specimen: the damper under test; empty for the configured one.
         operator: name of the operator.
         progress: receives the completed share, 0 to 1.
-        on_warning: receives each privilege that the system did not grant.
+        on_warning: receives each privilege that the system did not grant, and each overdue calibration.
 
     Returns:
         The status with its outcome, clean or lossy.
@@ -47,6 +50,7 @@ def run_on_rig(
     Raises:
         ConfigError: the configuration is not valid.
         MethodError: the method cannot be compiled within its limits.
+        CatalogueError: the catalogue with the calibration certificates cannot be opened.
         RunError: the bench belongs to another agent, an instrument does not reply, or the run stopped early; the
             recorded part is in the log.
     """
@@ -63,11 +67,29 @@ def run_on_rig(
         for warning in agent.get_status().warnings:
             on_warning(warning)
         document = method.model_dump(mode="json", by_alias=True)
-        reply = agent.run(RunCommand(method=document, specimen=specimen, operator=operator, log=str(out)))
+        command = RunCommand(
+            method=document,
+            specimen=specimen,
+            operator=operator,
+            certificates=_read_certificates(config.parent / bench_config.rig.folder),
+            log=str(out),
+        )
+        reply = agent.run(command)
         if not reply.ok:
             raise RunError(reply.error)
+        run = agent.get_run_status()
+        for overdue in () if run is None else run.calibration_overdue:
+            on_warning(overdue)
         opened.enter_context(_serve_commands(server, agent, stopping))
         return _follow_run(agent, stopping, progress)
+
+
+def _read_certificates(data: Path) -> tuple[IssuedCertificate, ...]:
+    """Return the certificates that apply today, from the catalogue of the bench's folder if it has one."""
+    if not (data / CATALOGUE_FILE).is_file():
+        return ()
+    with open_catalogue(data) as catalogue:
+        return tuple(catalogue.certificates.list_current(datetime.now(UTC).date()).values())
 
 
 @contextlib.contextmanager

@@ -90,6 +90,9 @@ class Run(View):
     log_bytes: int | None = Field(description="size of the log [bytes]; null until it was read")
     lost: dict[str, int] = Field(description="number of lost samples by channel; empty if none was lost")
     alarms: tuple[str, ...] = Field(description="texts of the alarms during the run")
+    calibration_overdue: tuple[str, ...] = Field(
+        description="channels whose calibration was overdue at the start, each with its certificate and due date"
+    )
     tags: tuple[str, ...] = Field(description="words by which a person sorts runs")
     trashed: datetime | None = Field(description="UTC at which the run was moved to the trash; null outside it")
     log_sha256: str | None = Field(description="hash of the log as it was recorded; null without a complete log")
@@ -176,6 +179,7 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         log_bytes=row.log_bytes,
         lost=row.lost or {},
         alarms=tuple(row.alarms or ()),
+        calibration_overdue=tuple(row.calibration_overdue or ()),
         tags=tuple(row.tags or ()),
         trashed=row.trashed,
         log_sha256=row.log_sha256,

@@ -2,6 +2,8 @@
 
 from datetime import UTC, datetime, timedelta
 
+from bench.calibration import IssuedCertificate, parse_certificate
+
 
 def make_certificate(channel="force", unit="N", **changes):
     """Return the document of a valid certificate, made last year and due in 100 days."""
@@ -28,3 +30,9 @@ def make_certificate(channel="force", unit="N", **changes):
 def shift(days):
     """Return a day relative to today as text."""
     return (datetime.now(UTC).date() + timedelta(days=days)).isoformat()
+
+
+def issue_certificate(channel="force", unit="N", version=1, **changes):
+    """Return a stored certificate."""
+    document = parse_certificate(make_certificate(channel, unit, **changes), "test")
+    return IssuedCertificate(id=f"id-{channel}", version=version, document=document)

@@ -34,9 +34,7 @@ def withdraw_certificate(certificate_id: str, data: Path, author: str, reason: s
     """
     with open_catalogue(data) as catalogue:
         if catalogue.certificates.find(certificate_id) is None:
-            raise CertificateError(
-                f"there is no certificate {certificate_id}; list shows the ids"
-            )
+            raise CertificateError(f"there is no certificate {certificate_id}; list shows the ids")
         if not catalogue.certificates.withdraw(certificate_id, author, reason):
             raise CertificateError(f"certificate {certificate_id} is withdrawn already; nothing was changed")
     return f"{certificate_id}: withdrawn; it stays in the list and applies to no later run"

@@ -10,6 +10,14 @@ from bench.calibration.certificate import (
     parse_certificate,
     read_certificate,
 )
+from bench.calibration.gain_errors import (
+    GAIN_CHANNELS,
+    GAIN_FORMULA,
+    CombinedInterval,
+    combine_estimates,
+    combine_interval,
+    find_exponents,
+)
 from bench.calibration.log_record import list_overdue, make_attachment, make_log_text, read_entry
 from bench.calibration.validity import (
     DUE_SOON,
@@ -22,16 +30,22 @@ from bench.calibration.validity import (
 
 __all__ = [
     "DUE_SOON",
+    "GAIN_CHANNELS",
+    "GAIN_FORMULA",
     "CalibrationPoint",
     "Certificate",
     "CertificateError",
     "CertificateState",
+    "CombinedInterval",
     "Day",
     "IssuedCertificate",
     "ShortText",
     "Uncertainty",
     "choose_current",
+    "combine_estimates",
+    "combine_interval",
     "describe_due",
+    "find_exponents",
     "find_state",
     "list_overdue",
     "make_attachment",

@@ -12,7 +12,6 @@ from mcap.reader import make_reader
 from mcap.records import Header, Message, Metadata
 from mcap.stream_reader import StreamReader
 
-from bench.calibration import list_overdue
 from bench.catalogue.models import RunOutcome
 from bench.endings import RunEnding, read_ending
 from bench.errors import LogError
@@ -52,8 +51,8 @@ class LogSummary:
     """None if the log neither contains nor determines it."""
     lost: dict[str, int]
     """Number of lost samples by channel; empty for a truncated log."""
-    calibration_overdue: list[str]
-    """Channels whose calibration was overdue at the start, in words."""
+    calibration: Mapping[str, str]
+    """Calibration by channel: JSON of its certificate, or text."""
 
 
 def read_log_summary(path: Path) -> LogSummary:
@@ -143,7 +142,7 @@ def _make_summary(
         continues=run.get("continues", ""),
         ending=read_ending(end),
         lost=_read_losses(end.get("lost", "")),
-        calibration_overdue=list_overdue(metadata.get("calibration", {})),
+        calibration=metadata.get("calibration", {}),
     )
 
 

@@ -2,6 +2,7 @@
 
 import { get, keepToken, takeToken } from "./common/api.js";
 import { CampaignView } from "./campaigns/campaigns.js";
+import { CertificateView } from "./calibration/certificates.js";
 import { CompareView } from "./compare/compare.js";
 import { openDialog } from "./common/dialogs.js";
 import { EventList } from "./bench/events.js";
@@ -66,6 +67,7 @@ const events = new EventList();
 const plan = new PlanView();
 const campaigns = new CampaignView();
 const comparison = new CompareView();
+const certificates = new CertificateView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -84,6 +86,7 @@ const router = new Router({
   specimens: (address) => specimens.show(address),
   specimen: (address) => specimen.show(address),
   campaigns: (address) => campaigns.show(address),
+  calibration: () => certificates.show(),
 });
 
 offerUnits(() => {

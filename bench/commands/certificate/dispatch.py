@@ -32,7 +32,7 @@ def certificate(
 ) -> None:
     """Add, list and withdraw calibration certificates; the service may run meanwhile.
 
-    A file holds one document mrbench.certificate/1. Corrections are made in the page or over REST.
+    A file holds one document mrbench.certificate/1. A correction is made in the page or over REST.
     """
     if (action is Action.LIST) == bool(target):
         raise typer.BadParameter("give a FILE to add or an ID to withdraw; list takes neither")

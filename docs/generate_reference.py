@@ -16,6 +16,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 import typer
 from pydantic import AliasChoices, BaseModel
 
+from bench.calibration import Certificate
 from bench.campaigns import Campaign, CampaignPlan
 from bench.config import BenchConfig
 from bench.log import MESSAGES, TOPIC_FAMILIES, make_message_schema
@@ -48,6 +49,7 @@ DOCUMENTS: dict[str, type[BaseModel]] = {
     "bench": BenchConfig,
     "campaign": Campaign,
     "campaign-plan": CampaignPlan,
+    "certificate": Certificate,
     "diagnosis": Diagnosis,
     "effect": EffectFile,
     "envelope": Envelope,

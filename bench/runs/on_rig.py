@@ -3,11 +3,14 @@
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 from bench.agent import Agent, CommandTrail, acquire_agent_lock, handle_command
 from bench.agent_protocol import CommandServer, RunCommand, RunStatus, StopCommand, get_sender, make_endpoint
 from bench.audit import make_agent_trail
+from bench.calibration import IssuedCertificate
+from bench.catalogue import CATALOGUE_FILE, open_catalogue
 from bench.config import load_config
 from bench.errors import RunError
 from bench.methods import Method
@@ -40,7 +43,7 @@ def run_on_rig(
         specimen: the damper under test; empty for the configured one.
         operator: name of the operator.
         progress: receives the completed share, 0 to 1.
-        on_warning: receives each privilege that the system did not grant.
+        on_warning: receives each privilege that the system did not grant, and each overdue calibration.
 
     Returns:
         The status with its outcome, clean or lossy.
@@ -48,6 +51,7 @@ def run_on_rig(
     Raises:
         ConfigError: the configuration is not valid.
         MethodError: the method cannot be compiled within its limits.
+        CatalogueError: the catalogue with the calibration certificates cannot be opened.
         RunError: the bench belongs to another agent, an instrument does not reply, or the run stopped early; the
             recorded part is in the log.
     """
@@ -65,7 +69,17 @@ def run_on_rig(
         for warning in agent.get_status().warnings:
             on_warning(warning)
         document = method.model_dump(mode="json", by_alias=True)
-        _start(agent, trail, RunCommand(method=document, specimen=specimen, operator=operator, log=str(out)))
+        command = RunCommand(
+            method=document,
+            specimen=specimen,
+            operator=operator,
+            certificates=_read_certificates(config.parent / bench_config.rig.folder),
+            log=str(out),
+        )
+        _start(agent, trail, command)
+        run = agent.get_run_status()
+        for overdue in () if run is None else run.calibration_overdue:
+            on_warning(overdue)
         opened.enter_context(_serve_commands(server, agent, trail, stopping))
         return _follow_run(agent, trail, stopping, progress)
 
@@ -83,6 +97,14 @@ def _start(agent: Agent, trail: CommandTrail, command: RunCommand) -> None:
     trail.record(command, "", reply, wait=True)
     if not reply.ok:
         raise RunError(reply.error)
+
+
+def _read_certificates(data: Path) -> tuple[IssuedCertificate, ...]:
+    """Return the certificates that apply today, from the catalogue of the bench's folder if it has one."""
+    if not (data / CATALOGUE_FILE).is_file():
+        return ()
+    with open_catalogue(data) as catalogue:
+        return tuple(catalogue.certificates.list_current(datetime.now(UTC).date()).values())
 
 
 @contextlib.contextmanager

@@ -21,6 +21,7 @@ from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import Method, compile_method, compute_envelope, load_method, parse_method
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_campaigns import FakeCampaigns, campaign_routes
+from tests.support.fake_certificates import add_certificate_routes
 from tests.support.fake_comparison import comparison_routes
 from tests.support.fake_people import COOKIE, TOKEN, FakePeople, people_routes
 from tests.support.fake_recording import recording_routes
@@ -47,6 +48,7 @@ CHANNELS = (
     Channel("temperature", "degC"),
 )
 PAUSE = "at checkpoint 10mm_1Hz, in 4 s"
+OVERDUE = "coil_voltage: calibration overdue since 2025-02-20 (certificate E-77 of Testo Industrial Services)"
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
 METHODS = [
     {
@@ -113,7 +115,8 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
         "ending": None, "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None,
         "noise_floor_n": None, "result": "", "jobs": [], "continues": None, "log_sha256": None, "integrity": None,
-        "lost": {}, "alarms": [], "tags": [], "trashed": None, "method_version": None, "method_sha256": None,
+        "lost": {}, "alarms": [], "calibration_overdue": [],
+        "tags": [], "trashed": None, "method_version": None, "method_sha256": None,
         "log_bytes": None,
         "diagnosis": None,
     } | more  # fmt: skip
@@ -152,6 +155,7 @@ class FakeBench:
         activity = "identify: refine, start 3 of 8"
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost", ending="stopped", log_sha256=HASH,
+                         calibration_overdue=[OVERDUE],
                          jobs=[fit_job("run-3", "failed", error="the worker was killed")]),
             "run-2": run(2, "clean", log_sha256=HASH, jobs=[fit_job("run-2", "running", activity=activity)]),
             "run-1": run(1, "clean", jobs=done_jobs("run-1", found), log_sha256=HASH,
@@ -260,6 +264,7 @@ def application(bench: FakeBench) -> FastAPI:
     )
     for other in others:
         app.include_router(other, prefix="/api/v1")
+    add_certificate_routes(app, FIT)
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 
@@ -287,6 +292,7 @@ def rig_routes(bench: FakeBench) -> APIRouter:
             "queue": "empty",
             "audit": "ok",
             "clocks": "ok",
+            "calibration": OVERDUE,
         }
 
     @router.post("/bench/reset")

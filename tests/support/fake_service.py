@@ -31,6 +31,7 @@ class FakeAgent:
         self.published = queue.Queue()
         self.reachable = True
         self.refuses = ""
+        self.overdue = ()
         self.commands = []
         self.defect = None
         self.audit = AuditPage(chain="", before="", lines=())
@@ -113,6 +114,7 @@ class FakeAgent:
             log=command.log or f"/elsewhere/run-{number}.mcap",
             started=f"2026-03-0{number}T10:00:00+00:00",
             duration_s=23.1,
+            calibration_overdue=self.overdue,
         )
         self._set(state="running", run=run)
 

@@ -7,7 +7,6 @@ from typing import Annotated
 
 import typer
 
-from bench.commands.people.stores import get_local_actor, open_catalogue
 from bench.commands.people.user import RoleName
 
 
@@ -32,20 +31,25 @@ def token(
 
     A new token is printed once; it is stored as a hash. A running service takes a change over within two seconds.
     """
+    from bench.agent_protocol import get_sender
+    from bench.catalogue import open_catalogue
+    from bench.commands.local_record import record
     from bench.people import new_secret
 
     if action is not TokenAction.LIST and not target:
         raise typer.BadParameter("give a label for the new token" if action is TokenAction.ADD else "give the id")
-    with open_catalogue(data) as catalogue:
+    with open_catalogue(data, is_created=True) as catalogue:
         store = catalogue.tokens
         if action is TokenAction.ADD:
             secret, sha256 = new_secret()
-            row = store.add(sha256, target, role.value, get_local_actor(), timedelta(days=days))
+            row = store.add(sha256, target, role.value, get_sender().actor, timedelta(days=days))
+            record(data, "token add", row.id, {}, {"label": target, "role": role.value, "days": days})
             typer.echo(f"{row.id}: {row.role} until {row.expires:%Y-%m-%d}; this is shown once:", err=True)
             typer.echo(secret)
         elif action is TokenAction.REVOKE:
             _check_id(store.get(target), target)
             store.revoke(target)
+            record(data, "token revoke", target, {}, {})
         else:
             for row in store.list_tokens():
                 state = "revoked" if row.revoked else "valid" if row.is_valid(datetime.now(UTC)) else "expired"

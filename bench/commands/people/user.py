@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from bench.commands.people.stores import open_catalogue
-
 if TYPE_CHECKING:
     from bench.catalogue import UserRow, UserStore
 
@@ -54,10 +52,14 @@ def user(
         raise typer.BadParameter("give the name of the user")
     if action is UserAction.ADD and role is None:
         raise typer.BadParameter("give the role: --role technician")
-    with open_catalogue(data) as catalogue:
+    from bench.catalogue import open_catalogue
+    from bench.commands.local_record import record
+
+    with open_catalogue(data, is_created=True) as catalogue:
         if action is UserAction.LIST:
             _list_users(catalogue.users)
-        elif action is UserAction.ADD:
+            return
+        if action is UserAction.ADD:
             _add(catalogue.users, name, str(role), full_name or "")
         elif action is UserAction.REMOVE:
             _get(catalogue.users, name)
@@ -68,6 +70,8 @@ def user(
             _change(catalogue.users, name, _collect_values(action, name, role, full_name, disabled))
             if action is UserAction.PASSWORD or disabled:
                 catalogue.sessions.end_all("user", name)
+        new = {"role": role and role.value, "full_name": full_name, "disabled": disabled}
+        record(data, f"user {action.value}", name, {}, new)
 
 
 def _list_users(store: "UserStore") -> None:

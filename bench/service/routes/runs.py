@@ -152,6 +152,7 @@ def _request_start(
         operator=request.operator,
         resume_after=request.resume_after,
         continues=continues,
+        certificates=tuple(context.catalogue.certificates.list_current(datetime.now(UTC).date()).values()),
         log=None if log is None else str(log),
     )
     status = context.monitor.send_command(command)

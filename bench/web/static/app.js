@@ -3,6 +3,7 @@
 import { Account } from "./account/account.js";
 import { get, readSession } from "./common/api.js";
 import { CampaignView } from "./campaigns/campaigns.js";
+import { CertificateView } from "./calibration/certificates.js";
 import { CompareView } from "./compare/compare.js";
 import { EventList } from "./bench/events.js";
 import { byId, fixed, write } from "./common/format.js";
@@ -78,6 +79,7 @@ const tokens = new TokenView();
 const signIn = new SignIn({ onSignedIn: begin });
 new Account({ onProblem: (text) => bar.showDetail(text, true) });
 watchRights((reason) => bar.showDetail(reason, true));
+const certificates = new CertificateView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -98,6 +100,7 @@ const router = new Router({
   campaigns: (address) => campaigns.show(address),
   people: () => people.show(),
   tokens: () => tokens.show(),
+  calibration: () => certificates.show(),
 });
 
 offerUnits(() => {

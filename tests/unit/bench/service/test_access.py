@@ -63,7 +63,8 @@ def test_only_health_description_and_sign_in_are_available_without_the_token(cli
 
 def test_health_and_description_are_open(client):
     del client.headers["Authorization"]
-    assert all(client.get(path).status_code == 200 for path in OPEN)
+    answers = (client.get(path) for _, path in OPEN if path.endswith(("health", "json", "ways")))
+    assert [answer.status_code for answer in answers] == [200, 200, 200]
 
 
 @pytest.mark.parametrize("first", ['{"token": ""}', '{"token": "wrong"}', "{}", "wrong"])

@@ -17,7 +17,7 @@ Right: TypeAlias = Literal[
     "manage_runs",
     "administer",
 ]
-"""What a person may do.
+"""Permission of a person or program.
 
 - ``view``: read everything but people, tokens of others and the audit trail.
 - ``stop``: stop and abort what moves.

@@ -26,7 +26,7 @@ class TokenRow(Base):
     role: Mapped[Role] = mapped_column(Text)
     created: Mapped[datetime] = mapped_column(UtcTime)
     created_by: Mapped[str] = mapped_column(Text)
-    """Who created it, as in the audit trail, such as ``user:mcurie``."""
+    """Creator as in the audit trail, such as ``user:mcurie``."""
     expires: Mapped[datetime] = mapped_column(UtcTime)
     last_used: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     """UTC of the latest use, in steps of five minutes."""

@@ -15,8 +15,8 @@ from bench.campaigns import (
     make_view,
     plan_campaign,
 )
+from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
-from bench.commands.local_record import record
 from bench.config import load_config
 
 AGENT_BENCH = "agent"

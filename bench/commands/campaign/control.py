@@ -24,8 +24,8 @@ from bench.campaigns import (
     send_test,
     stop,
 )
+from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
-from bench.commands.local_record import record
 
 _EVENTS = 200
 """Number of newest events that the JSON contains."""

@@ -38,8 +38,8 @@ def certificate(
         raise typer.BadParameter("give a FILE to add or an ID to withdraw; list takes neither")
     if (action is Action.WITHDRAW) != bool(reason.strip()):
         raise typer.BadParameter("withdraw needs --reason TEXT, and no other action takes it")
+    from bench.commands.audit import record
     from bench.commands.certificate.actions import add_certificate, list_certificates, withdraw_certificate
-    from bench.commands.local_record import record
 
     author = f"command:{operator}" if operator else "command"
     if action is Action.ADD:

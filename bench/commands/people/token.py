@@ -33,7 +33,7 @@ def token(
     """
     from bench.agent_protocol import get_sender
     from bench.catalogue import open_catalogue
-    from bench.commands.local_record import record
+    from bench.commands.audit import record
     from bench.people import new_secret
 
     if action is not TokenAction.LIST and not target:

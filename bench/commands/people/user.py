@@ -53,7 +53,7 @@ def user(
     if action is UserAction.ADD and role is None:
         raise typer.BadParameter("give the role: --role technician")
     from bench.catalogue import open_catalogue
-    from bench.commands.local_record import record
+    from bench.commands.audit import record
 
     with open_catalogue(data, is_created=True) as catalogue:
         if action is UserAction.LIST:

@@ -1,4 +1,4 @@
-"""Who sends a request."""
+"""Identity of the sender of a request."""
 
 import hashlib
 import hmac

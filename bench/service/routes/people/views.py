@@ -34,7 +34,7 @@ class SignInRequest(View):
 
 
 class Person(View):
-    """Who is signed in."""
+    """Person or program that is signed in."""
 
     name: str
     full_name: str

@@ -33,7 +33,7 @@ def test_the_actor_is_that_of_the_access_check(service, client):
         await checked(scope, receive, send)
 
     middleware = app.middleware_stack
-    while type(middleware).__name__ != "TokenCheckMiddleware":
+    while type(middleware).__name__ != "AccessCheckMiddleware":
         middleware = getattr(middleware, "_app", None) or middleware.app
     checked, middleware._app = middleware._app, sign_in
     senders = []

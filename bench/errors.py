@@ -11,6 +11,7 @@ BenchError
 ├── LiveDataError          a live batch cannot be read
 ├── LogError               a log cannot be read, written or repaired
 ├── RecordingError         a recording cannot be imported
+├── AuditError             the audit trail cannot be written or was altered
 └── ReportError            a report or a demo cannot be made
 
 Each message states what failed, the value and the limit with unit, and what to do. ``exit_code`` marks an error
@@ -54,6 +55,10 @@ class LogError(BenchError):
 
 class RecordingError(BenchError):
     """A recording cannot be imported."""
+
+
+class AuditError(BenchError):
+    """The audit trail cannot be written or read, or was altered."""
 
 
 class ReportError(BenchError):

@@ -16,10 +16,12 @@ from typing import Any, Literal, Union, get_args, get_origin
 import typer
 from pydantic import AliasChoices, BaseModel
 
+from bench.calibration import Certificate
 from bench.campaigns import Campaign, CampaignPlan
 from bench.config import BenchConfig
 from bench.log import MESSAGES, TOPIC_FAMILIES, make_message_schema
 from bench.methods import Envelope, Method
+from bench.oidc import OidcConfig
 from bench.service.application import create_app
 from identification.damper import COORDINATES, PARAMETERS, Quantity
 from identification.damper.definitions import STAGE_OF, VARIABLES_AT, EffectFile
@@ -47,6 +49,7 @@ DOCUMENTS: dict[str, type[BaseModel]] = {
     "bench": BenchConfig,
     "campaign": Campaign,
     "campaign-plan": CampaignPlan,
+    "certificate": Certificate,
     "diagnosis": Diagnosis,
     "effect": EffectFile,
     "envelope": Envelope,
@@ -54,6 +57,7 @@ DOCUMENTS: dict[str, type[BaseModel]] = {
     "forecast": Forecast,
     "foresight": DesignReport,
     "method": Method,
+    "oidc": OidcConfig,
     "prediction": Prediction,
     "scenario": Scenario,
     "trend": Trend,

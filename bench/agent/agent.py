@@ -14,7 +14,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from bench.agent.bench_clock import BenchClock
 from bench.agent.run_executor import RunExecutor, find_log_folder
 from bench.agent.run_slot import RunSlot
 from bench.agent.setup_step import SetupExecutor
@@ -26,7 +25,7 @@ from bench.agent.status import (
     make_limit_statuses,
 )
 from bench.agent.supervisor import SafetySupervisor
-from bench.agent.timing import OPERATION_TIMING, AgentTiming
+from bench.agent.timing import OPERATION_TIMING, AgentTiming, BenchClock
 from bench.agent_protocol import (
     AgentEvent,
     AgentState,

@@ -146,6 +146,7 @@ class Run:
             ending=self._ending if is_over else None,
             reason=self._reason if is_over else "",
             continues=request.continues,
+            calibration_overdue=request.overdue,
             pause="" if is_over else self._describe_pause(elapsed),
             lost=self._lost if is_over else self._recording_thread.count_lost(),
         )

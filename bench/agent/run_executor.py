@@ -1,6 +1,8 @@
 """Run executor: prepares a run from a command and executes it under the limits that apply to it."""
 
 import time
+from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -11,8 +13,10 @@ from bench.agent.run_supervision import RunSupervision
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import RunCommand
+from bench.calibration import IssuedCertificate, choose_current, list_overdue
 from bench.config import BenchConfig
 from bench.disk import check_space, estimate_log_size, find_free_space
+from bench.errors import RunError
 from bench.log import RunHeader
 from bench.recorder import (
     EventReporter,
@@ -83,9 +87,14 @@ class RunExecutor:
         """Prepare the run of a command; nothing moves.
 
         Raises:
-            MethodError, RunError: it cannot be executed, or the disk has no room for its log.
+            MethodError, RunError: it cannot be executed, the disk has no room for its log, or a calibration is
+                overdue and the configuration refuses that.
         """
         request = validate_request(command, self._rig, self._config.rig.specimen, self._find_log_folder())
+        metadata = self._describe(request, choose_current(command.certificates, request.identity.started.date()))
+        request = replace(request, overdue=tuple(list_overdue(metadata.header.calibration)))
+        self._check_calibration(request)
+        check_space(find_free_space(request.path.parent), _estimate_log_size(request, metadata.header))
         method, history = request.method, CommandHistory()
         supervision = RunSupervision(
             method, history, self._interlocks, self._supervisor, self._acquisition, self._clock, self._report_event
@@ -102,19 +111,28 @@ class RunExecutor:
         run = Run(
             request, history, sequencer, self._recording_thread, self._clock, self._report_event, self._timing
         )
-        maps = self._acquisition.maps
+        return PreparedRun(run, metadata, supervision)
+
+    def _describe(self, request: RunRequest, certificates: Mapping[str, IssuedCertificate]) -> LogMetadata:
+        """Return the content of the log apart from samples, marks and events."""
+        method, maps = request.method, self._acquisition.maps
         header = make_run_header(
-            method, request.identity, self._config, self._rig, maps, self._clock()
+            method, request.identity, self._config, self._rig, maps, self._clock(), certificates
         ).model_copy(update={"continues": request.continues, "resumed_after": request.resumed_after})
-        check_space(find_free_space(request.path.parent), _estimate_log_size(request, header))
-        metadata = LogMetadata(
+        return LogMetadata(
             header,
             # Read before anything moves, so that a missing certificate is reported in time.
-            make_attachments(method, self._config, self._rig, self._source),
+            make_attachments(method, self._config, self._rig, self._source, certificates),
             partial(describe_decoders, self._rig),
             partial(describe_clocks, self._rig, maps),
         )
-        return PreparedRun(run, metadata, supervision)
+
+    def _check_calibration(self, request: RunRequest) -> None:
+        if request.overdue and self._config.calibration.overdue == "refuse":
+            raise RunError(
+                f"the run was refused: {'; '.join(request.overdue)}; calibrate the channel and add its "
+                'certificate, or set overdue = "mark" in section [calibration] of bench.toml'
+            )
 
     def execute(self, prepared: PreparedRun) -> None:
         """Play and record a run to its end; afterwards the bench's own limits apply again."""

@@ -27,6 +27,8 @@ class RunRequest:
     """Checkpoint after which the run begins; empty for a whole run."""
     continues: str = ""
     """Identifier of the run that it continues; empty without one."""
+    overdue: tuple[str, ...] = ()
+    """Channels whose calibration is overdue, in words."""
 
 
 def validate_request(command: RunCommand, rig: Rig, specimen: str, folder: Path) -> RunRequest:

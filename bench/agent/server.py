@@ -4,11 +4,14 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 from bench.agent.agent import Agent
+from bench.agent.command_trail import CommandTrail
 from bench.agent.ownership import acquire_agent_lock
 from bench.agent_protocol import (
     AbortCommand,
+    AuditCommand,
     Command,
     CommandServer,
     DescribeCommand,
@@ -23,10 +26,14 @@ from bench.agent_protocol import (
     StopCommand,
     make_endpoint,
 )
+from bench.audit import make_agent_trail
 from bench.config import load_config
 from bench.errors import RunError
 from bench.processes import set_on_signals
 from drivers import DriverError
+
+_BenchCommand: TypeAlias = RunCommand | StopCommand | PauseCommand | AbortCommand | ResetCommand | PrepareCommand
+"""Command that acts on the bench."""
 
 
 def serve_agent(
@@ -57,6 +64,7 @@ def serve_agent(
         acquire_agent_lock(path),
         CommandServer(endpoint.commands, endpoint.key) as server,
         Publisher(endpoint.samples, endpoint.key) as publisher,
+        CommandTrail(make_agent_trail(config, path)) as trail,
     ):
         try:
             with Agent(config, path, publisher.publish) as agent:
@@ -64,18 +72,29 @@ def serve_agent(
                     on_warning(warning)
                 on_ready(f"agent of {config.rig.name}: commands {server.address}, samples {publisher.address}")
                 sys.stdout.flush()
-                server.serve(lambda command: handle_command(agent, command, stopping), stopping)
+                server.serve(lambda command: handle_command(agent, trail, command, stopping), stopping, trail)
         except DriverError as error:
             raise RunError(str(error)) from error
 
 
-def handle_command(agent: Agent, command: Command, stopping: threading.Event) -> Reply:
+def handle_command(agent: Agent, trail: CommandTrail, command: Command, stopping: threading.Event) -> Reply:
     """Execute a received command and return its reply; ``stopping`` is the event that ends the agent."""
     match command:
         case StatusCommand():
             return Reply(ok=True, status=agent.get_status())
         case DescribeCommand():
             return Reply(ok=True, description=agent.describe())
+        case AuditCommand():
+            return Reply(ok=True, audit=trail.read_page(command))
+        case ShutDownCommand():
+            stopping.set()
+            return Reply(ok=True, status=agent.get_status())
+        case _:
+            return _execute(agent, command)
+
+
+def _execute(agent: Agent, command: _BenchCommand) -> Reply:
+    match command:
         case RunCommand():
             return agent.run(command)
         case StopCommand():
@@ -88,6 +107,3 @@ def handle_command(agent: Agent, command: Command, stopping: threading.Event) ->
             return agent.reset()
         case PrepareCommand():
             return agent.prepare(command)
-        case ShutDownCommand():
-            stopping.set()
-            return Reply(ok=True, status=agent.get_status())

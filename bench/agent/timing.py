@@ -1,6 +1,18 @@
-"""Times of the agent that hardware and operation require, and that tests shorten."""
+"""Clock of every recorded time, and waiting times that hardware and operation require; tests shorten them."""
 
+import time
 from typing import NamedTuple
+
+
+class BenchClock:
+    """Bench clock [ns]: monotonic, zero when the agent starts."""
+
+    def __init__(self) -> None:
+        self._start_ns = time.monotonic_ns()
+
+    def __call__(self) -> int:
+        """Return the time now [ns]."""
+        return time.monotonic_ns() - self._start_ns
 
 
 class AgentTiming(NamedTuple):

@@ -1,12 +1,14 @@
 """Messages between the rig agent and its clients, and the sockets that carry them."""
 
 from bench.agent_protocol.endpoint import AgentEndpoint, derive_samples_address, find_agent, make_endpoint
-from bench.agent_protocol.link import AgentClient, CommandServer, Publisher
+from bench.agent_protocol.link import AgentClient, CommandAudit, CommandServer, Publisher
 from bench.agent_protocol.messages import (
     AbortCommand,
     AgentEvent,
     AgentState,
     AgentStatus,
+    AuditCommand,
+    AuditPage,
     BenchChannel,
     BenchDescription,
     BenchLimit,
@@ -22,11 +24,14 @@ from bench.agent_protocol.messages import (
     RunCommand,
     RunOutcome,
     RunStatus,
+    Sender,
+    SentCommand,
     SetupStatus,
     ShutDownCommand,
     StatusCommand,
     StopCommand,
 )
+from bench.agent_protocol.sender import get_sender, send_as
 from bench.agent_protocol.setup_client import request_setup_step
 from bench.agent_protocol.stop_client import request_end, request_stop
 
@@ -37,10 +42,13 @@ __all__ = [
     "AgentEvent",
     "AgentState",
     "AgentStatus",
+    "AuditCommand",
+    "AuditPage",
     "BenchChannel",
     "BenchDescription",
     "BenchLimit",
     "Command",
+    "CommandAudit",
     "CommandServer",
     "DescribeCommand",
     "InstrumentStatus",
@@ -54,14 +62,18 @@ __all__ = [
     "RunCommand",
     "RunOutcome",
     "RunStatus",
+    "Sender",
+    "SentCommand",
     "SetupStatus",
     "ShutDownCommand",
     "StatusCommand",
     "StopCommand",
     "derive_samples_address",
     "find_agent",
+    "get_sender",
     "make_endpoint",
     "request_end",
     "request_setup_step",
     "request_stop",
+    "send_as",
 ]

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Final, Self, TypeAlias
+from typing import Final, Protocol, Self, TypeAlias
 
 import orjson
 import zmq
@@ -24,13 +24,19 @@ from bench.agent_protocol.messages import (
     EVENT,
     SAMPLES,
     STATUS,
+    AbortCommand,
     AgentEvent,
     AgentStatus,
     Command,
     Message,
+    PauseCommand,
     Reply,
+    Sender,
+    SentCommand,
+    StopCommand,
     TimedCommand,
 )
+from bench.agent_protocol.sender import describe_peer, get_sender
 from bench.errors import AgentUnreachableError, ConfigError, RunError, SecretFileError
 from bench.live import LiveBatch, decode_batch, describe_channels, parse_channels
 from bench.validation import describe_validation_error
@@ -39,6 +45,26 @@ CommandHandler = Callable[[Command], Reply]
 Publication: TypeAlias = AgentStatus | LiveBatch | AgentEvent
 """Message that the agent publishes."""
 
+
+class CommandAudit(Protocol):
+    """Audit trail of the commands that reach the agent."""
+
+    def find_obstacle(self, command: SentCommand) -> str:
+        """Return why a command must not be executed, because it could not be recorded; empty if it may."""
+
+    def record(self, command: SentCommand | bytes, peer: str, reply: Reply, *, wait: bool) -> None:
+        """Record a command with its reply.
+
+        Args:
+            command: the command, or a message that is not one.
+            peer: its sender as seen at the socket.
+            reply: its reply.
+            wait: wait a moment until it is on the disk.
+        """
+
+
+_INVALID: Final = "invalid command"
+"""Beginning of the reply to a message that is not a command of this version."""
 _COMMAND_ADAPTER: TypeAdapter[Command] = TypeAdapter(Command)
 _MESSAGE_TYPES: Final[dict[bytes, type[AgentStatus | AgentEvent]]] = {STATUS: AgentStatus, EVENT: AgentEvent}
 _TOPICS: Final = {type_: topic for topic, type_ in _MESSAGE_TYPES.items()}
@@ -87,11 +113,36 @@ class CommandServer(_SocketOwner):
         """Listen for commands; arguments and errors as those of every bound socket."""
         super().__init__(zmq.REP, address, key)
 
-    def serve(self, handle: CommandHandler, stopping: threading.Event) -> None:
-        """Answer until ``stopping`` is set; an invalid command is answered with its error."""
+    def serve(self, handle: CommandHandler, stopping: threading.Event, audit: CommandAudit | None = None) -> None:
+        """Answer until ``stopping`` is set; an invalid command is answered with its error.
+
+        Args:
+            handle: executes a command.
+            stopping: ends the server.
+            audit: records the commands; None for no record.
+        """
         while not stopping.is_set():
             if self._socket.poll(_POLL_PERIOD):
-                self._socket.send(_handle_request(self._socket.recv(), handle).model_dump_json().encode())
+                self._answer(self._socket.recv(copy=False), handle, audit)
+
+    def _answer(self, frame: zmq.Frame, handle: CommandHandler, audit: CommandAudit | None) -> None:
+        """Execute a command and reply; what ends a motion is answered before it is recorded."""
+        command, reply = _parse_command(frame.bytes)
+        if command is not None:
+            reply = _execute(command, handle, audit)
+        is_urgent = isinstance(command, StopCommand | AbortCommand | PauseCommand)
+        if is_urgent:
+            self._send(reply)
+        if audit is not None and (command is None or isinstance(command, SentCommand)):
+            peer = describe_peer(self.address, _get_peer(frame))
+            audit.record(frame.bytes if command is None else command, peer, reply, wait=not is_urgent)
+        if not is_urgent:
+            self._send(reply)
+
+    def _send(self, reply: Reply) -> None:
+        # Clients of an older version refuse a field that they do not know, also that of a stop.
+        unknown = {"audit"} if reply.audit is None else None
+        self._socket.send(reply.model_dump_json(exclude=unknown).encode())
 
 
 class Publisher(_SocketOwner):
@@ -118,15 +169,16 @@ class Publisher(_SocketOwner):
 class AgentClient:
     """Client of the agent; may be used from any thread, and created before the agent is running."""
 
-    def __init__(self, commands: str, samples: str, key: Path | None = None) -> None:
+    def __init__(self, commands: str, samples: str, key: Path | None = None, sender: Sender | None = None) -> None:
         """Store the addresses; nothing is sent.
 
         Args:
             commands: address of the agent's request socket.
             samples: address of the agent's publishing socket.
             key: file with the agent's key, needed for TCP; it is read for each connection.
+            sender: on whose behalf commands are sent outside of `send_as`; by default the account of this process.
         """
-        self._commands, self._samples, self._key = commands, samples, key
+        self._commands, self._samples, self._key, self._sender = commands, samples, key, sender
 
     def send(self, command: Message, timeout: float = 5.0) -> Reply:
         """Send one command and wait for its reply.
@@ -138,10 +190,19 @@ class AgentClient:
         Raises:
             AgentUnreachableError: address or key is invalid, or no valid reply came in time.
         """
+        if isinstance(command, SentCommand) and command.sender is None:
+            stated = command.model_copy(update={"sender": get_sender(self._sender)})
+            reply = self._exchange(_limit_validity(stated, timeout), timeout)
+            # An agent that was started by an older version knows no senders, and must still stop.
+            if reply.ok or not (reply.error.startswith(_INVALID) and ".sender: no such key" in reply.error):
+                return reply
+        return self._exchange(_limit_validity(command, timeout), timeout)
+
+    def _exchange(self, command: Message, timeout: float) -> Reply:
         # One socket per command, because a request socket without its reply cannot be used again.
         with _open_socket(zmq.REQ) as socket:
             _connect(socket, self._commands, self._key)
-            socket.send(_limit_validity(command, timeout).model_dump_json().encode())
+            socket.send(command.model_dump_json().encode())
             if not socket.poll(round(timeout * 1e3)):
                 key = f", or check that {self._key} is its key" if self._commands.startswith("tcp://") else ""
                 raise AgentUnreachableError(
@@ -275,12 +336,21 @@ def _find_refusal(command: Command) -> str:
     )
 
 
-def _handle_request(request: bytes, handle: CommandHandler) -> Reply:
+def _parse_command(request: bytes) -> tuple[Command | None, Reply]:
+    """Return the command in a message; None and the reply if it is not one."""
     try:
-        command = _COMMAND_ADAPTER.validate_json(request)
+        return _COMMAND_ADAPTER.validate_json(request), Reply(ok=True)
     except ValidationError as error:
-        return Reply(ok=False, error=f"invalid command: {describe_validation_error(error, 'the message')}")
-    if refusal := _find_refusal(command):
+        fault = describe_validation_error(error, "the message")
+        return None, Reply(ok=False, error=f"{_INVALID}: {fault}")
+
+
+def _execute(command: Command, handle: CommandHandler, audit: CommandAudit | None) -> Reply:
+    """Execute a command, unless its sender has given up or it could not be recorded."""
+    refusal = _find_refusal(command)
+    if not refusal and audit is not None and isinstance(command, SentCommand):
+        refusal = audit.find_obstacle(command)
+    if refusal:
         return Reply(ok=False, error=refusal)
     try:
         return handle(command)
@@ -288,3 +358,10 @@ def _handle_request(request: bytes, handle: CommandHandler) -> Reply:
         return Reply(
             ok=False, error=f"{command.command} failed: {error!r}; internal error of the agent, please report"
         )
+
+
+def _get_peer(frame: zmq.Frame) -> str:
+    try:
+        return str(frame.get("Peer-Address"))
+    except zmq.ZMQError:  # a transport without addresses
+        return ""

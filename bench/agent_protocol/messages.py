@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from bench.calibration import IssuedCertificate
 from bench.endings import RunEnding
 from bench.setup_steps import SetupStep
 
@@ -27,7 +28,21 @@ class Message(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class TimedCommand(Message):
+class Sender(Message):
+    """Person or program on whose behalf a command is sent, for the audit trail of the agent."""
+
+    actor: str = Field(max_length=300, description="`user:NAME`, `local:ACCOUNT`, `campaign:ID`, `service`, ...")
+    origin: str = Field(default="local", max_length=300, description="address of the client, or `local`")
+    request: str = Field(default="", max_length=100, description="id of the request to the service; empty without")
+
+
+class SentCommand(Message):
+    """Command that is recorded in the audit trail."""
+
+    sender: Sender | None = Field(default=None, description="null from a client of an older version")
+
+
+class TimedCommand(SentCommand):
     """Command that begins something, clears a trip or ends the agent: refused when its sender no longer waits.
 
     A command may lie in the queue of an agent that is suspended or starts. Executed later, it would move the rod
@@ -62,24 +77,27 @@ class RunCommand(TimedCommand):
         default="", description="checkpoint of the method (segment) after which an interrupted run continues"
     )
     continues: str = Field(default="", description="id of the run that this one continues; empty without one")
+    certificates: tuple[IssuedCertificate, ...] = Field(
+        default=(), description="calibration certificates that apply to the channels; empty if none are known"
+    )
     log: str | None = Field(
         default=None, description="file of the log; by default named by the run's id, in the agent's folder"
     )
 
 
-class StopCommand(Message):
+class StopCommand(SentCommand):
     """Controlled stop of the run: the motion fades out, the coil goes to zero. Harmless without a run."""
 
     command: Literal["stop"] = "stop"
 
 
-class PauseCommand(Message):
+class PauseCommand(SentCommand):
     """End of the run at its next checkpoint, at rest. Without a later checkpoint the run is played to its end."""
 
     command: Literal["pause"] = "pause"
 
 
-class AbortCommand(Message):
+class AbortCommand(SentCommand):
     """Trip by a person: coil and actuator are stopped at once, each in its fastest way.
 
     It latches until a reset, also while nothing moves. Needs no lease.
@@ -125,8 +143,19 @@ class ShutDownCommand(TimedCommand):
     command: Literal["shut_down"] = "shut_down"
 
 
+class AuditCommand(Message):
+    """Request of entries of the agent's own audit trail."""
+
+    command: Literal["audit"] = "audit"
+    chain: str = Field(
+        default="", description="id of the chain that the client knows; with another one, no entries"
+    )
+    after: int = Field(default=0, ge=0, description="number of the last entry that the client has")
+
+
 Command: TypeAlias = Annotated[
     StatusCommand
+    | AuditCommand
     | DescribeCommand
     | RunCommand
     | StopCommand
@@ -162,6 +191,9 @@ class RunStatus(Message):
     )
     reason: str = Field(default="", description="reason why the outcome is not clean, for a person")
     continues: str = Field(default="", description="id of the run that this one continues; empty without one")
+    calibration_overdue: tuple[str, ...] = Field(
+        default=(), description="channels whose calibration was overdue at the start of the run, in words"
+    )
     pause: str = Field(
         default="", description="when a requested pause takes effect, for a person; empty without a request"
     )
@@ -268,6 +300,14 @@ class BenchDescription(Message):
     channels: dict[str, BenchChannel] = Field(description="recorded channels; `coil_drive` repeats a measured one")
 
 
+class AuditPage(Message):
+    """Part of the agent's audit trail."""
+
+    chain: str = Field(description="id of the chain; empty before its first entry")
+    before: str = Field(description="`sha256` of the entry `after`; empty if there is no such entry")
+    lines: tuple[str, ...] = Field(description="the entries that follow it, each as its line in the file")
+
+
 class Reply(Message):
     """Reply to a command."""
 
@@ -275,3 +315,4 @@ class Reply(Message):
     error: str = Field(default="", description="what failed, the value and the limit, what to do")
     status: AgentStatus | None = None
     description: BenchDescription | None = Field(default=None, description="only in the reply to `describe`")
+    audit: AuditPage | None = Field(default=None, description="only in the reply to `audit`")

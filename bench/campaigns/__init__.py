@@ -1,6 +1,13 @@
 """Campaigns: ordered runs with rests and conditions between them, resumed after anything."""
 
-from bench.campaigns.benches import AgentBench, CampaignBench, PlantBench, Thermometer, read_result
+from bench.campaigns.benches import (
+    AgentBench,
+    AgentConnection,
+    CampaignBench,
+    PlantBench,
+    Thermometer,
+    read_result,
+)
 from bench.campaigns.document import (
     WARM_UP_METHOD,
     AnyStep,
@@ -47,6 +54,7 @@ from bench.campaigns.view_text import format_view
 __all__ = [
     "WARM_UP_METHOD",
     "AgentBench",
+    "AgentConnection",
     "AnyStep",
     "Campaign",
     "CampaignBench",

@@ -2,7 +2,7 @@
 
 from bench.catalogue.backup import Copied, back_up, restore_backup
 from bench.catalogue.campaign_table import CampaignChange, CampaignTable, ClaimedNotification
-from bench.catalogue.catalogue import Catalogue
+from bench.catalogue.catalogue import Catalogue, open_catalogue
 from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
 from bench.catalogue.integrity import check_all, check_integrity
 from bench.catalogue.job_queue import REPEATABLE_STATES, JobFilter, JobQueue
@@ -23,14 +23,28 @@ from bench.catalogue.models import (
     RunRow,
     RunState,
 )
+from bench.catalogue.people import (
+    SessionRow,
+    SessionStore,
+    TokenRow,
+    TokenStore,
+    UserRow,
+    UserStore,
+    check_user_name,
+)
 from bench.catalogue.planning import (
     SHIPPED_VERSION,
+    ApprovalRow,
+    ApprovalStore,
+    CertificateStore,
     ClaimedKey,
     IdempotencyKeys,
     MethodRow,
     MethodStore,
     Specimen,
     SpecimenStore,
+    StoredCertificate,
+    find_stored_state,
 )
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
@@ -42,6 +56,8 @@ __all__ = [
     "REPEATABLE_STATES",
     "SHIPPED_VERSION",
     "UNFINISHED_STATES",
+    "ApprovalRow",
+    "ApprovalStore",
     "BatchRow",
     "CampaignChange",
     "CampaignEventRow",
@@ -49,6 +65,7 @@ __all__ = [
     "CampaignRow",
     "CampaignTable",
     "Catalogue",
+    "CertificateStore",
     "ClaimedKey",
     "ClaimedNotification",
     "Copied",
@@ -69,17 +86,27 @@ __all__ = [
     "RunPlan",
     "RunRow",
     "RunState",
+    "SessionRow",
+    "SessionStore",
     "Specimen",
     "SpecimenStore",
+    "StoredCertificate",
+    "TokenRow",
+    "TokenStore",
+    "UserRow",
+    "UserStore",
     "back_up",
     "catalogue_log",
     "check_all",
     "check_integrity",
+    "check_user_name",
     "compute_sha256",
     "find_catalogue",
+    "find_stored_state",
     "is_complete",
     "make_sqlite_url",
     "move_to_trash",
+    "open_catalogue",
     "open_database",
     "read_log_summary",
     "read_plan",

@@ -1,6 +1,7 @@
 """Access to the rows of runs and jobs; safe from any thread."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +10,19 @@ from sqlalchemy.orm import sessionmaker
 
 from bench.catalogue.campaign_table import CampaignTable
 from bench.catalogue.change_counter import ChangeCounter
+from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
+from bench.catalogue.errors import CatalogueError
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunOutcome, RunRow
-from bench.catalogue.planning import SHIPPED_VERSION, IdempotencyKeys, MethodStore, SpecimenStore
+from bench.catalogue.people import SessionStore, TokenStore, UserStore
+from bench.catalogue.planning import (
+    SHIPPED_VERSION,
+    ApprovalStore,
+    CertificateStore,
+    IdempotencyKeys,
+    MethodStore,
+    SpecimenStore,
+)
 from bench.catalogue.records import EventJournal, Notebook
 from bench.catalogue.run_filter import RunFilter
 from bench.methods import list_shipped_methods, load_method
@@ -31,7 +42,10 @@ class Catalogue:
         self.job_queue = JobQueue(engine)
         self.idempotency_keys = IdempotencyKeys(engine)
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
+        self.approvals = ApprovalStore(engine)
+        self.certificates = CertificateStore(engine)
         self.campaigns = CampaignTable(engine)
+        self.users, self.tokens, self.sessions = UserStore(engine), TokenStore(engine), SessionStore(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
         self.change_counter = ChangeCounter(engine)
         self._engine = engine
@@ -215,3 +229,28 @@ class Catalogue:
         change = update(JobRow).where(JobRow.id == job_id, JobRow.state.in_(states)).values(**values)
         with self._sessions.begin() as session:
             return session.scalar(change.returning(JobRow))
+
+
+@contextmanager
+def open_catalogue(data: Path, *, is_created: bool = False) -> Iterator[Catalogue]:
+    """Open the SQLite catalogue of a data folder for the duration of a block; a service may run meanwhile.
+
+    Args:
+        data: data folder.
+        is_created: create folder and catalogue if they are missing.
+
+    Raises:
+        CatalogueError: there is no catalogue, or it cannot be opened or created.
+    """
+    folder = data.resolve()
+    if is_created:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise CatalogueError(f"{folder} cannot be created: {error.strerror}; use another --data") from None
+    url = make_sqlite_url(folder / CATALOGUE_FILE) if is_created else find_catalogue(folder)
+    catalogue = Catalogue(open_database(url), folder)
+    try:
+        yield catalogue
+    finally:
+        catalogue.close()

@@ -51,6 +51,8 @@ class LogSummary:
     """None if the log neither contains nor determines it."""
     lost: dict[str, int]
     """Number of lost samples by channel; empty for a truncated log."""
+    calibration: Mapping[str, str]
+    """Calibration by channel: JSON of its certificate, or text."""
 
 
 def read_log_summary(path: Path) -> LogSummary:
@@ -140,6 +142,7 @@ def _make_summary(
         continues=run.get("continues", ""),
         ending=read_ending(end),
         lost=_read_losses(end.get("lost", "")),
+        calibration=metadata.get("calibration", {}),
     )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
+from bench.calibration import list_overdue
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.integrity import check_integrity, find_missing
 from bench.catalogue.log_summary import LogSummary, compute_sha256, read_log_summary
@@ -67,6 +68,7 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
         "log_bytes": stat.st_size,
         "log_modified_ns": stat.st_mtime_ns,
         "log_sha256": sha256,
+        "calibration_overdue": list_overdue(summary.calibration),
     }
     if known is not None:
         return _read_content(catalogue, catalogue.update_run(known.id, **values | _keep_report(known, summary)))

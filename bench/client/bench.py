@@ -11,7 +11,7 @@ from typing import Any
 from bench.client.campaign import Campaign
 from bench.client.live import LiveSamples, iterate_live
 from bench.client.run import Run, RunState, parse_run_state
-from bench.client.session import Session
+from bench.client.session import Session, quote_name
 
 _PAGE_SIZE = 50
 """Number of runs requested at a time."""
@@ -131,6 +131,51 @@ class Bench:
             ClientError: the service cannot be reached.
         """
         return list(self._session.get("/campaigns", limit=limit)["items"])
+
+    def list_certificates(self, channel: str | None = None) -> list[dict[str, Any]]:
+        """Return the newest version of every calibration certificate, with its state.
+
+        Args:
+            channel: only those of this channel; None for all.
+
+        Raises:
+            ClientError: there is no such channel, or the service cannot be reached.
+        """
+        return list(self._session.get("/certificates", channel=channel)["items"])
+
+    def add_certificate(self, certificate: Mapping[str, Any]) -> dict[str, Any]:
+        """Store a calibration certificate and return it with its id.
+
+        Args:
+            certificate: document `mrbench.certificate/1`.
+
+        Raises:
+            ClientError: the certificate is refused or stored already, or the service cannot be reached.
+        """
+        return dict(self._session.post("/certificates", certificate, key=uuid.uuid4().hex))
+
+    def correct_certificate(self, certificate_id: str, reason: str, **changes: object) -> dict[str, Any]:
+        """Store a correction of a certificate as its next version, and return that.
+
+        Args:
+            certificate_id: id of the certificate.
+            reason: reason of the correction.
+            changes: new values of date, due, points, uncertainty, standard or note.
+
+        Raises:
+            ClientError: the correction is refused, or the service cannot be reached.
+        """
+        return dict(
+            self._session.patch(f"/certificates/{quote_name(certificate_id)}", {"reason": reason, **changes})
+        )
+
+    def withdraw_certificate(self, certificate_id: str, reason: str) -> dict[str, Any]:
+        """Withdraw a certificate, which stays visible, and return it.
+
+        Raises:
+            ClientError: it is withdrawn already, or the service cannot be reached.
+        """
+        return dict(self._session.delete(f"/certificates/{quote_name(certificate_id)}", reason=reason))
 
     def live(self, rate_hz: float = math.inf) -> Iterator[LiveSamples]:
         """Yield live samples of all channels as arrays with units, until the caller stops.

@@ -87,6 +87,14 @@ class Session:
         """
         return self._send("PATCH", path, json.dumps(content).encode(), key)
 
+    def delete(self, path: str, **query: object) -> Any:
+        """Return the reply to DELETE, decoded from JSON; parts of the query that are None are left out.
+
+        Raises:
+            ClientError: the service refuses or cannot be reached.
+        """
+        return self._send("DELETE", _add_query(path, query), b"", None)
+
     def download(self, path: str, to: Path) -> Path:
         """Download a file, which appears complete or not at all, and return its path.
 

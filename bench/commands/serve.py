@@ -58,6 +58,10 @@ def serve(
     tls_key: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Private key (PEM) of --tls-cert, without a password.")
     ] = None,
+    oidc: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="oidc.toml of the provider (OpenID Connect) by which persons sign in."),
+    ] = None,
 ) -> None:
     """Serve the REST interface, the live values and the web page.
 
@@ -82,6 +86,7 @@ def serve(
         scheduler_tls=scheduler_tls,
         allow_plain_scheduler=plain_scheduler,
         tls=None if tls_cert is None or tls_key is None else TlsFiles(tls_cert, tls_key),
+        oidc=oidc,
         is_terminal=sys.stdout.isatty(),
     )
     run_service(options, lambda line: typer.echo(line))

@@ -13,15 +13,12 @@ def verify(
 
     Lists each log that was changed or is missing, and then exits with status 1. The service may run meanwhile.
     """
-    from bench.catalogue import Catalogue, check_all, find_catalogue, open_database
+    from bench.catalogue import check_all, open_catalogue
     from bench.errors import LogError
 
     folder = data.resolve()
-    catalogue = Catalogue(open_database(find_catalogue(folder)), folder)
-    try:
+    with open_catalogue(folder) as catalogue:
         rows = list(check_all(catalogue))
-    finally:
-        catalogue.close()
     damaged = [row for row in rows if row.integrity != "intact"]
     for row in damaged:
         found = f": recorded {row.log_sha256}, found {row.found_sha256}" if row.found_sha256 else ""

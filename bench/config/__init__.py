@@ -1,6 +1,15 @@
 """Configuration of a bench (``bench.toml``)."""
 
-from bench.config.bench_config import AgentSection, BenchConfig, ChannelSection, compute_identity, load_config
+from bench.config.bench_config import (
+    CHANNEL_UNITS,
+    AgentSection,
+    BenchConfig,
+    CalibrationSection,
+    ChannelName,
+    ChannelSection,
+    compute_identity,
+    load_config,
+)
 from bench.config.instruments import (
     ActuatorSection,
     AsciiLoadCellSection,
@@ -13,10 +22,13 @@ from bench.config.instruments import (
 )
 
 __all__ = [
+    "CHANNEL_UNITS",
     "ActuatorSection",
     "AgentSection",
     "AsciiLoadCellSection",
     "BenchConfig",
+    "CalibrationSection",
+    "ChannelName",
     "ChannelSection",
     "CoilAmplifierSection",
     "InstrumentSection",

@@ -65,6 +65,24 @@ class AgentSection(FrozenModel):
 ChannelName: TypeAlias = Literal[
     "displacement", "force", "actuator_position", "coil_voltage", "coil_current", "temperature"
 ]
+CHANNEL_UNITS: dict[str, str] = {
+    "displacement": "m",
+    "force": "N",
+    "actuator_position": "m",
+    "coil_voltage": "V",
+    "coil_current": "A",
+    "temperature": "degC",
+}
+"""Unit of each channel in a log."""
+
+
+class CalibrationSection(FrozenModel):
+    """Consequence of an overdue calibration."""
+
+    overdue: Literal["mark", "refuse"] = Field(
+        default="mark",
+        description="mark: a run with an overdue channel says so in its log; refuse: it does not start",
+    )
 
 
 class BenchConfig(FrozenModel):
@@ -78,6 +96,9 @@ class BenchConfig(FrozenModel):
     silence: SilenceSection = Field(default=SilenceSection(), description="actions for silent instruments")
     rig: RigSection = Field(default=RigSection(), description="name, folder and specimen of the bench")
     agent: AgentSection = Field(default=AgentSection(), description="addresses of the rig agent")
+    calibration: CalibrationSection = Field(
+        default=CalibrationSection(), description="consequence of an overdue calibration"
+    )
 
     @model_validator(mode="after")
     def _check_roles(self) -> Self:

@@ -85,7 +85,9 @@ class RunHeader(BaseModel):
         default="smoothed displacement", description="origin of the velocity in the samples"
     )
     resampled: str = Field(default="no", description="how channels were resampled to the bench's time base")
-    calibration: dict[str, str] = Field(default_factory=dict, description="calibration by channel, as text")
+    calibration: dict[str, str] = Field(
+        default_factory=dict, description="calibration by channel: JSON of its certificate, or text"
+    )
     clocks: dict[str, str] = Field(default_factory=dict, description="clock by device, as text or JSON")
     channels: dict[str, ChannelInfo] = Field(default_factory=dict, description="acquisition by channel")
 

@@ -2,15 +2,17 @@
 
 import platform
 from collections.abc import Callable, Mapping
-from datetime import timedelta
+from datetime import date, timedelta
 from importlib.metadata import version
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import orjson
 
-from bench.config import AsciiLoadCellSection, BenchConfig, ChannelSection, LoadCellSection
+from bench.calibration import IssuedCertificate, make_attachment, make_log_text
+from bench.config import CHANNEL_UNITS, AsciiLoadCellSection, BenchConfig, ChannelSection, LoadCellSection
 from bench.errors import RunError
 from bench.log import DECODERS_FILE, ChannelInfo, Identity, RunHeader
 from bench.methods import Method
@@ -24,14 +26,6 @@ RESAMPLING_NOTE = (
     "cubic, drive and actuator position linearly, temperature holds its latest reading"
 )
 NO_CALIBRATION = "none given"
-_UNITS = {
-    "displacement": "m",
-    "force": "N",
-    "actuator_position": "m",
-    "coil_voltage": "V",
-    "coil_current": "A",
-    "temperature": "degC",
-}
 
 
 class Attachment(NamedTuple):
@@ -54,7 +48,13 @@ class LogMetadata(NamedTuple):
 
 
 def make_run_header(
-    method: Method, identity: Identity, config: BenchConfig, rig: Rig, maps: Mapping[str, ClockMap], bench_ns: int
+    method: Method,
+    identity: Identity,
+    config: BenchConfig,
+    rig: Rig,
+    maps: Mapping[str, ClockMap],
+    bench_ns: int,
+    certificates: Mapping[str, IssuedCertificate] = MappingProxyType({}),
 ) -> RunHeader:
     """Make the header that is written when the log is opened.
 
@@ -65,6 +65,7 @@ def make_run_header(
         rig: instruments of the bench.
         maps: clock map of each instrument by name.
         bench_ns: bench clock now [ns].
+        certificates: certificates that apply, by channel.
     """
     return RunHeader(
         id=identity.make_run_id(method.name),
@@ -79,7 +80,7 @@ def make_run_header(
         utc_offset=(identity.started - timedelta(microseconds=bench_ns / 1000)).isoformat(),
         velocity_from="smoothed displacement",
         resampled=RESAMPLING_NOTE,
-        calibration=_describe_calibration(config, rig),
+        calibration=_describe_calibration(config, rig, certificates, identity.started.date()),
         clocks=describe_clocks(rig, maps),
         channels=make_channel_infos(config, rig),
     )
@@ -101,7 +102,13 @@ def describe_clocks(rig: Rig, maps: Mapping[str, ClockMap]) -> dict[str, str]:
     return descriptions
 
 
-def make_attachments(method: Method, config: BenchConfig, rig: Rig, source: Path | None) -> list[Attachment]:
+def make_attachments(
+    method: Method,
+    config: BenchConfig,
+    rig: Rig,
+    source: Path | None,
+    certificates: Mapping[str, IssuedCertificate] = MappingProxyType({}),
+) -> list[Attachment]:
     """Collect method, configuration, instruments and certificates.
 
     Args:
@@ -109,6 +116,7 @@ def make_attachments(method: Method, config: BenchConfig, rig: Rig, source: Path
         config: configuration of the bench.
         rig: instruments of the bench.
         source: file of the configuration; None without one.
+        certificates: certificates that apply, by channel.
 
     Raises:
         RunError: a certificate that the configuration names cannot be read.
@@ -118,7 +126,14 @@ def make_attachments(method: Method, config: BenchConfig, rig: Rig, source: Path
         attachments.append(Attachment("bench.toml", "application/toml", _read_bytes(source)))
     instruments = orjson.dumps(_describe_instruments(rig), option=orjson.OPT_INDENT_2)
     attachments.append(Attachment("instruments.json", "application/json", instruments))
+    applying = [certificates[name] for name in _find_channel_sections(config, rig) if name in certificates]
+    attachments += [_make_certificate_attachment(issued) for issued in applying]
     return attachments + _read_certificates(config, Path() if source is None else source.parent)
+
+
+def _make_certificate_attachment(issued: IssuedCertificate) -> Attachment:
+    name, data = make_attachment(issued)
+    return Attachment(name, "application/json", data)
 
 
 def _read_certificates(config: BenchConfig, folder: Path) -> list[Attachment]:
@@ -156,12 +171,17 @@ def _describe_instruments(rig: Rig) -> dict[str, Any]:
     }
 
 
-def _describe_calibration(config: BenchConfig, rig: Rig) -> dict[str, str]:
-    return {
-        name: (section.calibration or NO_CALIBRATION)
-        + (f"; certificate {Path(section.certificate).name}" if section.certificate else "")
-        for name, section in _find_channel_sections(config, rig).items()
-    }
+def _describe_calibration(
+    config: BenchConfig, rig: Rig, certificates: Mapping[str, IssuedCertificate], day: date
+) -> dict[str, str]:
+    """Return for each channel its certificate as JSON; without one, the text of the configuration."""
+    texts = {}
+    for name, section in _find_channel_sections(config, rig).items():
+        attached = f"; certificate {Path(section.certificate).name}" if section.certificate else ""
+        issued = certificates.get(rig.drive_channel if name == "coil_drive" else name)
+        text = f"{section.calibration or NO_CALIBRATION}{attached}"
+        texts[name] = text if issued is None else make_log_text(issued, day, f"{section.calibration}{attached}")
+    return texts
 
 
 def make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
@@ -169,7 +189,7 @@ def make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
     rates = _find_rates(config, rig)
     return {
         name: ChannelInfo(
-            unit=rig.drive_unit if name == "coil_drive" else _UNITS[name],
+            unit=rig.drive_unit if name == "coil_drive" else CHANNEL_UNITS[name],
             rate_hz=rates[name],
             filter=None
             if section.filter is None
@@ -182,7 +202,7 @@ def make_channel_infos(config: BenchConfig, rig: Rig) -> dict[str, ChannelInfo]:
 
 def _find_channel_sections(config: BenchConfig, rig: Rig) -> dict[str, ChannelSection]:
     """Return the configuration of each recorded channel; the drive has that of the channel that measures it."""
-    recorded = [name for name in _UNITS if name != "temperature" or rig.thermometer is not None]
+    recorded = [name for name in CHANNEL_UNITS if name != "temperature" or rig.thermometer is not None]
     configured: Mapping[str, ChannelSection] = {str(name): section for name, section in config.channels.items()}
     sections = {name: configured.get(name, ChannelSection()) for name in recorded}
     return {**sections, "coil_drive": sections[rig.drive_channel]}

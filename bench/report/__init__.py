@@ -1,7 +1,15 @@
 """Reports: one page with plots from a log, a fit and a diagnosis, which are all read as files."""
 
 from bench.report.diagnosis import VERDICTS, read_diagnosis
-from bench.report.documents import DocumentPart, Fit, Prediction, read_document, read_fit, read_prediction
+from bench.report.documents import (
+    DocumentPart,
+    Estimate,
+    Fit,
+    Prediction,
+    read_document,
+    read_fit,
+    read_prediction,
+)
 from bench.report.drawing import FAINT_COLOUR, INK_COLOUR, make_figure, style_axes
 from bench.report.layout import save_figures
 from bench.report.page import gather, make_figures, render
@@ -22,6 +30,7 @@ __all__ = [
     "INK_COLOUR",
     "VERDICTS",
     "DocumentPart",
+    "Estimate",
     "Finding",
     "Fit",
     "Prediction",

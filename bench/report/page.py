@@ -10,9 +10,15 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from bench.calibration import GAIN_FORMULA
 from bench.errors import ReportError
 from bench.log import Log, read_log
 from bench.report import content, diagnosis, diagnosis_plots, plots
+from bench.report.calibration import (
+    make_calibration_findings,
+    make_calibration_rows,
+    make_combined_rows,
+)
 from bench.report.diagnosis import Diagnosis, read_diagnosis
 from bench.report.documents import Fit, Prediction, read_fit, read_prediction
 from bench.report.layout import Picture, make_environment, render_png
@@ -164,9 +170,13 @@ def make_context(report: Report, command: str, created_at: datetime) -> dict[str
     return {
         "title": _make_title(report.log),
         "run": content.make_header_rows(report.log, report.sha256),
-        "findings": make_findings(report.log, report.fit, report.prediction, report.is_fitted_log),
+        "findings": [
+            *make_calibration_findings(report.log),
+            *make_findings(report.log, report.fit, report.prediction, report.is_fitted_log),
+        ],
         "outcome": content.make_outcome_rows(report.log),
         "channels": content.make_channel_rows(report.log),
+        "calibration": make_calibration_rows(report.log),
         "diagnosis": None if found is None else diagnosis.make_context(found, report.recording.drive_unit),
         "truth": _make_truth_context(report),
         "fit": None if report.fit is None else _make_fit_context(report),
@@ -211,6 +221,8 @@ def _make_fit_context(report: Report) -> dict[str, object]:
         "freed": ", ".join(prediction.freed),
         "coordinates": content.make_parameter_rows(fit.coordinates, "coordinates"),
         "parameters": content.make_parameter_rows(fit.parameters, "parameters"),
+        "combined": make_combined_rows(report.log, fit, report.sha256),
+        "formula": GAIN_FORMULA,
         "errors": _make_error_rows(fit),
         "floor": content.make_floor_rows(fit),
         "nuisances": content.make_nuisance_rows(fit),

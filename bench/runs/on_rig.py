@@ -3,10 +3,14 @@
 import contextlib
 import threading
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
-from bench.agent import Agent, acquire_agent_lock, handle_command
-from bench.agent_protocol import CommandServer, RunCommand, RunStatus, make_endpoint
+from bench.agent import Agent, CommandTrail, acquire_agent_lock, handle_command
+from bench.agent_protocol import CommandServer, RunCommand, RunStatus, StopCommand, get_sender, make_endpoint
+from bench.audit import make_agent_trail
+from bench.calibration import IssuedCertificate
+from bench.catalogue import CATALOGUE_FILE, open_catalogue
 from bench.config import load_config
 from bench.errors import RunError
 from bench.methods import Method
@@ -39,7 +43,7 @@ def run_on_rig(
         specimen: the damper under test; empty for the configured one.
         operator: name of the operator.
         progress: receives the completed share, 0 to 1.
-        on_warning: receives each privilege that the system did not grant.
+        on_warning: receives each privilege that the system did not grant, and each overdue calibration.
 
     Returns:
         The status with its outcome, clean or lossy.
@@ -47,6 +51,7 @@ def run_on_rig(
     Raises:
         ConfigError: the configuration is not valid.
         MethodError: the method cannot be compiled within its limits.
+        CatalogueError: the catalogue with the calibration certificates cannot be opened.
         RunError: the bench belongs to another agent, an instrument does not reply, or the run stopped early; the
             recorded part is in the log.
     """
@@ -57,25 +62,61 @@ def run_on_rig(
     with set_on_signals(stopping), acquire_agent_lock(config), contextlib.ExitStack() as opened:
         try:
             server = opened.enter_context(CommandServer(endpoint.commands, endpoint.key))
+            trail = opened.enter_context(CommandTrail(make_agent_trail(bench_config, config)))
             agent = opened.enter_context(Agent(bench_config, config))
         except DriverError as error:
             raise RunError(str(error)) from error
         for warning in agent.get_status().warnings:
             on_warning(warning)
         document = method.model_dump(mode="json", by_alias=True)
-        reply = agent.run(RunCommand(method=document, specimen=specimen, operator=operator, log=str(out)))
-        if not reply.ok:
-            raise RunError(reply.error)
-        opened.enter_context(_serve_commands(server, agent, stopping))
-        return _follow_run(agent, stopping, progress)
+        command = RunCommand(
+            method=document,
+            specimen=specimen,
+            operator=operator,
+            certificates=_read_certificates(config.parent / bench_config.rig.folder),
+            log=str(out),
+        )
+        _start(agent, trail, command)
+        run = agent.get_run_status()
+        for overdue in () if run is None else run.calibration_overdue:
+            on_warning(overdue)
+        opened.enter_context(_serve_commands(server, agent, trail, stopping))
+        return _follow_run(agent, trail, stopping, progress)
+
+
+def _start(agent: Agent, trail: CommandTrail, command: RunCommand) -> None:
+    """Start a run, and record who has.
+
+    Raises:
+        RunError: the agent refuses it, or it could not be recorded.
+    """
+    command = command.model_copy(update={"sender": get_sender()})
+    if obstacle := trail.find_obstacle(command):
+        raise RunError(obstacle)
+    reply = agent.run(command)
+    trail.record(command, "", reply, wait=True)
+    if not reply.ok:
+        raise RunError(reply.error)
+
+
+def _read_certificates(data: Path) -> tuple[IssuedCertificate, ...]:
+    """Return the certificates that apply today, from the catalogue of the bench's folder if it has one."""
+    if not (data / CATALOGUE_FILE).is_file():
+        return ()
+    with open_catalogue(data) as catalogue:
+        return tuple(catalogue.certificates.list_current(datetime.now(UTC).date()).values())
 
 
 @contextlib.contextmanager
-def _serve_commands(server: CommandServer, agent: Agent, stopping: threading.Event) -> Iterator[None]:
+def _serve_commands(
+    server: CommandServer, agent: Agent, trail: CommandTrail, stopping: threading.Event
+) -> Iterator[None]:
     """Answer commands of other processes for the duration of a block; the end of the agent stops the run."""
     ended = threading.Event()
     thread = threading.Thread(
-        target=server.serve, args=(lambda command: handle_command(agent, command, stopping), ended), daemon=True
+        target=server.serve,
+        args=(lambda command: handle_command(agent, trail, command, stopping), ended, trail),
+        daemon=True,
     )
     thread.start()
     try:
@@ -85,13 +126,13 @@ def _serve_commands(server: CommandServer, agent: Agent, stopping: threading.Eve
         thread.join()
 
 
-def _follow_run(agent: Agent, stopping: threading.Event, progress: Progress) -> RunStatus:
+def _follow_run(agent: Agent, trail: CommandTrail, stopping: threading.Event, progress: Progress) -> RunStatus:
     """Wait for the end of the run, stop it if requested, and return its status."""
     is_stopping = False
     while not agent.wait(_POLL_PERIOD):
         if stopping.is_set() and not is_stopping:
             is_stopping = True
-            agent.stop()
+            trail.record(StopCommand(sender=get_sender()), "signal", agent.stop(), wait=False)
         run = agent.get_run_status()
         if run is not None:
             progress(min(run.elapsed_s / run.duration_s, 1.0) if run.duration_s else 1.0)

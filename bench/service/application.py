@@ -21,20 +21,23 @@ from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqli
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
 from bench.live import LiveBatch, LiveBroadcaster, serialise_message
+from bench.oidc import OidcConfig, Provider
 from bench.samples import SampleStore
 from bench.service import problems
-from bench.service.access import Access
+from bench.service.access import Access, Authenticator, PeopleStores
 from bench.service.agent_monitor import AgentLink, AgentMonitor
+from bench.service.audit import AuditTrail, RecordedConnection
 from bench.service.campaigns import CampaignExecutor
 from bench.service.context import ServiceContext
 from bench.service.middleware import (
+    AccessCheckMiddleware,
+    AuditMiddleware,
     BodyLimitMiddleware,
     HeadMiddleware,
     KeptAnswerMiddleware,
     RequestLogMiddleware,
     RequestMetricsMiddleware,
     SecurityHeadersMiddleware,
-    TokenCheckMiddleware,
 )
 from bench.service.requests import refuse_unknown_parameters
 from bench.service.routes import PROTECTED_ROUTERS, PUBLIC_ROUTERS, refuse_unknown_paths
@@ -42,13 +45,22 @@ from bench.service.run_registry import RunRegistry
 from bench.service.transfer import MAX_UPLOAD_SIZE, remove_leftovers
 
 API = "/api/v1"
-PUBLIC_PATHS = (f"{API}/health", f"{API}/openapi.json")
-"""Paths below `/api/` that need no token."""
+PUBLIC_OPERATIONS = (
+    f"GET {API}/health",
+    f"GET {API}/openapi.json",
+    f"POST {API}/session",
+    f"GET {API}/session/ways",
+    f"GET {API}/session/oidc",
+    f"GET {API}/session/oidc/callback",
+)
+"""Operations that need no sign-in."""
 _LISTS = ("events", "jobs", "methods", "runs")
 KEPT_PATHS = frozenset(
     f"{API}/{name}" for name in ("bench", "bench/channels", "bench/instruments", "bench/limits", *_LISTS)
 )
 """Paths whose answers depend only on the catalogue, the agent's status and the query."""
+COMPUTATIONS = frozenset((f"{API}/methods/dry-run", f"{API}/campaigns/plan"))
+"""Paths whose POST only computes an answer; nothing of it is recorded."""
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]", "::1")
 PAGE_FOLDER = Path(__file__).parent.parent / "web" / "static"
 """Files of the web page."""
@@ -69,6 +81,8 @@ class AppSettings:
     """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
     database: str | None = None
     """URL of the catalogue's database; by default an SQLite file in the data folder."""
+    oidc: OidcConfig | None = None
+    """Provider by which persons sign in; None for local users and tokens only."""
 
 
 def create_app(settings: AppSettings | None = None) -> FastAPI:
@@ -92,7 +106,9 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.add_middleware(KeptAnswerMiddleware, paths=KEPT_PATHS)
     app.add_middleware(HeadMiddleware, below="/api/")
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
-    app.add_middleware(TokenCheckMiddleware, below="/api/", public=PUBLIC_PATHS)
+    app.add_middleware(AccessCheckMiddleware, below=API, public=PUBLIC_OPERATIONS)
+    routes = tuple(route for router in PROTECTED_ROUTERS for route in router.routes)
+    app.add_middleware(AuditMiddleware, api=API, routes=routes, unrecorded=COMPUTATIONS)
     app.add_middleware(RequestLogMiddleware)
     app.state.request_metrics = CollectorRegistry()
     app.add_middleware(RequestMetricsMiddleware, registry=app.state.request_metrics)
@@ -113,8 +129,8 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     return app
 
 
-_BEARER = HTTPBearer(auto_error=False, description="token that `mrbench serve` prints at its first start")
-"""Description of the token for OpenAPI; `TokenCheckMiddleware` checks it."""
+_BEARER = HTTPBearer(auto_error=False, description="token of the bench or of a program")
+"""Description of the token for OpenAPI; `AccessCheckMiddleware` checks it, or the cookie of a session."""
 
 
 @asynccontextmanager
@@ -132,6 +148,7 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         stack.push_async_callback(engine.close)
         await engine.start(context.job_manager)
         stack.enter_context(context.monitor)
+        stack.enter_context(context.audit)
         stack.enter_context(NotificationSender(context.campaigns.store))
         stack.enter_context(context.campaigns)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
@@ -165,10 +182,12 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
 
     job_manager = JobManager(catalogue, engine, on_job_changed)
     monitor = AgentMonitor(settings.link, on_message, on_status)
-    campaigns = CampaignExecutor(catalogue, monitor, is_local=settings.has_local_logs)
+    audit = AuditTrail(settings.data, settings.link.send)
+    recorded = RecordedConnection(monitor, audit.record)
+    campaigns = CampaignExecutor(catalogue, recorded, is_local=settings.has_local_logs)
     registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
     context = ServiceContext(
-        settings.access,
+        Authenticator(settings.access, PeopleStores(catalogue.users, catalogue.tokens, catalogue.sessions)),
         catalogue,
         monitor,
         broadcaster,
@@ -179,6 +198,8 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         SpaceMonitor(settings.data),
         SampleStore(settings.data),
         campaigns,
+        audit,
+        provider=None if settings.oidc is None else Provider(settings.oidc),
     )
     return context
 

@@ -15,9 +15,12 @@ from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.live import LiveBroadcaster
+from bench.oidc import Provider
+from bench.people import AttemptCounter, SignInCodes
 from bench.samples import SampleStore
-from bench.service.access import Access
+from bench.service.access import Authenticator
 from bench.service.agent_monitor import AgentMonitor
+from bench.service.audit import AuditTrail
 from bench.service.campaigns import CampaignExecutor
 from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
@@ -44,7 +47,7 @@ class Shown:
 class ServiceContext:
     """Objects shared by all routes."""
 
-    access: Access
+    authenticator: Authenticator
     catalogue: Catalogue
     monitor: AgentMonitor
     live: LiveBroadcaster
@@ -56,8 +59,15 @@ class ServiceContext:
     space_monitor: SpaceMonitor
     sample_store: SampleStore
     campaigns: CampaignExecutor
+    audit: AuditTrail
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
     """Locks of the idempotency keys of requests in progress."""
+    attempts: AttemptCounter = field(default_factory=AttemptCounter)
+    """Failed sign-ins by user name, and by client address for tokens and codes."""
+    codes: "SignInCodes[tuple[str, str]]" = field(default_factory=SignInCodes)
+    """Codes for another device; the owner is kind and subject of a session."""
+    provider: Provider | None = None
+    """Provider by which persons sign in; None without one."""
 
     @property
     def data(self) -> Path:

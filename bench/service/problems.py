@@ -13,6 +13,8 @@ from starlette.exceptions import HTTPException
 
 from bench.campaigns import CampaignDocumentError
 from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, NoRigError, RecordingError
+from bench.people import Right, find_roles
+from bench.service.access import Identity
 
 MEDIA_TYPE = "application/problem+json"
 _LOG = logging.getLogger(__name__)
@@ -38,10 +40,18 @@ class Problem(BaseModel):
 class ProblemError(Exception):
     """Error raised by a route and returned as a problem."""
 
-    def __init__(self, status: HTTPStatus, name: str, title: str, detail: str) -> None:
+    def __init__(
+        self,
+        status: HTTPStatus,
+        name: str,
+        title: str,
+        detail: str,
+        headers: Mapping[str, str] | None = None,
+    ) -> None:
         detail = shorten(detail, MAX_DETAIL)
         super().__init__(detail)
         self.problem = Problem(type=f"urn:mrbench:problem:{name}", title=title, status=status, detail=detail)
+        self.headers = headers
 
 
 class BodyTooLargeError(HTTPException):
@@ -69,9 +79,25 @@ def make_too_large(limit: int) -> ProblemError:
 
 
 def make_unauthorised() -> ProblemError:
-    """Return the error for a missing or wrong token."""
-    detail = "give the token as `Authorization: Bearer ...`; `mrbench serve --new-token` creates a new one"
-    return ProblemError(HTTPStatus.UNAUTHORIZED, "unauthorised", "The token is missing or wrong", detail)
+    """Return the error for a request without sign-in."""
+    detail = (
+        "sign in on the page, or give a token as `Authorization: Bearer ...`; `mrbench serve --new-token` "
+        "creates a new one of the bench"
+    )
+    return ProblemError(HTTPStatus.UNAUTHORIZED, "unauthorised", "Not signed in", detail)
+
+
+def make_csrf_missing() -> ProblemError:
+    """Return the error for a request that has the cookie of a session, but may come from another site."""
+    detail = "the request has a session's cookie; send the `csrf` value of GET /session as X-CSRF-Token with it"
+    return ProblemError(HTTPStatus.FORBIDDEN, "csrf", "The request may come from another site", detail)
+
+
+def make_right_missing(right: Right, identity: Identity) -> ProblemError:
+    """Return the error for a request that its sender has no right to."""
+    roles = " or ".join(find_roles(right))
+    detail = f"{identity.full_name} ({identity.role}) lacks the right {right}, which the role {roles} has"
+    return ProblemError(HTTPStatus.FORBIDDEN, "right-missing", "Not permitted", f"{detail}; ask an administrator")
 
 
 def make_conflict(name: str, title: str, detail: str) -> ProblemError:
@@ -86,7 +112,8 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
     }
     for status, description in (
         (400, "The request cannot be read"),
-        (401, "The token is missing or wrong"),
+        (401, "Not signed in"),
+        (403, "Not permitted"),
         (404, "The object does not exist"),
         (409, "Not possible in the present state"),
         (413, "The body is too large"),
@@ -170,4 +197,6 @@ def _make_validation_problem(error: RequestValidationError) -> ProblemError:
 def make_response(error: ProblemError, headers: Mapping[str, str] | None = None) -> JSONResponse:
     """Return the response for an error."""
     problem = error.problem
-    return JSONResponse(problem.model_dump(), problem.status, headers=headers, media_type=MEDIA_TYPE)
+    return JSONResponse(
+        problem.model_dump(), problem.status, headers=headers or error.headers, media_type=MEDIA_TYPE
+    )

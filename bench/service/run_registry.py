@@ -196,6 +196,7 @@ def make_run_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
         operator=run.operator,
         source="run",
         continues=run.continues or None,
+        calibration_overdue=list(run.calibration_overdue),
         started=_parse_utc(run.started),
         duration_s=run.duration_s,
         state="running",

@@ -15,9 +15,10 @@ from urllib.parse import urlsplit
 
 import uvicorn
 
-from bench.agent_protocol import AgentClient, AgentEndpoint, derive_samples_address, find_agent
+from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samples_address, find_agent
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr
+from bench.oidc import load_oidc_config
 from bench.processes import open_privately
 from bench.service.access import PLAIN_TOKEN_FILE, open_access, save_token
 from bench.service.agent_monitor import AgentLink, NoAgent
@@ -74,6 +75,8 @@ class ServeOptions:
     """Accept a scheduler without TLS beyond the loopback interface."""
     tls: TlsFiles | None = None
     """Files of HTTPS; without them, the service answers plain HTTP."""
+    oidc: Path | None = None
+    """``oidc.toml`` of the provider by which persons sign in."""
     is_terminal: bool = False
     """True if the printed lines are shown on a terminal and kept nowhere: only then is the token printed."""
 
@@ -88,13 +91,14 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
     Raises:
         ServiceError: the data folder, the port or the agent is not available.
         WorkerError: the address of the scheduler is not valid, or is refused because it has no TLS.
-        SecretFileError: the TLS file of the scheduler is missing, or other users may read it.
-        ConfigError: ``bench.toml`` or the address of the agent is invalid.
+        SecretFileError: a file with a secret is missing, or other users may read it.
+        ConfigError: ``bench.toml``, ``oidc.toml`` or the address of the agent is invalid.
         CatalogueError: the catalogue cannot be opened.
     """
     log_to_stderr()
     if options.tls is not None:
         check_tls(options.tls)
+    oidc = None if options.oidc is None else load_oidc_config(options.oidc)
     data = options.data.resolve()
     link, commands = _make_agent_link(options)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
@@ -112,6 +116,7 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
                 engine=_choose_engine(options, data),
                 has_local_logs=commands is None or _is_local(commands),
                 hosts=LOOPBACK_NAMES if loopback else ("*",),
+                oidc=oidc,
             )
         )
         host, port = listener.getsockname()[:2]
@@ -184,7 +189,7 @@ def _make_agent_link(options: ServeOptions) -> tuple[AgentLink, str | None]:
         endpoint = find_agent(options.config)
     else:
         return NoAgent(), None
-    return AgentClient(*endpoint), endpoint.commands
+    return AgentClient(*endpoint, sender=Sender(actor="service")), endpoint.commands
 
 
 def _is_local(address: str) -> bool:

@@ -20,14 +20,18 @@ class View(BaseModel):
 
 
 class Health(View):
-    """State of agent, worker, disk, queue and clocks, each in words."""
+    """State of agent, worker, disk, queue, audit trail and clocks, each in words."""
 
     version: str
     agent: str = Field(description="`ok`, or the reason why it is not available")
     worker: str = Field(description="`ok`, or the reason why it is not available")
     disk: str = Field(description="`ok`, or the free space of the data folder where it is little")
     queue: str = Field(description="`empty`, or the numbers of running and waiting jobs")
+    audit: str = Field(description="`ok`, or why the audit trail cannot be written, or that it was altered")
     clocks: str = Field(description="`ok`, or the instruments whose clock has an error above 1 ms, with its bound")
+    calibration: str = Field(
+        description="`ok`, or the channels whose calibration is overdue or due within 14 days, with the date"
+    )
 
 
 class SetupRequest(View):
@@ -87,6 +91,9 @@ class Run(View):
     log_bytes: int | None = Field(description="size of the log [bytes]; null until it was read")
     lost: dict[str, int] = Field(description="number of lost samples by channel; empty if none was lost")
     alarms: tuple[str, ...] = Field(description="texts of the alarms during the run")
+    calibration_overdue: tuple[str, ...] = Field(
+        description="channels whose calibration was overdue at the start, each with its certificate and due date"
+    )
     tags: tuple[str, ...] = Field(description="words by which a person sorts runs")
     trashed: datetime | None = Field(description="UTC at which the run was moved to the trash; null outside it")
     log_sha256: str | None = Field(description="hash of the log as it was recorded; null without a complete log")
@@ -173,6 +180,7 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         log_bytes=row.log_bytes,
         lost=row.lost or {},
         alarms=tuple(row.alarms or ()),
+        calibration_overdue=tuple(row.calibration_overdue or ()),
         tags=tuple(row.tags or ()),
         trashed=row.trashed,
         log_sha256=row.log_sha256,

@@ -21,7 +21,9 @@ from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import Method, compile_method, compute_envelope, load_method, parse_method
 from bench.service.routes.planning.previews import make_preview
 from tests.support.fake_campaigns import FakeCampaigns, campaign_routes
+from tests.support.fake_certificates import add_certificate_routes
 from tests.support.fake_comparison import comparison_routes
+from tests.support.fake_people import COOKIE, TOKEN, FakePeople, people_routes
 from tests.support.fake_recording import recording_routes
 from tests.support.fake_results import Records, analysis_routes, make_summary, record_routes
 from tests.support.fake_specimens import add_history, specimen_routes
@@ -30,7 +32,6 @@ STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
 FIT = Path(__file__).parents[1] / "contracts" / "documents_47f8566" / "fit.json"
 OPENAPI = Path(__file__).parents[2] / "docs" / "reference" / "openapi.json"
 REPORT = "<!doctype html><html lang='en'><title>Report</title><h1>Damper report</h1><p>Simulated.</p></html>"
-TOKEN = "a-token"
 SILENCE = "the rig agent at tcp://127.0.0.1:8700 did not answer within 1 s; is `mrbench rig` up?"
 REFUSAL = "lvdt: not connected for 3.2 s; plug it in and start again"
 CLAMPED = "a specimen is clamped, and homing would drive it into its ends; unclamp it and call unmount first"
@@ -47,6 +48,7 @@ CHANNELS = (
     Channel("temperature", "degC"),
 )
 PAUSE = "at checkpoint 10mm_1Hz, in 4 s"
+OVERDUE = "coil_voltage: calibration overdue since 2025-02-20 (certificate E-77 of Testo Industrial Services)"
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
 METHODS = [
     {
@@ -113,7 +115,8 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
         "ending": None, "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None,
         "noise_floor_n": None, "result": "", "jobs": [], "continues": None, "log_sha256": None, "integrity": None,
-        "lost": {}, "alarms": [], "tags": [], "trashed": None, "method_version": None, "method_sha256": None,
+        "lost": {}, "alarms": [], "calibration_overdue": [],
+        "tags": [], "trashed": None, "method_version": None, "method_sha256": None,
         "log_bytes": None,
         "diagnosis": None,
     } | more  # fmt: skip
@@ -152,6 +155,7 @@ class FakeBench:
         activity = "identify: refine, start 3 of 8"
         self.runs = {
             "run-3": run(3, "lossy", reason="12 samples of force were lost", ending="stopped", log_sha256=HASH,
+                         calibration_overdue=[OVERDUE],
                          jobs=[fit_job("run-3", "failed", error="the worker was killed")]),
             "run-2": run(2, "clean", log_sha256=HASH, jobs=[fit_job("run-2", "running", activity=activity)]),
             "run-1": run(1, "clean", jobs=done_jobs("run-1", found), log_sha256=HASH,
@@ -159,6 +163,7 @@ class FakeBench:
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
         self.records = Records(self.runs)
+        self.people = FakePeople()
         self.began, self.began_utc = time.monotonic(), time.time()
 
     def status(self) -> dict[str, Any]:
@@ -201,10 +206,27 @@ class FakeBench:
         return LiveBatch(first // BATCH, utc_s, 1 / RATE, CHANNELS, values)
 
 
-def problem(status: int, title: str, detail: str) -> JSONResponse:
+def problem(status: int, title: str, detail: str, name: str = "", retry_after: int | None = None) -> JSONResponse:
     """Return an error in the form of the service."""
-    content = {"type": "about:blank", "title": title, "status": status, "detail": detail}
-    return JSONResponse(content, status_code=status, media_type="application/problem+json")
+    kind = f"urn:mrbench:problem:{name}" if name else "about:blank"
+    content = {"type": kind, "title": title, "status": status, "detail": detail}
+    headers = {} if retry_after is None else {"Retry-After": str(retry_after)}
+    return JSONResponse(content, status_code=status, headers=headers, media_type="application/problem+json")
+
+
+def find_refusal(bench: FakeBench, request: Request) -> JSONResponse | None:
+    """Return why a request is refused: without sign-in, or with a cookie that another site may have used."""
+    operation = f"{request.method} {request.url.path}"
+    is_sign_in = operation in ("POST /api/v1/session", "GET /api/v1/session/ways")
+    if not request.url.path.startswith("/api/") or is_sign_in:
+        return None
+    session = bench.people.identify(request)
+    if session is None:
+        return problem(401, "Not signed in", "sign in on the page")
+    is_from_page = "authorization" in request.headers or request.headers.get("x-csrf-token") == session["csrf"]
+    if request.method in ("GET", "HEAD") or is_from_page:
+        return None
+    return problem(403, "The request may come from another site", "send X-CSRF-Token", "csrf")
 
 
 def application(bench: FakeBench) -> FastAPI:
@@ -213,12 +235,12 @@ def application(bench: FakeBench) -> FastAPI:
 
     @app.middleware("http")
     async def authorise(request: Request, call_next: Any) -> Any:
-        allowed = request.headers.get("authorization") == f"Bearer {TOKEN}"
-        if request.url.path.startswith("/api/") and not allowed:
-            return problem(401, "Not allowed", "the token is missing or wrong")
-        if request.method != "GET":
-            body = await request.body()
-            bench.posted.append((request.url.path.removeprefix("/api/v1/"), body.decode()))
+        refusal = find_refusal(bench, request)
+        if refusal is not None:
+            return refusal
+        path = request.url.path.removeprefix("/api/v1/")
+        if request.method != "GET" and path != "session":
+            bench.posted.append((path, (await request.body()).decode()))
         return await call_next(request)
 
     for routes in (
@@ -238,9 +260,11 @@ def application(bench: FakeBench) -> FastAPI:
         analysis_routes(),
         record_routes(bench.records, problem),
         campaign_routes(FakeCampaigns()),
+        people_routes(bench.people, problem),
     )
     for other in others:
         app.include_router(other, prefix="/api/v1")
+    add_certificate_routes(app, FIT)
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 
@@ -260,7 +284,16 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     @router.get("/health")
     async def health() -> Any:
         agent = SILENCE if bench.silent else "ok"
-        return {"version": "0.1.0", "agent": agent, "worker": "ok", "disk": "ok", "queue": "empty", "clocks": "ok"}
+        return {
+            "version": "0.1.0",
+            "agent": agent,
+            "worker": "ok",
+            "disk": "ok",
+            "queue": "empty",
+            "audit": "ok",
+            "clocks": "ok",
+            "calibration": OVERDUE,
+        }
 
     @router.post("/bench/reset")
     async def reset() -> Any:
@@ -454,11 +487,13 @@ def live_routes(bench: FakeBench) -> APIRouter:
     @router.websocket("/live")
     async def live(websocket: WebSocket) -> None:
         await websocket.accept()
-        if (await websocket.receive_json())["token"] != TOKEN:
-            await websocket.close(4401)
-            return
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-            await publish(websocket, bench)
+            first = await websocket.receive_json()
+            csrf = bench.people.sessions.get(websocket.cookies.get(COOKIE, ""), {}).get("csrf")
+            if first.get("token") == TOKEN or (csrf and first.get("csrf") == csrf):
+                await publish(websocket, bench)
+            else:
+                await websocket.close(4401)
 
     return router
 

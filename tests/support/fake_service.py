@@ -6,6 +6,8 @@ import time
 from bench.agent_protocol.messages import (
     AbortCommand,
     AgentStatus,
+    AuditCommand,
+    AuditPage,
     BenchChannel,
     BenchDescription,
     BenchLimit,
@@ -29,8 +31,11 @@ class FakeAgent:
         self.published = queue.Queue()
         self.reachable = True
         self.refuses = ""
+        self.overdue = ()
         self.commands = []
         self.defect = None
+        self.audit = AuditPage(chain="", before="", lines=())
+        self.trail = None
         self.description = BenchDescription(
             name="bench",
             specimen="mounted damper",
@@ -47,8 +52,8 @@ class FakeAgent:
             raise AgentUnreachableError(
                 "no rig agent answered at tcp://127.0.0.1:5570 within 1 s; start one: mrbench rig"
             )
-        if isinstance(command, DescribeCommand):
-            return Reply(ok=True, description=self.description)
+        if isinstance(command, DescribeCommand | AuditCommand):
+            return self._answer(command)
         self.commands.append(command)
         if self.refuses:
             return Reply(ok=False, error=self.refuses, status=self.status)
@@ -65,6 +70,11 @@ class FakeAgent:
             case ResetCommand():
                 self._set(state="idle", trip="")
         return Reply(ok=True, status=self._stamped_status())
+
+    def _answer(self, question):
+        if isinstance(question, DescribeCommand):
+            return Reply(ok=True, description=self.description)
+        return Reply(ok=True, audit=self.trail.read_page(question) if self.trail else self.audit)
 
     def subscribe(self, stopping):
         while not stopping.is_set():
@@ -104,6 +114,7 @@ class FakeAgent:
             log=command.log or f"/elsewhere/run-{number}.mcap",
             started=f"2026-03-0{number}T10:00:00+00:00",
             duration_s=23.1,
+            calibration_overdue=self.overdue,
         )
         self._set(state="running", run=run)
 

@@ -41,13 +41,14 @@ class RunBench:
     Args:
         folder: folder of the configuration and the logs.
         clock: bench clock [ns].
+        toml: configuration of the bench.
         actuator: settings of the actuator's double.
     """
 
-    def __init__(self, folder, clock, **actuator):
-        config = BenchConfig.model_validate(tomllib.loads(BENCH_TOML))
+    def __init__(self, folder, clock, toml=BENCH_TOML, **actuator):
+        config = BenchConfig.model_validate(tomllib.loads(toml))
         self.toml, self.clock, self.run = folder / "bench.toml", clock, None
-        self.toml.write_text(BENCH_TOML)
+        self.toml.write_text(toml)
         self.rig, self.doubles, self.events = (
             build_rig(config, clock, realtime=True),
             RigDoubles(**actuator),

@@ -22,6 +22,7 @@ def write_complete_log(
     ending=None,
     method=None,
     checkpoint="",
+    calibration=None,
 ):
     """Write two seconds of a sine; the first sample is at `first_s` [s] of the bench clock."""
     time = np.arange(1000) / 500.0
@@ -34,6 +35,7 @@ def write_complete_log(
         source=source,
         operator="M. Curie",
         utc_offset=started.isoformat() if started else "",
+        calibration=calibration or {},
     )
     with LogWriter(path, header) as log:
         columns = {

@@ -28,4 +28,4 @@ def test_the_escape_that_stops_leaves_the_dialog_open_and_the_next_one_closes_it
 
 @browser_test
 def test_stop_is_sent_while_the_page_asks_for_a_token(seen):
-    assert seen["stops"]["token-dialog Escape"] == [True, True]
+    assert seen["stops"]["sign-in-dialog Escape"] == [True, True]

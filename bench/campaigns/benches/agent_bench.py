@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
 
@@ -152,6 +153,7 @@ class AgentBench:
             operator=state.operator,
             resume_after=execution.resume_after,
             continues=execution.continues,
+            certificates=tuple(self._catalogue.certificates.list_current(datetime.now(UTC).date()).values()),
             log=str(path),
         )
         status = self._agent.send_command(command)

@@ -1,15 +1,22 @@
-"""Planning in the catalogue: specimens, stored methods, and keys of requests."""
+"""Planning in the catalogue: specimens, methods and their approvals, certificates, keys of requests."""
 
+from bench.catalogue.planning.approvals import ApprovalRow, ApprovalStore
+from bench.catalogue.planning.certificates import CertificateStore, StoredCertificate, find_stored_state
 from bench.catalogue.planning.idempotency import ClaimedKey, IdempotencyKeys
 from bench.catalogue.planning.methods import SHIPPED_VERSION, MethodRow, MethodStore
 from bench.catalogue.planning.specimens import Specimen, SpecimenStore
 
 __all__ = [
     "SHIPPED_VERSION",
+    "ApprovalRow",
+    "ApprovalStore",
+    "CertificateStore",
     "ClaimedKey",
     "IdempotencyKeys",
     "MethodRow",
     "MethodStore",
     "Specimen",
     "SpecimenStore",
+    "StoredCertificate",
+    "find_stored_state",
 ]

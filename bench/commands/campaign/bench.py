@@ -15,6 +15,7 @@ from bench.campaigns import (
     make_view,
     plan_campaign,
 )
+from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
 from bench.config import load_config
 
@@ -82,7 +83,9 @@ def find_or_create(store: CampaignStore, path: Path, operator: str) -> StoredCam
         raise CampaignError(f"campaign {held[0].id} holds the bench; stop it, or wait for its end")
     if problems := plan_campaign(document, methods).problems:
         raise CampaignError(f"the campaign cannot be run: {problems[0]}")
-    return store.create(document, methods, AGENT_BENCH, time.time(), operator)
+    created = store.create(document, methods, AGENT_BENCH, time.time(), operator)
+    record(store.catalogue.folder, "campaign run", created.id, {}, {"name": document.name, "operator": operator})
+    return created
 
 
 def _follow(store: CampaignStore, campaign: StoredCampaign, *, is_quiet: bool) -> StoredCampaign:

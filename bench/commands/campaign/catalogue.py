@@ -5,8 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from bench.campaigns import CampaignStore
-from bench.catalogue import CATALOGUE_FILE, Catalogue, find_catalogue, make_sqlite_url, open_database
-from bench.errors import RunError
+from bench.catalogue import open_catalogue
 
 
 @contextmanager
@@ -20,15 +19,5 @@ def open_store(data: Path, *, is_created: bool = False) -> Iterator[CampaignStor
     Raises:
         BenchError: there is no catalogue, or it cannot be opened.
     """
-    folder = data.resolve()
-    if is_created:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise RunError(f"{folder} cannot be created: {error.strerror}; use another --data") from None
-    url = make_sqlite_url(folder / CATALOGUE_FILE) if is_created else find_catalogue(folder)
-    catalogue = Catalogue(open_database(url), folder)
-    try:
+    with open_catalogue(data, is_created=is_created) as catalogue:
         yield CampaignStore(catalogue)
-    finally:
-        catalogue.close()

@@ -24,6 +24,7 @@ from bench.campaigns import (
     send_test,
     stop,
 )
+from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
 
 _EVENTS = 200
@@ -62,11 +63,15 @@ def control(
             typer.echo(send_test(campaign))
             return
         now = campaign.read_time()
+        before = campaign.state.status
         if action == "edit":
             campaign = store.edit(campaign.id, parse_edit(edit, "--edit"), now, operator)
         elif action != "status":
             change = _make_change(action, campaign, operator, now, note, choice)
             campaign = store.update(campaign.id, change)
+        if action != "status":
+            new = {"operator": operator, "note": note, "choice": choice, "edit": edit}
+            record(data, f"campaign {action}", campaign.id, {"status": before}, new)
         view = make_view(campaign, store.table.list_newest_events(campaign.id, _EVENTS))
         typer.echo(view.model_dump_json(indent=2) if as_json else "\n".join(format_view(view)))
         if action == "stop":

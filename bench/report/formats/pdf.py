@@ -35,6 +35,9 @@ def _list_sections(context: Mapping[str, Any]) -> Iterator[Section]:
         yield from _make_fit_sections(context["fit"])
     channels = Table(context["channels"], ("Channel", "Unit", "Rate", "Filter", "Delay"), (2, 1, 1, 3, 1))
     yield Section("The recording", tables=[Table(context["outcome"]), channels], pictures=["recording"])
+    if context["calibration"]:
+        names = ("Channel", "Certificate", "Date", "Due", "Gain uncertainty", "Gain error", "At the start")
+        yield Section("Calibration", tables=[Table(context["calibration"], names, (2, 3, 2, 2, 2, 2, 1))])
     origin = f"Created {context['created_at']} with mrbench {context['version']}: {context['command']}"
     made_by = [Table(context["fit"]["provenance"])] if context["fit"] else []
     yield Section("Provenance", [origin], made_by)
@@ -82,5 +85,9 @@ def _make_fit_sections(fit: Mapping[str, Any]) -> Iterator[Section]:
             for row in fit[form]
         ]
         yield Section(title, tables=[Table(rows, names, (1, 2, 1, 4))])
+    if fit["combined"]:
+        heads = ("Parameter", "Value, 95 % interval", "Unit", "From calibration")
+        table = Table(fit["combined"], heads, (1, 3, 1, 2))
+        yield Section("Intervals with calibration", [fit["formula"]], [table])
     pairs = fit["correlations"] or [("Strongly correlated pairs", "none beyond ±0.9")]
     yield Section("Uncertainty", tables=[Table(fit["floor"]), Table(fit["nuisances"]), Table(pairs)])

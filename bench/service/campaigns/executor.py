@@ -4,8 +4,10 @@ import logging
 import threading
 from types import TracebackType
 
+from bench.agent_protocol import Sender, send_as
 from bench.campaigns import (
     AgentBench,
+    AgentConnection,
     CampaignError,
     CampaignRunner,
     CampaignStore,
@@ -15,7 +17,6 @@ from bench.campaigns import (
 )
 from bench.catalogue import Catalogue
 from bench.log_lines import RepeatedFailure
-from bench.service.agent_monitor import AgentMonitor
 
 AGENT_BENCH = "agent"
 """Bench of the campaigns that the service executes."""
@@ -27,12 +28,12 @@ _LOG = logging.getLogger(__name__)
 class CampaignExecutor:
     """Thread that executes the campaigns of the agent, one after the other, oldest first."""
 
-    def __init__(self, catalogue: Catalogue, monitor: AgentMonitor, *, is_local: bool) -> None:
+    def __init__(self, catalogue: Catalogue, agent: AgentConnection, *, is_local: bool) -> None:
         """Use a catalogue and an agent.
 
         Args:
             catalogue: catalogue of the data folder.
-            monitor: connection to the agent.
+            agent: connection to the agent.
             is_local: whether the agent writes into the data folder; else nothing is executed.
         """
         self.store = CampaignStore(catalogue)
@@ -40,7 +41,7 @@ class CampaignExecutor:
         self.is_local = is_local
         self._stopping = threading.Event()
         self._failures = RepeatedFailure(_LOG, "campaign_failed", "campaign_continues")
-        self.bench = AgentBench(catalogue, monitor, self.thermometer, lambda: self._stopping.wait(PERIOD))
+        self.bench = AgentBench(catalogue, agent, self.thermometer, lambda: self._stopping.wait(PERIOD))
         self._thread = threading.Thread(target=self._execute, name="campaigns", daemon=True)
 
     def __enter__(self) -> "CampaignExecutor":
@@ -72,7 +73,9 @@ class CampaignExecutor:
         if not in_progress:
             return
         self._check_needs(in_progress[0])
-        ended = CampaignRunner(self.store, in_progress[0].id, self.bench).run(self._stopping.is_set)
+        sender = Sender(actor=f"campaign:{in_progress[0].id}")
+        with send_as(lambda: sender):
+            ended = CampaignRunner(self.store, in_progress[0].id, self.bench).run(self._stopping.is_set)
         _LOG.info("campaign_left", extra={"campaign": ended.id, "status": ended.state.status})
 
     def _check_needs(self, campaign: StoredCampaign) -> None:

@@ -2,6 +2,7 @@
 
 from bench.service.routes import (
     analyses,
+    audit,
     batches,
     bench_control,
     campaigns,
@@ -12,6 +13,7 @@ from bench.service.routes import (
     jobs,
     live,
     metrics,
+    people,
     planning,
     recordings,
     results,
@@ -20,11 +22,12 @@ from bench.service.routes import (
 )
 from bench.service.routes.unknown_paths import refuse_unknown_paths
 
-PUBLIC_ROUTERS = (health.router, live.router)
-"""Routers that need no token in the header; `live` checks its own."""
+PUBLIC_ROUTERS = (health.router, live.router, *people.PUBLIC_ROUTERS)
+"""Routers that need no sign-in; `live` checks its own first message."""
 PROTECTED_ROUTERS = (
     bench_control.router,
     metrics.router,
+    *people.ROUTERS,
     *planning.ROUTERS,
     runs.router,
     continuation.router,
@@ -37,7 +40,8 @@ PROTECTED_ROUTERS = (
     *recordings.ROUTERS,
     *campaigns.ROUTERS,
     *analyses.ROUTERS,
+    audit.router,
 )
-"""Routers that need the token."""
+"""Routers that need a sign-in."""
 
 __all__ = ["PROTECTED_ROUTERS", "PUBLIC_ROUTERS", "refuse_unknown_paths"]

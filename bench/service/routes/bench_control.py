@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 
 from bench.agent_protocol import AbortCommand, AgentStatus, PrepareCommand, StopCommand
+from bench.service.audit import note_old
 from bench.service.context import Context
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.views import SetupRequest
@@ -19,6 +20,8 @@ def get_bench(context: Context) -> AgentStatus:
 @router.post("/reset")
 def reset_bench(context: Context) -> AgentStatus:
     """Reset a trip whose cause is removed; nothing moves."""
+    status = context.monitor.latest_status
+    note_old(None if status is None else {"state": status.state, "trip": status.trip})
     return context.monitor.reset()
 
 

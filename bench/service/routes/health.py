@@ -1,4 +1,4 @@
-"""Route of the health of the service: agent, worker, disk, queue and clocks, each in words."""
+"""Route of the health of the service: agent, worker, disk, queue, clocks and calibration, each in words."""
 
 import asyncio
 from functools import cache
@@ -9,6 +9,7 @@ from fastapi import APIRouter
 from bench.agent_protocol import AgentStatus
 from bench.errors import BenchError
 from bench.service.context import Context, ServiceContext
+from bench.service.routes.planning import describe_calibration
 from bench.service.views import Health
 
 router = APIRouter(tags=["service"])
@@ -19,7 +20,7 @@ _MILLISECONDS = 1e3
 
 @router.get("/health")
 async def get_health(context: Context) -> Health:
-    """Return the state of agent, worker, disk, queue and clocks in words; needs no token."""
+    """Return the state of each part of the bench in words; needs no sign-in."""
     worker, parts = await asyncio.gather(
         context.engine.describe_state(), asyncio.to_thread(_describe_parts, context)
     )
@@ -36,7 +37,9 @@ def _describe_parts(context: ServiceContext) -> dict[str, str]:
         "agent": _describe_agent(context),
         "disk": context.space_monitor.describe() or "ok",
         "queue": _describe_queue(context),
+        "audit": context.audit.describe_state(),
         "clocks": describe_clocks(context.monitor.latest_status),
+        "calibration": describe_calibration(context),
     }
 
 

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Query
 
 from bench.catalogue import UNFINISHED_STATES, JobFilter, JobState
 from bench.jobs import Job, JobKind, JobPage, RetryRequest, make_job_view
+from bench.service.audit import note_old
 from bench.service.context import Context
 from bench.service.problems import make_conflict
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
@@ -43,6 +44,7 @@ def get_job(job_id: str, context: Context) -> Job:
 async def cancel_job(job_id: str, context: Context) -> Job:
     """Cancel a job; a job on a worker stays `running` until its processes have ended, within a second."""
     row = await asyncio.to_thread(context.get_job, job_id)
+    note_old({"state": row.state})
     if row.state not in UNFINISHED_STATES:
         raise make_conflict(
             "job-ended", "The job has ended", f"job {job_id} cannot be cancelled; its state is {row.state}"
@@ -54,6 +56,7 @@ async def cancel_job(job_id: str, context: Context) -> Job:
 async def retry_job(job_id: str, context: Context, request: RetryRequest) -> Job:
     """Queue a failed or cancelled job again; it keeps its id, and its attempts are counted on."""
     row = await asyncio.to_thread(context.get_job, job_id)
+    note_old({"state": row.state, "attempts": row.attempts})
     repeated = await context.job_manager.retry(row, request.reason)
     if repeated is None:
         raise make_conflict(

@@ -1,25 +1,31 @@
 """Websocket with live messages and samples."""
 
 import asyncio
+import hmac
+from collections.abc import Awaitable, Callable
 from contextlib import suppress
 
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, Field, ValidationError
 
 from bench.live import Listener, ListenerSettings
-from bench.service.context import Context
+from bench.service.access import CredentialKind, compute_csrf, read_cookie
+from bench.service.context import Context, ServiceContext
 
 router = APIRouter()
 _CLOSE_UNAUTHORISED = 4401
-"""Close code for a token that is missing or wrong."""
+"""Close code for a sign-in that is missing, wrong, or has ended."""
+_CHECK_INTERVAL = 10.0
+"""Time after which it is checked again whether a client is signed in [s]."""
 _SIGN_IN_TIMEOUT = 10.0
-"""Longest time until the first message, which carries the token [s]."""
+"""Longest time until the first message, which carries the sign-in [s]."""
 
 
 class SignIn(BaseModel):
-    """First message of a client."""
+    """First message of a client: a token, or the CSRF value of its session."""
 
-    token: str
+    token: str | None = None
+    csrf: str | None = Field(default=None, description="value of the session whose cookie came with the handshake")
     rate_hz: float = Field(default=float("inf"), gt=0, description="largest rate of the samples [Hz]")
     acknowledge: bool = Field(default=False, description="whether the client acknowledges the batches")
 
@@ -34,17 +40,20 @@ class Acknowledgement(BaseModel):
 async def stream_live(websocket: WebSocket, context: Context) -> None:
     """Send messages `{"topic": ..., "data": ...}` and samples in binary live batches.
 
-    The first message of the client is `{"token": ...}`. An address would appear in the logs of proxies. A client
-    that acknowledges the batches gets fresh ones when it resumes, instead of those in the buffers of the network.
+    The first message of the client is `{"token": ...}`, or `{"csrf": ...}` of the session whose cookie came with
+    the handshake. An address would appear in the logs of proxies. A client that acknowledges the batches gets
+    fresh ones when it resumes, instead of those in the buffers of the network.
     """
     # Accepted before the token is checked: a browser receives the close code only of an open connection.
     await websocket.accept()
     sign_in = await _receive_sign_in(websocket)
-    if not context.access.is_allowed(sign_in.token):
-        await websocket.close(_CLOSE_UNAUTHORISED, "the first message has no valid token")
+    identify = _make_check(websocket, sign_in, context)
+    if not await identify():
+        await websocket.close(_CLOSE_UNAUTHORISED, "the first message has no valid token or session")
         return
     with context.live.listen(ListenerSettings(sign_in.rate_hz, sign_in.acknowledge)) as listener:
         sender = asyncio.create_task(_send(websocket, listener))
+        guard = asyncio.create_task(_close_after_sign_out(websocket, identify))
         try:
             while True:
                 _handle_message(listener, await websocket.receive_text())
@@ -53,6 +62,30 @@ async def stream_live(websocket: WebSocket, context: Context) -> None:
             pass
         finally:
             sender.cancel()
+            guard.cancel()
+
+
+def _make_check(websocket: WebSocket, sign_in: SignIn, context: ServiceContext) -> Callable[[], Awaitable[bool]]:
+    """Return the check whether a client is signed in, which holds for later times, too."""
+    secret = read_cookie(websocket.scope)
+    if sign_in.token is not None:
+        credential: tuple[CredentialKind, str] = ("token", sign_in.token)
+    elif secret is not None and hmac.compare_digest((sign_in.csrf or "").encode(), compute_csrf(secret).encode()):
+        credential = ("session", secret)
+    else:
+        credential = ("token", "")
+
+    async def is_signed_in() -> bool:
+        return await asyncio.to_thread(context.authenticator.identify, *credential) is not None
+
+    return is_signed_in
+
+
+async def _close_after_sign_out(websocket: WebSocket, is_signed_in: Callable[[], Awaitable[bool]]) -> None:
+    """Close the connection once its token or session has ended."""
+    while await is_signed_in():  # noqa: ASYNC110 - other processes end sessions, too
+        await asyncio.sleep(_CHECK_INTERVAL)
+    await websocket.close(_CLOSE_UNAUTHORISED, "the session has ended; sign in again")
 
 
 async def _receive_sign_in(websocket: WebSocket) -> SignIn:
@@ -61,7 +94,7 @@ async def _receive_sign_in(websocket: WebSocket) -> SignIn:
         async with asyncio.timeout(_SIGN_IN_TIMEOUT):
             return SignIn.model_validate_json(await websocket.receive_text())
     except (TimeoutError, ValidationError, WebSocketDisconnect, KeyError):
-        return SignIn(token="")
+        return SignIn()
 
 
 def _handle_message(listener: Listener, text: str) -> None:

@@ -98,13 +98,13 @@ def check_complete(row: RunRow, verb: str) -> None:
 @router.get("/runs/{run_id}/fit", response_class=FileResponse, responses=JSON_FILE)
 def get_newest_fit(run_id: str, context: Context) -> SnapshotResponse:
     """Return the newest fit of a run, `mrbench.fit/1`."""
-    return make_file_response(context, _find_newest(context, run_id, "identify"), FIT_FILE)
+    return make_file_response(context, find_newest(context, run_id, "identify"), FIT_FILE)
 
 
 @router.get("/runs/{run_id}/diagnosis", response_class=FileResponse, responses=JSON_FILE)
 def get_newest_diagnosis(run_id: str, context: Context) -> SnapshotResponse:
     """Return the newest diagnosis of a run, `mrbench.diagnosis/1`."""
-    return make_file_response(context, _find_newest(context, run_id, "diagnose"), DIAGNOSIS_FILE)
+    return make_file_response(context, find_newest(context, run_id, "diagnose"), DIAGNOSIS_FILE)
 
 
 @router.get("/fits/{fit_id}", response_class=FileResponse, responses=JSON_FILE)
@@ -141,7 +141,12 @@ def get_done_job(context: ServiceContext, job_id: str, kind: JobKind, noun: str)
     return job
 
 
-def _find_newest(context: ServiceContext, run_id: str, kind: JobKind) -> JobRow:
+def find_newest(context: ServiceContext, run_id: str, kind: JobKind) -> JobRow:
+    """Return the newest job of a kind of a run that is done.
+
+    Raises:
+        ProblemError: there is no such run, or no such job; the message says why.
+    """
     row, queue = context.get_run(run_id), context.catalogue.job_queue
     done = queue.find_newest_done(row.id, kind)
     if done is None:

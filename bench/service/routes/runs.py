@@ -18,7 +18,7 @@ from bench.log import salvage_log
 from bench.methods import Method, compile_method, parse_method
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict
-from bench.service.requests import IDEMPOTENT, IdempotentRoute, find_first_request
+from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, find_first_request, get_operator
 from bench.service.routes.planning import find_method
 from bench.service.routes.run_search import RunSearch
 from bench.service.run_registry import make_run_row
@@ -32,8 +32,11 @@ _RECORD_TIMEOUT = 5.0
 
 
 @router.post("", status_code=201, dependencies=[IDEMPOTENT])
-async def start_run(request: StartRunRequest, http: Request, context: Context, response: Response) -> Run:
+async def start_run(
+    request: StartRunRequest, http: Request, context: Context, response: Response, sender: Sender
+) -> Run:
     """Start a run; the agent executes and records it even if the service ends."""
+    request = request.model_copy(update={"operator": get_operator(sender, request.operator)})
     method = await asyncio.to_thread(_check_method, context, request)
     return await begin_run(context, response, method, request, first_request=find_first_request(http))
 
@@ -149,6 +152,7 @@ def _request_start(
         operator=request.operator,
         resume_after=request.resume_after,
         continues=continues,
+        certificates=tuple(context.catalogue.certificates.list_current(datetime.now(UTC).date()).values()),
         log=None if log is None else str(log),
     )
     status = context.monitor.send_command(command)

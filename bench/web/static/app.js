@@ -1,9 +1,10 @@
 // Entry point: creates the parts of the page and distributes the messages of the service to them.
 
-import { get, keepToken, takeToken } from "./common/api.js";
+import { Account } from "./account/account.js";
+import { get, readSession } from "./common/api.js";
 import { CampaignView } from "./campaigns/campaigns.js";
+import { CertificateView } from "./calibration/certificates.js";
 import { CompareView } from "./compare/compare.js";
-import { openDialog } from "./common/dialogs.js";
 import { EventList } from "./bench/events.js";
 import { byId, fixed, write } from "./common/format.js";
 import { HealthStrip } from "./bench/health.js";
@@ -13,18 +14,23 @@ import { LiveLink, fillCoilChannel } from "./live/live.js";
 import { PlanView } from "./plan/plan.js";
 import { Playhead } from "./live/playhead.js";
 import { LivePlots, STRIP_SECONDS } from "./live/plots.js";
+import { PeopleView } from "./account/people.js";
 import { Preparation } from "./bench/prepare.js";
 import { FIELDS, QUANTITIES } from "./common/quantities.js";
 import { Readings } from "./live/readings.js";
+import { watchRights } from "./common/rights.js";
 import { SampleRing } from "./live/ring.js";
 import { Router } from "./common/router.js";
 import { RunView } from "./runs/run.js";
 import { RunList } from "./runs/runs.js";
 import { RunSearch } from "./runs/run_search.js";
 import { ServiceClock } from "./live/service_clock.js";
+import { takeSignInProblem } from "./common/sign_in_ways.js";
+import { SignIn, isAsking, takeCredentials } from "./account/sign_in.js";
 import { SpecimenView } from "./specimens/specimen.js";
 import { SpecimenList } from "./specimens/specimens.js";
 import { StartForm } from "./bench/start.js";
+import { TokenView } from "./account/tokens.js";
 import { TopBar } from "./bench/topbar.js";
 import { offerUnits } from "./common/units.js";
 import { UploadDialog } from "./common/upload.js";
@@ -33,6 +39,8 @@ import { UploadDialog } from "./common/upload.js";
 const REQUEST_AFTER = 0.9;
 /** Time [ms] between such requests: short at first, long once the connection counts as lost. */
 const REQUEST_EVERY = { fresh: 400, stale: 3_000 };
+/** Time [ms] after which the page asks again who is signed in, if the service did not answer. */
+const ASK_AGAIN_MS = 2_000;
 
 const ring = new SampleRing(FIELDS);
 const runView = new RunView();
@@ -66,6 +74,12 @@ const events = new EventList();
 const plan = new PlanView();
 const campaigns = new CampaignView();
 const comparison = new CompareView();
+const people = new PeopleView();
+const tokens = new TokenView();
+const signIn = new SignIn({ onSignedIn: begin });
+new Account({ onProblem: (text) => bar.showDetail(text, true) });
+watchRights((reason) => bar.showDetail(reason, true));
+const certificates = new CertificateView();
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -84,6 +98,9 @@ const router = new Router({
   specimens: (address) => specimens.show(address),
   specimen: (address) => specimen.show(address),
   campaigns: (address) => campaigns.show(address),
+  people: () => people.show(),
+  tokens: () => tokens.show(),
+  calibration: () => certificates.show(),
 });
 
 offerUnits(() => {
@@ -164,11 +181,25 @@ function showAge() {
   write(byId("live-age"), text);
 }
 
-/** Asks for the token. The refused one stays until another is given, so that Stop is still attempted with it. */
-function askForToken(reason) {
+/** Asks to sign in. The ended session stays until there is another, so that Stop is still attempted with it. */
+function askToSignIn(reason) {
   link.close();
-  write(byId("token-reason"), reason);
-  openDialog("token-dialog");
+  signIn.ask(reason);
+}
+
+/** Signs in with what the address contains, or goes on with the session of the cookie. */
+async function arrive() {
+  const failure = takeSignInProblem();
+  const given = takeCredentials();
+  if (given) return signIn.attempt(given);
+  try {
+    await readSession();
+    begin();
+  } catch (problem) {
+    if (problem.unauthorised) return askToSignIn(failure);
+    bar.showFailure(problem.after("Trying again"));
+    setTimeout(arrive, ASK_AGAIN_MS);
+  }
 }
 
 function begin() {
@@ -180,18 +211,12 @@ function begin() {
   router.go();
 }
 
-byId("token-form").addEventListener("submit", () => {
-  keepToken(byId("token").value.trim(), byId("remember").checked);
-  byId("token").value = "";
-  begin();
-});
 setInterval(showAge, 250);
 setInterval(() => {
   const due = performance.now() - requestedAt > (bar.stale ? REQUEST_EVERY.stale : REQUEST_EVERY.fresh);
-  if (due && !withoutRig && bar.age > REQUEST_AFTER && !byId("token-dialog").open) requestStatus();
+  if (due && !withoutRig && bar.age > REQUEST_AFTER && !isAsking()) requestStatus();
 }, 200);
-document.addEventListener("unauthorised", () => askForToken("The service does not accept this token."));
-addEventListener("hashchange", () => location.hash.startsWith("#token=") && takeToken() && begin());
+document.addEventListener("unauthorised", () => askToSignIn("The session has expired or was ended. Sign in again; this view stays open."));
+addEventListener("hashchange", () => /^#(token|code)=/.test(location.hash) && arrive());
 
-if (takeToken()) begin();
-else askForToken("");
+arrive();

@@ -29,7 +29,8 @@ const posted = (path) => page.waitForRequest((request) => request.method() === "
 
 async function letIn() {
   await page.goto(`${url}/#token=wrong`);
-  await hasText("#token-reason", "does not accept");
+  await hasText("#sign-in-reason", "credentials are wrong");
+  await page.check("input[value=token]");
   await page.fill("#token", token);
   await page.keyboard.press("Enter");
   await hasText("#state-word", "Idle");

@@ -37,9 +37,10 @@ async function openDirectly(hash) {
 
 async function signIn() {
   await page.goto(`${url}/#/runs/run-1/report`);
-  await page.locator("#token-dialog").waitFor();
-  seen.violations.token = await audit();
-  seen.small.token = await findSmall();
+  await page.locator("#sign-in-dialog").waitFor();
+  await page.check("input[value=token]");
+  seen.violations.signIn = await audit();
+  seen.small.signIn = await findSmall();
   await page.fill("#token", token);
   await page.keyboard.press("Enter");
   await hasText(...READY["#/runs/run-1/report"]);

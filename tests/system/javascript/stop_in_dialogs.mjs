@@ -49,14 +49,14 @@ async function stopIn(id, way) {
   seen.left[`${id} ${way}`] = !(await isOpen(id));
 }
 
-/** Lets the service refuse the token during a run, so that the page asks for another. */
-async function stopWhileTokenIsAsked() {
+/** Lets the session end during a run, so that the page asks to sign in again. */
+async function stopWhileSignInIsAsked() {
   await post("runs", { method: "quick", specimen: "MR-0042", operator: "another person" });
   await hasState("Running");
   await page.route("**/api/v1/bench", (route) => route.fulfill({ status: 401, json: { title: "Not allowed", detail: "" } }));
   await post("silence");
-  await page.waitForFunction(() => document.getElementById("token-dialog").open);
-  seen.stops["token-dialog Escape"] = [await isStopped(WAYS.Escape), await isOpen("token-dialog")];
+  await page.waitForFunction(() => document.getElementById("sign-in-dialog").open);
+  seen.stops["sign-in-dialog Escape"] = [await isStopped(WAYS.Escape), await isOpen("sign-in-dialog")];
 }
 
 try {
@@ -66,7 +66,7 @@ try {
   await post("runs", {}); // the first start is refused
   for (const way of Object.keys(WAYS)) await stopIn("home-dialog", way);
   for (const way of Object.keys(WAYS)) await stopIn("reset-dialog", way);
-  await stopWhileTokenIsAsked();
+  await stopWhileSignInIsAsked();
   console.log(JSON.stringify(seen));
 } finally {
   await close();

@@ -1,7 +1,7 @@
 """REST routes that compare runs, and show and request simulations of them."""
 
-from bench.service.routes.analyses import comparisons, predictions
+from bench.service.routes.analyses import calibration, comparisons, predictions
 
-ROUTERS = (comparisons.router, predictions.router)
+ROUTERS = (calibration.router, comparisons.router, predictions.router)
 
 __all__ = ["ROUTERS"]

@@ -3,7 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 from fastapi.responses import FileResponse
@@ -17,6 +17,7 @@ from bench.campaigns import (
     CampaignView,
     StoredCampaign,
     answer,
+    collect_edit_methods,
     collect_methods,
     expand_campaign,
     make_view,
@@ -29,11 +30,13 @@ from bench.campaigns import (
     stop,
 )
 from bench.disk import RESERVE, find_free_space
+from bench.service.audit import note_old
 from bench.service.campaigns import AGENT_BENCH
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_conflict, make_not_found
-from bench.service.requests import IDEMPOTENT, IdempotentRoute
+from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, get_author, get_operator
+from bench.service.routes.campaigns.approvals import check_approvals
 from bench.service.routes.campaigns.photos import get_media_type, save_photo
 from bench.service.routes.campaigns.views import (
     AnswerRequest,
@@ -70,17 +73,20 @@ def list_campaigns(
 
 
 @router.post("/campaigns", status_code=201, dependencies=[IDEMPOTENT])
-async def start_campaign(request: StartCampaignRequest, context: Context, response: Response) -> CampaignView:
+async def start_campaign(
+    request: StartCampaignRequest, context: Context, response: Response, sender: Sender
+) -> CampaignView:
     """Start a campaign on the bench; it continues after any crash. Refused if a condition can never be met."""
     worker = await context.engine.describe_state()
-    return await asyncio.to_thread(_start, context, request, worker, response)
+    operator = get_operator(sender, request.operator)
+    campaign = await asyncio.to_thread(_start, context, request.campaign, operator, worker)
+    response.headers["Location"] = f"/api/v1/campaigns/{campaign.id}"
+    return campaign
 
 
-def _start(
-    context: ServiceContext, request: StartCampaignRequest, worker: str, response: Response
-) -> CampaignView:
+def _start(context: ServiceContext, content: dict[str, Any], operator: str, worker: str) -> CampaignView:
     executor = context.campaigns
-    document = parse_campaign(request.campaign, "the request")
+    document = parse_campaign(content, "the request")
     methods = collect_methods(document)
     plan = plan_campaign(document, methods)
     if not executor.is_local:
@@ -94,13 +100,11 @@ def _start(
     steps = expand_campaign(document)
     if needs_results(document, steps) and worker != "ok":
         raise CampaignError(f"a condition of the campaign needs identifications, but there is no worker: {worker}")
-    if document.methods == "approved":
-        raise CampaignError("methods cannot be approved on this bench; use methods: any")
+    check_approvals(context, document, steps)
     if plan.problems:
         raise CampaignError(f"the campaign cannot be run: {plan.problems[0]}")
     executor.bench.check_needs(document, steps)
-    campaign = executor.store.create(document, methods, AGENT_BENCH, time.time(), request.operator)
-    response.headers["Location"] = f"/api/v1/campaigns/{campaign.id}"
+    campaign = executor.store.create(document, methods, AGENT_BENCH, time.time(), operator)
     return _show(executor.store, campaign)
 
 
@@ -119,46 +123,52 @@ def get_campaign(campaign_id: str, context: Context) -> CampaignView:
 
 
 @router.patch("/campaigns/{campaign_id}", dependencies=[IDEMPOTENT])
-def edit_campaign(campaign_id: str, request: EditRequest, context: Context) -> CampaignView:
+def edit_campaign(campaign_id: str, request: EditRequest, context: Context, sender: Sender) -> CampaignView:
     """Edit the queue of a campaign while it runs; the edit is recorded with who made it and when."""
     store = context.campaigns.store
-    now = _get(store, campaign_id).read_time()
-    return _show(store, store.edit(campaign_id, request.edit, now, request.who))
+    stored = _get(store, campaign_id)
+    note_old(_describe(stored))
+    check_approvals(context, stored.state.campaign, collect_edit_methods(request.edit))
+    now = stored.read_time()
+    return _show(store, store.edit(campaign_id, request.edit, now, get_author(sender, request.who)))
 
 
 @router.post("/campaigns/{campaign_id}/pause")
-def pause_campaign(campaign_id: str, request: CommandRequest, context: Context) -> CampaignView:
+def pause_campaign(campaign_id: str, request: CommandRequest, context: Context, sender: Sender) -> CampaignView:
     """Pause at the next checkpoint of the run in progress, or at once between runs."""
-    return _change(context, campaign_id, lambda state, now: pause(state, now, request.who))
+    return _change(context, campaign_id, lambda state, now: pause(state, now, get_author(sender, request.who)))
 
 
 @router.post("/campaigns/{campaign_id}/resume")
-def resume_campaign(campaign_id: str, request: CommandRequest, context: Context) -> CampaignView:
+def resume_campaign(campaign_id: str, request: CommandRequest, context: Context, sender: Sender) -> CampaignView:
     """Continue a paused campaign, an interrupted run after its checkpoint with the method's warm-up."""
-    return _change(context, campaign_id, lambda state, now: resume(state, now, request.who))
+    return _change(context, campaign_id, lambda state, now: resume(state, now, get_author(sender, request.who)))
 
 
 @router.post("/campaigns/{campaign_id}/stop")
-def stop_campaign(campaign_id: str, request: StopCampaignRequest, context: Context) -> CampaignView:
+def stop_campaign(
+    campaign_id: str, request: StopCampaignRequest, context: Context, sender: Sender
+) -> CampaignView:
     """Stop after the run in progress; with `now`, that run is stopped in a controlled way, too."""
-    view = _change(context, campaign_id, lambda state, now: stop(state, now, request.who))
+    who = get_author(sender, request.who)
+    view = _change(context, campaign_id, lambda state, now: stop(state, now, who))
     if request.now and view.bench == AGENT_BENCH and view.phase in ("starting", "stroking"):
         context.monitor.send_command(StopCommand())
     return view
 
 
 @router.post("/campaigns/{campaign_id}/answer", dependencies=[IDEMPOTENT])
-def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context) -> CampaignView:
+def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context, sender: Sender) -> CampaignView:
     """Answer a prompt with a note and a photo, or decide on a failed step."""
     stored = _get(context.campaigns.store, campaign_id)
     active = stored.state.active
-    photo = ""
+    photo, who = "", get_author(sender, request.who)
     if request.photo and active is not None and stored.state.needs_person:
         photo = save_photo(context.data, f"{campaign_id}-{active.item}-photo", request.photo)
     return _change(
         context,
         campaign_id,
-        lambda state, now: answer(state, now, request.who, request.note, photo, request.choice),
+        lambda state, now: answer(state, now, who, request.note, photo, request.choice),
     )
 
 
@@ -188,18 +198,24 @@ def get_queue(context: Context) -> QueueView:
 
 
 @router.patch("/queue", dependencies=[IDEMPOTENT])
-def edit_queue(request: EditRequest, context: Context) -> CampaignView:
+def edit_queue(request: EditRequest, context: Context, sender: Sender) -> CampaignView:
     """Edit the queue of the campaign that holds the bench."""
     held = context.campaigns.store.list_in_progress(AGENT_BENCH)
     if not held:
         raise make_not_found("campaign", "in progress; start one: POST /api/v1/campaigns")
-    return edit_campaign(held[0].id, request, context)
+    return edit_campaign(held[0].id, request, context, sender)
 
 
 def _get(store: CampaignStore, campaign_id: str) -> StoredCampaign:
     if store.table.get(campaign_id) is None:
         raise make_not_found("campaign", campaign_id)
     return store.get(campaign_id)
+
+
+def _describe(campaign: StoredCampaign) -> dict[str, object]:
+    """Return the state of a campaign before a change, for the audit trail: its status and its queue."""
+    state = campaign.state
+    return {"status": state.status, "queue": [f"{item.id} {item.state}" for item in state.items]}
 
 
 def _show(store: CampaignStore, campaign: StoredCampaign) -> CampaignView:
@@ -211,5 +227,7 @@ def _change(
 ) -> CampaignView:
     """Change a stored campaign; its executor acts on it at its next step."""
     store = context.campaigns.store
-    now = _get(store, campaign_id).read_time()
+    stored = _get(store, campaign_id)
+    note_old(_describe(stored))
+    now = stored.read_time()
     return _show(store, store.update(campaign_id, lambda state: transition(state, now)))

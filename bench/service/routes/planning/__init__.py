@@ -1,10 +1,12 @@
-"""Routes of planning: methods with their dry runs, specimens, and the facts of the bench."""
+"""Routes of planning: methods with their dry runs, specimens, certificates, and the facts of the bench."""
 
-from bench.service.routes.planning import bench_facts, dry_runs, methods, previews, specimens, trends
+from bench.service.routes.planning import bench_facts, certificates, dry_runs, methods, previews, specimens, trends
+from bench.service.routes.planning.certificates import describe_calibration
 from bench.service.routes.planning.method_library import find_method
 
 ROUTERS = (
     bench_facts.router,
+    certificates.router,
     previews.router,
     dry_runs.router,
     methods.router,
@@ -13,4 +15,4 @@ ROUTERS = (
 )
 """All routers; those with longer paths come first."""
 
-__all__ = ["ROUTERS", "find_method"]
+__all__ = ["ROUTERS", "describe_calibration", "find_method"]

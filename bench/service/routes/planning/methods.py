@@ -1,14 +1,16 @@
 """Routes that list, return and store methods."""
 
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 
-from bench.catalogue import SHIPPED_VERSION, MethodRow
+from bench.catalogue import SHIPPED_VERSION, ApprovalRow, MethodRow
 from bench.methods import Method, compile_method, list_shipped_methods, load_method
+from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
-from bench.service.requests import IDEMPOTENT, IdempotentRoute
+from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender
 from bench.service.routes.planning.method_library import StoredMethod, describe_facts, find_method, list_methods
 from bench.service.routes.planning.views import MethodPage, MethodSummary
 
@@ -28,7 +30,8 @@ def list_all_methods(
     """List the newest version of each method, in the order of the names; unusable ones say why."""
     drive_kind = _find_drive_kind(context)
     found = [one for one in list_methods(context) if before is None or one.method.name > before]
-    items = tuple(_summarise(one, drive_kind) for one in found[:limit])
+    approvals = context.catalogue.approvals.find(describe_facts(one.method).sha256 for one in found[:limit])
+    items = tuple(_summarise(one, drive_kind, approvals) for one in found[:limit])
     return MethodPage(items=items, next=items[-1].name if len(found) > limit else None)
 
 
@@ -39,11 +42,22 @@ def store_method(method: Method, context: Context, response: Response) -> Method
     201: a new version. 200: the name has a version of equal content.
     """
     compile_method(method)  # a method that exceeds its own limits is refused
+    note_old(_describe_newest(context, method.name))
     stored, is_new = _store(context, method)
     if not is_new:
         response.status_code = 200
     response.headers["Location"] = f"/api/v1/methods/{method.name}/{stored.version}"
-    return _summarise(stored, _find_drive_kind(context))
+    return _show(context, stored)
+
+
+def _describe_newest(context: ServiceContext, name: str) -> dict[str, Any] | None:
+    """Return version and hash of the newest version of a method before another one; None for a new name."""
+    row = context.catalogue.methods.get(name)
+    if row is not None:
+        return {"version": row.version, "sha256": row.sha256}
+    if name not in list_shipped_methods():
+        return None
+    return {"version": SHIPPED_VERSION, "sha256": load_method(name).compute_sha256()}
 
 
 def _store(context: ServiceContext, method: Method) -> tuple[StoredMethod, bool]:
@@ -68,14 +82,36 @@ def get_method_version(name: str, version: int, context: Context) -> Method:
     return find_method(context, name, version).method
 
 
+@router.post("/{name}/{version:int}/approval")
+def approve_method(name: str, version: int, context: Context, sender: Sender) -> MethodSummary:
+    """Approve a version of a method for campaigns that require it; the approval belongs to its content."""
+    found = find_method(context, name, version)
+    context.catalogue.approvals.approve(found.method.compute_sha256(), sender.full_name)
+    return _show(context, found)
+
+
+@router.delete("/{name}/{version:int}/approval")
+def withdraw_approval(name: str, version: int, context: Context) -> MethodSummary:
+    """Withdraw the approval of a version; campaigns in progress keep their methods."""
+    found = find_method(context, name, version)
+    context.catalogue.approvals.withdraw(found.method.compute_sha256())
+    return _show(context, found)
+
+
+def _show(context: ServiceContext, one: StoredMethod) -> MethodSummary:
+    approvals = context.catalogue.approvals.find([one.method.compute_sha256()])
+    return _summarise(one, _find_drive_kind(context), approvals)
+
+
 def _find_drive_kind(context: ServiceContext) -> str:
     """Return the drive of this bench; empty if no bench answers."""
     status = context.monitor.latest_status
     return "" if status is None else status.drive_kind
 
 
-def _summarise(one: StoredMethod, drive_kind: str) -> MethodSummary:
+def _summarise(one: StoredMethod, drive_kind: str, approvals: Mapping[str, ApprovalRow]) -> MethodSummary:
     facts, method = describe_facts(one.method), one.method
+    approval = approvals.get(facts.sha256)
     obstacle = describe_drive_obstacle(method, drive_kind)
     return MethodSummary(
         name=method.name,
@@ -87,6 +123,8 @@ def _summarise(one: StoredMethod, drive_kind: str) -> MethodSummary:
         duration_s=facts.duration,
         drive_kind=method.drive_kind,
         checkpoints=facts.checkpoints,
+        approved=approval.approved if approval else None,
+        approved_by=approval.approved_by if approval else "",
         usable=not obstacle,
         obstacle=obstacle,
     )

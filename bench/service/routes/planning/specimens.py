@@ -6,6 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Query, Response
 
 from bench.catalogue import Specimen
+from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import MEDIA_TYPE, ProblemError, make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
@@ -73,6 +74,7 @@ def change_specimen(
         detail = f"send the ETag of specimen {serial} as If-Match, so that no other change is lost"
         raise ProblemError(HTTPStatus.PRECONDITION_REQUIRED, "if-match-missing", "If-Match is missing", detail)
     values = _make_values(change)
+    note_old(_make_view(found).model_dump(mode="json", include=set(values)))
     is_seen = if_match == _make_tag(found)
     if not is_seen or not context.catalogue.specimens.describe(serial, found.revision, values):
         detail = f"specimen {serial} was changed meanwhile; read it again and repeat the change"

@@ -25,6 +25,8 @@ class MethodSummary(View):
     checkpoints: tuple[str, ...] = Field(
         description="segments after which a run can be paused, and resumed (`resume_after`)"
     )
+    approved: datetime | None = Field(description="UTC at which this content was approved; null if it is not")
+    approved_by: str = Field(description="person who approved it; empty if nobody did")
     usable: bool = Field(description="false if this bench cannot run it")
     obstacle: str = Field(description="reason why this bench cannot run it; empty if it can or no bench answers")
 

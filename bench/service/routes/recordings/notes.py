@@ -6,9 +6,10 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Header, Response
 
 from bench.catalogue import NoteRow
+from bench.service.audit import note_old
 from bench.service.context import Context
 from bench.service.problems import MEDIA_TYPE, ProblemError
-from bench.service.requests import IDEMPOTENT, IdempotentRoute
+from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, get_author
 from bench.service.routes.recordings.events import After, Limit
 from bench.service.routes.recordings.views import NotePage, NoteRequest, NoteView, RunChange
 from bench.service.views import Run, make_run_tag
@@ -31,10 +32,12 @@ def list_notes(run_id: str, context: Context, limit: Limit = 200, after: After =
 
 
 @router.post("/{run_id}/notes", status_code=201, dependencies=[IDEMPOTENT])
-def add_note(run_id: str, request: NoteRequest, context: Context) -> NoteView:
+def add_note(run_id: str, request: NoteRequest, context: Context, sender: Sender) -> NoteView:
     """Add a note to a run. Notes are never changed; a correction is a further note."""
     context.get_run(run_id)
-    return _make_view(context.catalogue.notebook.add_note(run_id, request.author, request.text))
+    return _make_view(
+        context.catalogue.notebook.add_note(run_id, get_author(sender, request.author), request.text)
+    )
 
 
 @router.patch("/{run_id}", responses=_PRECONDITIONS)
@@ -43,6 +46,7 @@ def change_run(
     change: RunChange,
     context: Context,
     response: Response,
+    sender: Sender,
     if_match: Annotated[str | None, Header(description="`ETag` of `GET /runs/{run_id}`")] = None,
 ) -> Run:
     """Change the tags of a run, and note who did; refused if the run was changed since it was read."""
@@ -50,9 +54,11 @@ def change_run(
     if if_match is None:
         detail = "PATCH needs the header If-Match with the ETag of GET /runs/{id}; read the run first"
         raise ProblemError(HTTPStatus.PRECONDITION_REQUIRED, "if-match-missing", "If-Match is missing", detail)
+    note_old({"tags": row.tags})
     is_current = if_match in ("*", make_run_tag(row))
     notebook = context.catalogue.notebook
-    changed = notebook.change_tags(run_id, change.author, change.tags, row.revision) if is_current else None
+    author = get_author(sender, change.author)
+    changed = notebook.change_tags(run_id, author, change.tags, row.revision) if is_current else None
     if changed is None:
         detail = f"run {run_id} was changed meanwhile; read it again and repeat the change"
         raise ProblemError(HTTPStatus.PRECONDITION_FAILED, "changed-meanwhile", "Changed meanwhile", detail)

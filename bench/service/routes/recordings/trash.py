@@ -5,6 +5,7 @@ import asyncio
 from fastapi import APIRouter
 
 from bench.catalogue import UNFINISHED_STATES, JobFilter, RunRow, move_to_trash, restore_from_trash
+from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import make_conflict
 from bench.service.views import Run
@@ -17,6 +18,7 @@ _MAX_JOBS = 1000
 async def trash_run(run_id: str, context: Context) -> Run:
     """Move a run and its log to the trash, and cancel its jobs; `GET /runs?trash=true` lists the trash."""
     row = await asyncio.to_thread(context.get_run, run_id)
+    note_old(_describe(row))
     if row.state == "running":
         raise make_conflict("run-not-ended", "The run goes on", f"run {run_id} is in progress; stop it first")
     if row.trashed is not None:
@@ -29,9 +31,14 @@ async def trash_run(run_id: str, context: Context) -> Run:
 async def restore_run(run_id: str, context: Context) -> Run:
     """Move a run and its log back from the trash."""
     row = await asyncio.to_thread(context.get_run, run_id)
+    note_old(_describe(row))
     if row.trashed is None:
         raise make_conflict("not-in-trash", "Not in the trash", f"run {run_id} is not in the trash")
     return await _move(context, row, is_restored=True)
+
+
+def _describe(row: RunRow) -> dict[str, str | None]:
+    return {"trashed": None if row.trashed is None else row.trashed.isoformat(), "log": row.log}
 
 
 async def _cancel_jobs(context: ServiceContext, row: RunRow) -> None:

@@ -1,7 +1,7 @@
-// Health of the service in one strip: agent, worker, queue, disk, wires, clocks. Each entry is a word, with the reason of a fault.
+// Health of the service in one strip: agent, worker, queue, disk, wires, clocks, calibration. Each entry is a word, with the reason of a fault.
 
 import { get } from "../common/api.js";
-import { byId, element, shortTime } from "../common/format.js";
+import { byId, element, shortTime, spaced } from "../common/format.js";
 
 const PERIOD_MS = 5_000;
 /** Error of a clock [s] above which it is marked; a sample lasts a millisecond. */
@@ -22,8 +22,11 @@ export class HealthStrip {
 
   async request() {
     try {
-      const { agent, worker, queue, disk } = await get("health");
-      this.show({ Agent: entry(agent), Worker: entry(worker), Queue: { kind: "good", text: queue }, Disk: entry(disk) });
+      const { agent, worker, queue, disk, calibration } = await get("health");
+      this.show({
+        Agent: entry(agent), Worker: entry(worker), Queue: { kind: "good", text: queue }, Disk: entry(disk),
+        Calibration: calibration === "ok" ? { kind: "good", text: "nothing due" } : { kind: "fair", text: shorten(calibration) },
+      });
     } catch (problem) {
       this.show({ Service: { kind: "bad", text: problem.message } });
     }
@@ -51,4 +54,6 @@ export class HealthStrip {
   }
 }
 
+/** Channels and dates alone; the view of the certificates has the rest. */
+const shorten = (calibration) => spaced(calibration.replaceAll(/: calibration | \(certificate [^;]*/g, (part) => (part.startsWith(":") ? " " : "")));
 const entry = (state) => (state === "ok" ? { kind: "good", text: "ready" } : { kind: "bad", text: state });

@@ -2,8 +2,7 @@
 
 import { get, start } from "../common/api.js";
 import { byId, describeDriveKind, duration, element, write } from "../common/format.js";
-
-const OPERATOR = "mrbench.operator";
+import { followOperator, keepOperatorName } from "../common/session.js";
 
 /** Reason why no run can be started, by state of the bench; empty if one can. */
 const OBSTACLES = {
@@ -22,7 +21,7 @@ export class StartForm {
     this.problem = "";
     this.busy = false;
     this.state = "unknown";
-    byId("operator").value = localStorage.getItem(OPERATOR) ?? "";
+    followOperator(byId("operator"));
     byId("start-form").addEventListener("submit", (event) => {
       event.preventDefault();
       this.start();
@@ -94,7 +93,7 @@ export class StartForm {
     this.show({ problem: "" });
     try {
       const run = await start("runs", { method, specimen, operator }); // returns once the run has started
-      localStorage.setItem(OPERATOR, operator);
+      keepOperatorName(operator);
       this.onStarted(run);
     } catch (problem) {
       this.problem = problem.after("Not started");

@@ -7,8 +7,9 @@ import { openDialog } from "../common/dialogs.js";
 import { byId, element, spaced, write } from "../common/format.js";
 import { encodePhoto } from "./photo.js";
 import { keep, refresh } from "./refresh.js";
+import { need } from "../common/rights.js";
+import { followOperator, keepOperatorName } from "../common/session.js";
 
-const OPERATOR = "mrbench.operator";
 const TEST_TIMEOUT_MS = 30_000;
 const REPORT_FORMATS = ["html", "pdf"];
 const QUESTIONS = {
@@ -23,8 +24,8 @@ export class CampaignActions {
   constructor({ onChanged }) {
     this.onChanged = onChanged;
     this.queue = new CampaignQueue({ act: (...given) => this.act(...given), save: (...given) => this.save(...given), who: () => this.who });
-    byId("campaign-who").value = localStorage.getItem(OPERATOR) ?? "";
-    byId("campaign-who").addEventListener("change", () => localStorage.setItem(OPERATOR, this.who));
+    followOperator(byId("campaign-who"), { fixed: true });
+    byId("campaign-who").addEventListener("change", () => keepOperatorName(this.who));
     for (const verb of Object.keys(QUESTIONS)) byId(`campaign-${verb}`).addEventListener("click", () => this.ask(verb));
     byId("campaign-test").addEventListener("click", () => this.test());
     for (const format of REPORT_FORMATS) byId(`campaign-report-${format}`).addEventListener("click", () => this.saveReport(format));
@@ -151,11 +152,11 @@ function makeForm({ text, needs_note: needsNote, needs_photo: needsPhoto, choice
   const buttons = choices.map((choice) => {
     const button = keep(element("button", { type: "button" }, choice === "stop" ? "Stop the campaign" : `${spaced(choice)} the step`), choice);
     button.addEventListener("click", () => choose(choice));
-    return button;
+    return choice === "stop" ? button : need("operate", button);
   });
   return [
     element("p", { className: "reason" }, text), label("Note", needsNote, note),
     choices.length ? null : label("Photo, JPEG or PNG", needsPhoto, photo),
-    element("p", { className: "actions" }, ...(buttons.length ? buttons : [keep(element("button", { className: "primary" }, "Answer"), "answer")])),
+    element("p", { className: "actions" }, ...(buttons.length ? buttons : [need("operate", keep(element("button", { className: "primary" }, "Answer"), "answer"))])),
   ].filter(Boolean);
 }

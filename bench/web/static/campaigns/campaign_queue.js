@@ -4,6 +4,7 @@ import { start } from "../common/api.js";
 import { countStates, describeKind, hasEnded, markStep } from "./campaign_words.js";
 import { byId, element, instant, write } from "../common/format.js";
 import { keep, refresh } from "./refresh.js";
+import { need } from "../common/rights.js";
 
 const FIRST = 30;
 const ENDED = ["done", "skipped", "failed", "held_back"];
@@ -81,7 +82,7 @@ export class CampaignQueue {
     const make = (text, edit, done) => {
       const button = keep(element("button", { type: "button", "aria-label": `${text}: step ${id}, ${item.label}` }, text), `${id}/${text}`);
       button.addEventListener("click", () => this.edit(edit(), done));
-      return button;
+      return need("operate", button);
     };
     if (RELEASABLE.includes(state)) return [make("Release", () => ({ edit: "release", item: id }), `Step ${id} is tried again.`)];
     if (state !== "pending") return [];

@@ -4,6 +4,7 @@ import { post, start } from "../common/api.js";
 import { describeDrive, describeKind } from "./campaign_words.js";
 import { duration, element, significant, write, byId } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { followOperator } from "../common/session.js";
 import { factList, table } from "../common/tables.js";
 
 const PLAN_TIMEOUT_MS = 120_000;
@@ -21,7 +22,7 @@ export class CampaignStart {
       event.preventDefault();
       this.start();
     });
-    byId("campaign-operator").value = localStorage.getItem("mrbench.operator") ?? "";
+    followOperator(byId("campaign-operator"));
     this.forget();
   }
 

@@ -3,6 +3,7 @@
 import { get } from "../common/api.js";
 import { CampaignActions } from "./campaign_actions.js";
 import { CampaignBoard } from "./campaign_board.js";
+import { isAsking } from "../account/sign_in.js";
 import { CampaignStart } from "./campaign_start.js";
 import { campaignAddress, markStatus } from "./campaign_words.js";
 import { byId, clock, element, localTime, write, zone } from "../common/format.js";
@@ -42,7 +43,7 @@ export class CampaignView {
 
   /** Requests the present state while the view is visible, and one request at a time. */
   follow() {
-    if (!byId("view-campaigns").hidden && !document.hidden && !this.loading && !byId("token-dialog").open) this.load();
+    if (!byId("view-campaigns").hidden && !document.hidden && !this.loading && !isAsking()) this.load();
   }
 
   async load() {

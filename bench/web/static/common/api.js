@@ -1,18 +1,20 @@
-// Client of the REST interface: token, JSON requests, files, and errors with their messages.
+// Client of the REST interface: JSON requests, files, and errors with their messages. The browser adds the cookie of the session.
 
 import { element } from "./format.js";
 import { parseBatch } from "../live/live_batch.js";
+import { csrfHeader, setSession } from "./session.js";
 
 const BASE = new URL("api/v1/", document.baseURI);
-const TOKEN_KEY = "mrbench.token";
+const SESSION = "session";
+const READING = ["GET", "HEAD"];
 const TIMEOUT_MS = 20_000;
 const FILE_TIMEOUT_MS = 600_000;
 
 /** Error of a request, with the detail that the service returned; `message` is a sentence for a person. */
 export class Problem extends Error {
-  constructor(status, title, detail, type = "") {
+  constructor(status, title, detail, type = "", retryAfter = null) {
     super(detail || title);
-    Object.assign(this, { status, title, type });
+    Object.assign(this, { status, title, type, retryAfter });
   }
 
   /** Returns a sentence that begins with the consequence. */
@@ -25,29 +27,24 @@ export class Problem extends Error {
     return this.type === "urn:mrbench:problem:no-rig";
   }
 
+  /** True if the browser has the cookie of a newer session than the page. */
+  get hasOldSession() {
+    return this.type === "urn:mrbench:problem:csrf";
+  }
+
   get unauthorised() {
     return this.status === 401;
   }
 }
 
-/** Moves a token from the address into the storage of this tab, so that no bookmark or screenshot contains it. */
-export function takeToken() {
-  const given = new URLSearchParams(location.hash.slice(1)).get("token");
-  if (given) {
-    keepToken(given);
-    history.replaceState(null, "", location.pathname + location.search);
-  }
-  return token();
-}
+/** Signs in with `{ name, password }`, `{ token }` or `{ code }`. */
+export const signIn = async (credentials) => setSession(await call("POST", SESSION, credentials));
 
-export const token = () => sessionStorage.getItem(TOKEN_KEY) ?? localStorage.getItem(TOKEN_KEY);
+/** Asks the service who is signed in; the cookie survives a reload, the page's memory does not. */
+export const readSession = async () => setSession(await call("GET", SESSION));
 
-/** Keeps a token in this tab, or in this browser until another is given. */
-export function keepToken(value, inBrowser = false) {
-  localStorage.removeItem(TOKEN_KEY);
-  sessionStorage.setItem(TOKEN_KEY, value);
-  if (inBrowser) localStorage.setItem(TOKEN_KEY, value);
-}
+/** Ends the session. */
+export const signOut = () => call("DELETE", SESSION);
 
 /** Address of the live websocket. */
 export function liveAddress() {
@@ -95,7 +92,7 @@ export async function start(path, body, method = "POST") {
   }
 }
 
-/** Fetches a file with the token in the header, which a plain link cannot send. */
+/** Fetches a file. A plain link could not say why a file is refused. */
 export async function file(path) {
   const response = await send("GET", path, undefined, FILE_TIMEOUT_MS);
   const match = /filename="?([^";]+)"?/.exec(response.headers.get("content-disposition") ?? "");
@@ -116,14 +113,14 @@ export function upload(path, form, onProgress) {
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
     request.open("POST", new URL(path, BASE));
-    request.setRequestHeader("Authorization", `Bearer ${token() ?? ""}`);
-    request.setRequestHeader("Idempotency-Key", makeKey());
+    const headers = { ...csrfHeader(), "Idempotency-Key": makeKey() };
+    for (const [name, value] of Object.entries(headers)) request.setRequestHeader(name, value);
     request.responseType = "json";
     request.upload.addEventListener("progress", ({ loaded, total }) => onProgress(total ? loaded / total : 0));
     request.addEventListener("error", () => reject(new Problem(0, "No answer", `The service at ${BASE.host} cannot be reached.`)));
     request.addEventListener("load", () => {
       if (request.status < 300) resolve(request.response);
-      else reject(makeProblem(request.status, request.statusText, request.response ?? {}));
+      else reject(makeProblem(request.status, request.statusText, request.response ?? {}, { path }));
     });
     request.send(form);
   });
@@ -143,8 +140,19 @@ async function readJson(response, timeout = TIMEOUT_MS) {
   }
 }
 
-async function send(method, path, body, timeout = TIMEOUT_MS, more = {}) {
-  const headers = { Authorization: `Bearer ${token() ?? ""}`, ...more };
+/** Sends a request. Another tab may have signed in anew meanwhile: then once more, with the value of that session. */
+async function send(...request) {
+  try {
+    return await attempt(...request);
+  } catch (problem) {
+    if (!problem.hasOldSession) throw problem;
+    await readSession();
+    return attempt(...request);
+  }
+}
+
+async function attempt(method, path, body, timeout = TIMEOUT_MS, more = {}) {
+  const headers = { ...(READING.includes(method) ? {} : csrfHeader()), ...more };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   let response;
   try {
@@ -154,7 +162,7 @@ async function send(method, path, body, timeout = TIMEOUT_MS, more = {}) {
   } catch (error) {
     throw new Problem(0, "No answer", describeFailure(error, timeout));
   }
-  if (!response.ok) throw await readProblem(response);
+  if (!response.ok) throw await readProblem(response, path);
   return response;
 }
 
@@ -164,14 +172,15 @@ function describeFailure(error, timeout) {
     : `The service at ${BASE.host} cannot be reached.`;
 }
 
-async function readProblem(response) {
-  return makeProblem(response.status, response.statusText, await response.json().catch(() => ({})));
+async function readProblem(response, path) {
+  const retryAfter = Number(response.headers.get("retry-after")) || null;
+  return makeProblem(response.status, response.statusText, await response.json().catch(() => ({})), { path, retryAfter });
 }
 
-function makeProblem(status, phrase, { title, detail, type }) {
-  if (status === 401) {
-    document.dispatchEvent(new Event("unauthorised")); // one place asks for another token
-    return new Problem(401, "Not signed in", "The service does not accept this token.");
+function makeProblem(status, phrase, { title, detail, type }, { path, retryAfter = null }) {
+  if (status === 401 && path !== SESSION) {
+    document.dispatchEvent(new Event("unauthorised")); // one place asks to sign in again
+    return new Problem(401, "Not signed in", "The session has ended. Sign in again.");
   }
-  return new Problem(status, title ?? `${status} ${phrase}`, typeof detail === "string" ? detail : "", type);
+  return new Problem(status, title ?? `${status} ${phrase}`, typeof detail === "string" ? detail : "", type, retryAfter);
 }

@@ -1,6 +1,7 @@
 // Websocket to the service.
 
-import { liveAddress, token } from "../common/api.js";
+import { liveAddress } from "../common/api.js";
+import { signedIn } from "../common/session.js";
 import { parseBatch } from "./live_batch.js";
 
 const RETRY_MS = [500, 1_000, 2_000, 5_000];
@@ -31,7 +32,7 @@ export class LiveLink {
     socket.binaryType = "arraybuffer";
     this.lastMessageAt = performance.now();
     socket.onopen = () => {
-      socket.send(JSON.stringify({ token: token() ?? "", acknowledge: true })); // the first message; an address would be logged
+      socket.send(JSON.stringify({ csrf: signedIn()?.csrf ?? "", acknowledge: true })); // another site does not know this value
       if (this.failures) this.onReopened();
     };
     socket.onmessage = ({ data }) => {

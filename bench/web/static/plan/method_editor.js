@@ -7,6 +7,7 @@ import { element, write } from "../common/format.js";
 import { makeFirstMethod, makeMethodForm } from "./method_form.js";
 import { locateProblem } from "./method_problems.js";
 import { plotPreview } from "./plan_plot.js";
+import { need } from "../common/rights.js";
 
 /** Pause [ms] after a change, after which the method is checked. */
 const PAUSE_MS = 700;
@@ -43,7 +44,7 @@ export class MethodEditor {
     this.words = element("ul", { className: "words" });
     this.toggle = this.makeButton("Edit as JSON", () => this.switch());
     this.assessment = this.makeButton("Assess what the strokes identify", () => this.assess());
-    const store = this.makeButton("Store as a version", () => this.store());
+    const store = need("manage_methods", this.makeButton("Store as a version", () => this.store()));
     store.classList.add("primary");
     const discard = this.makeButton("Discard the draft", () => this.discard());
     this.place = element("div", { className: "editor" },

@@ -7,6 +7,7 @@ import { byId, describeDriveKind, duration, element, fixed, significant, write }
 import { MethodEditor } from "./method_editor.js";
 import { plotPreview } from "./plan_plot.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { need } from "../common/rights.js";
 import { factList, rowTable } from "../common/tables.js";
 
 /** Address of a new method; a method of this name is edited at `#/plan/new/edit`. */
@@ -80,7 +81,7 @@ export class PlanView {
 
   build(method, preview) {
     const use = element("a", { className: "button primary", href: `#/bench?method=${encodeURIComponent(method.name)}` }, "Use on the bench");
-    const copy = element("a", { className: "button", href: `#/plan/${encodeURIComponent(method.name)}/edit` }, "Edit a copy");
+    const copy = need("manage_methods", element("a", { className: "button", href: `#/plan/${encodeURIComponent(method.name)}/edit` }, "Edit a copy"));
     const places = element("div", { className: "previews" });
     byId("plan").replaceChildren(
       element("p", {}, method.description), facts(method, preview), element("p", { className: "actions" }, use, copy),

@@ -1,6 +1,6 @@
 // Tables of a fit: force error by drive and by condition, and parameters with their intervals.
 
-import { significant, spaced } from "../common/format.js";
+import { element, significant, spaced } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { table } from "../common/tables.js";
 
@@ -49,11 +49,26 @@ export function describeCondition({ amplitude_m: amplitude, frequency_hz: freque
   ];
 }
 
-/** Parameters of the modified Bouc-Wen law with 95 % intervals. */
-export function makeParameterTable(fit) {
+/**
+ * Parameters of the modified Bouc-Wen law with 95 % intervals, as elements.
+ *
+ * `calibrated` has the intervals with the calibration; they are shown if a channel had a certificate.
+ */
+export function makeParameterTable(fit, calibrated = null) {
+  const withCalibration = Object.values(calibrated?.parameters ?? {}).some(({ calibration }) => calibration);
   const rows = Object.entries(fit.parameters).map(([name, { value, unit, ci95, note }]) => [
-    spaced(name), significant(value), ci95 ? `${significant(ci95[0])} … ${significant(ci95[1])}` : "not determined",
-    unit === "1" ? "–" : unit, note,
+    spaced(name), significant(value), ci95 ? intervalText(ci95) : "not determined",
+    ...(withCalibration ? [describeCalibrated(calibrated.parameters[name])] : []), unit === "1" ? "–" : unit, note,
   ]);
-  return table("Parameters of the modified Bouc-Wen law", ["Parameter", "Value", "95 % interval", "Unit", "Note"], rows);
+  const heads = ["Parameter", "Value", "95 % interval", ...(withCalibration ? ["95 % interval with calibration"] : []), "Unit", "Note"];
+  const made = table("Parameters of the modified Bouc-Wen law", heads, rows);
+  return withCalibration ? [made, element("p", { className: "soft" }, `Interval with calibration: ${calibrated.formula}`)] : [made];
+}
+
+const intervalText = ([low, high]) => `${significant(low)} … ${significant(high)}`;
+
+function describeCalibrated(found) {
+  if (!found) return "–";
+  if (found.missing.length) return `no certificate of ${found.missing.join(" and ")}`;
+  return found.ci95 ? intervalText(found.ci95) : "not determined";
 }

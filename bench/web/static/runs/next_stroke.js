@@ -5,10 +5,11 @@ import { ask } from "../common/dialogs.js";
 import { forceText, inForceUnit } from "./fit_tables.js";
 import { byId, duration, element, significant, write } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { need } from "../common/rights.js";
 import { joinEffects } from "./run_diagnosis.js";
+import { operatorName } from "../common/session.js";
 
 const SUFFIX = "_extended";
-const OPERATOR = "mrbench.operator";
 
 /** Describes a segment of a method: motion, drive and cycles with their units. */
 export function describeStroke({ motion, drive, cycles }, driveUnit) {
@@ -37,7 +38,7 @@ export function makeNextStroke(run, { next_stroke: proposal }, driveUnit) {
   const text = describeStroke(proposal.segment, driveUnit);
   const sets = proposal.separates.map((names) => `“${joinEffects(names)}”`).join(" and ");
   const answer = element("p", { className: "note", role: "status" });
-  const button = element("button", { type: "button", className: "primary" }, "Start with this stroke …");
+  const button = need("operate manage_methods", element("button", { type: "button", className: "primary" }, "Start with this stroke …"));
   button.addEventListener("click", async () => {
     button.disabled = true;
     await offer(run, proposal.segment, text, answer);
@@ -84,7 +85,7 @@ function describeStart(run, method, text, { envelope, bench }) {
 
 async function startMethod(run, method) {
   const { name, version } = await post("methods", method);
-  const operator = localStorage.getItem(OPERATOR) ?? "";
+  const operator = operatorName();
   await start("runs", { method: name, method_version: version, operator, ...(run.specimen && { specimen: run.specimen }) });
   // The next key can stop a run that was started here. The router moves the focus to the title of the view before.
   addEventListener("hashchange", () => byId("stop").focus(), { once: true });

@@ -6,7 +6,7 @@ import { element } from "../common/format.js";
 /**
  * Creates the frame of a report and its buttons.
  *
- * The report is fetched with the token in the header, so that no address contains it. It runs no script.
+ * The report is fetched as text, so that it can be shown in a frame without scripts and saved.
  */
 export async function makeReport(run) {
   const { blob, name } = await file(`runs/${encodeURIComponent(run.id)}/report`);

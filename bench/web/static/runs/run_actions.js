@@ -5,9 +5,15 @@ import { selectionAddress } from "../compare/compare_address.js";
 import { ask } from "../common/dialogs.js";
 import { element, instant } from "../common/format.js";
 import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
+import { need } from "../common/rights.js";
 import { runAddress } from "../common/router.js";
 
 const encode = encodeURIComponent;
+/** Rights that the buttons need, by the first word of their keys; files need none beyond reading. */
+const NEEDED = {
+  restore: "manage_runs", repair: "manage_runs", trash: "manage_runs", resume: "operate",
+  identify: "analyse", diagnose: "analyse", cancel: "analyse", retry: "analyse", integrity: "analyse",
+};
 const EXPORTS = [
   ["CSV", "export?format=csv"], ["Parquet", "export?format=parquet"], ["MAT", "export?format=mat"],
   ["PDF report", "report?format=pdf"], ["XLSX report", "report?format=xlsx"],
@@ -71,7 +77,8 @@ export class RunActions {
     const button = element("button", { type: "button", "aria-label": `${text}: ${name(run)}` }, text);
     button.dataset.key = `${run.id}/${key}`;
     button.addEventListener("click", act);
-    return button;
+    const right = NEEDED[key.split("-")[0]];
+    return right ? need(right, button) : button;
   }
 
   note(run, text) {

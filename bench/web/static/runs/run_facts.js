@@ -27,7 +27,8 @@ export function describeOutcome(run) {
   const mark = element("span", { className: `mark ${OUTCOMES[name] ?? "plain"}` }, spaced(name) + ending);
   const reason = run.state === "truncated" ? CUT_OFF : run.reason;
   const alarms = (run.alarms ?? []).map((text) => element("small", { className: "attention" }, `Alarm: ${text}`));
-  return [mark, element("small", {}, reason ?? ""), ...alarms];
+  const overdue = (run.calibration_overdue ?? []).map((text) => element("small", { className: "attention" }, text));
+  return [mark, element("small", {}, reason ?? ""), ...alarms, ...overdue];
 }
 
 /** Force error of the newest fit beside the noise floor. */

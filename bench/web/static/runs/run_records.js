@@ -2,9 +2,10 @@
 
 import { get, getTag, patch, saveFile, start } from "../common/api.js";
 import { element, instant, write } from "../common/format.js";
+import { need } from "../common/rights.js";
+import { keepOperatorName, operatorName, recordedName } from "../common/session.js";
 import { foldedSection, table } from "../common/tables.js";
 
-const AUTHOR = "mrbench.operator";
 const SIZES = [["GB", 1e9], ["MB", 1e6], ["kB", 1e3]];
 
 const pathOf = (run) => `runs/${encodeURIComponent(run.id)}`;
@@ -43,14 +44,14 @@ export class RunRecords {
 class RunNotes {
   constructor(run) {
     this.run = run;
-    this.author = field("Your name", { maxLength: 200, required: true, autocomplete: "off", value: localStorage.getItem(AUTHOR) ?? "" });
+    this.author = field("Your name", { maxLength: 200, required: true, autocomplete: "off", value: operatorName(), readOnly: recordedName() !== "" });
     this.text = field("Note", { tag: "textarea", maxLength: 10_000, rows: 3 });
     this.tag = field("New tag", { maxLength: 60, autocomplete: "off" });
     this.tags = element("ul", { className: "tags", "aria-label": "Tags" });
     this.list = element("ol", { className: "notes" }, element("li", { className: "soft" }, "Loading …"));
     this.answer = element("p", { className: "note", role: "status" });
-    const add = element("button", { type: "submit", className: "primary" }, "Add note");
-    const addTag = element("button", { type: "button" }, "Add tag");
+    const add = need("operate", element("button", { type: "submit", className: "primary" }, "Add note"));
+    const addTag = need("operate", element("button", { type: "button" }, "Add tag"));
     addTag.addEventListener("click", () => this.addTag());
     this.form = element("form", { className: "record-form" }, this.author.label, this.text.label, element("p", { className: "actions" }, add),
       this.tag.label, element("p", { className: "actions" }, addTag));
@@ -83,7 +84,7 @@ class RunNotes {
   }
 
   showTag(tag) {
-    const button = element("button", { type: "button", "aria-label": `Remove the tag ${tag}` }, "Remove");
+    const button = need("operate", element("button", { type: "button", "aria-label": `Remove the tag ${tag}` }, "Remove"));
     button.addEventListener("click", () => this.changeTags((tags) => tags.filter((one) => one !== tag), `The tag ${tag} was removed.`));
     return element("li", {}, element("span", {}, tag), button);
   }
@@ -118,7 +119,7 @@ class RunNotes {
 
   readAuthor() {
     const author = this.author.input.value.trim();
-    if (author) localStorage.setItem(AUTHOR, author);
+    if (author) keepOperatorName(author);
     else this.author.input.focus();
     return author;
   }

@@ -31,12 +31,13 @@ export class RunResults {
     Object.assign(this, { run, done });
     if (isKnown) return this.showMissing();
     const path = `runs/${encodeURIComponent(run.id)}`;
-    const [fit, diagnosis] = await Promise.all([
+    const [fit, diagnosis, calibrated] = await Promise.all([
       isFitted(run) ? get(`${path}/fit`) : null, findDone(run, "diagnose") ? get(`${path}/diagnosis`) : null,
+      isFitted(run) ? get(`${path}/fit/calibration`).catch(() => null) : null, // a fit of several logs has none
     ]);
     const driveUnit = fit?.drive_unit ?? (diagnosis && (await get(`${path}/segments`)).drive_unit);
     if (run !== this.run) return; // another state of the run was shown meanwhile
-    this.documents = { fit, diagnosis, driveUnit };
+    this.documents = { fit, diagnosis, calibrated, driveUnit };
     this.showDiagnosis();
     this.showFit();
     this.showMissing();
@@ -61,9 +62,9 @@ export class RunResults {
   }
 
   showFit() {
-    const { fit } = this.documents;
+    const { fit, calibrated } = this.documents;
     this.parameters.section.hidden = !fit;
-    if (fit) this.parameters.body.replaceChildren(makeParameterTable(fit), makeDriveTable(fit));
+    if (fit) this.parameters.body.replaceChildren(...makeParameterTable(fit, calibrated), makeDriveTable(fit));
   }
 
   async showForce() {

@@ -3,6 +3,7 @@
 import { getTag, patch } from "../common/api.js";
 import { element, instant, significant, write, describeDriveKind } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
+import { need } from "../common/rights.js";
 import { factList } from "../common/tables.js";
 
 const CHANGED_MEANWHILE = 412;
@@ -57,7 +58,7 @@ export class SpecimenFacts {
       ["Described first", registered ? instant(registered) : "not yet; only runs name it"],
     ];
     const list = factList(Object.fromEntries(rows));
-    this.edit = element("button", { type: "button" }, "Edit facts");
+    this.edit = need("operate", element("button", { type: "button" }, "Edit facts"));
     this.edit.addEventListener("click", () => this.open());
     this.place.replaceChildren(element("h2", {}, "Facts"), list, this.edit, element("p", { className: "note", role: "status" }, answer));
   }

@@ -2,6 +2,7 @@
 
 import { post, start } from "../common/api.js";
 import { element, instant, write } from "../common/format.js";
+import { need } from "../common/rights.js";
 import { describeJob, isUnfinished } from "../runs/run_facts.js";
 
 const LEAST_RUNS = 3;
@@ -20,7 +21,7 @@ export class TrendRequest {
     this.onJob = onJob;
     this.status = element("p", { role: "status" });
     this.progress = element("progress", { max: 1, "aria-label": "Progress of the trend" });
-    this.button = element("button", { type: "button" });
+    this.button = need("analyse", element("button", { type: "button" }));
     this.button.addEventListener("click", () => this.act());
     this.place = element("div", { className: "request" }, this.status, this.progress, this.button);
   }

@@ -11,10 +11,12 @@ import pytest
 
 from bench.agent.timing import AgentTiming
 from bench.agent_protocol.messages import RunCommand
+from bench.calibration import IssuedCertificate, list_overdue, read_entry
 from bench.config import BenchConfig
 from bench.disk import RESERVE
 from bench.errors import LogError, RunError
 from bench.recorder import make_attachments
+from tests.support.certificates import issue_certificate
 from tests.support.fake_rig import BENCH_TOML
 from tests.support.run_bench import METHOD, RunBench
 
@@ -240,6 +242,45 @@ class TestPreparation:
         method = bench.executor.prepare(RunCommand(method=METHOD)).run.request.method
         with pytest.raises(RunError, match=r"none\.pdf cannot be read"):
             make_attachments(method, config, bench.rig, tmp_path / "bench.toml")
+
+
+class TestCalibration:
+    """The coil is driven by its voltage, whose certificate is that of the drive as well."""
+
+    FORCE = issue_certificate("force", "N", number="4711", date="2020-01-01", due="2021-01-01")
+    VOLTAGE = issue_certificate("coil_voltage", "V", number="12")
+    COMMAND = RunCommand(method=METHOD, certificates=(FORCE, VOLTAGE))
+    MARK = "force: calibration overdue since 2021-01-01 (certificate 4711 of PTB Braunschweig)"
+
+    def test_the_log_contains_the_certificates_that_apply(self, bench):
+        metadata = bench.executor.prepare(self.COMMAND).metadata
+        calibration = metadata.header.calibration
+        assert calibration["coil_drive"] == calibration["coil_voltage"]
+        assert read_entry(calibration["coil_voltage"])["number"] == "12"
+        assert list_overdue(calibration) == [self.MARK]
+        assert calibration["displacement"] == "none given"
+        attached = {one.name: one.data for one in metadata.attachments}
+        assert IssuedCertificate.model_validate_json(attached["certificate-force.json"]) == self.FORCE
+        assert "certificate-coil_voltage.json" in attached
+
+    def test_an_overdue_channel_marks_the_run_by_default(self, bench):
+        assert bench.executor.prepare(self.COMMAND).run.get_status().calibration_overdue == (self.MARK,)
+        valid = RunCommand(method=METHOD, certificates=(self.VOLTAGE,))
+        assert bench.executor.prepare(valid).run.get_status().calibration_overdue == ()
+
+    def test_an_overdue_channel_is_refused_by_policy(self, tmp_path):
+        bench = RunBench(tmp_path, time.monotonic_ns, f'{BENCH_TOML}[calibration]\noverdue = "refuse"\n')
+        with pytest.raises(RunError) as refused:
+            bench.executor.prepare(self.COMMAND)
+        assert self.MARK in str(refused.value)
+        assert 'overdue = "mark"' in str(refused.value)
+        assert bench.executor.prepare(RunCommand(method=METHOD, certificates=(self.VOLTAGE,)))
+
+    def test_a_channel_that_is_not_recorded_is_not_judged(self, bench):
+        other = issue_certificate("temperature", "degC", date="2020-01-01", due="2021-01-01")
+        prepared = bench.executor.prepare(RunCommand(method=METHOD, certificates=(other,)))
+        assert prepared.run.get_status().calibration_overdue == ()
+        assert "certificate-temperature.json" not in {one.name for one in prepared.metadata.attachments}
 
 
 class TestClocks:

@@ -1,5 +1,6 @@
 """Commands and publications over real sockets on loopback."""
 
+import json
 import socket
 import threading
 from collections.abc import Iterator
@@ -123,6 +124,15 @@ def test_a_command_that_comes_too_late_is_answered_with_the_reason(server):
         reply = Reply.model_validate_json(client.recv())
     assert not reply.ok
     assert "nothing was done; repeat it" in reply.error
+
+
+def test_a_client_of_an_older_version_reads_the_replies_to_its_commands(server):
+    with zmq.Context.instance().socket(zmq.REQ) as client:
+        client.linger = 0
+        client.connect(server.address)
+        client.send(b'{"command": "stop"}')
+        assert client.poll(5000)
+        assert set(json.loads(client.recv())) == {"ok", "error", "status", "description"}
 
 
 def test_missing_agent_is_reported_in_time(address):

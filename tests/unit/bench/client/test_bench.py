@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bench.client import Bench, ClientError, RunState
+from tests.support.certificates import make_certificate
 from tests.support.service_logs import write_complete_log, write_truncated_log
 
 TIMEOUT = 20.0
@@ -122,3 +123,12 @@ def test_files_are_downloaded(service, bench, tmp_path):
     assert report.read_text().startswith("<!doctype html>")
     with pytest.raises(ClientError, match="there is no run two"):
         bench.run("two").download_report(target / "none.html")
+
+
+def test_certificates_are_added_corrected_and_withdrawn(bench):
+    added = bench.add_certificate(make_certificate())
+    corrected = bench.correct_certificate(added["id"], "typing error", note="second cell")
+    assert (corrected["version"], corrected["document"]["note"]) == (2, "second cell")
+    assert bench.withdraw_certificate(added["id"], "cell & cable replaced")["state"] == "withdrawn"
+    assert [one["withdrawal"]["reason"] for one in bench.list_certificates("force")] == ["cell & cable replaced"]
+    assert bench.list_certificates("coil_current") == []

@@ -12,6 +12,7 @@ from bench.commands.campaign.bench import check_served, find_or_create
 from bench.commands.campaign.catalogue import open_store
 from bench.commands.campaign.control import control
 from bench.commands.campaign.report import report
+from tests.support.audit_trails import list_all
 from tests.support.campaign_reports import STARTED, make_result, run_step, store_campaign
 from tests.support.message_servers import serve_webhook
 
@@ -57,6 +58,11 @@ def test_the_queue_is_edited_and_stopped_by_the_command_line_also_without_a_serv
         assert act("test-message").strip() == "sent"
         act("stop")
     assert [one["kind"] for one in received] == ["test", "ended"]
+    acts = list_all(tmp_path / "data" / "audit.jsonl")[1:]
+    assert [one.action for one in acts] == ["campaign run", "campaign edit", "campaign stop"]
+    assert (acts[2].old, acts[2].new) == ({"status": "running"}, {"operator": "B"})
+    assert {one.target for one in acts} == {view["id"]}
+    assert acts[0].actor.startswith("local:")
 
 
 def test_the_newest_campaign_is_reported_without_a_service(tmp_path, capsys):

@@ -6,9 +6,11 @@ import os
 import numpy as np
 import pytest
 
+from bench.calibration import make_log_text
+from tests.support.certificates import issue_certificate
 from tests.support.cyclic_logs import write_cyclic_log
 from tests.support.reports import fit_document, prediction
-from tests.support.service_logs import write_truncated_log
+from tests.support.service_logs import STARTED, write_complete_log, write_truncated_log
 
 API = "/api/v1"
 
@@ -132,3 +134,40 @@ def test_a_prediction_of_an_unknown_model_is_refused(service):
     answer = service.client.post(f"{API}/runs/b/predict", json={"model": "nothing"})
     assert answer.status_code == 409
     assert "there is no fit or diagnosis nothing" in answer.json()["detail"]
+
+
+def identify_with_certificate(service, of_this_log=True):
+    """Return a run whose force has a certificate of 0.2 % standard uncertainty, with its fit."""
+    text = make_log_text(issue_certificate(), STARTED.date(), "")
+    write_complete_log(service.data / "calibrated.mcap", "calibrated", calibration={"force": text})
+    service.scan()
+    run = service.get("/runs/calibrated")
+    document = fit_document(run["log_sha256"] if of_this_log else "5f" * 32)
+    document["parameters"]["n"] = {"value": 2.0, "unit": "1", "ci95": [1.9, 2.1], "identifiable": True}
+    service.complete(run["jobs"][0], {"rmse_n": 2.0, "noise_floor_n": 1.9}, {"fit.json": json.dumps(document)})
+    return run["jobs"][0]["id"]
+
+
+def test_the_intervals_of_a_fit_are_combined_with_the_calibration(service):
+    fit = identify_with_certificate(service)
+    found = service.get("/runs/calibrated/fit/calibration")
+    assert (found["fit"], "JCGM 100:2008" in found["formula"]) == (fit, True)
+    yield_force = found["coordinates"]["F_a"]
+    assert (yield_force["value"], yield_force["calibration"]) == (44.862, pytest.approx(0.002))
+    assert yield_force["ci95"][0] == pytest.approx(44.862 - np.hypot(0.096, 1.96 * 0.002 * 44.862))
+    assert (found["parameters"]["alpha_a"]["ci95"], found["parameters"]["alpha_a"]["missing"]) == (
+        None,
+        ["displacement"],
+    )
+    assert found["parameters"]["n"]["ci95"] == [1.9, 2.1]
+    assert service.get("/runs/calibrated/fit")["coordinates"]["F_a"]["ci95"] == [44.766, 44.959]
+
+
+def test_a_fit_of_other_logs_has_no_calibration(service):
+    identify_with_certificate(service, of_this_log=False)
+    answer = service.client.get(f"{API}/runs/calibrated/fit/calibration")
+    assert (answer.status_code, answer.json()["type"]) == (409, "urn:mrbench:problem:several-logs")
+
+
+def test_a_run_without_a_fit_has_no_calibrated_intervals(service):
+    assert service.client.get(f"{API}/runs/a/fit/calibration").status_code == 404

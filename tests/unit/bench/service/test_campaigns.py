@@ -9,6 +9,7 @@ import pytest
 from bench import cli
 from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
 from bench.campaigns import parse_campaign
+from tests.support.certificates import make_certificate
 from tests.support.message_servers import find_closed_port, serve_webhook
 from tests.support.service_logs import write_complete_log
 
@@ -48,8 +49,10 @@ def wait_for_command(service, kind, number=1):
 
 
 def test_a_campaign_is_executed_answered_and_listed(service):
+    stored = service.post("/certificates", make_certificate(), 201)
     campaign = start(service, [RUN, PROMPT, RUN])
     command = wait_for_command(service, RunCommand)
+    assert [one.id for one in command.certificates] == [stored["id"]]
     assert (command.specimen, command.operator) == ("MR-1", "M. Curie")
     wait(service, campaign, lambda found: found["phase"] == "stroking")
     assert service.get("/queue")["campaign"]["id"] == campaign["id"]
@@ -173,7 +176,7 @@ def test_the_photo_of_an_answer_is_returned_as_it_was_sent(service):
         ([], {}, 422, "at least one step"),
         ([{"run": {"specimen": "a", "method": "nonsense"}}], {}, 422, "there is no method nonsense"),
         ([COOL, RUN], {}, 409, "no thermometer"),
-        ([RUN], {"methods": "approved"}, 409, "methods: any"),
+        ([RUN], {"methods": "approved"}, 409, "not approved: "),
     ],
 )
 def test_a_campaign_that_cannot_be_met_is_refused_at_the_start(service, steps, more, status, reason):

@@ -6,11 +6,13 @@ from datetime import timedelta
 import pytest
 from sqlalchemy.exc import OperationalError
 
+from bench.calibration import list_overdue, make_log_text
 from bench.catalogue import JobRow, RunRow
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.scan import catalogue_log
 from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
 from bench.service.routes import runs
+from tests.support.certificates import issue_certificate, make_certificate, shift
 from tests.support.service_logs import STARTED, write_complete_log, write_truncated_log
 
 PAGE = "<!doctype html><title>report</title>"
@@ -51,6 +53,39 @@ def test_a_run_is_started_at_the_agent_and_catalogued_at_once(service):
     assert service.agent.commands[-1].method["name"] == "quick"
     assert service.agent.commands[-1].log == str(service.data / run["log"])
     assert [found["id"] for found in service.get("/runs")["items"]] == [run["id"]]
+
+
+def test_the_agent_gets_the_certificates_that_apply(service):
+    old = make_certificate(number="1", date=shift(-700), due=shift(-400))
+    for document in (old, make_certificate(), make_certificate("displacement", "m", date=shift(1))):
+        service.post("/certificates", document, 201)
+    start(service)
+    (issued,) = service.agent.commands[-1].certificates
+    assert (issued.document.channel, issued.document.number, issued.version) == ("force", "4711", 1)
+
+
+def test_a_run_with_an_overdue_channel_is_marked_from_its_start_to_its_log(service):
+    issued = issue_certificate(date="2020-01-01", due="2021-01-01")
+    text = make_log_text(issued, STARTED.date(), "")
+    service.agent.overdue = tuple(list_overdue({"force": text}))
+    run = start(service)
+    assert run["calibration_overdue"] == list(service.agent.overdue)
+    assert "overdue since 2021-01-01" in run["calibration_overdue"][0]
+    write_complete_log(
+        service.data / run["log"], run["id"], calibration={"force": text, "coil_drive": "none given"}
+    )
+    service.agent.finish("clean")
+    ended = service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "ended")
+    assert ended["calibration_overdue"] == list(service.agent.overdue)
+
+
+def test_a_log_from_elsewhere_brings_its_mark(service):
+    text = make_log_text(issue_certificate(date="2020-01-01", due="2021-01-01"), STARTED.date(), "")
+    write_complete_log(service.data / "one.mcap", "one", calibration={"force": text})
+    write_complete_log(service.data / "two.mcap", "two", calibration={"force": "none given"})
+    service.scan()
+    assert len(service.get("/runs/one")["calibration_overdue"]) == 1
+    assert service.get("/runs/two")["calibration_overdue"] == []
 
 
 def test_progress_is_reported_during_a_run(service):

@@ -1,10 +1,13 @@
-"""Access to the service by a token, which is shown once on a terminal, or kept in a file of its owner."""
+"""The bench's own token, whose holder administers the service.
 
-import hashlib
+It is shown once on a terminal, or kept in a file that only its owner can read.
+"""
+
 import hmac
 import os
-import secrets
 from pathlib import Path
+
+from bench.people import compute_sha256, new_secret
 
 TOKEN_FILE = "token.sha256"
 """File in the data folder with the hash of the token, not the token itself."""
@@ -23,7 +26,11 @@ class Access:
 
     def is_allowed(self, token: str) -> bool:
         """Return whether a token is valid, in a time that does not depend on its content."""
-        return hmac.compare_digest(_compute_sha256(token), self._sha256)
+        return self.is_hash(compute_sha256(token))
+
+    def is_hash(self, sha256: str) -> bool:
+        """Return whether this is the hash of the valid token."""
+        return hmac.compare_digest(sha256, self._sha256)
 
 
 def open_access(data: Path, *, new: bool = False) -> tuple[Access, str | None]:
@@ -39,10 +46,10 @@ def open_access(data: Path, *, new: bool = False) -> tuple[Access, str | None]:
     path = data / TOKEN_FILE
     if path.exists() and not new:
         return Access(path.read_text("ascii").strip()), None
-    token = secrets.token_urlsafe(32)
+    token, sha256 = new_secret()
     (data / PLAIN_TOKEN_FILE).unlink(missing_ok=True)  # it contains the old one
-    _write_privately(path, _compute_sha256(token))
-    return Access(_compute_sha256(token)), token
+    _write_privately(path, sha256)
+    return Access(sha256), token
 
 
 def save_token(data: Path, token: str) -> Path:
@@ -50,10 +57,6 @@ def save_token(data: Path, token: str) -> Path:
     path = data / PLAIN_TOKEN_FILE
     _write_privately(path, token)
     return path
-
-
-def _compute_sha256(token: str) -> str:
-    return hashlib.sha256(token.encode()).hexdigest()
 
 
 def _write_privately(path: Path, text: str) -> None:

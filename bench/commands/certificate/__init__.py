@@ -1,0 +1,5 @@
+"""`mrbench certificate`: calibration certificates of a data folder."""
+
+from bench.commands.certificate.dispatch import certificate
+
+__all__ = ["certificate"]

@@ -1,0 +1,6 @@
+"""Calibration in a report: certificates that applied at the start of the run, intervals with their uncertainty."""
+
+from bench.report.calibration.certificates import make_calibration_findings, make_calibration_rows
+from bench.report.calibration.intervals import make_combined_rows
+
+__all__ = ["make_calibration_findings", "make_calibration_rows", "make_combined_rows"]

@@ -1,0 +1,47 @@
+"""Certificates that applied at the start of a run, and a warning for each overdue channel."""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+from bench.calibration import list_overdue, read_entry
+from bench.log import Log
+from bench.report.summary import Finding
+from bench.report.values import format_percent, format_significant
+
+RECORD = "calibration"
+"""Metadata record with the calibration by channel."""
+
+
+class CalibrationRow(NamedTuple):
+    """Certificate of one channel."""
+
+    channel: str
+    certificate: str
+    date: str
+    due: str
+    uncertainty: str
+    gain_error: str
+    state: str
+
+
+def make_calibration_findings(log: Log) -> list[Finding]:
+    """Return a warning for each channel whose calibration was overdue at the start of the run."""
+    return [Finding("warning", f"{text}.") for text in list_overdue(log.metadata.get(RECORD, {}))]
+
+
+def make_calibration_rows(log: Log) -> list[CalibrationRow]:
+    """Make the rows of the channels with a certificate."""
+    entries = {name: read_entry(text) for name, text in log.metadata.get(RECORD, {}).items()}
+    return [_make_row(name, entry) for name, entry in entries.items() if "certificate" in entry]
+
+
+def _make_row(channel: str, entry: Mapping[str, Any]) -> CalibrationRow:
+    return CalibrationRow(
+        channel,
+        f"{entry['number']}, {entry['laboratory']} (version {entry['version']})",
+        entry["date"],
+        entry["due"],
+        f"{format_percent(entry['gain_standard_uncertainty'])} (k = 1)",
+        f"{format_significant(100 * entry['gain_error'], 2)} %",
+        str(entry["state"]).replace("_", " "),
+    )

@@ -11,8 +11,8 @@ import numpy as np
 
 from identification.damper.definitions import STAGE_OF
 from identification.damper.effects import STAGES, Action, Effect, Place, Stage, Variable
+from identification.gap.data import compute_residual_correlation_length
 from identification.gap.discovery.curve_effects import CurvePlace
-from identification.gap.discovery.curve_evidence import estimate_correlation_length
 from identification.gap.discovery.curve_fit import fit_best_curves, screen_curves
 from identification.gap.fits import Candidate
 from identification.gap.selection import CandidatePool, Posterior, normalise_scores
@@ -64,7 +64,7 @@ def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
 
     Curves are only fitted where the most probable set leaves more than the noise floor; else nothing changes.
     """
-    names = posterior.rank_sets()[0][0]
+    names = posterior.most_probable_set
     if not names or pool.reaches_floor(pool.candidates[names]):
         return posterior
     pool.unlisted = find_unlisted_cause(pool)
@@ -95,7 +95,7 @@ def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage,
     for curve, evidence in screened:
         stage = STAGE_OF[curve.at.place]
         odds[stage] = max(odds[stage], evidence.log_odds)
-    scores = np.array([odds[stage] for stage in STAGES]) / estimate_correlation_length(errors)
+    scores = np.array([odds[stage] for stage in STAGES]) / compute_residual_correlation_length(errors)
     cost = float(sum(r @ r for r in errors))
     excess = max(cost - problem.samples, 1.0)
     closed = min(2.0 * max(odds.values()) * cost / problem.samples / excess, 1.0)

@@ -10,7 +10,6 @@ import numpy as np
 from identification.fitting import EffectModel
 from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import describe_drift_explanation, subtract_clock_drift
-from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
 from identification.gap.selection.extension import try_extension
@@ -30,7 +29,7 @@ from identification.gap.selection.screening import (
     select_shortlist,
 )
 
-_CONTACTS = ("connection", "displacement_backlash")
+_CONTACT_ACTIONS = ("connection", "displacement_backlash")
 """Actions that need starts at several sizes, so that a search from one size of the effect finds nothing."""
 
 
@@ -85,7 +84,7 @@ def _search_best_sets(pool: CandidatePool, size: int) -> None:
         for effects in choices:
             if pool.budget_spent or pool.is_at_floor(pool.find_best()):
                 return
-            if not any(e.form.action in _CONTACTS for e in effects):
+            if not any(e.form.action in _CONTACT_ACTIONS for e in effects):
                 pool.search(effects)
 
 
@@ -146,11 +145,11 @@ def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
 def compute_final_posterior(pool: CandidatePool) -> Posterior:
     """Fit the most probable sets on all samples, extend the first, and compute the posterior of all sets."""
     _fit_probable_sets(pool)
-    most_probable = _fit_most_probable_set(pool)
+    most_probable = pool.fit_most_probable_set(CandidatePool.compute_posterior)
     for _ in range(pool.settings.max_extensions):
         if not try_extension(pool, most_probable):
             break
-        most_probable = pool.compute_posterior().rank_sets()[0][0]
+        most_probable = pool.compute_posterior().most_probable_set
         pool.fit_fully(most_probable)
     exchange_mounting(pool, most_probable)
     _check_effects(pool)
@@ -163,16 +162,15 @@ def _check_effects(pool: CandidatePool) -> None:
     An effect that only takes up the form error of another gains on the fitted samples, and hardly on others.
     """
     for _ in range(pool.settings.max_refits):
-        names = pool.compute_posterior().rank_sets()[0][0]
+        names = pool.compute_posterior().most_probable_set
         if len(names) < 2 or names in pool.held_out_evidence:
             return
         pool.fit_fully(names)
-        evidence = []
-        for model in pool.candidates[names].fit.effects:
-            subset = find_subset(pool, pool.candidates[names], model).names
-            before, after = pool.select_held_out(subset), pool.select_held_out(names)
-            evidence.append(BlockEvidence(subset, compute_evidence(before, after, pool.block_length)))
-        pool.held_out_evidence[names] = tuple(evidence)
+        candidate = pool.candidates[names]
+        subsets = [find_subset(pool, candidate, model) for model in candidate.fit.effects]
+        pool.held_out_evidence[names] = tuple(
+            BlockEvidence(subset.names, pool.compute_held_out_evidence(subset, candidate)) for subset in subsets
+        )
 
 
 def _fit_probable_sets(pool: CandidatePool) -> None:
@@ -184,13 +182,3 @@ def _fit_probable_sets(pool: CandidatePool) -> None:
     subsets = [names - {name} for names in likely[:1] if len(names) > 1 for name in sorted(names)]
     for names in dict.fromkeys([frozenset[str](), *likely, *(s for s in subsets if s in pool.candidates)]):
         pool.fit_fully(names)
-
-
-def _fit_most_probable_set(pool: CandidatePool) -> frozenset[str]:
-    """Fit the most probable set on all samples, until the set that is then most probable has a full fit."""
-    for _ in range(pool.settings.max_refits):
-        most_probable = pool.compute_posterior().rank_sets()[0][0]
-        if most_probable in pool.full_fits:
-            break
-        pool.fit_fully(most_probable)
-    return most_probable

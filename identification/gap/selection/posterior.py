@@ -93,6 +93,11 @@ class Posterior:
     unknown: float
     """Probability of an unknown cause."""
 
+    @property
+    def most_probable_set(self) -> frozenset[str]:
+        """Names of the effects of the most probable set."""
+        return self.rank_sets()[0][0]
+
     def compute_effect_probability(self, name: str) -> float:
         """Return the probability that an effect is active, alone or with others."""
         return float(sum(p for names, p in self.sets.items() if name in names))

@@ -130,9 +130,9 @@ def write_channels(path: Path, scenario: Scenario, result: RunResult) -> None:
 def write_truth(path: Path, scenario: Scenario, result: RunResult) -> None:
     """Write the hidden truth to an npz file, for tests and benchmarks; no log may contain it.
 
-    The arrays are at the samples. ``info`` contains the parameters, the effects, the errors drawn for each
-    channel, and ``recorded_f0`` [N], the preload as the log shows it: that of the damper minus the load cell's
-    zero shift.
+    The arrays are at the samples. ``info`` contains the parameters, the effects, and the errors drawn for each
+    channel. ``recorded_f0`` [N] is the preload as the log shows it: that of the damper minus the load cell's zero
+    shift.
     """
     truth, law = result.truth, scenario.parameters
     substeps = len(truth.position) // len(result.time)

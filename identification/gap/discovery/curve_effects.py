@@ -1,7 +1,7 @@
 """Curve effects: an unknown curve at each place, over each variable that can act there.
 
-The list follows the signal chain and not any known effect. A pair is left out where the recording cannot show it:
-a curve over a drive with fewer than three levels, or over a variable that does not vary.
+The list follows the signal chain and not any known effect. A pair is left out where the recording cannot show it.
+Examples are a curve over a drive with fewer than three levels, or over a variable that does not vary.
 """
 
 from collections.abc import Sequence

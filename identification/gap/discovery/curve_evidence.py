@@ -1,7 +1,8 @@
 """Evidence for a curve: marginal likelihood of a linear model with one prior deviation (MacKay 1992).
 
 The law and the effects that are already named are projected out of the residual and of the curve's sensitivities.
-What remains is a ridge regression. The prior deviation with the largest evidence sets smoothness and amplitude.
+A ridge regression on the curve's coefficients remains. The prior deviation with the largest evidence sets
+smoothness and amplitude.
 """
 
 import math

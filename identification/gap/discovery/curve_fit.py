@@ -60,7 +60,7 @@ class FittedCurve:
 
     @property
     def loss(self) -> float:
-        """Logarithm of the error [N], on the worse of fitted and held-out strokes, with the price of its size."""
+        """Logarithm of the error [N], on the worse of fitted and held-out strokes, with a penalty for its size."""
         at = self.curve.at
         count = len(at.variables) + any(v in HISTORY_VARIABLES for v in at.variables)
         error = max(self.candidate.train_rmse, self.candidate.held_out_rmse)
@@ -101,8 +101,8 @@ def fit_best_curves(
     """Fit the curves with the largest linear evidence, and return the most probable first.
 
     All are fitted from the end of their linear model. The best of these are also fitted from the regression:
-    without the curve, the law may have moved to values that hide it. So is the curve with the largest linear
-    evidence, because a first fit of a large curve may not leave such values.
+    without the curve, the law may have moved to values that hide it. The curve with the largest linear evidence is
+    fitted from the regression as well, because a first fit of a large curve may stay at such values.
     """
     warm = [_continue_linear_model(pool, parent, s) for s in _drop_variants(screened)[:_FITTED_CURVES]]
     best = sorted(range(len(warm)), key=lambda i: warm[i].loss)
@@ -178,7 +178,7 @@ def _evaluate_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, 
 def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
     """Continue a fit with the prior deviation that its coefficients suggest (MacKay 1992, eq. 2.17).
 
-    The linear model takes all that it leaves for noise, so its prior is too narrow for a large curve.
+    The linear model counts its whole residual as noise, so its prior is too narrow for a large curve.
     """
     problem, unknowns = fit.problem, fit.minimum.unknowns
     columns = problem.layout.effect_slices[-1]

@@ -1,8 +1,9 @@
-"""Excess that a curve outside the library leaves, as evidence against named effects that leave more.
+"""Excess of a curve outside the library, as evidence against named effects with a larger excess.
 
-Effects of the library can together resemble a cause that none of them is. A curve at the place of that cause,
-over its variable, then leaves less than they do. Curves where the library has an effect are fitted as well. Where
-one of them leaves least, the cause may be that effect in another form, which is no evidence against the library.
+Effects of the library can together resemble a cause that none of them is. A curve at the place of that cause, over
+its variable, then has a smaller excess than they have. Curves where the library has an effect are fitted as well.
+Where one of them has the smallest excess, the cause may be that effect in another form. This is no evidence
+against the library.
 """
 
 from collections.abc import Mapping
@@ -82,9 +83,9 @@ def find_unlisted_cause(pool: CandidatePool) -> Candidate | None:
 def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage, float]:
     """Return the probability of each stage for a cause outside the library, in addition to a set of effects.
 
-    The evidence of the best curve or fitted set at each stage decides, over the correlation length of the
-    residual: the errors of neighbouring samples are alike. It counts as far as the best one closes the gap. A
-    cause that nothing resembles is equally probable at all stages.
+    The evidence of the best curve or fitted set at each stage decides. It is divided by the correlation length of
+    the residual, because the errors of neighbouring samples are alike. It counts as far as the best one closes the
+    gap. A cause that nothing resembles is equally probable at all stages.
     """
     problem = pool.screening_problem.replace_effects(parent.fit.effects)
     with use_one_thread():

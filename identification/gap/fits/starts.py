@@ -1,7 +1,7 @@
 """Starts of a joint fit.
 
-A warm start loses large effects: without the effect, the law's coordinates have moved to values that hide it, and
-from there the effect seems small. Every start therefore begins with one joint step, and some begin at the
+A warm start can miss a large effect. Without the effect, the law's coordinates have moved to values that hide it,
+and from there the effect seems small. Every start therefore begins with one joint step, and some begin at the
 coordinates of the regression.
 """
 
@@ -47,7 +47,7 @@ def generate_starts(
 def _step_law_alone(problem: Problem, unknowns: Array, steps: int) -> Array:
     """Return unknowns (U,) after some steps of the law alone.
 
-    Backlash or compliance is soon lost while the law's yield displacement is still wrong.
+    While the law's yield displacement is still wrong, a descent reduces backlash or compliance to zero.
     """
     free = problem.free_mask & ~problem.delay_mask
     free[problem.layout.effects] = False

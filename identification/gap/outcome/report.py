@@ -98,7 +98,7 @@ class ReportBuilder:
     discovers: bool = False
     """True to search for a cause outside the library where the named effects do not explain the gap."""
     learns_residual: bool = False
-    """True to learn what law and effects leave, for predictions with the twin."""
+    """True to learn the residual of law and effects, for predictions with the twin."""
 
     @cached_property
     def regression(self) -> ResidualRegression:
@@ -166,7 +166,7 @@ class ReportBuilder:
         return make_twin(self.dataset, modelled, definition, fit, noise, fit.specimen, provenance)
 
     def _build_remainder(self, verdict: Verdict, named: Candidate, floor: float) -> Remainder | None:
-        """Describe what the named set leaves beyond the noise floor [N]; None without a gap."""
+        """Describe the residual of the named set beyond the noise floor [N]; None without a gap."""
         if verdict == "no_gap":
             return None
         stages = None if named.names else self.unlisted_stages
@@ -206,8 +206,8 @@ class ReportBuilder:
     def _choose_named_set(self) -> NamedSet:
         """Return the verdict and the named set; the law alone if none is named.
 
-        Where no set explains the gap, the most probable one that closes enough of it on unseen strokes is named as
-        a part of the cause.
+        Where no set explains the gap, one is named as a part of the cause: the most probable one that closes
+        enough of the gap on unseen strokes.
         """
         chosen = self._decide_set(self.posterior, self.posterior.most_probable_set)
         if self.partial is not None and chosen.verdict in ("unexplained", "partly_explained"):

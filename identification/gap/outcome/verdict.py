@@ -30,8 +30,8 @@ def decide_verdict(
 ) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts, and the held-out ones for a part.
 
-    Effects that close a part of the gap are named even where an unknown cause is more probable, because they
-    reduce the error on strokes that no fit used. Their probabilities then say that the cause may be another one.
+    Effects that close a part of the gap are named even where an unknown cause is more probable. They reduce the
+    error on strokes that no fit used. Their probabilities then state that the cause may be another one.
 
     Args:
         baseline: the law without effects.
@@ -124,7 +124,7 @@ def list_alternatives(posterior: Posterior, named: frozenset[str]) -> list[Effec
 
 
 def list_likely_sets(posterior: Posterior) -> list[frozenset[str]]:
-    """Return the most probable set and those that the data can hardly tell from it, the most probable first."""
+    """Return the most probable set and those that the data hardly distinguish from it, most probable first."""
     ranked = posterior.rank_sets()
     return [names for names, p in ranked if p >= _AMBIGUOUS_RATIO * ranked[0][1]]
 

@@ -1,8 +1,8 @@
 """Partial sets: effects that reduce the error on unseen strokes, where no set of effects explains the gap.
 
-Each candidate is compared with the law alone by block evidence on the held-out strokes. An effect that only takes
-up the form error of an unknown cause reduces the error in some blocks and increases it in others. The larger the
-part of the gap that a set leaves, the less certain it is that its effects are active.
+Each candidate is compared with the law alone by block evidence on the held-out strokes. An effect that only
+absorbs the form error of an unknown cause reduces the error in some blocks and increases it in others. The larger
+the part of the gap that a set leaves, the less certain it is that its effects are active.
 
 The search for the whole cause ends early, because hardly any effect brings an unknown cause near the floor. So the
 most probable partial set grows here: every effect with an expected gain is fitted with it, and the growth ends

@@ -1,8 +1,9 @@
 """Order in which sets of effects are fitted to a recording.
 
-The search goes forward: every effect is screened, and the most promising are fitted together with the law. The
-best sets grow by a second and a third effect. Then each effect of a set is left out once, and others are tried
-in its place. All of this uses decimated data. Finally the most probable sets are fitted on all samples.
+The search goes forward. Every effect is screened, and those with the largest expected gains are fitted together
+with the law. The best sets grow by a second and a third effect. Then each effect of a set is left out once, and
+others are tried in its place. All of this uses decimated data. Finally the most probable sets are fitted on all
+samples.
 """
 
 import numpy as np
@@ -34,7 +35,7 @@ _CONTACT_ACTIONS = ("connection", "displacement_backlash")
 
 
 def search_forward(pool: CandidatePool) -> None:
-    """Fit the promising sets of effects on decimated data."""
+    """Fit the sets of effects with the largest expected gains, on decimated data."""
     baseline = pool.fit_law()
     pool.noise_model.update(baseline, pool.full_problem, pool.evaluation)
     if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
@@ -126,7 +127,7 @@ def _is_worth_extending(pool: CandidatePool, best: Candidate, parent: Candidate)
 
 
 def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
-    """Fit a set with each of the most promising further effects, and with each mounting effect."""
+    """Fit a set with each further effect of the shortlist, and with each mounting effect."""
     settings, excess = pool.settings, pool.compute_excess(parent)
     gains = pool.screen(parent, parent.names)
     if not parent.names and excess > settings.large_excess:
@@ -159,7 +160,7 @@ def compute_final_posterior(pool: CandidatePool) -> Posterior:
 def _check_effects(pool: CandidatePool) -> None:
     """Compute what each effect of the most probable set gains on held-out samples, until that set stays the same.
 
-    An effect that only takes up the form error of another gains on the fitted samples, and hardly on others.
+    An effect that only absorbs the form error of another gains on the fitted samples, and hardly on others.
     """
     for _ in range(pool.settings.max_refits):
         names = pool.compute_posterior().most_probable_set

@@ -2,10 +2,9 @@
 
 The likelihood of white noise would be far too certain. With a hundred thousand samples, one per cent of misfit
 would decide everything, but the form error of every library is larger. The odds therefore follow the *ratio* of
-the excesses of two sets, to a fixed power, down to a resolution. The resolution is the noise of the floor itself,
-and the small part of the gap that even the correct effect leaves because its form is not exact. Smaller sets are
-more probable beforehand. An unknown cause is one of the alternatives: known effects are expected to leave a part
-of its gap that the correct effects hardly ever leave.
+the excesses of two sets, to a fixed power, down to a resolution. The resolution is the error of the floor, and the
+form error that even the correct effect leaves. Smaller sets are more probable beforehand. An unknown cause is one
+of the alternatives. Known effects are expected to leave a larger part of its gap than the correct effects would.
 """
 
 import math
@@ -46,7 +45,7 @@ _UNKNOWN_ODDS = 3.0
 _COMPLEXITY_FACTOR = 0.1
 """Factor on the prior of each effect for the freedom of its parameters."""
 _MISATTRIBUTION = 0.02
-"""Probability that a set which leaves nothing is not the cause."""
+"""Probability that a set which closes all of the gap is not the cause."""
 _MISATTRIBUTION_SLOPE = 0.4
 """Further probability of that, per part of the gap that the set leaves."""
 _RARE_WEIGHT = 0.3

@@ -1,11 +1,10 @@
 """Screening: linearised estimate of the gain of every effect, without fitting it.
 
-Each form is added to the baseline at several starts. An effect starts at zero size with several lengths, speeds
-or times, or at a small size where a zero size has no sensitivity. One Gauss-Newton step moves the law's
-coordinates and the effect together, inside their bounds, so that a gain which the coordinates alone could
-achieve does not count. The sensitivities over the law are those of the baseline. Those over an effect are
-differences of two simulations. Exact sensitivities, and a step with a line search, are used only for the
-effects with the largest predicted gains.
+Each form is added to the baseline at several starts. An effect starts at zero size with several lengths, speeds or
+times, or at a small size where a zero size has no sensitivity. One Gauss-Newton step moves the law's coordinates
+and the effect together, inside their bounds. A gain that the coordinates alone could achieve thus does not count.
+The sensitivities over the law are those of the baseline. Those over an effect are differences of two simulations.
+Exact sensitivities, and a step with a line search, are used only for the effects with the largest predicted gains.
 """
 
 from collections.abc import Mapping, Sequence

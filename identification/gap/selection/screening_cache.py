@@ -1,8 +1,8 @@
 """Cache of screenings.
 
 The gains of further effects are needed several times for the same set: when it grows, in exchanges, and in
-extensions at the end. A screening contains unknowns of the joint problem of its set. So it is valid while the
-forms and the order of the set's effects stay the same, and while the excess of the set stays nearly the same.
+extensions at the end. A screening contains unknowns of the joint problem of its set. It is therefore valid while
+the forms and the order of the set's effects stay the same. The excess of the set must also stay nearly the same.
 """
 
 from collections.abc import Callable, Mapping

@@ -64,7 +64,7 @@ def diagnose(
         bool,
         typer.Option(
             "--residual",
-            help="Also learn what law and effects leave; predictions with the twin add it, and show it apart.",
+            help="Also learn the residual of law and effects; predictions with the twin add it, with both errors.",
         ),
     ] = False,
     each: Annotated[

@@ -10,7 +10,7 @@ from identification.damper.definitions import STAGE_OF, Curve, EffectFile, Effec
 from identification.damper.effects import Variable
 from identification.fitting import EffectModel, minimise
 from identification.gap.data import compute_residual_correlation_length, split_by_piece
-from identification.gap.discovery.curve_effects import CurveEffect, collect_variables
+from identification.gap.discovery.curve_effects import CurveEffect, CurvePlace, collect_variables
 from identification.gap.discovery.curve_fit import FittedCurve
 from identification.gap.discovery.formulas import FormulaStart, rank_formulas
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
@@ -126,6 +126,25 @@ def make_curve_file(
 ) -> EffectFile:
     """Return the definition of an expression of the curve's variable, with the factors of its place."""
     at = fitted.curve.at
+    growth: dict[str, EffectParameter] = {}
+    if at.grows_with_drive:
+        quantity = fitted.curve.model.quantities[-1]
+        value = float(np.clip(fitted.values[-1], quantity.low, quantity.high))
+        growth = {"growth": EffectParameter(value=value, unit="1/{drive}", lo=quantity.low, hi=quantity.high)}
+    return EffectFile(
+        name=DISCOVERED,
+        stage=STAGE_OF[at.place],
+        place=at.place,
+        variables=list(at.variables),
+        expression=_write_factors(at, expression),
+        parameters=parameters | growth,
+        curve=curve,
+        source="found by a diagnosis",
+    )
+
+
+def _write_factors(at: CurvePlace, expression: str) -> str:
+    """Return an expression times the factors of its place: direction, drive and growth with the drive."""
     match at.direction:
         case "sign":
             expression = f"sign(velocity)*({expression})"
@@ -133,24 +152,7 @@ def make_curve_file(
             expression = f"velocity*({expression})"
     if at.has_drive_factor:
         expression = f"drive*({expression})"
-    if at.grows_with_drive:
-        growth = fitted.curve.model.quantities[-1]
-        expression = f"(1+growth*drive)*({expression})"
-        value = float(np.clip(fitted.values[-1], growth.low, growth.high))
-        parameters = {
-            **parameters,
-            "growth": EffectParameter(value=value, unit="1/{drive}", lo=growth.low, hi=growth.high),
-        }
-    return EffectFile(
-        name=DISCOVERED,
-        stage=STAGE_OF[at.place],
-        place=at.place,
-        variables=list(at.variables),
-        expression=expression,
-        parameters=parameters,
-        curve=curve,
-        source="found by a diagnosis",
-    )
+    return f"(1+growth*drive)*({expression})" if at.grows_with_drive else expression
 
 
 def _make_parameter(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
+from identification.fitting import EffectModel
 from identification.gap.data import Shrinkage
 from identification.gap.fits import EXPLAINED_RATIO, Candidate
 from identification.gap.outcome.interval import compute_interval
@@ -82,32 +83,36 @@ def build_named_effects(
 ) -> list[NamedEffect]:
     """Return the effects of a set with their parameters and intervals, the largest share first."""
     fit = candidate.fit
-    named = []
-    for model, active in zip(fit.effects, fit.active_effects, strict=True):
-        deviations = fit.deviations[model.name]
-        parameters = {
-            q.symbol: EffectValue(
-                value=value,
-                unit=q.format_unit(drive_unit),
-                ci95=compute_interval(value, deviations[q.symbol], q.low, q.high),
-            )
-            for q, value in zip(model.quantities, active.values, strict=True)
-        }
-        named.append(
-            NamedEffect(
-                name=model.name,
-                stage=model.effect.stage,
-                place=model.form.place,
-                variable=model.effect.variable,
-                form=model.form_name,
-                parameters=parameters,
-                share=shares[model.name][0],
-                share_ci95=shares[model.name][1],
-                probability=min(posterior.compute_effect_probability(model.name), 1.0),
-                note=_describe_sense(model.form_name),
-            )
+    named = [
+        NamedEffect(
+            name=model.name,
+            stage=model.effect.stage,
+            place=model.form.place,
+            variable=model.effect.variable,
+            form=model.form_name,
+            parameters=_build_values(model, active.values, fit.deviations[model.name], drive_unit),
+            share=shares[model.name][0],
+            share_ci95=shares[model.name][1],
+            probability=min(posterior.compute_effect_probability(model.name), 1.0),
+            note=_describe_sense(model.form_name),
         )
+        for model, active in zip(fit.effects, fit.active_effects, strict=True)
+    ]
     return sorted(named, key=lambda e: -e.share)
+
+
+def _build_values(
+    model: EffectModel, values: Sequence[float], deviations: Mapping[str, float], drive_unit: str
+) -> dict[str, EffectValue]:
+    """Return the parameters of an effect with their units and intervals, by name."""
+    return {
+        q.symbol: EffectValue(
+            value=value,
+            unit=q.format_unit(drive_unit),
+            ci95=compute_interval(value, deviations[q.symbol], q.low, q.high),
+        )
+        for q, value in zip(model.quantities, values, strict=True)
+    }
 
 
 def _describe_sense(form: str) -> str:

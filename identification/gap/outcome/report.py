@@ -4,9 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
-from typing import NamedTuple
-
-import numpy as np
 
 from identification.damper.effects import STAGES, Stage
 from identification.documents import (
@@ -48,14 +45,13 @@ from identification.gap.outcome.remainder import describe_remainder
 from identification.gap.outcome.twin import make_baseline_fit, make_twin
 from identification.gap.outcome.twin_residual import learn_twin_residual
 from identification.gap.outcome.verdict import (
+    NamedSet,
     Share,
     build_named_effects,
-    closes_part,
-    decide_unnamed_verdict,
-    decide_verdict,
+    choose_named_set,
+    estimate_expected_shrinkage,
     is_ambiguous,
     list_alternatives,
-    list_likely_sets,
 )
 from identification.gap.selection import (
     UNKNOWN_THRESHOLD,
@@ -69,17 +65,6 @@ _NEAREST_SHARE = 0.95
 """Largest error that unnamed effects may leave to be mentioned, relative to that of the baseline."""
 _MIN_STAGE_PROBABILITY = 0.05
 """Smallest probability of a stage that is reported as the most probable one."""
-
-
-class NamedSet(NamedTuple):
-    """Set of effects that is named, with its verdict."""
-
-    verdict: Verdict
-    candidate: Candidate
-    """The named set; the law alone if none is named."""
-    shrinkage: Shrinkage
-    posterior: Posterior
-    """Probabilities from which it was chosen."""
 
 
 @dataclass(frozen=True)
@@ -189,7 +174,7 @@ class ReportBuilder:
     def _build_discovery(self, found: DiscoveredEffect | None, named: Candidate) -> Discovery | None:
         if found is None:
             return None
-        shrinkage = self._estimate_shrinkage(found.candidate)
+        shrinkage = estimate_expected_shrinkage(self.pool, self.evaluation, found.candidate)
         return build_discovery(found, named, shrinkage, self.dataset.drive_unit)
 
     def _describe_search(self, verdict: Verdict, discovery: Discovery | None) -> list[str]:
@@ -204,33 +189,7 @@ class ReportBuilder:
         return ["no curve at any place closes part of the gap on held-out strokes, so none is reported"]
 
     def _choose_named_set(self) -> NamedSet:
-        """Return the verdict and the named set; the law alone if none is named.
-
-        Where no set explains the gap, one is named as a part of the cause: the most probable one that closes
-        enough of the gap on unseen strokes.
-        """
-        chosen = self._decide_set(self.posterior, self.posterior.most_probable_set)
-        if self.partial is not None and chosen.verdict in ("unexplained", "partly_explained"):
-            judged = (self._decide_set(self.partial, names) for names in list_likely_sets(self.partial))
-            partial = next((part for part in judged if part.candidate.names), None)
-            if partial is not None:
-                return partial._replace(verdict="partly_explained")
-        return chosen
-
-    def _decide_set(self, posterior: Posterior, names: frozenset[str]) -> NamedSet:
-        """Return the verdict with one set of a posterior."""
-        baseline, floor = self.pool.baseline, self.pool.floor
-        named = self.pool.candidates[names]
-        verdict = decide_verdict(baseline, named, floor, self.pool.no_gap_limit, posterior)
-        shrinkage = self._estimate_shrinkage(named)
-        benefit = shrinkage.expected_benefit
-        if verdict == "partly_explained" and not closes_part(shrinkage):
-            verdict = "unexplained"
-        if named.names and benefit is not None and benefit < 0.0:
-            verdict = decide_unnamed_verdict(baseline, floor, self.pool.no_gap_limit)
-        if named.names and verdict in ("no_gap", "unexplained"):
-            return NamedSet(verdict, baseline, self._estimate_shrinkage(baseline), posterior)
-        return NamedSet(verdict, named, shrinkage, posterior)
+        return choose_named_set(self.pool, self.evaluation, self.posterior, self.partial)
 
     def _describe_nearest(self, verdict: Verdict) -> list[str]:
         """Return the note on the most similar known effects where none is named."""
@@ -239,15 +198,6 @@ class ReportBuilder:
         if verdict != "unexplained" or best.held_out_rmse > _NEAREST_SHARE * before:
             return []
         return [describe_nearest(sorted(best.names), before, best.held_out_rmse, self.pool.floor)]
-
-    def _estimate_shrinkage(self, named: Candidate) -> Shrinkage:
-        noise_model = self.pool.noise_model
-        if named.names:
-            input_noise = noise_model.sample_other_runs(named, self.pool.full_problem)
-        else:
-            input_noise = np.zeros((1, len(self.evaluation.force)))
-        noise = noise_model.estimate_noise(named)
-        return self.evaluation.estimate_shrinkage(self.pool.baseline.residual, named.residual, noise, input_noise)
 
     def _estimate_shares(self, named: Candidate, shrinkage: Shrinkage) -> dict[str, Share]:
         """Return the share of each named effect; a set without it that was not fitted counts as the law alone."""

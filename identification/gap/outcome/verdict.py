@@ -1,13 +1,16 @@
-"""Verdict and named effects, from the candidates and their posterior."""
+"""Verdict, named set and its effects, from the candidates and their posterior."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
 
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
 from identification.fitting import EffectModel
-from identification.gap.data import Shrinkage
+from identification.gap.data import EvaluationData, Shrinkage
 from identification.gap.fits import EXPLAINED_RATIO, Candidate
 from identification.gap.outcome.interval import compute_interval
-from identification.gap.selection import UNKNOWN_THRESHOLD, Posterior
+from identification.gap.selection import UNKNOWN_THRESHOLD, CandidatePool, Posterior
 
 _MIN_NAMED_SHARE = 0.2
 """Smallest part of the gap that a named set closes."""
@@ -24,6 +27,68 @@ _MIN_PROBABILITY = 0.01
 
 Share = tuple[float, tuple[float, float]]
 """Part of the gap's variance that returns without an effect [1], with its 95 % interval."""
+
+
+class NamedSet(NamedTuple):
+    """Set of effects that is named, with its verdict."""
+
+    verdict: Verdict
+    candidate: Candidate
+    """The named set; the law alone if none is named."""
+    shrinkage: Shrinkage
+    posterior: Posterior
+    """Probabilities from which it was chosen."""
+
+
+def choose_named_set(
+    pool: CandidatePool, evaluation: EvaluationData, posterior: Posterior, partial: Posterior | None
+) -> NamedSet:
+    """Return the named set with its verdict; the law alone if none is named.
+
+    Where no set explains the gap, one is named as a part of the cause: the most probable one that closes enough of
+    the gap on unseen strokes.
+
+    Args:
+        pool: the fitted sets.
+        evaluation: the recordings, cut into cycles.
+        posterior: probabilities of the sets as the whole cause.
+        partial: probabilities of the sets as a part of the cause; None where the library probably has the cause.
+    """
+    chosen = _decide_set(pool, evaluation, posterior, posterior.most_probable_set)
+    if partial is not None and chosen.verdict in ("unexplained", "partly_explained"):
+        parts = (_decide_set(pool, evaluation, partial, names) for names in list_likely_sets(partial))
+        part = next((part for part in parts if part.candidate.names), None)
+        if part is not None:
+            return part._replace(verdict="partly_explained")
+    return chosen
+
+
+def _decide_set(
+    pool: CandidatePool, evaluation: EvaluationData, posterior: Posterior, names: frozenset[str]
+) -> NamedSet:
+    """Return the verdict with one set of a posterior."""
+    baseline, named = pool.baseline, pool.candidates[names]
+    verdict = decide_verdict(baseline, named, pool.floor, pool.no_gap_limit, posterior)
+    shrinkage = estimate_expected_shrinkage(pool, evaluation, named)
+    benefit = shrinkage.expected_benefit
+    if verdict == "partly_explained" and not closes_part(shrinkage):
+        verdict = "unexplained"
+    if named.names and benefit is not None and benefit < 0.0:
+        verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limit)
+    if named.names and verdict in ("no_gap", "unexplained"):
+        return NamedSet(verdict, baseline, estimate_expected_shrinkage(pool, evaluation, baseline), posterior)
+    return NamedSet(verdict, named, shrinkage, posterior)
+
+
+def estimate_expected_shrinkage(
+    pool: CandidatePool, evaluation: EvaluationData, candidate: Candidate
+) -> Shrinkage:
+    """Estimate how far the gap shrinks with a set of effects on another run of the damper."""
+    noise = pool.noise_model.estimate_noise(candidate)
+    input_noise = np.zeros((1, len(evaluation.force)))
+    if candidate.names:
+        input_noise = pool.noise_model.sample_other_runs(candidate, pool.full_problem)
+    return evaluation.estimate_shrinkage(pool.baseline.residual, candidate.residual, noise, input_noise)
 
 
 def decide_verdict(

@@ -154,12 +154,9 @@ class CandidatePool:
     def compute_posterior(self) -> Posterior:
         """Compute the posterior of all fitted sets."""
         floor = self._find_lowest_floor()
-        return compute_posterior(
-            self.collect_evidence(),
-            self.full_problem.samples,
-            self.noise_model.estimate.coloured_share,
-            None if self.unlisted is None else self.unlisted.compute_relative_excess(self.baseline, floor),
-        )
+        unlisted = None if self.unlisted is None else self.unlisted.compute_relative_excess(self.baseline, floor)
+        coloured_share = self.noise_model.estimate.coloured_share
+        return compute_posterior(self.collect_evidence(), self.full_problem.samples, coloured_share, unlisted)
 
     def _find_lowest_floor(self) -> float:
         """Return a floor [N] that lies below the residual of every candidate."""
@@ -296,10 +293,8 @@ class CandidatePool:
         return candidate
 
     def _find_mains_frequency(self, parent: Candidate) -> float:
-        """Find the mains frequency [Hz] in the residual of the longest stretch."""
-        counts = [len(p.force) for p in self.full_problem.pieces]
-        # The resolution of a frequency increases with the length of the stretch.
-        longest = counts.index(max(counts))
-        part = slice(sum(counts[:longest]), sum(counts[: longest + 1]))
-        error = np.where(parent.residual.valid, parent.residual.values, 0.0)[part]
-        return find_mains_frequency(error, self.full_problem.pieces[longest].excitation.rate)
+        """Find the mains frequency [Hz] in the residual of the longest stretch, which resolves it best."""
+        pieces = self.full_problem.pieces
+        errors = split_by_piece(np.where(parent.residual.valid, parent.residual.values, 0.0), pieces)
+        longest = max(range(len(pieces)), key=lambda i: len(errors[i]))
+        return find_mains_frequency(errors[longest], pieces[longest].excitation.rate)

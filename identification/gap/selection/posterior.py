@@ -125,14 +125,8 @@ def compute_posterior(
         + _FORM_ERROR * gap
     )
     scores = _compute_scores(sets, resolution, gap)
-    insignificant = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
     best = max(sets, key=lambda s: scores[s.names])
-    unknown = compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
-    unknown -= _LIKELIHOOD_EXPONENT * math.log(_UNKNOWN_FORM_ERROR * gap + resolution + insignificant)
-    unknown -= _penalise_incomplete(best, gap)
-    # An unknown cause is only an alternative where known effects leave an excess that the floor cannot explain.
-    weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
-    unknown += math.log(max(weight, 1e-9))
+    unknown = _score_unknown(best, gap, resolution, samples)
     if unlisted_excess is not None:
         unknown = float(np.logaddexp(unknown, _score_unlisted(unlisted_excess, resolution)))
     shares = normalise_scores(np.array([*scores.values(), unknown]))
@@ -162,6 +156,19 @@ def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) 
             if log_odds < 0.0:
                 scores[s.names] = min(scores[s.names], scores[parent] + log_odds)
     return scores
+
+
+def _score_unknown(best: SetEvidence, gap: float, resolution: float, samples: int) -> float:
+    """Return the log odds of an unknown cause, next to the most probable set.
+
+    It is an alternative only where known effects leave an excess that the noise floor cannot explain.
+    """
+    insignificant = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
+    score = compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
+    score -= _LIKELIHOOD_EXPONENT * math.log(_UNKNOWN_FORM_ERROR * gap + resolution + insignificant)
+    score -= _penalise_incomplete(best, gap)
+    weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
+    return score + math.log(max(weight, 1e-9))
 
 
 def _score_unlisted(excess: float, resolution: float) -> float:

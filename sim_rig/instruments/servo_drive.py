@@ -1,8 +1,8 @@
 """Simulated servo drive: CiA 402 in cyclic synchronous position and homing mode, behind a CANopen slave.
 
 Missing setpoints (event timer of RPDO 1), a lost heartbeat of the master (6007h) and a commanded stop all end in a
-quick stop by the drive's own ramp. The drive does not simulate the rod: it sends its demand to the rig as a
-command, and gets position and force back as the sensors report them. Homing finds the drive's zero. Before, its
+quick stop. The drive's own ramp defines it. The drive does not simulate the rod. It sends its demand to the rig as
+a command, and receives position and force as the sensors report them. Homing finds the drive's zero. Before, its
 position is relative to the position at switch-on.
 """
 

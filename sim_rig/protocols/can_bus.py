@@ -1,8 +1,8 @@
 """Timing of a CAN bus: arbitration by the lowest identifier, and transmission times by frame length.
 
 Every sender has one queue, as with one transmit mailbox: its frames keep their order, and only the first of each
-queue takes part in arbitration. A frame of n bytes has 47 + 8 n bits and stuff bits: at least none, at most one
-for every four of 34 + 8 n; half of the maximum is assumed. No frame is lost on this bus, frames are only delayed.
+queue takes part in arbitration. A frame of n bytes has 47 + 8 n bits and stuff bits. At most one stuff bit follows
+every four of 34 + 8 n bits; half of the maximum is assumed. No frame is lost on this bus, frames are only delayed.
 """
 
 from collections import deque

@@ -1,9 +1,9 @@
 """Sensor model of one channel: true values in, readings out, chunk by chunk.
 
-A true value passes, in this order: the device's anti-alias filter (evaluated at the resolution of the plant's
-substeps), transport delay and clock error, gain, zero and drift, noise, saturation, and the steps of the
-converter. Readings are stamped on the bench clock as mapped. The error of the mapping (an offset drawn for each
-run, a slow drift, jitter of each stamp) is the difference between true and reported delay.
+A true value first passes the device's anti-alias filter, at the resolution of the plant's substeps. Then follow
+transport delay and clock error, gain, zero and drift, noise, saturation, and the steps of the converter. Readings
+are stamped on the bench clock as mapped. The error of the mapping is an offset drawn for each run, a slow drift,
+and jitter of each stamp. It is the difference between true and reported delay.
 
 A channel keeps the states of its filter and of its random numbers from chunk to chunk. Its readings therefore do
 not depend on how the true values are divided into chunks.

@@ -123,7 +123,7 @@ class AgentBench:
         return time.time()
 
     def recover(self, campaign: StoredCampaign) -> ExecutionReport | None:
-        """Return what the agent or the log tells of the active run."""
+        """Return the state of the active run, from the agent or from its log."""
         return self._report(campaign)
 
     def observe(self, campaign: StoredCampaign) -> Observation:

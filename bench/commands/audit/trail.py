@@ -38,9 +38,10 @@ def audit(
         str, typer.Option(metavar="FILE", help="With export: file to write, .json or .csv; - prints JSON.")
     ] = "",
 ) -> None:
-    """Verify or export the record of who did what; the service may run meanwhile.
+    """Verify or export the record of who did what.
 
-    Exits with status 1 if an entry was changed, inserted, removed or exchanged, and names the first one.
+    The service may run meanwhile. Exits with status 1 if an entry was changed, inserted, removed or exchanged, and
+    names the first one.
     """
     if (action is Action.EXPORT) != bool(out):
         raise typer.BadParameter("export needs --out FILE, and no other action takes it")

@@ -10,10 +10,10 @@ def backup(
     out: Annotated[Path, typer.Option(metavar="DIR", help="New folder for the copy; it must not exist.")],
     data: Annotated[Path, typer.Argument(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
 ) -> None:
-    """Copy catalogue, logs and results of a data folder; the service may run and record meanwhile.
+    """Copy catalogue, logs and results of a data folder.
 
-    The copy appears complete or not at all. A log that is being recorded is copied up to this moment. Secrets that
-    a new service creates again are left out; the token stays valid.
+    The service may run and record meanwhile. The copy appears complete or not at all. A log that is being recorded
+    is copied up to this moment. Secrets that a new service creates again are left out; the token stays valid.
     """
     from bench.catalogue import back_up
 

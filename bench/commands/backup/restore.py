@@ -12,9 +12,10 @@ def restore(
         Path, typer.Option(metavar="DIR", help="Data folder to create; it must be empty or not exist.")
     ] = Path("runs"),
 ) -> None:
-    """Copy a backup to a new data folder, for `mrbench serve --data`; nothing is overwritten.
+    """Copy a backup to a new data folder.
 
-    `mrbench verify` then compares all logs with the hashes of their recording.
+    It is for `mrbench serve --data`; nothing is overwritten. `mrbench verify` then compares all logs with the
+    hashes of their recording.
     """
     from bench.catalogue import restore_backup
 

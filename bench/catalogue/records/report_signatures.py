@@ -10,7 +10,7 @@ from sqlalchemy.orm import Mapped, mapped_column, sessionmaker
 from bench.catalogue.models import Base, UtcTime
 
 ReportKind: TypeAlias = Literal["run", "campaign"]
-"""What a report is about."""
+"""Kind of thing that a report is about."""
 SignatureMeaning: TypeAlias = Literal["author", "reviewed", "approved"]
 """Why a person signs: as its author, after a review, or to approve it."""
 

@@ -23,7 +23,7 @@ UNSIGNED_LIFETIME = 86_400.0
 
 
 class Subject(NamedTuple):
-    """What a report is about."""
+    """Run or campaign that a report is about."""
 
     kind: ReportKind
     id: str

@@ -46,6 +46,7 @@ from bench.catalogue.planning import (
     StoredCertificate,
     find_stored_state,
 )
+from bench.catalogue.records import ReportKind, SignatureMeaning, SignatureRow, SignatureStore
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
@@ -81,6 +82,7 @@ __all__ = [
     "MethodStore",
     "NoteKind",
     "NoteRow",
+    "ReportKind",
     "RunFilter",
     "RunOutcome",
     "RunPlan",
@@ -88,6 +90,9 @@ __all__ = [
     "RunState",
     "SessionRow",
     "SessionStore",
+    "SignatureMeaning",
+    "SignatureRow",
+    "SignatureStore",
     "Specimen",
     "SpecimenStore",
     "StoredCertificate",

@@ -107,6 +107,26 @@ class Campaign:
         """
         return self._session.download(f"{self._path}/report?format={quote_name(report_format)}", to)
 
+    def list_signatures(self) -> list[dict[str, Any]]:
+        """Return the signatures of the reports of the campaign, the oldest first; persons sign in the page.
+
+        Raises:
+            ClientError: there is no such campaign, or the service cannot be reached.
+        """
+        return list(self._session.get(f"{self._path}/report/signatures")["items"])
+
+    def download_signed_report(self, sha256: str, to: Path) -> Path:
+        """Download a signed report, byte by byte as it was signed, and return its path.
+
+        Args:
+            sha256: hash of the file, from `list_signatures`.
+            to: file to write.
+
+        Raises:
+            ClientError: there is no such file, or the download breaks off.
+        """
+        return self._session.download(f"{self._path}/report/copies/{quote_name(sha256)}", to)
+
     def wait(self, timeout: float = 86_400.0) -> dict[str, Any]:
         """Wait until the campaign ends or asks for a person, and return its state.
 

@@ -164,6 +164,27 @@ class Run:
         """
         return self._session.download(f"{self._path}/report", to)
 
+    def list_signatures(self) -> list[dict[str, Any]]:
+        """Return the signatures of the reports on the run, the oldest first; persons sign in the page.
+
+        Raises:
+            ClientError: there is no such run, or the service cannot be reached.
+        """
+        return list(self._session.get(f"{self._path}/report/signatures")["items"])
+
+    def download_signed_report(self, sha256: str, to: Path) -> Path:
+        """Download a signed report, byte by byte as it was signed, and return its path.
+
+        Args:
+            sha256: hash of the file, from `list_signatures`.
+            to: file to write.
+
+        Raises:
+            ClientError: there is no such file, or the download breaks off.
+            LogError: the file cannot be written.
+        """
+        return self._session.download(f"{self._path}/report/copies/{quote_name(sha256)}", to)
+
     def stop(self) -> None:
         """Stop the run in a controlled way: the motion fades out, the coil goes to zero.
 

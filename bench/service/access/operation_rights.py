@@ -39,6 +39,8 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /runs/{run_id}/notes": "operate",
     "POST /runs/{run_id}/restore": "manage_runs",
     "POST /runs/{run_id}/salvage": "manage_runs",
+    "POST /runs/{run_id}/report/copies": "sign_reports",
+    "POST /runs/{run_id}/report/signatures": "sign_reports",
     "POST /batches": "analyse",
     "POST /jobs/{job_id}/cancel": "analyse",
     "POST /jobs/{job_id}/retry": "analyse",
@@ -62,6 +64,8 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /campaigns/{campaign_id}/resume": "operate",
     "POST /campaigns/{campaign_id}/stop": "stop",
     "POST /campaigns/{campaign_id}/test-message": "operate",
+    "POST /campaigns/{campaign_id}/report/copies": "sign_reports",
+    "POST /campaigns/{campaign_id}/report/signatures": "sign_reports",
     "PATCH /queue": "operate",
 }
 """Right by method and path; other operations that read need `view`, other ones that change need `administer`."""

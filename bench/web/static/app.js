@@ -1,6 +1,7 @@
 // Entry point: creates the parts of the page and distributes the messages of the service to them.
 
 import { Account } from "./account/account.js";
+import { AuditView } from "./account/audit_trail.js";
 import { get, readSession } from "./common/api.js";
 import { CampaignView } from "./campaigns/campaigns.js";
 import { CertificateView } from "./calibration/certificates.js";
@@ -76,6 +77,7 @@ const campaigns = new CampaignView();
 const comparison = new CompareView();
 const people = new PeopleView();
 const tokens = new TokenView();
+const audit = new AuditView();
 const signIn = new SignIn({ onSignedIn: begin });
 new Account({ onProblem: (text) => bar.showDetail(text, true) });
 watchRights((reason) => bar.showDetail(reason, true));
@@ -100,6 +102,7 @@ const router = new Router({
   campaigns: (address) => campaigns.show(address),
   people: () => people.show(),
   tokens: () => tokens.show(),
+  audit: (address) => audit.show(address),
   calibration: () => certificates.show(),
 });
 

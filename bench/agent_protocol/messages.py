@@ -273,7 +273,7 @@ class AgentEvent(Message):
     """Event of the agent or of a run."""
 
     time_ns: int
-    kind: str = Field(description="state, command, alarm, trip, late, checkpoint, run_finished")
+    kind: str = Field(description="state, command, alarm, trip, late, checkpoint, check, run_finished")
     text: str
 
 

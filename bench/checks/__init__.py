@@ -1,10 +1,16 @@
 """Checks between calibrations: records of checks from logs, and their control charts."""
 
-from bench.checks.chart import CheckSeries, ControlChart, make_chart
+from bench.checks.chart import (
+    ChartPoint,
+    CheckSeries,
+    CheckValue,
+    ControlChart,
+    describe_latest,
+    make_chart,
+)
 from bench.checks.control_chart import (
     BASELINE_POINTS,
     ChartLimits,
-    ChartPoint,
     ChartState,
     Rule,
     compute_chart,
@@ -31,6 +37,7 @@ __all__ = [
     "CheckKind",
     "CheckRecord",
     "CheckSeries",
+    "CheckValue",
     "ControlChart",
     "RestStatistics",
     "Rule",
@@ -39,6 +46,7 @@ __all__ = [
     "compute_limits",
     "compute_records",
     "compute_statistics",
+    "describe_latest",
     "estimate_correlation",
     "find_rules",
     "make_chart",

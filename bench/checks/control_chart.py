@@ -12,15 +12,12 @@ In the baseline only the first rule is evaluated. Limits that follow from 20 che
 false alarms are more frequent than with known limits.
 """
 
-from collections.abc import Sequence
-from datetime import datetime
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import Field
 
-from bench.checks.record import CheckRecord
 from bench.checks.statistics import Array
 from bench.validation import FrozenModel
 
@@ -35,18 +32,6 @@ EWMA_FACTOR = 2.962
 ChartState: TypeAlias = Literal["not_enough", "no_limits", "in_control", "out_of_control"]
 """State of the latest check; no_limits: the checks of the baseline do not differ."""
 Rule: TypeAlias = Literal["beyond_limits", "run_of_eight", "drift"]
-
-
-class ChartPoint(FrozenModel):
-    """One check in the chart, in the unit of the chart."""
-
-    run: str = Field(description="id of the run")
-    measured: datetime = Field(description="UTC")
-    value: float
-    standard_uncertainty: float
-    is_baseline: bool = Field(description="whether it belongs to the baseline")
-    ewma: float | None = Field(description="exponentially weighted mean; null in the baseline")
-    rules: tuple[Rule, ...] = Field(description="rules by which the check is out of control; empty for none")
 
 
 class ChartLimits(FrozenModel):
@@ -64,27 +49,33 @@ class ChartLimits(FrozenModel):
 
 
 class ChartValues(NamedTuple):
-    """Limits, points and state of a series of checks."""
+    """Limits and state of a series of checks."""
 
     limits: ChartLimits | None
     """None before the baseline is complete, and if its checks do not differ."""
-    points: tuple[ChartPoint, ...]
+    ewma: Array
+    """Weighted mean after each check that follows the baseline, shape (later checks,); empty without limits."""
+    rules: list[tuple[Rule, ...]]
+    """Rules by which each check is out of control."""
     state: ChartState
 
 
-def compute_chart(records: Sequence[CheckRecord]) -> ChartValues:
-    """Compute the chart of one channel from its checks, the oldest first."""
-    values = np.array([one.value for one in records])
-    uncertainties = np.array([one.standard_uncertainty for one in records])
+def compute_chart(values: Array, uncertainties: Array) -> ChartValues:
+    """Compute the chart of one channel.
+
+    Args:
+        values: values of the checks, shape (checks,), the oldest first.
+        uncertainties: their standard uncertainties, shape (checks,).
+    """
+    none: list[tuple[Rule, ...]] = [()] * len(values)
     if len(values) < BASELINE_POINTS:
-        return ChartValues(None, _make_points(records, None, [()] * len(records)), "not_enough")
+        return ChartValues(None, np.empty(0), none, "not_enough")
     limits = compute_limits(values[:BASELINE_POINTS], uncertainties[:BASELINE_POINTS])
     if not limits.sigma:
-        return ChartValues(None, _make_points(records, None, [()] * len(records)), "no_limits")
+        return ChartValues(None, np.empty(0), none, "no_limits")
     ewma = compute_ewma(values[BASELINE_POINTS:], limits.centre)
     rules = find_rules(values, ewma, limits)
-    state: ChartState = "out_of_control" if rules[-1] else "in_control"
-    return ChartValues(limits, _make_points(records, ewma, rules), state)
+    return ChartValues(limits, ewma, rules, "out_of_control" if rules[-1] else "in_control")
 
 
 def compute_limits(values: Array, uncertainties: Array) -> ChartLimits:
@@ -149,21 +140,3 @@ def _find_runs(sides: Array) -> npt.NDArray[np.bool_]:
         length = length + 1 if side and index and side == sides[index - 1] else int(side != 0)
         ends[index] = length >= RUN_LENGTH
     return ends
-
-
-def _make_points(
-    records: Sequence[CheckRecord], ewma: Array | None, rules: Sequence[tuple[Rule, ...]]
-) -> tuple[ChartPoint, ...]:
-    first = len(records) if ewma is None else BASELINE_POINTS
-    return tuple(
-        ChartPoint(
-            run=one.run,
-            measured=one.measured,
-            value=one.value,
-            standard_uncertainty=one.standard_uncertainty,
-            is_baseline=index < BASELINE_POINTS,
-            ewma=None if ewma is None or index < first else float(ewma[index - first]),
-            rules=rules[index],
-        )
-        for index, one in enumerate(records)
-    )

@@ -8,7 +8,7 @@ from sqlalchemy.orm import Mapped, mapped_column, sessionmaker
 
 from bench.calibration import LatestCheck
 from bench.catalogue.models import Base, RunRow, UtcTime
-from bench.checks import CheckRecord, CheckSeries, ControlChart, make_chart
+from bench.checks import CheckRecord, CheckSeries, CheckValue, ControlChart, describe_latest, make_chart
 
 
 class CheckRow(Base):
@@ -84,35 +84,17 @@ class CheckStore:
 
     def make_chart(self, series: CheckSeries) -> ControlChart:
         """Return the control chart of a series."""
-        since = self.find_baseline(series)
-        query = _select_present().where(*_match(CheckRow, series)).order_by(CheckRow.measured, CheckRow.run)
-        if since is not None:
-            query = query.where(CheckRow.measured >= since.since)
-        with self._sessions() as session:
-            records = [row.to_record() for row in session.scalars(query)]
-        return make_chart(series, records, None if since is None else since.since)
+        since, checks = self._list_counting(series)
+        return make_chart(series, checks, since)
 
     def make_latest_charts(self) -> list[ControlChart]:
         """Return for each channel the chart that its latest check belongs to."""
-        with self._sessions() as session:
-            channels = session.scalars(select(CheckRow.channel).distinct().order_by(CheckRow.channel)).all()
-        latest = [record for channel in channels if (record := self.find_latest(channel)) is not None]
-        return [self.make_chart(_find_series(record)) for record in latest]
+        return [self.make_chart(series) for series in self._list_series()]
 
     def list_latest(self) -> tuple[LatestCheck, ...]:
-        """Return the latest check of each channel, with its state in its chart."""
-        return tuple(
-            LatestCheck(
-                channel=chart.series.channel,
-                check=chart.series.check,
-                run=chart.points[-1].run,
-                measured=chart.points[-1].measured,
-                state=chart.state,
-                text=chart.text,
-            )
-            for chart in self.make_latest_charts()
-            if chart.points
-        )
+        """Return the latest check of each channel that counts, with its state in its chart."""
+        found = ((series, self._list_counting(series)[1]) for series in self._list_series())
+        return tuple(_describe_latest(series, checks) for series, checks in found if checks)
 
     def begin_baseline(self, series: CheckSeries, author: str, reason: str) -> None:
         """Let only checks from now on count in a series."""
@@ -125,6 +107,40 @@ class CheckStore:
         query = select(BaselineRow).where(*_match(BaselineRow, series)).order_by(BaselineRow.id.desc()).limit(1)
         with self._sessions() as session:
             return session.scalar(query)
+
+    def _list_series(self) -> list[CheckSeries]:
+        """Return the series that the latest check of each channel belongs to."""
+        with self._sessions() as session:
+            channels = session.scalars(select(CheckRow.channel).distinct().order_by(CheckRow.channel)).all()
+        latest = (self.find_latest(channel) for channel in channels)
+        return [_find_series(record) for record in latest if record is not None]
+
+    def _list_counting(self, series: CheckSeries) -> tuple[datetime | None, list[CheckValue]]:
+        """Return the UTC from which checks count, None for all, and these checks, the oldest first."""
+        baseline = self.find_baseline(series)
+        query = _select_present().where(*_match(CheckRow, series)).order_by(CheckRow.measured, CheckRow.run)
+        if baseline is not None:
+            query = query.where(CheckRow.measured >= baseline.since)
+        # Columns only: rows of years are read for each start of a run.
+        columns = query.with_only_columns(
+            CheckRow.run, CheckRow.measured, CheckRow.value, CheckRow.standard_uncertainty
+        )
+        with self._sessions() as session:
+            checks = [CheckValue(*row) for row in session.execute(columns)]
+        return None if baseline is None else baseline.since, checks
+
+
+def _describe_latest(series: CheckSeries, checks: list[CheckValue]) -> LatestCheck:
+    state, text = describe_latest(series, checks)
+    latest = checks[-1]
+    return LatestCheck(
+        channel=series.channel,
+        check=series.check,
+        run=latest.run,
+        measured=latest.measured,
+        state=state,
+        text=text,
+    )
 
 
 def _select_present() -> Select[CheckRow]:

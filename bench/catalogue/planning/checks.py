@@ -9,6 +9,7 @@ from sqlalchemy.orm import Mapped, mapped_column, sessionmaker
 from bench.calibration import LatestCheck
 from bench.catalogue.models import Base, RunRow, UtcTime
 from bench.checks import CheckRecord, CheckSeries, CheckValue, ControlChart, describe_latest, make_chart
+from bench.config import ChannelName
 
 
 class CheckRow(Base):
@@ -81,6 +82,13 @@ class CheckStore:
     def find_latest(self, channel: str) -> CheckRecord | None:
         """Return the latest record of a channel, or None."""
         return next(iter(self.list_newest(1, channel)), None)
+
+    def find_series(self, channel: ChannelName, specimen: str | None) -> CheckSeries:
+        """Return the series of a channel with a specimen; with None that of the channel's latest check."""
+        if specimen is None:
+            latest = self.find_latest(channel)
+            specimen = "" if latest is None else latest.specimen
+        return CheckSeries(check="zero", channel=channel, specimen=specimen)
 
     def make_chart(self, series: CheckSeries) -> ControlChart:
         """Return the control chart of a series."""

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 
-from bench.catalogue import Catalogue, open_catalogue
-from bench.checks import CheckRecord, CheckSeries, ControlChart, compute_records
+from bench.catalogue import open_catalogue
+from bench.checks import CheckRecord, ControlChart, compute_records
 from bench.config import ChannelName
 from bench.errors import BenchError
 from bench.log import read_log
@@ -54,7 +54,8 @@ def describe_charts(data: Path, channel: str, specimen: str | None) -> list[str]
     with open_catalogue(data) as catalogue:
         if not channel:
             return [chart.text for chart in catalogue.checks.make_latest_charts()] or ["no checks"]
-        return list(_describe_chart(catalogue.checks.make_chart(_find_series(catalogue, channel, specimen))))
+        series = catalogue.checks.find_series(_check_channel(channel), specimen)
+        return list(_describe_chart(catalogue.checks.make_chart(series)))
 
 
 def begin_baseline(data: Path, channel: str, specimen: str | None, author: str, reason: str) -> str:
@@ -65,16 +66,9 @@ def begin_baseline(data: Path, channel: str, specimen: str | None, author: str, 
         CatalogueError: there is no catalogue, or it cannot be opened.
     """
     with open_catalogue(data) as catalogue:
-        catalogue.checks.begin_baseline(_find_series(catalogue, channel, specimen), author, reason)
+        series = catalogue.checks.find_series(_check_channel(channel), specimen)
+        catalogue.checks.begin_baseline(series, author, reason)
     return f"{channel}: only checks from now on count; the earlier ones stay in the list"
-
-
-def _find_series(catalogue: Catalogue, channel: str, specimen: str | None) -> CheckSeries:
-    known = _check_channel(channel)
-    if specimen is None:
-        latest = catalogue.checks.find_latest(known)
-        specimen = "" if latest is None else latest.specimen
-    return CheckSeries(check="zero", channel=known, specimen=specimen)
 
 
 def _check_channel(name: str) -> ChannelName:

@@ -5,19 +5,20 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from pydantic import Field
 
-from bench.checks import CHECK_METHODS, CheckRecord, CheckSeries, ControlChart
+from bench.checks import CHECK_METHODS, CheckRecord, ControlChart
 from bench.config import ChannelName
 from bench.errors import AgentUnreachableError
-from bench.service.context import Context, ServiceContext
+from bench.service.context import Context
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.planning.certificate_views import Reason
 from bench.service.routes.planning.certificates import find_author
 from bench.service.views import View
+from bench.validation import SerialNumber
 
 router = APIRouter(prefix="/checks", tags=["checks"], route_class=IdempotentRoute)
 SpecimenName = Annotated[
-    str | None,
-    Query(max_length=200, description="mounted damper during the checks; by default that of the latest check"),
+    SerialNumber | None,
+    Query(description="mounted damper during the checks; by default that of the latest check"),
 ]
 
 
@@ -41,10 +42,8 @@ class BaselineRequest(View):
     """Request of a new baseline."""
 
     reason: Reason = Field(description="reason, such as a repair, for people")
-    specimen: str | None = Field(
-        default=None,
-        max_length=200,
-        description="mounted damper during the checks; by default that of the latest check",
+    specimen: SerialNumber | None = Field(
+        default=None, description="mounted damper during the checks; by default that of the latest check"
     )
 
 
@@ -72,7 +71,8 @@ def list_charts(context: Context) -> ChartList:
 @router.get("/{channel}/chart")
 def get_chart(channel: ChannelName, context: Context, specimen: SpecimenName = None) -> ControlChart:
     """Return the control chart of a channel. Checks with different specimens are never compared."""
-    return context.catalogue.checks.make_chart(_find_series(context, channel, specimen))
+    store = context.catalogue.checks
+    return store.make_chart(store.find_series(channel, specimen))
 
 
 @router.post("/{channel}/baseline", status_code=201, dependencies=[IDEMPOTENT])
@@ -80,13 +80,7 @@ def begin_baseline(
     channel: ChannelName, baseline: BaselineRequest, context: Context, request: Request
 ) -> ControlChart:
     """Let only checks from now on count in the chart of a channel; the earlier records stay in the list."""
-    series, store = _find_series(context, channel, baseline.specimen), context.catalogue.checks
+    store = context.catalogue.checks
+    series = store.find_series(channel, baseline.specimen)
     store.begin_baseline(series, find_author(request), baseline.reason)
     return store.make_chart(series)
-
-
-def _find_series(context: ServiceContext, channel: ChannelName, specimen: str | None) -> CheckSeries:
-    if specimen is None:
-        latest = context.catalogue.checks.find_latest(channel)
-        specimen = "" if latest is None else latest.specimen
-    return CheckSeries(check="zero", channel=channel, specimen=specimen)

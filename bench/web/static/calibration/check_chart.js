@@ -64,7 +64,7 @@ export class CheckChart {
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
       try {
-        await start(`checks/${channel}/baseline`, { specimen, reason: form.elements.reason.value.trim() });
+        await start(`checks/${channel}/baseline`, { specimen: specimen || null, reason: form.elements.reason.value.trim() });
         await this.onChanged(`A new baseline of the ${spaced(channel)} has begun.`);
       } catch (problem) {
         write(note, problem.after("Not changed"));

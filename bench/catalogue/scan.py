@@ -113,7 +113,8 @@ def _read_content(catalogue: Catalogue, row: RunRow) -> RunRow:
 def _compute_checks(path: Path) -> list[CheckRecord]:
     try:
         return compute_records(read_log(path))
-    except LogError:
+    except (LogError, ValueError) as error:  # an uploaded log may contain anything, and must not end the scan
+        _LOG.warning("check_not_recorded", extra={"log": str(path), "why": str(error)})
         return []
 
 

@@ -9,8 +9,7 @@ from datetime import datetime
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-import orjson
-from pydantic import Field
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError
 
 from bench.checks.statistics import Array, RestStatistics, compute_statistics
 from bench.config import CHANNEL_UNITS, ChannelName
@@ -35,6 +34,22 @@ _COLUMNS = {"force": ("force_raw", "force")}
 """Columns of a channel, the preferred one first: a tare would hide a shift of the zero."""
 _SHORTEST = 100
 """Smallest number of samples of a check."""
+
+
+class _Channel(BaseModel):
+    """Channel of an instrument, as a log describes it."""
+
+    name: str
+
+
+class _Instrument(BaseModel):
+    """Instrument, as a log describes it; logs of older versions have no serial number."""
+
+    serial: int | None = None
+    channels: tuple[_Channel, ...] = ()
+
+
+_INSTRUMENTS = TypeAdapter(dict[str, _Instrument])
 
 
 class CheckRecord(FrozenModel):
@@ -64,7 +79,8 @@ def compute_records(log: Log) -> list[CheckRecord]:
     """Compute the record of each channel; empty if the log is not that of a completed check."""
     run = log.metadata.get("run", {})
     segment = next((one for one in log.segments if one.name == REST_SEGMENT), None)
-    if run.get("method") not in CHECK_METHODS.values() or log.outcome not in ("clean", "lossy"):
+    is_check = run.get("method") in CHECK_METHODS.values() and run.get("source", "run") == "run"
+    if not is_check or log.outcome not in ("clean", "lossy"):
         return []
     if segment is None or not _is_at_rest(segment):
         return []
@@ -134,8 +150,11 @@ def _find_bench(log: Log) -> str:
 
 def _find_instrument(log: Log, channel: str) -> tuple[str, str]:
     """Return name and serial number of the instrument that measures a channel."""
-    instruments: dict[str, dict[str, Any]] = orjson.loads(log.attachments.get("instruments.json", b"{}"))
+    try:
+        instruments = _INSTRUMENTS.validate_json(log.attachments.get("instruments.json", b"{}"))
+    except ValidationError:  # an uploaded log may contain anything
+        return "", ""
     for name, one in instruments.items():
-        if channel in (entry["name"] for entry in one.get("channels", ())):
-            return name, str(one.get("serial") or "")
+        if channel in (entry.name for entry in one.channels):
+            return name, str(one.serial or "")
     return "", ""

@@ -49,6 +49,13 @@ def test_a_run_that_is_no_completed_check_has_no_record(tmp_path, changes):
     assert read_records(write_check_log(tmp_path / "a.mcap", **changes)) == {}
 
 
+def test_a_log_with_unreadable_instruments_has_a_record_without_them(tmp_path):
+    log = read_log(write_check_log(tmp_path / "a.mcap"))
+    log.attachments.update({"instruments.json": b'["cell"]', "bench.toml": b"[rig"})
+    record = compute_records(log)[0]
+    assert (record.channel, record.instrument, record.serial, record.bench) == ("force", "", "", "")
+
+
 def test_a_log_without_untared_force_is_read_from_the_force(tmp_path):
     log = read_log(write_check_log(tmp_path / "a.mcap", zero_n=8.0, tare_n=0.0))
     log.samples["force_raw"] = np.full(len(log.samples["force"]), np.nan)

@@ -5,6 +5,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from bench.catalogue import RunRow
 from bench.checks import BASELINE_POINTS, CheckRecord
 from bench.log.header import RunHeader
 from bench.log.writer import LogWriter
@@ -45,6 +46,17 @@ def make_records(values, uncertainty=0.1, channel="force", unit="N", start=START
         )
         for index, value in enumerate(values)
     ]
+
+
+def store_checks(catalogue, values):
+    """Store one check of the force per day with the given values [N], and of the displacement at rest."""
+    noise = np.random.default_rng(3).normal(2e-5, 2e-6, len(values)).tolist()
+    for record, other in zip(make_records(values), make_records(noise, 1e-7, "displacement", "m"), strict=True):
+        name = record.run
+        catalogue.add(
+            RunRow(id=name, method="zero_check", started=record.measured, state="ended", log=f"{name}.mcap")
+        )
+        catalogue.checks.replace(name, [record, other])
 
 
 def write_check_log(path, run="check-1", zero_n=0.0, day=0, seed=1, **changes):

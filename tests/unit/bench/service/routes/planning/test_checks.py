@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.checks import IN_CONTROL, MOUNTED, write_check_log
+from tests.support.checks import IN_CONTROL, MOUNTED, store_checks, write_check_log
 
 API = "/api/v1/checks"
 
@@ -10,9 +10,7 @@ API = "/api/v1/checks"
 @pytest.fixture
 def shifted(service):
     """Return a service whose latest check shows a zero shift of 12 N."""
-    for day, zero in enumerate([*IN_CONTROL, 0.0, 12.0]):
-        write_check_log(service.data / f"check-{day}.mcap", f"check-{day}", zero, day, seed=day)
-    service.scan()
+    store_checks(service.client.app.state.context.catalogue, [*IN_CONTROL, 0.0, 12.0])
     return service
 
 
@@ -33,14 +31,14 @@ def test_charts_need_no_agent(shifted):
     shifted.agent.reachable = False
     charts = shifted.get("/checks/charts")
     assert charts["method"] is None
-    assert {one["series"]["channel"] for one in charts["items"]} == {"force", "displacement", "coil_voltage"}
+    assert {one["series"]["channel"] for one in charts["items"]} == {"force", "displacement"}
 
 
 def test_records_are_listed_with_units_the_newest_first(shifted):
     newest, *others = shifted.get("/checks?channel=force")["items"]
     assert len(others) == 21
-    assert (newest["run"], newest["unit"], newest["instrument"]) == ("check-21", "N", "cell")
-    assert newest["value"] == pytest.approx(12.0, abs=0.35)
+    assert (newest["run"], newest["unit"], newest["instrument"]) == ("run-21", "N", "load_cell")
+    assert newest["value"] == 12.0
     assert len(shifted.get("/checks?limit=3")["items"]) == 3
     assert shifted.client.get(f"{API}?channel=velocity").status_code == 422
 
@@ -48,9 +46,9 @@ def test_records_are_listed_with_units_the_newest_first(shifted):
 def test_the_chart_has_limits_points_and_the_state_in_words(shifted):
     chart = shifted.get("/checks/force/chart")
     assert (chart["state"], chart["count"], chart["needed"], chart["unit"]) == ("out_of_control", 22, 20, "N")
-    assert chart["limits"]["centre"] == pytest.approx(0, abs=0.1)
+    assert chart["limits"]["centre"] == 0
     # Moving range 2 N over 1.128.
-    assert chart["limits"]["sigma"] == pytest.approx(1.77, abs=0.1)
+    assert chart["limits"]["sigma"] == pytest.approx(2 / 1.128)
     assert "beyond_limits" in chart["points"][-1]["rules"]
     assert [one["is_baseline"] for one in chart["points"]] == [True] * 20 + [False] * 2
     assert shifted.get("/checks/force/chart?specimen=S-2")["points"] == []
@@ -64,7 +62,7 @@ def test_health_names_the_channel_that_is_out_of_control(shifted):
 def test_a_run_gets_the_latest_checks(shifted):
     shifted.post("/runs", {"method": "quick", "specimen": "A"}, status=201)
     checks = {one.channel: one for one in shifted.agent.commands[-1].checks}
-    assert (checks["force"].state, checks["force"].run) == ("out_of_control", "check-21")
+    assert (checks["force"].state, checks["force"].run) == ("out_of_control", "run-21")
     assert checks["displacement"].state == "in_control"
 
 
@@ -74,8 +72,12 @@ def test_a_marked_run_says_so_in_its_view(service):
     assert run["failed_checks"] == ["force: zero check is out of control"]
 
 
-def test_a_check_is_not_identified(shifted):
-    assert shifted.get("/runs/check-3")["jobs"] == []
+def test_a_check_is_recorded_by_the_scan_and_not_identified(service):
+    write_check_log(service.data / "check-1.mcap", "check-1", zero_n=8.0)
+    service.scan()
+    assert service.get("/runs/check-1")["jobs"] == []
+    (record,) = service.get("/checks?channel=force")["items"]
+    assert (record["run"], record["value"]) == ("check-1", pytest.approx(8.0, abs=0.35))
 
 
 def test_a_new_baseline_needs_a_reason_and_clears_the_state(shifted):

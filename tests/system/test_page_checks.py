@@ -11,7 +11,9 @@ from tests.support.page_in_browser import browser_test, operate_page
 
 @pytest.fixture(scope="module")
 def bench():
-    return FakeBench()
+    bench = FakeBench()
+    bench.refusals = 0
+    return bench
 
 
 @pytest.fixture(scope="module")

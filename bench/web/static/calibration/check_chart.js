@@ -28,7 +28,7 @@ export class CheckChart {
     const figure = element("figure", { className: "curves" });
     this.place.append(this.title, element("p", { className: "cause" }, `${word}: ${reason}.`),
       element("p", { className: "soft" }, describeLimits(chart)), figure, makeTable(chart), this.makeBaseline(chart));
-    if (chart.points.length) this.plot = new CheckPlot(figure, { title: `Zero of the ${spaced(channel)}`, ...quantityOf(channel), ...chart });
+    if (chart.points.length) this.plot = new CheckPlot(figure, { ...chart, ...quantityOf(channel), title: `Zero of the ${spaced(channel)}` });
     else figure.remove();
   }
 

@@ -19,6 +19,7 @@ from bench.catalogue.planning import (
     SHIPPED_VERSION,
     ApprovalStore,
     CertificateStore,
+    CheckStore,
     IdempotencyKeys,
     MethodStore,
     SpecimenStore,
@@ -43,7 +44,7 @@ class Catalogue:
         self.idempotency_keys = IdempotencyKeys(engine)
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
         self.approvals = ApprovalStore(engine)
-        self.certificates = CertificateStore(engine)
+        self.certificates, self.checks = CertificateStore(engine), CheckStore(engine)
         self.campaigns = CampaignTable(engine)
         self.users, self.tokens, self.sessions = UserStore(engine), TokenStore(engine), SessionStore(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)

@@ -154,6 +154,7 @@ class AgentBench:
             resume_after=execution.resume_after,
             continues=execution.continues,
             certificates=tuple(self._catalogue.certificates.list_current(datetime.now(UTC).date()).values()),
+            checks=self._catalogue.checks.list_latest(),
             log=str(path),
         )
         status = self._agent.send_command(command)

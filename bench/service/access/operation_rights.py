@@ -53,6 +53,7 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /certificates": "change_limits",
     "PATCH /certificates/{certificate_id}": "change_limits",
     "DELETE /certificates/{certificate_id}": "change_limits",
+    "POST /checks/{channel}/baseline": "change_limits",
     "POST /specimens": "operate",
     "PATCH /specimens/{serial:path}": "operate",
     "POST /specimens/{serial:path}/trend": "analyse",

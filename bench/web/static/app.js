@@ -5,6 +5,7 @@ import { AuditView } from "./account/audit_trail.js";
 import { get, readSession } from "./common/api.js";
 import { CampaignView } from "./campaigns/campaigns.js";
 import { CertificateView } from "./calibration/certificates.js";
+import { CheckView } from "./calibration/checks.js";
 import { CompareView } from "./compare/compare.js";
 import { EventList } from "./bench/events.js";
 import { byId, fixed, write } from "./common/format.js";
@@ -82,6 +83,12 @@ const signIn = new SignIn({ onSignedIn: begin });
 new Account({ onProblem: (text) => bar.showDetail(text, true) });
 watchRights((reason) => bar.showDetail(reason, true));
 const certificates = new CertificateView();
+const checks = new CheckView({
+  onStarted: (run) => {
+    runs.update(run);
+    byId("stop").focus();
+  },
+});
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -103,7 +110,10 @@ const router = new Router({
   people: () => people.show(),
   tokens: () => tokens.show(),
   audit: (address) => audit.show(address),
-  calibration: () => certificates.show(),
+  calibration: (address) => {
+    certificates.show();
+    checks.show(address);
+  },
 });
 
 offerUnits(() => {
@@ -112,6 +122,7 @@ offerUnits(() => {
   specimen.relabel();
   runView.relabel();
   comparison.relabel();
+  checks.list();
 });
 
 let requesting = false;
@@ -136,7 +147,10 @@ const HANDLERS = {
     preparation.update(status);
   },
   event: (event) => events.add(event),
-  run: (run) => runs.update(run),
+  run: (run) => {
+    runs.update(run);
+    checks.update(run);
+  },
   job: (job) => {
     runs.updateJob(job);
     specimen.updateJob(job);

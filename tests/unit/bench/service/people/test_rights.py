@@ -30,6 +30,7 @@ LOWEST = {
     "engineer": """
         DELETE /runs/{run_id}, POST /runs/{run_id}/restore, POST /runs/{run_id}/salvage, POST /methods,
         POST /certificates, PATCH /certificates/{certificate_id}, DELETE /certificates/{certificate_id},
+        POST /checks/{channel}/baseline,
         POST /methods/{name}/{version}/approval, DELETE /methods/{name}/{version}/approval
     """,
     "administrator": """

@@ -57,6 +57,10 @@ class SyncLine:
     def tick(self, now_ns: int) -> None:
         """Do nothing: the line has no time-driven behaviour."""
 
+    def acts_by_itself(self, now_ns: int) -> bool:
+        """Return False: the line only listens."""
+        return False
+
 
 class RigServer:
     """A live rig with its wires open; a context manager."""

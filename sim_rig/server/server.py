@@ -136,7 +136,7 @@ class RigServer:
         self._serve_modbus(
             "coil_amplifier", cast("ModbusDevice", device), mode="voltage" if unit == "V" else "current"
         )
-        self.rig.periodic_tasks = [device.advance]
+        self.rig.periodic_tasks = [device.follow_time]
         return device
 
     def _serve_lvdt(self) -> None:

@@ -20,6 +20,8 @@ _COMMANDS = {code: name for name, code in CONTRACT["commands"].items()}
 _CODES, _FRAMES = CONTRACT["codes"], CONTRACT["frames"]
 _FULL_SCALE: float = _INSTRUMENT["full_scale_n"]
 _COUNTS_PER_NEWTON: int = _INSTRUMENT["counts_per_newton"]
+_MIN_POLL = 0.002
+"""[s] Shortest interval of polls."""
 _HEADER = bytes(CONTRACT["framing"]["sync"])
 
 
@@ -241,4 +243,5 @@ def make_load_cell(
     """
     device = LoadCellDevice(signals, clock)
     port = SerialPort(address, CONTRACT["line"]["baud"], _INSTRUMENT["transmit_buffer_bytes"], batch)
-    return SerialAdapter(port, device, signals.now_ns), device
+    # Between two batches nothing reaches the host, so the device is polled once for each.
+    return SerialAdapter(port, device, signals.now_ns, max(batch, _MIN_POLL)), device

@@ -72,13 +72,15 @@ def _convert(
         values[j] = np.rint(value / c.resolution) * c.resolution if c.resolution != 0.0 else value
 
 
-_CONSTANTS = numba.types.NamedUniTuple(numba.float64, len(ReadingConstants._fields), ReadingConstants)
+_COUNT = len(ReadingConstants._fields)
+_CONSTANTS = numba.types.NamedUniTuple(numba.float64, _COUNT, ReadingConstants)  # type: ignore[no-untyped-call]
 convert_readings = compile_function(
     _convert,
     numba.void(
         VECTOR, numba.int64, numba.float64, numba.boolean, numba.int64, numba.float64, _CONSTANTS,
         VECTOR, VECTOR, VECTOR, VECTOR,
     ),
+    brief=True,
 )  # fmt: skip
 """Make the readings from number ``start`` on, ``rate`` [Hz] of them in a second.
 

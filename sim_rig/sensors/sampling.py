@@ -101,7 +101,7 @@ def _filter(b: Array, a: Array, values: Array, state: Array, filtered: Array) ->
         state[order - 1] = b[order] * values[j] - a[order] * filtered[j]
 
 
-_compiled_filter = compile_function(_filter, numba.void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR))
+_compiled_filter = compile_function(_filter, numba.void(VECTOR, VECTOR, VECTOR, VECTOR, VECTOR), brief=True)
 
 
 def sample_held(values: Array, dt: float, instants: Array, first: int = 0) -> Array:

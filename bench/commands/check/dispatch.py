@@ -39,7 +39,7 @@ def check(
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
 ) -> None:
-    """Show zero checks and their control charts; the service may run meanwhile.
+    """Show zero checks and their control charts.
 
     A check is a run of the method zero_check, or zero_check_current for a damper driven by current. The service
     records the checks in its data folder.

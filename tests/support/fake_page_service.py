@@ -118,7 +118,7 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
         "ending": None, "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None,
         "noise_floor_n": None, "result": "", "jobs": [], "continues": None, "log_sha256": None, "integrity": None,
-        "lost": {}, "alarms": [], "calibration_overdue": [],
+        "lost": {}, "alarms": [], "calibration_overdue": [], "failed_checks": [],
         "tags": [], "trashed": None, "method_version": None, "method_sha256": None,
         "log_bytes": None,
         "diagnosis": None,

@@ -1,11 +1,12 @@
 """Signatures of reports and audit trail of the fake service; models and trail are the real ones."""
 
 import hashlib
+import shutil
 import tempfile
+import weakref
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from fastapi import APIRouter, FastAPI, Request
@@ -24,8 +25,9 @@ class FakeTrail:
     """Audit trail in a temporary folder, with a request, a refusal, a long value and a stop at the bench."""
 
     def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory()
-        self.path = Path(self._folder.name) / "audit.jsonl"
+        folder = tempfile.mkdtemp()
+        weakref.finalize(self, shutil.rmtree, folder)
+        self.path = Path(folder) / "audit.jsonl"
         self.chain = AuditChain(self.path)
         self.get_head = self.chain.get_head
         limits = {"stroke_m": 0.025, "velocity_mps": 0.4, "force_n": 1500.0, "drive": None, "temperature_c": 60.0}
@@ -53,8 +55,8 @@ class FakeTrail:
 
 
 def add_audit_routes(app: FastAPI, trail: FakeTrail) -> None:
-    """Add the real routes of the audit trail on a fake trail."""
-    app.state.context = SimpleNamespace(audit=trail)
+    """Add the real routes of the audit trail on a fake trail; those of the certificates have made the context."""
+    app.state.context.audit = trail
     app.include_router(audit.router, prefix="/api/v1")
 
 

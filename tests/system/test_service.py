@@ -232,4 +232,4 @@ def test_a_second_service_on_the_same_folder_is_refused(served, data):
     second = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert second.returncode == 1
     assert "another service uses" in second.stderr
-    assert served.call("health")["worker"] == "ok"
+    wait_until_false(lambda: served.call("health")["worker"] != "ok", "the first service has no worker")

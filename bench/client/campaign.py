@@ -9,13 +9,14 @@ from typing import Any
 
 from bench.client.errors import ClientError
 from bench.client.session import Session, quote_name
+from bench.client.signed_reports import SignedReports
 
 _POLL_PERIOD = 1.0
 """Time [s] between two requests while a script waits."""
 _ENDED = ("done", "stopped")
 
 
-class Campaign:
+class Campaign(SignedReports):
     """One campaign; each call requests its present state.
 
     Args:
@@ -25,7 +26,7 @@ class Campaign:
 
     def __init__(self, session: Session, campaign_id: str) -> None:
         self.id = campaign_id
-        self._session, self._path = session, f"/campaigns/{quote_name(campaign_id)}"
+        super().__init__(session, f"/campaigns/{quote_name(campaign_id)}")
 
     def __repr__(self) -> str:
         return f"Campaign({self.id!r})"
@@ -106,26 +107,6 @@ class Campaign:
             ClientError: the report is not available, the format is unknown, or the download breaks off.
         """
         return self._session.download(f"{self._path}/report?format={quote_name(report_format)}", to)
-
-    def list_signatures(self) -> list[dict[str, Any]]:
-        """Return the signatures of the reports of the campaign, the oldest first; persons sign in the page.
-
-        Raises:
-            ClientError: there is no such campaign, or the service cannot be reached.
-        """
-        return list(self._session.get(f"{self._path}/report/signatures")["items"])
-
-    def download_signed_report(self, sha256: str, to: Path) -> Path:
-        """Download a signed report, byte by byte as it was signed, and return its path.
-
-        Args:
-            sha256: hash of the file, from `list_signatures`.
-            to: file to write.
-
-        Raises:
-            ClientError: there is no such file, or the download breaks off.
-        """
-        return self._session.download(f"{self._path}/report/copies/{quote_name(sha256)}", to)
 
     def wait(self, timeout: float = 86_400.0) -> dict[str, Any]:
         """Wait until the campaign ends or asks for a person, and return its state.

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from bench.client.arrays import Arrays, make_arrays
 from bench.client.errors import ClientError
 from bench.client.session import Session, quote_name
+from bench.client.signed_reports import SignedReports
 from bench.validation import describe_validation_error
 
 _POLL_PERIOD = 0.5
@@ -74,7 +75,7 @@ class RunState(BaseModel):
         return self.state != "running" and not awaits_job and all(job.is_finished for job in self.jobs)
 
 
-class Run:
+class Run(SignedReports):
     """One run; each call requests its present state.
 
     Args:
@@ -84,7 +85,7 @@ class Run:
 
     def __init__(self, session: Session, run_id: str) -> None:
         self.id = run_id
-        self._session, self._path = session, f"/runs/{quote_name(run_id)}"
+        super().__init__(session, f"/runs/{quote_name(run_id)}")
 
     def __repr__(self) -> str:
         return f"Run({self.id!r})"
@@ -163,27 +164,6 @@ class Run:
             LogError: the file cannot be written.
         """
         return self._session.download(f"{self._path}/report", to)
-
-    def list_signatures(self) -> list[dict[str, Any]]:
-        """Return the signatures of the reports on the run, the oldest first; persons sign in the page.
-
-        Raises:
-            ClientError: there is no such run, or the service cannot be reached.
-        """
-        return list(self._session.get(f"{self._path}/report/signatures")["items"])
-
-    def download_signed_report(self, sha256: str, to: Path) -> Path:
-        """Download a signed report, byte by byte as it was signed, and return its path.
-
-        Args:
-            sha256: hash of the file, from `list_signatures`.
-            to: file to write.
-
-        Raises:
-            ClientError: there is no such file, or the download breaks off.
-            LogError: the file cannot be written.
-        """
-        return self._session.download(f"{self._path}/report/copies/{quote_name(sha256)}", to)
 
     def stop(self) -> None:
         """Stop the run in a controlled way: the motion fades out, the coil goes to zero.

@@ -81,12 +81,12 @@ class CalibrationSection(FrozenModel):
 
     overdue: Literal["mark", "refuse"] = Field(
         default="mark",
-        description="mark: a run with an overdue channel says so in its log; refuse: it does not start",
+        description="mark: the log of a run names its overdue channels; refuse: it does not start",
     )
     failed_check: Literal["mark", "refuse"] = Field(
         default="mark",
-        description="mark: a run with a channel whose latest check has failed says so in its log; refuse: it does "
-        "not start, except for a check",
+        description="mark: the log of a run names the channels whose latest check has failed; refuse: it does not "
+        "start, except for a check",
     )
     check_interval_days: PositiveFloat | None = Field(
         default=None, description="[days] largest age of a channel's latest check; by default any"

@@ -3,7 +3,6 @@
 They lie in ``reports/`` of the data folder, one folder for each run or campaign, and are named by their hash.
 """
 
-import os
 import shutil
 import time
 from collections.abc import Callable, Container
@@ -13,6 +12,7 @@ from typing import NamedTuple
 from urllib.parse import quote
 
 from bench.catalogue import LogIntegrity, ReportKind, compute_sha256
+from bench.disk import sync_path
 from bench.errors import LogError, ReportError
 from bench.service.transfer import make_folder
 
@@ -65,9 +65,9 @@ def keep_report(
             write(made)
             target = folder / f"{compute_sha256(made)}.{report_format}"
             if target.stem not in signed or not target.exists():
-                _sync(made)
+                sync_path(made)
                 made.replace(target)
-                _sync(folder)
+                sync_path(folder)
             return _describe(target)
         finally:
             shutil.rmtree(temporary, ignore_errors=True)
@@ -104,12 +104,3 @@ def _remove_old(folder: Path, signed: Container[str]) -> None:
     for path in folder.iterdir():
         if path.stem not in signed and path.stat().st_mtime < oldest:
             path.unlink(missing_ok=True)
-
-
-def _sync(path: Path) -> None:
-    """Pass a file, or the names in a folder, to the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

@@ -27,8 +27,8 @@ from identification.noise.window_fit import CycleFit, WindowFit
 from identification.signals import Motion
 from identification.threads import use_one_thread
 
-_AGREEMENT = 3.0
-"""Difference of the two estimates up to which they agree [standard deviations]."""
+_COLOUR_RANGE = 3.0
+"""Factor by which coloured noise or fast repeated force usually separates the two estimates, either way."""
 _HIGH_FREQUENCY_SCATTER = 1.6
 """Relative standard deviation of the high-frequency estimate times the root of its samples [1]; measured."""
 _MIN_SAMPLES = 200
@@ -63,8 +63,8 @@ class NoiseFloorEstimate:
 
     @property
     def coloured_share(self) -> float:
-        """Part of the variance that is not white [1]; 0 where the estimates agree or no cycles repeat."""
-        if self.noise != self.cycle_to_cycle:
+        """Part of the variance that is not white [1]; 0 where no cycles repeat."""
+        if self.cycle_to_cycle is None:
             return 0.0
         return max(1.0 - (self.high_frequency / max(self.noise, 1e-300)) ** 2, 0.0)
 
@@ -79,6 +79,15 @@ class NoiseFloorEstimate:
         return max(self.noise - _NORMAL_95 * self.deviation, 0.0), self.noise + _NORMAL_95 * self.deviation
 
 
+class _Estimate(NamedTuple):
+    """Estimate of a noise."""
+
+    noise: float
+    """[N]"""
+    deviation: float
+    """Its standard deviation [N]."""
+
+
 class _StretchNoise(NamedTuple):
     """Noise in the windows of one stretch."""
 
@@ -89,8 +98,8 @@ class _StretchNoise(NamedTuple):
 def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> NoiseFloorEstimate:
     """Estimate the common noise of the force of some stretches, without the effect of displacement noise.
 
-    If the estimate from repeated cycles agrees with that from high frequencies, the noise is white, and the two
-    are averaged by their precision. A mains line is not part of the floor: the effect ``mains_hum`` predicts it.
+    If the noise is white, the estimates from repeated cycles and from high frequencies agree. Their difference
+    gives the probability of that. A mains line is not part of the floor: the effect ``mains_hum`` predicts it.
 
     Args:
         stretches: recordings; ``measured`` marks the samples that are used.
@@ -108,21 +117,44 @@ def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> N
         return NoiseFloorEstimate(high_frequency, None, high_frequency, f"high frequency: {reason}")
     cycle_to_cycle, deviation = _combine_windows(windows)
     basis = f"cycle to cycle over {sum(w.cycles for w in windows)} cycles{_describe_extent(parts)}"
-    basis = f"{basis}; {_compare(cycle_to_cycle, deviation, high_frequency)}{_describe_lines(parts)}"
     other = _HIGH_FREQUENCY_SCATTER * high_frequency / math.sqrt(max(float(counts.sum()), 1.0))
-    noise, combined = _average(cycle_to_cycle, deviation, high_frequency, other)
+    repeated, fast = _Estimate(cycle_to_cycle, deviation), _Estimate(high_frequency, other)
+    white = _compute_white_probability(repeated, fast)
+    basis = f"{basis}; {_compare(cycle_to_cycle, high_frequency, white)}{_describe_lines(parts)}"
+    noise, combined = _mix(white, _average(repeated, fast), repeated)
     return NoiseFloorEstimate(noise, cycle_to_cycle, high_frequency, basis, combined)
 
 
-def _average(first: float, first_deviation: float, second: float, second_deviation: float) -> tuple[float, float]:
-    """Return the average of two estimates that agree, or the first, with its standard deviation; all in N."""
-    if abs(first - second) > _AGREEMENT * first_deviation:
-        return first, first_deviation
-    total = math.hypot(first_deviation, second_deviation)
+def _compute_white_probability(repeated: _Estimate, fast: _Estimate) -> float:
+    """Compute the probability [1] that the noise is white and does not repeat, from two estimates of it.
+
+    White noise lets them differ by their errors. Otherwise any ratio of the two within a factor of three, either
+    way, is equally probable. Both cases have the same prior probability.
+    """
+    deviation = math.hypot(repeated.deviation, fast.deviation)
+    if deviation == 0.0:
+        return float(repeated.noise == fast.noise)
+    distance = (repeated.noise - fast.noise) / deviation
+    white = math.exp(-0.5 * distance**2) / (math.sqrt(2.0 * math.pi) * deviation)
+    other = 1.0 / (2.0 * math.log(_COLOUR_RANGE) * max(repeated.noise, 1e-300))
+    return white / (white + other)
+
+
+def _average(first: _Estimate, second: _Estimate) -> _Estimate:
+    """Return the average of two estimates of one noise, weighted by their precision."""
+    total = math.hypot(first.deviation, second.deviation)
     if total == 0.0:
-        return first, 0.0
-    share = (second_deviation / total) ** 2
-    return share * first + (1.0 - share) * second, first_deviation * second_deviation / total
+        return first
+    share = (second.deviation / total) ** 2
+    noise = share * first.noise + (1.0 - share) * second.noise
+    return _Estimate(noise, first.deviation * second.deviation / total)
+
+
+def _mix(probability: float, first: _Estimate, second: _Estimate) -> _Estimate:
+    """Return mean and standard deviation of a noise that is the first estimate with a probability [1]."""
+    mean = probability * first.noise + (1.0 - probability) * second.noise
+    squares = [e.deviation**2 + (e.noise - mean) ** 2 for e in (first, second)]
+    return _Estimate(mean, math.sqrt(probability * squares[0] + (1.0 - probability) * squares[1]))
 
 
 def _estimate_stretch(stretch: Stretch, motion: Motion) -> _StretchNoise:
@@ -171,9 +203,9 @@ def _combine_windows(noises: Sequence[WindowNoise]) -> tuple[float, float]:
     return math.sqrt(variance), 0.5 * deviation / math.sqrt(max(variance, 1e-300))
 
 
-def _compare(cycle_to_cycle: float, deviation: float, high_frequency: float) -> str:
-    """Return the comparison of the two estimates as text."""
-    if abs(cycle_to_cycle - high_frequency) <= _AGREEMENT * deviation:
+def _compare(cycle_to_cycle: float, high_frequency: float, white: float) -> str:
+    """Return the comparison of the two estimates as text; ``white`` is the probability of white noise [1]."""
+    if white > 0.5:
         return "the high-frequency estimate agrees"
     ratio = cycle_to_cycle / max(high_frequency, 1e-12)
     if ratio > 1.0:

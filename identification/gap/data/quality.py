@@ -60,7 +60,7 @@ def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> 
         notes.append("only one amplitude: gas spring, end stop and displacement nonlinearity look alike")
     if floor.cycle_to_cycle is None:
         notes.append(f"the noise floor is estimated from high frequencies only: {floor.basis}")
-    if floor.coloured_share > 0.0:
+    if floor.is_known and floor.get_interval(floor.noise)[0] > floor.high_frequency:
         ratio = floor.noise / floor.high_frequency
         notes.append(
             f"the noise floor is {ratio:.2f} times the noise at high frequencies: part of the force does not "

@@ -12,7 +12,10 @@ from identification.noise.noise_floor import (
     NoiseFloorEstimate,
     _average,
     _compare,
+    _compute_white_probability,
+    _Estimate,
     _explain_missing_repeats,
+    _mix,
     estimate_floor,
 )
 from identification.signals.motion import estimate_motion
@@ -158,15 +161,38 @@ def test_the_floor_of_several_stretches_is_that_of_all_their_cycles():
 def test_a_stretch_without_repeated_cycles_has_the_noise_of_the_others():
     stretches = [make_stretch(4.0), make_stretch(2.0, seed=1, repeats=False)]
     found = estimate_floor(stretches, [estimate_motion(s) for s in stretches])
-    assert found.noise == found.cycle_to_cycle == pytest.approx(4.0, rel=0.03)
+    assert found.noise == pytest.approx(4.0, rel=0.03)
+    assert found.cycle_to_cycle == pytest.approx(4.0, rel=0.03)
     assert "in 1 of 2 stretches" in found.basis
 
 
-def test_estimates_that_agree_are_averaged_by_their_precision():
-    assert _average(2.0, 0.1, 2.2, 0.05) == pytest.approx((2.16, 0.1 / 5.0**0.5))
-    assert _average(2.0, 0.1, 2.31, 0.05) == (2.0, 0.1)
-    assert _average(0.0, 0.0, 0.0, 0.0) == (0.0, 0.0)
-    assert _average(2.0, 0.1, 1.71, 0.1) == pytest.approx((1.855, 0.1 / 2.0**0.5))
+def test_estimates_of_one_noise_are_averaged_by_their_precision():
+    assert _average(_Estimate(2.0, 0.1), _Estimate(2.2, 0.05)) == pytest.approx((2.16, 0.1 / 5.0**0.5))
+    assert _average(_Estimate(0.0, 0.0), _Estimate(0.0, 0.0)) == (0.0, 0.0)
+
+
+def test_noise_is_white_where_two_precise_estimates_agree():
+    precise = _Estimate(1.0, 0.001)
+    assert _compute_white_probability(_Estimate(1.0, 0.01), precise) > 0.98
+    assert _compute_white_probability(_Estimate(1.02, 0.01), precise) == pytest.approx(0.92, abs=0.02)
+    assert _compute_white_probability(_Estimate(1.05, 0.01), precise) < 1e-3
+    assert _compute_white_probability(_Estimate(0.95, 0.01), precise) < 1e-3
+    # An estimate that cannot tell gives the prior probability back, up to its width.
+    assert 0.3 < _compute_white_probability(_Estimate(1.5, 0.4), precise) < 0.7
+
+
+def test_a_probable_noise_hardly_changes_with_the_estimates():
+    fast = _Estimate(1.0, 0.002)
+    found = []
+    for repeated in np.arange(0.9, 1.5, 0.002):
+        estimate = _Estimate(float(repeated), 0.06)
+        found.append(_mix(_compute_white_probability(estimate, fast), _average(estimate, fast), estimate))
+    noise, deviation = np.transpose(found)
+    assert np.abs(np.diff(noise)).max() < 0.01
+    assert np.abs(np.diff(deviation)).max() < 0.01
+    # Between the two answers, the interval contains both.
+    middle = np.argmin(np.abs(noise - 1.06))
+    assert noise[middle] - 1.96 * deviation[middle] < 1.0 < 1.12 < noise[middle] + 1.96 * deviation[middle]
 
 
 def test_without_repeated_cycles_the_floor_lies_between_its_lower_bound_and_the_error_of_a_model():
@@ -178,18 +204,17 @@ def test_without_repeated_cycles_the_floor_lies_between_its_lower_bound_and_the_
 
 
 @pytest.mark.parametrize(
-    ("cycles", "high", "text"),
+    ("cycles", "high", "white", "text"),
     [
-        (1.05, 1.0, "the high-frequency estimate agrees"),
-        (1.0, 1.05, "the high-frequency estimate agrees"),
-        (1.12, 1.0, "1.12 times the high-frequency estimate: some force does not repeat"),
-        (1.0, 1.25, "only 0.80 of the high-frequency estimate"),
-        (0.0, 0.0, "agrees"),
-        (2.0, 0.0, "some force does not repeat"),
+        (1.05, 1.0, 0.6, "the high-frequency estimate agrees"),
+        (1.12, 1.0, 0.4, "1.12 times the high-frequency estimate: some force does not repeat"),
+        (1.0, 1.25, 0.0, "only 0.80 of the high-frequency estimate"),
+        (0.0, 0.0, 1.0, "agrees"),
+        (2.0, 0.0, 0.0, "some force does not repeat"),
     ],
 )
-def test_two_estimates_agree_within_three_standard_deviations(cycles, high, text):
-    assert text in _compare(cycles, 0.02, high)
+def test_the_likelier_relation_of_two_estimates_is_described(cycles, high, white, text):
+    assert text in _compare(cycles, high, white)
 
 
 def test_missing_repeats_are_explained():
@@ -211,7 +236,7 @@ def test_only_periodic_segments_with_a_frequency_show_repeated_cycles():
 def test_only_coloured_noise_has_a_coloured_share():
     assert NoiseFloorEstimate(4.0, 4.0, 2.0, "", 0.1).coloured_share == pytest.approx(0.75)
     assert NoiseFloorEstimate(4.0, 4.0, 5.0, "", 0.1).coloured_share == 0.0
-    assert NoiseFloorEstimate(3.9, 4.0, 3.8, "", 0.1).coloured_share == 0.0
+    assert NoiseFloorEstimate(3.9, 4.0, 3.8, "", 0.1).coloured_share == pytest.approx(0.05, abs=0.01)
     assert NoiseFloorEstimate(4.0, None, 4.0, "").coloured_share == 0.0
     assert [NoiseFloorEstimate(4.0, c, 4.0, "", d).is_known for c, d in ((4.0, 0.1), (None, None))] == [
         True,

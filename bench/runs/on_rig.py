@@ -10,7 +10,7 @@ from bench.agent import Agent, CommandTrail, acquire_agent_lock, handle_command
 from bench.agent_protocol import CommandServer, RunCommand, RunStatus, StopCommand, get_sender, make_endpoint
 from bench.audit import make_agent_trail
 from bench.calibration import IssuedCertificate
-from bench.catalogue import CATALOGUE_FILE, open_catalogue
+from bench.catalogue import has_catalogue, open_catalogue
 from bench.config import load_config
 from bench.errors import RunError
 from bench.methods import Method
@@ -101,7 +101,7 @@ def _start(agent: Agent, trail: CommandTrail, command: RunCommand) -> None:
 
 def _read_certificates(data: Path) -> tuple[IssuedCertificate, ...]:
     """Return the certificates that apply today, from the catalogue of the bench's folder if it has one."""
-    if not (data / CATALOGUE_FILE).is_file():
+    if not has_catalogue(data):
         return ()
     with open_catalogue(data) as catalogue:
         return tuple(catalogue.certificates.list_current(datetime.now(UTC).date()).values())

@@ -15,11 +15,28 @@ TIMEOUT = 20.0
 """Time limit for events in other threads [s]."""
 
 
+ON_BOTH_DATABASES = {
+    "test_campaigns",
+    "test_idempotency",
+    "test_jobs",
+    "test_run_search",
+    "test_runs",
+    "test_sign_in",
+}
+"""Modules whose tests of a service run on SQLite and on PostgreSQL."""
+
+
+def pytest_generate_tests(metafunc):
+    name = metafunc.module.__name__.rpartition(".")[2]
+    if "database" in metafunc.fixturenames and name in ON_BOTH_DATABASES:
+        metafunc.parametrize("database", ["sqlite", "postgresql"], indirect=True)
+
+
 class Service:
     """Service that can be started and ended repeatedly on one data folder."""
 
-    def __init__(self, data):
-        self.data = data
+    def __init__(self, data, database=None):
+        self.data, self.database = data, database
         self.agent = FakeAgent()
         self.engine = FakeEngine()
         self.access, self.token = open_access(data)
@@ -29,7 +46,7 @@ class Service:
         self.end()
         self.engine = FakeEngine()
         given = {"data": self.data, "access": self.access, "link": self.agent, "engine": self._engine}
-        app = create_app(AppSettings(**{**given, **changes}))
+        app = create_app(AppSettings(**{**given, "database": self.database, **changes}))
         self.client = TestClient(app, base_url="http://127.0.0.1:8600", raise_server_exceptions=False)
         self.client.headers["Authorization"] = f"Bearer {self.token}"
         return self.client.__enter__()
@@ -79,8 +96,15 @@ class Service:
 
 
 @pytest.fixture
-def service(tmp_path):
-    made = Service(tmp_path)
+def database(request):
+    """Return the URL of an empty catalogue in PostgreSQL; None for the SQLite file of the data folder."""
+    is_server = getattr(request, "param", "sqlite") == "postgresql"
+    return request.getfixturevalue("postgres_server").make_catalogue() if is_server else None
+
+
+@pytest.fixture
+def service(tmp_path, database):
+    made = Service(tmp_path, database)
     made.start()
     yield made
     made.end()

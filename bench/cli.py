@@ -34,7 +34,10 @@ def _mrbench(
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
     ] = False,
 ) -> None:
-    """Test bench for magnetorheological dampers: records, identifies, diagnoses."""
+    """Test bench for magnetorheological dampers: records, identifies, diagnoses.
+
+    With recordings: import, identify, diagnose, report. Without: demo. With a rig: rig, prepare, run, serve.
+    """
 
 
 def _make_application(commands: EntryPoints) -> typer.Typer:

@@ -125,3 +125,16 @@ class SpaceMonitor:
             except RunError as error:
                 self._warning = str(error)
         return self._warning
+
+
+def sync_path(path: Path) -> None:
+    """Pass a file, or the names in a folder, to the disk.
+
+    Raises:
+        OSError: the disk refuses.
+    """
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

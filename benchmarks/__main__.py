@@ -12,6 +12,7 @@ MODULES = {
     "commands": "speed.commands",
     "catalogue": "speed.catalogue",
     "rest_load": "speed.rest_load",
+    "rig_load": "speed.rig_load",
     "live_page": "live.page",
     "dead_bench": "live.dead_bench",
     "campaign": "live.campaign",

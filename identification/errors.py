@@ -5,8 +5,8 @@ IdentificationError
 ├── UnreadableLogError    not an mrbench log, or truncated, or without a channel
 └── UnusableDataError     too few or unsuitable samples for a fit
 
-A fit that does not converge is a result and not an error. ``exit_code`` tells the command line that the message is
-for a person and needs no traceback.
+A fit that does not converge is a result and not an error. The command line prints an error with ``exit_code`` in
+one line, without a traceback.
 """
 
 

@@ -8,7 +8,7 @@ SimRigError
 ├── TruthError      a truth file cannot be written, or would replace another file
 └── TrialError      a blind trial cannot continue: its seal is broken, or a recording failed
 
-``exit_code`` tells the command line that the message is for a person and needs no traceback.
+The command line prints an error with ``exit_code`` in one line, without a traceback.
 """
 
 

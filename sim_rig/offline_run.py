@@ -75,12 +75,12 @@ def run_offline(
     truth = TrueSignals(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     elapsed = commands.time - commands.time[0]
     if start_temperature is not None:
-        truth = _warm(truth, scenario, elapsed, start_temperature)
+        truth = _add_start_temperature(truth, scenario, elapsed, start_temperature)
     values, channel_errors = make_readings(scenario, elapsed, truth)
     return RunResult(commands.time, apply_faults(scenario, elapsed, values), truth, channel_errors)
 
 
-def _warm(truth: TrueSignals, scenario: Scenario, elapsed: Array, start: float) -> TrueSignals:
+def _add_start_temperature(truth: TrueSignals, scenario: Scenario, elapsed: Array, start: float) -> TrueSignals:
     """Add the decaying excess over the room with which the damper starts; nothing else depends on it."""
     thermal = scenario.thermal
     excess = (start - thermal.ambient) * np.exp(-thermal.loss / thermal.capacity * elapsed)
@@ -130,9 +130,9 @@ def write_channels(path: Path, scenario: Scenario, result: RunResult) -> None:
 def write_truth(path: Path, scenario: Scenario, result: RunResult) -> None:
     """Write the hidden truth to an npz file, for tests and benchmarks; no log may contain it.
 
-    The arrays are at the samples. ``info`` contains the parameters, the effects, the errors drawn for each
-    channel, and ``recorded_f0`` [N], the preload as the log shows it: that of the damper minus the load cell's
-    zero shift.
+    The arrays are at the samples. ``info`` contains the parameters, the effects, and the errors drawn for each
+    channel. ``recorded_f0`` [N] is the preload as the log shows it: that of the damper minus the load cell's zero
+    shift.
     """
     truth, law = result.truth, scenario.parameters
     substeps = len(truth.position) // len(result.time)

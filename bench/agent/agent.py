@@ -195,7 +195,7 @@ class Agent:
         return position.low, position.high
 
     def describe(self) -> BenchDescription:
-        """Return what the configuration says about the bench."""
+        """Return the description of the bench in the configuration."""
         return describe_bench(self._config, self._rig)
 
     def get_run_status(self) -> RunStatus | None:
@@ -231,7 +231,7 @@ class Agent:
         return Reply(ok=True, status=self.get_status())
 
     def pause(self) -> Reply:
-        """End the run at its next checkpoint, with everything at rest; the status says when that is."""
+        """End the run at its next checkpoint, with everything at rest; the status contains its time."""
         run = self._run_slot.current
         if run is None:
             return Reply(ok=False, error="no run is in progress; nothing was paused", status=self.get_status())

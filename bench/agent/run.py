@@ -147,6 +147,7 @@ class Run:
             reason=self._reason if is_over else "",
             continues=request.continues,
             calibration_overdue=request.overdue,
+            failed_checks=request.failed_checks,
             pause="" if is_over else self._describe_pause(elapsed),
             lost=self._lost if is_over else self._recording_thread.count_lost(),
         )
@@ -191,6 +192,8 @@ class Run:
         )
         resumed = f", resumed after segment {self.request.resumed_after}" if self.request.resumed_after else ""
         self._report_event("state", f"run of method {self.request.method.name} started{resumed}")
+        for text in self.request.failed_checks:
+            self._report_event("check", text)
         self.sequencer.run(programme)
 
     def _await_samples(self, until_ns: int) -> None:

@@ -1,7 +1,6 @@
 """Run executor: prepares a run from a command and executes it under the limits that apply to it."""
 
 import time
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,7 +12,8 @@ from bench.agent.run_supervision import RunSupervision
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import RunCommand
-from bench.calibration import IssuedCertificate, choose_current, list_overdue
+from bench.calibration import choose_current, list_failed, list_overdue, make_check_record, read_failed
+from bench.checks import CHECK_METHODS, CHECKED_CHANNELS
 from bench.config import BenchConfig
 from bench.disk import check_space, estimate_log_size, find_free_space
 from bench.errors import RunError
@@ -88,11 +88,15 @@ class RunExecutor:
 
         Raises:
             MethodError, RunError: it cannot be executed, the disk has no room for its log, or a calibration is
-                overdue and the configuration refuses that.
+                overdue or a check has failed, and the configuration refuses that.
         """
         request = validate_request(command, self._rig, self._config.rig.specimen, self._find_log_folder())
-        metadata = self._describe(request, choose_current(command.certificates, request.identity.started.date()))
-        request = replace(request, overdue=tuple(list_overdue(metadata.header.calibration)))
+        metadata = self._describe(request, command)
+        request = replace(
+            request,
+            overdue=tuple(list_overdue(metadata.header.calibration)),
+            failed_checks=tuple(read_failed(metadata.header.checks)),
+        )
         self._check_calibration(request)
         check_space(find_free_space(request.path.parent), _estimate_log_size(request, metadata.header))
         method, history = request.method, CommandHistory()
@@ -113,12 +117,20 @@ class RunExecutor:
         )
         return PreparedRun(run, metadata, supervision)
 
-    def _describe(self, request: RunRequest, certificates: Mapping[str, IssuedCertificate]) -> LogMetadata:
+    def _describe(self, request: RunRequest, command: RunCommand) -> LogMetadata:
         """Return the content of the log apart from samples, marks and events."""
         method, maps = request.method, self._acquisition.maps
+        certificates = choose_current(command.certificates, request.identity.started.date())
         header = make_run_header(
             method, request.identity, self._config, self._rig, maps, self._clock(), certificates
-        ).model_copy(update={"continues": request.continues, "resumed_after": request.resumed_after})
+        )
+        header = header.model_copy(
+            update={
+                "continues": request.continues,
+                "resumed_after": request.resumed_after,
+                "checks": self._describe_checks(request, command),
+            }
+        )
         return LogMetadata(
             header,
             # Read before anything moves, so that a missing certificate is reported in time.
@@ -127,11 +139,24 @@ class RunExecutor:
             partial(describe_clocks, self._rig, maps),
         )
 
+    def _describe_checks(self, request: RunRequest, command: RunCommand) -> dict[str, str]:
+        """Return the latest check of each channel; none for a run that is a check itself."""
+        if request.method.name in CHECK_METHODS.values():
+            return {}
+        interval = self._config.calibration.check_interval_days
+        failed = list_failed(command.checks, CHECKED_CHANNELS, request.identity.started, interval)
+        return make_check_record(command.checks, failed)
+
     def _check_calibration(self, request: RunRequest) -> None:
         if request.overdue and self._config.calibration.overdue == "refuse":
             raise RunError(
                 f"the run was refused: {'; '.join(request.overdue)}; calibrate the channel and add its "
                 'certificate, or set overdue = "mark" in section [calibration] of bench.toml'
+            )
+        if request.failed_checks and self._config.calibration.failed_check == "refuse":
+            raise RunError(
+                f"the run was refused: {'; '.join(request.failed_checks)}; find the cause and repeat the check, "
+                'or set failed_check = "mark" in section [calibration] of bench.toml'
             )
 
     def execute(self, prepared: PreparedRun) -> None:

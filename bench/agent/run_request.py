@@ -29,6 +29,8 @@ class RunRequest:
     """Identifier of the run that it continues; empty without one."""
     overdue: tuple[str, ...] = ()
     """Channels whose calibration is overdue, in words."""
+    failed_checks: tuple[str, ...] = ()
+    """Channels whose latest check has failed, in words."""
 
 
 def validate_request(command: RunCommand, rig: Rig, specimen: str, folder: Path) -> RunRequest:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from bench.calibration import IssuedCertificate
+from bench.calibration import IssuedCertificate, LatestCheck
 from bench.endings import RunEnding
 from bench.setup_steps import SetupStep
 
@@ -79,6 +79,9 @@ class RunCommand(TimedCommand):
     continues: str = Field(default="", description="id of the run that this one continues; empty without one")
     certificates: tuple[IssuedCertificate, ...] = Field(
         default=(), description="calibration certificates that apply to the channels; empty if none are known"
+    )
+    checks: tuple[LatestCheck, ...] = Field(
+        default=(), description="latest check of each channel; empty if none are known"
     )
     log: str | None = Field(
         default=None, description="file of the log; by default named by the run's id, in the agent's folder"
@@ -194,6 +197,9 @@ class RunStatus(Message):
     calibration_overdue: tuple[str, ...] = Field(
         default=(), description="channels whose calibration was overdue at the start of the run, in words"
     )
+    failed_checks: tuple[str, ...] = Field(
+        default=(), description="channels whose latest check had failed at the start of the run, in words"
+    )
     pause: str = Field(
         default="", description="when a requested pause takes effect, for a person; empty without a request"
     )
@@ -267,7 +273,7 @@ class AgentEvent(Message):
     """Event of the agent or of a run."""
 
     time_ns: int
-    kind: str = Field(description="state, command, alarm, trip, late, checkpoint, run_finished")
+    kind: str = Field(description="state, command, alarm, trip, late, checkpoint, check, run_finished")
     text: str
 
 

@@ -7,6 +7,7 @@ from bench.audit.export import EXPORT_FORMATS, ExportFormat, export_entries
 from bench.audit.lines import parse_entry
 from bench.audit.query import AuditFilter, find_entry, list_newest, read_after, read_chain_id
 from bench.audit.redaction import redact
+from bench.audit.report_signatures import find_signatures, make_signature
 from bench.audit.verification import Verification, compare_imports, verify_chain
 from bench.audit.writer import AuditWriter
 
@@ -27,8 +28,10 @@ __all__ = [
     "export_entries",
     "find_agent_trail",
     "find_entry",
+    "find_signatures",
     "list_newest",
     "make_agent_trail",
+    "make_signature",
     "parse_entry",
     "parse_head",
     "read_after",

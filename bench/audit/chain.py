@@ -15,6 +15,7 @@ from typing import Final, NamedTuple
 from bench.audit.entry import EMPTY_HEAD, Act, AuditEntry, Head, chain_act
 from bench.audit.lines import find_last_entry, parse_entry, read_fragment
 from bench.audit.redaction import shorten_text
+from bench.disk import sync_path
 from bench.errors import AuditError
 
 AUDIT_FILE: Final = "audit.jsonl"
@@ -83,7 +84,7 @@ class AuditChain:
         try:
             fcntl.flock(file, fcntl.LOCK_EX)
             if is_new:
-                _sync_folder(self.path.parent)
+                sync_path(self.path.parent)
             yield file
         finally:
             os.close(file)
@@ -153,12 +154,3 @@ def _replace(file: int, at: int, size: int, line: bytes) -> None:
 def _keep(fragment: bytes) -> Act:
     text = shorten_text(fragment.decode("latin-1"), _MAX_FRAGMENT)
     return Act(actor=_OWN, action=TORN, old=text, outcome=f"{len(fragment)} bytes without an end of the line")
-
-
-def _sync_folder(folder: Path) -> None:
-    """Pass the name of a new file to the disk."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

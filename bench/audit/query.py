@@ -98,7 +98,16 @@ def find_entry(path: Path, condition: Callable[[AuditEntry], bool]) -> AuditEntr
     Raises:
         AuditError: the file cannot be read.
     """
-    return next(filter(condition, _read_newest(path)), None)
+    return next(find_entries(path, condition), None)
+
+
+def find_entries(path: Path, condition: Callable[[AuditEntry], bool]) -> Iterator[AuditEntry]:
+    """Yield the entries that meet a condition, the newest first.
+
+    Raises:
+        AuditError: the file cannot be read.
+    """
+    return filter(condition, _read_newest(path))
 
 
 def _read_newest(path: Path) -> Iterator[AuditEntry]:

@@ -1,4 +1,4 @@
-"""Calibration certificates of the channels: document, validity on a day, record in a log."""
+"""Calibration certificates of the channels: document, validity on a day, record in a log; latest checks."""
 
 from bench.calibration.certificate import (
     CalibrationPoint,
@@ -18,6 +18,7 @@ from bench.calibration.gain_errors import (
     combine_interval,
     find_exponents,
 )
+from bench.calibration.latest_check import LatestCheck, list_failed, make_check_record, read_failed
 from bench.calibration.log_record import list_overdue, make_attachment, make_log_text, read_entry
 from bench.calibration.validity import (
     DUE_SOON,
@@ -39,6 +40,7 @@ __all__ = [
     "CombinedInterval",
     "Day",
     "IssuedCertificate",
+    "LatestCheck",
     "ShortText",
     "Uncertainty",
     "choose_current",
@@ -47,10 +49,13 @@ __all__ = [
     "describe_due",
     "find_exponents",
     "find_state",
+    "list_failed",
     "list_overdue",
     "make_attachment",
+    "make_check_record",
     "make_log_text",
     "parse_certificate",
     "read_certificate",
     "read_entry",
+    "read_failed",
 ]

@@ -112,7 +112,7 @@ def _run_within(seconds: float, act: Callable[[], None]) -> None:
 
 
 class _RefusedRedirect(HTTPRedirectHandler):
-    """A redirect would turn the POST into a GET, and the message would be lost without a word."""
+    """Refusal of redirects, which would turn the POST into a GET and lose the message without an error."""
 
     def redirect_request(self, *_: Any, **__: Any) -> None:
         return
@@ -171,7 +171,7 @@ def _make_mail(server: MailServer, recipient: Mail, content: dict[str, Any]) -> 
 
 
 def _describe(error: Exception) -> str:
-    """Return the reason of a failure in words, with what helps."""
+    """Return the reason of a failure as text, with what to do."""
     if isinstance(error, HTTPError):
         return f"it answered {error.code} {error.reason}"
     if isinstance(error, URLError) and isinstance(error.reason, Exception):

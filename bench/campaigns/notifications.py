@@ -1,8 +1,8 @@
 """Notifications of campaigns: on the end, on a stop, and when a person is needed.
 
-An event and its messages are stored in one transaction. A sender delivers them in a thread of its own, so that
-no campaign waits for a server. An attempt that fails is repeated with growing waits. The last failure stays on
-record. A message may arrive twice if a process is killed while it sends; its `id` tells.
+An event and its messages are stored in one transaction. A sender delivers them in a thread of its own, so that no
+campaign waits for a server. An attempt that fails is repeated with growing waits. The last failure stays on
+record. A message may arrive twice if a process is killed while it sends; its `id` is then the same.
 """
 
 import logging

@@ -48,6 +48,7 @@ from bench.catalogue.planning import (
     ApprovalRow,
     ApprovalStore,
     CertificateStore,
+    CheckStore,
     ClaimedKey,
     IdempotencyKeys,
     MethodRow,
@@ -57,6 +58,7 @@ from bench.catalogue.planning import (
     StoredCertificate,
     find_stored_state,
 )
+from bench.catalogue.records import ReportKind, SignatureMeaning, SignatureRow, SignatureStore
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
@@ -80,6 +82,7 @@ __all__ = [
     "CatalogueError",
     "CatalogueUnavailableError",
     "CertificateStore",
+    "CheckStore",
     "ClaimedKey",
     "ClaimedNotification",
     "Copied",
@@ -95,6 +98,7 @@ __all__ = [
     "MethodStore",
     "NoteKind",
     "NoteRow",
+    "ReportKind",
     "RunFilter",
     "RunOutcome",
     "RunPlan",
@@ -102,6 +106,9 @@ __all__ = [
     "RunState",
     "SessionRow",
     "SessionStore",
+    "SignatureMeaning",
+    "SignatureRow",
+    "SignatureStore",
     "Specimen",
     "SpecimenStore",
     "StoredCertificate",

@@ -18,11 +18,12 @@ from bench.catalogue.planning import (
     SHIPPED_VERSION,
     ApprovalStore,
     CertificateStore,
+    CheckStore,
     IdempotencyKeys,
     MethodStore,
     SpecimenStore,
 )
-from bench.catalogue.records import EventJournal, Notebook
+from bench.catalogue.records import EventJournal, Notebook, SignatureStore
 from bench.catalogue.run_filter import RunFilter
 from bench.methods import list_shipped_methods, load_method
 
@@ -42,10 +43,11 @@ class Catalogue:
         self.idempotency_keys = IdempotencyKeys(engine)
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
         self.approvals = ApprovalStore(engine)
-        self.certificates = CertificateStore(engine)
+        self.certificates, self.checks = CertificateStore(engine), CheckStore(engine)
         self.campaigns = CampaignTable(engine)
         self.users, self.tokens, self.sessions = UserStore(engine), TokenStore(engine), SessionStore(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
+        self.signatures = SignatureStore(engine)
         self.change_counter = ChangeCounter(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.

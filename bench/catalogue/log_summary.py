@@ -53,6 +53,8 @@ class LogSummary:
     """Number of lost samples by channel; empty for a truncated log."""
     calibration: Mapping[str, str]
     """Calibration by channel: JSON of its certificate, or text."""
+    checks: Mapping[str, str]
+    """Latest check by channel, as JSON; empty in logs of older versions."""
 
 
 def read_log_summary(path: Path) -> LogSummary:
@@ -143,6 +145,7 @@ def _make_summary(
         ending=read_ending(end),
         lost=_read_losses(end.get("lost", "")),
         calibration=metadata.get("calibration", {}),
+        checks=metadata.get("checks", {}),
     )
 
 

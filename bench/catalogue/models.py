@@ -96,6 +96,8 @@ class RunRow(Base):
     """Texts of the alarms in the log; None until its events were read."""
     calibration_overdue: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True), default=None)
     """Channels whose calibration was overdue at the start, in words; None in runs of older versions."""
+    failed_checks: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True), default=None)
+    """Channels whose latest check had failed at the start, in words; None in runs of older versions."""
     tags: Mapped[list[str]] = mapped_column(JSON, default=list)
     """Words by which a person sorts runs; each change is also a note."""
     revision: Mapped[int] = mapped_column(default=0)

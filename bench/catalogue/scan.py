@@ -5,13 +5,15 @@ from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 
-from bench.calibration import list_overdue
+from bench.calibration import list_overdue, read_failed
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.integrity import check_integrity, find_missing
 from bench.catalogue.log_summary import LogSummary, compute_sha256, read_log_summary
 from bench.catalogue.models import RunRow
 from bench.catalogue.records import read_log_events
+from bench.checks import CHECK_METHODS, CheckRecord, compute_records
 from bench.errors import LogError
+from bench.log import read_log
 
 TRUNCATED_MESSAGE = (
     "the log has no end, its recorder was killed; repair it with `mrbench salvage` or POST /runs/{id}/salvage"
@@ -69,6 +71,7 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
         "log_modified_ns": stat.st_mtime_ns,
         "log_sha256": sha256,
         "calibration_overdue": list_overdue(summary.calibration),
+        "failed_checks": read_failed(summary.checks),
     }
     if known is not None:
         return _read_content(catalogue, catalogue.update_run(known.id, **values | _keep_report(known, summary)))
@@ -93,7 +96,7 @@ def catalogue_log(catalogue: Catalogue, path: Path) -> RunRow | None:
 
 
 def _read_content(catalogue: Catalogue, row: RunRow) -> RunRow:
-    """Store losses and events of a complete log; a damaged one has none."""
+    """Store losses, events and the records of a check of a complete log; a damaged one has none."""
     if row.log_sha256 is None:
         return row
     path = catalogue.resolve_path(row.log)
@@ -102,7 +105,17 @@ def _read_content(catalogue: Catalogue, row: RunRow) -> RunRow:
     except LogError:
         lost, events = {}, []
     catalogue.event_journal.replace(row.id, events)
+    if row.method in CHECK_METHODS.values():
+        catalogue.checks.replace(row.id, _compute_checks(path))
     return catalogue.update_run(row.id, lost=lost)
+
+
+def _compute_checks(path: Path) -> list[CheckRecord]:
+    try:
+        return compute_records(read_log(path))
+    except (LogError, ValueError) as error:  # an uploaded log may contain anything, and must not end the scan
+        _LOG.warning("check_not_recorded", extra={"log": str(path), "why": str(error)})
+        return []
 
 
 def _log_skipped(catalogue: Catalogue, path: Path, why: str) -> None:

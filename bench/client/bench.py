@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bench.client.campaign import Campaign
+from bench.client.errors import ClientError
 from bench.client.live import LiveSamples, iterate_live
 from bench.client.run import Run, RunState, parse_run_state
 from bench.client.session import Session, quote_name
@@ -176,6 +177,59 @@ class Bench:
             ClientError: it is withdrawn already, or the service cannot be reached.
         """
         return dict(self._session.delete(f"/certificates/{quote_name(certificate_id)}", reason=reason))
+
+    def list_checks(self, channel: str | None = None, limit: int = _PAGE_SIZE) -> list[dict[str, Any]]:
+        """Return the newest records of checks, one for each run and channel.
+
+        Args:
+            channel: only those of this channel; None for all.
+            limit: largest number of records.
+
+        Raises:
+            ClientError: there is no such channel, or the service cannot be reached.
+        """
+        return list(self._session.get("/checks", channel=channel, limit=limit)["items"])
+
+    def get_check_chart(self, channel: str, specimen: str | None = None) -> dict[str, Any]:
+        """Return the control chart of a channel: centre, limits, points, state in words.
+
+        Args:
+            channel: such as `force`.
+            specimen: mounted damper during the checks; None for that of the latest check.
+
+        Raises:
+            ClientError: there is no such channel, or the service cannot be reached.
+        """
+        return dict(self._session.get(f"/checks/{quote_name(channel)}/chart", specimen=specimen))
+
+    def begin_check_baseline(self, channel: str, reason: str, specimen: str | None = None) -> dict[str, Any]:
+        """Let only checks from now on count in the chart of a channel, and return that chart.
+
+        Args:
+            channel: such as `force`.
+            reason: reason, such as a repair, for people.
+            specimen: mounted damper during the checks; None for that of the latest check.
+
+        Raises:
+            ClientError: it is refused, or the service cannot be reached.
+        """
+        request = {"reason": reason, "specimen": specimen}
+        return dict(self._session.post(f"/checks/{quote_name(channel)}/baseline", request, key=uuid.uuid4().hex))
+
+    def start_zero_check(self, specimen: str, operator: str = "") -> Run:
+        """Start the zero check of this bench: the rod rests at the middle without drive for 25 s.
+
+        Args:
+            specimen: mounted damper, or a word such as `none`; only checks with the same one are compared.
+            operator: name of the person.
+
+        Raises:
+            ClientError: the start is refused, or the service or its agent cannot be reached.
+        """
+        method = self._session.get("/checks/charts")["method"]
+        if method is None:
+            raise ClientError("the rig agent does not answer; start it, then repeat the check")
+        return self.start(str(method), specimen, operator)
 
     def live(self, rate_hz: float = math.inf) -> Iterator[LiveSamples]:
         """Yield live samples of all channels as arrays with units, until the caller stops.

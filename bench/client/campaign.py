@@ -9,13 +9,14 @@ from typing import Any
 
 from bench.client.errors import ClientError
 from bench.client.session import Session, quote_name
+from bench.client.signed_reports import SignedReports
 
 _POLL_PERIOD = 1.0
 """Time [s] between two requests while a script waits."""
 _ENDED = ("done", "stopped")
 
 
-class Campaign:
+class Campaign(SignedReports):
     """One campaign; each call requests its present state.
 
     Args:
@@ -25,7 +26,7 @@ class Campaign:
 
     def __init__(self, session: Session, campaign_id: str) -> None:
         self.id = campaign_id
-        self._session, self._path = session, f"/campaigns/{quote_name(campaign_id)}"
+        super().__init__(session, f"/campaigns/{quote_name(campaign_id)}")
 
     def __repr__(self) -> str:
         return f"Campaign({self.id!r})"

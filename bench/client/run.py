@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from bench.client.arrays import Arrays, make_arrays
 from bench.client.errors import ClientError
 from bench.client.session import Session, quote_name
+from bench.client.signed_reports import SignedReports
 from bench.validation import describe_validation_error
 
 _POLL_PERIOD = 0.5
@@ -74,7 +75,7 @@ class RunState(BaseModel):
         return self.state != "running" and not awaits_job and all(job.is_finished for job in self.jobs)
 
 
-class Run:
+class Run(SignedReports):
     """One run; each call requests its present state.
 
     Args:
@@ -84,7 +85,7 @@ class Run:
 
     def __init__(self, session: Session, run_id: str) -> None:
         self.id = run_id
-        self._session, self._path = session, f"/runs/{quote_name(run_id)}"
+        super().__init__(session, f"/runs/{quote_name(run_id)}")
 
     def __repr__(self) -> str:
         return f"Run({self.id!r})"

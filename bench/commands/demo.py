@@ -21,7 +21,7 @@ def demo(
         int, typer.Option(metavar="N", min=0, help="Seed of the hidden effect; the same seed hides the same one.")
     ] = 1,
 ) -> None:
-    """Start a simulated bench whose damper has a hidden effect, and find it.
+    """Start a simulated bench with a hidden effect, and find it.
 
     Records strokes at six drives over the instruments' wires, identifies the damper, diagnoses the sim-to-real
     gap, and plays the twin on a second recording. Only then it opens the truth, and states whether the name was

@@ -16,10 +16,11 @@ def health(
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
     url: Annotated[str, typer.Option(metavar="URL", help="Address of the service.")] = "http://127.0.0.1:8600",
 ) -> None:
-    """Check that a part of a bench answers at its socket: exit 0, or 1 and the reason.
+    """Check that a part of a bench answers at its socket.
 
-    Meant for supervisors such as containers. instruments connects to the TCP addresses of bench.toml, and is for
-    simulated ones: a real instrument may accept one host only.
+    Exits with status 0, or with 1 and the reason. Meant for supervisors such as containers. instruments connects
+    to the TCP addresses of bench.toml. It is for simulated ones, because a real instrument may accept one host
+    only.
     """
     from bench.health import check_part
 

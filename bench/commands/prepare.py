@@ -22,7 +22,7 @@ def prepare(
     ] = None,
     config: Annotated[Path, typer.Option(metavar="FILE", help="Configuration of the bench.")] = Path("bench.toml"),
 ) -> None:
-    """Execute a setup step before a run: home, move, mount, centre, unmount, tare, clear-tare.
+    """Execute a setup step before a run, such as home or tare.
 
     The rig agent that is running executes it (`mrbench rig` or `mrbench serve`).
 

@@ -39,9 +39,9 @@ def replay(
         Path, typer.Option(metavar="FILE", help="Key of a TCP --publish, created unless it exists.")
     ] = Path("agent.key"),
 ) -> None:
-    """Check that decoding the raw frames of a log gives its recorded readings.
+    """Check the raw frames of a log, and play its samples.
 
-    The drivers decode the frames again, and the readings are compared bit for bit; exit 1 if one differs. With
+    The drivers decode the frames, and the readings are compared bit for bit; exit 1 if one differs. With
     --publish the samples are then played to live views. --from, --to and --segment choose them.
     """
     from bench.log import read_log

@@ -33,10 +33,11 @@ def report(
         Path | None, typer.Option(metavar="DIR", help="Also write the plots to this folder, as SVG and PNG.")
     ] = None,
 ) -> None:
-    """Write a report on a recording; the ending of --out chooses the format.
+    """Write a report on a recording as page, PDF or workbook.
 
-    Page (.html) and PDF show recorded over simulated force, errors, and parameters with intervals, and name
-    deficiencies. The workbook (.xlsx) has the samples, values of each stroke, parameters and definitions.
+    The ending of --out chooses the format. Page (.html) and PDF show recorded over simulated force, errors, and
+    parameters with intervals, and name deficiencies. The workbook (.xlsx) has the samples, values of each stroke,
+    parameters and definitions.
     """
     import shlex
     from datetime import UTC, datetime

@@ -25,9 +25,10 @@ def rig(
         bool, typer.Option("--force", help="With --end: also end a tripped agent, which forgets the trip.")
     ] = False,
 ) -> None:
-    """Control the instruments of a bench, and execute the commands of `mrbench prepare` and of the service.
+    """Run the rig agent, which controls the instruments of a bench.
 
-    Runs until Ctrl-C or SIGTERM. With --end, it ends the agent that runs.
+    It executes the commands of `mrbench prepare` and of the service. Runs until Ctrl-C or SIGTERM. With --end, it
+    ends the agent that runs.
     """
     if force and not end:
         raise typer.BadParameter("--force needs --end")

@@ -16,9 +16,9 @@ def salvage(
         ),
     ] = None,
 ) -> None:
-    """Repair a log whose recorder was killed, and report the lost samples.
+    """Repair a log whose recorder was killed.
 
-    All closed chunks are kept. A complete log is not changed.
+    Reports the lost samples. All closed chunks are kept. A complete log is not changed.
     """
     from bench.log import salvage_log
 

@@ -9,9 +9,10 @@ import typer
 def verify(
     data: Annotated[Path, typer.Argument(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
 ) -> None:
-    """Check that the recorded logs are unchanged, by the hashes that were stored when they were recorded.
+    """Check that the recorded logs are unchanged.
 
-    Lists each log that was changed or is missing, and then exits with status 1. The service may run meanwhile.
+    Compares them with the hashes of their recording. Lists each log that was changed or is missing, and then exits
+    with status 1. The service may run meanwhile.
     """
     from bench.catalogue import check_all, open_catalogue
     from bench.errors import LogError

@@ -32,9 +32,9 @@ def worker(
         ),
     ] = 19,
 ) -> None:
-    """Execute identification jobs, one at a time, at the lowest priority.
+    """Execute identification jobs, one at a time.
 
-    Ends when the scheduler ends.
+    Runs at the lowest priority. Ends when the scheduler ends.
     """
     from bench.jobs import find_scheduler, get_tls_file, locate_scheduler, run_worker
     from bench.log_lines import log_to_stderr
@@ -53,9 +53,9 @@ def scheduler(
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on; 0 chooses a free one.")] = 8786,
 ) -> None:
-    """Distribute the jobs of services to workers, also on other machines.
+    """Distribute the jobs of services to workers.
 
-    Needed only where they outlive the service or run elsewhere: `mrbench serve` starts a scheduler of its own. All
+    Needed only where workers outlive the service or run on other machines: `mrbench serve` starts a scheduler. All
     connections are encrypted; jobs.pem in --data is created at the first start and admits services and workers.
     """
     from bench.jobs import run_scheduler

@@ -77,11 +77,19 @@ CHANNEL_UNITS: dict[str, str] = {
 
 
 class CalibrationSection(FrozenModel):
-    """Consequence of an overdue calibration."""
+    """Consequences of overdue calibrations and failed checks."""
 
     overdue: Literal["mark", "refuse"] = Field(
         default="mark",
-        description="mark: a run with an overdue channel says so in its log; refuse: it does not start",
+        description="mark: the log of a run names its overdue channels; refuse: it does not start",
+    )
+    failed_check: Literal["mark", "refuse"] = Field(
+        default="mark",
+        description="mark: the log of a run names the channels whose latest check has failed; refuse: it does not "
+        "start, except for a check",
+    )
+    check_interval_days: PositiveFloat | None = Field(
+        default=None, description="[days] largest age of a channel's latest check; by default any"
     )
 
 
@@ -97,7 +105,7 @@ class BenchConfig(FrozenModel):
     rig: RigSection = Field(default=RigSection(), description="name, folder and specimen of the bench")
     agent: AgentSection = Field(default=AgentSection(), description="addresses of the rig agent")
     calibration: CalibrationSection = Field(
-        default=CalibrationSection(), description="consequence of an overdue calibration"
+        default=CalibrationSection(), description="consequences of overdue calibrations and failed checks"
     )
 
     @model_validator(mode="after")

@@ -88,17 +88,23 @@ class RunHeader(BaseModel):
     calibration: dict[str, str] = Field(
         default_factory=dict, description="calibration by channel: JSON of its certificate, or text"
     )
+    checks: dict[str, str] = Field(
+        default_factory=dict, description="latest check by channel, as JSON; empty if none are known"
+    )
     clocks: dict[str, str] = Field(default_factory=dict, description="clock by device, as text or JSON")
     channels: dict[str, ChannelInfo] = Field(default_factory=dict, description="acquisition by channel")
 
     def make_metadata(self) -> dict[str, dict[str, str]]:
         """Return the metadata records by name; MCAP stores strings only."""
-        run = self.model_dump(exclude={"velocity_from", "resampled", "calibration", "clocks", "channels"})
+        run = self.model_dump(
+            exclude={"velocity_from", "resampled", "calibration", "checks", "clocks", "channels"}
+        )
         units = list_sample_units(self.drive_unit)
         return {
             "run": serialise_values(run),
             "units": {**units, "velocity_from": self.velocity_from, "resampled": self.resampled},
             "calibration": self.calibration,
+            **({"checks": self.checks} if self.checks else {}),
             "clocks": self.clocks,
             "channels": serialise_values({name: channel.model_dump() for name, channel in self.channels.items()}),
         }

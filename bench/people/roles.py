@@ -15,6 +15,7 @@ Right: TypeAlias = Literal[
     "approve_methods",
     "change_limits",
     "manage_runs",
+    "sign_reports",
     "administer",
 ]
 """Permission of a person or program.
@@ -27,13 +28,14 @@ Right: TypeAlias = Literal[
 - ``manage_methods``: store methods; ``approve_methods``: approve them for campaigns.
 - ``change_limits``: limits and calibration of the bench.
 - ``manage_runs``: trash, restore and salvage runs.
+- ``sign_reports``: sign reports on runs and campaigns.
 - ``administer``: people, tokens of others, audit trail.
 """
 ROLES: tuple[Role, ...] = get_args(Role)
 RIGHTS: tuple[Right, ...] = get_args(Right)
 _ADDED: dict[Role, tuple[Right, ...]] = {
     "viewer": ("view", "stop"),
-    "technician": ("operate", "analyse"),
+    "technician": ("operate", "analyse", "sign_reports"),
     "engineer": ("reset_trip", "manage_methods", "approve_methods", "change_limits", "manage_runs"),
     "administrator": ("administer",),
 }

@@ -18,6 +18,7 @@ from bench.log import DECODERS_FILE, ChannelInfo, Identity, RunHeader
 from bench.methods import Method
 from bench.rig import ClockMap, Rig
 from drivers import load_wire_file
+from drivers.load_cell import LoadCell
 from drivers.replay import snapshot_decoder
 from drivers.transport import load_register_map
 
@@ -162,6 +163,7 @@ def _describe_instruments(rig: Rig) -> dict[str, Any]:
         one.name: {
             "driver": one.driver,
             "address": one.address,
+            "serial": one.instrument.serial if isinstance(one.instrument, LoadCell) else None,
             "channels": [
                 {"name": channel.name, "unit": channel.unit, "low": channel.low, "high": channel.high}
                 for channel in one.instrument.channels

@@ -51,7 +51,7 @@ CAPTIONS = {
     "discovery": (
         "Curve of the effect outside the library",
         "Estimate with its 95 % band, without the factors of further variables."
-        " A part that the law can take up, such as a straight line over force, is not determined.",
+        " A part that the law can absorb, such as a straight line over force, is not determined.",
     ),
     "recording": (
         "The whole recording",

@@ -5,11 +5,11 @@ import threading
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 from bench.agent import Agent, CommandTrail, acquire_agent_lock, handle_command
 from bench.agent_protocol import CommandServer, RunCommand, RunStatus, StopCommand, get_sender, make_endpoint
 from bench.audit import make_agent_trail
-from bench.calibration import IssuedCertificate
 from bench.catalogue import has_catalogue, open_catalogue
 from bench.config import load_config
 from bench.errors import RunError
@@ -43,7 +43,7 @@ def run_on_rig(
         specimen: the damper under test; empty for the configured one.
         operator: name of the operator.
         progress: receives the completed share, 0 to 1.
-        on_warning: receives each privilege that the system did not grant, and each overdue calibration.
+        on_warning: receives each privilege that the system did not grant, overdue calibration and failed check.
 
     Returns:
         The status with its outcome, clean or lossy.
@@ -51,7 +51,7 @@ def run_on_rig(
     Raises:
         ConfigError: the configuration is not valid.
         MethodError: the method cannot be compiled within its limits.
-        CatalogueError: the catalogue with the calibration certificates cannot be opened.
+        CatalogueError: the catalogue with certificates and checks cannot be opened.
         RunError: the bench belongs to another agent, an instrument does not reply, or the run stopped early; the
             recorded part is in the log.
     """
@@ -73,13 +73,13 @@ def run_on_rig(
             method=document,
             specimen=specimen,
             operator=operator,
-            certificates=_read_certificates(config.parent / bench_config.rig.folder),
+            **_read_catalogue(config.parent / bench_config.rig.folder),
             log=str(out),
         )
         _start(agent, trail, command)
         run = agent.get_run_status()
-        for overdue in () if run is None else run.calibration_overdue:
-            on_warning(overdue)
+        for warning in () if run is None else (*run.calibration_overdue, *run.failed_checks):
+            on_warning(warning)
         opened.enter_context(_serve_commands(server, agent, trail, stopping))
         return _follow_run(agent, trail, stopping, progress)
 
@@ -99,12 +99,13 @@ def _start(agent: Agent, trail: CommandTrail, command: RunCommand) -> None:
         raise RunError(reply.error)
 
 
-def _read_certificates(data: Path) -> tuple[IssuedCertificate, ...]:
-    """Return the certificates that apply today, from the catalogue of the bench's folder if it has one."""
+def _read_catalogue(data: Path) -> dict[str, Any]:
+    """Return today's certificates and the latest checks from the catalogue of a folder, if it has one."""
     if not has_catalogue(data):
-        return ()
+        return {}
     with open_catalogue(data) as catalogue:
-        return tuple(catalogue.certificates.list_current(datetime.now(UTC).date()).values())
+        certificates = catalogue.certificates.list_current(datetime.now(UTC).date())
+        return {"certificates": tuple(certificates.values()), "checks": catalogue.checks.list_latest()}
 
 
 @contextlib.contextmanager

@@ -19,6 +19,7 @@ from bench.catalogue import (
     is_complete,
     scan_logs,
 )
+from bench.checks import CHECK_METHODS
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
 
@@ -30,6 +31,8 @@ DAMAGED: tuple[LogIntegrity, ...] = ("changed", "missing")
 """Results of an integrity check after which a log is not identified."""
 IDENTIFIED_OUTCOMES: tuple[RunOutcome, ...] = ("clean", "lossy")
 """Outcomes after which a run is identified automatically."""
+_WITHOUT_FIT = (WARM_UP_METHOD, *CHECK_METHODS.values())
+"""Methods whose runs are not identified automatically."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -171,7 +174,7 @@ class RunRegistry:
             (is_wanted or row.source == "run")
             and row.outcome in IDENTIFIED_OUTCOMES
             and row.log_sha256
-            and row.method != WARM_UP_METHOD
+            and row.method not in _WITHOUT_FIT
         )
         if (
             is_complete_run
@@ -204,6 +207,7 @@ def make_run_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
         source="run",
         continues=run.continues or None,
         calibration_overdue=list(run.calibration_overdue),
+        failed_checks=list(run.failed_checks),
         started=_parse_utc(run.started),
         duration_s=run.duration_s,
         state="running",

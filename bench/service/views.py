@@ -30,7 +30,8 @@ class Health(View):
     audit: str = Field(description="`ok`, or why the audit trail cannot be written, or that it was altered")
     clocks: str = Field(description="`ok`, or the instruments whose clock has an error above 1 ms, with its bound")
     calibration: str = Field(
-        description="`ok`, or the channels whose calibration is overdue or due within 14 days, with the date"
+        description="`ok`, or the channels whose calibration is overdue or due within 14 days, with the date, or "
+        "whose latest check is out of control"
     )
 
 
@@ -93,6 +94,9 @@ class Run(View):
     alarms: tuple[str, ...] = Field(description="texts of the alarms during the run")
     calibration_overdue: tuple[str, ...] = Field(
         description="channels whose calibration was overdue at the start, each with its certificate and due date"
+    )
+    failed_checks: tuple[str, ...] = Field(
+        description="channels whose latest check had failed at the start, in words with values"
     )
     tags: tuple[str, ...] = Field(description="words by which a person sorts runs")
     trashed: datetime | None = Field(description="UTC at which the run was moved to the trash; null outside it")
@@ -181,6 +185,7 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         lost=row.lost or {},
         alarms=tuple(row.alarms or ()),
         calibration_overdue=tuple(row.calibration_overdue or ()),
+        failed_checks=tuple(row.failed_checks or ()),
         tags=tuple(row.tags or ()),
         trashed=row.trashed,
         log_sha256=row.log_sha256,

@@ -24,18 +24,34 @@ _CLOCK_TICKS = os.sysconf("SC_CLK_TCK")
 def run(method: str = METHOD) -> None:
     """Record a method over the wires of a simulated rig while another process keeps one core busy."""
     with TemporaryDirectory() as folder:
-        bench, log = Path(folder) / "bench.toml", Path(folder) / "soak.mcap"
-        rig = _start_mrbench("sim", "--out", str(bench))
-        busy = subprocess.Popen([sys.executable, "-c", _BUSY_LOOP])
-        try:
-            _wait_for_file(bench, rig)
-            agent = _start_mrbench("run", method, "--config", str(bench), "--out", str(log))
-            shares = _measure_shares({"agent": agent, "simulated rig": rig, "busy process": busy}, agent)
-        finally:
-            for process in (busy, rig):
-                process.terminate()
-                process.wait()
+        log = Path(folder) / "soak.mcap"
+        shares = record_over_wires(method, log, {"busy process": _BUSY_LOOP})
         _print_report(log, shares)
+
+
+def record_over_wires(method: str, log: Path, companions: dict[str, str]) -> dict[str, float]:
+    """Record a method from a simulated rig into a log.
+
+    Args:
+        method: its name.
+        log: file to be written; the bench's configuration is written beside it.
+        companions: Python programs that run meanwhile, by name.
+
+    Returns:
+        Core load [1] of agent, simulated rig and companions.
+    """
+    bench = log.with_name("bench.toml")
+    processes = {"simulated rig": _start_mrbench("sim", "--out", str(bench))}
+    for name, program in companions.items():
+        processes[name] = subprocess.Popen([sys.executable, "-c", program])
+    try:
+        _wait_for_file(bench, processes["simulated rig"])
+        agent = _start_mrbench("run", method, "--config", str(bench), "--out", str(log))
+        return _measure_shares({"agent": agent, **processes}, agent)
+    finally:
+        for process in processes.values():
+            process.terminate()
+            process.wait()
 
 
 def _start_mrbench(*words: str) -> "subprocess.Popen[bytes]":

@@ -48,8 +48,11 @@ class CommandChannel:
         """Return a token that the last 255 requests did not carry."""
         return next(self._tokens) % 256
 
-    def identify(self) -> None:
+    def identify(self) -> int:
         """Check that a load cell of the wire file's protocol and calibration replies.
+
+        Returns:
+            Its serial number.
 
         Raises:
             NoReplyError, InvalidReplyError: another instrument replied, or none.
@@ -64,6 +67,7 @@ class CommandChannel:
                     f"{self._name}: it reports {quantity} {value}, expected {expected}; set it in the instrument, "
                     "or correct the wire file"
                 )
+        return reply.serial
 
     def execute(self, command: str, argument: int = 0) -> int:
         """Send a command and return the value of its acknowledgement.

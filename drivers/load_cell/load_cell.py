@@ -59,6 +59,7 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
         super().__init__(name, channels, line, clock, LoadCellDecoder())
         self._rate = self._check_rate(rate)
         self._clock_reader = ClockReader(self._decoder, clock, baud)
+        self._serial: int | None = None
         self._latest_blocks: dict[str, SampleBlock] = {}
         self._commands = CommandChannel(name, self._decoder, line.write, self._read_once)
 
@@ -79,7 +80,7 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
 
     def _begin_stream(self) -> None:
         self.stop()  # another host may have left the stream on, at a rate that drowns every reply
-        self._commands.identify()
+        self._serial = self._commands.identify()
         self._set_rate(self._rate)
         with self._read_lock:
             self._pending = []
@@ -90,6 +91,11 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
     def clock_reading(self) -> ClockReading | None:
         """Latest reading of the load cell's clock; None before the first."""
         return self._clock_reader.clock_reading
+
+    @property
+    def serial(self) -> int | None:
+        """Serial number that the instrument reported at `connect`; None before."""
+        return self._serial
 
     def close(self) -> None:
         """Stop the stream and close the line. May be repeated, and called without `connect`."""

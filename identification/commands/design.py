@@ -20,7 +20,10 @@ def foresee(
         float | None, typer.Option(metavar="N", min=1e-6, help="Standard deviation of the force noise [N].")
     ] = None,
 ) -> None:
-    """Estimate how precisely planned strokes determine each parameter, and propose one more stroke."""
+    """Estimate how precisely planned strokes identify a damper.
+
+    States the precision of each parameter, and proposes one more stroke.
+    """
     from identification.documents import check_output_path, write_document
     from identification.experiment_design import assess_design, load_assumed_damper, read_planned_strokes
 

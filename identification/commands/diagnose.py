@@ -64,7 +64,7 @@ def diagnose(
         bool,
         typer.Option(
             "--residual",
-            help="Also learn what law and effects leave; predictions with the twin add it, and show it apart.",
+            help="Also learn the residual of law and effects; predictions with the twin add it, with both errors.",
         ),
     ] = False,
     each: Annotated[
@@ -78,7 +78,10 @@ def diagnose(
     witness: Annotated[bool, typer.Option("--witness", hidden=True, help="Former name of --cross-check.")] = False,
     seed: Seed = 1,
 ) -> None:
-    """Find where simulation and recording differ, which effects explain it, and how far they close the gap."""
+    """Find the effects that the simulation of a recording lacks.
+
+    States where simulation and recording differ, which effects explain it, and how far they close the gap.
+    """
     from identification.damper.definitions import check_new_name, load_effects
     from identification.documents import check_output_path, describe_output_path, write_document
     from identification.fitting import HoldOut, read_damper_model
@@ -177,7 +180,10 @@ def trend(
     out: Out,
     seed: Seed = 1,
 ) -> None:
-    """Find quantities that rise or fall over the runs of one specimen, by how much per run and since which run."""
+    """Find quantities that change over the runs of one specimen.
+
+    States by how much per run, and since which run.
+    """
     from identification.documents import check_output_path, describe_output_path, write_document
     from identification.gap import analyse_trend
     from identification.logs import load

@@ -80,7 +80,10 @@ def identify(
         ),
     ] = False,
 ) -> None:
-    """Estimate the damper's parameters from recordings, each with an interval and a note."""
+    """Estimate the damper's parameters from recordings.
+
+    Each has an interval, and a note where these strokes do not determine it.
+    """
     # Imported inside the command, as in all commands: `--help` must not wait for numba and scipy (decision 0006).
     from identification.documents import check_output_path, write_document
     from identification.errors import IdentificationError
@@ -170,7 +173,10 @@ def predict(
         str, typer.Option(metavar="offset", help="Further quantity to estimate on this log: `offset`.")
     ] = "",
 ) -> None:
-    """Simulate a fit or twin on a log; only the inner displacement at the start of each stretch is estimated."""
+    """Simulate a fit or twin on a log or on planned strokes.
+
+    Only the inner displacement at the start of each stretch is estimated.
+    """
     from identification.documents import check_output_path, write_document, write_force_series
     from identification.errors import IdentificationError
     from identification.fitting import read_fit_or_model

@@ -36,7 +36,10 @@ def tune(
     ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
 ) -> None:
-    """Find better settings of a network by Bayesian optimisation; an interrupted study can be continued."""
+    """Find better settings of a network by Bayesian optimisation.
+
+    An interrupted study can be continued.
+    """
     from identification.documents import check_output_path
     from identification.errors import IdentificationError
     from identification.tuning import (

@@ -1,8 +1,8 @@
 """Thirteen regular coordinates in place of the paper's fourteen parameters.
 
-The force is unchanged by (alpha_a, alpha_b, beta, gamma, A) -> (s alpha_a, s alpha_b, s^(n-1) beta,
-s^(n-1) gamma, A/s), so no recording determines that direction. With the saturated
-hysteretic displacement ``z_ss = (A/(beta+gamma))^(1/n)``, these coordinates are gauge-free and well scaled:
+The force is unchanged by (alpha_a, alpha_b, beta, gamma, A) -> (s alpha_a, s alpha_b, s^(n-1) beta, s^(n-1) gamma,
+A/s), so no recording determines that direction. With the saturated hysteretic displacement ``z_ss =
+(A/(beta+gamma))^(1/n)``, these coordinates are gauge-free and well scaled:
 
     F_a = alpha_a z_ss   F_b = alpha_b z_ss   D_y = z_ss / A   rho = beta / (beta + gamma)   f0 = k1 x0
 

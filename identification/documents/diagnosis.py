@@ -191,7 +191,7 @@ class Discovery(DiscoveredCurve):
     shrinkage: float | None = Field(description="as in `gap`, with the discovered effect")
     shrinkage_ci95: tuple[float, float] | None = Field(description="its 95 % interval")
     further: list[DiscoveredCurve] = Field(
-        default_factory=list, description="effects found after it in what it leaves, the first first"
+        default_factory=list, description="effects found after it in the remaining residual, in this order"
     )
 
 
@@ -225,7 +225,10 @@ class Diagnosis(Document):
     """Result of a diagnosis of the sim-to-real gap."""
 
     schema_: Literal["mrbench.diagnosis/1"] = Field(default="mrbench.diagnosis/1", alias="schema")
-    verdict: Verdict
+    verdict: Verdict = Field(
+        description="no_gap: nothing beyond the noise floor; explained, partly_explained: the named effects close "
+        "the gap, or a part of it; unexplained: no effect is named"
+    )
     effects: list[NamedEffect] = Field(description="most probable set; empty for no_gap and unexplained")
     alternatives: list[EffectSet] = Field(max_length=3, description="other sets, the most probable first")
     probability: float = Field(ge=0, le=1, description="probability of exactly the named set")
@@ -236,12 +239,12 @@ class Diagnosis(Document):
     gap: Gap
     where: GapLocation
     remainder: Remainder | None = Field(
-        default=None, description="what is left with the named effects; null where nothing is left"
+        default=None, description="residual with the named effects; null where it is at the noise floor"
     )
     discovery: Discovery | None = Field(
         default=None, description="cause outside the library; null unless searched for and found"
     )
-    next_stroke: NextStroke | None = Field(description="null where nothing is left to separate")
+    next_stroke: NextStroke | None = Field(description="null where no sets of effects have to be separated")
     explanation: str = Field(description="two sentences for a person")
     cross_check: CrossCheck | None = Field(
         default=None,

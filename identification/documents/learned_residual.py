@@ -35,7 +35,7 @@ class TwinResidual(Document):
     factor: list[Row] = Field(description="lower Cholesky factor of their precision times `ridge`, row by row")
     ridge: float = Field(gt=0, description="variance of a sample's noise over that of the prior")
     prior_n: float = Field(ge=0, description="standard deviation far from all recorded states, in N")
-    rest_n: float = Field(ge=0, description="standard deviation of what it does not predict, noise included, in N")
+    rest_n: float = Field(ge=0, description="standard deviation of the unpredicted part, noise included, in N")
     before_n: float = Field(description="RMSE of law and effects on the conditions left out, in N")
     after_n: float = Field(description="RMSE with the residual, each condition predicted from the others, in N")
     conditions: int = Field(ge=2, description="number of conditions that were left out in turn")

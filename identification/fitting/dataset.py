@@ -14,7 +14,7 @@ from identification.fitting.force_channel import LowPass, compute_filter_delay
 from identification.fitting.piece import Piece
 from identification.logs import Recording, Stretch
 from identification.noise import NoiseFloorEstimate, estimate_floor
-from identification.signals import average_drive_levels, estimate_motion
+from identification.signals import Motion, average_drive_levels, estimate_motion
 from identification.simulate import Excitation
 
 _TRANSIENT_TIME = 0.02
@@ -140,11 +140,7 @@ def assemble(
         UnusableDataError: the logs have different kinds of drive, or the hold-out selects nothing or leaves too
             few samples.
     """
-    kinds = {r.drive_kind for r in recordings}
-    if len(kinds) > 1:
-        raise UnusableDataError(
-            f"the logs are driven in different ways ({', '.join(sorted(kinds))}); fit them separately"
-        )
+    _check_drive_kinds(recordings)
     stretches = [s for r in recordings for s in r.stretches]
     held_out = [hold_out.make_mask(s) for s in stretches]
     starts = [s.time[0] - r.stretches[0].time[0] for r in recordings for s in r.stretches]
@@ -162,13 +158,27 @@ def assemble(
         )
         pieces.append(replace(_make_piece(stretch, excitation, fitted), log=log))
     _check_hold_out(hold_out, held_out, pieces)
-    # Only valid samples of the force may enter its noise floor, and none that a choice must not read.
-    read = [replace(s, measured=s.valid_mask & ~m) for s, m in zip(stretches, held_out, strict=True)]
-    known = [k for k, s in enumerate(read) if np.count_nonzero(s.measured) > _MIN_FLOOR_SAMPLES]
-    floor = estimate_floor([read[k] for k in known], [motions[k] for k in known])
+    floor = _estimate_floor(stretches, held_out, motions)
     return Dataset(
         tuple(pieces), tuple(held_out), tuple(stretches), floor, tuple(recordings), tuple(notes), hold_out
     )
+
+
+def _check_drive_kinds(recordings: Sequence[Recording]) -> None:
+    kinds = {r.drive_kind for r in recordings}
+    if len(kinds) > 1:
+        raise UnusableDataError(
+            f"the logs are driven in different ways ({', '.join(sorted(kinds))}); fit them separately"
+        )
+
+
+def _estimate_floor(
+    stretches: Sequence[Stretch], held_out: Sequence[BoolArray], motions: Sequence[Motion]
+) -> NoiseFloorEstimate:
+    """Estimate the noise floor from the valid samples that are not held out."""
+    read = [replace(s, measured=s.valid_mask & ~m) for s, m in zip(stretches, held_out, strict=True)]
+    known = [k for k, s in enumerate(read) if np.count_nonzero(s.measured) > _MIN_FLOOR_SAMPLES]
+    return estimate_floor([read[k] for k in known], [motions[k] for k in known])
 
 
 def _exclude_unresolved(stretch: Stretch, unresolved: BoolArray, max_excluded: float, notes: list[str]) -> Stretch:

@@ -94,14 +94,14 @@ def _search(problem: Problem, settings: OptimiserSettings, progress: Progress, s
     preview = _decimate_for_preview(problem)
     starts = make_starting_points(preview) if start is None else [start]
     is_distant = start is None or settings.holds_shape
-    first = _approach(preview, starts[0], settings, meter.report) if is_distant else starts[0]
+    first = _minimise_preview(preview, starts[0], settings, meter.report) if is_distant else starts[0]
     best = minimise(problem, first, settings.iterations, meter.report, tolerance=settings.tolerance)
     agreeing = 0
     for other_start in itertools.islice(_generate_restarts(preview, starts, settings.seed), settings.restarts):
         if meter.is_spent or _is_conclusive(problem, best) or agreeing >= _MIN_AGREEING:
             break
-        approached = _approach(preview, other_start, settings, meter.report)
-        other = minimise(problem, approached, settings.iterations, meter.report, tolerance=settings.tolerance)
+        near = _minimise_preview(preview, other_start, settings, meter.report)
+        other = minimise(problem, near, settings.iterations, meter.report, tolerance=settings.tolerance)
         change = other.evaluation.cost / best.evaluation.cost - 1.0
         agreeing += abs(change) < _SAME_COST
         if change < 0.0:
@@ -119,7 +119,7 @@ def _is_conclusive(problem: Problem, minimum: Minimum) -> bool:
     return minimum.evaluation.cost / problem.samples < _FLOOR_RATIO and bool(interior.all())
 
 
-def _approach(preview: Problem, start: Array, settings: OptimiserSettings, progress: Progress) -> Array:
+def _minimise_preview(preview: Problem, start: Array, settings: OptimiserSettings, progress: Progress) -> Array:
     """Return the unknowns (U,) of a start's minimum on the preview.
 
     The first steps hold the shape of the loop and the rate of the field, which cannot be found while the forces

@@ -171,10 +171,9 @@ class Problem:
         """
         derivatives = np.zeros((COORDINATE_COUNT, self.layout.per_log_count))
         coordinates = self.space.to_coordinates(unknowns[self.layout.coordinates])
+        first = self.layout.per_log.start
         for name, column in zip(self.per_log, self._find_log_columns(piece), strict=False):
-            derivatives[:, column - self.layout.per_log.start] = PER_LOG_PARAMETERS[name].differentiate(
-                coordinates
-            )
+            derivatives[:, column - first] = PER_LOG_PARAMETERS[name].differentiate(coordinates)
         return derivatives
 
     def get_piece(self, unknowns: Array, piece: int) -> Piece:

@@ -1,7 +1,7 @@
 """Search coordinates: well-scaled numbers behind the thirteen regular coordinates, bounded in a recording's units.
 
 Yield force, c0 and c1 must be positive at every drive. Their search coordinates are the logarithms of their values
-at the lowest and at the highest drive, so the slopes over the drive may have either sign. With a single drive,
+at the lowest and at the highest drive. The slopes over the drive may thus have either sign. With a single drive,
 slopes and eta are not observable and stay fixed.
 """
 

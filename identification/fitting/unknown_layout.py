@@ -1,7 +1,7 @@
 """Order of the unknowns of a fit.
 
-The search coordinates of the law come first, then the two delays, y(0) of each piece, the effects' search
-coordinates, and the per-log parameters of each log after the first.
+The search coordinates of the law come first, then the two delays and y(0) of each piece. The effects' search
+coordinates follow, then the per-log parameters of each log after the first.
 """
 
 from dataclasses import dataclass

@@ -59,7 +59,7 @@ def diagnose(
         settings: limits and thresholds of the search.
         library: effects that the search considers, by name; those that come with the program if None.
         discover: also search for a cause outside the library, where the named effects do not explain the gap.
-        learn_residual: learn what law and effects leave, for predictions with the twin.
+        learn_residual: learn the residual of law and effects, for predictions with the twin.
 
     Raises:
         UnusableDataError: the recordings are too short, clipped, of different specimens, or do not contain force
@@ -171,9 +171,8 @@ def make_candidate_pool(
 def make_diagnosis_problem(dataset: Dataset, pieces: tuple[Piece, ...]) -> Problem:
     """Make the fit problem of a diagnosis.
 
-    Delays are limited to the error of the clocks, because a larger delay is an
-    effect. Each log after the first has its own force offset, because the zero of the load cell differs from
-    run to run.
+    Delays are limited to the error of the clocks, because a larger delay is an effect. Each log after the first
+    has its own force offset, because the zero of the load cell differs from run to run.
     """
     problem = make_problem(dataset, _CLOCK_DEVIATION)
     return replace(

@@ -1,4 +1,4 @@
-"""Mains line in what the windows of a stretch leave of the force: one frequency and one phase for all windows.
+"""Mains line in the remainder of the force in the windows of a stretch: one frequency and one phase for all.
 
 Mains interference is an effect that a diagnosis names (``mains_hum``), not noise. A line that is not coherent over
 the whole stretch stays in the noise, because no model predicts it.

@@ -1,8 +1,9 @@
 """Noise floor of the recorded force: the part that no model of the damper can explain.
 
-Where whole cycles repeat, the floor is what the cycle, its slow change and the achieved motion leave of the force,
-for noise of any spectrum. Fourth differences give a lower bound: they see only noise too fast for a damper. Where
-nothing repeats, the floor lies between this bound and the error of the best model.
+Where whole cycles repeat, a fit of the cycle, of its slow change and of the achieved motion is subtracted from the
+force. The floor is the remainder, for noise of any spectrum. Fourth differences give a lower bound: they see only
+noise too fast for a damper. Where nothing repeats, the floor lies between this bound and the error of the best
+model.
 """
 
 import math

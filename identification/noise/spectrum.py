@@ -32,7 +32,7 @@ class WindowSpectrum(NamedTuple):
     frequency: Array
     """Frequencies of the bins [Hz]."""
     power: Array
-    """Power of what the fit leaves, |rfft|² / N [N²]."""
+    """Power of the remainder of the fit, |rfft|² / N [N²]."""
     gain: Array
     """Part of the power of white noise that the fit leaves [1]."""
     window: RepeatedWindow
@@ -75,7 +75,7 @@ class WindowNoise(NamedTuple):
 
 
 def make_spectrum(fit: WindowFit, remainder: Array, rate: float) -> WindowSpectrum:
-    """Return the spectrum of what a window's fit leaves of the force (N,) [N] at a rate [Hz]."""
+    """Return the spectrum of the remainder of a window's fit of the force (N,) [N] at a rate [Hz]."""
     count = len(remainder)
     power = np.asarray(np.abs(np.fft.rfft(remainder)) ** 2 / count, float)
     frequency = np.asarray(np.arange(len(power)) * (rate / count), float)

@@ -40,7 +40,7 @@ class CycleFit:
         self._factors = _factorise_normal(self._columns)
 
     def remove(self, values: Array) -> Array:
-        """Return what the fit leaves of each column of values (N, k); invalid samples become 0."""
+        """Return the remainder of each column of values (N, k) after the fit; invalid samples become 0."""
         known = values * self.window.valid[:, None]
         return np.asarray(known - self._columns @ self._factors.solve(self._columns.T @ known))
 
@@ -58,14 +58,14 @@ class WindowFit:
     def __init__(self, cycle_fit: CycleFit) -> None:
         """Prepare the motion's columns and measure the gain."""
         self.window, self._cycle_fit = cycle_fit.window, cycle_fit
-        # Only what the cycle's fit leaves of the motion differs from cycle to cycle.
+        # Only the remainder of the motion after the cycle's fit differs from cycle to cycle.
         columns = cycle_fit.remove(_make_motion_columns(self.window))
         self._columns = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
         self.gain: Array = self._measure_gain()
         """(N // 2 + 1,) mean power that the fit leaves of white noise of variance 1, at each frequency [1]."""
 
     def remove(self, values: Array) -> Array:
-        """Return what the fit leaves of each column of values (N, k); invalid samples become 0."""
+        """Return the remainder of each column of values (N, k) after the fit; invalid samples become 0."""
         remainder = self._cycle_fit.remove(values)
         return np.asarray(remainder - self._columns @ (self._columns.T @ remainder))
 

@@ -42,7 +42,7 @@ class ResidualSamples(NamedTuple):
 
 
 def learn_residual(stretches: Sequence[ResidualSamples], units: StateUnits, seed: int) -> TwinResidual | None:
-    """Learn a residual; None where none predicts conditions that it has not seen.
+    """Learn a residual; None where none predicts conditions that were left out.
 
     Args:
         stretches: samples of all recordings.

@@ -1,7 +1,7 @@
 """Limit of a residual force that keeps the damper passive: it returns no more energy than it has absorbed.
 
 The absorbed energy is a store that starts empty. The residual may feed power into the rod only while the store is
-not empty; otherwise it is zero (energy tank, Franken et al. 2011, IEEE Transactions on Robotics 27).
+not empty. Otherwise it is zero (energy tank, Franken et al. 2011, IEEE Transactions on Robotics 27).
 """
 
 import numpy as np

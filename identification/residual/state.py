@@ -1,8 +1,8 @@
 """State of a damper on which its residual may depend, without units.
 
 Velocity, acceleration and travel since the last reversal are compressed: a residual changes fastest near a
-reversal, where all three are small or change their sign. The recent speed tells a reversal from rest, and a slow
-stroke from the turn of a fast one, which are alike in all other variables.
+reversal, where all three are small or change their sign. The recent speed distinguishes a reversal from rest, and
+a slow stroke from the turn of a fast one. All other variables are alike there.
 """
 
 from collections.abc import Mapping

@@ -5,8 +5,9 @@ forces -> [force channel] -> force. A force channel with a delay tau shows the f
 delay is therefore applied to the smooth inputs. Interpolation of the force would round its corners.
 
 Effects on the inputs (coil, displacement channel, backlash) and factors on the law are computed before the
-integration, which takes field, motion and factors as arrays with their derivatives. Effects on the force are
-computed after it. A compliant mount has a separate integrator, because the damper's displacement is then a state.
+integration. The integration takes field, motion and factors as arrays with their derivatives. Effects on the force
+are computed after it. A compliant mount has a separate integrator, because the damper's displacement is then a
+state.
 """
 
 from dataclasses import replace

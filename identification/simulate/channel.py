@@ -144,11 +144,11 @@ def apply_force_channel(
         force = force + form.function(motion.a, *values)
         if J is not None:
             _add_columns(J, first + at, partial(form.function, motion.a), form, values)
-            steepness = _differentiate_inertia(form, values, motion)
-            J[:, delays] += (steepness * motion.da)[:, None]
+            derivative = _differentiate_inertia(form, values, motion)
+            J[:, delays] += (derivative * motion.da)[:, None]
             for early, _, _ in model.select_forms("displacement_shift"):
                 # A delay of the displacement acts as a negative delay of the force.
-                J[:, first + early] -= steepness * motion.da
+                J[:, first + early] -= derivative * motion.da
     for at, form, values in model.select_forms("additive_force"):
         force = force + form.function(excitation.time, excitation.sampled_drive, *values)
         if J is not None:

@@ -194,8 +194,8 @@ def _solve_linearised(
         slip = slip0 + slip1 * zeta
         rate = compute_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
         over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
-        steepness = 1.0 - w * (over_zeta + over_slip * slip1)
-        move = (zk + w * rate - zeta) / max(steepness, 0.2)
+        derivative = 1.0 - w * (over_zeta + over_slip * slip1)
+        move = (zk + w * rate - zeta) / max(derivative, 0.2)
         zeta += min(max(move, -MAX_MOVE), MAX_MOVE)
         if abs(move) < TOLERANCE:
             break

@@ -156,9 +156,9 @@ def _compute_bend(error: Callable[..., Any], x: Array, values: tuple[float, ...]
 
 def _compute_gain(error: Callable[..., Any], x: Array, values: tuple[float, ...]) -> Array:
     """Compute the gain [1] of the channel at displacements x (N,)."""
-    steepness = (error(x + _FIRST_STEP, *values) - error(x - _FIRST_STEP, *values)) / (2.0 * _FIRST_STEP)
+    derivative = (error(x + _FIRST_STEP, *values) - error(x - _FIRST_STEP, *values)) / (2.0 * _FIRST_STEP)
     # A channel with zero or negative gain has no inverse, but a search may try one.
-    return np.asarray(np.maximum(1.0 + steepness, 0.1))
+    return np.asarray(np.maximum(1.0 + derivative, 0.1))
 
 
 def _follow_with_backlash(motion: DamperMotion, form: Form, values: tuple[float, ...], at: int) -> DamperMotion:

@@ -123,9 +123,9 @@ def solve_stage(
         slip = v - (constant + slope * zeta - y_known) / weight
         rate = compute_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
-        steepness = 1.0 - weight * over_zeta + over_slip * slope
+        derivative = 1.0 - weight * over_zeta + over_slip * slope
         # Just after a reversal the derivative may be small or negative. A bounded change passes this region.
-        move = (zeta_known + weight * rate - zeta) / max(steepness, 0.2)
+        move = (zeta_known + weight * rate - zeta) / max(derivative, 0.2)
         zeta += min(max(move, -MAX_MOVE), MAX_MOVE)
         if abs(move) < TOLERANCE:
             break

@@ -1,8 +1,8 @@
 """Parameter offset: distance of a network's parameters from the best simulated fit, without that fit.
 
 From the network's parameters, one Gauss-Newton step of the simulated fit would be d = -H⁻¹ g. It is zero for a
-network as good as the simulated fit. Otherwise it is the network's bias, which hardly shows in the force: the
-force error grows with the square of the offset over the number of samples.
+network as good as the simulated fit. Otherwise it is the network's bias. It hardly shows in the force, whose error
+grows with the square of the offset over the number of samples.
 """
 
 import numpy as np

@@ -1,10 +1,10 @@
 """Clock drift: a slow change of the force channel's delay within a run, and its effect on a fit.
 
 The difference between the clocks of two devices changes over seconds. A force delay of about ten microseconds
-resembles a slightly stiffer damper, and moves k0 and k1 of a clean fit by several of their deviations. The delay
-may therefore drift at the end of a fit, linearly between knots. The size of the drift is the one with the
-largest likelihood of the residuals, with the knots integrated out (empirical Bayes; Robbins 1956). The unknowns
-follow by one Gauss-Newton step from which the knots are eliminated, and their intervals widen accordingly.
+resembles a slightly stiffer damper. It moves k0 and k1 of a clean fit by several of their deviations. The delay
+may therefore drift at the end of a fit, linearly between knots. The size of the drift is the one with the largest
+likelihood of the residuals, with the knots integrated out (empirical Bayes; Robbins 1956). The unknowns follow by
+one Gauss-Newton step from which the knots are eliminated, and their intervals widen accordingly.
 """
 
 from collections.abc import Iterable

@@ -1,8 +1,8 @@
 """Covariance of the unknowns at the minimum of a fit.
 
 It is the covariance of least squares, scaled by the remaining misfit. Where the misfit is coloured, neighbouring
-residuals are not independent. The scores summed over blocks of time account for that, and the wider of the two
-variances is used (block sandwich, White 1980, Newey and West 1987).
+residuals are not independent. The scores summed over blocks of time account for that (block sandwich, White 1980,
+Newey and West 1987). The larger of the two variances is used.
 """
 
 from dataclasses import dataclass

@@ -2,10 +2,10 @@
 
 The motion that drives the simulation is estimated from a noisy displacement. Its error changes the yield
 displacement and the shape as much as the force noise does. The drive is measured as well. The mean of a level that
-lasts two seconds has a thirtieth of the drive's noise, and changes the yield force as much as a hundredth of a
-newton. The noise is therefore resampled. The fitted motion and the drive get fresh noise and are estimated again
-in the same way. The change of the simulated force is propagated to the unknowns by one Gauss-Newton step
-(linearised parametric bootstrap).
+lasts two seconds has a thirtieth of the drive's noise. It changes the yield force by a hundredth of a newton. The
+noise is therefore resampled. The fitted motion and the drive get fresh noise and are estimated again in the same
+way. The change of the simulated force is propagated to the unknowns by one Gauss-Newton step (linearised
+parametric bootstrap).
 
 The sensitivities are computed along the erroneous motion as well. This correlation biases the fit, as noise on the
 abscissa flattens a straight line (errors in variables; Carroll et al. 2006). The same replicas show the bias: a

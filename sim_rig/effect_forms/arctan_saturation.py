@@ -9,8 +9,8 @@ from sim_rig.effect_forms.form import FIELD, AlternativeForm, Place
 
 def compute_field(now: Any, memory: Any, values: Any, rate: Any) -> float:
     """Return the field [drive] that the fluid sees."""
-    steepness = 0.5 * math.pi * values[0]
-    return float(now[FIELD]) if steepness <= 0.0 else math.atan(steepness * now[FIELD]) / steepness
+    slope = 0.5 * math.pi * values[0]
+    return float(now[FIELD]) if slope <= 0.0 else math.atan(slope * now[FIELD]) / slope
 
 
 ARCTAN_SATURATION = AlternativeForm(

@@ -1,9 +1,9 @@
 """Size of each form on the laboratory damper.
 
 At both ends of a range the six-drive sine method was simulated without noise, with the other parameters in the
-middle of theirs. To first order, the error of a refitted law is twice the noise of the force at the lower end, and
-three and a half times at the upper end. A full refit moves further and leaves less, most of all for a lag of the
-coil. With other values of the other parameters the error differs as well.
+middle of theirs. To first order, the error of a refitted law is 2 times the noise of the force at the lower end,
+and 3.5 times at the upper end. A full refit moves further and leaves less, most of all for a lag of the coil. With
+other values of the other parameters the error differs as well.
 """
 
 from sim_rig.trial.cases import ValueRange

@@ -89,6 +89,13 @@ class CoilAmplifierDevice:
                 self._signals.command("drive", level)
             return level
 
+    def follow_time(self) -> bool:
+        """Advance to the present instant; return whether the output changes by itself, or soon may."""
+        with self._lock:
+            changes = self.advance() != self.output.target or self.output.table is TableState.RUNNING
+            silence_ns = self._signals.now_ns() - self._last_request_ns
+            return changes or silence_ns > self._watchdog * 1e9 / 2
+
     def trigger(self, at_ns: int) -> None:
         """Start an armed table by a pulse of the SYNC input at ``at_ns`` [ns]."""
         with self._lock:

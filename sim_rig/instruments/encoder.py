@@ -1,9 +1,8 @@
 """Sensors of the simulated servo drive: encoder, motor torque, clock."""
 
 import math
+from operator import mul
 from typing import NamedTuple
-
-import numpy as np
 
 from sim_rig.live import DeviceClock, RigInterface
 
@@ -51,12 +50,16 @@ class DriveSensors:
     def read_motion(self, now_ns: int) -> tuple[int, float, float]:
         """Return time [ns], position [m] and velocity [m/s] from the last five samples."""
         times, values = self._signals.read_latest("actuator_position", 5, now_ns)
-        if len(values) < 2 or not np.isfinite(values).all():
-            return now_ns, (float(values[-1]) if len(values) else 0.0), 0.0
+        # For five samples, lists take less time than arrays.
+        instants, positions = times.tolist(), values.tolist()
+        if len(positions) < 2 or not all(map(math.isfinite, positions)):
+            return now_ns, (positions[-1] if positions else 0.0), 0.0
         # Least squares over all five: between two samples, 1 ms apart, the encoder step of 5 µm would be 5 mm/s.
-        seconds = (times - times[-1]) / 1e9
-        spread = seconds - seconds.mean()
-        return int(times[-1]), float(values[-1]), float(spread @ values / (spread @ spread))
+        seconds = [(instant - instants[-1]) / 1e9 for instant in instants]
+        mean = sum(seconds) / len(seconds)
+        spread = [second - mean for second in seconds]
+        slope = sum(map(mul, spread, positions)) / sum(map(mul, spread, spread))
+        return instants[-1], positions[-1], slope
 
     def read_torque(self, now_ns: int, rated: float) -> int:
         """Return the motor torque for the force on the rod, in thousandths of ``rated`` [N m]."""

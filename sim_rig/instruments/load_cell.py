@@ -20,6 +20,8 @@ _COMMANDS = {code: name for name, code in CONTRACT["commands"].items()}
 _CODES, _FRAMES = CONTRACT["codes"], CONTRACT["frames"]
 _FULL_SCALE: float = _INSTRUMENT["full_scale_n"]
 _COUNTS_PER_NEWTON: int = _INSTRUMENT["counts_per_newton"]
+_MIN_POLL = 0.002
+"""[s] Shortest interval of polls."""
 _HEADER = bytes(CONTRACT["framing"]["sync"])
 
 
@@ -60,6 +62,43 @@ def encode_frame(kind: str, *fields: int) -> bytes:
     return _HEADER + covered + struct.pack("<H", compute_checksum(covered))
 
 
+class _RecentCounts:
+    """Counts of the latest samples, with their spread; samples older than a window are discarded."""
+
+    def __init__(self, window_ns: int) -> None:
+        self._window_ns = window_ns
+        self._samples: deque[tuple[int, int]] = deque()
+        # Candidates for the lowest and the highest: each is more extreme than all later ones. Otherwise every
+        # sample would need a search of the whole window.
+        self._lows: deque[tuple[int, int]] = deque()
+        self._highs: deque[tuple[int, int]] = deque()
+
+    def add(self, at_ns: int, counts: int) -> None:
+        """Add a sample, and discard those that are too old by then."""
+        self._samples.append((at_ns, counts))
+        while self._lows and self._lows[-1][1] >= counts:
+            self._lows.pop()
+        while self._highs and self._highs[-1][1] <= counts:
+            self._highs.pop()
+        self._lows.append((at_ns, counts))
+        self._highs.append((at_ns, counts))
+        for samples in (self._samples, self._lows, self._highs):
+            while samples[0][0] < at_ns - self._window_ns:
+                samples.popleft()
+
+    def compute_span(self) -> int:
+        """Return the time between the oldest and the newest sample [ns]."""
+        return self._samples[-1][0] - self._samples[0][0] if self._samples else 0
+
+    def compute_spread(self) -> int:
+        """Return the difference of the highest and the lowest counts."""
+        return self._highs[0][1] - self._lows[0][1]
+
+    def compute_mean(self) -> float:
+        """Return the mean of the counts."""
+        return sum(counts for _, counts in self._samples) / len(self._samples)
+
+
 class LoadCellDevice:
     """Behaviour of the instrument, without its line; faults may be injected from any thread."""
 
@@ -86,7 +125,7 @@ class LoadCellDevice:
         self._counts = 0
         self._last_sample_ns = signals.now_ns()
         self._tick = 0
-        self._recent_counts: deque[tuple[int, int]] = deque()
+        self._recent_counts = _RecentCounts(round(_INSTRUMENT["tare_time_s"] * 1e9))
 
     def skip_samples(self, samples: int) -> None:
         """Advance the sequence number, as if samples had been lost inside the instrument."""
@@ -123,9 +162,7 @@ class LoadCellDevice:
 
     def _make_frames(self, at_ns: int, newtons: float) -> list[bytes]:
         status = self._convert(newtons)
-        self._recent_counts.append((at_ns, self._counts))
-        while self._recent_counts[0][0] < at_ns - _INSTRUMENT["tare_time_s"] * 1e9:
-            self._recent_counts.popleft()
+        self._recent_counts.add(at_ns, self._counts)
         # The offset of a quarter keeps the rig's sample instants away from the rounding edges.
         tick = round(at_ns * self._rate * 1e-9 - 0.25)
         due, self._tick = tick != self._tick, tick
@@ -145,12 +182,9 @@ class LoadCellDevice:
         return int(fault | _STATUS["overload"] * (abs(self._counts) >= _FULL_SCALE * _COUNTS_PER_NEWTON))
 
     def _is_stable(self) -> bool:
-        counts = [counts for _, counts in self._recent_counts]
-        full = (
-            bool(counts)
-            and self._recent_counts[-1][0] - self._recent_counts[0][0] >= 0.9e9 * _INSTRUMENT["tare_time_s"]
-        )
-        return full and max(counts) - min(counts) <= _INSTRUMENT["tare_band_n"] * _COUNTS_PER_NEWTON
+        is_full = self._recent_counts.compute_span() >= 0.9e9 * _INSTRUMENT["tare_time_s"]
+        band = _INSTRUMENT["tare_band_n"] * _COUNTS_PER_NEWTON
+        return bool(is_full and self._recent_counts.compute_spread() <= band)
 
     def _make_reply(self, token: int, command: int, argument: int, now_ns: int) -> bytes:
         name = _COMMANDS.get(command)
@@ -192,8 +226,7 @@ class LoadCellDevice:
         overloaded = abs(self._counts) >= _FULL_SCALE * _COUNTS_PER_NEWTON
         if tared and (overloaded or self.bridge_open or not self._is_stable()):
             return "not_now", 0
-        counts = [counts for _, counts in self._recent_counts]
-        self._tare = round(sum(counts) / len(counts)) if tared else None
+        self._tare = round(self._recent_counts.compute_mean()) if tared else None
         return "done", self._tare or 0
 
 
@@ -210,4 +243,5 @@ def make_load_cell(
     """
     device = LoadCellDevice(signals, clock)
     port = SerialPort(address, CONTRACT["line"]["baud"], _INSTRUMENT["transmit_buffer_bytes"], batch)
-    return SerialAdapter(port, device, signals.now_ns), device
+    # Between two batches nothing reaches the host, so the device is polled once for each.
+    return SerialAdapter(port, device, signals.now_ns, max(batch, _MIN_POLL)), device

@@ -1,8 +1,8 @@
 """Simulated servo drive: CiA 402 in cyclic synchronous position and homing mode, behind a CANopen slave.
 
 Missing setpoints (event timer of RPDO 1), a lost heartbeat of the master (6007h) and a commanded stop all end in a
-quick stop by the drive's own ramp. The drive does not simulate the rod: it sends its demand to the rig as a
-command, and gets position and force back as the sensors report them. Homing finds the drive's zero. Before, its
+quick stop. The drive's own ramp defines it. The drive does not simulate the rod. It sends its demand to the rig as
+a command, and receives position and force as the sensors report them. Homing finds the drive's zero. Before, its
 position is relative to the position at switch-on.
 """
 
@@ -21,15 +21,12 @@ _MILLISECOND = 1_000_000
 """[ns]"""
 _MAX_SAMPLE_AGE_NS = 15_000_000
 """Threshold on the age of the newest position [ns]: above it, the simulation is behind and not the rod."""
+_OVERDUE_PERIODS = 1.25
+"""Threshold on the age of the last setpoint [interpolation periods]: above it, the next one is missing."""
 _HOMING, _CYCLIC_POSITION = 6, 8
 """Modes of operation."""
-_NO_POSITION, _MASTER_LOST, _SETPOINT_TIMEOUT, _FOLLOWING_ERROR, _TRAVEL_LIMIT = (
-    0x7320,
-    0x8130,
-    0x8250,
-    0x8611,
-    0x8612,
-)
+_NO_POSITION, _MASTER_LOST, _SETPOINT_TIMEOUT = 0x7320, 0x8130, 0x8250
+_FOLLOWING_ERROR, _TRAVEL_LIMIT = 0x8611, 0x8612
 """Emergency codes: position sensor, heartbeat of the master, setpoint timeout, following error, travel limit."""
 
 
@@ -84,6 +81,12 @@ class ServoDriveDevice:
             self._supervise(now_ns)
             self._publish_demand(now_ns)
         self.slave.tick(now_ns)
+
+    def acts_by_itself(self, now_ns: int) -> bool:
+        """Return whether the rod moves without setpoints, or a setpoint is missing."""
+        overdue_ns = _OVERDUE_PERIODS * self.objects.get_number(0x60C2, 1) * _MILLISECOND
+        is_overdue = self._setpoint_ns is None or now_ns - self._setpoint_ns > overdue_ns
+        return is_overdue and self.generator.state is not MotionState.REST
 
     def raise_fault(self, code: int, now_ns: int | None = None) -> None:
         """Enter the fault state with an emergency code, after braking."""

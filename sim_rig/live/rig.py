@@ -70,7 +70,7 @@ class LiveRig:
             PlantError: the effects have no finite force there.
         """
         self.periodic_tasks: Sequence[Callable[[], object]] = ()
-        """Functions that the thread calls twice per batch, for devices that act by time."""
+        """Functions for devices that act by time: called once per batch, and twice while one returns True."""
         self.failure: Exception | None = None
         """Error by which the thread ended, if it did."""
         self.lag_ns = 0
@@ -165,13 +165,16 @@ class LiveRig:
             while not self._stopping.is_set():
                 if not self._clock.wait_until(due):
                     continue
-                for run_task in self.periodic_tasks:
-                    run_task()
                 idle = due - self._last_command_ns > _IDLE_AFTER_NS
-                if due - self._simulated_ns >= self._batch_ns * (_IDLE_BATCHES if idle else 1):
+                changes = [run_task() for run_task in self.periodic_tasks]
+                batch_ns = self._batch_ns * (_IDLE_BATCHES if idle else 1)
+                if self._clock.now_ns() - self._simulated_ns >= batch_ns:
                     self.catch_up()
+                complete = self._simulated_ns + batch_ns
+                # An idle rig looks for a command, which ends the larger batches, as often as for changes.
+                turn = min(complete, due + self._batch_ns // 2) if idle or any(changes) else complete
                 # Missed turns are not repeated: `catch_up` simulates all that is due at once.
-                due = max(due + self._batch_ns // 2, self._clock.now_ns())
+                due = max(turn, self._clock.now_ns())
         except Exception as error:  # reported by the process that runs the rig
             self.failure = error
 

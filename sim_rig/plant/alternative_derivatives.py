@@ -1,9 +1,9 @@
 """Time derivatives of the states of the plant with alternative forms: law, forms, mounting and servo.
 
-In addition to the states of actuator, law and amplifier there are the damper's own displacement behind a compliant
-mounting, and the states of at most three forms. The damper's velocity is the one at which the forces of mounting
-and damper are equal. The inertia of a mass at the load cell does not act on the actuator, whose own moving mass
-(stiffness over squared bandwidth) is about three hundred kilograms.
+There are the states of actuator, law and amplifier, the damper's own displacement behind a compliant mounting, and
+the states of at most three forms. The damper's velocity is the one at which the forces of mounting and damper are
+equal. The inertia of a mass at the load cell does not act on the actuator. The actuator's own moving mass
+(stiffness over squared bandwidth) is about 300 kg.
 """
 
 from typing import Any

@@ -62,13 +62,13 @@ compute_transmitted_force = compile_function(connection.compute_transmitted_forc
 
 @compile_function
 def _compute_damper_motion(
-    position: float, velocity: float, last: float, backlash: float, follower: BinaryFunction
+    position: float, velocity: float, last: float, backlash: float, backlash_map: BinaryFunction
 ) -> tuple[float, float]:
     """Return displacement [m] and velocity [m/s] of the damper behind its mounting, from its last one [m]."""
     if backlash == 0.0:
         return position, velocity
-    x = follower(last, position)
-    return x, (follower(x, position + velocity * LOOKAHEAD) - x) / LOOKAHEAD
+    x = backlash_map(last, position)
+    return x, (backlash_map(x, position + velocity * LOOKAHEAD) - x) / LOOKAHEAD
 
 
 @compile_function
@@ -199,7 +199,7 @@ def compute_rates(
     delayed_output: float,
     k: Array,
     p: Array,
-    follower: BinaryFunction,
+    backlash_map: BinaryFunction,
     parallel_force: QuaternaryFunction,
     field_map: BinaryFunction,
     scale_factors: ScaleFunction,
@@ -218,7 +218,7 @@ def compute_rates(
         delayed_output: [V or A] amplifier output as it reaches the coil after the dead time.
         k: (CONSTANT_COUNT,) constants of actuator, amplifier, coil, heat and mounting.
         p: (14,) parameters of the law in the paper's order.
-        follower: displacement of the damper over (its last one, actuator) [m].
+        backlash_map: displacement of the damper over (its last one, actuator) [m].
         parallel_force: [N] over displacement [m], velocity [m/s], deflection of a lip [1] and gas position [m].
         field_map: field that the fluid sees over (field, remanence) [V or A].
         scale_factors: factors of alpha, c0 and c1 over displacement, velocity and energy.
@@ -229,7 +229,7 @@ def compute_rates(
     Returns:
         Force on the load cell [N], displacement [m], velocity [m/s] and slip velocity [m/s] of the damper.
     """
-    driven_x, driven_v = _compute_damper_motion(s[POSITION], s[VELOCITY], last_damper, k[BACKLASH], follower)
+    driven_x, driven_v = _compute_damper_motion(s[POSITION], s[VELOCITY], last_damper, k[BACKLASH], backlash_map)
     compliant = k[FIXTURE_COMPLIANCE] > 0.0
     x, v, u = s[DAMPER] if compliant else driven_x, driven_v, field_map(s[FIELD], remanence)
     passes, mounting_force = 1, 0.0

@@ -76,7 +76,7 @@ class EffectFunctions:
             return 1.0 / values[[q.symbol for q in form.parameters].index(constant)]
         return 0.0
 
-    def make_follower(self) -> BinaryFunction:
+    def make_backlash_map(self) -> BinaryFunction:
         """Return the damper's new displacement [m] over its previous one and the actuator's position."""
         followers = self.select("displacement_backlash")
         return bind_values(followers[0][0].function, followers[0][1]) if followers else rigid_mounting

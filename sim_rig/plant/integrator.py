@@ -66,7 +66,7 @@ def _integrate_step(
     h: float,
     k: Array,
     p: Array,
-    follower: BinaryFunction,
+    backlash_map: BinaryFunction,
     parallel_force: QuaternaryFunction,
     field_map: BinaryFunction,
     field_memory: BinaryFunction,
@@ -91,7 +91,7 @@ def _integrate_step(
         delayed_output,
         k,
         p,
-        follower,
+        backlash_map,
         parallel_force,
         field_map,
         scale_factors,
@@ -110,7 +110,7 @@ def _integrate_step(
         delayed_output,
         k,
         p,
-        follower,
+        backlash_map,
         parallel_force,
         field_map,
         scale_factors,
@@ -129,7 +129,7 @@ def _integrate_step(
         delayed_output,
         k,
         p,
-        follower,
+        backlash_map,
         parallel_force,
         field_map,
         scale_factors,
@@ -148,7 +148,7 @@ def _integrate_step(
         delayed_output,
         k,
         p,
-        follower,
+        backlash_map,
         parallel_force,
         field_map,
         scale_factors,
@@ -161,7 +161,7 @@ def _integrate_step(
     # Once per step, from its end: stages are trial points that must not enter the memory of clevis and iron.
     if k[FIELD_MEMORY] != 0.0 and s[FIELD] != field:
         remanence = field_memory(remanence, s[FIELD] - field)
-    last_damper = float(follower(last_damper, s[POSITION]))
+    last_damper = float(backlash_map(last_damper, s[POSITION]))
     if defined is not None:
         x = s[DAMPER] if k[FIXTURE_COMPLIANCE] > 0.0 else last_damper
         lost_energy = k[COOLING_RATE] * h * 0.5 * (energy + s[ENERGY])
@@ -194,7 +194,7 @@ def _integrate(
     substeps: int,
     k: Array,
     p: Array,
-    follower: BinaryFunction,
+    backlash_map: BinaryFunction,
     parallel_force: QuaternaryFunction,
     field_map: BinaryFunction,
     field_memory: BinaryFunction,
@@ -219,7 +219,7 @@ def _integrate(
         command: (M+1,) commanded displacement [m] at the start of each sample and the end of the last.
         drive: (M,) commanded drive [V or A], held through each sample.
         h: [s] one substep; ``substeps`` of them make a sample.
-        k, p, follower, parallel_force, field_map, scale_factors: as in ``compute_rates``.
+        k, p, backlash_map, parallel_force, field_map, scale_factors: as in ``compute_rates``.
         field_memory: remanence over (last remanence, change of the field).
         defined: functions of defined effects, with their memory; None without such effects.
         positions, velocities, forces: (M substeps,) filled with position [m] and velocity [m/s] of the actuator
@@ -256,7 +256,7 @@ def _integrate(
                 delayed_output,
                 k,
                 p,
-                follower,
+                backlash_map,
                 parallel_force,
                 field_map,
                 scale_factors,
@@ -270,7 +270,7 @@ def _integrate(
                 damper[i, 0], damper[i, 1] = x, v
             if j == substeps // 2:
                 outputs[i] = s[OUTPUT]
-            steps = count_steps(s, rate, x, slip, drive[i], h, k, p, follower)
+            steps = count_steps(s, rate, x, slip, drive[i], h, k, p, backlash_map)
             if not (steps <= MAX_STEPS and math.isfinite(force) and math.isfinite(s[Z])):
                 return last_damper, remanence, i
             for step in range(int(steps)):
@@ -278,7 +278,7 @@ def _integrate(
                 step_end = start + (end - start) * (step + 1) / steps
                 last_damper, remanence = _integrate_step(
                     s, last_damper, remanence, step_start, step_end, drive[i], delayed_output, h / steps, k, p,
-                    follower, parallel_force, field_map, field_memory, scale_factors,
+                    backlash_map, parallel_force, field_map, field_memory, scale_factors,
                     defined, time + h * step / steps, work,
                 )  # fmt: skip
     return last_damper, remanence, len(drive)

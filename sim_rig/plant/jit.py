@@ -54,13 +54,15 @@ SCALE_TYPE = numba.types.FunctionType(_SCALE_SIGNATURE)
 """Type of ``ScaleFunction``."""
 
 
-def compile_function(function: Function, signature: Any = None) -> Function:
-    """Return the function as machine code, cached on disk between processes; it releases the interpreter's lock.
+def compile_function(function: Function, signature: Any = None, *, brief: bool = False) -> Function:
+    """Return the function as machine code, cached on disk between processes.
 
-    With a signature it is compiled at once for that signature only, otherwise at its first call.
+    With a signature it is compiled at once for that signature only, otherwise at its first call. It releases the
+    interpreter's lock, unless it is ``brief``: a thread that has to wait for the lock again loses more time than a
+    few microseconds of work give to the others.
     """
     # By numpy's rules a division by zero gives infinity instead of an exception; the integrators check for it.
-    return cast(Function, numba.njit(signature, cache=True, nogil=True, error_model="numpy")(function))
+    return cast(Function, numba.njit(signature, cache=True, nogil=not brief, error_model="numpy")(function))
 
 
 def compile_inline(function: Function) -> Function:

@@ -73,7 +73,7 @@ class Plant:
         effects = EffectFunctions(scenario)
         self._law = np.array(scenario.parameters)
         self._parallel_force = FixedAddress(effects.make_parallel_force(), QUATERNARY_TYPE)
-        self._follower = FixedAddress(effects.make_follower(), BINARY_TYPE)
+        self._follower = FixedAddress(effects.make_backlash_map(), BINARY_TYPE)
         self._scale_factors = FixedAddress(effects.make_scale_factors(), SCALE_TYPE)
         self._field_map = FixedAddress(effects.make_field_map(), BINARY_TYPE)
         self._field_memory = FixedAddress(effects.make_field_memory(), BINARY_TYPE)

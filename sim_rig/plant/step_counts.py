@@ -65,15 +65,15 @@ def count_steps(
     h: float,
     k: Array,
     p: Array,
-    follower: BinaryFunction,
+    backlash_map: BinaryFunction,
 ) -> float:
     """Return the steps that a substep of h [s] needs for stability, and for accuracy at reversals and contacts."""
     turn = 2.0 * abs(rate[VELOCITY]) * h
     fastest = abs(slip) + turn
     steps = 1.0
     if k[BACKLASH] != 0.0:
-        moves = follower(x, s[POSITION] + s[VELOCITY] * LOOKAHEAD) != x
-        moves_later = follower(x, s[POSITION] + s[VELOCITY] * h) != x
+        moves = backlash_map(x, s[POSITION] + s[VELOCITY] * LOOKAHEAD) != x
+        moves_later = backlash_map(x, s[POSITION] + s[VELOCITY] * h) != x
         if moves != moves_later:  # contact in the clevis begins or ends within this substep
             steps = CONTACT_STEPS
             fastest += abs(s[VELOCITY])

@@ -1,11 +1,13 @@
 """Timing of a CAN bus: arbitration by the lowest identifier, and transmission times by frame length.
 
 Every sender has one queue, as with one transmit mailbox: its frames keep their order, and only the first of each
-queue takes part in arbitration. A frame of n bytes has 47 + 8 n bits and stuff bits: at least none, at most one
-for every four of 34 + 8 n; half of the maximum is assumed. No frame is lost on this bus, frames are only delayed.
+queue takes part in arbitration. A frame of n bytes has 47 + 8 n bits and stuff bits. At most one stuff bit follows
+every four of 34 + 8 n bits; half of the maximum is assumed. No frame is lost on this bus, frames are only delayed.
 """
 
 from collections import deque
+from itertools import chain
+from operator import itemgetter
 from typing import NamedTuple
 
 
@@ -43,20 +45,33 @@ class BusTiming:
 
     def pop_transmitted(self, now_ns: int) -> list[tuple[int, CanFrame]]:
         """Return the frames whose last bit was transmitted, each with that instant [ns], in order."""
-        transmitted: list[tuple[int, CanFrame]] = []
-        while True:
-            if self._current is None:
-                self._current = self._arbitrate(now_ns)
-            if self._current is None or self._current[0] > now_ns:
-                return transmitted
-            transmitted.append(self._current)
-            self._current = None
+        return list(iter(lambda: self.pop_next(now_ns), None))
+
+    def pop_next(self, now_ns: int) -> tuple[int, CanFrame] | None:
+        """Return the next frame whose last bit was transmitted, with that instant [ns]; None if there is none.
+
+        A reply to it that is queued before the next call takes part in the next arbitration, however late that is.
+        """
+        if self._current is None:
+            self._current = self._arbitrate(now_ns)
+        if self._current is None or self._current[0] > now_ns:
+            return None
+        transmitted, self._current = self._current, None
+        return transmitted
 
     def find_next_event(self) -> int | None:
         """Return the instant of the next event [ns]; None if no frame waits."""
-        if self._current is not None:
-            return self._current[0]
-        return self._find_start()
+        return self._find_start() if self._current is None else self._current[0]
+
+    def find_idle_instant(self) -> int | None:
+        """Return the end [ns] of all frames that follow each other without a pause; None if no frame waits."""
+        end = self.find_next_event()
+        if end is None:
+            return None
+        for ready_ns, frame in sorted(chain.from_iterable(self._queues.values()), key=itemgetter(0)):
+            if ready_ns <= end:
+                end += round(count_frame_bits(len(frame.data)) * self._bit_ns)
+        return end
 
     def compute_load(self, elapsed_ns: int) -> float:
         """Return the part of ``elapsed_ns`` in which the wire was busy [1]."""

@@ -21,10 +21,10 @@ from sim_rig.protocols.serial_endpoint import open_raw_pty
 from sim_rig.protocols.serial_port import make_noise
 
 ReplyFaultKind = Literal["delay", "drop", "crc", "exception", "truncate", "unit", "garbage", "stale"]
-_POLL_PERIOD = 0.005
-"""[s] of real time between two calls of the device's `advance` without requests."""
 _REQUEST_TIMEOUT = 0.05
 """[s] after which an incomplete request is discarded."""
+_INCOMPLETE_POLL = 0.005
+"""[s] between two turns while a request is incomplete or waits."""
 
 
 class ReplyFault(NamedTuple):
@@ -74,6 +74,8 @@ class ModbusServer:
     """[bit/s] of RTU replies; None for no delay."""
     bits_per_character: int = 10
     """[bit] per byte on the line."""
+    poll: float = 0.005
+    """[s] of real time between two calls of the device's `advance` without requests."""
     silent: bool = False
     """While true, no reply is sent."""
     reply_count: int = 0
@@ -147,7 +149,8 @@ class ModbusServer:
 
     def _serve(self) -> None:
         while not self._stopping.is_set():
-            wait = _POLL_PERIOD
+            # An incomplete request has a deadline of its own.
+            wait = _INCOMPLETE_POLL if any(host.received for host in self._hosts) else self.poll
             if self._pending is not None:
                 wait = min(wait, max(0.0, self._pending.due - time.monotonic()))
             for key, _ in self._selector.select(wait):

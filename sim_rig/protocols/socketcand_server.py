@@ -2,7 +2,8 @@
 
 Clients use raw mode: ``< open can0 >``, ``< rawmode >``, then ``< send 181 2 aa bb >`` to send and ``< frame 181
 12.345678 AABB >`` as received frames. The nodes are in this process. All share one `BusTiming` on the clock of the
-rig: a frame is delivered when its last bit was transmitted. One thread serves all, so that nodes need no locks.
+rig: a frame is delivered when its last bit was transmitted, and frames without a pause between them together, when
+the last of them was. One thread serves all, so that nodes need no locks.
 """
 
 import contextlib
@@ -27,8 +28,10 @@ _LINE_LIMIT = 200
 _SO_TIMESTAMPNS = 35
 """SO_TIMESTAMPNS, which Python does not name: Linux reports the arrival of data as two 64 bit numbers."""
 _TIMESTAMP = struct.Struct("=qq")
-_POLL_PERIOD = 1e-3
-"""[s] between two ticks of the nodes without other events."""
+_TICK_PERIOD = 1e-3
+"""[s] between two ticks of the nodes without other events, while one of them acts by itself."""
+_IDLE_TICK_PERIOD = 4e-3
+"""[s] the same while none of them does. Waking the thread costs more than a tick."""
 
 
 class CanNode(Protocol):
@@ -42,6 +45,9 @@ class CanNode(Protocol):
 
     def tick(self, now_ns: int) -> None:
         """Advance to the present instant."""
+
+    def acts_by_itself(self, now_ns: int) -> bool:
+        """Return whether its behaviour depends on ticks, and not only on frames."""
 
 
 class _Client:
@@ -127,15 +133,15 @@ class SocketcandServer:
     def _serve(self) -> None:
         while self._running:
             now = self._now_ns()
+            while (transmitted := self.timing.pop_next(now)) is not None:
+                self._deliver(*transmitted)
             for node in self._nodes:
                 node.tick(now)
-            for end_ns, frame in self.timing.pop_transmitted(now):
-                self._deliver(frame, end_ns)
             for client in self._clients:
                 self._run_guarded(client, client.flush)
             self._wait(now)
 
-    def _deliver(self, frame: CanFrame, end_ns: int) -> None:
+    def _deliver(self, end_ns: int, frame: CanFrame) -> None:
         line = f"< frame {frame.identifier:03X} {end_ns / 1e9:.6f} {frame.data.hex().upper()} >".encode("ascii")
         for node in self._nodes:
             if node is not frame.sender:
@@ -146,8 +152,9 @@ class SocketcandServer:
 
     def _wait(self, now: int) -> None:
         """Wait until a socket is ready or an event is due, then handle the sockets."""
-        due = self.timing.find_next_event()
-        timeout = _POLL_PERIOD if due is None else min(max(due - now, 0) / 1e9, _POLL_PERIOD)
+        due = self.timing.find_idle_instant()
+        period = _TICK_PERIOD if any(node.acts_by_itself(now) for node in self._nodes) else _IDLE_TICK_PERIOD
+        timeout = period if due is None else min(max(due - now, 0) / 1e9, period)
         readable, _, _ = select.select([self._listener, *(c.socket for c in self._clients)], [], [], timeout)
         if self._listener in readable:
             self._accept()

@@ -120,11 +120,13 @@ def _apply_force_effects(effects: EffectFunctions, truth: TrueSignals, start: fl
 
     A defined effect acts on the force after all effects of the library and the defined effects before it.
     """
+    added, defined = effects.select("additive_force"), effects.select("channel_function")
+    if not added and not defined:
+        return truth.force
     time = _compute_substep_times(truth, start, step)
     drive = np.repeat(truth.output, len(truth.force) // len(truth.output))
-    added = effects.select("additive_force")
     force = truth.force + sum(form.function(time, drive, *values) for form, values in added)
-    for form, values in effects.select("channel_function"):
+    for form, values in defined:
         force = force + form.function({"force": force, "drive": drive, "time": time}, *values)
     return np.asarray(force)
 

@@ -1,9 +1,9 @@
 """Sensor model of one channel: true values in, readings out, chunk by chunk.
 
-A true value passes, in this order: the device's anti-alias filter (evaluated at the resolution of the plant's
-substeps), transport delay and clock error, gain, zero and drift, noise, saturation, and the steps of the
-converter. Readings are stamped on the bench clock as mapped. The error of the mapping (an offset drawn for each
-run, a slow drift, jitter of each stamp) is the difference between true and reported delay.
+A true value first passes the device's anti-alias filter, at the resolution of the plant's substeps. Then follow
+transport delay and clock error, gain, zero and drift, noise, saturation, and the steps of the converter. Readings
+are stamped on the bench clock as mapped. The error of the mapping is an offset drawn for each run, a slow drift,
+and jitter of each stamp. It is the difference between true and reported delay.
 
 A channel keeps the states of its filter and of its random numbers from chunk to chunk. Its readings therefore do
 not depend on how the true values are divided into chunks.
@@ -13,14 +13,12 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy import signal
 
 from sim_rig.plant import Array
 from sim_rig.scenario import ClockDeviation, Filter, Sensor
-from sim_rig.sensors.sampling import FilterStream, interpolate_cubic, sample_held
+from sim_rig.sensors.readings import ReadingConstants, convert_readings
+from sim_rig.sensors.sampling import FilterStream, apply_filter
 
-_DRIFT_PERIOD = 100.0
-"""[s] period of the slow drift that the mapping of a clock leaves."""
 _MIN_LAG = 8e-5
 """Threshold on a hidden lag [s]: below it, the lag is omitted, as it is faster than any filter of a device."""
 _MAX_JITTER = 9.0
@@ -91,7 +89,9 @@ class ChannelStream:
         self._first = 0
         self._next = 0
         self._correlation = math.exp(-1 / (rate * sensor.slow_noise_time))
+        self._noise_filter = np.array([1.0, 0.0]), np.array([1.0, -self._correlation])
         self._noise_state = np.zeros(1)
+        self._constants = _make_constants(model, sensor, errors)
 
     def feed(self, true_values: Array) -> None:
         """Add (K,) further true values in the channel's unit."""
@@ -120,26 +120,21 @@ class ChannelStream:
         Returns:
             (count,) stamps since the start [s] and (count,) readings in the channel's unit.
         """
-        stamps = np.arange(self._next, self._next + count) / self.rate
-        instants = self._compute_instants(stamps)
-        sample = sample_held if self._model.held else interpolate_cubic
-        true = sample(self._true_values, self._model.dt, instants, self._first)
-        value = true * (1 + self._sensor.gain_error) + self._errors.zero + self._sensor.drift * stamps
-        value = _quantise(value + self._draw_noise(count), self._sensor)
+        stamps, values = np.empty(count), np.empty(count)
+        convert_readings(
+            self._true_values, self._first, self._model.dt, self._model.held, self._next, self.rate,
+            self._constants, self._draw_jitter(count), self._draw_noise(count), stamps, values,
+        )  # fmt: skip
         self._next += count
         self._discard_used()
-        return stamps, value
+        return stamps, values
 
-    def _compute_instants(self, stamps: Array) -> Array:
-        """Return the instants [s] whose true values the readings show."""
-        errors, sensor = self._errors, self._sensor
-        instants = stamps - sensor.delay - self._model.hidden_delay + errors.offset
-        if errors.drift:
-            instants += errors.drift * np.sin(2 * np.pi * stamps / _DRIFT_PERIOD + errors.phase)
-        if sensor.jitter:
-            jitter = self._jitter.standard_normal(len(stamps))
-            instants += sensor.jitter * np.minimum(np.maximum(jitter, -_MAX_JITTER), _MAX_JITTER)
-        return instants
+    def _draw_jitter(self, count: int) -> Array:
+        """Return the random error [s] of the instant of each reading."""
+        if not self._sensor.jitter:
+            return np.zeros(count)
+        jitter = self._jitter.standard_normal(count)
+        return np.asarray(self._sensor.jitter * np.minimum(np.maximum(jitter, -_MAX_JITTER), _MAX_JITTER))
 
     def _draw_noise(self, count: int) -> Array:
         """Return white plus coloured noise for each reading."""
@@ -149,10 +144,7 @@ class ChannelStream:
             shocks = sensor.slow_noise * self._shocks.standard_normal(count)
             # All but the first shock of the run, so that the noise has its full size from the start.
             shocks[1 if self._next == 0 else 0 :] *= math.sqrt(1 - self._correlation**2)
-            coloured, self._noise_state = signal.lfilter(
-                [1.0], [1.0, -self._correlation], shocks, zi=self._noise_state
-            )
-            noise += coloured
+            noise += apply_filter(*self._noise_filter, shocks, self._noise_state)
         return noise
 
     def _discard_used(self) -> None:
@@ -167,8 +159,16 @@ class ChannelStream:
         self._true_values, self._first = self._true_values[first - self._first :], first
 
 
-def _quantise(value: Array, sensor: Sensor) -> Array:
-    """Return the value saturated at the limit and rounded to the converter's steps."""
-    if sensor.limit is not None:
-        value = np.minimum(np.maximum(value, -sensor.limit), sensor.limit)
-    return np.round(value / sensor.resolution) * sensor.resolution if sensor.resolution else value
+def _make_constants(model: SamplingModel, sensor: Sensor, errors: ChannelErrors) -> ReadingConstants:
+    return ReadingConstants(
+        delay=float(sensor.delay),
+        hidden_delay=float(model.hidden_delay),
+        offset=float(errors.offset),
+        drift=float(errors.drift),
+        phase=float(errors.phase),
+        gain=1.0 + sensor.gain_error,
+        zero=float(errors.zero),
+        zero_drift=float(sensor.drift),
+        limit=math.inf if sensor.limit is None else float(sensor.limit),
+        resolution=float(sensor.resolution),
+    )

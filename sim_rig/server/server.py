@@ -25,6 +25,8 @@ from sim_rig.server.bench_toml import TomlSection, Wire
 
 _SYNC_ID = 0x80
 """CAN identifier of the SYNC frame."""
+_MODBUS_POLL = 0.05
+"""[s] between two turns of a Modbus server without requests; its instrument does not depend on them."""
 _MAX_UPTIME_NS = 3_600_000_000_000
 """[ns] largest time for which an instrument was switched on before the rig's clock began."""
 
@@ -56,6 +58,10 @@ class SyncLine:
 
     def tick(self, now_ns: int) -> None:
         """Do nothing: the line has no time-driven behaviour."""
+
+    def acts_by_itself(self, now_ns: int) -> bool:
+        """Return False: the line only listens."""
+        return False
 
 
 class RigServer:
@@ -128,11 +134,11 @@ class RigServer:
     def _serve_amplifier(self) -> CoilAmplifierDevice:
         unit = self._scenario.drive_unit
         device = CoilAmplifierDevice(self.rig, self._make_clock("coil_amplifier"), unit)
-        # Also advanced by the plant's thread, as its output changes between two requests.
+        # Advanced by the plant's thread, as its output changes between two requests.
         self._serve_modbus(
             "coil_amplifier", cast("ModbusDevice", device), mode="voltage" if unit == "V" else "current"
         )
-        self.rig.periodic_tasks = [device.advance]
+        self.rig.periodic_tasks = [device.follow_time]
         return device
 
     def _serve_lvdt(self) -> None:
@@ -141,14 +147,14 @@ class RigServer:
             return self._serve_modbus("lvdt", device)
         document = load_wire_file("lvdt")
         line = {name: document["serial"][name] for name in ("baud", "parity", "stop_bits")}
-        server = ModbusServer(device, document["unit"], baud=line["baud"]).listen_pty()
+        server = ModbusServer(device, document["unit"], baud=line["baud"], poll=_MODBUS_POLL).listen_pty()
         self._resources.enter_context(server)
         self._add_wire("lvdt", "Modbus RTU on a pty", {"url": server.address, "unit": document["unit"], **line})
         return None
 
     def _serve_modbus(self, name: str, device: ModbusDevice, **settings: str) -> None:
         unit: int = load_wire_file(name)["unit"]
-        server = ModbusServer(device, unit, MBAP).listen()
+        server = ModbusServer(device, unit, MBAP, poll=_MODBUS_POLL).listen()
         self._resources.enter_context(server)
         url = self._insert_fault_proxy(name, server.address)
         self._add_wire(name, "Modbus TCP", {"url": url, "unit": unit, **settings})

@@ -30,7 +30,10 @@ def trial(
         ),
     ] = None,
 ) -> None:
-    """Test the diagnosis on sealed scenarios with alternative forms of effects; a killed trial continues."""
+    """Test the diagnosis on scenarios whose truth is sealed.
+
+    The effects have other forms than in the library. A trial that was killed continues.
+    """
     from sim_rig.trial.cases import TrialFolder
     from sim_rig.trial.execution import DIAGNOSE, TrialOptions, prepare_truth, run_cases
     from sim_rig.trial.progress import show_progress_bars

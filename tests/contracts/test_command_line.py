@@ -30,6 +30,7 @@ def test_help_lists_all_commands_with_descriptions(tmp_path):
     listed = mrbench("--help", folder=tmp_path).stdout.partition("Commands:")[2].splitlines()
     assert [line.split()[0] for line in listed if line.strip()] == COMMANDS
     assert all(len(line.split()) > 3 for line in listed if line.strip())
+    assert not [line for line in listed if line.endswith("...")], "a description is cut off"
 
 
 def test_help_imports_no_heavy_package():

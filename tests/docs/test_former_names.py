@@ -15,7 +15,7 @@ MODELS = (
     "identification.pinn.common.settings",
     "sim_rig.scenario",
     "sim_rig.trial.cases",
-    "sim_rig.trial.scoring.answer",
+    "sim_rig.trial.scoring.trial_report",
 )
 PRODUCT = {"bench", "identification", "sim_rig"}
 RECORDS = ("docs/evidence/", "docs/decisions/")

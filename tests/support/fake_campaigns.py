@@ -43,6 +43,7 @@ from bench.service.routes.campaigns.views import (
     make_summary,
 )
 
+UNAPPROVED = "the campaign requires approved methods; not approved: quick"
 STARTED = datetime(2025, 3, 4, 20, tzinfo=UTC).timestamp()
 NIGHT = {
     "name": "night",
@@ -199,7 +200,9 @@ def campaign_routes(campaigns: FakeCampaigns) -> APIRouter:
             return refuse(error)
 
     @router.post("", status_code=201)
-    async def start(wanted: StartCampaignRequest) -> CampaignView:
+    async def start(wanted: StartCampaignRequest) -> Any:
+        if wanted.campaign.get("methods") == "approved":
+            return refuse(CampaignError(UNAPPROVED))
         made = FakeCampaign("morning-1", wanted.campaign, wanted.operator)
         campaigns.known = {made.id: made, **campaigns.known}
         return made.proceed()

@@ -1,4 +1,4 @@
-"""Certificates of the fake service: the routes and the store of the service itself, and intervals of its fit."""
+"""Certificates and checks of the fake service: routes and stores of the service itself, intervals of its fit."""
 
 import json
 from datetime import UTC, datetime
@@ -14,8 +14,9 @@ from bench.calibration import GAIN_FORMULA, combine_estimates, make_log_text, pa
 from bench.catalogue import CertificateStore, IdempotencyKeys
 from bench.catalogue.models import Base
 from bench.service.problems import install_handlers
-from bench.service.routes.planning.certificates import router
+from bench.service.routes.planning import certificates, checks
 from tests.support.certificates import issue_certificate, make_certificate, shift
+from tests.support.fake_checks import describe_bench, fill_checks
 
 _TABLE = {"points": [{"reference": 0.0, "indicated": 0.0}, {"reference": 0.05, "indicated": 0.04997}]}
 _STORED = (
@@ -29,16 +30,20 @@ _STORED = (
 
 
 def add_certificate_routes(app: FastAPI, fit: Path) -> None:
-    """Add the routes of certificates, with one certificate in each usual state, and of the intervals of a fit."""
+    """Add the routes of certificates and checks with some in each usual state, and of the intervals of a fit."""
     engine = create_engine("sqlite://", poolclass=StaticPool, connect_args={"check_same_thread": False})
     Base.metadata.create_all(engine)
     store = CertificateStore(engine)
     for document in _STORED:
         store.add(parse_certificate(document, "fake"), "user:mcurie")
-    catalogue = SimpleNamespace(certificates=store, idempotency_keys=IdempotencyKeys(engine))
-    app.state.context = SimpleNamespace(catalogue=catalogue, key_locks=WeakValueDictionary())
+    catalogue = SimpleNamespace(
+        certificates=store, checks=fill_checks(engine), idempotency_keys=IdempotencyKeys(engine)
+    )
+    monitor = SimpleNamespace(describe_bench=describe_bench)
+    app.state.context = SimpleNamespace(catalogue=catalogue, monitor=monitor, key_locks=WeakValueDictionary())
     install_handlers(app)
-    app.include_router(router, prefix="/api/v1")
+    for router in (certificates.router, checks.router):
+        app.include_router(router, prefix="/api/v1")
     app.include_router(_fit_routes(json.loads(fit.read_text("utf-8"))), prefix="/api/v1")
 
 

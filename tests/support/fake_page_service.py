@@ -25,7 +25,8 @@ from tests.support.fake_certificates import add_certificate_routes
 from tests.support.fake_comparison import comparison_routes
 from tests.support.fake_people import COOKIE, TOKEN, FakePeople, people_routes
 from tests.support.fake_recording import recording_routes
-from tests.support.fake_results import Records, analysis_routes, make_summary, record_routes
+from tests.support.fake_results import MADE, Records, analysis_routes, make_summary, record_routes
+from tests.support.fake_signatures import FakeTrail, add_audit_routes, signature_routes
 from tests.support.fake_specimens import add_history, specimen_routes
 
 STATIC = Path(__file__).parents[2] / "bench" / "web" / "static"
@@ -63,6 +64,8 @@ METHODS = [
         "obstacle": "",
         "sha256": HASH,
         "created": None,
+        "approved": None,
+        "approved_by": "",
     }
     for name, title, duration in (
         ("identification", "Strokes for an identification", 162.0),
@@ -115,7 +118,7 @@ def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
         "ending": None, "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None,
         "noise_floor_n": None, "result": "", "jobs": [], "continues": None, "log_sha256": None, "integrity": None,
-        "lost": {}, "alarms": [], "calibration_overdue": [],
+        "lost": {}, "alarms": [], "calibration_overdue": [], "failed_checks": [],
         "tags": [], "trashed": None, "method_version": None, "method_sha256": None,
         "log_bytes": None,
         "diagnosis": None,
@@ -163,7 +166,8 @@ class FakeBench:
             "run-0": run(0, None, state="truncated", duration_s=None, reason="the log has no end"),
         }  # fmt: skip
         self.records = Records(self.runs)
-        self.people = FakePeople()
+        self.people, self.trail = FakePeople(), FakeTrail()
+        self.approvals: dict[tuple[str, int], dict[str, Any]] = {}
         self.began, self.began_utc = time.monotonic(), time.time()
 
     def status(self) -> dict[str, Any]:
@@ -261,10 +265,13 @@ def application(bench: FakeBench) -> FastAPI:
         record_routes(bench.records, problem),
         campaign_routes(FakeCampaigns()),
         people_routes(bench.people, problem),
+        signature_routes(bench.people, bench.trail, problem),
+        approval_routes(bench),
     )
     for other in others:
         app.include_router(other, prefix="/api/v1")
     add_certificate_routes(app, FIT)
+    add_audit_routes(app, bench.trail)
     app.mount("/", StaticFiles(directory=STATIC, html=True))
     return app
 
@@ -334,7 +341,7 @@ def method_routes(bench: FakeBench) -> APIRouter:
 
     @router.get("")
     async def methods() -> Any:
-        return {"items": METHODS, "next": None}
+        return {"items": [one | bench.approvals.get((one["name"], 1), {}) for one in METHODS], "next": None}
 
     @router.get("/{name}")
     @router.get("/{name}/{version:int}")
@@ -370,6 +377,33 @@ def method_routes(bench: FakeBench) -> APIRouter:
         length = compile_method(found).duration
         known = {"name": found.name, "title": found.title, "duration_s": length}
         return METHODS[-1] | known | {"version": 2, "source": "stored"}
+
+    return router
+
+
+def approval_routes(bench: FakeBench) -> APIRouter:
+    """Create the routes of versions and their approvals; each method has its included version and a stored one."""
+    router = APIRouter(prefix="/methods/{name}")
+
+    def show(name: str, version: int) -> dict[str, Any]:
+        stored = {"source": "stored", "created": "2025-03-04T10:00:00Z"} if version > 1 else {}
+        return METHODS[-1] | stored | {"name": name, "version": version} | bench.approvals.get((name, version), {})
+
+    @router.get("/versions")
+    async def versions(name: str) -> Any:
+        return {"items": [show(name, 2), show(name, 1)]}
+
+    @router.post("/{version:int}/approval")
+    async def approve(name: str, version: int, request: Request) -> Any:
+        own = bench.people.identify(request)
+        assert own is not None
+        bench.approvals[name, version] = {"approved": MADE.isoformat(), "approved_by": own["person"]["full_name"]}
+        return show(name, version)
+
+    @router.delete("/{version:int}/approval")
+    async def withdraw(name: str, version: int) -> Any:
+        bench.approvals.pop((name, version), None)
+        return show(name, version)
 
     return router
 

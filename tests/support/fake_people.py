@@ -18,10 +18,12 @@ FAILURES = 3
 ROLES = ("viewer", "technician", "engineer", "administrator")
 ADDED = {
     "viewer": ("view", "stop"),
-    "technician": ("operate", "analyse"),
+    "technician": ("operate", "analyse", "sign_reports"),
     "engineer": ("reset_trip", "manage_methods", "approve_methods", "change_limits", "manage_runs"),
     "administrator": ("administer",),
 }
+EXTERNAL = {"name": "wpauli", "full_name": "Wolfgang Pauli", "role": "technician", "password": ""}
+"""Person of an identity provider; the fake one does not sign in."""
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 3 3"><path d="M0 0h1v1H0zM2 0h1v1H2zM1 1h1v2H1z"/></svg>'
 )
@@ -56,6 +58,8 @@ class FakePeople:
             ("vguest", "Visiting Guest", "viewer"),
         ):
             self.add_user({"name": name, "full_name": full_name, "role": role, "password": PASSWORD})
+        self.add_user(EXTERNAL)
+        self.users["wpauli"] |= {"external": True, "has_password": False}
         self.add_token({"label": "nightly export", "role": "viewer", "expires_in_days": 90}, "user:mcurie")
         self.tokens["t-1"]["last_used"] = utc(-3600)
 
@@ -66,7 +70,7 @@ class FakePeople:
         self.users[name] = {
             "name": name, "full_name": wanted["full_name"], "role": wanted["role"], "extra_rights": extra,
             "rights": rights_of(wanted["role"], extra), "disabled": False, "has_password": True, "created": utc(),
-            "last_seen": None, "locked_until": None, "revision": 1,
+            "last_seen": None, "locked_until": None, "revision": 1, "external": False,
         }  # fmt: skip
         return self.users[name]
 
@@ -194,6 +198,8 @@ def add_user_routes(router: APIRouter, people: FakePeople, problem: Problem) -> 
     @router.patch("/users/{name}")
     async def change(name: str, wanted: dict[str, Any], request: Request) -> Any:
         user, own = people.users[name], people.identify(request)
+        if user["external"] and {"role", "full_name", "password"} & wanted.keys():
+            return problem(409, "The provider administers this user", f"user {name} signs in by the provider")
         is_own = own is not None and own["person"]["name"] == name and "password" in wanted
         if is_own and wanted.get("current_password") != people.passwords[name]:
             return problem(403, "The present password is wrong", "give the present password", "wrong-password")

@@ -32,6 +32,7 @@ class FakeAgent:
         self.reachable = True
         self.refuses = ""
         self.overdue = ()
+        self.failed_checks = ()
         self.commands = []
         self.defect = None
         self.audit = AuditPage(chain="", before="", lines=())
@@ -115,6 +116,7 @@ class FakeAgent:
             started=f"2026-03-0{number}T10:00:00+00:00",
             duration_s=23.1,
             calibration_overdue=self.overdue,
+            failed_checks=self.failed_checks,
         )
         self._set(state="running", run=run)
 

@@ -120,9 +120,9 @@ def raised_priority():
 
 
 @contextlib.contextmanager
-def live_bench(folder, choices=TCP, faults=None, limits=""):
-    """Serve a rig on its wires."""
-    scenario = load_scenario("default")
+def live_bench(folder, choices=TCP, faults=None, limits="", scenario=None):
+    """Serve a rig on its wires; it plays the default scenario unless another one is given."""
+    scenario = scenario or load_scenario("default")
     with raised_priority(), RigServer(scenario, RunningClock(), choices, faults) as served:
         until(lambda: len(served.rig.read_truth().truth.output) > 500)
         write_bench_toml(folder / "bench.toml", served.wires, scenario)

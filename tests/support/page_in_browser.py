@@ -39,7 +39,8 @@ def operate_page(bench: FakeBench, script: str) -> dict[str, Any]:
     """Run a script of `tests/system/javascript` on the page of a fake bench; return what it has seen."""
     with served(bench) as address:
         command = [str(NODE), str(FOLDER / script), address, TOKEN, str(CHROMIUM)]
-        result = subprocess.run(command, capture_output=True, text=True, timeout=180, check=False)
+        # Less than the time limit of a test, so that what the browser has printed is still shown.
+        result = subprocess.run(command, capture_output=True, text=True, timeout=280, check=False)
     assert result.returncode == 0, result.stderr
     seen: dict[str, Any] = json.loads(result.stdout)
     return seen

@@ -30,7 +30,7 @@ def columns():
     }
 
 
-def write_log(path, outcome="clean", specimen="damper 7", calibration=None):
+def write_log(path, outcome="clean", specimen="damper 7", calibration=None, checks=None):
     found = columns()
     time_ns = np.round(found["time"] * 1e9).astype(np.int64)
     header = RunHeader(
@@ -43,6 +43,7 @@ def write_log(path, outcome="clean", specimen="damper 7", calibration=None):
         utc_offset="2026-05-04T03:02:01+00:00",
         versions={"mrbench": "0.1.0"},
         calibration=calibration or {},
+        checks=checks or {},
         channels={"force": ChannelInfo(unit="N", rate_hz=1000.0, delay_s=0.001)},
     )
     samples = {name: found[name] for name in ("displacement", "velocity", "force")} | {

@@ -30,6 +30,8 @@ pytestmark = [pytest.mark.wire, pytest.mark.timeout(240)]
 
 SIZE = 120_000_000
 """[byte] Size of the disk: the reserve, and room for the estimated log."""
+ROOM_OF_TRAIL = 10_000_000
+"""[byte] Room that suffices for the audit trail and not for a log."""
 
 
 @pytest.fixture
@@ -83,7 +85,11 @@ def test_full_disk_ends_a_run_in_order_and_refuses_the_next(tmp_path, disk):
         until(bench.rests)
         refused = agent.send(RunCommand(method=method(), log=str(disk / "next.mcap")))
         assert not refused.ok
-        assert "0.000 GB free, but the log of this run needs up to" in refused.error
+        assert "0 bytes are free for the audit trail" in refused.error
+        os.truncate(disk / "other", (disk / "other").stat().st_size - ROOM_OF_TRAIL)
+        refused = agent.send(RunCommand(method=method(), log=str(disk / "next.mcap")))
+        assert not refused.ok
+        assert "GB free, but the log of this run needs up to" in refused.error
         assert not (disk / "next.mcap").exists()
         (disk / "other").unlink()
         assert agent.send(RunCommand(method=method(), log=str(disk / "next.mcap"))).ok

@@ -5,7 +5,7 @@ import re
 import pytest
 
 from bench.campaigns import CampaignView
-from tests.support.fake_campaigns import RESULT, FakeCampaigns
+from tests.support.fake_campaigns import RESULT, UNAPPROVED, FakeCampaigns
 from tests.support.fake_page_service import FakeBench
 from tests.support.page_in_browser import browser_test, operate_page
 
@@ -20,6 +20,11 @@ def test_the_documents_of_the_fake_service_are_those_of_the_service():
     for one in FakeCampaigns().known.values():
         document = one.view().model_dump(mode="json")
         assert CampaignView.model_validate(document).id == one.id
+
+
+@browser_test
+def test_a_campaign_that_requires_approved_methods_says_which_one_is_not(seen):
+    assert seen["unapproved"] == f"Not started: {UNAPPROVED}."
 
 
 @browser_test

@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from bench.audit import find_signatures
 from tests.support.fake_page_service import FakeBench
 from tests.support.page_in_browser import browser_test, operate_page
 
@@ -25,7 +26,7 @@ def seen(bench):
 def test_no_dialog_and_no_view_has_a_finding(seen):
     assert seen["errors"] == []
     assert {name: found for name, found in seen["findings"].items() if found} == {}
-    assert len(seen["findings"]) == 8
+    assert len(seen["findings"]) == 13
 
 
 @browser_test
@@ -99,6 +100,66 @@ def test_an_administrator_adds_changes_and_disables_people(seen, bench):
     assert "disabled" in people["Lise"]
     assert bench.people.passwords["enoether"] == "conserved quantity"
     assert "mcurie is the last administrator" in seen["lastAdministrator"]
+
+
+@browser_test
+def test_what_the_identity_provider_gives_is_not_offered_as_a_field(seen, bench):
+    assert "wpauli, of the identity provider" in seen["external"]
+    assert "by the identity provider only" in seen["external"]
+    assert "Set password" not in seen["external"]
+    hidden = ("Full name", "Role", "Name for signing in", "Password")
+    assert not any(label.startswith(hidden) for label in seen["externalFields"])
+    assert "Full name, role and password come from there" in seen["externalWords"]
+    changes = [json.loads(body) for path, body in bench.posted if path == "users/wpauli"]
+    assert changes == [{"extra_rights": ["manage_methods"]}]
+
+
+@browser_test
+def test_a_version_of_a_method_is_approved_after_a_question_and_the_approval_is_withdrawn(seen):
+    newest, included = (row.split("\t") for row in seen["approved"])
+    assert newest[0] == "version 2"
+    assert re.match(r"approved\s+by Marie Curie, 2025-03-04 \d\d:20:00 UTC", newest[2].strip())
+    assert included[:3] == ["version 1", "included in mrbench", "not approved"]
+    assert [row.split("\t")[2].strip() for row in seen["withdrawn"]] == ["not approved"] * 2
+    assert "Campaigns in progress keep their methods." in seen["approvalQuestion"]
+
+
+@browser_test
+def test_a_person_reads_a_report_and_signs_exactly_that_file(seen, bench):
+    (before,) = seen["signedBefore"]
+    assert "Emmy Noether" in before
+    assert "Newer results exist; this report does not contain them." in before
+    sha256 = seen["toBeSigned"].removeprefix("SHA-256 ")
+    assert sha256 in seen["signDialog"]
+    assert "You sign as Marie Curie." in seen["signDialog"]
+    assert seen["wrongSignature"] == "Not signed: give the present password."
+    assert re.fullmatch(r"Signed: approved\. It is entry \d+ of the audit trail\.", seen["signed"])
+    after = seen["signedAfter"][1]
+    assert all(words in after for words in ("Marie Curie", "approved", sha256, "as signed"))
+    assert re.search(r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d UTC", after)
+    (entry,) = find_signatures(bench.trail.path, sha256)
+    assert entry.new["meaning"] == "approved"
+
+
+@browser_test
+def test_the_audit_trail_is_read_searched_verified_and_exported(seen):
+    assert len(seen["trail"]) == 50
+    signature, stop, refused, change = (row.split("\t") for row in seen["trail"][:4])
+    assert signature[3].startswith("report signed")
+    assert "entry 2 of the rig agent's own trail, sent by account rig, process 4711" in stop[3]
+    assert "from local" in stop[2]
+    assert refused[6] == "403 Visiting Guest (viewer) lacks the right operate"
+    assert change[2].startswith("user:mcurie")
+    assert "MR-0042" in change[3]
+    assert [value.strip() for value in change[4:6]] == ["limits", "limits"]
+    assert seen["wholeTrail"] == 65
+    assert seen["verified"].startswith("Nothing was altered in 65 entries; 1 of them are imported")
+    assert seen["exported"] == "audit-65.csv"
+    (row,), address = seen["found"]
+    assert "report signed" in row
+    conditions = r"actor=user%3Amcurie&action=report\+signed&from=2025-03-0\dT\d\d%3A00%3A00\.000Z"
+    assert re.fullmatch(rf"#/audit\?{conditions}", address)
+    assert seen["kept"] == ["2025-03-05T08:00", "user:mcurie"]
 
 
 @browser_test

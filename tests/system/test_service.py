@@ -108,6 +108,15 @@ def find_job_processes(data):
     return [pid for pid in found if is_running(pid)]
 
 
+def wait_for_job_processes(data):
+    """Return the ids of the processes of a job; between two of its commands there is none."""
+    deadline = time.monotonic() + DEADLINE
+    while not (found := find_job_processes(data)):
+        assert time.monotonic() < deadline, "the job started no command"
+        time.sleep(0.02)
+    return found
+
+
 def wait_until_false(condition, message):
     deadline = time.monotonic() + DEADLINE
     while condition():
@@ -173,8 +182,7 @@ def check_diagnosis(service, data):
 
 def test_a_job_succeeds_after_its_worker_was_killed_and_its_run_is_diagnosed(served, data):
     served.wait_for_job(is_identifying)
-    worker, commands = served.find_worker(), find_job_processes(data)
-    assert commands
+    worker, commands = served.find_worker(), wait_for_job_processes(data)
     os.kill(worker, signal.SIGKILL)
     wait_until_false(lambda: any(map(is_running, commands)), "commands of the killed worker still run")
     job = served.wait_for_job(has_ended)
@@ -188,7 +196,7 @@ def test_a_job_succeeds_after_its_worker_was_killed_and_its_run_is_diagnosed(ser
 
 def test_a_job_succeeds_after_the_service_was_killed(served, data):
     job = served.wait_for_job(is_identifying)
-    worker, commands = served.find_worker(), find_job_processes(data)
+    worker, commands = served.find_worker(), wait_for_job_processes(data)
     served.kill()
     wait_until_false(
         lambda: any(map(is_running, [worker, *commands])), "processes of the killed service still run"
@@ -204,8 +212,7 @@ def test_a_job_succeeds_after_the_service_was_killed(served, data):
 
 def test_cancel_stops_the_process_and_leaves_no_files(served, data):
     job = served.wait_for_job(is_identifying)
-    commands = find_job_processes(data)
-    assert commands
+    commands = wait_for_job_processes(data)
     served.call(f"jobs/{job['id']}/cancel", "POST")
     assert served.wait_for_job(has_ended)["state"] == "cancelled"
     wait_until_false(lambda: any(map(is_running, commands)), "a cancelled command still runs")
@@ -215,7 +222,7 @@ def test_cancel_stops_the_process_and_leaves_no_files(served, data):
 
 def test_an_interrupt_ends_the_service_and_its_worker(served, data):
     served.wait_for_job(is_identifying)
-    worker, commands = served.find_worker(), find_job_processes(data)
+    worker, commands = served.find_worker(), wait_for_job_processes(data)
     assert served.end() == 0
     wait_until_false(lambda: any(map(is_running, [worker, *commands])), "processes of the service still run")
 
@@ -225,4 +232,4 @@ def test_a_second_service_on_the_same_folder_is_refused(served, data):
     second = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert second.returncode == 1
     assert "another service uses" in second.stderr
-    assert served.call("health")["worker"] == "ok"
+    wait_until_false(lambda: served.call("health")["worker"] != "ok", "the first service has no worker")

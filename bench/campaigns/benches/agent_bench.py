@@ -123,7 +123,7 @@ class AgentBench:
         return time.time()
 
     def recover(self, campaign: StoredCampaign) -> ExecutionReport | None:
-        """Return what the agent or the log tells of the active run."""
+        """Return the state of the active run, from the agent or from its log."""
         return self._report(campaign)
 
     def observe(self, campaign: StoredCampaign) -> Observation:
@@ -154,6 +154,7 @@ class AgentBench:
             resume_after=execution.resume_after,
             continues=execution.continues,
             certificates=tuple(self._catalogue.certificates.list_current(datetime.now(UTC).date()).values()),
+            checks=self._catalogue.checks.list_latest(),
             log=str(path),
         )
         status = self._agent.send_command(command)

@@ -17,7 +17,7 @@ from bench.campaigns.document import (
 from bench.campaigns.engine.state import CampaignState, ParameterResult, RunFact, RunResult
 
 MIN_DRIFT_RUNS = 2
-"""Smallest number of runs of one kind of which a drift can be told."""
+"""Smallest number of runs of one kind for which a drift can be computed."""
 
 
 def needs_thermometer(steps: Iterable[Step]) -> bool:

@@ -1,7 +1,7 @@
 """State machine of a campaign: a pure function of state, observation and time.
 
 `advance` makes at most one transition for each call. The executor of a campaign stores the new state before it
-acts, so that a process that is killed at any moment finds where to continue.
+acts. A process that was killed at any moment thus finds where to continue.
 """
 
 from bench.campaigns.document import PromptStep, RestStep, WarmUpStep

@@ -1,7 +1,8 @@
-"""Planning in the catalogue: specimens, methods and their approvals, certificates, keys of requests."""
+"""Planning in the catalogue: specimens, methods, their approvals, certificates, checks, keys of requests."""
 
 from bench.catalogue.planning.approvals import ApprovalRow, ApprovalStore
 from bench.catalogue.planning.certificates import CertificateStore, StoredCertificate, find_stored_state
+from bench.catalogue.planning.checks import CheckStore
 from bench.catalogue.planning.idempotency import ClaimedKey, IdempotencyKeys
 from bench.catalogue.planning.methods import SHIPPED_VERSION, MethodRow, MethodStore
 from bench.catalogue.planning.specimens import Specimen, SpecimenStore
@@ -11,6 +12,7 @@ __all__ = [
     "ApprovalRow",
     "ApprovalStore",
     "CertificateStore",
+    "CheckStore",
     "ClaimedKey",
     "IdempotencyKeys",
     "MethodRow",

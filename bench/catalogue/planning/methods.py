@@ -84,6 +84,12 @@ class MethodStore:
         with self._sessions() as session:
             return session.scalars(query.limit(1)).first()
 
+    def list_versions(self, name: str) -> Sequence[MethodRow]:
+        """Return the stored versions of a name, the newest first."""
+        query = select(MethodRow).where(MethodRow.name == name).order_by(MethodRow.version.desc())
+        with self._sessions() as session:
+            return session.scalars(query).all()
+
     def list_newest(self) -> Sequence[MethodRow]:
         """Return the newest version of each stored name, in the order of the names."""
         newest = select(MethodRow.name, func.max(MethodRow.version).label("version")).group_by(MethodRow.name)

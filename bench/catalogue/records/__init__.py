@@ -1,7 +1,17 @@
-"""Records that are kept beside the logs: notes, tags and events."""
+"""Records that are kept beside the logs: notes, tags, events, and signatures of reports."""
 
 from bench.catalogue.records.event_journal import EventJournal
 from bench.catalogue.records.log_events import LogEvent, read_log_events
 from bench.catalogue.records.notebook import Notebook
+from bench.catalogue.records.report_signatures import ReportKind, SignatureMeaning, SignatureRow, SignatureStore
 
-__all__ = ["EventJournal", "LogEvent", "Notebook", "read_log_events"]
+__all__ = [
+    "EventJournal",
+    "LogEvent",
+    "Notebook",
+    "ReportKind",
+    "SignatureMeaning",
+    "SignatureRow",
+    "SignatureStore",
+    "read_log_events",
+]

@@ -34,23 +34,35 @@ def audit(
         Path | None,
         typer.Option(metavar="FILE", help="With verify: also the own trail of the rig agent of this bench.toml."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            exists=True,
+            dir_okay=False,
+            help="With verify: report whose signatures are listed; exits with status 1 if it has none.",
+        ),
+    ] = None,
     out: Annotated[
         str, typer.Option(metavar="FILE", help="With export: file to write, .json or .csv; - prints JSON.")
     ] = "",
 ) -> None:
-    """Verify or export the record of who did what; the service may run meanwhile.
+    """Verify or export the record of who did what.
 
-    Exits with status 1 if an entry was changed, inserted, removed or exchanged, and names the first one.
+    The service may run meanwhile. Exits with status 1 if an entry was changed, inserted, removed or exchanged, and
+    names the first one.
     """
     if (action is Action.EXPORT) != bool(out):
         raise typer.BadParameter("export needs --out FILE, and no other action takes it")
-    if action is not Action.VERIFY and (head or config):
-        raise typer.BadParameter("--head and --config belong to verify")
+    if action is not Action.VERIFY and (head or config or report):
+        raise typer.BadParameter("--head, --config and --report belong to verify")
     from bench.audit import AUDIT_FILE, AuditChain
 
     path = data / AUDIT_FILE
     if action is Action.VERIFY:
         _verify(path, head, config)
+        if report is not None:
+            _list_signatures(path, report)
     elif action is Action.HEAD:
         typer.echo(str(AuditChain(path).get_head()))
     else:
@@ -74,6 +86,26 @@ def _verify(path: Path, head: str, config: Path | None) -> None:
     if fault:
         raise AuditError(f"{place}: the audit trail was altered: {fault}; compare it with a backup or an export")
     typer.echo("nothing was altered" + ("" if head else "; a missing end is found only with --head"))
+
+
+def _list_signatures(path: Path, report: Path) -> None:
+    """Print who has signed a file, from a trail that was verified."""
+    from bench.audit import find_signatures
+    from bench.catalogue import compute_sha256
+    from bench.errors import AuditError
+
+    sha256 = compute_sha256(report)
+    found = find_signatures(path, sha256)
+    if not found:
+        raise AuditError(
+            f"{report}: nobody has signed this file (SHA-256 {sha256}); give the file that was signed, not a "
+            "report that was made again"
+        )
+    for entry in found:
+        values = entry.new
+        person = f"{values['full_name']} ({entry.actor}, {values['role']})"
+        typer.echo(f"signed as {values['meaning']} by {person} at {entry.utc}, entry {entry.seq}")
+    typer.echo(f"{report}: SHA-256 {sha256}, report on {found[-1].new['report']} {found[-1].target}")
 
 
 def _read_head(text: str) -> "Head":

@@ -19,10 +19,10 @@ def restore(
         ),
     ] = None,
 ) -> None:
-    """Copy a backup to a new data folder, for `mrbench serve --data`; nothing is overwritten.
+    """Copy a backup to a new data folder.
 
-    `pg_restore` writes a catalogue of PostgreSQL, all of it or nothing. `mrbench verify` then compares all logs
-    with the hashes of their recording.
+    It is for `mrbench serve --data`; nothing is overwritten. `pg_restore` writes a catalogue of PostgreSQL, all of
+    it or nothing. `mrbench verify` then compares all logs with the hashes of their recording.
     """
     from bench.catalogue import restore_backup
 

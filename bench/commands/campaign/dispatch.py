@@ -65,9 +65,10 @@ def campaign(
         bool, typer.Option("--new", help="With run: start again, also if the campaign is not finished.")
     ] = False,
 ) -> None:
-    """Plan, run, control and report campaigns: ordered runs with rests and conditions between them.
+    """Plan, run, control and report campaigns.
 
-    A campaign that was interrupted continues with the same command: no finished run is repeated.
+    A campaign is a list of runs with rests and conditions between them. One that was interrupted continues with
+    the same command: no finished run is repeated.
     """
     as_json = out == "-"
     if action in (Action.PLAN, Action.RUN) and not target:

@@ -30,9 +30,10 @@ def certificate(
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
 ) -> None:
-    """Add, list and withdraw calibration certificates; the service may run meanwhile.
+    """Add, list and withdraw calibration certificates.
 
-    A file holds one document mrbench.certificate/1. A correction is made in the page or over REST.
+    The service may run meanwhile. A file holds one document mrbench.certificate/1. A correction is made in the
+    page or over REST.
     """
     if (action is Action.LIST) == bool(target):
         raise typer.BadParameter("give a FILE to add or an ID to withdraw; list takes neither")

@@ -27,9 +27,10 @@ def token(
     days: Annotated[int, typer.Option(min=1, max=366, help="With add: time until the token ends [days].")] = 30,
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
 ) -> None:
-    """Administer the tokens of programs, at the machine that keeps the data folder of the service.
+    """Administer the tokens of programs.
 
-    A new token is printed once; it is stored as a hash. A running service takes a change over within two seconds.
+    Run it on the machine with the data folder of the service. A new token is printed once; it is stored as a hash.
+    A running service takes a change over within two seconds.
     """
     from bench.agent_protocol import get_sender
     from bench.catalogue import open_catalogue

@@ -43,10 +43,10 @@ def user(
     ] = None,
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
 ) -> None:
-    """Administer the users of a service, at the machine that keeps its data folder.
+    """Administer the users of a service.
 
-    A password is asked for on a terminal, or read from the first line of the input. A running service takes a
-    change over within two seconds.
+    Run it on the machine with its data folder. A password is asked for on a terminal, or read from the first line
+    of the input. A running service takes a change over within two seconds.
     """
     if action is not UserAction.LIST and not name:
         raise typer.BadParameter("give the name of the user")

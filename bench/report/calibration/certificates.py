@@ -1,15 +1,17 @@
-"""Certificates that applied at the start of a run, and a warning for each overdue channel."""
+"""Certificates that applied at the start of a run; warnings for overdue channels and failed checks."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from bench.calibration import list_overdue, read_entry
+from bench.calibration import list_overdue, read_entry, read_failed
 from bench.log import Log
 from bench.report.summary import Finding
 from bench.report.values import format_percent, format_significant
 
 RECORD = "calibration"
 """Metadata record with the calibration by channel."""
+CHECKS_RECORD = "checks"
+"""Metadata record with the latest check by channel."""
 
 
 class CalibrationRow(NamedTuple):
@@ -25,8 +27,9 @@ class CalibrationRow(NamedTuple):
 
 
 def make_calibration_findings(log: Log) -> list[Finding]:
-    """Return a warning for each channel whose calibration was overdue at the start of the run."""
-    return [Finding("warning", f"{text}.") for text in list_overdue(log.metadata.get(RECORD, {}))]
+    """Return a warning for each channel whose calibration was overdue or whose check had failed at the start."""
+    overdue, failed = list_overdue(log.metadata.get(RECORD, {})), read_failed(log.metadata.get(CHECKS_RECORD, {}))
+    return [Finding("warning", f"{text}.") for text in (*overdue, *failed)]
 
 
 def make_calibration_rows(log: Log) -> list[CalibrationRow]:

@@ -36,7 +36,7 @@ ALGORITHMS: tuple[tuple[str, str, str], ...] = (
     (
         "probability of an effect",
         "1",
-        "Probability that the effect is at work, over all sets of effects compared.",
+        "Probability that the effect is active, over all sets of effects compared.",
     ),
 )
 """Term, unit and definition."""

@@ -39,6 +39,8 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /runs/{run_id}/notes": "operate",
     "POST /runs/{run_id}/restore": "manage_runs",
     "POST /runs/{run_id}/salvage": "manage_runs",
+    "POST /runs/{run_id}/report/copies": "sign_reports",
+    "POST /runs/{run_id}/report/signatures": "sign_reports",
     "POST /batches": "analyse",
     "POST /jobs/{job_id}/cancel": "analyse",
     "POST /jobs/{job_id}/retry": "analyse",
@@ -51,6 +53,7 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /certificates": "change_limits",
     "PATCH /certificates/{certificate_id}": "change_limits",
     "DELETE /certificates/{certificate_id}": "change_limits",
+    "POST /checks/{channel}/baseline": "change_limits",
     "POST /specimens": "operate",
     "PATCH /specimens/{serial:path}": "operate",
     "POST /specimens/{serial:path}/trend": "analyse",
@@ -62,6 +65,8 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "POST /campaigns/{campaign_id}/resume": "operate",
     "POST /campaigns/{campaign_id}/stop": "stop",
     "POST /campaigns/{campaign_id}/test-message": "operate",
+    "POST /campaigns/{campaign_id}/report/copies": "sign_reports",
+    "POST /campaigns/{campaign_id}/report/signatures": "sign_reports",
     "PATCH /queue": "operate",
 }
 """Right by method and path; other operations that read need `view`, other ones that change need `administer`."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Final
 
-from bench.audit import AUDIT_FILE, Act, AuditWriter, Head, verify_chain
+from bench.audit import AUDIT_FILE, Act, AuditEntry, AuditWriter, Head, verify_chain
 from bench.errors import AuditError
 from bench.service.audit.agent_import import AgentImport, SendFunction
 
@@ -61,6 +61,20 @@ class AuditTrail:
         """Write an act as soon as possible; never waits."""
         if not self._is_one_too_many(act):
             self._writer.record(act)
+
+    def write_now(self, act: Act) -> AuditEntry:
+        """Write an act, and return its entry once it is on the disk; called in a thread.
+
+        Raises:
+            AuditError: it was not written within the time limit; it may be written later.
+        """
+        try:
+            return self._writer.record(act).result(WRITE_TIMEOUT)
+        except FutureTimeoutError:
+            raise AuditError(
+                f"{self.path}: the disk has not taken an entry of the audit trail within {WRITE_TIMEOUT:g} s; "
+                "check the disk, and look there before you repeat the request"
+            ) from None
 
     async def write(self, act: Act) -> None:
         """Write an act, and wait until it is on the disk, for a limited time."""

@@ -19,6 +19,7 @@ from bench.service.routes import (
     results,
     run_files,
     runs,
+    signing,
 )
 from bench.service.routes.unknown_paths import refuse_unknown_paths
 
@@ -37,6 +38,7 @@ PROTECTED_ROUTERS = (
     jobs.router,
     batches.router,
     *exchange.ROUTERS,
+    *signing.ROUTERS,
     *recordings.ROUTERS,
     *campaigns.ROUTERS,
     *analyses.ROUTERS,

@@ -1,9 +1,11 @@
 // Entry point: creates the parts of the page and distributes the messages of the service to them.
 
 import { Account } from "./account/account.js";
+import { AuditView } from "./account/audit_trail.js";
 import { get, readSession } from "./common/api.js";
 import { CampaignView } from "./campaigns/campaigns.js";
 import { CertificateView } from "./calibration/certificates.js";
+import { CheckView } from "./calibration/checks.js";
 import { CompareView } from "./compare/compare.js";
 import { EventList } from "./bench/events.js";
 import { byId, fixed, write } from "./common/format.js";
@@ -76,10 +78,17 @@ const campaigns = new CampaignView();
 const comparison = new CompareView();
 const people = new PeopleView();
 const tokens = new TokenView();
+const audit = new AuditView();
 const signIn = new SignIn({ onSignedIn: begin });
 new Account({ onProblem: (text) => bar.showDetail(text, true) });
 watchRights((reason) => bar.showDetail(reason, true));
 const certificates = new CertificateView();
+const checks = new CheckView({
+  onStarted: (run) => {
+    runs.update(run);
+    byId("stop").focus();
+  },
+});
 new UploadDialog({ onRun: (run) => runs.update(run) });
 const limits = new Limits();
 new Readings(ring, byId("readings"), STRIP_SECONDS, limits);
@@ -100,7 +109,11 @@ const router = new Router({
   campaigns: (address) => campaigns.show(address),
   people: () => people.show(),
   tokens: () => tokens.show(),
-  calibration: () => certificates.show(),
+  audit: (address) => audit.show(address),
+  calibration: (address) => {
+    certificates.show();
+    checks.show(address);
+  },
 });
 
 offerUnits(() => {
@@ -109,6 +122,7 @@ offerUnits(() => {
   specimen.relabel();
   runView.relabel();
   comparison.relabel();
+  checks.list();
 });
 
 let requesting = false;
@@ -133,7 +147,10 @@ const HANDLERS = {
     preparation.update(status);
   },
   event: (event) => events.add(event),
-  run: (run) => runs.update(run),
+  run: (run) => {
+    runs.update(run);
+    checks.update(run);
+  },
   job: (job) => {
     runs.updateJob(job);
     specimen.updateJob(job);

@@ -1,8 +1,8 @@
 """Compliance of the fixture: a spring between load cell and damper, in series with it.
 
 The damper lags the actuator by the spring's elongation, and its force depends on its own displacement and
-velocity. Both are solved together. A fixture of screws and plates hardens as its gaps close, gradually
-(``stiffening``) or all at once: a badly tightened joint is soft until its faces touch (``closing_joint``).
+velocity. Both are solved together. A fixture of screws and plates hardens as its gaps close. This is gradual
+(``stiffening``), or sudden where a badly tightened joint is soft until its faces touch (``closing_joint``).
 Compliance in front of the load cell is not part of this effect, because the displacement is measured behind it.
 """
 

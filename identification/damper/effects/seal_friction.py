@@ -2,8 +2,8 @@
 
 force = (F_c + F_s exp(-(v/v_s)²)) v / sqrt(v² + v_0²); the last factor is a smooth sign. With
 ``stribeck_exponential`` the peak falls as an exponential of the speed. A soft lip deflects before it slides
-(Dahl): with ``presliding`` the sign is replaced by the lip's deflection, a memory of the travel since the last
-reversal.
+(Dahl). With ``presliding`` the sign is replaced by the lip's deflection, which depends on the travel since the
+last reversal.
 """
 
 from typing import Any

@@ -1,8 +1,8 @@
 """Heating of the oil: the damper softens with the energy that it has dissipated.
 
 The energy leaves the damper with a time constant. The energy E that remains softens it by the factor 1 / (1 + s
-E). The yield force of the particles falls less with temperature than the viscosity of the oil: not at all
-(``viscosity_only``), as much (``uniform``), or in part (``partial``).
+E). The yield force of the particles falls less with temperature than the viscosity of the oil. It does not fall
+(``viscosity_only``), falls as much (``uniform``), or in part (``partial``).
 """
 
 from typing import Any

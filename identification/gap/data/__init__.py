@@ -1,6 +1,6 @@
 """Cycles of a recording, held-out samples, data quality, and the residual on them."""
 
-from identification.gap.data.correlation import compute_correlation_length
+from identification.gap.data.correlation import compute_correlation_length, compute_residual_correlation_length
 from identification.gap.data.cycles import Cycles, Indices, split_by_piece
 from identification.gap.data.evaluation import EvaluationData
 from identification.gap.data.quality import (
@@ -22,6 +22,7 @@ __all__ = [
     "check_sliding_recorded",
     "compute_correlation_length",
     "compute_harmonics",
+    "compute_residual_correlation_length",
     "describe_unobservable_effects",
     "estimate_drift",
     "map_gap",

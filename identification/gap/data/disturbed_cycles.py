@@ -61,8 +61,8 @@ def _describe_disturbed(jerks: Array, disturbed: BoolArray, limit: float) -> str
 def _drop_segment_ends(disturbed: BoolArray, cycles: Cycles) -> BoolArray:
     """Return the disturbed cycles (cycles,) without those that only contain the start or end of the stroke.
 
-    The first and the last cycle of a segment stay if a cycle between them is disturbed, or if the disturbance
-    continues from the segment before or into the next one.
+    The first and the last cycle of a segment stay if a cycle between them is disturbed. They also stay if the
+    disturbance continues from the segment before, or into the next one.
     """
     kept = disturbed.copy()
     for number in np.unique(cycles.segment[disturbed]):

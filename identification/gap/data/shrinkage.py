@@ -93,7 +93,7 @@ def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates
     With effects, two errors remain on another run:
 
     - The form error: the error of all cycles beyond noise and input noise. Fitted cycles count as well, because
-      two dozen parameters hide next to nothing of it and the held-out cycles are a small sample. It is never
+      two dozen parameters absorb hardly any of it and the held-out cycles are a small sample. It is never
       negative. It differs between strokes, the more so the fewer strokes were recorded. Segments and then cycles
       are resampled. Many strokes are a sample, whose mean holds for other strokes. Few strokes are not: on others
       the form error is larger on average. What differs is its part of the gap, which lies between none and all.
@@ -172,9 +172,9 @@ def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replica
 def _vary_part(part: Array, deviation: Array) -> Array:
     """Return parts of the gap [1] on other strokes, for deviations of their log odds.
 
-    A part cannot exceed the whole: a factor would let a third of the gap that remains become more than all of it.
-    A part above one, where the effects harm, stays as it is. To first order the mean is kept for many strokes,
-    which are a representative sample. For few strokes a small part is larger on average (decision 0014).
+    A part cannot exceed the whole. With a factor, a remaining third of the gap could become more than all of it. A
+    part above one, where the effects harm, stays as it is. To first order the mean is kept for many strokes, which
+    are a representative sample. For few strokes a small part is larger on average (decision 0014).
     """
     shift = 0.5 * _FORM_DEVIATION**2 * (1.0 - 2.0 * part)
     factor = np.exp(deviation - shift)

@@ -1,8 +1,9 @@
 """Basis of smooth curves over one variable, with independent coefficients of the same size.
 
 A curve is a cubic spline with a penalty on its roughness. The coefficients are rotated and scaled so that the
-penalty becomes their sum of squares (Eilers and Marx 1996 for the penalty; Wood 2017, 5.4, for the rotation). One
-prior deviation then sets smoothness and amplitude together. The amplitude hardly depends on the number of knots.
+penalty becomes their sum of squares. The penalty is that of Eilers and Marx (1996), the rotation that of Wood
+(2017, 5.4). One prior deviation then sets smoothness and amplitude together. The amplitude hardly depends on the
+number of knots.
 """
 
 from collections.abc import Mapping

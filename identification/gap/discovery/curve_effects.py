@@ -1,7 +1,7 @@
 """Curve effects: an unknown curve at each place, over each variable that can act there.
 
-The list follows the signal chain and not any known effect. A pair is left out where the recording cannot show it:
-a curve over a drive with fewer than three levels, or over a variable that does not vary.
+The list follows the signal chain and not any known effect. A pair is left out where the recording cannot show it.
+Examples are a curve over a drive with fewer than three levels, or over a variable that does not vary.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from identification.arrays import Array
 from identification.damper import Quantity
 from identification.damper.definitions import ACTIONS, STAGE_OF
 from identification.damper.effects import Effect, Form, Place, Variable
-from identification.fitting import EffectModel, Piece, Problem
+from identification.fitting import EffectModel, Piece, Problem, RecordingScales
 from identification.gap.discovery.curve_basis import (
     MAX_GROWTH,
     CurveFunction,
@@ -161,9 +161,9 @@ def collect_variables(pieces: Sequence[Piece], forces: Sequence[Array]) -> dict[
         stroke = piece.excitation
         damper = DamperVariables(stroke, stroke.displacement, stroke.velocity, stroke.acceleration)
         coil = make_coil_variables(stroke.sampled_drive, stroke.start, 1.0 / stroke.rate)
+        recorded = {"force": force, "drive_history": coil["drive_history"]}
         for name in names:
-            others = coil[name] if name == "drive_history" else damper[name] if name != "force" else force
-            tables[name].append(others)
+            tables[name].append(recorded[name] if name in recorded else damper[name])
     return {name: np.concatenate(parts) for name, parts in tables.items()}
 
 
@@ -180,17 +180,10 @@ def _is_visible(at: CurvePlace, values: dict[str, Array], problem: Problem) -> b
 
 def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> CurveEffect:
     scales = problem.space.scales
-    sizes: dict[Place, float] = {
-        "drive": scales.drive if not at.has_drive_factor else 1.0,
-        "field": scales.drive,
-        "damper_gain": 1.0,
-        "parallel_force": scales.damping if at.is_viscous else scales.force,
-        "displacement_channel": scales.length,
-    }
     function = CurveFunction(
         make_basis(values, _WARPS.get(at.variables[0], "none")),
         at.variables,
-        sizes.get(at.place, scales.force),
+        _find_size(at, scales),
         at.direction,
         at.has_drive_factor,
         at.grows_with_drive,
@@ -203,6 +196,18 @@ def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> Curve
     growth = Quantity("growth", "1/{drive}", low, high, 1.0 / scales.drive, "growth with the drive")
     linear = _make_model(at, _list_coefficients(2 * function.basis.size), LinearGrowth(function, scales.drive))
     return CurveEffect(at, function, _make_model(at, (*coefficients, growth), function), linear)
+
+
+def _find_size(at: CurvePlace, scales: RecordingScales) -> float:
+    """Return the value of a curve of size one, in the unit of its place over that of its factors."""
+    sizes: dict[Place, float] = {
+        "drive": scales.drive if not at.has_drive_factor else 1.0,
+        "field": scales.drive,
+        "damper_gain": 1.0,
+        "parallel_force": scales.damping if at.is_viscous else scales.force,
+        "displacement_channel": scales.length,
+    }
+    return sizes.get(at.place, scales.force)
 
 
 def _list_coefficients(count: int) -> tuple[Quantity, ...]:

@@ -1,7 +1,8 @@
 """Evidence for a curve: marginal likelihood of a linear model with one prior deviation (MacKay 1992).
 
 The law and the effects that are already named are projected out of the residual and of the curve's sensitivities.
-What remains is a ridge regression. The prior deviation with the largest evidence sets smoothness and amplitude.
+A ridge regression on the curve's coefficients remains. The prior deviation with the largest evidence sets
+smoothness and amplitude.
 """
 
 import math
@@ -11,7 +12,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import Evaluation, Problem
-from identification.gap.data import Indices, compute_correlation_length
+from identification.gap.data import Indices
 
 _DEVIATIONS = np.geomspace(1e-4, 1e2, 43)
 """Prior deviations of the coefficients that are tried [1]."""
@@ -33,7 +34,7 @@ class CurveEvidence(NamedTuple):
 def compute_curve_evidence(joint: Problem, here: Evaluation, unknowns: Array, columns: slice) -> CurveEvidence:
     """Compute the evidence for a curve from cost, gradient and curvature at a curve of zero.
 
-    An unknown of the law at a bound is held if its step would leave the bound, because it takes nothing up there.
+    An unknown of the law at a bound is held if its step would leave the bound.
 
     Args:
         joint: problem with the curve.
@@ -65,10 +66,7 @@ def _compute_evidence(joint: Problem, here: Evaluation, outer: Indices, inner: I
     eigenvalues, vectors = np.linalg.eigh(0.5 * (S + S.T))
     eigenvalues, z = np.maximum(eigenvalues, 0.0), vectors.T @ b
     law_cost = here.cost - float(g[outer] @ projection[:, -1])
-    gain = float(np.sum(z**2 / np.maximum(eigenvalues, 1e-9 * eigenvalues.max() + 1e-300)))
-    # The error that the best curve leaves counts as noise. It is taken as independent, so the odds are far too
-    # certain: they only rank the curves, and held-out strokes decide.
-    variance = max((law_cost - min(gain, law_cost)) / joint.samples, 1.0)
+    variance = _estimate_variance(eigenvalues, z, law_cost, joint.samples)
     odds = [_compute_log_odds(eigenvalues, z, s**2, variance) for s in _DEVIATIONS]
     best = int(np.argmax(odds))
     deviation = float(_DEVIATIONS[best])
@@ -80,16 +78,17 @@ def _compute_evidence(joint: Problem, here: Evaluation, outer: Indices, inner: I
     return CurveEvidence(odds[best], deviation / math.sqrt(variance), step)
 
 
+def _estimate_variance(eigenvalues: Array, z: Array, law_cost: float, samples: int) -> float:
+    """Return the noise variance over that of the problem: the error that the best curve leaves, at least one.
+
+    Errors are taken as independent, so the odds are far too certain. They only rank the curves; held-out
+    strokes decide.
+    """
+    gain = float(np.sum(z**2 / np.maximum(eigenvalues, 1e-9 * eigenvalues.max() + 1e-300)))
+    return max((law_cost - min(gain, law_cost)) / samples, 1.0)
+
+
 def _compute_log_odds(eigenvalues: Array, z: Array, prior: float, variance: float) -> float:
     """Return the log odds for a prior variance and a noise variance, both over the problem's own."""
     shrunk = prior * z**2 / (variance * (variance + prior * eigenvalues))
     return 0.5 * float(np.sum(shrunk - np.log1p(prior * eigenvalues / variance)))
-
-
-def estimate_correlation_length(residuals: list[Array]) -> float:
-    """Return the number of neighbouring samples with the same error [1], from residuals (N,) of the pieces.
-
-    It is the integral of the autocorrelation up to its first zero.
-    """
-    longest = max(residuals, key=len)
-    return compute_correlation_length(longest - longest.mean())

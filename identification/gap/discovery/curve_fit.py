@@ -18,7 +18,7 @@ from identification.gap.discovery.curve_effects import (
 )
 from identification.gap.discovery.curve_evidence import CurveEvidence, compute_curve_evidence
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
-from identification.gap.selection import CandidatePool, compute_evidence
+from identification.gap.selection import CandidatePool
 from identification.progress import ignore_progress
 from identification.threads import use_one_thread
 
@@ -34,7 +34,7 @@ _SMALLEST_DEVIATION = 1e-8
 """Smallest prior deviation [1]: a curve of zero keeps one."""
 _FRESH_FIT = OptimiserSettings(iterations=_ITERATIONS, restarts=0, holds_shape=True)
 """Fit from the regression."""
-_VARIABLE_PRICE = 0.03
+_VARIABLE_PENALTY = 0.03
 """Relative decrease of the error that one more variable or effect has to bring."""
 _GROWTH_DEVIATION = 1.0
 """Prior deviation of the growth with the drive, over the inverse of the highest drive [1]."""
@@ -60,11 +60,11 @@ class FittedCurve:
 
     @property
     def loss(self) -> float:
-        """Logarithm of the error [N], on the worse of fitted and held-out strokes, with the price of its size."""
+        """Logarithm of the error [N], on the worse of fitted and held-out strokes, with a penalty for its size."""
         at = self.curve.at
         count = len(at.variables) + any(v in HISTORY_VARIABLES for v in at.variables)
         error = max(self.candidate.train_rmse, self.candidate.held_out_rmse)
-        return math.log(error) + _VARIABLE_PRICE * (count + len(self.candidate.fit.effects))
+        return math.log(error) + _VARIABLE_PENALTY * (count + len(self.candidate.fit.effects))
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -74,7 +74,7 @@ class FittedCurve:
     @property
     def covariance(self) -> Array:
         """(P, P) covariance of these coefficients."""
-        columns = list(self.candidate.fit.problem.iterate_effects())[-1][1]
+        columns = self.candidate.fit.problem.layout.effect_slices[-1]
         return np.asarray(self.candidate.fit.covariance.unknowns[columns, columns])
 
 
@@ -101,8 +101,8 @@ def fit_best_curves(
     """Fit the curves with the largest linear evidence, and return the most probable first.
 
     All are fitted from the end of their linear model. The best of these are also fitted from the regression:
-    without the curve, the law may have moved to values that hide it. So is the curve with the largest linear
-    evidence, because a first fit of a large curve may not leave such values.
+    without the curve, the law may have moved to values that hide it. The curve with the largest linear evidence is
+    fitted from the regression as well, because a first fit of a large curve may stay at such values.
     """
     warm = [_continue_linear_model(pool, parent, s) for s in _drop_variants(screened)[:_FITTED_CURVES]]
     best = sorted(range(len(warm)), key=lambda i: warm[i].loss)
@@ -136,14 +136,14 @@ def _drop_variants(screened: Sequence[ScreenedCurve]) -> list[ScreenedCurve]:
 def _continue_linear_model(pool: CandidatePool, parent: Candidate, screened: ScreenedCurve) -> FittedCurve:
     """Fit a curve with the law and the effects of a set, from the end of its linear model."""
     curve, evidence = screened
-    model = _give_prior(curve, evidence.deviation)
+    model = _set_prior(curve, evidence.deviation)
     parent_problem = pool.screening_problem.replace_effects(parent.fit.effects)
     problem = parent_problem.replace_effects((*parent.fit.effects, model))
     start = insert_effect_unknowns(parent_problem, parent.fit.minimum.unknowns, np.zeros(len(model.quantities)))
     target = _find_linear_solution(parent_problem, parent.fit.minimum.unknowns, screened)
     with use_one_thread():
         minimum = minimise(problem, _search_line(problem, start, target), _FIRST_ITERATIONS, ignore_progress)
-    return _judge_curve(pool, parent, curve, JointFit(problem, minimum))
+    return _evaluate_curve(pool, parent, curve, JointFit(problem, minimum))
 
 
 def _finish_fit(pool: CandidatePool, fitted: FittedCurve) -> FittedCurve:
@@ -158,7 +158,7 @@ def _finish_fit(pool: CandidatePool, fitted: FittedCurve) -> FittedCurve:
             if other.evaluation.cost < fit.minimum.evaluation.cost:
                 fit = JointFit(fit.problem, other)
         fit = _update_prior(fit, curve)
-    return _judge_curve(pool, fitted.parent, curve, fit)
+    return _evaluate_curve(pool, fitted.parent, curve, fit)
 
 
 def _replace_law(problem: Problem, unknowns: Array, law: Array) -> Array:
@@ -169,26 +169,19 @@ def _replace_law(problem: Problem, unknowns: Array, law: Array) -> Array:
     return moved
 
 
-def _judge_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, fit: JointFit) -> FittedCurve:
+def _evaluate_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, fit: JointFit) -> FittedCurve:
     """Return a fitted curve with its block evidence over the set without it."""
     candidate = pool.evaluate(fit)
-    held_out = pool.evaluation.held_out_samples
-    unseen = [replace(c.residual, valid=c.residual.valid & held_out) for c in (parent, candidate)]
-    return FittedCurve(
-        curve,
-        candidate,
-        parent,
-        compute_evidence(unseen[0], unseen[1], pool.block_length),
-    )
+    return FittedCurve(curve, candidate, parent, pool.compute_held_out_evidence(parent, candidate))
 
 
 def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
     """Continue a fit with the prior deviation that its coefficients suggest (MacKay 1992, eq. 2.17).
 
-    The linear model takes all that it leaves for noise, so its prior is too narrow for a large curve.
+    The linear model counts its whole residual as noise, so its prior is too narrow for a large curve.
     """
     problem, unknowns = fit.problem, fit.minimum.unknowns
-    columns = list(problem.iterate_effects())[-1][1]
+    columns = problem.layout.effect_slices[-1]
     inner = slice(columns.start, columns.start + curve.function.basis.size)
     variance = max(fit.ratio**2, 1.0)
     # The curvature of a coefficient of which nothing is known is that of its prior alone.
@@ -199,12 +192,12 @@ def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
     )
     determined = max(float(np.sum(np.clip(known, 0.0, 1.0))), 1.0)
     deviation = float(np.sqrt(np.sum(unknowns[inner] ** 2) / determined / variance))
-    model = _give_prior(curve, max(deviation, _SMALLEST_DEVIATION))
+    model = _set_prior(curve, max(deviation, _SMALLEST_DEVIATION))
     again = problem.replace_effects((*problem.effects[:-1], model))
     return JointFit(again, minimise(again, unknowns, _ITERATIONS, ignore_progress))
 
 
-def _give_prior(curve: CurveEffect, deviation: float) -> EffectModel:
+def _set_prior(curve: CurveEffect, deviation: float) -> EffectModel:
     """Return a curve's model with the prior deviations of its coefficients and of its growth."""
     deviations = (deviation,) * curve.function.basis.size + (_GROWTH_DEVIATION,) * curve.at.grows_with_drive
     return replace(curve.model, prior_deviations=deviations)

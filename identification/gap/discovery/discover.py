@@ -1,8 +1,8 @@
 """Search for a cause outside the library: where it acts, on which variable, its curve, and the shortest formula.
 
 A curve is tried at every place and over every variable, with the law alone and with the named effects. The most
-probable one is kept if it closes part of the gap on strokes that no fit used. A formula then replaces the curve
-if it does as well. What is left is searched once more.
+probable one is kept if it closes part of the gap on strokes that no fit used. A formula then replaces the curve if
+it does as well. The remaining residual is searched once more.
 """
 
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ class DiscoveredEffect:
     candidate: Candidate
     """The set with the formula, or else the curve, fitted on all samples."""
     further: tuple[FittedCurve, ...] = ()
-    """Curves found after it in what it leaves."""
+    """Curves found after it in the remaining residual."""
 
 
 def discover_effect(pool: CandidatePool, named: Candidate) -> DiscoveredEffect | None:
@@ -57,7 +57,7 @@ def _find_curves(pool: CandidatePool, parent: Candidate) -> list[FittedCurve]:
 
 
 def _find_further(pool: CandidatePool, first: FittedCurve) -> tuple[FittedCurve, ...]:
-    """Return the curves that are accepted one after the other in what the first leaves."""
+    """Return the curves that are accepted one after the other in the residual of the first."""
     found = [first]
     while len(found) < _PLACES and not pool.is_at_floor(found[-1].candidate):
         parent = found[-1].candidate

@@ -9,9 +9,8 @@ from identification.arrays import Array
 from identification.damper.definitions import STAGE_OF, Curve, EffectFile, EffectParameter, make_effect
 from identification.damper.effects import Variable
 from identification.fitting import EffectModel, minimise
-from identification.gap.data import split_by_piece
-from identification.gap.discovery.curve_effects import CurveEffect, collect_variables
-from identification.gap.discovery.curve_evidence import estimate_correlation_length
+from identification.gap.data import compute_residual_correlation_length, split_by_piece
+from identification.gap.discovery.curve_effects import CurveEffect, CurvePlace, collect_variables
 from identification.gap.discovery.curve_fit import FittedCurve
 from identification.gap.discovery.formulas import FormulaStart, rank_formulas
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
@@ -72,7 +71,7 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
     count = fitted.curve.function.basis.size
     starts = rank_formulas(fitted.curve, np.array(fitted.values[:count]), variable)
     errors = split_by_piece(fitted.candidate.residual.values, pool.full_problem.pieces)
-    samples = len(fitted.candidate.residual.values) / estimate_correlation_length(errors)
+    samples = len(fitted.candidate.residual.values) / compute_residual_correlation_length(errors)
     formulas = [_fit_formula(pool, fitted, start, variable, samples) for start in starts[:_FITTED_FORMULAS]]
     kept = [f for f in formulas if _keeps_gain(fitted, f.candidate)]
     return min(kept, key=lambda f: f.criterion, default=None)
@@ -93,7 +92,7 @@ def _fit_formula(
     parent = fitted.candidate.fit
     others = parent.effects[:-1]
     problem = pool.screening_problem.replace_effects((*others, model))
-    columns = list(parent.problem.iterate_effects())[-1][1]
+    columns = parent.problem.layout.effect_slices[-1]
     law = np.delete(parent.minimum.unknowns, columns)
     unknowns = insert_effect_unknowns(
         pool.screening_problem.replace_effects(others), law, model.to_search(model.starts[0])
@@ -127,6 +126,25 @@ def make_curve_file(
 ) -> EffectFile:
     """Return the definition of an expression of the curve's variable, with the factors of its place."""
     at = fitted.curve.at
+    growth: dict[str, EffectParameter] = {}
+    if at.grows_with_drive:
+        quantity = fitted.curve.model.quantities[-1]
+        value = float(np.clip(fitted.values[-1], quantity.low, quantity.high))
+        growth = {"growth": EffectParameter(value=value, unit="1/{drive}", lo=quantity.low, hi=quantity.high)}
+    return EffectFile(
+        name=DISCOVERED,
+        stage=STAGE_OF[at.place],
+        place=at.place,
+        variables=list(at.variables),
+        expression=_write_factors(at, expression),
+        parameters=parameters | growth,
+        curve=curve,
+        source="found by a diagnosis",
+    )
+
+
+def _write_factors(at: CurvePlace, expression: str) -> str:
+    """Return an expression times the factors of its place: direction, drive and growth with the drive."""
     match at.direction:
         case "sign":
             expression = f"sign(velocity)*({expression})"
@@ -134,24 +152,7 @@ def make_curve_file(
             expression = f"velocity*({expression})"
     if at.has_drive_factor:
         expression = f"drive*({expression})"
-    if at.grows_with_drive:
-        growth = fitted.curve.model.quantities[-1]
-        expression = f"(1+growth*drive)*({expression})"
-        value = float(np.clip(fitted.values[-1], growth.low, growth.high))
-        parameters = {
-            **parameters,
-            "growth": EffectParameter(value=value, unit="1/{drive}", lo=growth.low, hi=growth.high),
-        }
-    return EffectFile(
-        name=DISCOVERED,
-        stage=STAGE_OF[at.place],
-        place=at.place,
-        variables=list(at.variables),
-        expression=expression,
-        parameters=parameters,
-        curve=curve,
-        source="found by a diagnosis",
-    )
+    return f"(1+growth*drive)*({expression})" if at.grows_with_drive else expression
 
 
 def _make_parameter(

@@ -1,7 +1,7 @@
 """Formulas that may replace a curve: short expressions of one variable, and their starts.
 
-A curve is only known up to what the law can take up, such as a straight line over displacement. A formula is
-therefore fitted to a curve together with these functions, by linear least squares on a grid of its scales.
+A curve is known only up to functions that the law can absorb, such as a straight line over displacement. A formula
+is therefore fitted to a curve together with these functions, by linear least squares on a grid of its scales.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -25,11 +25,11 @@ _POWERS = (0.4, 0.7, 1.5, 2.0, 3.0)
 _POSITIONS = np.linspace(-0.8, 0.8, 9)
 """Positions that are tried, over the range of the variable about its middle [1]."""
 _CANCELLATION = 30.0
-"""Largest term of a formula, relative to the curve: larger terms cancel, and mean nothing [1]."""
+"""Largest term of a formula, relative to the curve: larger terms cancel each other [1]."""
 _EXTRAPOLATION = 1e3
 """Largest amplitude of a formula, relative to the curve [1]: a larger one describes what was not recorded."""
 _STEP_WIDTH = 0.05
-"""Width of the smooth sign that the law can take up, over the largest speed [1]."""
+"""Width of the smooth sign that the law can absorb, over the largest speed [1]."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def rank_formulas(curve: CurveEffect, coefficients: Array, variable: Array) -> l
 
 
 def _list_absorbed(curve: CurveEffect, z: Array) -> Array:
-    """Return the functions (N, M) of the variable that the law can take up at the place of a curve."""
+    """Return the functions (N, M) of the variable that the law can absorb at the place of a curve."""
     size = max(float(np.abs(z).max()), 1e-300)
     columns = [np.ones(len(z))]
     straight: dict[Place, tuple[Variable, ...]] = {

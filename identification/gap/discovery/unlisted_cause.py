@@ -1,8 +1,9 @@
-"""Excess that a curve outside the library leaves, as evidence against named effects that leave more.
+"""Excess of a curve outside the library, as evidence against named effects with a larger excess.
 
-Effects of the library can together resemble a cause that none of them is. A curve at the place of that cause,
-over its variable, then leaves less than they do. Curves where the library has an effect are fitted as well. Where
-one of them leaves least, the cause may be that effect in another form, which is no evidence against the library.
+Effects of the library can together resemble a cause that none of them is. A curve at the place of that cause, over
+its variable, then has a smaller excess than they have. Curves where the library has an effect are fitted as well.
+Where one of them has the smallest excess, the cause may be that effect in another form. This is no evidence
+against the library.
 """
 
 from collections.abc import Mapping
@@ -11,8 +12,8 @@ import numpy as np
 
 from identification.damper.definitions import STAGE_OF
 from identification.damper.effects import STAGES, Action, Effect, Place, Stage, Variable
+from identification.gap.data import compute_residual_correlation_length
 from identification.gap.discovery.curve_effects import CurvePlace
-from identification.gap.discovery.curve_evidence import estimate_correlation_length
 from identification.gap.discovery.curve_fit import fit_best_curves, screen_curves
 from identification.gap.fits import Candidate
 from identification.gap.selection import CandidatePool, Posterior, normalise_scores
@@ -64,7 +65,7 @@ def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
 
     Curves are only fitted where the most probable set leaves more than the noise floor; else nothing changes.
     """
-    names = posterior.rank_sets()[0][0]
+    names = posterior.most_probable_set
     if not names or pool.reaches_floor(pool.candidates[names]):
         return posterior
     pool.unlisted = find_unlisted_cause(pool)
@@ -82,9 +83,9 @@ def find_unlisted_cause(pool: CandidatePool) -> Candidate | None:
 def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage, float]:
     """Return the probability of each stage for a cause outside the library, in addition to a set of effects.
 
-    The evidence of the best curve or fitted set at each stage decides, over the correlation length of the
-    residual: the errors of neighbouring samples are alike. It counts as far as the best one closes the gap. A
-    cause that nothing resembles is equally probable at all stages.
+    The evidence of the best curve or fitted set at each stage decides. It is divided by the correlation length of
+    the residual, because the errors of neighbouring samples are alike. It counts as far as the best one closes the
+    gap. A cause that nothing resembles is equally probable at all stages.
     """
     problem = pool.screening_problem.replace_effects(parent.fit.effects)
     with use_one_thread():
@@ -95,7 +96,7 @@ def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage,
     for curve, evidence in screened:
         stage = STAGE_OF[curve.at.place]
         odds[stage] = max(odds[stage], evidence.log_odds)
-    scores = np.array([odds[stage] for stage in STAGES]) / estimate_correlation_length(errors)
+    scores = np.array([odds[stage] for stage in STAGES]) / compute_residual_correlation_length(errors)
     cost = float(sum(r @ r for r in errors))
     excess = max(cost - problem.samples, 1.0)
     closed = min(2.0 * max(odds.values()) * cost / problem.samples / excess, 1.0)

@@ -1,7 +1,7 @@
 """Starts of a joint fit.
 
-A warm start loses large effects: without the effect, the law's coordinates have moved to values that hide it, and
-from there the effect seems small. Every start therefore begins with one joint step, and some begin at the
+A warm start can miss a large effect. Without the effect, the law's coordinates have moved to values that hide it,
+and from there the effect seems small. Every start therefore begins with one joint step, and some begin at the
 coordinates of the regression.
 """
 
@@ -35,7 +35,7 @@ def generate_starts(
         further: unknowns (U,) of the problem that are starts as well; they come first.
     """
     for u in further:
-        yield take_joint_step(problem, _settle_law(problem, u, options.law_steps))[0]
+        yield take_joint_step(problem, _step_law_alone(problem, u, options.law_steps))[0]
     origins = [] if start is None else [start]
     if options.starts and (start is None or options.regression_start):
         origins.append(make_starting_points(problem.replace_effects(()))[0])
@@ -44,10 +44,10 @@ def generate_starts(
         yield take_joint_step(problem, replace_effect_unknowns(problem, unknowns, values))[0]
 
 
-def _settle_law(problem: Problem, unknowns: Array, steps: int) -> Array:
+def _step_law_alone(problem: Problem, unknowns: Array, steps: int) -> Array:
     """Return unknowns (U,) after some steps of the law alone.
 
-    Backlash or compliance is soon lost while the law's yield displacement is still wrong.
+    While the law's yield displacement is still wrong, a descent reduces backlash or compliance to zero.
     """
     free = problem.free_mask & ~problem.delay_mask
     free[problem.layout.effects] = False

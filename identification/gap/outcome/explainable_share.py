@@ -98,7 +98,7 @@ class ResidualRegression:
         return build_features(self.evaluation.pieces)
 
     def explain(self, candidate: Candidate) -> "Explained":
-        """Return what the regression predicts of a set's residual; nothing near the noise floor."""
+        """Return the part of a set's residual that the regression predicts; none near the noise floor."""
         if candidate.held_out_rmse < NEAR_FLOOR_RATIO * self.floor:
             return Explained(0.0, dict.fromkeys(FEATURE_VARIABLES, 0.0))
         if candidate.names not in self._known:

@@ -3,8 +3,19 @@
 from collections.abc import Sequence
 
 from identification.damper.effects import EFFECTS
-from identification.documents import Diagnosis, Discovery, EffectSet, Gap, NamedEffect, Verdict
+from identification.documents import (
+    Diagnosis,
+    Discovery,
+    EffectSet,
+    Gap,
+    NamedEffect,
+    Remainder,
+    TwinResidual,
+    Verdict,
+)
 
+_EXPLAINABLE_THRESHOLD = 0.3
+"""Explainable share above which the remainder counts as explainable."""
 _LIKELY_ALTERNATIVE = 0.1
 """Smallest probability of an alternative that is mentioned."""
 _CHECKS: dict[str, str] = {
@@ -102,6 +113,31 @@ def describe_discovery(discovery: Discovery, before: float) -> str:
     return (
         f"outside the library: {function} at the {place}, over {variables}, reduces the error on held-out strokes "
         f"from {before:.3g} to {discovery.rmse_n:.3g} N"
+    )
+
+
+def describe_learned_residual(residual: TwinResidual | None) -> str:
+    """Return the note on the learned residual; None where none predicts conditions that were left out."""
+    if residual is None:
+        return "no residual is learned: what is left does not predict stroke conditions that were left out"
+    return (
+        f"learned residual: {residual.before_n:.3g} N without and {residual.after_n:.3g} N with it, each of "
+        f"{residual.conditions} stroke conditions predicted from the others"
+    )
+
+
+def locate_remainder(remainder: Remainder, drive_unit: str) -> str:
+    """Return the sentence on the condition in which the remainder is largest, and on what it depends."""
+    largest = remainder.map[0]
+    variables = " and ".join(v.replace("_", " ") for v in remainder.variables[:2])
+    dependence = "it does not correlate with any recorded stroke or drive quantity"
+    if remainder.explainable > _EXPLAINABLE_THRESHOLD:
+        dependence = f"a flexible model of stroke and drive explains {remainder.explainable:.0%} of it"
+        dependence += f", mostly from {variables}" if variables else ""
+    return (
+        f"The remainder is largest at {largest.drive:.3g} {drive_unit}, "
+        f"{1e3 * largest.amplitude_m:.3g} mm and {largest.frequency_hz:.3g} Hz ({largest.gap_n:.3g} N), and "
+        f"{dependence}."
     )
 
 

@@ -1,10 +1,9 @@
 """Next stroke: the trial segment that best separates the sets of effects which the data leave open.
 
-The segments are simulated with each rival model. The score is the difference of their forces that no refit
-could remove, over the noise (T-optimal design, Atkinson and Fedorov 1975). It is linearised in the parameters
-of damper and effects, each held by the information of the recording. Either rival may be the true one, and the
-other is refitted: the smaller difference of both cases counts. Form errors hide a difference in the same way as
-noise.
+The segments are simulated with each rival model. The score is the difference of their forces that no refit could
+remove, over the noise (T-optimal design, Atkinson and Fedorov 1975). It is linearised in the parameters of damper
+and effects, each held by the information of the recording. Either rival may be the true one, and the other is
+refitted. The smaller difference of both cases counts. Form errors mask a difference in the same way as noise.
 """
 
 import math

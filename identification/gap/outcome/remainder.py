@@ -30,14 +30,14 @@ def describe_remainder(
     floor: float,
     stages: Mapping[Stage, float] | None = None,
 ) -> Remainder | None:
-    """Describe what a set of effects leaves on held-out strokes; None if it is at the noise floor.
+    """Describe the residual of a set of effects on held-out strokes; None if it is at the noise floor.
 
     Args:
         pool: the fitted sets.
         named: the named set; the baseline if none is named.
         regression: regression on the residuals of this recording.
         floor: noise of the force [N].
-        stages: probability of each stage for what is left, where it is known.
+        stages: probability of each stage for the remaining cause, where it is known.
     """
     if named.held_out_rmse < NEAR_FLOOR_RATIO * floor:
         return None
@@ -100,7 +100,7 @@ def _find_nearest(phase: Array, wanted: Array) -> Indices:
 
 
 def _find_stage(pool: CandidatePool, named: Candidate, stages: Mapping[Stage, float]) -> Stage | None:
-    """Return the stage that is likely for what a set leaves, else that of a known effect.
+    """Return the likely stage of the remaining cause, else the stage of a known effect.
 
     A known effect counts where no stage is likely. It is the one with the largest expected gain.
     """

@@ -4,9 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
-from typing import NamedTuple
-
-import numpy as np
 
 from identification.damper.effects import STAGES, Stage
 from identification.documents import (
@@ -17,6 +14,7 @@ from identification.documents import (
     HeldOutError,
     Provenance,
     Remainder,
+    Twin,
     TwinResidual,
     Verdict,
 )
@@ -36,8 +34,10 @@ from identification.gap.outcome.discovery_document import build_discovery
 from identification.gap.outcome.explainable_share import ResidualRegression
 from identification.gap.outcome.explanation import (
     describe_discovery,
+    describe_learned_residual,
     describe_nearest,
     explain_diagnosis,
+    locate_remainder,
 )
 from identification.gap.outcome.held_out_strokes import measure_held_out_strokes
 from identification.gap.outcome.next_stroke import propose_next_stroke
@@ -45,14 +45,13 @@ from identification.gap.outcome.remainder import describe_remainder
 from identification.gap.outcome.twin import make_baseline_fit, make_twin
 from identification.gap.outcome.twin_residual import learn_twin_residual
 from identification.gap.outcome.verdict import (
+    NamedSet,
     Share,
     build_named_effects,
-    closes_part,
-    decide_unnamed_verdict,
-    decide_verdict,
+    choose_named_set,
+    estimate_expected_shrinkage,
     is_ambiguous,
     list_alternatives,
-    list_likely_sets,
 )
 from identification.gap.selection import (
     UNKNOWN_THRESHOLD,
@@ -66,19 +65,6 @@ _NEAREST_SHARE = 0.95
 """Largest error that unnamed effects may leave to be mentioned, relative to that of the baseline."""
 _MIN_STAGE_PROBABILITY = 0.05
 """Smallest probability of a stage that is reported as the most probable one."""
-_EXPLAINABLE_THRESHOLD = 0.3
-"""Explainable share above which the remainder counts as explainable."""
-
-
-class NamedSet(NamedTuple):
-    """Set of effects that is named, with its verdict."""
-
-    verdict: Verdict
-    candidate: Candidate
-    """The named set; the law alone if none is named."""
-    shrinkage: Shrinkage
-    posterior: Posterior
-    """Probabilities from which it was chosen."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +83,7 @@ class ReportBuilder:
     discovers: bool = False
     """True to search for a cause outside the library where the named effects do not explain the gap."""
     learns_residual: bool = False
-    """True to learn what law and effects leave, for predictions with the twin."""
+    """True to learn the residual of law and effects, for predictions with the twin."""
 
     @cached_property
     def regression(self) -> ResidualRegression:
@@ -111,26 +97,36 @@ class ReportBuilder:
 
     def build_result(self) -> DiagnosisResult:
         """Build the documents."""
-        verdict, named, shrinkage, posterior = self._choose_named_set()
-        found = self._discover(verdict, named)
-        modelled = named if found is None else found.candidate
-        residual = self._learn_residual(verdict, modelled)
-        gap = self._build_gap(verdict, named, shrinkage, self._measure_held_out(named, modelled, residual))
+        chosen = self._choose_named_set()
+        found = self._discover(chosen.verdict, chosen.candidate)
+        modelled = chosen.candidate if found is None else found.candidate
+        residual = self._learn_residual(chosen.verdict, modelled)
+        discovery = self._build_discovery(found, chosen.candidate)
+        held_out = self._measure_held_out(chosen.candidate, modelled, residual)
+        diagnosis = self._build_diagnosis(chosen, discovery, residual, held_out)
+        twin = self._build_twin(modelled, discovery, diagnosis.provenance)
+        return DiagnosisResult(diagnosis, twin.model_copy(update={"residual": residual}))
+
+    def _build_diagnosis(
+        self,
+        chosen: NamedSet,
+        discovery: Discovery | None,
+        residual: TwinResidual | None,
+        held_out: HeldOutError | None,
+    ) -> Diagnosis:
+        verdict, named, shrinkage, posterior = chosen
+        gap = self._build_gap(verdict, named, shrinkage, held_out)
         shares = self._estimate_shares(named, shrinkage)
         effects = build_named_effects(named, posterior, shares, self.dataset.drive_unit)
         alternatives = list_alternatives(self.posterior, named.names)
-        remainder: Remainder | None = None
-        if verdict != "no_gap":
-            stages = None if named.names else self.unlisted_stages
-            remainder = describe_remainder(self.pool, named, self.regression, gap.noise_floor_n, stages)
-        provenance = self._make_provenance()
-        discovery = self._build_discovery(found, named)
-        diagnosis = Diagnosis(
+        probability = self.posterior.sets.get(named.names, 0.0)
+        remainder = self._build_remainder(verdict, named, gap.noise_floor_n)
+        return Diagnosis(
             verdict=verdict,
             effects=effects,
             alternatives=alternatives,
-            probability=self.posterior.sets.get(named.names, 0.0),
-            ambiguous=is_ambiguous(alternatives, self.posterior.sets.get(named.names, 0.0)),
+            probability=probability,
+            ambiguous=is_ambiguous(alternatives, probability),
             unknown_probability=self.posterior.unknown,
             gap=gap,
             where=self._locate_gap(posterior),
@@ -145,13 +141,21 @@ class ReportBuilder:
                 *self._describe_residual(residual),
                 *describe_unobservable_effects(self.evaluation.cycles, self.dataset.floor),
             ],
-            provenance=provenance,
+            provenance=self._make_provenance(),
         )
+
+    def _build_twin(self, modelled: Candidate, discovery: Discovery | None, provenance: Provenance) -> Twin:
         noise = self.pool.noise_model.noise
         fit = make_baseline_fit(self.dataset, self.evaluation, self.pool.baseline, noise, provenance)
         definition = None if discovery is None else discovery.definition
-        twin = make_twin(self.dataset, modelled, definition, fit, noise, fit.specimen, provenance)
-        return DiagnosisResult(diagnosis, twin.model_copy(update={"residual": residual}))
+        return make_twin(self.dataset, modelled, definition, fit, noise, fit.specimen, provenance)
+
+    def _build_remainder(self, verdict: Verdict, named: Candidate, floor: float) -> Remainder | None:
+        """Describe the residual of the named set beyond the noise floor [N]; None without a gap."""
+        if verdict == "no_gap":
+            return None
+        stages = None if named.names else self.unlisted_stages
+        return describe_remainder(self.pool, named, self.regression, floor, stages)
 
     def _discover(self, verdict: Verdict, named: Candidate) -> DiscoveredEffect | None:
         """Return a cause outside the library, if it is wanted and something is left to explain."""
@@ -165,19 +169,12 @@ class ReportBuilder:
 
     def _describe_residual(self, residual: TwinResidual | None) -> list[str]:
         """Return the note on the learned residual, if it is wanted."""
-        if not self.learns_residual:
-            return []
-        if residual is None:
-            return ["no residual is learned: what is left does not predict stroke conditions that were left out"]
-        return [
-            f"learned residual: {residual.before_n:.3g} N without and {residual.after_n:.3g} N with it, each of "
-            f"{residual.conditions} stroke conditions predicted from the others"
-        ]
+        return [describe_learned_residual(residual)] if self.learns_residual else []
 
     def _build_discovery(self, found: DiscoveredEffect | None, named: Candidate) -> Discovery | None:
         if found is None:
             return None
-        shrinkage = self._estimate_shrinkage(found.candidate)
+        shrinkage = estimate_expected_shrinkage(self.pool, self.evaluation, found.candidate)
         return build_discovery(found, named, shrinkage, self.dataset.drive_unit)
 
     def _describe_search(self, verdict: Verdict, discovery: Discovery | None) -> list[str]:
@@ -192,33 +189,7 @@ class ReportBuilder:
         return ["no curve at any place closes part of the gap on held-out strokes, so none is reported"]
 
     def _choose_named_set(self) -> NamedSet:
-        """Return the verdict and the named set; the law alone if none is named.
-
-        Where no set explains the gap, the most probable one that closes enough of it on unseen strokes is named as
-        a part of the cause.
-        """
-        chosen = self._judge_set(self.posterior, self.posterior.rank_sets()[0][0])
-        if self.partial is not None and chosen.verdict in ("unexplained", "partly_explained"):
-            judged = (self._judge_set(self.partial, names) for names in list_likely_sets(self.partial))
-            partial = next((part for part in judged if part.candidate.names), None)
-            if partial is not None:
-                return partial._replace(verdict="partly_explained")
-        return chosen
-
-    def _judge_set(self, posterior: Posterior, names: frozenset[str]) -> NamedSet:
-        """Return the verdict with one set of a posterior."""
-        baseline, floor = self.pool.baseline, self.pool.floor
-        named = self.pool.candidates[names]
-        verdict = decide_verdict(baseline, named, floor, self.pool.no_gap_limit, posterior)
-        shrinkage = self._estimate_shrinkage(named)
-        benefit = shrinkage.expected_benefit
-        if verdict == "partly_explained" and not closes_part(shrinkage):
-            verdict = "unexplained"
-        if named.names and benefit is not None and benefit < 0.0:
-            verdict = decide_unnamed_verdict(baseline, floor, self.pool.no_gap_limit)
-        if named.names and verdict in ("no_gap", "unexplained"):
-            return NamedSet(verdict, baseline, self._estimate_shrinkage(baseline), posterior)
-        return NamedSet(verdict, named, shrinkage, posterior)
+        return choose_named_set(self.pool, self.evaluation, self.posterior, self.partial)
 
     def _describe_nearest(self, verdict: Verdict) -> list[str]:
         """Return the note on the most similar known effects where none is named."""
@@ -227,15 +198,6 @@ class ReportBuilder:
         if verdict != "unexplained" or best.held_out_rmse > _NEAREST_SHARE * before:
             return []
         return [describe_nearest(sorted(best.names), before, best.held_out_rmse, self.pool.floor)]
-
-    def _estimate_shrinkage(self, named: Candidate) -> Shrinkage:
-        noise_model = self.pool.noise_model
-        if named.names:
-            input_noise = noise_model.sample_other_runs(named, self.pool.full_problem)
-        else:
-            input_noise = np.zeros((1, len(self.evaluation.force)))
-        noise = noise_model.estimate_noise(named)
-        return self.evaluation.estimate_shrinkage(self.pool.baseline.residual, named.residual, noise, input_noise)
 
     def _estimate_shares(self, named: Candidate, shrinkage: Shrinkage) -> dict[str, Share]:
         """Return the share of each named effect; a set without it that was not fitted counts as the law alone."""
@@ -304,21 +266,7 @@ class ReportBuilder:
 
     def _describe_place(self, remainder: Remainder | None) -> str:
         """Return the sentence on the residual with the named effects; empty where nothing is left."""
-        if remainder is None:
-            return ""
-        largest = remainder.map[0]
-        variables = " and ".join(v.replace("_", " ") for v in remainder.variables[:2])
-        dependence = (
-            f"a flexible model of stroke and drive explains {remainder.explainable:.0%} of it"
-            + (f", mostly from {variables}" if variables else "")
-            if remainder.explainable > _EXPLAINABLE_THRESHOLD
-            else "it does not correlate with any recorded stroke or drive quantity"
-        )
-        return (
-            f"The remainder is largest at {largest.drive:.3g} {self.dataset.drive_unit}, "
-            f"{1e3 * largest.amplitude_m:.3g} mm and {largest.frequency_hz:.3g} Hz ({largest.gap_n:.3g} N), and "
-            f"{dependence}."
-        )
+        return "" if remainder is None else locate_remainder(remainder, self.dataset.drive_unit)
 
     def _make_provenance(self) -> Provenance:
         return Provenance(

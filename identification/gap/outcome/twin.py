@@ -9,6 +9,7 @@ from identification.damper import to_parameters
 from identification.damper.definitions import DEFINED_FORM, EffectFile
 from identification.documents import (
     Delay,
+    DriveError,
     DriveKind,
     Fit,
     FitStage,
@@ -106,9 +107,6 @@ def make_baseline_fit(
         set(names[observable & ~interior]),
         unit,
     )
-    residual, force = baseline.residual.values, evaluation.force
-    fitted, held_out = evaluation.fitted_samples, evaluation.held_out_samples
-    errors = [-part for part in split_by_piece(residual, evaluation.pieces)]
     return Fit(
         specimen=dataset.recordings[0].metadata["run"].get("specimen", ""),
         drive_kind=dataset.recordings[0].drive_kind,
@@ -120,15 +118,11 @@ def make_baseline_fit(
         noise_floor_n=floor,
         floor=make_noise_floor(noise, baseline.train_rmse),
         rmse_n=SplitErrors(train=baseline.train_rmse, validation=None, held_out=baseline.held_out_rmse),
-        nrmse=SplitErrors(
-            train=compute_nrmse(residual[fitted], force[fitted]),
-            validation=None,
-            held_out=compute_nrmse(residual[held_out], force[held_out]),
-        ),
-        per_drive=compute_drive_errors(
-            [p.excitation.drive for p in evaluation.pieces], errors, [p.force for p in evaluation.pieces], unit
-        ),
-        stages=[_make_stage(compute_rmse(residual[fitted]), minimum.iterations)],
+        nrmse=_compute_relative_errors(evaluation, baseline),
+        per_drive=_compute_drive_errors(evaluation, baseline, unit),
+        stages=[
+            _make_stage(compute_rmse(baseline.residual.values[evaluation.fitted_samples]), minimum.iterations)
+        ],
         agreement=None,
         result="converged" if minimum.converged else f"not converged: stopped after {minimum.iterations} steps",
         correlations=find_strong_correlations(coordinate_covariance),
@@ -136,6 +130,24 @@ def make_baseline_fit(
             logs=provenance.logs, version=version("mrbench"), seed=provenance.seed, settings={"stages": "refine"}
         ),
     )
+
+
+def _compute_relative_errors(evaluation: EvaluationData, baseline: Candidate) -> SplitErrors:
+    """Compute the NRMSE on the fitted and on the held-out samples."""
+    residual, force = baseline.residual.values, evaluation.force
+    fitted, held_out = evaluation.fitted_samples, evaluation.held_out_samples
+    return SplitErrors(
+        train=compute_nrmse(residual[fitted], force[fitted]),
+        validation=None,
+        held_out=compute_nrmse(residual[held_out], force[held_out]),
+    )
+
+
+def _compute_drive_errors(evaluation: EvaluationData, baseline: Candidate, unit: str) -> list[DriveError]:
+    """Compute the force error at each drive; errors are simulated less recorded force."""
+    pieces = evaluation.pieces
+    errors = [-part for part in split_by_piece(baseline.residual.values, pieces)]
+    return compute_drive_errors([p.excitation.drive for p in pieces], errors, [p.force for p in pieces], unit)
 
 
 def _make_stage(rmse: float, iterations: int) -> FitStage:

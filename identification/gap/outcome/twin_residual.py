@@ -1,4 +1,4 @@
-"""Learned residual of a twin: what law and effects leave, divided into conditions that are left out in turn."""
+"""Learned residual of a twin: the residual of law and effects, with conditions that are left out in turn."""
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ _TIME_PARTS = 5
 
 
 def learn_twin_residual(evaluation: EvaluationData, named: Candidate, seed: int) -> TwinResidual | None:
-    """Learn the residual of a set; None where none predicts conditions that it has not seen.
+    """Learn the residual of a set; None where none predicts conditions that were left out.
 
     Strokes that the user held out are not read.
 

@@ -1,12 +1,16 @@
-"""Verdict and named effects, from the candidates and their posterior."""
+"""Verdict, named set and its effects, from the candidates and their posterior."""
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
 
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
-from identification.gap.data import Shrinkage
+from identification.fitting import EffectModel
+from identification.gap.data import EvaluationData, Shrinkage
 from identification.gap.fits import EXPLAINED_RATIO, Candidate
 from identification.gap.outcome.interval import compute_interval
-from identification.gap.selection import UNKNOWN_THRESHOLD, Posterior
+from identification.gap.selection import UNKNOWN_THRESHOLD, CandidatePool, Posterior
 
 _MIN_NAMED_SHARE = 0.2
 """Smallest part of the gap that a named set closes."""
@@ -25,13 +29,75 @@ Share = tuple[float, tuple[float, float]]
 """Part of the gap's variance that returns without an effect [1], with its 95 % interval."""
 
 
+class NamedSet(NamedTuple):
+    """Set of effects that is named, with its verdict."""
+
+    verdict: Verdict
+    candidate: Candidate
+    """The named set; the law alone if none is named."""
+    shrinkage: Shrinkage
+    posterior: Posterior
+    """Probabilities from which it was chosen."""
+
+
+def choose_named_set(
+    pool: CandidatePool, evaluation: EvaluationData, posterior: Posterior, partial: Posterior | None
+) -> NamedSet:
+    """Return the named set with its verdict; the law alone if none is named.
+
+    Where no set explains the gap, one is named as a part of the cause: the most probable one that closes enough of
+    the gap on unseen strokes.
+
+    Args:
+        pool: the fitted sets.
+        evaluation: the recordings, cut into cycles.
+        posterior: probabilities of the sets as the whole cause.
+        partial: probabilities of the sets as a part of the cause; None where the library probably has the cause.
+    """
+    chosen = _decide_set(pool, evaluation, posterior, posterior.most_probable_set)
+    if partial is not None and chosen.verdict in ("unexplained", "partly_explained"):
+        parts = (_decide_set(pool, evaluation, partial, names) for names in list_likely_sets(partial))
+        part = next((part for part in parts if part.candidate.names), None)
+        if part is not None:
+            return part._replace(verdict="partly_explained")
+    return chosen
+
+
+def _decide_set(
+    pool: CandidatePool, evaluation: EvaluationData, posterior: Posterior, names: frozenset[str]
+) -> NamedSet:
+    """Return the verdict with one set of a posterior."""
+    baseline, named = pool.baseline, pool.candidates[names]
+    verdict = decide_verdict(baseline, named, pool.floor, pool.no_gap_limit, posterior)
+    shrinkage = estimate_expected_shrinkage(pool, evaluation, named)
+    benefit = shrinkage.expected_benefit
+    if verdict == "partly_explained" and not closes_part(shrinkage):
+        verdict = "unexplained"
+    if named.names and benefit is not None and benefit < 0.0:
+        verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limit)
+    if named.names and verdict in ("no_gap", "unexplained"):
+        return NamedSet(verdict, baseline, estimate_expected_shrinkage(pool, evaluation, baseline), posterior)
+    return NamedSet(verdict, named, shrinkage, posterior)
+
+
+def estimate_expected_shrinkage(
+    pool: CandidatePool, evaluation: EvaluationData, candidate: Candidate
+) -> Shrinkage:
+    """Estimate how far the gap shrinks with a set of effects on another run of the damper."""
+    noise = pool.noise_model.estimate_noise(candidate)
+    input_noise = np.zeros((1, len(evaluation.force)))
+    if candidate.names:
+        input_noise = pool.noise_model.sample_other_runs(candidate, pool.full_problem)
+    return evaluation.estimate_shrinkage(pool.baseline.residual, candidate.residual, noise, input_noise)
+
+
 def decide_verdict(
     baseline: Candidate, named: Candidate, floor: float, no_gap_limit: float, posterior: Posterior
 ) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts, and the held-out ones for a part.
 
-    Effects that close a part of the gap are named even where an unknown cause is more probable, because they
-    reduce the error on strokes that no fit used. Their probabilities then say that the cause may be another one.
+    Effects that close a part of the gap are named even where an unknown cause is more probable. They reduce the
+    error on strokes that no fit used. Their probabilities then state that the cause may be another one.
 
     Args:
         baseline: the law without effects.
@@ -82,32 +148,36 @@ def build_named_effects(
 ) -> list[NamedEffect]:
     """Return the effects of a set with their parameters and intervals, the largest share first."""
     fit = candidate.fit
-    named = []
-    for model, active in zip(fit.effects, fit.active_effects, strict=True):
-        deviations = fit.deviations[model.name]
-        parameters = {
-            q.symbol: EffectValue(
-                value=value,
-                unit=q.format_unit(drive_unit),
-                ci95=compute_interval(value, deviations[q.symbol], q.low, q.high),
-            )
-            for q, value in zip(model.quantities, active.values, strict=True)
-        }
-        named.append(
-            NamedEffect(
-                name=model.name,
-                stage=model.effect.stage,
-                place=model.form.place,
-                variable=model.effect.variable,
-                form=model.form_name,
-                parameters=parameters,
-                share=shares[model.name][0],
-                share_ci95=shares[model.name][1],
-                probability=min(posterior.compute_effect_probability(model.name), 1.0),
-                note=_describe_sense(model.form_name),
-            )
+    named = [
+        NamedEffect(
+            name=model.name,
+            stage=model.effect.stage,
+            place=model.form.place,
+            variable=model.effect.variable,
+            form=model.form_name,
+            parameters=_build_values(model, active.values, fit.deviations[model.name], drive_unit),
+            share=shares[model.name][0],
+            share_ci95=shares[model.name][1],
+            probability=min(posterior.compute_effect_probability(model.name), 1.0),
+            note=_describe_sense(model.form_name),
         )
+        for model, active in zip(fit.effects, fit.active_effects, strict=True)
+    ]
     return sorted(named, key=lambda e: -e.share)
+
+
+def _build_values(
+    model: EffectModel, values: Sequence[float], deviations: Mapping[str, float], drive_unit: str
+) -> dict[str, EffectValue]:
+    """Return the parameters of an effect with their units and intervals, by name."""
+    return {
+        q.symbol: EffectValue(
+            value=value,
+            unit=q.format_unit(drive_unit),
+            ci95=compute_interval(value, deviations[q.symbol], q.low, q.high),
+        )
+        for q, value in zip(model.quantities, values, strict=True)
+    }
 
 
 def _describe_sense(form: str) -> str:
@@ -124,7 +194,7 @@ def list_alternatives(posterior: Posterior, named: frozenset[str]) -> list[Effec
 
 
 def list_likely_sets(posterior: Posterior) -> list[frozenset[str]]:
-    """Return the most probable set and those that the data can hardly tell from it, the most probable first."""
+    """Return the most probable set and those that the data hardly distinguish from it, most probable first."""
     ranked = posterior.rank_sets()
     return [names for names, p in ranked if p >= _AMBIGUOUS_RATIO * ranked[0][1]]
 

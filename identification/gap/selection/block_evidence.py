@@ -1,10 +1,10 @@
 """Block evidence: logarithm of the odds between two candidates, summed over short blocks (decision 0016).
 
-The correct effect in another form than the damper's leaves a form error, which is large in some blocks and
-small in others. In the total sum of squares, the large blocks hide the contribution of a second effect in all
-others. Each block therefore has an unknown error size of its own, and its likelihood is that of a normal error
-of unknown size. An active effect reduces the error wherever it acts. An effect that only takes up the form
-error of another reduces it in one block and increases it in the next.
+The correct effect in another form than the damper's leaves a form error, which is large in some blocks and small
+in others. In the total sum of squares, the large blocks mask the contribution of a second effect in all others.
+Each block therefore has an unknown error size of its own, and its likelihood is that of a normal error of unknown
+size. An active effect reduces the error wherever it acts. An effect that only absorbs the form error of another
+reduces it in one block and increases it in the next.
 """
 
 import math

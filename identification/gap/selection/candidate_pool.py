@@ -5,7 +5,7 @@ decide which sets are fitted.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -24,6 +24,7 @@ from identification.gap.fits import (
     refit_all_samples,
 )
 from identification.gap.noise import NoiseModel, find_mains_frequency
+from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
 from identification.gap.selection.screening import ScreeningResult
 from identification.gap.selection.screening_cache import ScreeningCache
@@ -153,12 +154,9 @@ class CandidatePool:
     def compute_posterior(self) -> Posterior:
         """Compute the posterior of all fitted sets."""
         floor = self._find_lowest_floor()
-        return compute_posterior(
-            self.collect_evidence(),
-            self.full_problem.samples,
-            self.noise_model.estimate.coloured_share,
-            None if self.unlisted is None else self.unlisted.compute_relative_excess(self.baseline, floor),
-        )
+        unlisted = None if self.unlisted is None else self.unlisted.compute_relative_excess(self.baseline, floor)
+        coloured_share = self.noise_model.estimate.coloured_share
+        return compute_posterior(self.collect_evidence(), self.full_problem.samples, coloured_share, unlisted)
 
     def _find_lowest_floor(self) -> float:
         """Return a floor [N] that lies below the residual of every candidate."""
@@ -205,10 +203,14 @@ class CandidatePool:
             self.candidates[candidate.names] = candidate
         return self.candidates[candidate.names]
 
-    def select_held_out(self, names: frozenset[str]) -> Residual:
-        """Return the residual of a fitted set on the held-out samples."""
-        residual = self.candidates[names].residual
+    def select_held_out(self, candidate: Candidate) -> Residual:
+        """Return the residual of a candidate on the held-out samples."""
+        residual = candidate.residual
         return replace(residual, valid=residual.valid & self.evaluation.held_out_samples)
+
+    def compute_held_out_evidence(self, before: Candidate, after: Candidate) -> float:
+        """Compute the block evidence for one candidate over another on the held-out samples."""
+        return compute_evidence(self.select_held_out(before), self.select_held_out(after), self.block_length)
 
     def fit_fully(self, names: frozenset[str]) -> None:
         """Fit a set on all samples, once, starting from its best fit on decimated data."""
@@ -216,6 +218,15 @@ class CandidatePool:
             self._continue_fit(names)
             self.candidates[names] = self.refit_all_samples(self.candidates[names])
             self.full_fits.add(names)
+
+    def fit_most_probable_set(self, compute_posterior: Callable[["CandidatePool"], Posterior]) -> frozenset[str]:
+        """Fit the most probable set on all samples; repeat while another set is then more probable."""
+        for _ in range(self.settings.max_refits):
+            names = compute_posterior(self).most_probable_set
+            if names in self.full_fits:
+                break
+            self.fit_fully(names)
+        return names
 
     def screen(self, parent: Candidate, without: frozenset[str]) -> list[ScreeningResult]:
         """Estimate the gain of every further effect in addition to a set, except of those named."""
@@ -282,10 +293,8 @@ class CandidatePool:
         return candidate
 
     def _find_mains_frequency(self, parent: Candidate) -> float:
-        """Find the mains frequency [Hz] in the residual of the longest stretch."""
-        counts = [len(p.force) for p in self.full_problem.pieces]
-        # The resolution of a frequency increases with the length of the stretch.
-        longest = counts.index(max(counts))
-        part = slice(sum(counts[:longest]), sum(counts[: longest + 1]))
-        error = np.where(parent.residual.valid, parent.residual.values, 0.0)[part]
-        return find_mains_frequency(error, self.full_problem.pieces[longest].excitation.rate)
+        """Find the mains frequency [Hz] in the residual of the longest stretch, which resolves it best."""
+        pieces = self.full_problem.pieces
+        errors = split_by_piece(np.where(parent.residual.valid, parent.residual.values, 0.0), pieces)
+        longest = max(range(len(pieces)), key=lambda i: len(errors[i]))
+        return find_mains_frequency(errors[longest], pieces[longest].excitation.rate)

@@ -39,7 +39,7 @@ def exchange_effects(pool: CandidatePool) -> None:
 def exchange_mounting(pool: CandidatePool, names: frozenset[str]) -> None:
     """Fit backlash in place of compliance in a set of several effects, or the reverse, on all samples.
 
-    Screening predicts no gain of either, and each can take up most of the other. The one in the set may only have
+    Screening predicts no gain of either, and each can absorb most of the other. The one in the set may only have
     been tried first.
     """
     for present, other in (MOUNTING_EFFECTS, MOUNTING_EFFECTS[::-1]):

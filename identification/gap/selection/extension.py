@@ -1,10 +1,10 @@
 """Extension of the most probable set by one effect, after its full fit (decision 0016).
 
-The forward search uses decimated data and ends where the form error could hide what remains. Here the set is
-fitted on all samples, and the most promising further effects are compared by block evidence. A confusable
-effect, which acts on the same variable as one in the set, can take up its form error. Block evidence cannot
-separate the two, so a confusable effect pays an additional penalty, and only sets that the search has already
-fitted are considered.
+The forward search uses decimated data. It ends where the form error of a set could mask a further effect. Here the
+set is fitted on all samples, and the further effects with the largest expected gains are compared by block
+evidence. A confusable effect acts on the same variable as one in the set, and can absorb its form error. Block
+evidence cannot separate the two. A confusable effect therefore pays an additional penalty, and only sets that the
+search has already fitted are considered.
 """
 
 from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
@@ -46,7 +46,7 @@ def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
 
 
 def _fit_extensions(pool: CandidatePool, names: frozenset[str], without: frozenset[str]) -> list[frozenset[str]]:
-    """Return the sets with the most promising further effects, and the best extension that is already known."""
+    """Return the sets with a further effect of the shortlist, and the best extension that is already known."""
     known, sets = pool.candidates[names], []
     for gain in select_shortlist(pool.screen(known, without), pool.settings.extension_effects):
         sets.append(names | {gain.effect_model.name})

@@ -1,7 +1,7 @@
-"""Mounting effects: backlash and compliance, which are fitted whatever their screening predicts.
+"""Mounting effects: backlash and compliance, which are fitted independently of their screening.
 
-While the law's yield displacement is wrong, the law looks nearly the same as either, and neither seems to gain
-anything. Each is started at several sizes. Richer forms are only fitted if a simpler one closes part of the gap.
+While the law's yield displacement is wrong, the law resembles either, and no gain is predicted for either. Each is
+started at several sizes. Richer forms are only fitted if a simpler one closes part of the gap.
 """
 
 from collections.abc import Mapping, Sequence

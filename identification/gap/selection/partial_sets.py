@@ -1,8 +1,8 @@
 """Partial sets: effects that reduce the error on unseen strokes, where no set of effects explains the gap.
 
-Each candidate is compared with the law alone by block evidence on the held-out strokes. An effect that only takes
-up the form error of an unknown cause reduces the error in some blocks and increases it in others. The larger the
-part of the gap that a set leaves, the less certain it is that its effects are at work.
+Each candidate is compared with the law alone by block evidence on the held-out strokes. An effect that only
+absorbs the form error of an unknown cause reduces the error in some blocks and increases it in others. The larger
+the part of the gap that a set leaves, the less certain it is that its effects are active.
 
 The search for the whole cause ends early, because hardly any effect brings an unknown cause near the floor. So the
 most probable partial set grows here: every effect with an expected gain is fitted with it, and the growth ends
@@ -25,7 +25,10 @@ from identification.gap.selection.posterior import (
 from identification.gap.selection.screening import select_shortlist
 
 _GENUINE_PROBABILITY = 0.5
-"""Probability that an effect which closes a part of the gap of an unknown cause is at work, and no look-alike."""
+"""Probability that an effect is active if it closes a part of the gap of an unknown cause.
+
+Otherwise it only resembles that cause.
+"""
 
 
 def find_partial_sets(pool: CandidatePool, posterior: Posterior) -> Posterior:
@@ -34,29 +37,19 @@ def find_partial_sets(pool: CandidatePool, posterior: Posterior) -> Posterior:
     ``posterior`` has the probabilities of the sets as the whole cause, and that of an unknown one. The most
     probable set grows effect by effect, and its subsets with one effect less are fitted if they are not.
     """
-    best = _fit_most_probable_set(pool)
+    best = pool.fit_most_probable_set(compute_partial_posterior)
     while len(best) < pool.settings.max_partial_effects:
         _fit_extensions(pool, best)
-        grown = _prune(pool, _fit_most_probable_set(pool))
+        grown = _prune(pool, pool.fit_most_probable_set(compute_partial_posterior))
         if len(grown) <= len(best):
             break
         best = grown
-    best = _fit_most_probable_set(pool)
+    best = pool.fit_most_probable_set(compute_partial_posterior)
     for model in pool.candidates[best].fit.effects:
         find_subset(pool, pool.candidates[best], model)
     partial, part = compute_partial_posterior(pool), _GENUINE_PROBABILITY * posterior.unknown
     sets = {n: posterior.sets.get(n, 0.0) + part * p for n, p in partial.sets.items()}
     return Posterior(sets, 1.0 - sum(sets.values()))
-
-
-def _fit_most_probable_set(pool: CandidatePool) -> frozenset[str]:
-    """Fit the most probable partial set on all samples; repeat where another is then more probable."""
-    for _ in range(pool.settings.max_refits):
-        best = compute_partial_posterior(pool).rank_sets()[0][0]
-        if best in pool.full_fits:
-            break
-        pool.fit_fully(best)
-    return best
 
 
 def _prune(pool: CandidatePool, names: frozenset[str]) -> frozenset[str]:
@@ -67,7 +60,7 @@ def _prune(pool: CandidatePool, names: frozenset[str]) -> frozenset[str]:
     """
     for model in pool.candidates[names].fit.effects:
         fit_without_effect(pool, pool.candidates[names], model)
-    return _fit_most_probable_set(pool)
+    return pool.fit_most_probable_set(compute_partial_posterior)
 
 
 def _fit_extensions(pool: CandidatePool, names: frozenset[str]) -> None:
@@ -80,7 +73,7 @@ def _fit_extensions(pool: CandidatePool, names: frozenset[str]) -> None:
 
 def compute_partial_posterior(pool: CandidatePool) -> Posterior:
     """Compute the probabilities of the fitted sets from block evidence on the held-out strokes."""
-    before = pool.select_held_out(frozenset())
+    before = pool.select_held_out(pool.baseline)
     samples = count_independent_samples(before, pool.block_length)
     names = list(pool.candidates)
     weights = {s.names: s.weight for s in pool.collect_evidence()}
@@ -88,7 +81,7 @@ def compute_partial_posterior(pool: CandidatePool) -> Posterior:
         [
             compute_log_prior(n)
             + math.log(weights[n])
-            + compute_evidence(before, pool.select_held_out(n), pool.block_length, samples)
+            + compute_evidence(before, pool.select_held_out(pool.candidates[n]), pool.block_length, samples)
             for n in names
         ]
     )

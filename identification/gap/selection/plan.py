@@ -1,8 +1,9 @@
 """Order in which sets of effects are fitted to a recording.
 
-The search goes forward: every effect is screened, and the most promising are fitted together with the law. The
-best sets grow by a second and a third effect. Then each effect of a set is left out once, and others are tried
-in its place. All of this uses decimated data. Finally the most probable sets are fitted on all samples.
+The search goes forward. Every effect is screened, and those with the largest expected gains are fitted together
+with the law. The best sets grow by a second and a third effect. Then each effect of a set is left out once, and
+others are tried in its place. All of this uses decimated data. Finally the most probable sets are fitted on all
+samples.
 """
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy as np
 from identification.fitting import EffectModel
 from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import describe_drift_explanation, subtract_clock_drift
-from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
 from identification.gap.selection.extension import try_extension
@@ -30,12 +30,12 @@ from identification.gap.selection.screening import (
     select_shortlist,
 )
 
-_CONTACTS = ("connection", "displacement_backlash")
+_CONTACT_ACTIONS = ("connection", "displacement_backlash")
 """Actions that need starts at several sizes, so that a search from one size of the effect finds nothing."""
 
 
 def search_forward(pool: CandidatePool) -> None:
-    """Fit the promising sets of effects on decimated data."""
+    """Fit the sets of effects with the largest expected gains, on decimated data."""
     baseline = pool.fit_law()
     pool.noise_model.update(baseline, pool.full_problem, pool.evaluation)
     if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
@@ -85,7 +85,7 @@ def _search_best_sets(pool: CandidatePool, size: int) -> None:
         for effects in choices:
             if pool.budget_spent or pool.is_at_floor(pool.find_best()):
                 return
-            if not any(e.form.action in _CONTACTS for e in effects):
+            if not any(e.form.action in _CONTACT_ACTIONS for e in effects):
                 pool.search(effects)
 
 
@@ -127,7 +127,7 @@ def _is_worth_extending(pool: CandidatePool, best: Candidate, parent: Candidate)
 
 
 def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
-    """Fit a set with each of the most promising further effects, and with each mounting effect."""
+    """Fit a set with each further effect of the shortlist, and with each mounting effect."""
     settings, excess = pool.settings, pool.compute_excess(parent)
     gains = pool.screen(parent, parent.names)
     if not parent.names and excess > settings.large_excess:
@@ -146,11 +146,11 @@ def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
 def compute_final_posterior(pool: CandidatePool) -> Posterior:
     """Fit the most probable sets on all samples, extend the first, and compute the posterior of all sets."""
     _fit_probable_sets(pool)
-    most_probable = _fit_most_probable_set(pool)
+    most_probable = pool.fit_most_probable_set(CandidatePool.compute_posterior)
     for _ in range(pool.settings.max_extensions):
         if not try_extension(pool, most_probable):
             break
-        most_probable = pool.compute_posterior().rank_sets()[0][0]
+        most_probable = pool.compute_posterior().most_probable_set
         pool.fit_fully(most_probable)
     exchange_mounting(pool, most_probable)
     _check_effects(pool)
@@ -160,19 +160,18 @@ def compute_final_posterior(pool: CandidatePool) -> Posterior:
 def _check_effects(pool: CandidatePool) -> None:
     """Compute what each effect of the most probable set gains on held-out samples, until that set stays the same.
 
-    An effect that only takes up the form error of another gains on the fitted samples, and hardly on others.
+    An effect that only absorbs the form error of another gains on the fitted samples, and hardly on others.
     """
     for _ in range(pool.settings.max_refits):
-        names = pool.compute_posterior().rank_sets()[0][0]
+        names = pool.compute_posterior().most_probable_set
         if len(names) < 2 or names in pool.held_out_evidence:
             return
         pool.fit_fully(names)
-        evidence = []
-        for model in pool.candidates[names].fit.effects:
-            subset = find_subset(pool, pool.candidates[names], model).names
-            before, after = pool.select_held_out(subset), pool.select_held_out(names)
-            evidence.append(BlockEvidence(subset, compute_evidence(before, after, pool.block_length)))
-        pool.held_out_evidence[names] = tuple(evidence)
+        candidate = pool.candidates[names]
+        subsets = [find_subset(pool, candidate, model) for model in candidate.fit.effects]
+        pool.held_out_evidence[names] = tuple(
+            BlockEvidence(subset.names, pool.compute_held_out_evidence(subset, candidate)) for subset in subsets
+        )
 
 
 def _fit_probable_sets(pool: CandidatePool) -> None:
@@ -184,13 +183,3 @@ def _fit_probable_sets(pool: CandidatePool) -> None:
     subsets = [names - {name} for names in likely[:1] if len(names) > 1 for name in sorted(names)]
     for names in dict.fromkeys([frozenset[str](), *likely, *(s for s in subsets if s in pool.candidates)]):
         pool.fit_fully(names)
-
-
-def _fit_most_probable_set(pool: CandidatePool) -> frozenset[str]:
-    """Fit the most probable set on all samples, until the set that is then most probable has a full fit."""
-    for _ in range(pool.settings.max_refits):
-        most_probable = pool.compute_posterior().rank_sets()[0][0]
-        if most_probable in pool.full_fits:
-            break
-        pool.fit_fully(most_probable)
-    return most_probable

@@ -2,10 +2,9 @@
 
 The likelihood of white noise would be far too certain. With a hundred thousand samples, one per cent of misfit
 would decide everything, but the form error of every library is larger. The odds therefore follow the *ratio* of
-the excesses of two sets, to a fixed power, down to a resolution. The resolution is the noise of the floor itself,
-and the small part of the gap that even the correct effect leaves because its form is not exact. Smaller sets are
-more probable beforehand. An unknown cause is one of the alternatives: known effects are expected to leave a part
-of its gap that the correct effects hardly ever leave.
+the excesses of two sets, to a fixed power, down to a resolution. The resolution is the error of the floor, and the
+form error that even the correct effect leaves. Smaller sets are more probable beforehand. An unknown cause is one
+of the alternatives. Known effects are expected to leave a larger part of its gap than the correct effects would.
 """
 
 import math
@@ -46,7 +45,7 @@ _UNKNOWN_ODDS = 3.0
 _COMPLEXITY_FACTOR = 0.1
 """Factor on the prior of each effect for the freedom of its parameters."""
 _MISATTRIBUTION = 0.02
-"""Probability that a set which leaves nothing is not the cause."""
+"""Probability that a set which closes all of the gap is not the cause."""
 _MISATTRIBUTION_SLOPE = 0.4
 """Further probability of that, per part of the gap that the set leaves."""
 _RARE_WEIGHT = 0.3
@@ -93,6 +92,11 @@ class Posterior:
     unknown: float
     """Probability of an unknown cause."""
 
+    @property
+    def most_probable_set(self) -> frozenset[str]:
+        """Names of the effects of the most probable set."""
+        return self.rank_sets()[0][0]
+
     def compute_effect_probability(self, name: str) -> float:
         """Return the probability that an effect is active, alone or with others."""
         return float(sum(p for names, p in self.sets.items() if name in names))
@@ -121,14 +125,8 @@ def compute_posterior(
         + _FORM_ERROR * gap
     )
     scores = _compute_scores(sets, resolution, gap)
-    insignificant = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
     best = max(sets, key=lambda s: scores[s.names])
-    unknown = compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
-    unknown -= _LIKELIHOOD_EXPONENT * math.log(_UNKNOWN_FORM_ERROR * gap + resolution + insignificant)
-    unknown -= _penalise_incomplete(best, gap)
-    # An unknown cause is only an alternative where known effects leave an excess that the floor cannot explain.
-    weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
-    unknown += math.log(max(weight, 1e-9))
+    unknown = _score_unknown(best, gap, resolution, samples)
     if unlisted_excess is not None:
         unknown = float(np.logaddexp(unknown, _score_unlisted(unlisted_excess, resolution)))
     shares = normalise_scores(np.array([*scores.values(), unknown]))
@@ -158,6 +156,19 @@ def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) 
             if log_odds < 0.0:
                 scores[s.names] = min(scores[s.names], scores[parent] + log_odds)
     return scores
+
+
+def _score_unknown(best: SetEvidence, gap: float, resolution: float, samples: int) -> float:
+    """Return the log odds of an unknown cause, next to the most probable set.
+
+    It is an alternative only where known effects leave an excess that the noise floor cannot explain.
+    """
+    insignificant = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
+    score = compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
+    score -= _LIKELIHOOD_EXPONENT * math.log(_UNKNOWN_FORM_ERROR * gap + resolution + insignificant)
+    score -= _penalise_incomplete(best, gap)
+    weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
+    return score + math.log(max(weight, 1e-9))
 
 
 def _score_unlisted(excess: float, resolution: float) -> float:

@@ -1,11 +1,10 @@
 """Screening: linearised estimate of the gain of every effect, without fitting it.
 
-Each form is added to the baseline at several starts. An effect starts at zero size with several lengths, speeds
-or times, or at a small size where a zero size has no sensitivity. One Gauss-Newton step moves the law's
-coordinates and the effect together, inside their bounds, so that a gain which the coordinates alone could
-achieve does not count. The sensitivities over the law are those of the baseline. Those over an effect are
-differences of two simulations. Exact sensitivities, and a step with a line search, are used only for the
-effects with the largest predicted gains.
+Each form is added to the baseline at several starts. An effect starts at zero size with several lengths, speeds or
+times, or at a small size where a zero size has no sensitivity. One Gauss-Newton step moves the law's coordinates
+and the effect together, inside their bounds. A gain that the coordinates alone could achieve thus does not count.
+The sensitivities over the law are those of the baseline. Those over an effect are differences of two simulations.
+Exact sensitivities, and a step with a line search, are used only for the effects with the largest predicted gains.
 """
 
 from collections.abc import Mapping, Sequence
@@ -177,16 +176,12 @@ class _Linearisation:
         first = self.problem.layout.per_log.start
         effect = np.arange(first, first + len(model.quantities))
         others = np.setdiff1d(np.arange(len(start)), effect)
-        absent = not any(v for v, q in zip(values, model.quantities, strict=True) if q.low <= 0.0)
-        origin = self.residuals if absent else self._compute_weighted_residuals(joint, start)
-        steps = [_make_difference_step(joint, start, int(column), absent) for column in effect]
-        moved = [self._compute_weighted_residuals(joint, start + s) if s.any() else origin for s in steps]
+        origin, derivatives = self._differentiate_effect(joint, start, model, values)
         hessian, gradient = np.zeros((len(start), len(start))), np.zeros(len(start))
         hessian[np.ix_(others, others)], gradient[others] = self.evaluation.hessian, self.evaluation.gradient
         cost = self.evaluation.cost
         for i, (r, J) in enumerate(zip(self.residuals, self.sensitivities, strict=True)):
-            columns, here = others[self.problem.find_columns(i)], origin[i]
-            E = np.column_stack([(m[i] - here) / max(s.sum(), 1e-12) for m, s in zip(moved, steps, strict=True)])
+            columns, here, E = others[self.problem.find_columns(i)], origin[i], derivatives[i]
             cross = J.T @ E
             hessian[np.ix_(columns, effect)] += cross
             hessian[np.ix_(effect, columns)] += cross.T
@@ -195,6 +190,21 @@ class _Linearisation:
             gradient[effect] += E.T @ here
             cost += float(here @ here - r @ r)
         return Evaluation(cost if np.isfinite(cost) else np.inf, hessian, gradient)
+
+    def _differentiate_effect(
+        self, joint: Problem, start: Array, model: EffectModel, values: tuple[float, ...]
+    ) -> tuple[tuple[Array, ...], list[Array]]:
+        """Return the residuals (N,) of each piece at a start, and their differences (N, P) over the effect."""
+        first = self.problem.layout.per_log.start
+        absent = not any(v for v, q in zip(values, model.quantities, strict=True) if q.low <= 0.0)
+        origin = self.residuals if absent else self._compute_weighted_residuals(joint, start)
+        steps = [_make_difference_step(joint, start, first + k, absent) for k in range(len(model.quantities))]
+        moved = [self._compute_weighted_residuals(joint, start + s) if s.any() else origin for s in steps]
+        derivatives = [
+            np.column_stack([(m[i] - here) / max(s.sum(), 1e-12) for m, s in zip(moved, steps, strict=True)])
+            for i, here in enumerate(origin)
+        ]
+        return origin, derivatives
 
     def _compute_weighted_residuals(self, joint: Problem, unknowns: Array) -> tuple[Array, ...]:
         """Compute the residuals of each piece relative to the noise, (N,) each."""

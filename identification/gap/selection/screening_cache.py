@@ -1,8 +1,8 @@
 """Cache of screenings.
 
 The gains of further effects are needed several times for the same set: when it grows, in exchanges, and in
-extensions at the end. A screening contains unknowns of the joint problem of its set. So it is valid while the
-forms and the order of the set's effects stay the same, and while the excess of the set stays nearly the same.
+extensions at the end. A screening contains unknowns of the joint problem of its set. It is therefore valid while
+the forms and the order of the set's effects stay the same. The excess of the set must also stay nearly the same.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,6 +28,11 @@ class _Screening(NamedTuple):
     names: frozenset[str]
     """Names of the screened effects."""
     gains: list[ScreeningResult]
+
+    def is_valid(self, parent: Candidate, excess: float, wanted: frozenset[str]) -> bool:
+        """Return True if the gains of the wanted effects still hold for a set with an excess [1]."""
+        is_near = abs(excess - self.excess) <= _CACHE_TOLERANCE * self.excess
+        return is_near and self.effects == parent.fit.effects and wanted <= self.names
 
 
 @dataclass
@@ -59,12 +64,7 @@ class ScreeningCache:
         """
         wanted = frozenset(self.library) - without
         entry = self._entries.get(parent.names)
-        if (
-            entry is None
-            or entry.effects != parent.fit.effects
-            or not wanted <= entry.names
-            or abs(excess - entry.excess) > _CACHE_TOLERANCE * entry.excess
-        ):
+        if entry is None or not entry.is_valid(parent, excess, wanted):
             highest = max(p.excitation.rate for p in problem.pieces)
             names = [name for name in self.library if name in wanted]
             models = list_effect_models(names, problem.space.scales.damper_size, self.library)

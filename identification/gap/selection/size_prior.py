@@ -7,7 +7,7 @@ from identification.damper import LIBRARY_SIZE, DamperSize, scale_quantity
 from identification.simulate import ActiveEffect
 
 _IMPLAUSIBLE_WEIGHT = 0.03
-"""Weight of an effect whose size has not been seen on any bench."""
+"""Weight of an effect whose size is not plausible on a bench."""
 _MAX_NONLINEARITY = 0.1
 """Largest deviation of a displacement channel from a straight line, relative to half the stroke."""
 _MIN_FREE_STROKE = 0.3

@@ -2,8 +2,8 @@
 
 An effect changes the inputs of the law (field, motion, factors of F, c0 and c1) or adds a parallel force. Both
 follow from a recording's inputs alone, by functions of the simulation that precede its integration. No state of
-the law is needed for them, and nothing is simulated. In a mounting with backlash or compliance, the damper's
-motion depends on its force or on its past, and would be a third state of the network. Such effects are not
+the law is needed for them, and nothing is simulated. With backlash or compliance in the mounting, the damper's
+motion depends on its force or on its past. It would be a third state of the network. Such effects are not
 supported.
 """
 

@@ -1,7 +1,7 @@
 """Inputs of the network: motion, drive and field of one piece at any time.
 
-Time is that of the displacement channel. The field follows the drive in closed form (eq. 8 for a drive that is
-held between samples), so the network does not have to learn it.
+Time is that of the displacement channel. The field follows the drive in closed form (eq. 8, for a drive that is
+held between samples). The network does not have to learn it.
 """
 
 from typing import NamedTuple

@@ -1,7 +1,7 @@
 """Reversals of the slip x - y, at which the hysteresis turns; they differ from the reversals of the stroke x.
 
-The inner point lags. The slip velocity w = x' - y' changes sign some ten milliseconds before x' does, stays near
-zero while y' follows x', and grows after the breakthrough. Near zero its sign is arbitrary. A reversal is
+The inner point lags. The slip velocity w = x' - y' changes sign some ten milliseconds before x' does. It stays
+near zero while y' follows x', and grows after the breakthrough. Near zero its sign is arbitrary. A reversal is
 therefore an extreme of the slip itself, which the slip leaves by more than a fraction of the yield displacement.
 """
 

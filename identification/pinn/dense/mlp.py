@@ -1,8 +1,8 @@
 """Multilayer perceptron with tanh layers that propagates the derivative along the solution with its values.
 
-Inputs are functions of time, so the rate of an output is the product of the network's Jacobian with the rates of
-all inputs (a Jacobian-vector product). A partial derivative over an input called t would ignore the rates of the
-others, and the law does not apply to it.
+Inputs are functions of time. The rate of an output is therefore the product of the network's Jacobian with the
+rates of all inputs (a Jacobian-vector product). A partial derivative over an input called t would ignore the rates
+of the others, and the law does not apply to it.
 """
 
 from collections.abc import Sequence

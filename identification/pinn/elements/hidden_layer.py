@@ -2,9 +2,9 @@
 
 Units have random slopes and centres (extreme learning machine, Huang et al. 2006; local ones for differential
 equations: Dong and Li 2021). The units are nearly collinear, so they are whitened by a singular value
-decomposition. They are then recombined into one function that is 1 at the left end, one that is 1 at the right
-end, and others that vanish at both. States of neighbouring elements thus share their value at the node, and no
-loss has to enforce continuity.
+decomposition. They are then recombined: one function is 1 at the left end, one is 1 at the right end, and the
+others vanish at both. States of neighbouring elements thus share their value at the node, and no loss has to
+enforce continuity.
 """
 
 from collections.abc import Iterator

@@ -96,7 +96,7 @@ def _apply_function(code: int, value: float) -> float:
 
 
 @compile_function
-def _keep_from_zero(value: float) -> float:
+def _limit_magnitude(value: float) -> float:
     return _SMALLEST if abs(value) < _SMALLEST else value
 
 
@@ -105,7 +105,7 @@ def _raise_to_power(base: float, exponent: float) -> float:
     if exponent != np.round(exponent):
         # A negative base would have no real result.
         return float((_SMALLEST if base < _SMALLEST else base) ** exponent)
-    return float((_keep_from_zero(base) if exponent < 0.0 else base) ** exponent)
+    return float((_limit_magnitude(base) if exponent < 0.0 else base) ** exponent)
 
 
 @compile_function
@@ -116,7 +116,7 @@ def _apply_operator(code: int, left: float, right: float) -> float:
         return left - right
     if code == _MULTIPLY:
         return left * right
-    return left / _keep_from_zero(right) if code == _DIVIDE else _raise_to_power(left, right)
+    return left / _limit_magnitude(right) if code == _DIVIDE else _raise_to_power(left, right)
 
 
 @compile_function

@@ -1,7 +1,7 @@
 """Variables of defined effects in compiled code, and the memory from which those of the past follow.
 
-Memory is updated once per integration step, from its end. Inside a step, a variable is that of the stage on top of
-the memory, because stages are trial points that must not enter the memory. The drive is held, so its memory is
+Memory is updated once per integration step, from its end. Inside a step, a variable is computed from the memory
+and the present stage. Stages are trial points and must not change the memory. The drive is held, so its memory is
 updated where the drive may change.
 """
 

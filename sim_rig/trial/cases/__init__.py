@@ -1,8 +1,9 @@
 """Cases of the blind trial: random draw, strokes, sealed truth, folder."""
 
-from sim_rig.trial.cases.calibrate import compute_noise_floor
 from sim_rig.trial.cases.draw import GRID_RATIOS, SampledCase, draw_cases, draw_grid, size_case
 from sim_rig.trial.cases.folder import DiagnosisOutcome, Seal, TrialFolder, TrialKind
+from sim_rig.trial.cases.parameter_values import ValueRange, compute_measures, draw_value, draw_values
+from sim_rig.trial.cases.sizing import compute_noise_floor
 from sim_rig.trial.cases.specimens import SIZES
 from sim_rig.trial.cases.strokes import VARIANTS, RunKind, make_method_document, make_strokes
 from sim_rig.trial.cases.truth import (
@@ -14,7 +15,6 @@ from sim_rig.trial.cases.truth import (
     read_sealed_truth,
     write_sealed_truth,
 )
-from sim_rig.trial.cases.values import ValueRange, compute_measures, draw_value, draw_values
 
 __all__ = [
     "GRID_RATIOS",

@@ -8,11 +8,11 @@ import numpy as np
 
 from sim_rig.effect_forms import FORMS, Place
 from sim_rig.errors import TrialError
-from sim_rig.trial.cases.calibrate import compute_noise_floor, find_size, make_sizing_model
+from sim_rig.trial.cases.parameter_values import compute_measures, draw_values
+from sim_rig.trial.cases.sizing import compute_noise_floor, find_size, make_sizing_model
 from sim_rig.trial.cases.specimens import SIZES, draw_specimen, make_scenario_document
 from sim_rig.trial.cases.strokes import VARIANTS, compute_duration, make_strokes
 from sim_rig.trial.cases.truth import CaseKind, Magnitude, MethodKind, TrueCase, TrueEffect
-from sim_rig.trial.cases.values import compute_measures, draw_values
 
 CASE_COUNTS: dict[CaseKind, int] = {"single": 58, "nothing": 100, "pair": 33, "unknown": 30, "triple": 9}
 """Number of cases of each kind among 230."""

@@ -1,9 +1,9 @@
 """Scores of the blind trial."""
 
-from sim_rig.trial.scoring.answer import CaseResult, Proportion, Scores, TrialReport
 from sim_rig.trial.scoring.score import compute_proportion, compute_scores
 from sim_rig.trial.scoring.summary import score_trial
 from sim_rig.trial.scoring.table import render_table
+from sim_rig.trial.scoring.trial_report import CaseResult, Proportion, Scores, TrialReport
 from sim_rig.trial.scoring.unseal import compute_force_noise, compute_true_shrinkage, unseal_case
 
 __all__ = [

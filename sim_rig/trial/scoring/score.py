@@ -8,7 +8,7 @@ from statistics import fmean, median
 
 from sim_rig.effect_forms import FORMS
 from sim_rig.trial.cases import GRID_RATIOS
-from sim_rig.trial.scoring.answer import (
+from sim_rig.trial.scoring.trial_report import (
     CalibrationBin,
     CaseResult,
     DetectionBin,

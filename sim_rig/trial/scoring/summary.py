@@ -3,8 +3,8 @@
 from sim_rig.errors import TrialError
 from sim_rig.trial.cases import TrialFolder, read_sealed_truth
 from sim_rig.trial.execution import WIRES_SUFFIX, TrialOptions
-from sim_rig.trial.scoring.answer import TrialReport
 from sim_rig.trial.scoring.score import compute_scores
+from sim_rig.trial.scoring.trial_report import TrialReport
 from sim_rig.trial.scoring.unseal import unseal_case
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from statistics import median
 
-from sim_rig.trial.scoring.answer import CalibrationBin, Proportion, TrialReport
+from sim_rig.trial.scoring.trial_report import CalibrationBin, Proportion, TrialReport
 
 
 def render_table(trial: TrialReport) -> str:

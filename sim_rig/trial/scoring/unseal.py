@@ -7,7 +7,7 @@ import orjson
 
 from sim_rig.trial.cases import DiagnosisOutcome, TrialFolder, TrueCase, compute_noise_floor
 from sim_rig.trial.execution import WIRES_SUFFIX
-from sim_rig.trial.scoring.answer import CaseResult, NamedSet
+from sim_rig.trial.scoring.trial_report import CaseResult, NamedSet
 
 MIN_PROBABILITY = 1e-3
 """[1] smallest probability of the truth in the scores: a set that is not listed does not count as impossible."""

@@ -146,6 +146,7 @@ async function managePeople() {
   await page.locator("#person-password").focus();
   await page.keyboard.press("Enter");
   await hasText("#people-note", "was added");
+  await changeExternal();
   await page.getByRole("button", { name: "Set password … Emmy Noether" }).click();
   await page.fill("#new-password", "conserved quantity");
   await page.fill("#repeated-password", "conserved quantities");
@@ -163,6 +164,90 @@ async function managePeople() {
   seen.lastAdministrator = await text("#people-note");
   seen.people = await page.locator("#people tr").allInnerTexts();
   await look("people");
+}
+
+/** A person of the identity provider: what comes from there is neither shown as a field nor sent. */
+async function changeExternal() {
+  seen.external = await page.locator("#people tr", { hasText: "Wolfgang Pauli" }).innerText();
+  await page.getByRole("button", { name: "Change … Wolfgang Pauli" }).click();
+  seen.externalFields = await page.locator("#person-form").evaluate((form) =>
+    [...form.querySelectorAll("label")].filter((one) => one.checkVisibility()).map((one) => one.innerText.trim()));
+  seen.externalWords = await text("#person-external");
+  await page.getByLabel("store methods").check();
+  await look("external");
+  await page.getByRole("button", { name: "Save" }).click();
+  await hasText("#people-note", "Wolfgang Pauli was changed");
+}
+
+/** Approves a version of a method, and withdraws the approval. */
+async function approveMethod() {
+  await page.goto(`${url}/#/plan/quick`);
+  await hasText("#plan", "version 2");
+  const versions = page.getByRole("group", { name: "Versions and approval" });
+  const act = async (name, words) => {
+    await versions.getByRole("button", { name }).click();
+    seen.approvalQuestion = await text("#question-dialog");
+    await page.click("#question-agree");
+    await versions.getByText(words).waitFor();
+    return versions.locator("tbody tr").allInnerTexts();
+  };
+  seen.approved = await act("Approve … version 2 of quick", "Version 2 was approved.");
+  await look("approval");
+  seen.withdrawn = await act("Withdraw the approval … version 2 of quick", "The approval of version 2 was withdrawn.");
+}
+
+/** Reads a report and signs it, first with a wrong password. */
+async function signReport() {
+  await page.goto(`${url}/#/runs/run-1`);
+  await hasText("#run", "Residual by condition");
+  const section = page.getByRole("region", { name: "Signatures" });
+  await section.locator("summary").click();
+  await section.getByText("Newer results exist").waitFor();
+  seen.signedBefore = await section.locator("tbody tr").allInnerTexts();
+  await section.getByRole("button", { name: "Make the report to sign" }).click();
+  await section.frameLocator("iframe").getByText("Report 1 on run-1").waitFor();
+  seen.toBeSigned = await section.locator(".folded > .path").innerText();
+  await section.getByRole("button", { name: "Sign this report …" }).click();
+  await page.selectOption("#sign-meaning", "approved");
+  await page.fill("#sign-password", "not this one");
+  await page.keyboard.press("Enter");
+  await hasText("#sign-report-dialog [role=alert]", "Not signed");
+  seen.wrongSignature = await text("#sign-report-dialog [role=alert]");
+  seen.signDialog = await text("#sign-report-dialog");
+  await look("sign");
+  await page.fill("#sign-password", PASSWORD);
+  await page.keyboard.press("Enter");
+  await section.getByText("Signed: approved").waitFor();
+  seen.signed = await section.locator("p[role=status]").innerText();
+  seen.signedAfter = await section.locator("tbody tr").allInnerTexts();
+  await section.scrollIntoViewIfNeeded();
+  await look("signatures");
+}
+
+/** Reads, searches, verifies and exports the audit trail. */
+async function readTrail() {
+  await choose("Audit trail");
+  await hasText("#audit", "local:rig");
+  const rows = () => page.locator("#audit > tr").allInnerTexts();
+  seen.trail = await rows();
+  await look("audit");
+  await page.click("#audit-older");
+  await until(() => document.getElementById("audit").childElementCount > 50);
+  seen.wholeTrail = (await rows()).length;
+  await page.click("#audit-verify button.primary");
+  await hasText("#audit-answer", "Nothing was altered");
+  seen.verified = await text("#audit-answer");
+  const [saved] = await Promise.all([page.waitForEvent("download"), page.click("#audit-export-csv")]);
+  seen.exported = saved.suggestedFilename();
+  await page.selectOption("#audit-form [name=action]", "report signed");
+  await page.fill("#audit-form [name=actor]", "user:mcurie");
+  await page.fill("#audit-form [name=from]", "2025-03-05T08:00");
+  await page.keyboard.press("Enter");
+  await until(() => document.getElementById("audit").childElementCount === 1);
+  seen.found = [await rows(), new URL(page.url()).hash];
+  await page.reload();
+  await hasText("#audit", "report signed");
+  seen.kept = [await page.inputValue("#audit-form [name=from]"), await page.inputValue("#audit-form [name=actor]")];
 }
 
 async function manageTokens() {
@@ -256,7 +341,7 @@ async function loseSession() {
 }
 
 try {
-  const steps = [failAndWait, beTechnician, beViewer, walkMenu, managePeople, manageTokens, changePassword, signInDevices, loseSession];
+  const steps = [failAndWait, beTechnician, beViewer, walkMenu, managePeople, approveMethod, signReport, readTrail, manageTokens, changePassword, signInDevices, loseSession];
   for (const step of steps) await step();
   console.log(JSON.stringify(seen));
 } finally {

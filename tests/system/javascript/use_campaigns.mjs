@@ -178,6 +178,11 @@ async function begin() {
   seen.refusedPlan = await text("#campaign-start-note");
   seen.startsWithoutPlan = await page.locator("#campaign-begin").isEnabled();
   const steps = [{ run: { specimen: "MR-0042", method: "quick" } }, { rest: { seconds: 600 } }];
+  await give(JSON.stringify({ name: "strict", steps, methods: "approved" }));
+  await hasText("#campaign-plan", "Dry run of strict");
+  await page.click("#campaign-begin");
+  await hasText("#campaign-start-note", "Not started");
+  seen.unapproved = await text("#campaign-start-note");
   const document = { name: "morning", steps };
   await page.setInputFiles("#campaign-file", { name: "morning.json", mimeType: "application/json", buffer: Buffer.from(JSON.stringify(document)) });
   await hasText("#campaign-plan", "Dry run of morning");

@@ -8,7 +8,7 @@ search then reads an index instead of the JSON of every job.
 from alembic import op
 
 revision = "0017"
-down_revision = "0014"
+down_revision = "0016"
 
 _UPGRADE = (
     "CREATE EXTENSION IF NOT EXISTS pg_trgm",

@@ -7,7 +7,7 @@ from fastapi.responses import FileResponse
 
 from bench.campaign_report import CAMPAIGN_REPORT_FORMATS, CampaignReportFormat
 from bench.errors import ReportError
-from bench.service.context import Context
+from bench.service.context import Context, ServiceContext
 from bench.service.problems import make_not_found
 from bench.service.routes.exchange import MEDIA_TYPES
 from bench.service.transfer import run_command, send_temporary_file
@@ -29,7 +29,16 @@ def get_campaign_report(
         raise make_not_found("campaign", campaign_id)
 
     def write(out: str) -> None:
-        run_command(["campaign", "report", campaign_id, "--data", str(context.data), "--out", out], ReportError)
+        write_campaign_report(context, campaign_id, out)
 
     name = f"{campaign_id}.report.{report_format}"
     return send_temporary_file(context.data, name, MEDIA_TYPES[report_format], write, inline=True)
+
+
+def write_campaign_report(context: ServiceContext, campaign_id: str, out: str) -> None:
+    """Write the present report of a campaign to a file with the ending of its format.
+
+    Raises:
+        ReportError: it cannot be made.
+    """
+    run_command(["campaign", "report", campaign_id, "--data", str(context.data), "--out", out], ReportError)

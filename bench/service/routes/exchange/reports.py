@@ -2,6 +2,8 @@
 
 import asyncio
 from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
@@ -40,10 +42,36 @@ async def get_newest_report(
     row = await asyncio.to_thread(context.get_run, run_id)
     results = await asyncio.to_thread(_find_results, context, row)
     if report_format == "html" and results:
-        stored = _find_page(context, max(results, key=lambda job: job.finished or job.created))
+        stored = _find_page(context, max(results, key=_get_end))
         if stored is not None:
             return stored
     return await asyncio.to_thread(_make_report, context, row, results, report_format)
+
+
+def write_report(context: ServiceContext, row: RunRow, report_format: ReportFormat, out: Path) -> None:
+    """Write the present report on a run to a file with the ending of its format.
+
+    Raises:
+        ReportError: it cannot be made.
+        ProblemError: the run has no complete log.
+    """
+    results = _find_results(context, row)
+    if report_format == "html" and results:
+        page = _locate_page(context, max(results, key=_get_end))
+        if page.is_file():
+            out.write_bytes(page.read_bytes())
+            return
+    check_complete(row, "reported on")
+    _run_report(context, row, results, str(out))
+
+
+def find_newest_result(context: ServiceContext, row: RunRow) -> datetime | None:
+    """Return the UTC at which the newest fit or diagnosis of a run ended; None without one."""
+    return max(map(_get_end, _find_results(context, row)), default=None)
+
+
+def _get_end(job: JobRow) -> datetime:
+    return job.finished or job.created
 
 
 def _find_results(context: ServiceContext, row: RunRow) -> list[JobRow]:
@@ -54,26 +82,33 @@ def _find_results(context: ServiceContext, row: RunRow) -> list[JobRow]:
 
 def _find_page(context: ServiceContext, job: JobRow) -> SnapshotResponse | None:
     """Return the stored page of a job; None if it was removed."""
-    path = context.catalogue.resolve_path(job.result or "") / REPORT_FILE
+    path = _locate_page(context, job)
     try:
         return SnapshotResponse(path, MEDIA_TYPES["html"], f"{job.run_id}.{REPORT_FILE}", inline=True)
     except FileNotFoundError:
         return None
 
 
+def _locate_page(context: ServiceContext, job: JobRow) -> Path:
+    return context.catalogue.resolve_path(job.result or "") / REPORT_FILE
+
+
 def _make_report(
     context: ServiceContext, row: RunRow, results: list[JobRow], report_format: ReportFormat
 ) -> FileResponse:
     check_complete(row, "reported on")
-    log = context.catalogue.resolve_path(row.log)
-    documents = list(_list_documents(context, results))
 
     def write(out: str) -> None:
-        run_command(["report", str(log), *documents, "--out", out], ReportError)
+        _run_report(context, row, results, out)
 
     name = f"{row.id}.report.{report_format}"
     inline = report_format != "xlsx"
     return send_temporary_file(context.data, name, MEDIA_TYPES[report_format], write, inline=inline)
+
+
+def _run_report(context: ServiceContext, row: RunRow, results: list[JobRow], out: str) -> None:
+    log = context.catalogue.resolve_path(row.log)
+    run_command(["report", str(log), *_list_documents(context, results), "--out", out], ReportError)
 
 
 def _list_documents(context: ServiceContext, results: list[JobRow]) -> Iterator[str]:

@@ -1,7 +1,6 @@
 """Sign-in of browsers: by password, by token, or by the code of another device."""
 
 import asyncio
-import math
 from datetime import UTC, datetime, timedelta
 from http import HTTPStatus
 from typing import Any
@@ -14,7 +13,7 @@ from bench.service import problems
 from bench.service.access import Identity, compute_csrf, get_cookie_name, read_cookie
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError
-from bench.service.requests import Sender
+from bench.service.requests import Sender, check_wait
 from bench.service.routes.people.views import CodeView, Person, SessionView, SignInRequest, sort_rights
 
 public_router = APIRouter(prefix="/session", tags=["people"])
@@ -93,7 +92,7 @@ async def _check_credentials(context: ServiceContext, request: SignInRequest, ht
             await asyncio.to_thread(context.authenticator.identify, "token", token), "the token is wrong"
         )
     key = f"user:{request.name}" if request.code is None else f"code:{http.client.host if http.client else ''}"
-    _check_wait(context.attempts.get_wait(key))
+    check_wait(context.attempts.get_wait(key))
     if request.code is not None:
         found = await asyncio.to_thread(_redeem, context, request.code.get_secret_value())
         reason = "the code is wrong, was used, or has ended; make a new one on the other device"
@@ -126,19 +125,6 @@ def _require(identity: Identity | None, reason: str) -> Identity:
     if identity is None:
         raise ProblemError(HTTPStatus.UNAUTHORIZED, "sign-in-failed", "Sign-in failed", reason)
     return identity
-
-
-def _check_wait(wait: float) -> None:
-    if wait > 0:
-        seconds = math.ceil(wait)
-        detail = f"too many sign-ins failed; wait {seconds} s and try again"
-        raise ProblemError(
-            HTTPStatus.TOO_MANY_REQUESTS,
-            "too-many-attempts",
-            "Too many attempts",
-            detail,
-            headers={"Retry-After": str(seconds)},
-        )
 
 
 def _make_view(identity: Identity, secret: str | None) -> SessionView:

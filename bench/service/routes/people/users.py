@@ -8,11 +8,11 @@ from fastapi import APIRouter
 from pydantic import SecretStr
 
 from bench.catalogue import UserRow
-from bench.people import check_password, compute_rights, hash_password, is_password
+from bench.people import check_password, compute_rights, hash_password
 from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict, make_not_found
-from bench.service.requests import Sender, require_right
+from bench.service.requests import Sender, check_password_again, require_right
 from bench.service.routes.people.views import UserChange, UserList, UserRequest, UserView, sort_rights
 
 router = APIRouter(prefix="/users", tags=["people"])
@@ -63,7 +63,7 @@ def change_user(name: str, change: UserChange, context: Context, sender: Sender)
         detail = f"user {name} signs in by the provider; change {', '.join(sorted(given & _OF_PROVIDER))} there"
         raise make_conflict("external-user", "The provider administers this user", detail)
     if is_own and change.password is not None:
-        _check_current_password(context, row, change.current_password)
+        check_password_again(context, row, change.current_password, "current_password")
     values: dict[str, Any] = change.model_dump(include=given - _OWN_CHANGES, exclude_none=True, mode="json")
     if change.password is not None:
         values["password_hash"] = _hash(change.password, name)
@@ -89,17 +89,6 @@ def _get_user(context: ServiceContext, name: str) -> UserRow:
     if row is None:
         raise make_not_found("user", name)
     return row
-
-
-def _check_current_password(context: ServiceContext, row: UserRow, given: SecretStr | None) -> None:
-    """Check the present password, with the same wait after failures as at a sign-in."""
-    key = f"user:{row.name}"
-    is_right = given is not None and context.attempts.get_wait(key) == 0
-    if not is_right or given is None or not is_password(given.get_secret_value(), row.password_hash):
-        context.attempts.record_failure(key)
-        detail = "current_password: give the present password; after failures, wait before the next attempt"
-        raise ProblemError(HTTPStatus.FORBIDDEN, "wrong-password", "The present password is wrong", detail)
-    context.attempts.record_success(key)
 
 
 def _hash(password: SecretStr | None, name: str) -> str | None:

@@ -1,12 +1,22 @@
-"""Routes of planning: methods with their dry runs, specimens, certificates, and the facts of the bench."""
+"""Routes of planning: methods with their dry runs, specimens, certificates, checks, facts of the bench."""
 
-from bench.service.routes.planning import bench_facts, certificates, dry_runs, methods, previews, specimens, trends
+from bench.service.routes.planning import (
+    bench_facts,
+    certificates,
+    checks,
+    dry_runs,
+    methods,
+    previews,
+    specimens,
+    trends,
+)
 from bench.service.routes.planning.certificates import describe_calibration
 from bench.service.routes.planning.method_library import find_method
 
 ROUTERS = (
     bench_facts.router,
     certificates.router,
+    checks.router,
     previews.router,
     dry_runs.router,
     methods.router,

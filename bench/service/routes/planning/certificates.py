@@ -40,7 +40,7 @@ def add_certificate(
     certificate: Certificate, context: Context, request: Request, response: Response
 ) -> CertificateView:
     """Store a certificate. It never changes; runs that start from now on name it in their log."""
-    stored = context.catalogue.certificates.add(certificate, _find_author(request))
+    stored = context.catalogue.certificates.add(certificate, find_author(request))
     if stored is None:
         detail = (
             f"certificate {certificate.number} of {certificate.laboratory} for channel {certificate.channel} is "
@@ -81,7 +81,7 @@ def correct_certificate(
         raise ProblemError(
             HTTPStatus.UNPROCESSABLE_ENTITY, "certificate-refused", "The certificate was refused", str(error)
         ) from None
-    author, store = _find_author(request), context.catalogue.certificates
+    author, store = find_author(request), context.catalogue.certificates
     if not store.correct(stored, corrected, author, correction.reason):
         detail = f"certificate {certificate_id} was corrected meanwhile; read it again and repeat the correction"
         raise make_conflict("changed-meanwhile", "Changed meanwhile", detail)
@@ -97,19 +97,22 @@ def withdraw_certificate(
 ) -> CertificateView:
     """Withdraw a certificate with all its versions: it stays visible, and applies to no later run."""
     _get_present(context, certificate_id)
-    context.catalogue.certificates.withdraw(certificate_id, _find_author(request), reason)
+    context.catalogue.certificates.withdraw(certificate_id, find_author(request), reason)
     return get_certificate(certificate_id, context)
 
 
 def describe_calibration(context: ServiceContext) -> str:
-    """Return `ok`, or the channels whose calibration is overdue or due soon, with the date."""
+    """Return `ok`, or the channels whose calibration is overdue or due soon, or whose check is out of control."""
     day = datetime.now(UTC).date()
     current = [one.document for one in context.catalogue.certificates.list_current(day).values()]
     by_due = sorted(current, key=lambda certificate: certificate.due)
-    return "; ".join(filter(None, (describe_due(one, day) for one in by_due))) or "ok"
+    due = (describe_due(one, day) for one in by_due)
+    checks = (one.text for one in context.catalogue.checks.list_latest() if one.state == "out_of_control")
+    return "; ".join(filter(None, (*due, *checks))) or "ok"
 
 
-def _find_author(request: Request) -> str:
+def find_author(request: Request) -> str:
+    """Return the user or token of a request; the token of the service has no name of its own."""
     return str(request.scope.get("state", {}).get("actor") or _TOKEN_HOLDER)
 
 

@@ -56,6 +56,20 @@ def find_method(context: ServiceContext, name: str, version: int | None = None) 
     raise make_not_found("method", name if version is None else f"{name} of version {version}")
 
 
+def list_versions(context: ServiceContext, name: str) -> list[StoredMethod]:
+    """Return the versions of a method, the newest first.
+
+    Raises:
+        ProblemError: there is no such method.
+    """
+    shipped = _load_shipped_methods().get(name)
+    found = [_read(row) for row in context.catalogue.methods.list_versions(name)]
+    found += [] if shipped is None else [shipped]
+    if not found:
+        raise make_not_found("method", name)
+    return found
+
+
 def _read(row: MethodRow) -> StoredMethod:
     return StoredMethod(parse_method(row.document, f"method {row.name}"), row.version, row.created)
 

@@ -11,8 +11,14 @@ from bench.methods import Method, compile_method, list_shipped_methods, load_met
 from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
 from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender
-from bench.service.routes.planning.method_library import StoredMethod, describe_facts, find_method, list_methods
-from bench.service.routes.planning.views import MethodPage, MethodSummary
+from bench.service.routes.planning.method_library import (
+    StoredMethod,
+    describe_facts,
+    find_method,
+    list_methods,
+    list_versions,
+)
+from bench.service.routes.planning.views import MethodPage, MethodSummary, MethodVersions
 
 router = APIRouter(prefix="/methods", tags=["methods"], route_class=IdempotentRoute)
 _SAME: dict[int | str, dict[str, Any]] = {
@@ -82,10 +88,19 @@ def get_method_version(name: str, version: int, context: Context) -> Method:
     return find_method(context, name, version).method
 
 
+@router.get("/{name}/versions")
+def list_method_versions(name: str, context: Context) -> MethodVersions:
+    """List all versions of a method with their approvals, the newest first."""
+    found, drive_kind = list_versions(context, name), _find_drive_kind(context)
+    approvals = context.catalogue.approvals.find(describe_facts(one.method).sha256 for one in found)
+    return MethodVersions(items=tuple(_summarise(one, drive_kind, approvals) for one in found))
+
+
 @router.post("/{name}/{version:int}/approval")
 def approve_method(name: str, version: int, context: Context, sender: Sender) -> MethodSummary:
     """Approve a version of a method for campaigns that require it; the approval belongs to its content."""
     found = find_method(context, name, version)
+    _note_approval(context, found)
     context.catalogue.approvals.approve(found.method.compute_sha256(), sender.full_name)
     return _show(context, found)
 
@@ -94,8 +109,16 @@ def approve_method(name: str, version: int, context: Context, sender: Sender) ->
 def withdraw_approval(name: str, version: int, context: Context) -> MethodSummary:
     """Withdraw the approval of a version; campaigns in progress keep their methods."""
     found = find_method(context, name, version)
+    _note_approval(context, found)
     context.catalogue.approvals.withdraw(found.method.compute_sha256())
     return _show(context, found)
+
+
+def _note_approval(context: ServiceContext, found: StoredMethod) -> None:
+    """Hand the former approval of a method to the audit trail."""
+    sha256 = found.method.compute_sha256()
+    row = context.catalogue.approvals.find([sha256]).get(sha256)
+    note_old({"sha256": sha256, "approved_by": row.approved_by if row else None})
 
 
 def _show(context: ServiceContext, one: StoredMethod) -> MethodSummary:

@@ -15,6 +15,7 @@ from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.planning.views import ParameterValue, RunParameters, SpecimenParameters
+from bench.service.routes.results import SAME_JOB
 from bench.service.run_registry import DAMAGED
 
 router = APIRouter(prefix="/specimens", tags=["specimens"], route_class=IdempotentRoute)
@@ -25,9 +26,6 @@ _MOST_RUNS = 50
 _OUTCOMES = ("clean", "lossy")
 """Outcomes of the runs that a trend reads."""
 _FILE = describe_file("application/json")
-_SAME_JOB: dict[int | str, dict[str, Any]] = {
-    200: {"description": "an equal job is unfinished or done, and is returned; nothing was queued", "model": Job}
-}
 
 
 @router.get("/{serial:path}/trend", response_class=FileResponse, responses=_FILE)
@@ -49,7 +47,7 @@ def get_trend(serial: str, context: Context) -> SnapshotResponse:
     raise make_not_found("trend of specimen", f"{serial}; request one: POST to the same address")
 
 
-@router.post("/{serial:path}/trend", status_code=201, responses=_SAME_JOB, dependencies=[IDEMPOTENT])
+@router.post("/{serial:path}/trend", status_code=201, responses=SAME_JOB, dependencies=[IDEMPOTENT])
 async def request_trend(serial: str, context: Context, response: Response) -> Job:
     """Queue the trend over the newest runs of a specimen; it belongs to the newest of them.
 

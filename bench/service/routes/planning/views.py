@@ -12,10 +12,10 @@ from bench.validation import SerialNumber
 
 
 class MethodSummary(View):
-    """Newest version of a method."""
+    """One version of a method."""
 
     name: str
-    version: int = Field(description="newest version; 1 is the included one of a method of mrbench")
+    version: int = Field(description="number of the version; 1 is the included one of a method of mrbench")
     sha256: str = Field(description="hash of the content")
     source: str = Field(description="`included` in mrbench, or `stored` by a person")
     created: datetime | None = Field(description="UTC at which this version was stored; null for an included one")
@@ -36,6 +36,12 @@ class MethodPage(View):
 
     items: tuple[MethodSummary, ...]
     next: str | None = Field(description="value of `before` for the next page; null on the last page")
+
+
+class MethodVersions(View):
+    """Versions of one method, the newest first."""
+
+    items: tuple[MethodSummary, ...]
 
 
 class PreviewSeries(View):

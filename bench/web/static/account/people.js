@@ -41,7 +41,7 @@ export class PeopleView {
   row(person) {
     const { name, full_name: fullName, role, extra_rights: extra, last_seen: seen } = person;
     return element("tr", {},
-      element("th", { scope: "row" }, fullName || name, element("small", {}, name)),
+      element("th", { scope: "row" }, fullName || name, element("small", {}, person.external ? `${name}, of the identity provider` : name)),
       element("td", {}, role, element("small", {}, extra.length ? `also ${extra.join(", ")}` : "")),
       element("td", {}, ...describeState(person)),
       element("td", { className: "number" }, seen ? localTime(seen) : "never"),
@@ -57,7 +57,7 @@ export class PeopleView {
     };
     return [
       make("Change …", () => this.form.open(person)),
-      make("Set password …", () => this.password.open(person, { isOwn: false })),
+      ...(person.external ? [] : [make("Set password …", () => this.password.open(person, { isOwn: false }))]),
       person.disabled ? make("Enable", () => this.setDisabled(person, false)) : make("Disable …", () => this.disable(person)),
       make("Remove …", () => this.remove(person)),
     ];
@@ -93,9 +93,10 @@ export class PeopleView {
 const nameOf = ({ name, full_name: fullName }) => fullName || name;
 
 /** Whether a person can sign in now, with the reason why not. */
-function describeState({ disabled, has_password: hasPassword, locked_until: locked }) {
+function describeState({ disabled, external, has_password: hasPassword, locked_until: locked }) {
   const mark = (kind, text) => element("span", { className: `mark ${kind}` }, text);
   if (disabled) return [mark("bad", "disabled")];
+  if (external) return [mark("good", "may sign in"), element("small", {}, "by the identity provider only")];
   if (locked) return [mark("fair", "locked"), element("small", {}, `until ${instant(locked)}, after failed sign-ins`)];
   if (!hasPassword) return [mark("fair", "no password"), element("small", {}, "set one, so that this person can sign in")];
   return [mark("good", "may sign in")];

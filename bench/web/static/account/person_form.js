@@ -29,11 +29,18 @@ export class PersonDialog {
       part.hidden = person !== null;
       part.querySelector("input").disabled = part.hidden;
     }
+    this.isExternal = person?.external ?? false;
+    byId("person-external").hidden = !this.isExternal;
+    for (const part of document.querySelectorAll("#person-form [data-local]")) {
+      part.hidden = this.isExternal;
+      part.querySelector("input, select").disabled = part.hidden;
+    }
     byId("person-full-name").value = person?.full_name ?? "";
     byId("person-role").value = person?.role ?? "technician";
     this.offerRights(person?.extra_rights ?? []);
     openDialog("person-dialog");
-    byId(person ? "person-full-name" : "person-name").focus();
+    const first = this.isExternal ? document.querySelector("#person-rights input") ?? byId("person-cancel") : byId(person ? "person-full-name" : "person-name");
+    first.focus();
   }
 
   /** Offers the rights that the chosen role does not contain. */
@@ -51,8 +58,13 @@ export class PersonDialog {
     return [...document.querySelectorAll("#person-rights input:checked")].map(({ value }) => value);
   }
 
+  /** What the identity provider gives of its own persons. */
+  readLocal() {
+    return { full_name: byId("person-full-name").value.trim(), role: byId("person-role").value };
+  }
+
   async save() {
-    const facts = { full_name: byId("person-full-name").value.trim(), role: byId("person-role").value, extra_rights: this.readRights() };
+    const facts = { ...(this.isExternal ? {} : this.readLocal()), extra_rights: this.readRights() };
     try {
       const saved = await this.send(facts);
       byId("person-dialog").close("done");

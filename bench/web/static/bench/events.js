@@ -4,7 +4,7 @@ import { byId, clock, element, spaced, zone } from "../common/format.js";
 
 const KEY = "mrbench.events";
 const KEPT = 200;
-const URGENT = ["trip", "alarm"];
+const URGENT = ["trip", "alarm", "check"];
 
 export class EventList {
   constructor() {

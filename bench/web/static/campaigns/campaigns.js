@@ -8,6 +8,7 @@ import { CampaignStart } from "./campaign_start.js";
 import { campaignAddress, markStatus } from "./campaign_words.js";
 import { byId, clock, element, localTime, write, zone } from "../common/format.js";
 import { keep, refresh } from "./refresh.js";
+import { ReportSignatures } from "../runs/signatures.js";
 
 const PERIOD_MS = 2_000;
 const PAGE = 20;
@@ -31,6 +32,7 @@ export class CampaignView {
     byId("campaign").hidden = true;
     this.setTitle(id ? "Campaign" : "Campaigns");
     write(byId("campaign-note"), "Loading …");
+    byId("campaign-signatures").replaceChildren(...(id ? [new ReportSignatures(`campaigns/${encodeURIComponent(id)}`, `campaign ${id}`).section] : []));
     if (id && id === this.begun) byId("stop").focus(); // the next key can stop what was started here
     return this.load();
   }

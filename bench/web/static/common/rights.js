@@ -16,6 +16,7 @@ export const RIGHTS = {
   approve_methods: ["approve methods", "engineer"],
   change_limits: ["change limits and calibration", "engineer"],
   manage_runs: ["trash, restore and repair runs", "engineer"],
+  sign_reports: ["sign reports", "technician"],
   administer: ["manage people and tokens of others", "administrator"],
 };
 

@@ -1,5 +1,5 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/plan/METHOD/edit`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`, `#/calibration`, `#/compare?run=A&run=B`.
+// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`, `#/calibration?check=CHANNEL`, `#/audit`, `#/compare?run=A&run=B`.
 
 import { byId } from "./format.js";
 

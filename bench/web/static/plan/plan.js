@@ -5,6 +5,7 @@ import { clearPlots } from "../common/axes_plot.js";
 import { makeForecast } from "./forecast.js";
 import { byId, describeDriveKind, duration, element, fixed, significant, write } from "../common/format.js";
 import { MethodEditor } from "./method_editor.js";
+import { MethodVersions } from "./method_versions.js";
 import { plotPreview } from "./plan_plot.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { need } from "../common/rights.js";
@@ -37,9 +38,9 @@ export class PlanView {
 
   async list() {
     const methods = (await get("methods")).items.sort((a, b) => a.duration_s - b.duration_s);
-    byId("plan-methods").replaceChildren(...methods.map(({ name, title, duration_s: length, version, obstacle }) => {
+    byId("plan-methods").replaceChildren(...methods.map(({ name, title, duration_s: length, version, obstacle, approved }) => {
       const link = element("a", { href: `#/plan/${encodeURIComponent(name)}` }, element("strong", {}, name),
-        ` ${duration(length)}${version > 1 ? `, version ${version}` : ""}`);
+        ` ${duration(length)}${version > 1 ? `, version ${version}` : ""}${approved ? ", approved" : ""}`);
       if (name === this.name) link.setAttribute("aria-current", "page");
       const reason = obstacle ? element("small", { className: "attention" }, `Not on this bench: ${obstacle}`) : null;
       return element("li", {}, link, element("small", {}, title), reason);
@@ -83,10 +84,12 @@ export class PlanView {
     const use = element("a", { className: "button primary", href: `#/bench?method=${encodeURIComponent(method.name)}` }, "Use on the bench");
     const copy = need("manage_methods", element("a", { className: "button", href: `#/plan/${encodeURIComponent(method.name)}/edit` }, "Edit a copy"));
     const places = element("div", { className: "previews" });
+    const versions = new MethodVersions(method.name);
     byId("plan").replaceChildren(
       element("p", {}, method.description), facts(method, preview), element("p", { className: "actions" }, use, copy),
       element("h3", {}, "Preview"), places, makeForecast(method.name),
-      element("h3", {}, "Segments"), segmentTable(method, preview));
+      versions.section, element("h3", {}, "Segments"), segmentTable(method, preview));
+    versions.load();
     clearPlots(this.plots);
     this.plots = plotPreview(preview, places);
   }

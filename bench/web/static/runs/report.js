@@ -10,12 +10,18 @@ import { element } from "../common/format.js";
  */
 export async function makeReport(run) {
   const { blob, name } = await file(`runs/${encodeURIComponent(run.id)}/report`);
-  const frame = element("iframe", { className: "report", title: `Report of run ${run.id}`, srcdoc: await blob.text() });
-  frame.setAttribute("sandbox", "allow-same-origin allow-modals");
-  // As high as its content, so that there is only one scroll bar.
-  frame.addEventListener("load", () => { frame.style.height = `${frame.contentDocument.documentElement.scrollHeight + 16}px`; });
+  const frame = makeReportFrame(await blob.text(), `Report of run ${run.id}`);
   const print = element("button", { type: "button" }, "Print …");
   print.addEventListener("click", () => frame.contentWindow.print());
   const save = element("a", { className: "button", href: URL.createObjectURL(blob), download: name }, "Save");
   return [element("p", { className: "actions" }, print, save), frame];
+}
+
+/** Creates the frame that shows the page of a report, without its scripts. */
+export function makeReportFrame(html, title) {
+  const frame = element("iframe", { className: "report", title, srcdoc: html });
+  frame.setAttribute("sandbox", "allow-same-origin allow-modals");
+  // As high as its content, so that there is only one scroll bar.
+  frame.addEventListener("load", () => { frame.style.height = `${frame.contentDocument.documentElement.scrollHeight + 16}px`; });
+  return frame;
 }

@@ -8,6 +8,7 @@ import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted, mayReport } from "./run_facts.js";
 import { RunRecords } from "./run_records.js";
 import { RunResults } from "./run_results.js";
+import { ReportSignatures } from "./signatures.js";
 import { runAddress, specimenAddress } from "../common/router.js";
 import { factList, foldedSection } from "../common/tables.js";
 
@@ -50,7 +51,7 @@ export class RunView {
     const title = `${run.specimen || "Unnamed specimen"}, ${run.method}`;
     write(byId("view-run").querySelector("h1"), title);
     document.body.dataset.title = title;
-    const parts = { report: () => [this.makeReportPlace()], replay: () => [this.makeReplayPlace()] }[this.part] ?? (() => this.makeEverything(run));
+    const parts = { report: () => [this.makeReportPlace(), this.makeSignatures(run)], replay: () => [this.makeReplayPlace()] }[this.part] ?? (() => this.makeEverything(run));
     byId("run").replaceChildren(this.navigation(), ...parts());
     this.showFacts();
   }
@@ -61,7 +62,11 @@ export class RunView {
     this.records = new RunRecords(run);
     const { section, body } = foldedSection("Report", { whenOpened: () => this.loadReport() });
     this.report = body;
-    return [this.facts, ...this.results.sections, ...this.records.sections, section];
+    return [this.facts, ...this.results.sections, ...this.records.sections, section, this.makeSignatures(run)];
+  }
+
+  makeSignatures(run) {
+    return new ReportSignatures(`runs/${encodeURIComponent(run.id)}`, `run ${run.id}`).section;
   }
 
   makeReportPlace() {

@@ -27,8 +27,8 @@ export function describeOutcome(run) {
   const mark = element("span", { className: `mark ${OUTCOMES[name] ?? "plain"}` }, spaced(name) + ending);
   const reason = run.state === "truncated" ? CUT_OFF : run.reason;
   const alarms = (run.alarms ?? []).map((text) => element("small", { className: "attention" }, `Alarm: ${text}`));
-  const overdue = (run.calibration_overdue ?? []).map((text) => element("small", { className: "attention" }, text));
-  return [mark, element("small", {}, reason ?? ""), ...alarms, ...overdue];
+  const marks = [...(run.calibration_overdue ?? []), ...(run.failed_checks ?? [])].map((text) => element("small", { className: "attention" }, text));
+  return [mark, element("small", {}, reason ?? ""), ...alarms, ...marks];
 }
 
 /** Force error of the newest fit beside the noise floor. */

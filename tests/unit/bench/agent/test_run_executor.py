@@ -5,22 +5,25 @@ import gc
 import shutil
 import time
 import tomllib
+from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 
 import pytest
 
 from bench.agent.timing import AgentTiming
 from bench.agent_protocol.messages import RunCommand
-from bench.calibration import IssuedCertificate, list_overdue, read_entry
+from bench.calibration import IssuedCertificate, LatestCheck, list_overdue, read_entry, read_failed
 from bench.config import BenchConfig
 from bench.disk import RESERVE
 from bench.errors import LogError, RunError
+from bench.methods import load_method
 from bench.recorder import make_attachments
 from tests.support.certificates import issue_certificate
 from tests.support.fake_rig import BENCH_TOML
 from tests.support.run_bench import METHOD, RunBench
 
 SECOND = 1_000_000_000
+NOW = datetime.now(UTC)
 OUTSIDE_METHOD, OUTSIDE_FIXTURE = 0.03, 0.06
 """[m] Positions beyond the limits of the method and of the fixture."""
 BETWEEN_FORCES = 950.0
@@ -281,6 +284,58 @@ class TestCalibration:
         prepared = bench.executor.prepare(RunCommand(method=METHOD, certificates=(other,)))
         assert prepared.run.get_status().calibration_overdue == ()
         assert "certificate-temperature.json" not in {one.name for one in prepared.metadata.attachments}
+
+
+class TestChecks:
+    """Latest checks of the channels, judged at the start of a run."""
+
+    TEXT = "force: zero check of 2026-01-26 08:00 UTC is out of control: 12 N is above the limit 5.3 N"
+    FAILED, FINE = (
+        LatestCheck(channel=channel, check="zero", run="check-1", measured=NOW, state=state, text=text)
+        for channel, state, text in (
+            ("force", "out_of_control", TEXT),
+            ("displacement", "in_control", "displacement: zero check is in control"),
+        )
+    )
+    COMMAND = RunCommand(method=METHOD, checks=(FAILED, FINE))
+
+    def test_a_failed_check_marks_log_and_status_by_default(self, bench):
+        prepared = bench.executor.prepare(self.COMMAND)
+        assert prepared.run.get_status().failed_checks == (self.TEXT,)
+        record = prepared.metadata.header.make_metadata()["checks"]
+        assert read_failed(record) == [self.TEXT]
+        assert read_entry(record["displacement"])["state"] == "in_control"
+
+    def test_a_marked_run_has_an_event(self, bench, tmp_path):
+        prepared = bench.executor.prepare(self.COMMAND.model_copy(update={"log": str(tmp_path / "a.mcap")}))
+        prepared.run.sequencer.run = lambda programme: None
+        bench.executor.execute(prepared)
+        assert bench.events.list_texts("check") == [self.TEXT]
+
+    def test_without_known_checks_nothing_is_marked_and_the_log_has_no_record(self, bench):
+        prepared = bench.executor.prepare(RunCommand(method=METHOD))
+        assert prepared.run.get_status().failed_checks == ()
+        assert "checks" not in prepared.metadata.header.make_metadata()
+
+    def test_a_failed_check_is_refused_by_policy_but_a_check_is_not(self, tmp_path):
+        toml = f'{BENCH_TOML}[calibration]\nfailed_check = "refuse"\n'
+        bench = RunBench(tmp_path, time.monotonic_ns, toml)
+        with pytest.raises(RunError) as refused:
+            bench.executor.prepare(self.COMMAND)
+        assert self.TEXT in str(refused.value)
+        assert 'failed_check = "mark"' in str(refused.value)
+        assert bench.executor.prepare(RunCommand(method=METHOD, checks=(self.FINE,)))
+        zero_check = load_method("zero_check").model_dump(mode="json", by_alias=True)
+        prepared = bench.executor.prepare(RunCommand(method=zero_check, checks=(self.FAILED,)))
+        assert prepared.run.get_status().failed_checks == ()
+
+    def test_an_interval_makes_an_old_and_a_missing_check_fail(self, tmp_path):
+        toml = f"{BENCH_TOML}[calibration]\ncheck_interval_days = 7\n"
+        bench = RunBench(tmp_path, time.monotonic_ns, toml)
+        old = self.FINE.model_copy(update={"measured": NOW - timedelta(days=10)})
+        failed = bench.executor.prepare(RunCommand(method=METHOD, checks=(old,))).run.get_status().failed_checks
+        assert "displacement: the latest zero check is 10.0 days old; one is due every 7 days" in failed
+        assert "force: no zero check yet; one is due every 7 days" in failed
 
 
 class TestClocks:

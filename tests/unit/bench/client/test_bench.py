@@ -1,10 +1,13 @@
 """Client of the service, against the service itself."""
 
+import json
 import time
+from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
 
+from bench.catalogue import compute_sha256
 from bench.client import Bench, ClientError, RunState
 from tests.support.certificates import make_certificate
 from tests.support.service_logs import write_complete_log, write_truncated_log
@@ -123,6 +126,37 @@ def test_files_are_downloaded(service, bench, tmp_path):
     assert report.read_text().startswith("<!doctype html>")
     with pytest.raises(ClientError, match="there is no run two"):
         bench.run("two").download_report(target / "none.html")
+
+
+def test_a_signed_report_is_listed_and_downloaded_byte_by_byte(service, bench, tmp_path):
+    write_complete_log(service.data / "one.mcap", run="one")
+    run = await_run(bench, "one")
+    assert run.list_signatures() == []
+    kept = bench._session.post("/runs/one/report/copies", {"format": "pdf"})
+    sign_as_person(
+        service, bench, "/runs/one/report/signatures", {"sha256": kept["sha256"], "meaning": "approved"}
+    )
+    (signed,) = run.list_signatures()
+    assert (signed["full_name"], signed["meaning"], signed["file"]) == ("Marie Curie", "approved", "intact")
+    file = run.download_signed_report(signed["sha256"], tmp_path / "signed.pdf")
+    assert file.read_bytes().startswith(b"%PDF-")
+    assert compute_sha256(file) == signed["sha256"]
+
+
+def sign_as_person(service, bench, path, content):
+    person = {"name": "mcurie", "password": "radium and polonium"}
+    bench._session.post("/users", {**person, "full_name": "Marie Curie", "role": "engineer"})
+
+    def send(path, content, **headers):
+        body, given = json.dumps(content).encode(), {"Content-Type": "application/json", **headers}
+        return urlopen(Request(f"{service.url}/api/v1{path}", body, given, method="POST"))
+
+    with send("/session", person) as answer:
+        cookie, csrf = answer.headers["Set-Cookie"].partition(";")[0], json.load(answer)["csrf"]
+    with send(
+        path, {**content, "password": person["password"]}, Cookie=cookie, **{"X-CSRF-Token": csrf}
+    ) as answer:
+        assert answer.status == 201
 
 
 def test_certificates_are_added_corrected_and_withdrawn(bench):

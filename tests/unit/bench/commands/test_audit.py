@@ -7,8 +7,8 @@ from importlib.metadata import EntryPoint
 import pytest
 from typer.testing import CliRunner
 
-from bench.audit import Act, AuditChain, find_agent_trail, verify_chain
-from bench.catalogue import Catalogue, back_up, make_sqlite_url, open_database
+from bench.audit import Act, AuditChain, Source, find_agent_trail, find_signatures, make_signature, verify_chain
+from bench.catalogue import Catalogue, back_up, compute_sha256, make_sqlite_url, open_database
 from bench.cli import _make_application
 from bench.errors import AuditError
 from tests.support.audit_trails import list_all, make_act, write_trail
@@ -102,6 +102,34 @@ def test_the_trail_of_the_agent_is_verified_by_its_configuration(data, tmp_path)
     agent.write_bytes(agent.read_bytes().replace(b"ada", b"bob"))
     answer = call("verify", "--data", data, "--config", config)
     assert f"{agent}: the audit trail was altered" in str(answer.exception)
+
+
+def test_the_signatures_of_a_report_are_told_and_an_unsigned_file_is_an_error(data, tmp_path):
+    report = tmp_path / "report.html"
+    report.write_text("<!doctype html>")
+    content = {"sha256": compute_sha256(report), "full_name": "Marie Curie", "role": "engineer", "report": "run"}
+    chain = AuditChain(data / "audit.jsonl")
+    for user, meaning in (("mcurie", "author"), ("lmeitner", "approved")):
+        chain.append(make_signature(f"user:{user}", "10.0.0.7", "1", "run-1", {**content, "meaning": meaning}))
+    answer = call("verify", "--data", data, "--report", report)
+    assert answer.exit_code == 0, answer.output
+    first, second, file = answer.output.splitlines()[-3:]
+    assert first.startswith("signed as author by Marie Curie (user:mcurie, engineer) at ")
+    assert second.endswith(", entry 8")
+    assert file == f"{report}: SHA-256 {content['sha256']}, report on run run-1"
+    report.write_text("<!doctype html> ")
+    answer = call("verify", "--data", data, "--report", report)
+    assert isinstance(answer.exception, AuditError)
+    assert "nobody has signed this file" in str(answer.exception)
+
+
+def test_an_imported_entry_is_no_signature(data, tmp_path):
+    report = tmp_path / "report.html"
+    report.write_text("<!doctype html>")
+    act = make_signature("user:mcurie", "", "", "run-1", {"sha256": compute_sha256(report)})
+    forged = act.model_copy(update={"source": Source(chain="c", seq=1, prev="0" * 64, sha256="1" * 64)})
+    AuditChain(data / "audit.jsonl").append(forged)
+    assert find_signatures(data / "audit.jsonl", compute_sha256(report)) == []
 
 
 def test_a_backup_contains_the_trail(data, tmp_path):

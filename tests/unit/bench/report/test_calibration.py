@@ -5,7 +5,7 @@ from datetime import UTC, date, datetime
 
 import pytest
 
-from bench.calibration import make_log_text
+from bench.calibration import make_check_record, make_log_text
 from bench.log import read_log
 from bench.report import page
 from bench.report.calibration import make_calibration_findings, make_calibration_rows, make_combined_rows
@@ -45,6 +45,12 @@ def test_certificates_are_listed_and_an_overdue_one_is_a_warning(tmp_path):
     assert force[4:] == ("0.20 % (k = 1)", "0.30 %", "overdue")
     assert (displacement.channel, displacement.state) == ("displacement", "valid")
     assert make_calibration_findings(log) == [("warning", OVERDUE)]
+
+
+def test_a_failed_check_is_a_warning(tmp_path):
+    text = "force: no zero check yet; one is due every 7 days"
+    path = write_log(tmp_path / "strokes.mcap", checks=make_check_record((), [text]))
+    assert make_calibration_findings(read_log(path)) == [("warning", f"{text}.")]
 
 
 def test_a_log_without_certificates_has_neither_rows_nor_findings(tmp_path):

@@ -61,7 +61,7 @@ def test_no_further_start_is_tried_after_the_steps_are_spent(monkeypatch, steps,
     monkeypatch.setattr(output_error, "minimise", minimise)
     monkeypatch.setattr(output_error, "_decimate_for_preview", lambda problem: problem)
     monkeypatch.setattr(output_error, "make_starting_points", lambda problem: [np.zeros(2)])
-    monkeypatch.setattr(output_error, "_approach", lambda preview, start, iterations, progress: start)
+    monkeypatch.setattr(output_error, "_minimise_preview", lambda preview, start, iterations, progress: start)
     monkeypatch.setattr(output_error, "_is_conclusive", lambda problem, minimum: False)
     monkeypatch.setattr(output_error, "_generate_restarts", lambda *given: iter([np.ones(2)] * 5))
     fit_output_error(None, OptimiserSettings(restarts=2, budget=Budget(steps=steps)))

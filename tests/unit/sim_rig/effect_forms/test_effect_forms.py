@@ -12,7 +12,7 @@ from sim_rig.plant.alternative_plant import AlternativePlant, apply_displacement
 from sim_rig.plant.plant import Plant, apply_start_ramp, count_substeps
 from sim_rig.scenario.scenario import parse_scenario
 from sim_rig.sensors.channels import compute_true_values
-from sim_rig.trial.cases.values import RANGES
+from sim_rig.trial.cases.parameter_values import RANGES
 
 REQUIRED = {
     *("field_saturation", "magnetic_remanence", "coil_lag", "gas_spring", "seal_friction", "orifice_turbulence"),

@@ -10,7 +10,7 @@ from sim_rig.effect_forms import FORMS
 from sim_rig.hidden_effect import SIZE_RANGES, draw_scenario
 from sim_rig.hidden_effect.draw import DURATION, STROKE
 from sim_rig.plant import make_plant
-from sim_rig.trial.cases.calibrate import SizingModel
+from sim_rig.trial.cases.sizing import SizingModel
 from sim_rig.trial.cases.strokes import PlannedStroke, sample_strokes
 
 SEEDS = range(200)

@@ -3,6 +3,7 @@
 import math
 import struct
 
+import numpy as np
 import pytest
 
 from sim_rig.instruments.load_cell import LoadCellDevice, compute_checksum, encode_frame
@@ -140,3 +141,14 @@ def test_requests_are_found_in_pieces_and_between_noise(device):
     assert device.receive(b"\x00\xa5" + request[:5], 0) == []
     assert len(device.receive(request[5:] + damaged + request + request[:3], 0)) == 2
     assert len(device.receive(request[3:], 0)) == 1
+
+
+def test_the_stable_bit_is_that_of_a_search_of_the_last_100_ms(signals, device):
+    ask(device, START)
+    noise = np.random.default_rng(5)
+    forces = np.repeat(noise.uniform(-9.0, 9.0, 40), 25) + noise.uniform(-6.0, 6.0, 1000)
+    stable = [bool(status & STABLE) for *_, status in record(signals, device, forces.tolist())]
+    counts = np.round(forces * 800)
+    expected = [k >= 90 and np.ptp(counts[max(k - 100, 0) : k + 1]) <= 25 * 800 for k in range(1000)]
+    assert stable == expected
+    assert 100 < sum(expected) < 900

@@ -162,3 +162,26 @@ def test_a_frame_waits_until_it_is_ready():
     assert bus.find_next_event() == 5 * MILLISECOND
     assert len(bus.pop_transmitted(6 * MILLISECOND)) == 1
     assert bus.find_next_event() is None
+
+
+def test_frames_that_follow_each_other_are_transmitted_at_one_instant():
+    bus = BusTiming()
+    assert bus.find_idle_instant() is None
+    for identifier in (0x205, 0x080):
+        bus.enqueue(CanFrame(identifier, bytes(8), "master"), MILLISECOND)
+    bus.enqueue(CanFrame(0x181, bytes(8), "late"), 5 * MILLISECOND)
+    idle = MILLISECOND + 2 * count_frame_bits(8) * 1000
+    assert bus.find_idle_instant() == idle
+    assert bus.pop_next(MILLISECOND) is None
+    assert bus.find_idle_instant() == idle
+    assert [end for end, _ in bus.pop_transmitted(idle)][-1] == idle
+
+
+def test_a_reply_wins_the_arbitration_against_later_frames_however_late_it_is_popped():
+    bus = BusTiming()
+    for identifier in (0x080, 0x605):
+        bus.enqueue(CanFrame(identifier, b"", "master"), 0)
+    end, frame = bus.pop_next(9 * MILLISECOND)
+    bus.enqueue(CanFrame(0x185, b"", "drive"), end)
+    assert frame.identifier == 0x080
+    assert [frame.identifier for _, frame in bus.pop_transmitted(9 * MILLISECOND)] == [0x185, 0x605]

@@ -196,3 +196,18 @@ def test_an_object_refuses_values_outside_its_data_sheet(index, data, code):
 def test_identifiers_of_process_data_contain_the_node():
     assert ObjectDictionary(EDS, 7).get_number(0x1400, 1) == 0x207
     assert ObjectDictionary(EDS, 9).get_number(0x1400, 1) == 0x209
+
+
+def test_the_drive_needs_ticks_only_while_it_moves_without_punctual_setpoints(node):
+    node.command(1)
+    assert not node.drive.acts_by_itself(0)
+    for turn, word in enumerate((6, 7, 15, 15)):
+        node.drive.receive(0x200 + NODE, struct.pack("<Hbi", word, 8, 10_000), 4 * turn * MS)
+        node.drive.receive(0x80, b"", 4 * turn * MS)
+    assert node.drive.state is DriveState.ENABLED
+    assert not node.drive.acts_by_itself(17 * MS)
+    assert node.drive.acts_by_itself(18 * MS)
+    for at in range(18, 1000):
+        node.drive.tick(at * MS)
+    assert node.drive.state is DriveState.QUICK_STOP
+    assert not node.drive.acts_by_itself(1000 * MS)

@@ -4,11 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import signal
 
 from sim_rig.scenario import ChannelFault
 from sim_rig.sensors.channels import compute_true_values, read_channel
 from sim_rig.sensors.faults import apply_channel_faults
-from sim_rig.sensors.sampling import interpolate_cubic, sample_held
+from sim_rig.sensors.sampling import apply_filter, interpolate_cubic, sample_held
 
 CUBE = np.arange(6.0) ** 3
 
@@ -71,3 +72,12 @@ def test_fault_lasts_from_its_start_up_to_its_end(kind, start, expected):
     fault = ChannelFault(kind=kind, channel="force", start=start, duration=2.0)
     found = apply_channel_faults([fault], np.arange(5.0), np.array([1.0, 2, 3, 4, 5]), 9.0)
     assert [None if np.isnan(value) else value for value in found] == expected
+
+
+def test_a_filter_in_parts_has_the_output_of_scipy():
+    b, a = signal.butter(3, 0.1)
+    values = np.random.default_rng(1).standard_normal(50)
+    state = signal.lfilter_zi(b, a) * values[0]
+    expected, _ = signal.lfilter(b, a, values, zi=state)
+    parts = [apply_filter(b, a, part, state) for part in (values[:7], values[7:8], values[8:])]
+    assert np.concatenate(parts) == pytest.approx(expected, abs=1e-14)

@@ -39,6 +39,26 @@ def test_a_changed_method_is_not_approved(engineer):
     assert (stored.status_code, stored.json()["approved"]) == (201, None)
 
 
+def test_every_version_is_listed_with_its_own_approval(engineer):
+    engineer.send("POST", "/methods", {**engineer.get("/methods/quick"), "title": "another content"})
+    engineer.send("POST", "/methods/quick/1/approval")
+    newest, included = engineer.get("/methods/quick/versions")["items"]
+    assert [one["version"] for one in (newest, included)] == [2, 1]
+    assert (newest["approved"], included["approved_by"]) == (None, "The engineer")
+    assert (newest["source"], included["source"]) == ("stored", "included")
+    assert newest["sha256"] != included["sha256"]
+    assert engineer.send("GET", "/methods/nothing/versions").status_code == 404
+
+
+def test_the_audit_trail_has_the_former_approval(engineer, bench):
+    for verb in ("POST", "DELETE"):
+        engineer.send(verb, "/methods/quick/1/approval")
+    withdrawn, approved = bench.get("/audit?action=approval")["items"]
+    assert (approved["actor"], approved["old"]["approved_by"]) == ("user:engineer", None)
+    assert withdrawn["old"]["approved_by"] == "The engineer"
+    assert withdrawn["old"]["sha256"] == engineer.get("/methods/quick/versions")["items"][0]["sha256"]
+
+
 def test_a_campaign_can_require_approved_methods(engineer):
     refused = start(engineer, [RUN, NEXT], methods="approved")
     assert "proposed strokes" in refused.json()["detail"]

@@ -23,11 +23,14 @@ LOWEST = {
         PATCH /specimens/{serial}, POST /specimens/{serial}/trend, POST /campaigns,
         PATCH /campaigns/{campaign_id}, POST /campaigns/{campaign_id}/answer,
         POST /campaigns/{campaign_id}/pause, POST /campaigns/{campaign_id}/resume,
-        POST /campaigns/{campaign_id}/test-message, PATCH /queue
+        POST /campaigns/{campaign_id}/test-message, PATCH /queue, POST /runs/{run_id}/report/copies,
+        POST /runs/{run_id}/report/signatures, POST /campaigns/{campaign_id}/report/copies,
+        POST /campaigns/{campaign_id}/report/signatures
     """,
     "engineer": """
         DELETE /runs/{run_id}, POST /runs/{run_id}/restore, POST /runs/{run_id}/salvage, POST /methods,
         POST /certificates, PATCH /certificates/{certificate_id}, DELETE /certificates/{certificate_id},
+        POST /checks/{channel}/baseline,
         POST /methods/{name}/{version}/approval, DELETE /methods/{name}/{version}/approval
     """,
     "administrator": """

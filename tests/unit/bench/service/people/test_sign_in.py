@@ -15,7 +15,7 @@ def test_a_person_signs_in_by_password_and_out_again(people, open_browser):
     browser = open_browser("technician")
     session = browser.get("/session")
     assert session["person"]["full_name"] == "The technician"
-    assert session["person"]["rights"] == ["view", "stop", "operate", "analyse"]
+    assert session["person"]["rights"] == ["view", "stop", "operate", "analyse", "sign_reports"]
     assert session["kind"] == "user"
     assert 11.9 * 3600 < session["expired_in_s"] <= 12 * 3600
     assert browser.send("DELETE", "/session").status_code == 204

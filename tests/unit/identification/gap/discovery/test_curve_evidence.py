@@ -9,11 +9,7 @@ from scipy.linalg import null_space
 from scipy.stats import multivariate_normal
 
 from identification.fitting import Evaluation
-from identification.gap.discovery.curve_evidence import (
-    _DEVIATIONS,
-    compute_curve_evidence,
-    estimate_correlation_length,
-)
+from identification.gap.discovery.curve_evidence import _DEVIATIONS, compute_curve_evidence
 
 LAW, CURVE = slice(0, 4), slice(4, 10)
 SAMPLES = 40
@@ -132,19 +128,3 @@ def test_the_noise_is_what_the_curve_leaves_and_no_less_than_that_of_the_problem
     assert finer.log_odds == pytest.approx(once.log_odds, rel=1e-6)
     np.testing.assert_allclose(finer.step, once.step, rtol=1e-6, atol=1e-9)
     assert compute(J / 40.0, error / 40.0).log_odds < 0.5 * once.log_odds
-
-
-@pytest.mark.parametrize("memory", [0.0, 0.5, 0.9, 0.97])
-def test_the_correlation_length_of_an_autoregression_has_its_known_value(memory):
-    random = default_rng(8)
-    values = np.zeros(60_000)
-    for i, noise in enumerate(random.standard_normal(len(values) - 1), 1):
-        values[i] = memory * values[i - 1] + noise
-    length = estimate_correlation_length([values])
-    assert length == pytest.approx((1.0 + memory) / (1.0 - memory), rel=0.15)
-
-
-def test_the_correlation_length_is_that_of_the_longest_piece_and_ignores_its_mean():
-    short, long = np.ones(50), default_rng(9).standard_normal(5000)
-    assert estimate_correlation_length([short, 1e3 + long]) == pytest.approx(1.0, abs=0.15)
-    assert estimate_correlation_length([np.full(20, 3.0)]) == 1.0

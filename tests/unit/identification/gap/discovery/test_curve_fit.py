@@ -16,8 +16,8 @@ from identification.gap.discovery.curve_fit import (
     ScreenedCurve,
     _drop_variants,
     _find_linear_solution,
-    _give_prior,
     _search_line,
+    _set_prior,
     _update_prior,
     fit_best_curves,
     screen_curves,
@@ -43,7 +43,7 @@ def make_curve(place, *variables, effects=(GAIN,)):
     problem, unknowns = pool.screening_problem, pool.baseline.fit.minimum.unknowns
     curves = list_curve_effects(problem, problem.simulate(unknowns))
     curve = next(c for c in curves if (c.at.place, c.at.variables) == (place, variables))
-    joint = problem.replace_effects((_give_prior(curve, 0.1),))
+    joint = problem.replace_effects((_set_prior(curve, 0.1),))
     zero = np.zeros(len(curve.model.quantities))
     return curve, joint, insert_effect_unknowns(problem, unknowns, zero)
 
@@ -185,7 +185,7 @@ def test_the_prior_returns_to_the_size_of_the_curve():
     fitted = fitted_with(GROWING)
     settled = fitted.candidate.fit.effects[-1].prior_deviations[0]
     for wrong in (0.02, 50.0):
-        model = _give_prior(fitted.curve, wrong * settled)
+        model = _set_prior(fitted.curve, wrong * settled)
         problem = fitted.candidate.fit.problem.replace_effects((model,))
         fit = JointFit(problem, minimise(problem, fitted.candidate.fit.minimum.unknowns, 25, ignore_progress))
         for _ in range(4):
@@ -220,7 +220,7 @@ def test_growth_has_a_prior_of_its_own():
     curve, joint, _ = make_curve("parallel_force", "displacement", "drive", effects=(GROWING,))
     deviations = joint.effects[-1].prior_deviations
     assert deviations == (0.1,) * curve.function.basis.size + (1.0,)
-    assert len(_give_prior(fitted_with(GAIN).curve, 0.1).prior_deviations) == 12
+    assert len(_set_prior(fitted_with(GAIN).curve, 0.1).prior_deviations) == 12
 
 
 def test_the_end_of_the_linear_model_has_its_law_and_curve():

@@ -6,7 +6,6 @@ import pytest
 
 from sim_rig.effect_forms import FORMS, Place
 from sim_rig.trial.cases import draw as drawing
-from sim_rig.trial.cases.calibrate import SizingModel, find_size
 from sim_rig.trial.cases.draw import (
     KNOWN_FORMS,
     RATIOS,
@@ -16,6 +15,8 @@ from sim_rig.trial.cases.draw import (
     draw_grid,
     size_case,
 )
+from sim_rig.trial.cases.parameter_values import compute_measures, draw_values
+from sim_rig.trial.cases.sizing import SizingModel, find_size
 from sim_rig.trial.cases.specimens import SIZES, draw_specimen
 from sim_rig.trial.cases.strokes import (
     RATE,
@@ -25,7 +26,6 @@ from sim_rig.trial.cases.strokes import (
     make_strokes,
     sample_strokes,
 )
-from sim_rig.trial.cases.values import compute_measures, draw_values
 
 
 @pytest.fixture(scope="module")

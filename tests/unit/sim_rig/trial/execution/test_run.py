@@ -14,8 +14,8 @@ from sim_rig.trial.commands import trial
 from sim_rig.trial.execution import run as running
 from sim_rig.trial.execution.processes import CommandFailedError, run_command
 from sim_rig.trial.execution.run import TrialOptions, prepare_truth, run_cases
-from sim_rig.trial.scoring.answer import TrialReport
 from sim_rig.trial.scoring.summary import score_trial
+from sim_rig.trial.scoring.trial_report import TrialReport
 from tests.support.trial import make_diagnosis, make_truth
 
 

@@ -3,7 +3,6 @@ import math
 import pytest
 
 from sim_rig.trial.cases.folder import DiagnosisOutcome
-from sim_rig.trial.scoring.answer import TrialReport
 from sim_rig.trial.scoring.score import (
     NOTHING_LABEL,
     UNKNOWN_LABEL,
@@ -12,6 +11,7 @@ from sim_rig.trial.scoring.score import (
     compute_scores,
 )
 from sim_rig.trial.scoring.table import render_table
+from sim_rig.trial.scoring.trial_report import TrialReport
 from sim_rig.trial.scoring.unseal import MIN_PROBABILITY, compute_true_shrinkage, evaluate_case
 from tests.support.trial import SUCCESSFUL, make_diagnosis, make_truth
 

@@ -4,8 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from sim_rig.trial.scoring.answer import Proportion
 from sim_rig.trial.scoring.table import _compute_median_ratio, _format_proportion, _list_misses
+from sim_rig.trial.scoring.trial_report import Proportion
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,63 @@
+"""Arguments of `mrbench check`, and the choice of the action."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+class Action(StrEnum):
+    """Actions on checks."""
+
+    LIST = "list"
+    SHOW = "show"
+    CHART = "chart"
+    BASELINE = "baseline"
+
+
+def check(
+    action: Annotated[
+        Action,
+        typer.Argument(
+            help="list: the newest checks. show: the check in a log. chart: control chart of a channel, or the "
+            "state of all. baseline: let only later checks count."
+        ),
+    ],
+    target: Annotated[
+        str,
+        typer.Argument(
+            help="File for show, else a channel such as force; list and chart take all by default.",
+            metavar="CHANNEL|LOG",
+        ),
+    ] = "",
+    specimen: Annotated[
+        str | None,
+        typer.Option(metavar="SERIAL", help="Mounted damper; by default that of the channel's latest check."),
+    ] = None,
+    reason: Annotated[str, typer.Option(metavar="TEXT", help="With baseline: reason, for people.")] = "",
+    data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
+    operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
+) -> None:
+    """Show zero checks and their control charts.
+
+    A check is a run of the method zero_check, or zero_check_current for a damper driven by current. The service
+    records the checks in its data folder.
+    """
+    if (action is Action.BASELINE) != bool(reason.strip()):
+        raise typer.BadParameter("baseline needs --reason TEXT, and no other action takes it")
+    if action in (Action.BASELINE, Action.SHOW) and not target:
+        raise typer.BadParameter("baseline needs a CHANNEL, show needs a LOG")
+    from bench.commands.audit import record
+    from bench.commands.check.actions import begin_baseline, describe_charts, describe_log, list_checks
+
+    if action is Action.LIST:
+        typer.echo("\n".join(list_checks(data, target)))
+    elif action is Action.CHART:
+        typer.echo("\n".join(describe_charts(data, target, specimen)))
+    elif action is Action.SHOW:
+        typer.echo("\n".join(describe_log(Path(target))))
+    else:
+        author = f"command:{operator}" if operator else "command"
+        typer.echo(begin_baseline(data, target, specimen, author, reason.strip()))
+        record(data, "check baseline", target, {}, {"operator": operator, "reason": reason.strip()})

@@ -1,0 +1,83 @@
+// Zero checks of the channels: state, latest check and its age, start of a check, and the chart of a chosen channel.
+
+import { get, start } from "../common/api.js";
+import { byId, element, instant, spaced, write } from "../common/format.js";
+import { CheckChart } from "./check_chart.js";
+import { age, describeState, withUnit } from "./check_words.js";
+
+const ADDRESS = "#/calibration?check=";
+
+export class CheckView {
+  /** `onStarted` receives a started run. */
+  constructor({ onStarted }) {
+    Object.assign(this, { onStarted, charts: [], method: null, chosen: "", isShown: false });
+    this.chart = new CheckChart({ onChanged: (text) => this.load(text) });
+    this.form = byId("check-start");
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.start();
+    });
+  }
+
+  /** Loads and lists the charts; `?check=CHANNEL` chooses one. */
+  async show({ query }) {
+    this.isShown = true;
+    this.chosen = query.get("check") ?? "";
+    await this.load();
+    if (this.chosen) this.chart.focus();
+  }
+
+  async load(answer = "") {
+    try {
+      const { items, method, specimen } = await get("checks/charts");
+      Object.assign(this, { charts: items, method });
+      if (!this.form.elements.specimen.value) this.form.elements.specimen.value = specimen;
+      write(byId("checks-note"), items.length ? "" : "No checks yet. Start one at rest, with the same specimen each time.");
+      this.list();
+      write(byId("checks-answer"), answer);
+    } catch (problem) {
+      write(byId("checks-note"), problem.after("The checks cannot be listed"));
+    }
+  }
+
+  /** Shows all values again, after other units were chosen. */
+  list() {
+    byId("checks").replaceChildren(...this.charts.map((chart) => makeRow(chart)));
+    const known = this.charts.find(({ series }) => series.channel === this.chosen);
+    this.chart.show(known ?? null);
+  }
+
+  /** Loads the charts again when a check has ended. */
+  update(run) {
+    if (this.isShown && run.outcome && run.method.startsWith("zero_check")) this.load();
+  }
+
+  async start() {
+    if (!this.method) {
+      await this.load();
+      if (!this.method) return write(byId("checks-answer"), "Not started: the rig agent does not answer. Start it, then repeat the check.");
+    }
+    try {
+      const run = await start("runs", { method: this.method, specimen: this.form.elements.specimen.value.trim() });
+      write(byId("checks-answer"), "The zero check has started. Its result appears here after its end.");
+      this.onStarted(run);
+    } catch (problem) {
+      write(byId("checks-answer"), problem.after("Not started"));
+    }
+  }
+}
+
+function makeRow(chart) {
+  const { series: { channel, specimen }, points, limits } = chart;
+  const { kind, word, reason } = describeState(chart);
+  const latest = points.at(-1);
+  return element("tr", {},
+    element("th", { scope: "row" }, spaced(channel)),
+    element("td", {}, element("span", { className: `mark ${kind}` }, word), element("small", {}, reason)),
+    element("td", {}, ...(latest ? [age(latest.measured), element("small", {}, instant(latest.measured))] : ["–"])),
+    element("td", { className: "number" }, ...(latest
+      ? [withUnit(latest.value, channel), element("small", {}, `standard uncertainty ${withUnit(latest.standard_uncertainty, channel, 2)}`)] : ["–"])),
+    element("td", { className: "number" }, limits ? `${withUnit(limits.lower, channel)} … ${withUnit(limits.upper, channel)}` : "–"),
+    element("td", {}, specimen || "not named"),
+    element("td", {}, element("a", { className: "button", href: `${ADDRESS}${channel}`, "aria-label": `Chart of the ${spaced(channel)}` }, "Chart")));
+}

@@ -1,0 +1,44 @@
+"""Zero checks of the fake service: a shifted load cell, a displacement in control, and a new coil voltage."""
+
+from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
+
+import numpy as np
+from sqlalchemy import Engine
+from sqlalchemy.orm import Session
+
+from bench.catalogue import CheckStore, RunRow
+from tests.support.checks import MOUNTED, make_records
+
+_CHECKS = 26
+_SHIFTED = 2
+"""Number of checks since the zero of the load cell has moved."""
+
+
+def fill_checks(engine: Engine) -> CheckStore:
+    """Return a store with one check per day until yesterday."""
+    generator = np.random.default_rng(4)
+    start = datetime.now(UTC) - timedelta(days=_CHECKS)
+    force = generator.normal(0.4, 0.8, _CHECKS)
+    force[-_SHIFTED:] += 6.0
+    channels = (
+        *make_records(force.tolist(), 0.03, start=start),
+        *make_records(generator.normal(2e-5, 3e-6, _CHECKS).tolist(), 4e-7, "displacement", "m", start),
+        *make_records(generator.normal(0, 2e-4, 7).tolist(), 2e-5, "coil_voltage", "V", start),
+    )
+    store = CheckStore(engine)
+    with Session(engine) as session, session.begin():
+        for index in range(_CHECKS):
+            session.add(_make_run(f"run-{index}", start + timedelta(days=index)))
+    for run in {one.run for one in channels}:
+        store.replace(run, [one for one in channels if one.run == run])
+    return store
+
+
+def describe_bench() -> SimpleNamespace:
+    """Return what the charts need of the bench."""
+    return SimpleNamespace(drive_kind="coil_v", specimen=MOUNTED)
+
+
+def _make_run(name: str, started: datetime) -> RunRow:
+    return RunRow(id=name, method="zero_check", started=started, state="ended", log=f"{name}.mcap")

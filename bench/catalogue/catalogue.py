@@ -5,7 +5,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Engine, func, select, tuple_, update
+from sqlalchemy import Engine, event, func, select, tuple_, update
 from sqlalchemy.orm import sessionmaker
 
 from bench.catalogue.campaign_table import CampaignTable
@@ -55,8 +55,9 @@ class Catalogue:
         self._skipped: dict[Path, str] = {}
 
     def close(self) -> None:
-        """Close all connections."""
+        """Close all connections; one that a thread still uses is closed when the thread returns it."""
         self.change_counter.close()
+        event.listen(self._engine.pool, "checkin", lambda connection, record: record.close())
         self._engine.dispose()
 
     def make_name(self, path: Path) -> str:

@@ -79,8 +79,6 @@ class AppSettings:
     """True if the agent writes into the data folder."""
     hosts: tuple[str, ...] = LOOPBACK_NAMES
     """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
-    database: str | None = None
-    """URL of the catalogue's database; by default the one that the data folder keeps, or else its SQLite file."""
     oidc: OidcConfig | None = None
     """Provider by which persons sign in; None for local users and tokens only."""
 
@@ -136,7 +134,7 @@ _BEARER = HTTPBearer(auto_error=False, description="token of the bench or of a p
 @asynccontextmanager
 async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[None]:
     """Run catalogue, engine, agent monitor and scans; they end in reverse order, also after an error."""
-    database = await asyncio.to_thread(open_database, settings.database or locate_catalogue(settings.data))
+    database = await asyncio.to_thread(open_database, locate_catalogue(settings.data))
     await asyncio.to_thread(remove_leftovers, settings.data)
     async with AsyncExitStack() as stack:
         catalogue = Catalogue(database, settings.data)

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from bench.catalogue import keep_address
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from tests.support.fake_service import FakeAgent, FakeEngine
@@ -21,7 +22,6 @@ ON_BOTH_DATABASES = {
     "test_jobs",
     "test_run_search",
     "test_runs",
-    "test_sign_in",
 }
 """Modules whose tests of a service run on SQLite and on PostgreSQL."""
 
@@ -35,8 +35,8 @@ def pytest_generate_tests(metafunc):
 class Service:
     """Service that can be started and ended repeatedly on one data folder."""
 
-    def __init__(self, data, database=None):
-        self.data, self.database = data, database
+    def __init__(self, data):
+        self.data = data
         self.agent = FakeAgent()
         self.engine = FakeEngine()
         self.access, self.token = open_access(data)
@@ -46,7 +46,7 @@ class Service:
         self.end()
         self.engine = FakeEngine()
         given = {"data": self.data, "access": self.access, "link": self.agent, "engine": self._engine}
-        app = create_app(AppSettings(**{**given, "database": self.database, **changes}))
+        app = create_app(AppSettings(**{**given, **changes}))
         self.client = TestClient(app, base_url="http://127.0.0.1:8600", raise_server_exceptions=False)
         self.client.headers["Authorization"] = f"Bearer {self.token}"
         return self.client.__enter__()
@@ -104,7 +104,9 @@ def database(request):
 
 @pytest.fixture
 def service(tmp_path, database):
-    made = Service(tmp_path, database)
+    if database is not None:
+        keep_address(tmp_path, database)
+    made = Service(tmp_path)
     made.start()
     yield made
     made.end()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.catalogue import CATALOGUE_FILE, keep_address
+from bench.catalogue import CATALOGUE_FILE
 from tests.unit.bench.service.people.conftest import PASSWORD, Browser
 
 ADMIN = {"name": "anna", "full_name": "Anna", "role": "technician", "password": PASSWORD}
@@ -54,10 +54,9 @@ def test_who_was_signed_in_can_stop_and_do_nothing_else_meanwhile(service, outag
     assert stranger.send("POST", "/bench/stop").status_code == 401
 
 
-def test_the_service_uses_the_database_that_its_folder_keeps(service, database):
+def test_the_service_uses_the_database_that_its_folder_keeps(service):
     service.post("/users", ADMIN, 201)
     service.end()
-    keep_address(service.data, database)
-    service.start(database=None)
+    service.start()
     assert [user["name"] for user in service.get("/users")["items"]] == ["anna"]
     assert not (service.data / CATALOGUE_FILE).exists()

@@ -54,6 +54,16 @@ def test_an_interrupted_connection_is_replaced(catalogue, postgres_server, url):
     assert catalogue.get_run("run-1").method == "quick"
 
 
+def test_a_connection_in_use_at_the_end_is_closed_when_it_is_returned(catalogue, url):
+    engine = open_database(url)
+    used = engine.connect()
+    sent = used.connection.dbapi_connection
+    Catalogue(engine, catalogue.folder).close()
+    assert not sent.closed
+    used.close()
+    assert sent.closed
+
+
 def test_a_database_that_is_away_is_an_error_of_ours_and_comes_back(catalogue, postgres_server, url):
     postgres_server.allow_connections(url, False)
     try:

@@ -14,8 +14,6 @@ _VALUES = table(
     column("value", Double),
 )
 """Effects of the newest diagnosis and parameters of the newest fit of each run, kept by a trigger."""
-
-
 _TEXTS: ColumnElement[str] = literal_column("runs.texts", Text)
 """Specimen, method, operator and reason of a run in small letters, kept by the server."""
 

@@ -29,7 +29,8 @@ def test_a_job_goes_on_while_the_database_is_away_and_its_result_is_recorded(dat
         test_service.wait_until_false(lambda: "_not_recorded" not in service.log.read_text(), "nothing was tried")
         postgres_server.allow_connections(url, True)
         job = service.wait_for_job(has_ended)
-        assert (job["state"], job["attempts"]) == ("done", 1)
+        assert (job["state"], job["attempts"]) == ("done", 1), job["error"]
+        test_service.check_results(service, data)
     finally:
         service.end()
     assert SECRET not in service.log.read_text()

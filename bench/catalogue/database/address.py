@@ -25,6 +25,10 @@ _DRIVERS = {
 """Driver of each kind of URL that is accepted."""
 _SECRETS = ("sslpassword",)
 """Parameters of a URL that are never shown, besides the password."""
+_EXPECTED = (
+    "the address of the catalogue cannot be read; give postgresql://USER:PASSWORD@HOST:PORT/DATABASE, with %XX "
+    "for special characters in the password"
+)
 
 
 def make_sqlite_url(path: Path) -> str:
@@ -120,12 +124,6 @@ def parse_server_address(url: str) -> URL:
     if address.drivername == SQLITE:
         raise CatalogueError(_EXPECTED)
     return address
-
-
-_EXPECTED = (
-    "the address of the catalogue cannot be read; give postgresql://USER:PASSWORD@HOST:PORT/DATABASE, with %XX "
-    "for special characters in the password"
-)
 
 
 def describe_address(address: URL) -> str:

@@ -18,7 +18,6 @@ TIMEOUT = 20.0
 
 ON_BOTH_DATABASES = {
     "test_campaigns",
-    "test_idempotency",
     "test_jobs",
     "test_run_search",
     "test_runs",

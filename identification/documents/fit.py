@@ -189,7 +189,7 @@ class Prediction(Document):
     rmse_n: float = Field(description="root mean square force error, in N")
     nrmse: float = Field(description="`rmse_n` over the standard deviation of the recorded force")
     bias_n: float = Field(description="mean of simulated less recorded force, in N")
-    noise_floor_n: float = Field(description="noise of the recorded force, in N")
+    noise_floor_n: float = Field(description="noise of the recorded force, in N, at most `rmse_n`")
     per_drive: list[DriveError]
     samples: int = Field(description="number of samples")
     freed: list[str] = Field(description="quantities estimated on this log")

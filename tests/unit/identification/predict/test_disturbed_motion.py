@@ -1,0 +1,33 @@
+"""Prediction of a recording in which no cycle repeats the motion of another."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.fitting import DamperModel, HoldOut, assemble
+from identification.predict.predict import predict_log
+from identification.simulate import Excitation, SimulationModel, simulate
+from tests.support.laboratory import LABORATORY, MOTION_NOISE, NOISE, RATE, recording, stretch
+
+
+def record_late_setpoints(seed: int, lateness: float):
+    """Return a recording whose setpoints are late by another time [s] in each tenth of a second."""
+    planned, random = stretch("late", 0.010, 1.0, seed), np.random.default_rng(seed)
+    steps = np.repeat(random.uniform(-lateness, lateness, len(planned.time) // 100), 100)
+    late = np.convolve(steps, np.hanning(61) / np.hanning(61).sum(), "same")
+    x = 0.010 * np.sin(2 * np.pi * (planned.time + late))
+    velocity = np.gradient(x) * RATE
+    motion = Excitation(RATE, x, velocity, np.gradient(velocity) * RATE, planned.drive)
+    force = simulate(SimulationModel(LABORATORY), motion, max_travel=0.005).force
+    noise = random.standard_normal((2, len(x)))
+    return recording(replace(planned, displacement=x + MOTION_NOISE * noise[0], force=force + NOISE * noise[1]))
+
+
+@pytest.mark.parametrize(("seed", "lateness"), [(31, 0.02), (32, 0.03), (33, 0.04)])
+def test_the_floor_is_at_most_the_error_of_a_model_on_unseen_strokes(seed, lateness):
+    log = record_late_setpoints(seed, lateness)
+    repeated = assemble([log], HoldOut()).floor.noise
+    prediction, _ = predict_log(DamperModel(LABORATORY), log)
+    assert repeated > 1.1 * NOISE, "the cycles of this recording should not repeat"
+    assert prediction.noise_floor_n == prediction.rmse_n == pytest.approx(NOISE, rel=0.15)

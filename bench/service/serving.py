@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 import uvicorn
 
 from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samples_address, find_agent
-from bench.catalogue import keep_address
+from bench.catalogue import keep_address, locate_catalogue, open_database
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr
 from bench.oidc import load_oidc_config
@@ -105,8 +105,7 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
     data = options.data.resolve()
     link, commands = _make_agent_link(options)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
-        if options.catalogue is not None:
-            keep_address(data, options.catalogue)
+        _prepare_catalogue(data, options.catalogue)
         supervisor = _supervise_agent(options, link, data)
         # Until now a client is refused at once; it would wait in vain for as long as the agent takes to start.
         with _explain_address_error(options.host, options.port):
@@ -133,6 +132,17 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
             _run_server(app, listener, options.tls)
         if supervisor is not None and supervisor.has_started:
             print_line(shut_down_idle_agent(link))
+
+
+def _prepare_catalogue(data: Path, url: str | None) -> None:
+    """Open the catalogue once, so that a failure ends the start with one line and before the agent starts.
+
+    Raises:
+        CatalogueError: the catalogue cannot be opened, or another one is in the data folder.
+    """
+    if url is not None:
+        keep_address(data, url)
+    open_database(locate_catalogue(data)).dispose()
 
 
 def _format_address(page: str, token: str | None, data: Path, *, is_terminal: bool) -> str:

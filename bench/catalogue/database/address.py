@@ -127,5 +127,6 @@ def parse_server_address(url: str) -> URL:
 
 
 def describe_address(address: URL) -> str:
-    """Return an address for a person, without its secrets."""
-    return address.difference_update_query(_SECRETS).render_as_string(hide_password=True)
+    """Return an address for a person, without its secrets and without the driver."""
+    shown = address.difference_update_query(_SECRETS).set(drivername=address.get_backend_name())
+    return shown.render_as_string(hide_password=True)

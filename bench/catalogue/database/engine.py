@@ -52,7 +52,8 @@ def open_database(url: str) -> Engine:
     except ImportError as error:
         raise CatalogueError(f"psycopg is missing ({error}); pip install 'mrbench[postgres]'") from error
     except SQLAlchemyError as error:
-        raise CatalogueError(f"the catalogue {shown} cannot be opened: {str(error).splitlines()[0]}") from error
+        cause = error.orig if isinstance(error, DBAPIError) else error
+        raise CatalogueError(f"the catalogue {shown} cannot be opened: {_get_first_line(cause)}") from error
     event.listen(engine, "handle_error", lambda context: _raise_unavailable(context, shown))
     return engine
 
@@ -77,8 +78,13 @@ def _raise_unavailable(context: ExceptionContext, shown: str) -> None:
     # A failed check of a pooled connection is followed by a new connection.
     if context.is_pre_ping or not isinstance(error, DBAPIError) or isinstance(error, _OWN_ERRORS):
         return
-    cause = str(context.original_exception).splitlines() or [type(context.original_exception).__name__]
-    raise CatalogueUnavailableError(f"the catalogue {shown} cannot be used at present: {cause[0]}; try again")
+    cause = _get_first_line(context.original_exception)
+    raise CatalogueUnavailableError(f"the catalogue {shown} cannot be used at present: {cause}; try again")
+
+
+def _get_first_line(error: BaseException | None) -> str:
+    lines = str(error).splitlines() or [type(error).__name__]
+    return lines[0]
 
 
 def _migrate(engine: Engine) -> None:

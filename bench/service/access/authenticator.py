@@ -59,7 +59,7 @@ class Authenticator:
         return identity
 
     def recall_for_stop(self, kind: CredentialKind, secret: str) -> Identity | None:
-        """Return whoever was known before the catalogue could not be reached, with the right to stop only."""
+        """Return the identity that was known before the catalogue was away, with the right to stop only."""
         with self._lock:
             _, identity = self._kept.get((kind, compute_sha256(secret)), (0.0, None))
         if identity is None or _has_expired(identity):

@@ -60,10 +60,10 @@ def test_a_token_is_found_used_and_revoked(catalogue):
     assert not stored.is_valid(datetime.now(UTC))
 
 
-def test_an_approval_is_replaced_and_withdrawn(catalogue):
+def test_the_first_approval_counts_until_it_is_withdrawn(catalogue):
     for name in ("anna", "bert"):
         catalogue.approvals.approve(HASH, name)
-    assert {key: row.approved_by for key, row in catalogue.approvals.find([HASH, "b"]).items()} == {HASH: "bert"}
+    assert {key: row.approved_by for key, row in catalogue.approvals.find([HASH, "b"]).items()} == {HASH: "anna"}
     catalogue.approvals.withdraw(HASH)
     assert catalogue.approvals.find([HASH]) == {}
 

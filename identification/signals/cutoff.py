@@ -10,7 +10,7 @@ Indices = npt.NDArray[np.intp]
 
 _CUTOFF_RATIO = 1.35
 """Ratio of successive trial cutoffs."""
-_MIN_CUTOFF, _MAX_CUTOFF = 0.003, 0.25
+LOWEST_CUTOFF, _MAX_CUTOFF = 0.003, 0.25
 """Range of the trial cutoffs in cycles a sample."""
 _STROKE_BAND = 200.0
 """Frequency [Hz] above which no hydraulic or electric actuator moves: a sensor shows only noise there."""
@@ -37,9 +37,9 @@ def choose_cutoffs(
         noise: standard deviation of the displacement's noise [m].
         twicing: whether the smoother smooths its remainder again.
     """
-    highest = max(min(_MAX_CUTOFF * rate, _STROKE_BAND), 2.0 * _MIN_CUTOFF * rate)
-    steps = int(np.log(highest / (_MIN_CUTOFF * rate)) / np.log(_CUTOFF_RATIO)) + 1
-    trials = np.geomspace(highest, _MIN_CUTOFF * rate, steps + 1)[::-1]
+    highest = max(min(_MAX_CUTOFF * rate, _STROKE_BAND), 2.0 * LOWEST_CUTOFF * rate)
+    steps = int(np.log(highest / (LOWEST_CUTOFF * rate)) / np.log(_CUTOFF_RATIO)) + 1
+    trials = np.geomspace(highest, LOWEST_CUTOFF * rate, steps + 1)[::-1]
     both_measured = weights[1:] * weights[:-1]
     count = int(regions.max()) + 1
     sizes = np.bincount(regions[1:], both_measured, count)

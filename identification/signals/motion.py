@@ -21,9 +21,15 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.logs import PERIODIC_MOTIONS, Segment, Stretch
 from identification.signals.actuator_compliance import MAX_LAG, estimate_compliance_motion
-from identification.signals.cutoff import choose_cutoffs
+from identification.signals.cutoff import LOWEST_CUTOFF, choose_cutoffs
 from identification.signals.harmonics import Harmonics, find_steady_cycles, fit_harmonics
-from identification.signals.motion_regions import MotionRegions, divide_stretch, find_disturbances, mark_runs
+from identification.signals.motion_regions import (
+    REST_CUTOFF,
+    MotionRegions,
+    divide_stretch,
+    find_disturbances,
+    mark_runs,
+)
 from identification.signals.smoother import compute_penalty, differentiate, smooth_signal
 
 _MAX_RUN = 30.0
@@ -72,7 +78,7 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
     compliance_motion = estimate_compliance_motion(stretch, np.where(disturbed, 0.0, weights), noise)
     is_compliant = bool(np.any(compliance_motion))
     waves = _fit_periodic_parts(stretch, weights, compliance_motion, noise)
-    regions = divide_stretch(stretch, waves, is_compliant)
+    regions = divide_stretch(stretch, waves, is_compliant, noise)
     expected = _make_expected_differences(compliance_motion, waves, int(MAX_LAG * stretch.rate))
     if cutoff is None:
         cutoff = _choose_cutoff(stretch, weights, expected, regions, noise)
@@ -98,11 +104,12 @@ def _choose_cutoff(
     """Return the cutoff (N,) [Hz] of the smoother."""
     choose = partial(choose_cutoffs, expected=expected, regions=regions.regions, rate=stretch.rate, noise=noise)
     cutoff = choose(stretch.displacement, weights, twicing=True)[regions.regions]
-    if not regions.disturbed.any():
-        return cutoff
-    # Disturbances must not raise the cutoff of the undisturbed motion around them.
-    undisturbed = choose(stretch.displacement, np.where(regions.disturbed, 0.0, weights), twicing=True)
-    return np.where(regions.disturbed, cutoff, undisturbed[regions.regions])
+    if regions.disturbed.any():
+        # Disturbances must not raise the cutoff of the undisturbed motion around them.
+        undisturbed = choose(stretch.displacement, np.where(regions.disturbed, 0.0, weights), twicing=True)
+        cutoff = np.where(regions.disturbed, cutoff, undisturbed[regions.regions])
+    # The motion before and after a rest reaches into it through the smoother and would raise its cutoff.
+    return np.where(regions.rest, max(REST_CUTOFF, LOWEST_CUTOFF * stretch.rate), cutoff)
 
 
 def estimate_recorded_noise(stretch: Stretch) -> float:

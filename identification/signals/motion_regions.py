@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import binary_dilation
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from identification.arrays import Array, BoolArray
 from identification.logs import Stretch
@@ -18,6 +18,14 @@ from identification.signals.harmonics import Harmonics
 
 Indices = npt.NDArray[np.intp]
 
+_REST_WINDOW = 0.1
+"""Time [s] in which a rod at rest shows nothing but noise."""
+REST_CUTOFF = 0.5 / _REST_WINDOW
+"""Frequency [Hz] above which a motion would show in that window."""
+_SHORT_MOTION = 4.0 * _REST_WINDOW
+"""Time [s] up to which a motion beside a rest is a transition: too few samples for a cutoff of its own."""
+_REST_DEVIATIONS = 4.0
+"""Excess of the variance in that window up to which it is noise alone [standard deviations]."""
 _TRANSITION_TIME = 0.03
 """Time [s] left for transients around disturbances and around the ends of periodic parts."""
 MAX_COMPLIANCE_MOTION = 0.03
@@ -30,20 +38,23 @@ class MotionRegions(NamedTuple):
     """Division of a stretch, (N,) each."""
 
     regions: Indices
-    """Region of each sample: 0 for transitions, then the repeating parts, the parts between, the disturbances."""
+    """Region of each sample: 0 for transitions, then repeating parts, motion between them, rests, disturbances."""
+    rest: BoolArray
+    """True where the rod rests."""
     disturbed: BoolArray
     """True in a disturbance."""
     unresolved: BoolArray
     """True in a disturbance so large that the motion between samples is unknown."""
 
 
-def divide_stretch(stretch: Stretch, waves: list[Harmonics], is_compliant: bool) -> MotionRegions:
+def divide_stretch(stretch: Stretch, waves: list[Harmonics], is_compliant: bool, noise: float) -> MotionRegions:
     """Divide a stretch into regions.
 
     Args:
         stretch: the recording.
         waves: its repeating parts.
         is_compliant: whether its actuator deforms under load, which adds transitions at the stretch's ends.
+        noise: standard deviation of the displacement's noise [m].
     """
     count, reach = len(stretch.time), _compute_reach(stretch)
     edges = {edge for wave in waves for edge in (wave.start, wave.stop)} - {0, count}
@@ -54,7 +65,23 @@ def divide_stretch(stretch: Stretch, waves: list[Harmonics], is_compliant: bool)
     disturbances = find_disturbances(stretch, deviation)
     disturbed = mark_runs(disturbances, count)
     large = disturbed & (deviation > _UNRESOLVED_FRACTION * _compute_amplitude(stretch))
-    return MotionRegions(_label_regions(waves, transitions, disturbances), disturbed, _widen(large, reach))
+    occupied = transitions | disturbed | mark_runs([np.arange(w.start, w.stop) for w in waves], count)
+    rest = _find_rest(stretch, noise) & ~occupied
+    regions = _label_regions(waves, transitions, rest, disturbances, _SHORT_MOTION * stretch.rate)
+    return MotionRegions(regions, rest, disturbed, _widen(large, reach))
+
+
+def _find_rest(stretch: Stretch, noise: float) -> BoolArray:
+    """Return a mask (N,) of the samples in whose surroundings the displacement varies by noise alone.
+
+    A cutoff that passes the fast motion of a segment would pass noise where the rod rests in the same segment.
+    """
+    window = max(int(_REST_WINDOW * stretch.rate), 2)
+    x = stretch.displacement - np.mean(stretch.displacement)
+    variance = uniform_filter1d(x**2, window) - uniform_filter1d(x, window) ** 2
+    still = _find_runs(variance < (1.0 + _REST_DEVIATIONS * np.sqrt(2.0 / window)) * noise**2)
+    # A slow reversal is still for less than a window.
+    return mark_runs([run for run in still if len(run) >= window], len(x))
 
 
 def find_disturbances(stretch: Stretch, deviation: Array) -> list[Indices]:
@@ -93,14 +120,24 @@ def _mark_around(edges: set[int], count: int, reach: int) -> BoolArray:
     return mask
 
 
-def _label_regions(waves: list[Harmonics], transitions: BoolArray, disturbances: list[Indices]) -> Indices:
-    """Return the region (N,) of each sample, in the order that `MotionRegions` states."""
+def _label_regions(
+    waves: list[Harmonics], transitions: BoolArray, rest: BoolArray, disturbances: list[Indices], shortest: float
+) -> Indices:
+    """Return the region (N,) of each sample, in the order that `MotionRegions` states.
+
+    A motion beside a rest that has fewer samples than ``shortest`` is a transition: a start or a stop.
+    """
     # A transition overrides the wave that it overlaps, a disturbance overrides both.
     regions = np.full(len(transitions), -1)
     for k, wave in enumerate(waves):
         regions[wave.start : wave.stop] = 1 + k
     regions[transitions] = 0
-    for k, run in enumerate([*_find_runs(regions < 0), *disturbances], 1 + len(waves)):
+    beside_rest = _widen(rest, 1)
+    moving = _find_runs((regions < 0) & ~rest)
+    starts = [run for run in moving if len(run) < shortest and beside_rest[run].any()]
+    regions[mark_runs(starts, len(regions))] = 0
+    runs = [*_find_runs((regions < 0) & ~rest), *_find_runs((regions < 0) & rest), *disturbances]
+    for k, run in enumerate(runs, 1 + len(waves)):
         regions[run] = k
     return regions
 

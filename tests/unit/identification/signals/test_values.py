@@ -33,8 +33,10 @@ from identification.signals.motion import (
     _make_expected_differences,
     _raise_end_cutoffs,
     estimate_displacement_noise,
+    estimate_motion,
 )
 from identification.signals.motion_regions import (
+    REST_CUTOFF,
     _find_runs,
     _label_regions,
     _mark_around,
@@ -193,9 +195,45 @@ def make_wave(start, stop, disturbance=0.0):
 
 def test_regions_are_transitions_waves_parts_between_and_disturbances():
     found = _label_regions(
-        [make_wave(2, 6), make_wave(8, 12)], np.isin(np.arange(14), [5, 8]), [np.array([3]), np.array([10, 11])]
+        [make_wave(2, 6), make_wave(8, 12)],
+        np.isin(np.arange(14), [5, 8]),
+        np.zeros(14, bool),
+        [np.array([3]), np.array([10, 11])],
+        shortest=2,
     )
     np.testing.assert_array_equal(found, [3, 3, 1, 6, 1, 0, 4, 4, 0, 2, 7, 7, 5, 5])
+
+
+def test_a_rest_is_a_region_of_its_own_and_short_motion_beside_it_a_transition():
+    rest = np.isin(np.arange(16), [5, 6, 7, 10, 11])
+    found = _label_regions([make_wave(0, 3)], np.isin(np.arange(16), [3]), rest, [], shortest=3)
+    np.testing.assert_array_equal(found, [1, 1, 1, 0, 0, 3, 3, 3, 0, 0, 4, 4, 2, 2, 2, 2])
+
+
+def move_and_rest(rate=1000.0, noise=2e-6):
+    """Displacement [m] of a rod that rests for a second, moves 5 mm within 0.2 s, and rests again."""
+    time = np.arange(round(2.2 * rate)) / rate
+    ramp = 0.5 - 0.5 * np.cos(np.pi * np.clip((time - 1.0) / 0.2, 0.0, 1.0))
+    return time, 0.005 * ramp, noise * np.random.default_rng(4).standard_normal(len(time))
+
+
+def test_a_rest_is_smoothed_more_than_the_motion_beside_it():
+    _, x, noise = move_and_rest()
+    recorded = stretch(x + noise)
+    motion = estimate_motion(recorded)
+    error = motion.displacement - x
+    resting, moving = np.r_[0:850, 1350:2200], slice(1000, 1200)
+    assert motion.cutoff[resting].max() == REST_CUTOFF
+    assert motion.cutoff[moving].min() > 2 * REST_CUTOFF
+    assert np.std(error[resting]) < 0.2 * np.std(noise)
+    assert np.std(error[moving]) < np.std(noise)
+
+
+def test_a_slow_stroke_is_no_rest():
+    time = np.arange(4000) / 1000
+    noise = 2e-6 * np.random.default_rng(5).standard_normal(4000)
+    found = divide_stretch(stretch(0.001 * np.sin(2 * np.pi * time / 4) + noise), [], False, 2e-6)
+    assert not found.rest.any()
 
 
 def level(drive_step=None, seams=()):
@@ -234,12 +272,12 @@ def test_a_small_departure_at_a_change_of_drive_or_stroke_is_no_disturbance(give
 def test_a_disturbance_of_four_thousandths_of_the_stroke_is_unresolved(size, unresolved):
     wave = make_wave(100, 900)
     wave.disturbance[400:410] = size
-    found = divide_stretch(level(), [wave], is_compliant=False)
+    found = divide_stretch(level(), [wave], is_compliant=False, noise=0.0)
     np.testing.assert_array_equal(np.flatnonzero(found.disturbed), range(469, 541))
     np.testing.assert_array_equal(np.flatnonzero(found.unresolved), range(469, 541) if unresolved else [])
     np.testing.assert_array_equal(np.flatnonzero(found.regions == 0), [*range(69, 131), *range(869, 931)])
     assert found.regions[[0, 200, 500, 950]].tolist() == [2, 1, 4, 3]
-    compliant = divide_stretch(level(), [wave], is_compliant=True)
+    compliant = divide_stretch(level(), [wave], is_compliant=True, noise=0.0)
     assert compliant.regions[[0, 30, 31, 969, 968]].tolist() == [0, 0, 2, 0, 3]
 
 

@@ -3,7 +3,18 @@
 from bench.catalogue.backup import Copied, back_up, restore_backup
 from bench.catalogue.campaign_table import CampaignChange, CampaignTable, ClaimedNotification
 from bench.catalogue.catalogue import Catalogue, open_catalogue
-from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
+from bench.catalogue.database import (
+    CATALOGUE_FILE,
+    SQLITE,
+    find_catalogue,
+    has_catalogue,
+    keep_address,
+    locate_catalogue,
+    make_sqlite_url,
+    open_database,
+    parse_address,
+)
+from bench.catalogue.errors import CatalogueError, CatalogueUnavailableError
 from bench.catalogue.integrity import check_all, check_integrity
 from bench.catalogue.job_queue import REPEATABLE_STATES, JobFilter, JobQueue
 from bench.catalogue.log_summary import LogSummary, compute_sha256, is_complete, read_log_summary
@@ -57,6 +68,7 @@ __all__ = [
     "CATALOGUE_FILE",
     "REPEATABLE_STATES",
     "SHIPPED_VERSION",
+    "SQLITE",
     "UNFINISHED_STATES",
     "ApprovalRow",
     "ApprovalStore",
@@ -67,6 +79,8 @@ __all__ = [
     "CampaignRow",
     "CampaignTable",
     "Catalogue",
+    "CatalogueError",
+    "CatalogueUnavailableError",
     "CertificateStore",
     "CheckStore",
     "ClaimedKey",
@@ -110,11 +124,15 @@ __all__ = [
     "compute_sha256",
     "find_catalogue",
     "find_stored_state",
+    "has_catalogue",
     "is_complete",
+    "keep_address",
+    "locate_catalogue",
     "make_sqlite_url",
     "move_to_trash",
     "open_catalogue",
     "open_database",
+    "parse_address",
     "read_log_summary",
     "read_plan",
     "restore_backup",

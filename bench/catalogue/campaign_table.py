@@ -5,8 +5,9 @@ from datetime import datetime
 from typing import Any, NamedTuple
 
 from sqlalchemy import Engine, select, tuple_
-from sqlalchemy.orm import Session, sessionmaker
+from sqlalchemy.orm import sessionmaker
 
+from bench.catalogue.database import begin_write
 from bench.catalogue.models import CampaignEventRow, CampaignNotificationRow, CampaignRow, NotificationState
 
 
@@ -69,7 +70,7 @@ class CampaignTable:
         Returns:
             The campaign after the change.
         """
-        with self._begin_write() as session:
+        with begin_write(self._engine) as session:
             row = session.get_one(CampaignRow, campaign_id, with_for_update=True)
             made = make_change(row)
             if made is not None:
@@ -109,7 +110,7 @@ class CampaignTable:
         with self._sessions() as session:
             if session.scalars(due).first() is None:
                 return None
-        with self._begin_write() as session:
+        with begin_write(self._engine) as session:
             claimed = session.scalars(due.with_for_update(skip_locked=True)).first()
             if claimed is None:
                 return None
@@ -126,9 +127,3 @@ class CampaignTable:
         with self._sessions.begin() as session:
             row = session.get_one(CampaignNotificationRow, notification_id)
             row.state, row.reason, row.next_attempt = state, reason, again
-
-    def _begin_write(self) -> Session:
-        session = self._sessions()
-        if self._engine.dialect.name == "sqlite":
-            session.connection().exec_driver_sql("BEGIN IMMEDIATE")
-        return session

@@ -5,12 +5,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Engine, func, select, tuple_, update
+from sqlalchemy import Engine, event, func, select, tuple_, update
 from sqlalchemy.orm import sessionmaker
 
 from bench.catalogue.campaign_table import CampaignTable
-from bench.catalogue.change_counter import ChangeCounter
-from bench.catalogue.database import CATALOGUE_FILE, find_catalogue, make_sqlite_url, open_database
+from bench.catalogue.database import ChangeCounter, find_catalogue, locate_catalogue, open_database
 from bench.catalogue.errors import CatalogueError
 from bench.catalogue.job_queue import JobQueue
 from bench.catalogue.models import UNFINISHED_STATES, JobRow, JobState, RunOutcome, RunRow
@@ -56,8 +55,9 @@ class Catalogue:
         self._skipped: dict[Path, str] = {}
 
     def close(self) -> None:
-        """Close all connections."""
+        """Close all connections; one that a thread still uses is closed when the thread returns it."""
         self.change_counter.close()
+        event.listen(self._engine.pool, "checkin", lambda connection, record: record.close())
         self._engine.dispose()
 
     def make_name(self, path: Path) -> str:
@@ -93,7 +93,7 @@ class Catalogue:
         """
         query = (
             select(RunRow)
-            .where(*(selection or RunFilter()).make_conditions())
+            .where(*(selection or RunFilter()).make_conditions(self._engine.dialect.name))
             .order_by(RunRow.started.desc(), RunRow.id.desc())
             .limit(limit)
         )
@@ -235,7 +235,7 @@ class Catalogue:
 
 @contextmanager
 def open_catalogue(data: Path, *, is_created: bool = False) -> Iterator[Catalogue]:
-    """Open the SQLite catalogue of a data folder for the duration of a block; a service may run meanwhile.
+    """Open the catalogue of a data folder for the duration of a block; a service may run meanwhile.
 
     Args:
         data: data folder.
@@ -250,7 +250,7 @@ def open_catalogue(data: Path, *, is_created: bool = False) -> Iterator[Catalogu
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise CatalogueError(f"{folder} cannot be created: {error.strerror}; use another --data") from None
-    url = make_sqlite_url(folder / CATALOGUE_FILE) if is_created else find_catalogue(folder)
+    url = locate_catalogue(folder) if is_created else find_catalogue(folder)
     catalogue = Catalogue(open_database(url), folder)
     try:
         yield catalogue

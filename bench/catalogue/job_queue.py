@@ -8,6 +8,7 @@ from typing import Any
 from sqlalchemy import ColumnElement, Engine, func, select, tuple_
 from sqlalchemy.orm import Session, sessionmaker
 
+from bench.catalogue.database import begin_write
 from bench.catalogue.models import UNFINISHED_STATES, BatchRow, JobRow, JobState
 
 REPEATABLE_STATES: tuple[JobState, ...] = ("failed", "cancelled")
@@ -58,7 +59,7 @@ class JobQueue:
         Returns:
             The job with this key, and whether it was queued now.
         """
-        with self._begin_write() as session:
+        with begin_write(self._engine, JobRow) as session:
             present = _find_by_key(session, job.key)
             if present is None:
                 session.add(job)
@@ -73,7 +74,7 @@ class JobQueue:
 
     def retry(self, job_id: str, reason: str) -> JobRow | None:
         """Queue a failed or cancelled job again; return None if it is in another state."""
-        with self._begin_write() as session:
+        with begin_write(self._engine, JobRow) as session:
             job = session.get(JobRow, job_id)
             if job is None or job.state not in REPEATABLE_STATES:
                 return None
@@ -92,7 +93,7 @@ class JobQueue:
         Returns:
             The ended job, or None if it had ended before; the job that was queued, or None.
         """
-        with self._begin_write() as session:
+        with begin_write(self._engine, JobRow) as session:
             job = session.get(JobRow, job_id)
             if job is None or job.state not in UNFINISHED_STATES:
                 return None, None
@@ -168,13 +169,6 @@ class JobQueue:
         query = select(JobRow).where(JobRow.id.in_(job_ids))
         with self._sessions() as session:
             return {job.id: job for job in session.scalars(query)}
-
-    def _begin_write(self) -> Session:
-        """Return a session that locks the database for writing at once, so that reading and adding are atomic."""
-        session = self._sessions()
-        if self._engine.dialect.name == "sqlite":
-            session.connection().exec_driver_sql("BEGIN IMMEDIATE")
-        return session
 
 
 def _find_by_key(session: Session, key: str) -> JobRow | None:

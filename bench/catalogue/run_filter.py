@@ -7,11 +7,13 @@ from datetime import datetime
 from sqlalchemy import ColumnElement, Text, cast, exists, or_, select
 from sqlalchemy.orm import aliased
 
+from bench.catalogue.database import POSTGRES
+from bench.catalogue.indexed_search import contains_text, has_newest_value
 from bench.catalogue.models import JobRow, NoteRow, RunOutcome, RunRow
 from bench.endings import RunEnding
 
 _SEARCHED = (RunRow.specimen, RunRow.method, RunRow.operator, RunRow.reason)
-"""Columns that are searched for a text."""
+"""Columns that are searched for a text; PostgreSQL keeps them together in one column."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,12 @@ class RunFilter:
     is_trashed: bool = False
     """Runs in the trash instead of all others."""
 
-    def make_conditions(self) -> list[ColumnElement[bool]]:
-        """Return the conditions of a query for the selected runs."""
+    def make_conditions(self, database: str) -> list[ColumnElement[bool]]:
+        """Return the conditions of a query for the selected runs.
+
+        Args:
+            database: kind of the database, as SQLAlchemy calls its dialect.
+        """
         given: list[ColumnElement[bool] | None] = [
             RunRow.trashed.is_not(None) if self.is_trashed else RunRow.trashed.is_(None),
             None if self.specimen is None else RunRow.specimen == self.specimen,
@@ -49,12 +55,26 @@ class RunFilter:
             None if self.ending is None else RunRow.ending == self.ending,
             None if self.started_from is None else RunRow.started >= self.started_from,
             None if self.started_to is None else RunRow.started < self.started_to,
+        ]
+        given += self._search_indices() if database == POSTGRES else self._search_documents()
+        return [condition for condition in given if condition is not None]
+
+    def _search_documents(self) -> list[ColumnElement[bool] | None]:
+        return [
             None if self.text is None else _contains(self.text),
             None if self.tag is None else _has_tag(self.tag),
             None if self.effect is None else _names_effect(self.effect),
             None if self.parameter is None else self._is_in_range(self.parameter),
         ]
-        return [condition for condition in given if condition is not None]
+
+    def _search_indices(self) -> list[ColumnElement[bool] | None]:
+        least, most = self.parameter_min, self.parameter_max
+        return [
+            None if self.text is None else contains_text(self.text),
+            None if self.tag is None else _has_tag(self.tag),
+            None if self.effect is None else has_newest_value("diagnose", self.effect),
+            None if self.parameter is None else has_newest_value("identify", self.parameter, least, most),
+        ]
 
     def _is_in_range(self, name: str) -> ColumnElement[bool]:
         value = JobRow.summary[("parameters", name)].as_float()

@@ -58,6 +58,15 @@ def serve(
     tls_key: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Private key (PEM) of --tls-cert, without a password.")
     ] = None,
+    catalogue: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            envvar="MRBENCH_CATALOGUE",
+            help="PostgreSQL database of the catalogue, postgresql://USER@HOST/DATABASE; the data folder keeps "
+            "the address. By default an SQLite file in --data.",
+        ),
+    ] = None,
     oidc: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="oidc.toml of the provider (OpenID Connect) by which persons sign in."),
@@ -86,6 +95,7 @@ def serve(
         scheduler_tls=scheduler_tls,
         allow_plain_scheduler=plain_scheduler,
         tls=None if tls_cert is None or tls_key is None else TlsFiles(tls_cert, tls_key),
+        catalogue=catalogue,
         oidc=oidc,
         is_terminal=sys.stdout.isatty(),
     )

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 
 from distributed import Client, Event, KilledWorker
 from distributed.client import FutureCancelledError
-from sqlalchemy.exc import SQLAlchemyError
 
+from bench.catalogue import CatalogueUnavailableError
 from bench.jobs.dask_task import TOPIC, make_cancel_flag, run_dask_task
 from bench.jobs.errors import JobCancelledError, JobError
 from bench.jobs.job_spec import JobSpec, ResultSummary
@@ -101,6 +101,7 @@ class DaskEngine:
         self._address, self._security = location
         self._client: Any = None
         self._listener: JobListener | None = None
+        self._is_announced = False
         self._submissions: dict[str, _Submission] = {}
         self._tasks: set[asyncio.Task[None]] = set()
         self._asking, self._asked_at, self._worker_state = asyncio.Lock(), float("-inf"), ""
@@ -181,9 +182,19 @@ class DaskEngine:
             _LOG.warning("scheduler_absent", extra={"address": self._address, "why": str(error)})
             return
         client.subscribe_topic(TOPIC, self._on_event)
-        self._client = client
-        if self._listener is not None:
+        self._client, self._is_announced = client, False
+        await self._announce()
+
+    async def _announce(self) -> None:
+        """Have all unfinished jobs submitted; this is tried again while the catalogue cannot be read."""
+        if self._client is None or self._listener is None or self._is_announced:
+            return
+        try:
             await self._listener.on_connected()
+        except CatalogueUnavailableError as error:
+            _LOG.warning("jobs_not_submitted", extra={"why": str(error)})
+        else:
+            self._is_announced = True
 
     async def _stay_connected(self) -> None:
         while True:
@@ -191,15 +202,19 @@ class DaskEngine:
             if self._client is None or self._client.status in ("closed", "closing"):
                 self._client, self._submissions = None, {}
                 await self._connect()
+            await self._announce()
 
     async def _on_event(self, event: tuple[float, dict[str, Any]]) -> None:
         _, content = event
         if self._listener is None or content["job"] not in self._submissions:
             return
-        if content["progress"]:
-            await self._listener.on_progress(content["job"], JobProgress(**content["progress"]))
-        else:
-            await self._listener.on_started(content["job"])
+        try:
+            if content["progress"]:
+                await self._listener.on_progress(content["job"], JobProgress(**content["progress"]))
+            else:
+                await self._listener.on_started(content["job"])
+        except CatalogueUnavailableError as error:  # the end of the job is reported until it is recorded
+            _LOG.warning("job_progress_not_recorded", extra={"job": content["job"], "why": str(error)})
 
     async def _follow_job(self, submission: _Submission) -> None:
         job_id = submission.spec.job_id
@@ -251,6 +266,6 @@ async def _report_end(report: Callable[[], Awaitable[None]], job_id: str) -> Non
     while True:
         try:
             return await report()
-        except (OSError, SQLAlchemyError) as error:
+        except (OSError, CatalogueUnavailableError) as error:
             _LOG.warning("job_end_not_recorded", extra={"job": job_id, "why": str(error).splitlines()[0]})
         await asyncio.sleep(_REPORT_PAUSE)

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any, cast
 
-from bench.catalogue import UNFINISHED_STATES, Catalogue, JobRow, RunRow
+from bench.catalogue import UNFINISHED_STATES, Catalogue, CatalogueUnavailableError, JobRow, RunRow
 from bench.jobs.engine import JobEngine
 from bench.jobs.errors import JobError
 from bench.jobs.job_spec import (
@@ -35,6 +35,8 @@ ANALYSED_OUTCOMES = ("clean", "lossy")
 """Outcomes of a run after which its identification is followed by a diagnosis."""
 _MODEL_FILES = {"identify": FIT_FILE, "diagnose": TWIN_FILE}
 """File that stands for a job as a model."""
+_SUBMIT_PAUSE = 2.0
+"""Time [s] before a job is submitted again, if the catalogue could not be read."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -201,7 +203,16 @@ class JobManager:
     async def _announce_queued(self, row: JobRow) -> None:
         _LOG.info("job_queued", extra={"job": row.id, "run": row.run_id, "kind": row.kind})
         self._on_changed(row)
-        await self._submit(row)
+        await self._submit_at_last(row)
+
+    async def _submit_at_last(self, job: JobRow) -> None:
+        """Submit a queued job, again and again while the catalogue cannot be read: nobody else would submit it."""
+        while True:
+            try:
+                return await self._submit(job)
+            except CatalogueUnavailableError as error:
+                _LOG.warning("job_not_submitted", extra={"job": job.id, "why": str(error)})
+            await asyncio.sleep(_SUBMIT_PAUSE)
 
     async def _submit(self, job: JobRow) -> None:
         try:

@@ -10,7 +10,7 @@ from typing import Any
 from bench.agent import Agent, CommandTrail, acquire_agent_lock, handle_command
 from bench.agent_protocol import CommandServer, RunCommand, RunStatus, StopCommand, get_sender, make_endpoint
 from bench.audit import make_agent_trail
-from bench.catalogue import CATALOGUE_FILE, open_catalogue
+from bench.catalogue import has_catalogue, open_catalogue
 from bench.config import load_config
 from bench.errors import RunError
 from bench.methods import Method
@@ -100,8 +100,8 @@ def _start(agent: Agent, trail: CommandTrail, command: RunCommand) -> None:
 
 
 def _read_catalogue(data: Path) -> dict[str, Any]:
-    """Return today's certificates and the latest checks from the catalogue in a folder, if there is one."""
-    if not (data / CATALOGUE_FILE).is_file():
+    """Return today's certificates and the latest checks from the catalogue of a folder, if it has one."""
+    if not has_catalogue(data):
         return {}
     with open_catalogue(data) as catalogue:
         certificates = catalogue.certificates.list_current(datetime.now(UTC).date())

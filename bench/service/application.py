@@ -17,7 +17,7 @@ from starlette.middleware.trustedhost import TrustedHostMiddleware
 
 from bench.agent_protocol import AgentEvent, AgentStatus
 from bench.campaigns import NotificationSender
-from bench.catalogue import CATALOGUE_FILE, Catalogue, JobRow, RunRow, make_sqlite_url, open_database
+from bench.catalogue import Catalogue, JobRow, RunRow, locate_catalogue, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
 from bench.live import LiveBatch, LiveBroadcaster, serialise_message
@@ -79,8 +79,6 @@ class AppSettings:
     """True if the agent writes into the data folder."""
     hosts: tuple[str, ...] = LOOPBACK_NAMES
     """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
-    database: str | None = None
-    """URL of the catalogue's database; by default an SQLite file in the data folder."""
     oidc: OidcConfig | None = None
     """Provider by which persons sign in; None for local users and tokens only."""
 
@@ -136,9 +134,7 @@ _BEARER = HTTPBearer(auto_error=False, description="token of the bench or of a p
 @asynccontextmanager
 async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[None]:
     """Run catalogue, engine, agent monitor and scans; they end in reverse order, also after an error."""
-    database = await asyncio.to_thread(
-        open_database, settings.database or make_sqlite_url(settings.data / CATALOGUE_FILE)
-    )
+    database = await asyncio.to_thread(open_database, locate_catalogue(settings.data))
     await asyncio.to_thread(remove_leftovers, settings.data)
     async with AsyncExitStack() as stack:
         catalogue = Catalogue(database, settings.data)

@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field
 from starlette.exceptions import HTTPException
 
 from bench.campaigns import CampaignDocumentError
+from bench.catalogue import CatalogueUnavailableError
 from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, NoRigError, RecordingError
 from bench.people import Right, find_roles
 from bench.service.access import Identity
@@ -105,6 +106,12 @@ def make_conflict(name: str, title: str, detail: str) -> ProblemError:
     return ProblemError(HTTPStatus.CONFLICT, name, title, detail)
 
 
+def make_bench_problem(error: BenchError) -> ProblemError:
+    """Return an error of the bench as a problem."""
+    status, name, title = next(kind[1:] for kind in _BENCH_PROBLEMS if isinstance(error, kind[0]))
+    return ProblemError(status, name, title, str(error))
+
+
 RESPONSES: dict[int | str, dict[str, Any]] = {
     status: {
         "description": description,
@@ -118,7 +125,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         (409, "Not possible in the present state"),
         (413, "The body is too large"),
         (422, "The request is invalid"),
-        (503, "The rig agent does not answer"),
+        (503, "The rig agent or the catalogue does not answer"),
     )
 }
 """Error responses of every route."""
@@ -143,6 +150,12 @@ _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
         "The campaign was refused",
     ),
     (AgentUnreachableError, HTTPStatus.SERVICE_UNAVAILABLE, "agent-unreachable", "The rig agent does not answer"),
+    (
+        CatalogueUnavailableError,
+        HTTPStatus.SERVICE_UNAVAILABLE,
+        "catalogue-unavailable",
+        "The catalogue cannot be used at present",
+    ),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),
 )
@@ -157,8 +170,7 @@ def install_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(BenchError)
     async def _handle_bench_error(request: Request, error: BenchError) -> JSONResponse:
-        status, name, title = next(kind[1:] for kind in _BENCH_PROBLEMS if isinstance(error, kind[0]))
-        return make_response(ProblemError(status, name, title, str(error)))
+        return make_response(make_bench_problem(error))
 
     @app.exception_handler(RequestValidationError)
     async def _handle_invalid_request(request: Request, error: RequestValidationError) -> JSONResponse:

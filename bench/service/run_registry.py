@@ -7,11 +7,18 @@ from collections.abc import Awaitable, Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
-from sqlalchemy.exc import SQLAlchemyError
-
 from bench.agent_protocol import AgentEvent, AgentStatus, RunStatus
 from bench.campaigns import WARM_UP_METHOD
-from bench.catalogue import Catalogue, LogIntegrity, RunOutcome, RunRow, catalogue_log, is_complete, scan_logs
+from bench.catalogue import (
+    Catalogue,
+    CatalogueUnavailableError,
+    LogIntegrity,
+    RunOutcome,
+    RunRow,
+    catalogue_log,
+    is_complete,
+    scan_logs,
+)
 from bench.checks import CHECK_METHODS
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
@@ -85,7 +92,7 @@ class RunRegistry:
         run = status.run if status and status.run and status.run.outcome is None else None
         try:
             self._catalogue.event_journal.record(event.kind, event.text, run.id if run else None)
-        except SQLAlchemyError as error:
+        except CatalogueUnavailableError as error:
             self._failures.note(error)
 
     async def scan(self) -> None:

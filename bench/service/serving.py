@@ -16,6 +16,7 @@ from urllib.parse import urlsplit
 import uvicorn
 
 from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samples_address, find_agent
+from bench.catalogue import keep_address, locate_catalogue, open_database
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr
 from bench.oidc import load_oidc_config
@@ -75,6 +76,8 @@ class ServeOptions:
     """Accept a scheduler without TLS beyond the loopback interface."""
     tls: TlsFiles | None = None
     """Files of HTTPS; without them, the service answers plain HTTP."""
+    catalogue: str | None = None
+    """URL of the catalogue's database, which the data folder keeps; by default that of its last start."""
     oidc: Path | None = None
     """``oidc.toml`` of the provider by which persons sign in."""
     is_terminal: bool = False
@@ -93,7 +96,7 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
         WorkerError: the address of the scheduler is not valid, or is refused because it has no TLS.
         SecretFileError: a file with a secret is missing, or other users may read it.
         ConfigError: ``bench.toml``, ``oidc.toml`` or the address of the agent is invalid.
-        CatalogueError: the catalogue cannot be opened.
+        CatalogueError: the catalogue cannot be opened, or another one is in the data folder.
     """
     log_to_stderr()
     if options.tls is not None:
@@ -102,6 +105,7 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
     data = options.data.resolve()
     link, commands = _make_agent_link(options)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
+        _prepare_catalogue(data, options.catalogue)
         supervisor = _supervise_agent(options, link, data)
         # Until now a client is refused at once; it would wait in vain for as long as the agent takes to start.
         with _explain_address_error(options.host, options.port):
@@ -128,6 +132,17 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
             _run_server(app, listener, options.tls)
         if supervisor is not None and supervisor.has_started:
             print_line(shut_down_idle_agent(link))
+
+
+def _prepare_catalogue(data: Path, url: str | None) -> None:
+    """Open the catalogue once, so that a failure ends the start with one line and before the agent starts.
+
+    Raises:
+        CatalogueError: the catalogue cannot be opened, or another one is in the data folder.
+    """
+    if url is not None:
+        keep_address(data, url)
+    open_database(locate_catalogue(data)).dispose()
 
 
 def _format_address(page: str, token: str | None, data: Path, *, is_terminal: bool) -> str:

@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 from bench.campaigns import CampaignRunner, CampaignStore, PlantBench, collect_methods, parse_campaign
-from bench.catalogue import CATALOGUE_FILE, Catalogue, make_sqlite_url, open_database
+from bench.catalogue import Catalogue, locate_catalogue, open_database
 from bench.log import read_log
 
 RIG = (sys.executable, str(Path(__file__).with_name("fast_rig.py")))
@@ -31,7 +31,7 @@ STEPS = {"matrix": {"specimens": ["A", "B", "C"], "methods": [METHOD], "repeats"
 
 
 def open_store(folder):
-    return CampaignStore(Catalogue(open_database(make_sqlite_url(folder / CATALOGUE_FILE)), folder))
+    return CampaignStore(Catalogue(open_database(locate_catalogue(folder)), folder))
 
 
 def execute(folder):

@@ -37,19 +37,27 @@ def dockerfile(word):
     COMPOSE is None, reason="docker-compose is not installed; run `apt-get install docker-compose`"
 )
 def test_docker_compose_reads_the_file():
-    words = [COMPOSE, "-f", FILE, "--profile", "simulated", "config", "--services"]
+    words = [COMPOSE, "-f", FILE, "--profile", "simulated", "--profile", "postgres", "config", "--services"]
     read = subprocess.run(words, capture_output=True, text=True, check=False)
     assert read.returncode == 0, read.stderr
-    assert set(read.stdout.split()) == set(ORDER)
+    assert set(read.stdout.split()) == {*ORDER, "database"}
 
 
 def test_every_container_is_started_again_and_has_a_health_check_and_the_network_of_the_scheduler():
     for name, service in services().items():
         assert service["restart"] == "unless-stopped"
-        assert service["healthcheck"]["test"][:3] == ["CMD", "mrbench", "health"]
+        checks = ["CMD", "pg_isready"] if name == "database" else ["CMD", "mrbench", "health"]
+        assert service["healthcheck"]["test"][: len(checks)] == checks
         assert service.get("network_mode") == (None if name == "scheduler" else "service:scheduler")
-    assert [name for name, service in services().items() if "profiles" in service] == ["sim"]
+    assert [name for name, service in services().items() if "profiles" in service] == ["sim", "database"]
     assert {"mem_limit", "cpus"} <= services()["worker"].keys()
+
+
+def test_service_and_database_share_the_password_which_is_not_in_the_file():
+    service, database = services()["service"], services()["database"]
+    assert service["environment"]["PGPASSWORD"] == database["environment"]["POSTGRES_PASSWORD"]
+    assert service["environment"]["PGPASSWORD"] == "${POSTGRES_PASSWORD:-}"
+    assert "listen_addresses=127.0.0.1" in database["command"]
 
 
 def test_the_image_contains_all_packages():

@@ -41,10 +41,10 @@ TINY = {
 class ServiceProcess:
     """A service process on a data folder."""
 
-    def __init__(self, data, token=None, command=MRBENCH):
+    def __init__(self, data, token=None, command=MRBENCH, options=()):
         self.log = data.parent / "service.log"
         self.log.unlink(missing_ok=True)
-        command = [*command, "serve", "--port", "0", "--data", str(data)]
+        command = [*command, "serve", "--port", "0", "--data", str(data), *options]
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
                 command, stdout=subprocess.PIPE, stderr=log, text=True, env=ENVIRONMENT

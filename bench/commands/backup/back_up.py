@@ -14,6 +14,7 @@ def backup(
 
     The service may run and record meanwhile. The copy appears complete or not at all. A log that is being recorded
     is copied up to this moment. Secrets that a new service creates again are left out; the token stays valid.
+    A catalogue in PostgreSQL is written by `pg_dump` to the file `catalogue.dump`, and its address is left out.
     """
     from bench.catalogue import back_up
 

@@ -58,6 +58,14 @@ class Authenticator:
             self._keep((kind, sha256), identity)
         return identity
 
+    def recall_for_stop(self, kind: CredentialKind, secret: str) -> Identity | None:
+        """Return the identity that was known before the catalogue was away, with the right to stop only."""
+        with self._lock:
+            _, identity = self._kept.get((kind, compute_sha256(secret)), (0.0, None))
+        if identity is None or _has_expired(identity):
+            return None
+        return replace(identity, rights=identity.rights & {"stop"})
+
     def identify_user(self, name: str) -> Identity | None:
         """Return the identity of a user; None if there is none, or if it is disabled."""
         row = self._stores.users.find(name)

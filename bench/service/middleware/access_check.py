@@ -3,10 +3,12 @@
 import asyncio
 import hmac
 from collections.abc import Container
+from http import HTTPStatus
 
 from starlette.datastructures import Headers
 from starlette.types import ASGIApp, Receive, Scope, Send
 
+from bench.catalogue import CatalogueUnavailableError
 from bench.service import problems
 from bench.service.access import CredentialKind, Identity, OperationRights, compute_csrf, read_cookie
 from bench.service.context import ServiceContext
@@ -40,16 +42,19 @@ class AccessCheckMiddleware:
         if scope["type"] != "http" or not scope["path"].startswith(self._below):
             await self._app(scope, receive, send)
             return
-        identity = await _identify(scope)
+        identity, outage = await _identify(scope)
         scope.setdefault("state", {}).update(identity=identity, actor=identity.actor if identity else "")
         verb = "GET" if scope["method"] == "HEAD" else scope["method"]
         is_public = f"{verb} {scope['path']}" in self._public
         problem = None if is_public else self._find_problem(scope, identity)
+        if problem is not None and outage is not None:
+            problem = outage
         if problem is None:
             await self._app(scope, receive, send)
             return
         # The connection is closed, because a body that nobody wants may follow.
-        headers = _UNAUTHORISED_HEADERS if identity is None else problems.CLOSE
+        is_unknown = problem.problem.status == HTTPStatus.UNAUTHORIZED
+        headers = _UNAUTHORISED_HEADERS if is_unknown else problems.CLOSE
         await problems.make_response(problem, headers)(scope, receive, send)
 
     def _find_problem(self, scope: Scope, identity: Identity | None) -> problems.ProblemError | None:
@@ -64,14 +69,18 @@ class AccessCheckMiddleware:
         return None if right in identity.rights else problems.make_right_missing(right, identity)
 
 
-async def _identify(scope: Scope) -> Identity | None:
+async def _identify(scope: Scope) -> tuple[Identity | None, problems.ProblemError | None]:
+    """Return who sends a request, and the problem if the catalogue cannot tell; a known person may then stop."""
     context: ServiceContext = scope["app"].state.context
     credential = _read_credential(scope)
     if credential is None:
-        return None
+        return None, None
     # The event loop must not wait for the database; a stop may follow at any moment.
     known = context.authenticator.recall(*credential)
-    return known or await asyncio.to_thread(context.authenticator.identify, *credential)
+    try:
+        return known or await asyncio.to_thread(context.authenticator.identify, *credential), None
+    except CatalogueUnavailableError as error:
+        return context.authenticator.recall_for_stop(*credential), problems.make_bench_problem(error)
 
 
 def _read_credential(scope: Scope) -> tuple[CredentialKind, str] | None:

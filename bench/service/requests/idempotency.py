@@ -20,9 +20,8 @@ from weakref import WeakValueDictionary
 
 from fastapi import Depends, Header, Request, Response
 from fastapi.routing import APIRoute
-from sqlalchemy.exc import SQLAlchemyError
 
-from bench.catalogue import ClaimedKey, IdempotencyKeys
+from bench.catalogue import CatalogueUnavailableError, ClaimedKey, IdempotencyKeys
 from bench.service.context import ServiceContext
 from bench.service.problems import ProblemError, shorten
 
@@ -138,8 +137,8 @@ def _store(keys: IdempotencyKeys, key: str, response: Response) -> None:
     headers = {name: response.headers[name] for name in _KEPT_HEADERS if name in response.headers}
     try:
         keys.store(key, response.status_code, headers, bytes(response.body).decode())
-    except SQLAlchemyError as error:
-        _LOG.warning("answer_not_stored", extra={"why": str(error).splitlines()[0]})
+    except CatalogueUnavailableError as error:
+        _LOG.warning("answer_not_stored", extra={"why": str(error)})
 
 
 def _refuse(detail: str) -> ProblemError:

@@ -1,12 +1,14 @@
 """Route of the health of the service: agent, worker, disk, queue, clocks and calibration, each in words."""
 
 import asyncio
+from collections.abc import Callable
 from functools import cache
 from importlib.metadata import version
 
 from fastapi import APIRouter
 
 from bench.agent_protocol import AgentStatus
+from bench.catalogue import CatalogueUnavailableError
 from bench.errors import BenchError
 from bench.service.context import Context, ServiceContext
 from bench.service.routes.planning import describe_calibration
@@ -36,11 +38,19 @@ def _describe_parts(context: ServiceContext) -> dict[str, str]:
     return {
         "agent": _describe_agent(context),
         "disk": context.space_monitor.describe() or "ok",
-        "queue": _describe_queue(context),
+        "queue": _describe_from_catalogue(_describe_queue, context),
         "audit": context.audit.describe_state(),
         "clocks": describe_clocks(context.monitor.latest_status),
-        "calibration": describe_calibration(context),
+        "calibration": _describe_from_catalogue(describe_calibration, context),
     }
+
+
+def _describe_from_catalogue(describe: Callable[[ServiceContext], str], context: ServiceContext) -> str:
+    """Return a description, or that there is none; the cause names the server, and health is public."""
+    try:
+        return describe(context)
+    except CatalogueUnavailableError:
+        return "not known: the catalogue cannot be used at present; see the log of the service"
 
 
 def _describe_agent(context: ServiceContext) -> str:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from pydantic import BaseModel, Field, ValidationError
 
+from bench.catalogue import CatalogueUnavailableError
 from bench.live import Listener, ListenerSettings
 from bench.service.access import CredentialKind, compute_csrf, read_cookie
 from bench.service.context import Context, ServiceContext
@@ -76,7 +77,10 @@ def _make_check(websocket: WebSocket, sign_in: SignIn, context: ServiceContext) 
         credential = ("token", "")
 
     async def is_signed_in() -> bool:
-        return await asyncio.to_thread(context.authenticator.identify, *credential) is not None
+        try:
+            return await asyncio.to_thread(context.authenticator.identify, *credential) is not None
+        except CatalogueUnavailableError:  # who was signed in stays so
+            return context.authenticator.recall_for_stop(*credential) is not None
 
     return is_signed_in
 

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
-from sqlalchemy.exc import SQLAlchemyError
 
 from bench.agent_protocol import AbortCommand, AgentStatus, RunCommand, RunStatus, StatusCommand, StopCommand
-from bench.catalogue import RunRow, catalogue_log
+from bench.catalogue import CatalogueUnavailableError, RunRow, catalogue_log
 from bench.errors import RunError
 from bench.log import salvage_log
 from bench.methods import Method, compile_method, parse_method
@@ -115,7 +114,7 @@ def _make_started_view(context: ServiceContext, run: RunStatus, status: AgentSta
     """
     try:
         return _make_view(context, run.id)
-    except (ProblemError, SQLAlchemyError):
+    except (ProblemError, CatalogueUnavailableError):
         return make_run_view(make_run_row(run, context.catalogue), [], status)
 
 

@@ -16,13 +16,13 @@ from bench.campaigns import (
     stop,
 )
 from bench.campaigns.notifications import MAX_ATTEMPTS, RETRY_AFTER
-from bench.catalogue import CATALOGUE_FILE, CampaignNotificationRow, Catalogue, make_sqlite_url, open_database
+from bench.catalogue import CampaignNotificationRow, Catalogue, open_database
 from tests.support.message_servers import find_closed_port, serve_silence, serve_webhook
 
 
 @pytest.fixture
-def store(tmp_path):
-    catalogue = Catalogue(open_database(make_sqlite_url(tmp_path / CATALOGUE_FILE)), tmp_path)
+def store(tmp_path, catalogue_url):
+    catalogue = Catalogue(open_database(catalogue_url), tmp_path)
     yield CampaignStore(catalogue)
     catalogue.close()
 

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from bench.catalogue.catalogue import Catalogue
-from bench.catalogue.database import make_sqlite_url, open_database
+from bench.catalogue.database import SQLITE, keep_address, open_database, parse_address
 from bench.catalogue.integrity import check_all, check_integrity
 from bench.catalogue.log_summary import compute_sha256
 from bench.catalogue.scan import scan_logs
@@ -15,9 +15,9 @@ from tests.support.service_logs import write_complete_log, write_truncated_log
 
 
 @pytest.fixture
-def catalogue(tmp_path):
+def catalogue(tmp_path, catalogue_url):
     """Catalogue of one recorded log."""
-    catalogue = Catalogue(open_database(make_sqlite_url(tmp_path / "catalogue.db")), tmp_path)
+    catalogue = Catalogue(open_database(catalogue_url), tmp_path)
     write_complete_log(tmp_path / "a.mcap", "a")
     scan(catalogue)
     yield catalogue
@@ -85,7 +85,9 @@ def verify(folder):
     return CliRunner().invoke(_make_application([entry]), ["verify", str(folder)])
 
 
-def test_the_command_names_changed_and_missing_logs(catalogue):
+def test_the_command_names_changed_and_missing_logs(catalogue, catalogue_url):
+    if parse_address(catalogue_url).drivername != SQLITE:
+        keep_address(catalogue.folder, catalogue_url)
     done = verify(catalogue.folder)
     assert (done.exit_code, done.output) == (0, "1 of 1 logs are unchanged since they were recorded\n")
     flip_byte(catalogue.folder / "a.mcap", keep_time=True)

@@ -5,14 +5,14 @@ from datetime import UTC, datetime
 import pytest
 
 from bench.catalogue.catalogue import Catalogue
-from bench.catalogue.database import make_sqlite_url, open_database
+from bench.catalogue.database import open_database
 from bench.catalogue.job_queue import JobFilter
 from bench.catalogue.models import BatchRow, JobRow, RunRow
 
 
 @pytest.fixture
-def catalogue(tmp_path):
-    catalogue = Catalogue(open_database(make_sqlite_url(tmp_path / "catalogue.db")), tmp_path)
+def catalogue(tmp_path, catalogue_url):
+    catalogue = Catalogue(open_database(catalogue_url), tmp_path)
     for name in ("run-1", "run-2"):
         started = datetime(2026, 3, 1, 10, tzinfo=UTC)
         catalogue.add(RunRow(id=name, method="quick", started=started, state="ended", log=f"{name}.mcap"))

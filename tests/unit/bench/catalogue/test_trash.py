@@ -5,7 +5,6 @@ import pytest
 from bench.catalogue import (
     Catalogue,
     RunFilter,
-    make_sqlite_url,
     move_to_trash,
     open_database,
     restore_from_trash,
@@ -16,8 +15,8 @@ from tests.support.service_logs import write_complete_log
 
 
 @pytest.fixture
-def catalogue(tmp_path):
-    catalogue = Catalogue(open_database(make_sqlite_url(tmp_path / "catalogue.db")), tmp_path)
+def catalogue(tmp_path, catalogue_url):
+    catalogue = Catalogue(open_database(catalogue_url), tmp_path)
     write_complete_log(tmp_path / "one.mcap")
     scan(catalogue)
     yield catalogue

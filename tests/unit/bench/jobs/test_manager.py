@@ -5,9 +5,11 @@ from datetime import UTC, datetime
 
 import pytest
 
+from bench.catalogue import CatalogueUnavailableError
 from bench.catalogue.catalogue import Catalogue
-from bench.catalogue.database import make_sqlite_url, open_database
+from bench.catalogue.database import open_database
 from bench.catalogue.models import RunRow
+from bench.jobs import manager
 from bench.jobs.errors import JobError
 from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, TWIN_FILE
 from bench.jobs.manager import JobManager
@@ -20,8 +22,8 @@ from tests.support.fake_service import FakeEngine
 class ManagedJobs:
     """A job manager on an empty catalogue; each call runs its own event loop."""
 
-    def __init__(self, folder):
-        self.catalogue = Catalogue(open_database(make_sqlite_url(folder / "catalogue.db")), folder)
+    def __init__(self, folder, url):
+        self.catalogue = Catalogue(open_database(url), folder)
         self.engine, self.changes = FakeEngine(), []
         self.manager = JobManager(
             self.catalogue, self.engine, lambda job: self.changes.append((job.id, job.state))
@@ -43,8 +45,8 @@ class ManagedJobs:
 
 
 @pytest.fixture
-def jobs(tmp_path):
-    jobs = ManagedJobs(tmp_path)
+def jobs(tmp_path, catalogue_url):
+    jobs = ManagedJobs(tmp_path, catalogue_url)
     yield jobs
     jobs.catalogue.close()
 
@@ -233,3 +235,18 @@ def test_a_report_on_an_unknown_job_changes_nothing(jobs):
     jobs.call("on_started", "unknown")
     jobs.call("on_done", "unknown", {})
     assert jobs.changes == []
+
+
+def test_a_queued_job_is_submitted_as_soon_as_the_catalogue_can_be_read(jobs, monkeypatch):
+    failures = [CatalogueUnavailableError("the server is away")] * 3
+    get_run = jobs.catalogue.get_run
+
+    def fail_at_first(run_id):
+        if failures:
+            raise failures.pop()
+        return get_run(run_id)
+
+    monkeypatch.setattr(manager, "_SUBMIT_PAUSE", 0.0)
+    monkeypatch.setattr(jobs.catalogue, "get_run", fail_at_first)
+    job = jobs.job()
+    assert (failures, list(jobs.engine.specs)) == ([], [job.id])

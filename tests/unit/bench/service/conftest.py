@@ -7,12 +7,28 @@ from pathlib import Path
 import pytest
 from fastapi.testclient import TestClient
 
+from bench.catalogue import keep_address
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from tests.support.fake_service import FakeAgent, FakeEngine
 
 TIMEOUT = 20.0
 """Time limit for events in other threads [s]."""
+
+
+ON_BOTH_DATABASES = {
+    "test_campaigns",
+    "test_jobs",
+    "test_run_search",
+    "test_runs",
+}
+"""Modules whose tests of a service run on SQLite and on PostgreSQL."""
+
+
+def pytest_generate_tests(metafunc):
+    name = metafunc.module.__name__.rpartition(".")[2]
+    if "database" in metafunc.fixturenames and name in ON_BOTH_DATABASES:
+        metafunc.parametrize("database", ["sqlite", "postgresql"], indirect=True)
 
 
 class Service:
@@ -79,7 +95,16 @@ class Service:
 
 
 @pytest.fixture
-def service(tmp_path):
+def database(request):
+    """Return the URL of an empty catalogue in PostgreSQL; None for the SQLite file of the data folder."""
+    is_server = getattr(request, "param", "sqlite") == "postgresql"
+    return request.getfixturevalue("postgres_server").make_catalogue() if is_server else None
+
+
+@pytest.fixture
+def service(tmp_path, database):
+    if database is not None:
+        keep_address(tmp_path, database)
     made = Service(tmp_path)
     made.start()
     yield made

@@ -4,10 +4,9 @@ import os
 from datetime import timedelta
 
 import pytest
-from sqlalchemy.exc import OperationalError
 
 from bench.calibration import list_overdue, make_log_text
-from bench.catalogue import JobRow, RunRow
+from bench.catalogue import CatalogueUnavailableError, JobRow, RunRow
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.scan import catalogue_log
 from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
@@ -229,7 +228,7 @@ def test_a_run_has_an_ending_apart_from_its_outcome(service, outcome, ending):
 
 def test_a_run_that_the_catalogue_cannot_record_is_started_nevertheless(service, monkeypatch, caplog):
     """A catalogue on a full disk: the rig moves, so the request has succeeded, and the catalogue catches up."""
-    full = OperationalError("INSERT", {}, Exception("database or disk is full"))
+    full = CatalogueUnavailableError("database or disk is full")
     add = Catalogue.add
 
     def fail(catalogue, row):

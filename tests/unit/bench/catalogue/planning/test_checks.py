@@ -4,7 +4,7 @@ from datetime import timedelta
 
 import pytest
 
-from bench.catalogue import open_catalogue, scan_logs
+from bench.catalogue import Catalogue, open_database, scan_logs
 from bench.catalogue.trash import move_to_trash, restore_from_trash
 from bench.checks import CheckSeries
 from tests.support.checks import IN_CONTROL, MOUNTED, START, write_check_log
@@ -13,9 +13,10 @@ FORCE = CheckSeries(check="zero", channel="force", specimen=MOUNTED)
 
 
 @pytest.fixture
-def catalogue(tmp_path):
-    with open_catalogue(tmp_path, is_created=True) as catalogue:
-        yield catalogue
+def catalogue(tmp_path, catalogue_url):
+    catalogue = Catalogue(open_database(catalogue_url), tmp_path)
+    yield catalogue
+    catalogue.close()
 
 
 def scan(catalogue, zeros, first_day=0):

@@ -4,14 +4,14 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from bench.catalogue import IdempotencyKeys, make_sqlite_url, open_database
+from bench.catalogue import IdempotencyKeys, open_database
 
 NOW = datetime(2026, 3, 1, 12, 0, 0, 123456, tzinfo=UTC)
 
 
 @pytest.fixture
-def keys(tmp_path):
-    engine = open_database(make_sqlite_url(tmp_path / "catalogue.db"))
+def keys(catalogue_url):
+    engine = open_database(catalogue_url)
     yield IdempotencyKeys(engine)
     engine.dispose()
 

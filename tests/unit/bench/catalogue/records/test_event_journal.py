@@ -4,7 +4,7 @@ from datetime import timedelta
 
 import pytest
 
-from bench.catalogue import Catalogue, make_sqlite_url, open_database, scan_logs
+from bench.catalogue import Catalogue, open_database, scan_logs
 from bench.catalogue.records import read_log_events
 from bench.log import LogWriter
 from tests.support.logs import MILLISECOND, header, times, values, write_log
@@ -12,8 +12,8 @@ from tests.support.service_logs import STARTED
 
 
 @pytest.fixture
-def catalogue(tmp_path):
-    catalogue = Catalogue(open_database(make_sqlite_url(tmp_path / "catalogue.db")), tmp_path)
+def catalogue(tmp_path, catalogue_url):
+    catalogue = Catalogue(open_database(catalogue_url), tmp_path)
     yield catalogue
     catalogue.close()
 

@@ -5,10 +5,9 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from sqlalchemy.exc import OperationalError
 
 from bench.agent_protocol import RunCommand
-from bench.catalogue import IdempotencyKeys
+from bench.catalogue import CatalogueUnavailableError, IdempotencyKeys
 from tests.support.service_logs import write_complete_log
 
 BODY = {"method": "quick", "specimen": "damper 7"}
@@ -112,7 +111,7 @@ def test_a_log_that_is_not_listed_yet_starts_no_second_run(service, monkeypatch)
 
 def test_an_answer_that_cannot_be_stored_is_given_all_the_same(service, monkeypatch):
     def fail(*given):
-        raise OperationalError("update", {}, Exception("database or disk is full"))
+        raise CatalogueUnavailableError("database or disk is full")
 
     monkeypatch.setattr(IdempotencyKeys, "store", fail)
     run = post(service, "/runs", BODY, "key-1").json()

@@ -5,8 +5,7 @@ from datetime import UTC, datetime
 from types import SimpleNamespace
 
 from bench.catalogue.catalogue import Catalogue
-from bench.catalogue.change_counter import ChangeCounter
-from bench.catalogue.database import make_sqlite_url, open_database
+from bench.catalogue.database import ChangeCounter, make_sqlite_url, open_database
 from bench.catalogue.models import RunRow
 
 

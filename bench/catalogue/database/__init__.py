@@ -1,0 +1,40 @@
+"""Database of a catalogue: its address, its connections, and what differs between SQLite and PostgreSQL."""
+
+from bench.catalogue.database.address import (
+    ADDRESS_FILE,
+    CATALOGUE_FILE,
+    POSTGRES,
+    SQLITE,
+    describe_address,
+    find_catalogue,
+    has_catalogue,
+    keep_address,
+    locate_catalogue,
+    make_sqlite_url,
+    parse_address,
+    parse_server_address,
+)
+from bench.catalogue.database.change_counter import ChangeCounter
+from bench.catalogue.database.engine import open_database
+from bench.catalogue.database.postgres_tools import dump_database, restore_database
+from bench.catalogue.database.writing import begin_write
+
+__all__ = [
+    "ADDRESS_FILE",
+    "CATALOGUE_FILE",
+    "POSTGRES",
+    "SQLITE",
+    "ChangeCounter",
+    "begin_write",
+    "describe_address",
+    "dump_database",
+    "find_catalogue",
+    "has_catalogue",
+    "keep_address",
+    "locate_catalogue",
+    "make_sqlite_url",
+    "open_database",
+    "parse_address",
+    "parse_server_address",
+    "restore_database",
+]

@@ -1,0 +1,97 @@
+"""Connection to the database of a catalogue, with the migration of its tables to this version."""
+
+from collections.abc import Callable
+from typing import Any
+
+from alembic import command
+from alembic.config import Config
+from alembic.util import CommandError
+from sqlalchemy import URL, Engine, create_engine, event
+from sqlalchemy.engine import ExceptionContext
+from sqlalchemy.exc import (
+    DataError,
+    DBAPIError,
+    IntegrityError,
+    NotSupportedError,
+    ProgrammingError,
+    SQLAlchemyError,
+)
+
+from bench.catalogue.database import postgres
+from bench.catalogue.database.address import SQLITE, describe_address, parse_address
+from bench.catalogue.errors import CatalogueError, CatalogueUnavailableError
+
+_PRAGMAS = ("journal_mode=WAL", "synchronous=NORMAL", "foreign_keys=ON", "busy_timeout=5000")
+"""SQLite settings. With a write-ahead log readers never wait for a writer, and a kill loses no committed data."""
+_OWN_ERRORS = (IntegrityError, DataError, ProgrammingError, NotSupportedError)
+"""Errors of a statement, in contrast to those of the connection, the server or the disk."""
+
+
+def open_database(url: str) -> Engine:
+    """Connect to a database and run the migrations that it lacks.
+
+    Args:
+        url: address, such as ``sqlite:///runs/catalogue.db`` or ``postgresql://USER:PASSWORD@HOST/DATABASE``.
+
+    Raises:
+        CatalogueError: the database cannot be opened, is not a database, or was written by a later version.
+    """
+    address = parse_address(url)
+    shown = describe_address(address)
+    try:
+        engine = _create_engine(address)
+        try:
+            _migrate(engine)
+        except BaseException:
+            engine.dispose()  # otherwise connections and the lock of an SQLite file stay until garbage collection
+            raise
+    except CommandError as error:
+        raise CatalogueError(
+            f"the catalogue {shown} was written by a later version ({error}); use that version of mrbench"
+        ) from error
+    except ImportError as error:
+        raise CatalogueError(f"psycopg is missing ({error}); pip install 'mrbench[postgres]'") from error
+    except SQLAlchemyError as error:
+        cause = error.orig if isinstance(error, DBAPIError) else error
+        raise CatalogueError(f"the catalogue {shown} cannot be opened: {_get_first_line(cause)}") from error
+    event.listen(engine, "handle_error", lambda context: _raise_unavailable(context, shown))
+    return engine
+
+
+def _create_engine(address: URL) -> Engine:
+    if address.drivername != SQLITE:
+        return postgres.create_engine(address)
+    engine = create_engine(address)
+    event.listen(engine, "connect", _set_pragmas)
+    return engine
+
+
+def _set_pragmas(connection: Any, record: object) -> None:
+    execute: Callable[[str], object] = connection.execute
+    for pragma in _PRAGMAS:
+        execute(f"PRAGMA {pragma}")
+
+
+def _raise_unavailable(context: ExceptionContext, shown: str) -> None:
+    """Raise an error of ours in place of one of the connection, the server or the disk."""
+    error = context.sqlalchemy_exception
+    # A failed check of a pooled connection is followed by a new connection.
+    if context.is_pre_ping or not isinstance(error, DBAPIError) or isinstance(error, _OWN_ERRORS):
+        return
+    cause = _get_first_line(context.original_exception)
+    raise CatalogueUnavailableError(f"the catalogue {shown} cannot be used at present: {cause}; try again")
+
+
+def _get_first_line(error: BaseException | None) -> str:
+    lines = str(error).splitlines() or [type(error).__name__]
+    return lines[0]
+
+
+def _migrate(engine: Engine) -> None:
+    config = Config()
+    config.set_main_option("script_location", "bench.catalogue:migrations")
+    with engine.begin() as connection:
+        if engine.dialect.name != SQLITE:
+            postgres.wait_for_other_migrations(connection)
+        config.attributes["connection"] = connection
+        command.upgrade(config, "head")

@@ -117,10 +117,12 @@ def _draw_asymmetry(random: Random, size: DamperSize, duration: float) -> DrawnF
     width, step = _draw_log(random, 0.01, 0.15) * size.velocity, _draw_step(random)
 
     def scale(s: float) -> Function:
+        # A share above one would let the damper push in one direction.
+        yielding, viscous = (float(np.clip(s * share, -0.9, 0.9)) for share in (on_yield, on_viscous))
         return lambda x, v: (
-            1.0 + s * on_yield * step(v / width),
-            1.0 + s * on_viscous * step(v / width),
-            1.0 + s * on_viscous * step(v / width),
+            1.0 + yielding * step(v / width),
+            1.0 + viscous * step(v / width),
+            1.0 + viscous * step(v / width),
         )
 
     return DrawnForm("direction_asymmetry", "scaling", scale)

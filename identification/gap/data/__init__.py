@@ -8,6 +8,7 @@ from identification.gap.data.quality import (
     check_sliding_recorded,
     describe_unobservable_effects,
 )
+from identification.gap.data.repeated_residual import RepeatedResidual, estimate_repeated_residual
 from identification.gap.data.residual_map import Residual, compute_harmonics, estimate_drift, map_gap
 from identification.gap.data.shrinkage import NEAR_FLOOR_RATIO, Shrinkage
 
@@ -16,6 +17,7 @@ __all__ = [
     "Cycles",
     "EvaluationData",
     "Indices",
+    "RepeatedResidual",
     "Residual",
     "Shrinkage",
     "check_cycle_count",
@@ -25,6 +27,7 @@ __all__ = [
     "compute_residual_correlation_length",
     "describe_unobservable_effects",
     "estimate_drift",
+    "estimate_repeated_residual",
     "map_gap",
     "split_by_piece",
 ]

@@ -5,13 +5,13 @@ It starts with the noise floor of the recorded force. Propagated input noise is 
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import Piece, Problem
-from identification.gap.data import EvaluationData, split_by_piece
+from identification.gap.data import EvaluationData, estimate_repeated_residual, split_by_piece
 from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
@@ -66,6 +66,27 @@ class NoiseModel:
         size = math.sqrt(float(squares.mean()))
         # With missing effects the simulated loop may be far too steep. The smallest estimate is the safe one.
         self.input_noise = size if self.input_noise is None else min(size, self.input_noise)
+
+    def narrow_floor(self, candidate: Candidate, evaluation: EvaluationData) -> None:
+        """Take the floor from the residual of the law where a part of it repeats with the cycles.
+
+        That part is an error of the law and the rest is noise. Within the interval of the floor it would count as
+        noise, because slow noise leaves a wide interval.
+
+        Args:
+            candidate: the law without effects.
+            evaluation: the recordings, cut into cycles.
+        """
+        repeated = estimate_repeated_residual(candidate.residual, evaluation.cycles)
+        if repeated is None or repeated.lowest < (NO_GAP_RATIO**2 - 1.0) * self.noise**2:
+            return
+        values = candidate.residual.values[candidate.residual.valid]
+        known = repeated.square + (self.input_noise or 0.0) ** 2
+        rest = math.sqrt(max(float(np.mean(values**2)) - known, 0.0))
+        low, high = self.estimate.get_interval(self.noise)
+        if low <= rest <= high:
+            deviation = 0.5 * repeated.deviation / rest
+            self.estimate = replace(self.estimate, noise=rest, deviation=deviation)
 
     def estimate_noise(self, candidate: Candidate) -> float:
         """Return the noise of the recorded force [N], limited by the residual of a candidate fitted later."""

@@ -38,6 +38,7 @@ def search_forward(pool: CandidatePool) -> None:
     """Fit the sets of effects with the largest expected gains, on decimated data."""
     baseline = pool.fit_law()
     pool.noise_model.update(baseline, pool.full_problem, pool.evaluation)
+    pool.noise_model.narrow_floor(baseline, pool.evaluation)
     if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
         return
     beam = [baseline]

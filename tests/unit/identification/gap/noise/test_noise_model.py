@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.gap.data import RepeatedResidual
 from identification.gap.fits import Candidate
+from identification.gap.noise import noise_model
 from identification.gap.noise.noise_model import NoiseModel
 from identification.noise.noise_floor import NoiseFloorEstimate
 from tests.support.candidate_pools import NOISE, fit_baseline
@@ -76,3 +78,41 @@ def test_the_highest_floor_is_the_upper_end_of_the_interval_with_the_input_noise
     assert replace(known, input_noise=1.0).highest_floor == pytest.approx(np.hypot(3.196, 1.0))
     unknown = NoiseModel(NoiseFloorEstimate(2.0, None, 2.0, "high frequency"), ())
     assert unknown.highest_floor == 2.0
+
+
+@pytest.fixture
+def narrow(pool, monkeypatch):
+    """Narrow a floor [N] of a deviation [N] for a part [1] of the law's mean square that repeats."""
+
+    def narrow(noise, deviation, part, part_deviation=0.0):
+        square = float(np.mean(pool.baseline.residual.values[pool.baseline.residual.valid] ** 2))
+        repeated = RepeatedResidual(part * square, part_deviation * square)
+        monkeypatch.setattr(noise_model, "estimate_repeated_residual", lambda residual, cycles: repeated)
+        model = make_model(pool)
+        model.estimate = NoiseFloorEstimate(noise * square**0.5, None, NOISE, "", deviation * square**0.5)
+        model.narrow_floor(pool.baseline, pool.evaluation)
+        return model.noise / square**0.5, model.estimate.deviation / square**0.5
+
+    return narrow
+
+
+def test_a_residual_that_repeats_is_no_noise(narrow):
+    found, deviation = narrow(0.95, 0.1, 0.19, 0.01)
+    assert found == pytest.approx(0.9)
+    assert deviation == pytest.approx(0.5 * 0.01 / 0.9)
+
+
+def test_a_floor_that_excludes_the_rest_of_the_residual_stays(narrow):
+    assert narrow(0.5, 0.1, 0.19, 0.01) == (0.5, 0.1)
+
+
+def test_a_residual_that_repeats_by_chance_is_noise(narrow):
+    assert narrow(0.95, 0.1, 0.19, 0.05) == (0.95, 0.1)
+    assert narrow(0.95, 0.1, 0.01, 0.0) == (0.95, 0.1)
+
+
+def test_without_cycles_to_compare_the_floor_stays(pool):
+    model = make_model(pool)
+    before = model.estimate
+    model.narrow_floor(pool.baseline, pool.evaluation)
+    assert model.estimate is before

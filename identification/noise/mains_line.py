@@ -18,7 +18,7 @@ _HARMONICS = (1, 3)
 """Orders of the line's harmonics that the effect ``mains_hum`` has."""
 _PADDING_FACTOR = 8
 """Factor by which zero padding refines the spectrum."""
-_MIN_GAIN = 0.5
+_MIN_GAIN = 0.1
 """Smallest part of a line's power that the fits must leave [1]; elsewhere a line looks like the damper."""
 _MIN_BINS = 20
 """Smallest number of frequency bins in the range; with fewer, a short oscillation looks like a line."""
@@ -75,10 +75,14 @@ def _find_frequency(fits: Sequence[WindowFit], remainders: Sequence[Array], rate
     # The median of an exponential variable is 0.69 of its mean.
     if explained[strongest] < _MIN_POWER_RATIO * float(np.median(explained[visible])) / np.log(2.0):
         return None
-    resolution = rate / len(series)
-    grid = frequency[strongest] + resolution * np.linspace(-1.0, 1.0, 2 * _PADDING_FACTOR + 1)
-    grid = grid[_measure_gain(fits, grid, rate) > _MIN_GAIN]
-    return float(grid[np.argmax([_measure_explained(fits, remainders, f / rate) for f in grid])])
+    # The fit of a window removes a line near a harmonic of the stroke, and leaves what leaks beside it.
+    leakage, resolution = rate / min(len(fit.window.force) for fit in fits), rate / len(series)
+    centre = float(frequency[strongest])
+    for reach, step in ((leakage, 0.5 * resolution), (resolution, resolution / _PADDING_FACTOR)):
+        grid = centre + np.arange(-reach, reach, step)
+        grid = np.append(grid[_measure_gain(fits, grid, rate) > _MIN_GAIN], centre)
+        centre = float(grid[np.argmax([_measure_explained(fits, remainders, f / rate) for f in grid])])
+    return centre
 
 
 def _measure_explained(fits: Sequence[WindowFit], remainders: Sequence[Array], step: float) -> float:

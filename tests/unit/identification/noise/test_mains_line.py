@@ -33,6 +33,15 @@ def test_a_line_with_one_phase_is_found_and_removed(frequency):
     assert np.std(np.concatenate(found.remainders)) < 1.02
 
 
+@pytest.mark.parametrize("frequency", [50.1, 50.2, 50.25, 60.15])
+def test_a_line_beside_a_harmonic_of_the_stroke_is_found_at_its_own_frequency(frequency):
+    """The fits remove most of such a line, and leave more beside it than at its frequency."""
+    found = find(lambda t: 15.0 * np.sin(2.0 * np.pi * frequency * t + 0.4))
+    assert found.frequency == pytest.approx(frequency, abs=0.01)
+    assert found.deviation == pytest.approx(15.0 * 0.5**0.5, rel=0.1)
+    assert np.std(np.concatenate(found.remainders)) < 1.05
+
+
 def test_the_third_harmonic_is_removed_with_it():
     found = find(lambda t: np.sin(2.0 * np.pi * 50.8 * t) + 1.5 * np.cos(6.0 * np.pi * 50.8 * t))
     assert np.std(np.concatenate(found.remainders)) < 1.02

@@ -143,9 +143,12 @@ def _make_prediction(
     errors, forces = log.errors, log.forces
     error, force = np.concatenate(errors), np.concatenate(forces)
     physics = np.concatenate(log.physics_errors)
-    floor = _limit_floor(log.dataset.floor.noise, compute_rmse(error), compute_rmse(physics))
+    rmse, physics_rmse = compute_rmse(error), compute_rmse(physics)
+    # Where late setpoints disturb every cycle, force that differs with the motion counts as noise. No model
+    # predicts noise, so the error of a simulation of the recorded motion is an upper bound.
+    floor = min(log.dataset.floor.noise, rmse, physics_rmse)
     return Prediction(
-        rmse_n=compute_rmse(error),
+        rmse_n=rmse,
         nrmse=compute_nrmse(error, force),
         bias_n=float(error.mean()),
         noise_floor_n=floor,
@@ -153,10 +156,8 @@ def _make_prediction(
         samples=len(error),
         freed=["y0 of each stretch"] + (["force offset of each stretch"] if free_offset else []),
         before_n=before,
-        shrinkage=None if before is None else _compute_shrinkage(before, compute_rmse(physics), floor),
-        physics=ForceError(rmse_n=compute_rmse(physics), nrmse=compute_nrmse(physics, force))
-        if log.residuals
-        else None,
+        shrinkage=None if before is None else _compute_shrinkage(before, physics_rmse, floor),
+        physics=ForceError(rmse_n=physics_rmse, nrmse=compute_nrmse(physics, force)) if log.residuals else None,
         band=band,
         provenance=provenance,
     )
@@ -216,16 +217,6 @@ def _compute_baseline_error(model: DamperModel, dataset: Dataset, free_offset: b
     baseline = make_damper_model(model.baseline)
     log = _LogPrediction(dataset, [baseline.predict(p, free_offset=free_offset) for p in dataset.pieces])
     return compute_rmse(np.concatenate(log.errors))
-
-
-def _limit_floor(floor: float, *errors: float) -> float:
-    """Return the noise floor [N], at most the errors of models on the same samples [N].
-
-    A disturbed rod does not repeat its motion. The force that differs with it counts as noise where no cycle is
-    undisturbed, but a simulation of the recorded motion predicts it. No model predicts noise, so its error is an
-    upper bound of the floor.
-    """
-    return min(floor, *errors)
 
 
 def _compute_shrinkage(before: float, after: float, floor: float) -> float | None:

@@ -9,8 +9,8 @@ turn:
 2. A periodic stroke repeats. Its harmonics are fitted over all segments through which it continues (harmonics.py).
 3. The remainder is smoothed with twicing (smoother.py), towards the third differences of parts 1 and 2. The cutoff
    of each region minimises the estimated error of the *velocity* (cutoff.py). Regions are periodic segments, the
-   parts between them, and their transitions (motion_regions.py). A common cutoff for fades, moves and holds would
-   distort the fades by micrometres, and with them k0 and k1.
+   motion between them, and transitions (motion_regions.py). Rests have the lowest cutoff. A common cutoff for
+   fades, moves and holds would distort the fades by micrometres, and with them k0 and k1.
 """
 
 from functools import partial

@@ -1,4 +1,4 @@
-"""Division of a stretch into regions of like motion: repeating strokes, transitions, remainders, disturbances.
+"""Division of a stretch into regions: repeating strokes, transitions, other motion, rests, disturbances.
 
 A disturbance is a short departure of the rod from the wave that it repeats: a late setpoint, or a shock. It is
 smoothed as a region of its own, because its fast motion would let noise into the whole segment. Far off the wave,
@@ -19,7 +19,7 @@ from identification.signals.harmonics import Harmonics
 Indices = npt.NDArray[np.intp]
 
 _REST_WINDOW = 0.1
-"""Time [s] in which a rod at rest shows nothing but noise."""
+"""Time [s] over which the displacement must vary by noise alone for the rod to count as at rest."""
 REST_CUTOFF = 0.5 / _REST_WINDOW
 """Frequency [Hz] above which a motion would show in that window."""
 _SHORT_MOTION = 4.0 * _REST_WINDOW

@@ -30,7 +30,7 @@ class RepeatedResidual(NamedTuple):
 
     @property
     def lowest(self) -> float:
-        """Mean square that noise alone hardly ever exceeds [N²]."""
+        """Lower bound of the mean square that is an error of the model [N²]; negative where noise explains all."""
         return self.square - _CERTAIN * self.deviation
 
 
@@ -39,9 +39,8 @@ def estimate_repeated_residual(residual: Residual, cycles: Cycles) -> RepeatedRe
 
     Cycles next to each other share slow noise, so only others are compared, each without its mean and slope.
     """
-    tables = [
-        t for number in range(len(cycles.conditions)) if (t := _make_table(residual, cycles, number)) is not None
-    ]
+    segments = range(len(cycles.conditions))
+    tables = [table for k in segments if (table := _make_table(residual, cycles, k)) is not None]
     if not tables:
         return None
     weights = np.array([len(table) for table in tables], float)

@@ -23,7 +23,7 @@ from bench.catalogue.planning import (
     MethodStore,
     SpecimenStore,
 )
-from bench.catalogue.records import EventJournal, Notebook, SignatureStore
+from bench.catalogue.records import EventJournal, LogCopies, Notebook, SignatureStore
 from bench.catalogue.run_filter import RunFilter
 from bench.methods import list_shipped_methods, load_method
 
@@ -48,6 +48,7 @@ class Catalogue:
         self.users, self.tokens, self.sessions = UserStore(engine), TokenStore(engine), SessionStore(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
         self.signatures = SignatureStore(engine)
+        self.log_copies = LogCopies(engine)
         self.change_counter = ChangeCounter(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.

@@ -21,6 +21,7 @@ from bench.catalogue import Catalogue, JobRow, RunRow, locate_catalogue, open_da
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
 from bench.live import LiveBatch, LiveBroadcaster, serialise_message
+from bench.log_store import LogCopier
 from bench.oidc import OidcConfig, Provider
 from bench.samples import SampleStore
 from bench.service import problems
@@ -81,6 +82,8 @@ class AppSettings:
     """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
     oidc: OidcConfig | None = None
     """Provider by which persons sign in; None for local users and tokens only."""
+    log_store: str | None = None
+    """URL of the store to which logs are copied; None without one."""
 
 
 def create_app(settings: AppSettings | None = None) -> FastAPI:
@@ -147,6 +150,8 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         stack.enter_context(context.audit)
         stack.enter_context(NotificationSender(context.campaigns.store))
         stack.enter_context(context.campaigns)
+        if context.log_copier is not None:
+            stack.enter_context(context.log_copier)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.live.publish_clock()))
         yield
@@ -196,6 +201,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         campaigns,
         audit,
         provider=None if settings.oidc is None else Provider(settings.oidc),
+        log_copier=None if settings.log_store is None else LogCopier(catalogue, settings.log_store),
     )
     return context
 

@@ -15,6 +15,7 @@ from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.live import LiveBroadcaster
+from bench.log_store import LogCopier
 from bench.oidc import Provider
 from bench.people import AttemptCounter, SignInCodes
 from bench.samples import SampleStore
@@ -68,6 +69,8 @@ class ServiceContext:
     """Codes for another device; the owner is kind and subject of a session."""
     provider: Provider | None = None
     """Provider by which persons sign in; None without one."""
+    log_copier: LogCopier | None = None
+    """Copies the logs to a store; None without one."""
 
     @property
     def data(self) -> Path:

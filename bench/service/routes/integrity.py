@@ -33,4 +33,6 @@ def _make_view(row: RunRow) -> Integrity:
         recorded_sha256=row.log_sha256,
         found_sha256=row.log_sha256 if row.integrity == "intact" else row.found_sha256,
         checked=row.checked,
+        copy_url=row.copy_url,
+        copied=row.copied,
     )

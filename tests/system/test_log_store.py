@@ -1,0 +1,90 @@
+"""Service as a process with its logs on an S3-compatible server, which goes away while runs are recorded."""
+
+import hashlib
+import json
+import subprocess
+
+import pytest
+
+from tests.support.object_server import BUCKET, SECRETS, ObjectServer
+from tests.support.quick_jobs import COMMAND
+from tests.system.test_service import MRBENCH, TINY, ServiceProcess, wait_until_false
+
+STORE = f"s3://{BUCKET}/bench-1"
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory):
+    server = ObjectServer(tmp_path_factory.mktemp("objects"))
+    yield server
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory, server):
+    data = tmp_path_factory.mktemp("bench") / "runs"
+    data.mkdir()
+    (data.parent / "tiny.json").write_text(json.dumps(TINY))
+    service = ServiceProcess(data, command=COMMAND, options=("--log-store", STORE), environment=server.environment)
+    service.data = data
+    yield service
+    service.end()
+
+
+def record(service, seed):
+    """Record a run to the data folder, and return its log as soon as it is catalogued."""
+    log = service.data / f"run-{seed}.mcap"
+    words = [*MRBENCH, "run", str(service.data.parent / "tiny.json"), "--scenario", "default"]
+    subprocess.run([*words, "--seed", str(seed), "--out", str(log)], check=True, capture_output=True, timeout=120)
+    wait_until_false(lambda: find(service, log) is None, "the run was not catalogued")
+    return log
+
+
+def find(service, log):
+    """Return the id of the run with a log, or None."""
+    return next((run["id"] for run in service.call("runs")["items"] if run["log"] == log.name), None)
+
+
+def wait_for_copy(service, server, log):
+    """Wait for the copy of a log, and compare it with the log."""
+    path = f"runs/{find(service, log)}/integrity"
+    wait_until_false(lambda: service.call(path)["copied"] is None, f"{log.name} was not copied")
+    view = service.call(path)
+    content = server.read(view["copy_url"].removeprefix(f"s3://{BUCKET}/"))
+    assert hashlib.sha256(content).hexdigest() == view["recorded_sha256"]
+    assert content == log.read_bytes()
+
+
+def wait_for_health(service, words):
+    wait_until_false(lambda: words not in service.call("health")["log_store"], f"health never said {words}")
+
+
+def test_a_recorded_run_arrives_in_the_store(service, server):
+    log = record(service, 1)
+    wait_for_copy(service, server, log)
+    (name,) = server.list_objects()
+    assert name.startswith("bench-1/run-1.")
+    wait_for_health(service, "ok")
+
+
+@pytest.mark.parametrize("outage", ["stopped", "silent"])
+def test_a_run_that_is_recorded_while_the_store_is_away_arrives_when_it_is_back(service, server, outage):
+    seed = ["stopped", "silent"].index(outage) + 2
+    server.stop() if outage == "stopped" else server.pause()
+    log = record(service, seed)
+    wait_for_health(service, "1 log waits for a copy")
+    assert service.call(f"runs/{find(service, log)}/integrity")["copied"] is None
+    if outage == "stopped":
+        wait_for_health(service, "the log store cannot be reached")
+        server.start()
+    else:
+        server.resume()
+    wait_for_copy(service, server, log)
+    wait_for_health(service, "ok")
+
+
+def test_neither_secrets_nor_the_endpoint_are_shown(service, server):
+    text = service.log.read_text()
+    assert "log_store_failed" in text
+    assert "log_store_works_again" in text
+    assert not [word for word in (*SECRETS.values(), f":{server.port}") if word in text]

@@ -1,14 +1,15 @@
 """Service as a process with its logs on an S3-compatible server, which goes away while runs are recorded."""
 
 import hashlib
-import json
-import subprocess
 
+import numpy as np
 import pytest
 
+from bench.log.header import RunHeader
+from bench.log.writer import LogWriter
 from tests.support.object_server import BUCKET, SECRETS, ObjectServer
 from tests.support.quick_jobs import COMMAND
-from tests.system.test_service import MRBENCH, TINY, ServiceProcess, wait_until_false
+from tests.system.test_service import ServiceProcess, wait_until_false
 
 STORE = f"s3://{BUCKET}/bench-1"
 
@@ -24,18 +25,26 @@ def server(tmp_path_factory):
 def service(tmp_path_factory, server):
     data = tmp_path_factory.mktemp("bench") / "runs"
     data.mkdir()
-    (data.parent / "tiny.json").write_text(json.dumps(TINY))
     service = ServiceProcess(data, command=COMMAND, options=("--log-store", STORE), environment=server.environment)
     service.data = data
     yield service
     service.end()
 
 
-def record(service, seed):
-    """Record a run to the data folder, and return its log as soon as it is catalogued."""
-    log = service.data / f"run-{seed}.mcap"
-    words = [*MRBENCH, "run", str(service.data.parent / "tiny.json"), "--scenario", "default"]
-    subprocess.run([*words, "--seed", str(seed), "--out", str(log)], check=True, capture_output=True, timeout=120)
+def record(service, name, during=lambda: None):
+    """Record a run to the data folder, act in its middle, and return its log as soon as it is catalogued."""
+    log = service.data / f"{name}.mcap"
+    time = np.arange(1000) / 500.0
+    columns = {"displacement": 0.01 * np.sin(time), "velocity": 0.01 * np.cos(time), "force": 50 * np.cos(time)}
+    header = RunHeader(id=name, source="run", specimen="1", method="quick", drive_kind="coil_v", drive_unit="V")
+    with LogWriter(log, header) as writer:
+        for half in (slice(0, 500), slice(500, 1000)):
+            samples = {key: column[half] for key, column in columns.items()}
+            samples["coil_drive"] = np.full(500, 0.2)
+            writer.write_samples(np.round(time[half] * 1e9).astype(np.int64), samples)
+            if half.start == 0:
+                during()
+        writer.close("clean", "", "completed")
     wait_until_false(lambda: find(service, log) is None, "the run was not catalogued")
     return log
 
@@ -60,7 +69,7 @@ def wait_for_health(service, words):
 
 
 def test_a_recorded_run_arrives_in_the_store(service, server):
-    log = record(service, 1)
+    log = record(service, "run-1")
     wait_for_copy(service, server, log)
     (name,) = server.list_objects()
     assert name.startswith("bench-1/run-1.")
@@ -69,9 +78,7 @@ def test_a_recorded_run_arrives_in_the_store(service, server):
 
 @pytest.mark.parametrize("outage", ["stopped", "silent"])
 def test_a_run_that_is_recorded_while_the_store_is_away_arrives_when_it_is_back(service, server, outage):
-    seed = ["stopped", "silent"].index(outage) + 2
-    server.stop() if outage == "stopped" else server.pause()
-    log = record(service, seed)
+    log = record(service, f"run-{outage}", server.stop if outage == "stopped" else server.pause)
     wait_for_health(service, "1 log waits for a copy")
     assert service.call(f"runs/{find(service, log)}/integrity")["copied"] is None
     if outage == "stopped":

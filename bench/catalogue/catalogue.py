@@ -143,9 +143,11 @@ class Catalogue:
             return session.scalars(query).all()
 
     def list_present_logs(self) -> Sequence[tuple[str, str]]:
-        """Return id and log name of the runs with a stored hash whose log is not known to be missing."""
+        """Return id and log name of the runs with a stored hash whose log is expected here."""
         is_missing = func.coalesce(RunRow.integrity, "intact") == "missing"
-        query = select(RunRow.id, RunRow.log).where(RunRow.log_sha256.is_not(None), ~is_missing)
+        query = select(RunRow.id, RunRow.log).where(
+            RunRow.log_sha256.is_not(None), ~is_missing, RunRow.removed.is_(None)
+        )
         with self._sessions() as session:
             return [(run_id, log) for run_id, log in session.execute(query)]
 

@@ -76,6 +76,15 @@ def serve(
             "file:///FOLDER; the data folder keeps the address.",
         ),
     ] = None,
+    keep_local: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DAYS",
+            min=0,
+            help="Remove logs from --data when their verified copy in the log store is so old; they are fetched "
+            "when needed. By default none is removed.",
+        ),
+    ] = None,
     oidc: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="oidc.toml of the provider (OpenID Connect) by which persons sign in."),
@@ -106,6 +115,7 @@ def serve(
         tls=None if tls_cert is None or tls_key is None else TlsFiles(tls_cert, tls_key),
         catalogue=catalogue,
         log_store=log_store,
+        keep_local=keep_local,
         oidc=oidc,
         is_terminal=sys.stdout.isatty(),
     )

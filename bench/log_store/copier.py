@@ -43,10 +43,18 @@ class LogCopier:
     Args:
         catalogue: the catalogue of the data folder.
         store: address of the store.
+        remove_old: removes logs whose copy is old enough; called after each look.
         clock: time [s].
     """
 
-    def __init__(self, catalogue: Catalogue, store: str, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        catalogue: Catalogue,
+        store: str,
+        remove_old: Callable[[], None] = lambda: None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._remove_old = remove_old
         self._catalogue, self._store, self._clock = catalogue, store, clock
         self._outage, self._store_wait = "", GrowingWait()
         self._run_waits: dict[str, GrowingWait] = {}
@@ -71,6 +79,7 @@ class LogCopier:
         while not self._stopping.is_set():
             try:
                 self.copy_due()
+                self._remove_old()
             except Exception as error:  # the thread must not end, or later logs would not be copied
                 self._failures.note(error)
             self._stopping.wait(PERIOD)

@@ -81,6 +81,8 @@ class ServeOptions:
     """URL of the catalogue's database, which the data folder keeps; by default that of its last start."""
     log_store: str | None = None
     """URL of the store for copies of the logs, which the data folder keeps; by default that of its last start."""
+    keep_local: float | None = None
+    """Days after which a copied log is removed from this machine; None for never."""
     oidc: Path | None = None
     """``oidc.toml`` of the provider by which persons sign in."""
     is_terminal: bool = False
@@ -128,6 +130,7 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
                 hosts=LOOPBACK_NAMES if loopback else ("*",),
                 oidc=oidc,
                 log_store=find_store(data),
+                keep_local=options.keep_local,
             )
         )
         host, port = listener.getsockname()[:2]

@@ -128,6 +128,9 @@ class Integrity(View):
     checked: datetime | None = Field(description="UTC of the latest comparison")
     copy_url: str | None = Field(description="address of the verified copy in the log store; null without one")
     copied: datetime | None = Field(description="UTC at which the copy was verified")
+    removed: datetime | None = Field(
+        description="UTC at which the log was removed from this machine; null while it is here"
+    )
 
 
 class RunPage(View):

@@ -31,12 +31,12 @@ def service(tmp_path_factory, server):
     service.end()
 
 
-def record(service, name, during=lambda: None):
+def record(service, name, source, during=lambda: None):
     """Record a run to the data folder, act in its middle, and return its log as soon as it is catalogued."""
     log = service.data / f"{name}.mcap"
     time = np.arange(1000) / 500.0
     columns = {"displacement": 0.01 * np.sin(time), "velocity": 0.01 * np.cos(time), "force": 50 * np.cos(time)}
-    header = RunHeader(id=name, source="run", specimen="1", method="quick", drive_kind="coil_v", drive_unit="V")
+    header = RunHeader(id=name, source=source, specimen="1", method="quick", drive_kind="coil_v", drive_unit="V")
     with LogWriter(log, header) as writer:
         for half in (slice(0, 500), slice(500, 1000)):
             samples = {key: column[half] for key, column in columns.items()}
@@ -69,7 +69,7 @@ def wait_for_health(service, words):
 
 
 def test_a_recorded_run_arrives_in_the_store(service, server):
-    log = record(service, "run-1")
+    log = record(service, "run-1", "run")
     wait_for_copy(service, server, log)
     (name,) = server.list_objects()
     assert name.startswith("bench-1/run-1.")
@@ -78,7 +78,7 @@ def test_a_recorded_run_arrives_in_the_store(service, server):
 
 @pytest.mark.parametrize("outage", ["stopped", "silent"])
 def test_a_run_that_is_recorded_while_the_store_is_away_arrives_when_it_is_back(service, server, outage):
-    log = record(service, f"run-{outage}", server.stop if outage == "stopped" else server.pause)
+    log = record(service, f"run-{outage}", "import", server.stop if outage == "stopped" else server.pause)
     wait_for_health(service, "1 log waits for a copy")
     assert service.call(f"runs/{find(service, log)}/integrity")["copied"] is None
     if outage == "stopped":

@@ -23,7 +23,7 @@ def clock():
 
 @pytest.fixture
 def copier(catalogue, store, clock):
-    return LogCopier(catalogue, store, clock)
+    return LogCopier(catalogue, store, clock=clock)
 
 
 def damage(url):

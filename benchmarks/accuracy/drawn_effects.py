@@ -158,6 +158,7 @@ def measure_size(force: Array, stroke: Excitation) -> DamperSize:
         0.5 * float(np.ptp(stroke.displacement)),
         float(np.abs(stroke.velocity).max()),
         float(np.abs(stroke.drive).max()),
+        len(force) / stroke.rate,
     )
 
 

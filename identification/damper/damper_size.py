@@ -2,7 +2,8 @@
 
 The library states its bounds, scales and starts for a laboratory damper. For a damper of another size they follow
 the dimension of the unit: a force grows with the damper's force, a time derivative with its velocity over its
-length. A pure time belongs to electronics, heat or flow, not to the size, and keeps its value.
+length. A time of electronics or flow does not belong to the size, and keeps its value. A time of a slow change,
+such as a drift, follows the time over which the recording shows it.
 """
 
 import re
@@ -13,7 +14,7 @@ from identification.damper.parameters import Quantity
 
 
 class DamperSize(NamedTuple):
-    """Magnitudes of force, motion and drive of one damper."""
+    """Magnitudes of force, motion and drive of one damper, and of the time over which it is observed."""
 
     force: float
     """[N]"""
@@ -23,25 +24,30 @@ class DamperSize(NamedTuple):
     """Peak speed [m/s]."""
     drive: float
     """Highest drive [V or A]."""
+    observation_time: float
+    """Time over which slow changes are observed [s]."""
 
 
-LIBRARY_SIZE = DamperSize(500.0, 0.015, 0.15, 1.0)
+LIBRARY_SIZE = DamperSize(500.0, 0.015, 0.15, 1.0, 100.0)
 """Size for which the library of effects states its values."""
-SMALLEST_SIZE = DamperSize(5.0, 5e-4, 1e-3, 1e-2)
+SMALLEST_SIZE = DamperSize(5.0, 5e-4, 1e-3, 1e-2, 1.0)
 """Smallest admitted size."""
-LARGEST_SIZE = DamperSize(5e5, 1.0, 10.0, 100.0)
+LARGEST_SIZE = DamperSize(5e5, 1.0, 10.0, 100.0, 1e5)
 """Largest admitted size."""
 _DIMENSIONS = {
-    # Exponents of newton, metre, second and drive.
-    "1": (0, 0, 0, 0),
-    "N": (1, 0, 0, 0),
-    "m": (0, 1, 0, 0),
-    "s": (0, 0, 1, 0),
-    "{drive}": (0, 0, 0, 1),
-    "Hz": (0, 0, -1, 0),
-    "J": (1, 1, 0, 0),
-    "kg": (1, -1, 2, 0),
+    # Exponents of newton, metre, second, drive and observation.
+    "1": (0, 0, 0, 0, 0),
+    "N": (1, 0, 0, 0, 0),
+    "m": (0, 1, 0, 0, 0),
+    "s": (0, 0, 1, 0, 0),
+    "{drive}": (0, 0, 0, 1, 0),
+    "{observation}": (0, 0, 0, 0, 1),
+    "Hz": (0, 0, -1, 0, 0),
+    "J": (1, 1, 0, 0, 0),
+    "kg": (1, -1, 2, 0, 0),
 }
+SLOW_TIME = "{observation}"
+"""Scaling of a quantity in seconds that belongs to a slow change."""
 
 
 def compute_scale_factor(unit: str, size: DamperSize) -> float:
@@ -50,11 +56,12 @@ def compute_scale_factor(unit: str, size: DamperSize) -> float:
     Raises:
         KeyError: the unit contains a symbol without a dimension.
     """
-    force, length, time, drive = _parse_dimension(unit)
+    force, length, time, drive, observation = _parse_dimension(unit)
     # Only with a length or a force does a time follow the motion.
     time = time if force or length else 0
     ratio = DamperSize(*(a / b for a, b in zip(size, LIBRARY_SIZE, strict=True)))
-    return float(ratio.force**force * ratio.length ** (length + time) * ratio.velocity**-time * ratio.drive**drive)
+    motion = ratio.force**force * ratio.length ** (length + time) * ratio.velocity**-time
+    return float(motion * ratio.drive**drive * ratio.observation_time**observation)
 
 
 def scale_quantity(quantity: Quantity, size: DamperSize) -> Quantity:
@@ -71,16 +78,16 @@ def widen_bounds(quantity: Quantity) -> Quantity:
 
 
 def _list_extreme_sizes() -> list[DamperSize]:
-    """Return all combinations of smallest and largest force, length, velocity and drive."""
+    """Return all combinations of smallest and largest magnitudes."""
     return [DamperSize(*values) for values in product(*zip(SMALLEST_SIZE, LARGEST_SIZE, strict=True))]
 
 
-def _parse_dimension(unit: str) -> tuple[int, int, int, int]:
-    """Return the exponents of newton, metre, second and drive of a unit such as ``N s^2/m^2``."""
+def _parse_dimension(unit: str) -> tuple[int, ...]:
+    """Return the exponents of newton, metre, second, drive and observation of a unit such as ``N s^2/m^2``."""
     numerator, _, denominator = unit.partition("/")
-    total = [0, 0, 0, 0]
+    total = [0] * len(DamperSize._fields)
     for part, sign in ((numerator, 1), (denominator, -1)):
         for symbol, power in re.findall(r"([^\s()^]+)(?:\^(\d+))?", part):
             for i, exponent in enumerate(_DIMENSIONS[symbol]):
                 total[i] += sign * exponent * int(power or 1)
-    return total[0], total[1], total[2], total[3]
+    return tuple(total)

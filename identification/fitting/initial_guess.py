@@ -4,7 +4,8 @@ Away from reversals the hysteretic variable is saturated and the inner displacem
 linear: (F_a + F_b u) sgn v + (c0_a + c0_b u) v + (k0 + k1) x - f0. One regression gives these coefficients.
 
 In a damper that hardly yields, most of that viscous force is due to c1, and the regression fails. The second start
-distributes the same peak force accordingly.
+distributes the same peak force accordingly. A damper may also slide at the lowest drive and hardly yield at the
+highest one, which is the third start.
 """
 
 from collections.abc import Sequence
@@ -30,11 +31,11 @@ _DRIVE_CHANGE = 0.1
 _MAX_ROWS, _MIN_ROWS = 20_000, 60
 """Largest number of samples in the regression, and smallest number of settled ones."""
 _YIELD_DISPLACEMENT, _LOW_SLIP_YIELD_DISPLACEMENT = 0.008, 0.02
-"""Yield displacement of the two starts, in units of the length."""
+"""Yield displacement of a damper that slides and of one that hardly yields, in units of the length."""
 START_RHO, START_N, START_FIELD_RATE = 0.5, 1.7, 20.0
 """Starting values of rho [1], n [1] and eta [units of the rate], on which no regression depends."""
 _DASHPOT_RATIO, _LOW_SLIP_DASHPOT_RATIO = 12.0, 6.0
-"""Ratio of c1 to c0 in the two starts. Origin: order of magnitude in published dampers."""
+"""Ratio of c1 to c0 in both. Origin: order of magnitude in published dampers."""
 _LOW_SLIP_YIELD, _LOW_SLIP_VISCOUS = 0.8, 0.2
 """Yield force, and force of c0 at the peak velocity, over the peak force of a low-slip damper."""
 _LEAST_SHARE = 0.02
@@ -44,12 +45,10 @@ ACCUMULATOR_SHARE = 0.3
 
 
 def make_starting_points(problem: Problem) -> list[Array]:
-    """Return the starting points (U,): that of the regression, and that of a damper that hardly yields."""
+    """Return the starting points (U,): a damper that slides, one that hardly yields, and one that does both."""
     coefficients = _regress_force(problem.pieces, problem.space.scales)
-    return [
-        problem.make_start(make_start(coefficients, problem.space))
-        for make_start in (_make_sliding_start, _make_low_slip_start)
-    ]
+    starts = _make_sliding_start, _make_low_slip_start, _make_mixed_start
+    return [problem.make_start(make_start(coefficients, problem.space)) for make_start in starts]
 
 
 def draw_random_start(problem: Problem, unknowns: Array, factor: float, seed: int) -> Array:
@@ -74,27 +73,36 @@ def estimate_least_damping(pieces: Sequence[Piece], scales: RecordingScales) -> 
 
 
 def _make_sliding_start(coefficients: Array, space: SearchSpace) -> Coordinates:
+    yields, c0 = _distribute_sliding(coefficients, space)
+    return _make_coordinates(coefficients, space, _YIELD_DISPLACEMENT, yields, c0, _DASHPOT_RATIO)
+
+
+def _make_mixed_start(coefficients: Array, space: SearchSpace) -> Coordinates:
+    """Return a start that slides at the lowest drive and hardly yields at the highest."""
+    sliding, low_slip = _distribute_sliding(coefficients, space), _distribute_low_slip(coefficients, space)
+    yields, c0 = (np.array([s[0], h[1]]) for s, h in zip(sliding, low_slip, strict=True))
+    return _make_coordinates(coefficients, space, _YIELD_DISPLACEMENT, yields, c0, _LOW_SLIP_DASHPOT_RATIO)
+
+
+def _distribute_sliding(coefficients: Array, space: SearchSpace) -> tuple[Array, Array]:
+    """Return the regression's yield forces [N] and c0 [N s/m] at lowest and highest drive, (2,) each."""
     F_a, F_b, c0_a, c0_b, _, _ = coefficients
-    velocity = space.scales.velocity
     drives = np.array([space.lowest_drive, space.highest_drive])
-    peaks = _LEAST_SHARE * _compute_peak_forces(coefficients, space)
-    return _make_coordinates(
-        coefficients, space, _YIELD_DISPLACEMENT,
-        np.maximum(F_a + F_b * drives, peaks), np.maximum(c0_a + c0_b * drives, peaks / velocity), _DASHPOT_RATIO,
-    )  # fmt: skip
+    least = _LEAST_SHARE * _compute_peak_forces(coefficients, space)
+    return np.maximum(F_a + F_b * drives, least), np.maximum(c0_a + c0_b * drives, least / space.scales.velocity)
+
+
+def _distribute_low_slip(coefficients: Array, space: SearchSpace) -> tuple[Array, Array]:
+    """Return the yield forces [N] and c0 [N s/m] of a damper that hardly yields with the same peak forces."""
+    peaks = _compute_peak_forces(coefficients, space)
+    return _LOW_SLIP_YIELD * peaks, _LOW_SLIP_VISCOUS * peaks / space.scales.velocity
 
 
 def _make_low_slip_start(coefficients: Array, space: SearchSpace) -> Coordinates:
     """Return a start with the same peak forces in which the dashpot c1 carries most of the motion."""
-    peaks = _compute_peak_forces(coefficients, space)
-    viscous = _LOW_SLIP_VISCOUS * peaks / space.scales.velocity
+    yields, c0 = _distribute_low_slip(coefficients, space)
     return _make_coordinates(
-        coefficients,
-        space,
-        _LOW_SLIP_YIELD_DISPLACEMENT,
-        _LOW_SLIP_YIELD * peaks,
-        viscous,
-        _LOW_SLIP_DASHPOT_RATIO,
+        coefficients, space, _LOW_SLIP_YIELD_DISPLACEMENT, yields, c0, _LOW_SLIP_DASHPOT_RATIO
     )
 
 

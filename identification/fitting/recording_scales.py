@@ -14,6 +14,10 @@ from identification.fitting.piece import Piece
 
 _PEAK_QUANTILE = 0.995
 """Quantile of the speed that counts as its peak [1]: differentiated noise has larger values."""
+_SLOW_ANGLE = 1000.0
+"""Smallest time over which slow changes are observed, over half stroke divided by peak speed [1].
+
+A change that is faster than this many strokes could not be told from the strokes."""
 _SMALLEST = 1e-12
 """Lower limit of a scale, in its unit: a recording at rest has none, and nothing may be divided by zero."""
 
@@ -32,11 +36,14 @@ class RecordingScales:
     """Highest drive [V or A]; one where the drive is always zero."""
     sampling_rate: float
     """Highest sampling rate [Hz]."""
+    duration: float
+    """Length of the longest stretch [s]."""
 
     @property
     def damper_size(self) -> DamperSize:
         """Size of the damper, by which the ranges of effects are scaled."""
-        return DamperSize(self.force, self.length, self.velocity, self.drive)
+        observation = max(self.duration, _SLOW_ANGLE / self.rate)
+        return DamperSize(self.force, self.length, self.velocity, self.drive, observation)
 
     @property
     def rate(self) -> float:
@@ -66,4 +73,5 @@ def measure_scales(pieces: Sequence[Piece]) -> RecordingScales:
         velocity=max(float(np.quantile(speed, _PEAK_QUANTILE)), _SMALLEST),
         drive=float(max(np.abs(p.excitation.drive[used]).max() for p, used in fitted)) or 1.0,
         sampling_rate=max(p.excitation.rate for p in pieces),
+        duration=max(len(p.force) / p.excitation.rate for p, _ in fitted),
     )

@@ -23,6 +23,7 @@ from identification.noise.spectrum import (
     fit_low_frequency_spectrum,
     make_spectrum,
 )
+from identification.noise.time_scales import ScaleVariance, average_scales
 from identification.noise.window_fit import CycleFit, WindowFit
 from identification.signals import Motion
 from identification.threads import use_one_thread
@@ -55,6 +56,10 @@ class NoiseFloorEstimate:
     """Estimate on which ``noise`` rests, and the reason, as text for a person."""
     deviation: float | None = None
     """Standard deviation of ``noise`` [N]; None if no cycles repeat."""
+    scales: tuple[ScaleVariance, ...] = ()
+    """Variance of the noise by time scale; empty if no cycles repeat, or if sampling rates differ."""
+    pink_variance: float = 0.0
+    """Variance of slow noise in each factor e of the frequency [N²]."""
 
     @property
     def is_known(self) -> bool:
@@ -67,6 +72,16 @@ class NoiseFloorEstimate:
         if self.cycle_to_cycle is None:
             return 0.0
         return max(1.0 - (self.high_frequency / max(self.noise, 1e-300)) ** 2, 0.0)
+
+    def compute_chance(self, samples: int) -> float:
+        """Return the standard deviation of the mean square of some samples of noise, over its variance [1]."""
+        if not self.scales:
+            return math.sqrt(2.0 / samples)
+        # A difference every 2 m samples is independent, and a variance of k of them varies by sqrt(2 / k).
+        squares = sum(s.variance**2 * 4.0 * s.samples / samples for s in self.scales)
+        slower = max(self.noise**2 - sum(s.variance for s in self.scales), 0.0)
+        squares += slower**2 * min(8.0 * self.scales[-1].samples / samples, 2.0)
+        return math.sqrt(squares) / self.noise**2
 
     def get_interval(self, error: float) -> tuple[float, float]:
         """Return the 95 % interval of the floor [N].
@@ -93,6 +108,8 @@ class _StretchNoise(NamedTuple):
 
     windows: list[WindowNoise]
     line: MainsLine | None
+    pink_variance: float = 0.0
+    """Variance of slow noise in each factor e of the frequency [N²]."""
 
 
 def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> NoiseFloorEstimate:
@@ -122,7 +139,10 @@ def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> N
     white = _compute_white_probability(repeated, fast)
     basis = f"{basis}; {_compare(cycle_to_cycle, high_frequency, white)}{_describe_lines(parts)}"
     noise, combined = _mix(white, _average(repeated, fast), repeated)
-    return NoiseFloorEstimate(noise, cycle_to_cycle, high_frequency, basis, combined)
+    scales = _average_scales(windows) if len({s.rate for s in stretches}) == 1 else ()
+    return NoiseFloorEstimate(
+        noise, cycle_to_cycle, high_frequency, basis, combined, scales, _average_pink_variance(parts)
+    )
 
 
 def _compute_white_probability(repeated: _Estimate, fast: _Estimate) -> float:
@@ -167,7 +187,8 @@ def _estimate_stretch(stretch: Stretch, motion: Motion) -> _StretchNoise:
     cleaned = remainders if line is None else line.remainders
     spectra = [make_spectrum(fit, remainder, stretch.rate) for fit, remainder in zip(fits, cleaned, strict=True)]
     low, duration = fit_low_frequency_spectrum(spectra), len(stretch.force) / stretch.rate
-    return _StretchNoise([estimate_window_noise(spectrum, low, duration) for spectrum in spectra], line)
+    noises = [estimate_window_noise(spectrum, low, duration) for spectrum in spectra]
+    return _StretchNoise(noises, line, 2.0 * low.pink / stretch.rate)
 
 
 def _exclude_disturbed_cycles(windows: Sequence[RepeatedWindow], size: float) -> list[CycleFit]:
@@ -191,6 +212,17 @@ def _exclude_disturbed_cycles(windows: Sequence[RepeatedWindow], size: float) ->
         for fit, r in zip(fits, repeated, strict=True)
         if np.count_nonzero(r) >= MIN_CYCLES
     ]
+
+
+def _average_scales(windows: Sequence[WindowNoise]) -> tuple[ScaleVariance, ...]:
+    """Return the mean variance of the noise of all windows by time scale."""
+    return average_scales([w.scales for w in windows], [w.samples for w in windows])
+
+
+def _average_pink_variance(parts: Sequence[_StretchNoise]) -> float:
+    """Return the mean variance of slow noise in each factor e of the frequency [N²]."""
+    weights = np.array([sum(w.samples for w in part.windows) for part in parts], float)
+    return float(weights @ [part.pink_variance for part in parts] / weights.sum())
 
 
 def _combine_windows(noises: Sequence[WindowNoise]) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from scipy.optimize import nnls
 
 from identification.arrays import Array, BoolArray
 from identification.noise.repeated_windows import RepeatedWindow
+from identification.noise.time_scales import ScaleVariance, compute_gain, list_scales
 from identification.noise.window_fit import WindowFit
 
 _KNOWN_GAIN = 0.5
@@ -72,6 +73,8 @@ class WindowNoise(NamedTuple):
     samples: int
     """Number of valid samples."""
     cycles: int
+    scales: tuple[ScaleVariance, ...] = ()
+    """Variance of the noise by time scale."""
 
 
 def make_spectrum(fit: WindowFit, remainder: Array, rate: float) -> WindowSpectrum:
@@ -124,7 +127,19 @@ def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, d
     smooth = uniform_filter1d(values, min(_SMOOTHED_BINS, len(values)), mode="nearest")[1:]
     deviation = 2.0 * float(np.sqrt((smooth**2).sum() / gain[1:].mean())) / count
     samples = int(np.count_nonzero(spectrum.window.valid))
-    return WindowNoise(variance, deviation, 2.0 * float(values[0]) / count, samples, spectrum.window.cycles)
+    scales = tuple(_compute_scale_variance(values, spectrum, m) for m in list_scales(samples))
+    return WindowNoise(
+        variance, deviation, 2.0 * float(values[0]) / count, samples, spectrum.window.cycles, scales
+    )
+
+
+def _compute_scale_variance(values: Array, spectrum: WindowSpectrum, samples: int) -> ScaleVariance:
+    """Return the variance at a scale of noise with the power ``values`` (N // 2 + 1,) [N²]."""
+    count = len(spectrum.window.force)
+    seen = values * compute_gain(np.arange(len(values)) / count, samples)
+    smooth = uniform_filter1d(seen, min(_SMOOTHED_BINS, len(seen)), mode="nearest")[1:]
+    deviation = 2.0 * float(np.sqrt((smooth**2).sum() / spectrum.gain[1:].mean())) / count
+    return ScaleVariance(samples, 2.0 * float(seen[1:].sum()) / count, deviation)
 
 
 def _fill_harmonics(spectrum: WindowSpectrum) -> Array:

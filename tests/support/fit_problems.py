@@ -12,7 +12,7 @@ from identification.simulate import Excitation, SimulationModel, simulate
 
 LABORATORY = to_coordinates(find_parameter_set("laboratory").parameters)
 RATE, NOISE = 1000.0, 2.5
-SCALES = RecordingScales(force=200.0, length=0.01, velocity=0.1, drive=0.5, sampling_rate=RATE)
+SCALES = RecordingScales(force=200.0, length=0.01, velocity=0.1, drive=0.5, sampling_rate=RATE, duration=6.0)
 LEVELS = (0.0, 0.3, 0.1, 0.5, 0.2, 0.4)
 
 

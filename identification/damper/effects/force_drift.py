@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.damper.damper_size import SLOW_TIME
 from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
@@ -52,7 +53,7 @@ FORCE_DRIFT = Effect(
             "additive_force",
             (
                 Quantity("change", "N", -1e4, 1e4, 5.0, "final change of the zero"),
-                Quantity("duration", "s", 3.0, 3000.0, 60.0, "time constant of that change"),
+                Quantity("duration", "s", 3.0, 3000.0, 60.0, "time constant of that change", SLOW_TIME),
             ),
             ((0.0, 10.0), (0.0, 40.0), (0.0, 400.0)),
             compute_settling_drift,
@@ -63,7 +64,7 @@ FORCE_DRIFT = Effect(
             (
                 Quantity("cosine", "N", -1e4, 1e4, 5.0, "cosine of the zero's wave"),
                 Quantity("sine", "N", -1e4, 1e4, 5.0, "sine of the zero's wave"),
-                Quantity("period", "s", 10.0, 3000.0, 100.0, "period of that wave"),
+                Quantity("period", "s", 10.0, 3000.0, 100.0, "period of that wave", SLOW_TIME),
             ),
             ((0.0, 0.0, 25.0), (0.0, 0.0, 50.0), (0.0, 0.0, 100.0), (0.0, 0.0, 250.0)),
             compute_sinusoidal_drift,
@@ -71,7 +72,7 @@ FORCE_DRIFT = Effect(
         Form(
             "harmonic",
             "additive_force",
-            (*_HARMONICS, Quantity("period", "s", 60.0, 3000.0, 100.0, "period of the slowest wave")),
+            (*_HARMONICS, Quantity("period", "s", 60.0, 3000.0, 100.0, "period of the slowest wave", SLOW_TIME)),
             ((0.0,) * 12 + (70.0,), (0.0,) * 12 + (140.0,)),
             compute_harmonic_drift,
         ),

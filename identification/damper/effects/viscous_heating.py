@@ -7,6 +7,7 @@ E). The yield force of the particles falls less with temperature than the viscos
 
 from typing import Any
 
+from identification.damper.damper_size import SLOW_TIME
 from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
@@ -30,8 +31,8 @@ def soften_partially(energy: Any, softening: Any, recovery_time: Any, yield_expo
 
 
 _PARAMETERS = (
-    Quantity("softening", "1/J", 0.0, 0.1, 2e-4, "loss per joule in the damper"),
-    Quantity("recovery_time", "s", 2.0, 1e4, 100.0, "time constant with which the heat leaves"),
+    Quantity("softening", "1/J", 0.0, 0.1, 2e-4, "loss per joule in the damper", f"s/(N m {SLOW_TIME})"),
+    Quantity("recovery_time", "s", 2.0, 1e4, 100.0, "time constant with which the heat leaves", SLOW_TIME),
 )
 _YIELD_EXPONENT = Quantity(
     "yield_exponent", "1", 0.05, 1.0, 0.5, "power with which the yield force follows the viscosity"

@@ -2,22 +2,24 @@
 
 from identification.gap.data.correlation import compute_correlation_length, compute_residual_correlation_length
 from identification.gap.data.cycles import Cycles, Indices, split_by_piece
+from identification.gap.data.error_square import ErrorSquare
 from identification.gap.data.evaluation import EvaluationData
 from identification.gap.data.quality import (
     check_cycle_count,
     check_sliding_recorded,
     describe_unobservable_effects,
 )
-from identification.gap.data.repeated_residual import RepeatedResidual, estimate_repeated_residual
+from identification.gap.data.repeated_residual import estimate_repeated_residual
 from identification.gap.data.residual_map import Residual, compute_harmonics, estimate_drift, map_gap
+from identification.gap.data.scale_excess import estimate_scale_excess
 from identification.gap.data.shrinkage import NEAR_FLOOR_RATIO, Shrinkage
 
 __all__ = [
     "NEAR_FLOOR_RATIO",
     "Cycles",
+    "ErrorSquare",
     "EvaluationData",
     "Indices",
-    "RepeatedResidual",
     "Residual",
     "Shrinkage",
     "check_cycle_count",
@@ -28,6 +30,7 @@ __all__ = [
     "describe_unobservable_effects",
     "estimate_drift",
     "estimate_repeated_residual",
+    "estimate_scale_excess",
     "map_gap",
     "split_by_piece",
 ]

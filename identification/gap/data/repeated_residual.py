@@ -4,37 +4,20 @@ Noise of any spectrum differs between two cycles of one stroke. What their resid
 the model. It can be far smaller than the uncertainty of a floor with slow noise and still be certain.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from identification.arrays import Array
 from identification.gap.data.cycles import Cycles
+from identification.gap.data.error_square import ErrorSquare
 from identification.gap.data.residual_map import Residual
 
 _PHASE_BINS = 32
 """Parts of a cycle in which the residuals of two cycles are compared."""
-_CERTAIN = 4.0
-"""Distance from noise alone at which an error is certain [standard deviations]."""
 _FEWEST_CYCLES = 4
 """Smallest number of cycles of a segment."""
 
 
-class RepeatedResidual(NamedTuple):
-    """Mean square of the repeated part of a residual over the periodic segments."""
-
-    square: float
-    """[N²]; without an error of the model it is zero on average."""
-    deviation: float
-    """Its standard deviation from noise alone [N²]."""
-
-    @property
-    def lowest(self) -> float:
-        """Lower bound of the mean square that is an error of the model [N²]; negative where noise explains all."""
-        return self.square - _CERTAIN * self.deviation
-
-
-def estimate_repeated_residual(residual: Residual, cycles: Cycles) -> RepeatedResidual | None:
+def estimate_repeated_residual(residual: Residual, cycles: Cycles) -> ErrorSquare | None:
     """Estimate the part of a residual that repeats from cycle to cycle; None if no segment has enough cycles.
 
     Cycles next to each other share slow noise, so only others are compared, each without its mean and slope.
@@ -46,7 +29,7 @@ def estimate_repeated_residual(residual: Residual, cycles: Cycles) -> RepeatedRe
     weights = np.array([len(table) for table in tables], float)
     weights /= weights.sum()
     found = np.array([_compare_cycles(table) for table in tables])
-    return RepeatedResidual(float(weights @ found[:, 0]), float(np.sqrt(weights**2 @ found[:, 1])))
+    return ErrorSquare(float(weights @ found[:, 0]), float(np.sqrt(weights**2 @ found[:, 1])))
 
 
 def _make_table(residual: Residual, cycles: Cycles, segment: int) -> Array | None:

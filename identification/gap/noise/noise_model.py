@@ -11,12 +11,21 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import Piece, Problem
-from identification.gap.data import EvaluationData, estimate_repeated_residual, split_by_piece
+from identification.gap.data import (
+    EvaluationData,
+    estimate_repeated_residual,
+    estimate_scale_excess,
+    split_by_piece,
+)
 from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
 from identification.noise import NoiseFloorEstimate
 
+_NORMAL_95 = 1.96
+"""Half the width of a 95 % interval [standard deviations]."""
+_CHANCE_DEVIATIONS = 3.0
+"""Standard deviations of a mean square that noise alone hardly exceeds: in one recording of 700."""
 _SEARCH_DRAWS = 2
 """Draws of the input noise during the search; over the strokes, each estimates its size to some hundredths."""
 _REPORT_DRAWS = 8
@@ -35,6 +44,8 @@ class NoiseModel:
     """Seed of the input noise."""
     input_noise: float | None = None
     """Propagated noise of the displacement [N]; None before the first update."""
+    has_certain_error: bool = False
+    """True where a part of the law's residual is certainly an error of the law."""
     _motion_draws: list[tuple[Piece, ...]] = field(default_factory=list)
 
     @property
@@ -52,6 +63,18 @@ class NoiseModel:
         """Upper end of the floor's 95 % interval [N]; the floor itself where no cycles repeat."""
         return math.hypot(self.estimate.get_interval(self.noise)[1], self.input_noise or 0.0)
 
+    def compute_highest_rmse(self, samples: int) -> float:
+        """Return the RMSE [N] that noise alone hardly exceeds on some samples.
+
+        Slow noise differs from one part of a recording to the next. Where an error of the law is certain, the
+        floor is that of the recorded noise itself.
+        """
+        if self.has_certain_error:
+            return self.highest_floor
+        uncertain = _CHANCE_DEVIATIONS / _NORMAL_95 * (self.highest_floor**2 - self.floor**2)
+        chance = _CHANCE_DEVIATIONS * self.estimate.compute_chance(samples) * self.noise**2
+        return math.sqrt(self.floor**2 + math.hypot(uncertain, chance))
+
     def update(self, candidate: Candidate, full_problem: Problem, evaluation: EvaluationData) -> None:
         """Estimate the propagated noise of the displacement from a candidate's simulated loop.
 
@@ -68,25 +91,30 @@ class NoiseModel:
         self.input_noise = size if self.input_noise is None else min(size, self.input_noise)
 
     def narrow_floor(self, candidate: Candidate, evaluation: EvaluationData) -> None:
-        """Take the floor from the residual of the law where a part of it repeats with the cycles.
+        """Take the floor from the residual of the law where a part of it is certainly an error of the law.
 
-        That part is an error of the law and the rest is noise. Within the interval of the floor it would count as
-        noise, because slow noise leaves a wide interval.
+        That part repeats with the cycles, or exceeds the noise at its time scale. The rest is noise. Within the
+        interval of the floor all of it would count as noise, because slow noise leaves a wide interval.
 
         Args:
             candidate: the law without effects.
             evaluation: the recordings, cut into cycles.
         """
-        repeated = estimate_repeated_residual(candidate.residual, evaluation.cycles)
-        if repeated is None or repeated.lowest < (NO_GAP_RATIO**2 - 1.0) * self.noise**2:
+        input_square = (self.input_noise or 0.0) ** 2
+        found = (
+            estimate_repeated_residual(candidate.residual, evaluation.cycles),
+            estimate_scale_excess(candidate.residual, self.estimate.scales, input_square),
+        )
+        errors = [e for e in found if e is not None and e.lowest > (NO_GAP_RATIO**2 - 1.0) * self.noise**2]
+        if not errors:
             return
+        self.has_certain_error = True
+        error = max(errors, key=lambda e: e.square)
         values = candidate.residual.values[candidate.residual.valid]
-        known = repeated.square + (self.input_noise or 0.0) ** 2
-        rest = math.sqrt(max(float(np.mean(values**2)) - known, 0.0))
+        rest = math.sqrt(max(float(np.mean(values**2)) - error.square - input_square, 0.0))
         low, high = self.estimate.get_interval(self.noise)
         if low <= rest <= high:
-            deviation = 0.5 * repeated.deviation / rest
-            self.estimate = replace(self.estimate, noise=rest, deviation=deviation)
+            self.estimate = replace(self.estimate, noise=rest, deviation=0.5 * error.deviation / rest)
 
     def estimate_noise(self, candidate: Candidate) -> float:
         """Return the noise of the recorded force [N], limited by the residual of a candidate fitted later."""

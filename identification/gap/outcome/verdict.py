@@ -68,13 +68,13 @@ def _decide_set(
 ) -> NamedSet:
     """Return the verdict with one set of a posterior."""
     baseline, named = pool.baseline, pool.candidates[names]
-    verdict = decide_verdict(baseline, named, pool.floor, pool.no_gap_limit, posterior)
+    verdict = decide_verdict(baseline, named, pool.floor, pool.no_gap_limits, posterior)
     shrinkage = estimate_expected_shrinkage(pool, evaluation, named)
     benefit = shrinkage.expected_benefit
     if verdict == "partly_explained" and not closes_part(shrinkage):
         verdict = "unexplained"
     if named.names and benefit is not None and benefit < 0.0:
-        verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limit)
+        verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limits)
     if named.names and verdict in ("no_gap", "unexplained"):
         return NamedSet(verdict, baseline, estimate_expected_shrinkage(pool, evaluation, baseline), posterior)
     return NamedSet(verdict, named, shrinkage, posterior)
@@ -92,7 +92,11 @@ def estimate_expected_shrinkage(
 
 
 def decide_verdict(
-    baseline: Candidate, named: Candidate, floor: float, no_gap_limit: float, posterior: Posterior
+    baseline: Candidate,
+    named: Candidate,
+    floor: float,
+    no_gap_limits: tuple[float, float],
+    posterior: Posterior,
 ) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts, and the held-out ones for a part.
 
@@ -103,11 +107,13 @@ def decide_verdict(
         baseline: the law without effects.
         named: the most probable set.
         floor: noise floor [N].
-        no_gap_limit: RMSE of the baseline [N] up to which the verdict is ``no_gap``.
+        no_gap_limits: RMSE of the baseline on fitted and on held-out samples [N] up to which the verdict is
+            ``no_gap``.
         posterior: probabilities of the sets.
     """
-    at_floor = baseline.held_out_rmse < no_gap_limit and baseline.train_rmse < max(
-        _FLOOR_RATIO * floor, no_gap_limit
+    fitted_limit, held_out_limit = no_gap_limits
+    at_floor = baseline.held_out_rmse < held_out_limit and baseline.train_rmse < max(
+        _FLOOR_RATIO * floor, fitted_limit
     )
     if at_floor or (not named.names and posterior.unknown < UNKNOWN_THRESHOLD):
         return "no_gap"
@@ -137,10 +143,11 @@ def closes_part(shrinkage: Shrinkage) -> bool:
     return value is not None and interval is not None and value >= _MIN_NAMED_SHARE and interval[0] > 0.0
 
 
-def decide_unnamed_verdict(baseline: Candidate, floor: float, no_gap_limit: float) -> Verdict:
+def decide_unnamed_verdict(baseline: Candidate, floor: float, no_gap_limits: tuple[float, float]) -> Verdict:
     """Decide the verdict where the most probable set is not named because it is expected to harm another run."""
-    limit = max(_FLOOR_RATIO * floor, no_gap_limit)
-    return "no_gap" if max(baseline.train_rmse, baseline.held_out_rmse) < limit else "unexplained"
+    fitted, held_out = (max(_FLOOR_RATIO * floor, limit) for limit in no_gap_limits)
+    at_floor = baseline.train_rmse < fitted and baseline.held_out_rmse < held_out
+    return "no_gap" if at_floor else "unexplained"
 
 
 def build_named_effects(

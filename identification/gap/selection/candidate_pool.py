@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.damper.effects import EFFECTS, Effect
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, make_starting_points
 from identification.gap.data import EvaluationData, Residual, split_by_piece
@@ -23,7 +23,7 @@ from identification.gap.fits import (
     fit_jointly,
     refit_all_samples,
 )
-from identification.gap.noise import NoiseModel, find_mains_frequency
+from identification.gap.noise import NoiseModel, compute_noise_drift, find_mains_frequency
 from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
 from identification.gap.selection.screening import ScreeningResult
@@ -52,6 +52,8 @@ QUICK_FIT = FitOptions(
 """One descent from the best of the given starts, on decimated data."""
 _SEARCH = OptimiserSettings(iterations=40, restarts=1, tolerance=SEARCH_TOLERANCE)
 """Search from the regression and, if its minimum is not conclusive, from the low-slip start."""
+_LAW_SEARCH = replace(_SEARCH, restarts=2)
+"""Search of the law alone, on which all sets rest: also from the mixed start."""
 
 
 @dataclass
@@ -99,9 +101,14 @@ class CandidatePool:
         return self.noise_model.floor
 
     @property
-    def no_gap_limit(self) -> float:
-        """RMSE of the baseline [N] up to which the verdict is ``no_gap``."""
-        return max(self.settings.no_gap_ratio * self.floor, self.noise_model.highest_floor)
+    def no_gap_limits(self) -> tuple[float, float]:
+        """RMSE of the baseline on fitted and on held-out samples [N] up to which the verdict is ``no_gap``."""
+        fitted, held_out = self.evaluation.fitted_samples, self.evaluation.held_out_samples
+        return self._find_no_gap_limit(fitted), self._find_no_gap_limit(held_out)
+
+    def _find_no_gap_limit(self, samples: BoolArray) -> float:
+        highest = self.noise_model.compute_highest_rmse(max(int(np.count_nonzero(samples)), 1))
+        return max(self.settings.no_gap_ratio * self.floor, highest)
 
     @property
     def block_length(self) -> float:
@@ -178,7 +185,8 @@ class CandidatePool:
         """
         self.fit_count += 1
         problem = self.decimated_problem.replace_effects(effects)
-        return self._keep(self.evaluate(JointFit(problem, fit_output_error(problem, _SEARCH))))
+        minimum = fit_output_error(problem, _SEARCH if effects else _LAW_SEARCH)
+        return self._keep(self.evaluate(JointFit(problem, minimum)))
 
     def fit(
         self, effects: tuple[EffectModel, ...], starts: Sequence[Array] = (), options: FitOptions = QUICK_FIT
@@ -267,11 +275,15 @@ class CandidatePool:
         return make_starting_points(self.decimated_problem)[0]
 
     def evaluate(self, fit: JointFit) -> Candidate:
-        """Compute the residual of a fit on all samples."""
+        """Compute the residual of a fit on all samples; a drift that slow noise explains remains in it."""
         forces = self.full_problem.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
-        residual = self.evaluation.compute_residual(forces)
+        estimate = self.noise_model.estimate
+        drift = compute_noise_drift(fit, self.full_problem, estimate.pink_variance)
+        residual = self.evaluation.compute_residual(
+            [f - d for f, d in zip(forces, split_by_piece(drift, self.full_problem.pieces), strict=True)]
+        )
         held_out = max(int(np.count_nonzero(self.evaluation.held_out_samples)), 1)
-        chance = _CHANCE_DEVIATIONS * math.sqrt(2.0 / held_out)
+        chance = _CHANCE_DEVIATIONS * estimate.compute_chance(held_out)
         return Candidate(fit, residual, *self.evaluation.compute_rmse(residual), chance)
 
     def _continue_fit(self, names: frozenset[str]) -> None:

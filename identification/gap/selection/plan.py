@@ -102,7 +102,8 @@ def _select_beam(pool: CandidatePool, size: int, sets: list[Candidate], parent: 
 
 def _is_gap_negligible(pool: CandidatePool, baseline: Candidate) -> bool:
     """Return True if the baseline is so close to the noise floor that no effect is searched for."""
-    return max(baseline.train_rmse, baseline.held_out_rmse) < pool.no_gap_limit
+    fitted, held_out = pool.no_gap_limits
+    return baseline.train_rmse < fitted and baseline.held_out_rmse < held_out
 
 
 def _is_explained_by_clocks(pool: CandidatePool) -> bool:

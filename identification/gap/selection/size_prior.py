@@ -14,8 +14,8 @@ _MIN_FREE_STROKE = 0.3
 """Smallest free travel before an end stop, relative to the largest displacement."""
 _BOUND_TOLERANCE = 1e-3
 """Distance from a bound, relative to the bound, within which a size counts as at it."""
-_MIN_TIME_CONSTANT = 8.0
-"""Smallest time constant, or quarter of a period, of a slow effect [s]."""
+_MIN_TIME_CONSTANT = 0.08
+"""Smallest time constant, or quarter of a period, of a slow effect, over the time of its observation [1]."""
 _GRID_POINTS = 50
 """Displacements at which the nonlinearity of a channel is evaluated."""
 
@@ -28,11 +28,11 @@ def compute_size_weight(effect: ActiveEffect, displacement: Array, size: DamperS
         displacement: displacement of the strokes [m], any number of samples.
         size: size of the damper, from which the bounds of the search follow.
     """
-    plausible = _has_plausible_size(effect, displacement) and not _is_at_bound(effect, size)
+    plausible = _has_plausible_size(effect, displacement, size) and not _is_at_bound(effect, size)
     return 1.0 if plausible else _IMPLAUSIBLE_WEIGHT
 
 
-def _has_plausible_size(effect: ActiveEffect, displacement: Array) -> bool:
+def _has_plausible_size(effect: ActiveEffect, displacement: Array, size: DamperSize) -> bool:
     """Return True if an effect is as large and as slow as its name implies."""
     values = {q.symbol: v for q, v in zip(effect.form.parameters, effect.values, strict=True)}
     match effect.effect.name:
@@ -41,9 +41,10 @@ def _has_plausible_size(effect: ActiveEffect, displacement: Array) -> bool:
         case "end_stop":
             return values["gap"] > _MIN_FREE_STROKE * float(np.abs(displacement).max())
         case "force_drift":
-            return min(values.get("duration", np.inf), values.get("period", np.inf) / 4.0) > _MIN_TIME_CONSTANT
+            times = values.get("duration", np.inf), values.get("period", np.inf) / 4.0
+            return min(times) > _MIN_TIME_CONSTANT * size.observation_time
         case "viscous_heating":
-            return values["recovery_time"] > _MIN_TIME_CONSTANT
+            return values["recovery_time"] > _MIN_TIME_CONSTANT * size.observation_time
         case _:
             return True
 

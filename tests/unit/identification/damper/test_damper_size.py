@@ -5,6 +5,7 @@ import pytest
 from identification.damper.damper_size import (
     LARGEST_SIZE,
     LIBRARY_SIZE,
+    SLOW_TIME,
     SMALLEST_SIZE,
     DamperSize,
     compute_scale_factor,
@@ -14,8 +15,9 @@ from identification.damper.damper_size import (
 from identification.damper.effects import EFFECTS
 from identification.damper.parameters import Quantity
 
-FORCE, LENGTH, VELOCITY, DRIVE = 100.0, 4.0, 2.0, 5.0
-LARGER = DamperSize(*(v * f for v, f in zip(LIBRARY_SIZE, (FORCE, LENGTH, VELOCITY, DRIVE), strict=True)))
+FORCE, LENGTH, VELOCITY, DRIVE, OBSERVATION = 100.0, 4.0, 2.0, 5.0, 3.0
+FACTORS = FORCE, LENGTH, VELOCITY, DRIVE, OBSERVATION
+LARGER = DamperSize(*(v * f for v, f in zip(LIBRARY_SIZE, FACTORS, strict=True)))
 QUANTITIES = [
     pytest.param(q, id=f"{effect.name}-{form.name}-{q.symbol}")
     for effect in EFFECTS.values()
@@ -28,7 +30,8 @@ QUANTITIES = [
     ("unit", "factor"),
     [
         ("1", 1.0),
-        ("s", 1.0),  # electronics and heat do not grow with the damper
+        ("s", 1.0),  # electronics do not grow with the damper
+        (SLOW_TIME, OBSERVATION),
         ("Hz", 1.0),
         ("N", FORCE),
         ("m", LENGTH),
@@ -40,6 +43,7 @@ QUANTITIES = [
         ("N s^2/m^2", FORCE / VELOCITY**2),
         ("kg", FORCE / (VELOCITY**2 / LENGTH)),
         ("1/J", 1.0 / (FORCE * LENGTH)),
+        (f"s/(N m {SLOW_TIME})", 1.0 / (FORCE * VELOCITY * OBSERVATION)),  # energy of the observed time
         ("N/{drive}", FORCE / DRIVE),
         ("1/{drive}", 1.0 / DRIVE),
         ("N s/(m {drive})", FORCE / VELOCITY / DRIVE),

@@ -130,7 +130,7 @@ def test_a_damper_that_hardly_yields_is_found_from_a_low_slip_start():
         c1_a=6960.0, c1_b=25500.0, k0=1540.0, k1=1000.0, f0=5.9,
     )  # fmt: skip
     problem = problem_of(stiff, [sine(0.010, 1.0, 12.0, (0.0, 0.1, 0.2, 0.3, 0.4, 0.5))])
-    usual, low_slip = make_starting_points(problem)
+    usual, low_slip, _ = make_starting_points(problem)
     cost = {
         kind: minimise(problem, start, 60, ignore_progress).evaluation.cost / problem.samples
         for kind, start in (("usual", usual), ("low slip", low_slip))
@@ -138,6 +138,22 @@ def test_a_damper_that_hardly_yields_is_found_from_a_low_slip_start():
     assert cost["usual"] > 10.0, "else this damper needs no low-slip start"
     assert cost["low slip"] == pytest.approx(1.0, abs=0.04)
     assert fit_output_error(problem).evaluation.cost == pytest.approx(cost["low slip"] * problem.samples, rel=1e-3)
+
+
+def test_a_damper_that_slides_at_low_drive_only_is_found_from_a_mixed_start():
+    # It yields at 25 N without a drive. At the highest drive, 160 N are less than half of its yield force.
+    c = Coordinates(
+        F_a=25.0, F_b=183.0, D_y=4.3e-5, rho=0.66, n=3.0, eta=163.0, c0_a=960.0, c0_b=-87.0,
+        c1_a=2200.0, c1_b=790.0, k0=1570.0, k1=5520.0, f0=-6.6,
+    )  # fmt: skip
+    levels = (0.0, 1.0, 2.25, 0.5, 2.0, 1.5)
+    problem = problem_of(c, [sine(0.010, f, 12.0, levels) for f in (0.4, 0.85)], drives=(0.0, 2.25))
+    usual, _, mixed = (
+        minimise(problem, start, 60, ignore_progress).evaluation.cost / problem.samples
+        for start in make_starting_points(problem)
+    )
+    assert usual > 1.1, "else this damper needs no mixed start"
+    assert mixed == pytest.approx(1.0, abs=0.04)
 
 
 def test_a_fit_with_a_preview_ends_in_the_minimum_of_all_samples():

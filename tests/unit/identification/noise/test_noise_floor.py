@@ -1,5 +1,6 @@
 """Noise floor of a stretch, and of several."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from identification.noise.noise_floor import (
     _mix,
     estimate_floor,
 )
+from identification.noise.time_scales import ScaleVariance
 from identification.signals.motion import estimate_motion
 from tests.support.strokes import RATE, hysteresis, random_motion, recorded, sine, sine_segment, stretch
 
@@ -242,3 +244,28 @@ def test_only_coloured_noise_has_a_coloured_share():
         True,
         False,
     ]
+
+
+def test_the_chance_of_white_noise_is_that_of_independent_samples():
+    scales = tuple(ScaleVariance(2**k, 2.0 / 2**k, 0.0) for k in range(10))
+    known = NoiseFloorEstimate(2.0, 2.0, 2.0, "", 0.1, scales)
+    assert known.compute_chance(5000) == pytest.approx(math.sqrt(2.0 / 5000), rel=1e-3)
+    assert NoiseFloorEstimate(2.0, None, 2.0, "").compute_chance(5000) == pytest.approx(math.sqrt(2.0 / 5000))
+
+
+def test_the_mean_square_of_slow_noise_varies_more():
+    slow = NoiseFloorEstimate(2.0, 2.0, 1.0, "", 0.1, (ScaleVariance(1, 0.1, 0.0), ScaleVariance(64, 3.9, 0.0)))
+    assert slow.compute_chance(5000) == pytest.approx(3.9 / 4.0 * math.sqrt(4.0 * 64 / 5000), rel=0.01)
+    slower = NoiseFloorEstimate(2.0, 2.0, 1.0, "", 0.1, (ScaleVariance(1, 0.1, 0.0), ScaleVariance(64, 0.9, 0.0)))
+    assert slower.compute_chance(5000) > 3.0 / 4.0 * math.sqrt(8.0 * 64 / 5000)
+    assert slower.compute_chance(10) < 2.5
+
+
+@pytest.mark.parametrize("share", [0.0, 0.8])
+def test_the_scales_contain_the_variance_of_the_noise(share):
+    displacement, velocity = sine(10e-3, 2.0, 14.0)
+    slow = lfilter([np.sqrt(1.0 - 0.98**2)], [1.0, -0.98], white(len(velocity), 7))
+    noise = np.sqrt(1.0 - share) * white(len(velocity), 8) + np.sqrt(share) * slow
+    estimate = floor_of(displacement, hysteresis(velocity) + noise, frequency=2.0)
+    assert sum(s.variance for s in estimate.scales) == pytest.approx(estimate.cycle_to_cycle**2, rel=0.1)
+    assert estimate.scales[0].variance / estimate.noise**2 == pytest.approx(0.5 * (1.0 - share), abs=0.05)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import RepeatedResidual
+from identification.gap.data import ErrorSquare
 from identification.gap.fits import Candidate
 from identification.gap.noise import noise_model
 from identification.gap.noise.noise_model import NoiseModel
-from identification.noise.noise_floor import NoiseFloorEstimate
+from identification.noise import NoiseFloorEstimate, ScaleVariance
 from tests.support.candidate_pools import NOISE, fit_baseline
 from tests.support.effects import active
 
@@ -80,13 +80,41 @@ def test_the_highest_floor_is_the_upper_end_of_the_interval_with_the_input_noise
     assert unknown.highest_floor == 2.0
 
 
+def test_noise_hardly_exceeds_its_floor_by_the_chance_of_some_samples():
+    model = NoiseModel(NoiseFloorEstimate(2.0, 2.0, 2.0, "", 0.0), (), input_noise=1.0)
+    assert model.compute_highest_rmse(1800) ** 2 == pytest.approx(5.0 + 3.0 * 4.0 / 30.0)
+    slow = replace(model.estimate, scales=(ScaleVariance(1, 0.1, 0.0), ScaleVariance(64, 3.9, 0.0)))
+    assert replace(model, estimate=slow).compute_highest_rmse(1800) > 1.1 * model.compute_highest_rmse(1800)
+    assert replace(model, has_certain_error=True).compute_highest_rmse(1800) == pytest.approx(np.sqrt(5.0))
+
+
+def test_the_uncertainty_of_the_floor_adds_to_the_chance():
+    model = NoiseModel(NoiseFloorEstimate(2.0, 2.0, 2.0, "", 0.1), ())
+    uncertain = 3.0 / 1.96 * (2.196**2 - 4.0)
+    assert model.compute_highest_rmse(1800) ** 2 == pytest.approx(4.0 + np.hypot(uncertain, 0.4))
+
+
+def test_an_error_beyond_the_noise_at_its_scale_is_no_noise(pool, monkeypatch):
+    residual = pool.baseline.residual
+    square = float(np.mean(residual.values[residual.valid] ** 2))
+    monkeypatch.setattr(noise_model, "estimate_repeated_residual", lambda residual, cycles: None)
+    monkeypatch.setattr(
+        noise_model, "estimate_scale_excess", lambda *given: ErrorSquare(0.19 * square, 0.01 * square)
+    )
+    model = make_model(pool)
+    model.estimate = NoiseFloorEstimate(0.95 * square**0.5, None, NOISE, "", 0.1 * square**0.5)
+    model.narrow_floor(pool.baseline, pool.evaluation)
+    assert model.noise == pytest.approx(0.9 * square**0.5)
+    assert model.has_certain_error
+
+
 @pytest.fixture
 def narrow(pool, monkeypatch):
     """Narrow a floor [N] of a deviation [N] for a part [1] of the law's mean square that repeats."""
 
     def narrow(noise, deviation, part, part_deviation=0.0):
         square = float(np.mean(pool.baseline.residual.values[pool.baseline.residual.valid] ** 2))
-        repeated = RepeatedResidual(part * square, part_deviation * square)
+        repeated = ErrorSquare(part * square, part_deviation * square)
         monkeypatch.setattr(noise_model, "estimate_repeated_residual", lambda residual, cycles: repeated)
         model = make_model(pool)
         model.estimate = NoiseFloorEstimate(noise * square**0.5, None, NOISE, "", deviation * square**0.5)
@@ -103,12 +131,12 @@ def test_a_residual_that_repeats_is_no_noise(narrow):
 
 
 def test_a_floor_that_excludes_the_rest_of_the_residual_stays(narrow):
-    assert narrow(0.5, 0.1, 0.19, 0.01) == (0.5, 0.1)
+    assert narrow(0.5, 0.1, 0.19, 0.01) == pytest.approx((0.5, 0.1))
 
 
 def test_a_residual_that_repeats_by_chance_is_noise(narrow):
-    assert narrow(0.95, 0.1, 0.19, 0.05) == (0.95, 0.1)
-    assert narrow(0.95, 0.1, 0.01, 0.0) == (0.95, 0.1)
+    assert narrow(0.95, 0.1, 0.19, 0.05) == pytest.approx((0.95, 0.1))
+    assert narrow(0.95, 0.1, 0.01, 0.0) == pytest.approx((0.95, 0.1))
 
 
 def test_without_cycles_to_compare_the_floor_stays(pool):

@@ -55,7 +55,7 @@ def make_builder(
         candidates=candidates,
         library=EFFECTS,
         floor=FLOOR,
-        no_gap_limit=1.008 * FLOOR,
+        no_gap_limits=(1.008 * FLOOR,) * 2,
         noise_model=noise_model,
         full_problem=SimpleNamespace(),
         baseline_excess=8.0,

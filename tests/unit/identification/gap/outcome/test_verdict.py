@@ -29,7 +29,7 @@ def make_candidate(names, train, held_out):
 def decide(named, train, held_out, *, baseline=(3.0, 3.0), unknown=0.1):
     candidate = make_candidate(named, train, held_out)
     posterior = Posterior({candidate.names: 1.0 - unknown}, unknown)
-    return decide_verdict(make_candidate((), *baseline), candidate, FLOOR, NO_GAP_RATIO * FLOOR, posterior)
+    return decide_verdict(make_candidate((), *baseline), candidate, FLOOR, (NO_GAP_RATIO * FLOOR,) * 2, posterior)
 
 
 @pytest.mark.parametrize(
@@ -74,8 +74,10 @@ def test_a_gap_on_the_fitted_samples_alone_is_one():
 
 
 def test_an_unnamed_set_leaves_a_gap_only_where_there_is_one():
-    assert decide_unnamed_verdict(make_candidate((), 1.005, 1.025), FLOOR, NO_GAP_RATIO * FLOOR) == "no_gap"
-    assert decide_unnamed_verdict(make_candidate((), 1.3, 1.02), FLOOR, NO_GAP_RATIO * FLOOR) == "unexplained"
+    assert decide_unnamed_verdict(make_candidate((), 1.005, 1.025), FLOOR, (NO_GAP_RATIO * FLOOR,) * 2) == "no_gap"
+    assert (
+        decide_unnamed_verdict(make_candidate((), 1.3, 1.02), FLOOR, (NO_GAP_RATIO * FLOOR,) * 2) == "unexplained"
+    )
 
 
 def test_alternatives_are_the_most_probable_other_sets():
@@ -122,7 +124,7 @@ def test_an_answer_is_ambiguous_if_an_alternative_is_half_as_probable(probabilit
 def test_a_baseline_within_the_interval_of_the_floor_has_no_gap():
     candidate, baseline = make_candidate(("gas_spring",), 1.0, 1.0), make_candidate((), 1.06, 1.06)
     posterior = Posterior({candidate.names: 0.9}, 0.1)
-    assert decide_verdict(baseline, candidate, FLOOR, 1.07 * FLOOR, posterior) == "no_gap"
-    assert decide_verdict(baseline, candidate, FLOOR, 1.05 * FLOOR, posterior) == "explained"
-    assert decide_unnamed_verdict(baseline, FLOOR, 1.07 * FLOOR) == "no_gap"
-    assert decide_unnamed_verdict(baseline, FLOOR, 1.05 * FLOOR) == "unexplained"
+    assert decide_verdict(baseline, candidate, FLOOR, (1.07 * FLOOR,) * 2, posterior) == "no_gap"
+    assert decide_verdict(baseline, candidate, FLOOR, (1.05 * FLOOR,) * 2, posterior) == "explained"
+    assert decide_unnamed_verdict(baseline, FLOOR, (1.07 * FLOOR,) * 2) == "no_gap"
+    assert decide_unnamed_verdict(baseline, FLOOR, (1.05 * FLOOR,) * 2) == "unexplained"

@@ -8,6 +8,7 @@ import pytest
 from identification.damper import LIBRARY_SIZE
 from identification.gap.fits.candidate import Candidate
 from identification.gap.selection.candidate_pool import CandidatePool
+from identification.noise import NoiseFloorEstimate
 
 FLOOR = 2.0
 
@@ -21,7 +22,7 @@ def make_pool(problem=None, evaluation=None, rate=10.0, **settings):
     settings = {"screening_rate": 100.0, "fit_budget": 3} | settings
     problem = SimpleNamespace() if problem is None else problem
     problem.space = SimpleNamespace(scales=SimpleNamespace(rate=rate, damper_size=LIBRARY_SIZE))
-    noise_model = SimpleNamespace(floor=FLOOR)
+    noise_model = SimpleNamespace(floor=FLOOR, estimate=NoiseFloorEstimate(FLOOR, None, FLOOR, ""))
     pool = CandidatePool(problem, evaluation, noise_model, settings=SimpleNamespace(**settings))
     pool.candidates[frozenset()] = make_candidate((), 6.0, 6.0)
     return pool
@@ -99,12 +100,16 @@ def test_data_are_decimated_by_rate_and_length(rates, length, motion, factor):
 @pytest.mark.parametrize(("held_out", "chance"), [([1] * 8 + [0] * 2, 1.0), ([0] * 10, 2.0 * np.sqrt(2.0))])
 def test_chance_is_two_deviations_of_the_variance_of_the_held_out_samples(held_out, chance):
     evaluation = make_evaluation(held_out, [1] * 10)
-    evaluation.compute_residual = lambda forces: forces
+    evaluation.compute_residual = lambda forces: forces[0]
     evaluation.compute_rmse = lambda residual: (3.0, 4.0)
-    problem = SimpleNamespace(replace_effects=lambda effects: SimpleNamespace(simulate=lambda unknowns: unknowns))
-    fit = SimpleNamespace(effects=(), minimum=SimpleNamespace(unknowns="forces"))
+    excitation = SimpleNamespace(time=np.arange(3.0), sampled_drive=np.zeros(3), rate=1.0)
+    problem = SimpleNamespace(
+        pieces=(SimpleNamespace(excitation=excitation, force=np.zeros(3)),),
+        replace_effects=lambda effects: SimpleNamespace(simulate=lambda unknowns: [unknowns]),
+    )
+    fit = SimpleNamespace(effects=(), active_effects=(), minimum=SimpleNamespace(unknowns=np.arange(3.0)))
     candidate = make_pool(problem, evaluation).evaluate(fit)
-    assert (candidate.residual, candidate.train_rmse, candidate.held_out_rmse) == ("forces", 3.0, 4.0)
+    assert (list(candidate.residual), candidate.train_rmse, candidate.held_out_rmse) == ([0.0, 1.0, 2.0], 3.0, 4.0)
     assert candidate.chance_excess == pytest.approx(chance)
 
 

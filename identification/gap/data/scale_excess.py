@@ -1,0 +1,44 @@
+"""Part of a residual that exceeds the noise at its time scale.
+
+Slow noise leaves the floor uncertain, and an error of the model within that interval would count as noise. The
+uncertain part of such noise is slower than the strokes, however. At the scale of an error the noise is known, and
+what exceeds it there is an error of the model.
+"""
+
+import math
+from collections.abc import Sequence
+
+from identification.gap.data.error_square import ErrorSquare
+from identification.gap.data.residual_map import Residual
+from identification.noise import ScaleVariance, measure_scale_variance
+
+
+def estimate_scale_excess(
+    residual: Residual, scales: Sequence[ScaleVariance], input_square: float
+) -> ErrorSquare | None:
+    """Estimate the part of a residual beyond the noise, over the scales where it is certain; None if nowhere.
+
+    Args:
+        residual: residual of the law.
+        scales: variance of the noise of the force by time scale.
+        input_square: mean square of the propagated noise of the displacement [N²], at an unknown scale.
+    """
+    found = [_compute_excess(residual, scale, input_square) for scale in scales]
+    certain = [excess for excess in found if excess.lowest > 0.0]
+    if not certain:
+        return None
+    return ErrorSquare(sum(e.square for e in certain), math.hypot(*(e.deviation for e in certain)))
+
+
+def _compute_excess(residual: Residual, scale: ScaleVariance, input_square: float) -> ErrorSquare:
+    """Return the part of a residual beyond the noise at one scale."""
+    total, count, start = 0.0, 0, 0
+    for samples, _ in residual.rates:
+        part = slice(start, start + samples)
+        variance, differences = measure_scale_variance(residual.values[part], residual.valid[part], scale.samples)
+        total, count, start = total + variance * differences, count + differences, start + samples
+    if not count:
+        return ErrorSquare(0.0, math.inf)
+    # A difference every 2 m samples is independent, and a variance of k of them varies by sqrt(2 / k).
+    chance = scale.variance * math.sqrt(4.0 * scale.samples / count)
+    return ErrorSquare(total / count - scale.variance - input_square, math.hypot(chance, scale.deviation))

@@ -1,0 +1,71 @@
+"""Variance of a signal by time scale: of half the difference of two neighbouring means (Haar wavelet).
+
+A difference of two means of m samples hardly contains changes that are much slower or faster than 2 m samples. It
+shows an error of a model at this scale even if much stronger slow noise hides it in the total. The variances at
+m = 1, 2, 4, ... samples add up to that of the signal (Percival 1995, Biometrika 82:619).
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+
+_FEWEST_DIFFERENCES = 8
+"""Smallest number of separate differences in a signal for a variance at a scale."""
+
+
+class ScaleVariance(NamedTuple):
+    """Variance at one time scale."""
+
+    samples: int
+    """Samples of each of the two means."""
+    variance: float
+    """[N²]"""
+    deviation: float
+    """Its standard deviation [N²]."""
+
+
+def list_scales(count: int) -> Iterator[int]:
+    """Yield the scales [samples] of which a signal of some samples contains enough separate differences."""
+    samples = 1
+    while 2 * samples * _FEWEST_DIFFERENCES <= count:
+        yield samples
+        samples *= 2
+
+
+def compute_gain(frequency: Array, samples: int) -> Array:
+    """Return the part (B,) of the power that a scale contains [1], at frequencies (B,) in cycles a sample."""
+    angle = np.pi * np.maximum(frequency, 1e-12)
+    return np.asarray((np.sin(angle * samples) ** 2 / (samples * np.sin(angle))) ** 2)
+
+
+def measure_scale_variance(values: Array, valid: BoolArray, samples: int) -> tuple[float, int]:
+    """Return the variance [N²] of a signal (N,) [N] at a scale, and the number of differences in it.
+
+    Only differences without an invalid sample count; the variance is zero without any.
+    """
+    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
+    counts = np.concatenate([[0], np.cumsum(valid)])
+    if len(values) < 2 * samples:
+        return 0.0, 0
+    first, second = sums[samples:-samples] - sums[: -2 * samples], sums[2 * samples :] - sums[samples:-samples]
+    whole = counts[2 * samples :] - counts[: -2 * samples] == 2 * samples
+    differences = (second - first)[whole] / (2.0 * samples)
+    return float(np.mean(differences**2)) if len(differences) else 0.0, len(differences)
+
+
+def average_scales(
+    parts: Sequence[Sequence[ScaleVariance]], weights: Sequence[float]
+) -> tuple[ScaleVariance, ...]:
+    """Return the mean variances of independent signals at the scales that all of them have."""
+    shares = np.array(weights, float) / sum(weights)
+    return tuple(
+        ScaleVariance(
+            same[0].samples,
+            float(shares @ [s.variance for s in same]),
+            float(np.linalg.norm(shares * [s.deviation for s in same])),
+        )
+        for same in zip(*parts, strict=False)
+    )

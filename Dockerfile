@@ -8,7 +8,7 @@ WORKDIR /opt/mrbench
 ARG PIP_EXTRA_INDEX_URL=
 # Dependencies first: an edit of the sources does not load them again.
 COPY pyproject.toml README.md ./
-RUN pip install --no-cache-dir '.[identification,sim,export,postgres]'
+RUN pip install --no-cache-dir '.[identification,sim,export,postgres,s3]'
 COPY bench bench
 COPY drivers drivers
 COPY identification identification

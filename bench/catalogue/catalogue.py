@@ -23,7 +23,7 @@ from bench.catalogue.planning import (
     MethodStore,
     SpecimenStore,
 )
-from bench.catalogue.records import EventJournal, Notebook, SignatureStore
+from bench.catalogue.records import EventJournal, LogCopies, Notebook, SignatureStore
 from bench.catalogue.run_filter import RunFilter
 from bench.methods import list_shipped_methods, load_method
 
@@ -48,6 +48,7 @@ class Catalogue:
         self.users, self.tokens, self.sessions = UserStore(engine), TokenStore(engine), SessionStore(engine)
         self.notebook, self.event_journal = Notebook(engine), EventJournal(engine)
         self.signatures = SignatureStore(engine)
+        self.log_copies = LogCopies(engine)
         self.change_counter = ChangeCounter(engine)
         self._engine = engine
         # Rows are read after their session has ended, so they must not expire with it.
@@ -142,9 +143,11 @@ class Catalogue:
             return session.scalars(query).all()
 
     def list_present_logs(self) -> Sequence[tuple[str, str]]:
-        """Return id and log name of the runs with a stored hash whose log is not known to be missing."""
+        """Return id and log name of the runs with a stored hash whose log is expected here."""
         is_missing = func.coalesce(RunRow.integrity, "intact") == "missing"
-        query = select(RunRow.id, RunRow.log).where(RunRow.log_sha256.is_not(None), ~is_missing)
+        query = select(RunRow.id, RunRow.log).where(
+            RunRow.log_sha256.is_not(None), ~is_missing, RunRow.removed.is_(None)
+        )
         with self._sessions() as session:
             return [(run_id, log) for run_id, log in session.execute(query)]
 

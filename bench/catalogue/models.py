@@ -90,6 +90,14 @@ class RunRow(Base):
     """Hash that the latest check found in a changed log."""
     checked: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
     """UTC of the latest check."""
+    copy_url: Mapped[str | None] = mapped_column(Text, default=None)
+    """Address of the verified copy of the log in a log store; None without one."""
+    copied: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
+    """UTC at which the copy was verified."""
+    removed: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
+    """UTC at which the log was removed from this machine after its copy; None while it is here."""
+    fetched: Mapped[datetime | None] = mapped_column(UtcTime, default=None)
+    """UTC at which the log was last fetched from its copy."""
     lost: Mapped[dict[str, int] | None] = mapped_column(JSON(none_as_null=True), default=None)
     """Number of lost samples by channel; None until the end of the log was read."""
     alarms: Mapped[list[str] | None] = mapped_column(JSON(none_as_null=True), default=None)

@@ -67,6 +67,24 @@ def serve(
             "the address. By default an SQLite file in --data.",
         ),
     ] = None,
+    log_store: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            envvar="MRBENCH_LOG_STORE",
+            help="Store to which the logs of finished runs are copied, such as s3://BUCKET/PREFIX or "
+            "file:///FOLDER; the data folder keeps the address.",
+        ),
+    ] = None,
+    keep_local: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DAYS",
+            min=0,
+            help="Remove logs from --data when their verified copy in the log store is so old; they are fetched "
+            "when needed. By default none is removed.",
+        ),
+    ] = None,
     oidc: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="oidc.toml of the provider (OpenID Connect) by which persons sign in."),
@@ -96,6 +114,8 @@ def serve(
         allow_plain_scheduler=plain_scheduler,
         tls=None if tls_cert is None or tls_key is None else TlsFiles(tls_cert, tls_key),
         catalogue=catalogue,
+        log_store=log_store,
+        keep_local=keep_local,
         oidc=oidc,
         is_terminal=sys.stdout.isatty(),
     )

@@ -6,9 +6,11 @@ import uuid
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, cast
 
 from bench.catalogue import UNFINISHED_STATES, Catalogue, CatalogueUnavailableError, JobRow, RunRow
+from bench.errors import LogError
 from bench.jobs.engine import JobEngine
 from bench.jobs.errors import JobError
 from bench.jobs.job_spec import (
@@ -46,8 +48,22 @@ class JobManager:
     A job that was unfinished when the service ended is submitted again under its key.
     """
 
-    def __init__(self, catalogue: Catalogue, engine: JobEngine, on_changed: Callable[[JobRow], None]) -> None:
-        """Use a catalogue and an engine; ``on_changed`` receives every changed job, in the event loop."""
+    def __init__(
+        self,
+        catalogue: Catalogue,
+        engine: JobEngine,
+        on_changed: Callable[[JobRow], None],
+        locate_log: Callable[[RunRow], Path] | None = None,
+    ) -> None:
+        """Use a catalogue and an engine.
+
+        Args:
+            catalogue: catalogue of runs and jobs.
+            engine: executes the jobs.
+            on_changed: receives every changed job, in the event loop.
+            locate_log: returns the path of a run's log and fetches it if it is not here; by default its path.
+        """
+        self._locate_log = locate_log or (lambda run: catalogue.resolve_path(run.log))
         self._catalogue, self._queue = catalogue, catalogue.job_queue
         self._engine = engine
         self._on_changed = on_changed
@@ -217,7 +233,7 @@ class JobManager:
     async def _submit(self, job: JobRow) -> None:
         try:
             spec = await asyncio.to_thread(self._make_spec, job)
-        except JobError as error:
+        except (JobError, LogError) as error:
             await self.on_failed(job.id, str(error))
             return
         async with self._submission_lock:
@@ -230,11 +246,12 @@ class JobManager:
 
         Raises:
             JobError: its run or its model no longer exists.
+            LogError: a log is in a log store only, and cannot be fetched.
         """
         run = self._catalogue.get_run(job.run_id)
         if run is None:
             raise JobError(f"run {job.run_id} is no longer in the catalogue")
-        log = self._catalogue.resolve_path(run.log)
+        log = self._locate_log(run)
         paths = {name: self._find_file(self._catalogue.get_job(source)) for name, source in job.inputs.items()}
         if paths.get("model") == "":
             raise JobError(f"the result of job {job.inputs['model']}, its model, was removed; give another model")
@@ -244,7 +261,7 @@ class JobManager:
             job_id=job.id,
             key=job.key,
             log=str(log),
-            logs=tuple(str(self._catalogue.resolve_path(one.log)) for one in runs),
+            logs=tuple(str(self._locate_log(one)) for one in runs),
             result=str(get_result_folder(log, job.kind, job.key)),
             settings=settings,
             submission=job.submissions,

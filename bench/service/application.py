@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from bench.catalogue import Catalogue, JobRow, RunRow, locate_catalogue, open_da
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
 from bench.live import LiveBatch, LiveBroadcaster, serialise_message
+from bench.log_store import LocalLogs, LogCopier
 from bench.oidc import OidcConfig, Provider
 from bench.samples import SampleStore
 from bench.service import problems
@@ -81,6 +83,10 @@ class AppSettings:
     """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
     oidc: OidcConfig | None = None
     """Provider by which persons sign in; None for local users and tokens only."""
+    log_store: str | None = None
+    """URL of the store to which logs are copied; None without one."""
+    keep_local: float | None = None
+    """Days after which a copied log is removed from this machine; None for never."""
 
 
 def create_app(settings: AppSettings | None = None) -> FastAPI:
@@ -147,6 +153,8 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         stack.enter_context(context.audit)
         stack.enter_context(NotificationSender(context.campaigns.store))
         stack.enter_context(context.campaigns)
+        if context.log_copier is not None:
+            stack.enter_context(context.log_copier)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.live.publish_clock()))
         yield
@@ -176,7 +184,8 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         elif isinstance(message, LiveBatch):
             campaigns.thermometer.take(message)
 
-    job_manager = JobManager(catalogue, engine, on_job_changed)
+    local_logs = LocalLogs(catalogue)
+    job_manager = JobManager(catalogue, engine, on_job_changed, local_logs.locate)
     monitor = AgentMonitor(settings.link, on_message, on_status)
     audit = AuditTrail(settings.data, settings.link.send)
     recorded = RecordedConnection(monitor, audit.record)
@@ -195,9 +204,19 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         SampleStore(settings.data),
         campaigns,
         audit,
+        local_logs,
         provider=None if settings.oidc is None else Provider(settings.oidc),
+        log_copier=_make_copier(settings, catalogue, local_logs),
     )
     return context
+
+
+def _make_copier(settings: AppSettings, catalogue: Catalogue, local_logs: LocalLogs) -> LogCopier | None:
+    if settings.log_store is None:
+        return None
+    days = settings.keep_local
+    remove_old = (lambda: None) if days is None else partial(local_logs.remove_old, days)
+    return LogCopier(catalogue, settings.log_store, remove_old)
 
 
 async def _cancel_task(task: "asyncio.Task[None]") -> None:

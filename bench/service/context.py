@@ -15,6 +15,7 @@ from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.live import LiveBroadcaster
+from bench.log_store import LocalLogs, LogCopier
 from bench.oidc import Provider
 from bench.people import AttemptCounter, SignInCodes
 from bench.samples import SampleStore
@@ -60,6 +61,7 @@ class ServiceContext:
     sample_store: SampleStore
     campaigns: CampaignExecutor
     audit: AuditTrail
+    local_logs: LocalLogs
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
     """Locks of the idempotency keys of requests in progress."""
     attempts: AttemptCounter = field(default_factory=AttemptCounter)
@@ -68,6 +70,8 @@ class ServiceContext:
     """Codes for another device; the owner is kind and subject of a session."""
     provider: Provider | None = None
     """Provider by which persons sign in; None without one."""
+    log_copier: LogCopier | None = None
+    """Copies the logs to a store; None without one."""
 
     @property
     def data(self) -> Path:
@@ -89,6 +93,14 @@ class ServiceContext:
         if row is None:
             raise make_not_found("run", run_id)
         return row
+
+    def locate_log(self, row: RunRow) -> Path:
+        """Return the path of the log of a run; fetch a log that was removed after its copy.
+
+        Raises:
+            LogError: it cannot be fetched.
+        """
+        return self.local_logs.locate(row)
 
     def get_job(self, job_id: str) -> JobRow:
         """Return the job with this id.

@@ -14,6 +14,7 @@ from starlette.exceptions import HTTPException
 from bench.campaigns import CampaignDocumentError
 from bench.catalogue import CatalogueUnavailableError
 from bench.errors import AgentUnreachableError, BenchError, LogError, MethodError, NoRigError, RecordingError
+from bench.log_store import LogStoreUnavailableError
 from bench.people import Right, find_roles
 from bench.service.access import Identity
 
@@ -125,7 +126,7 @@ RESPONSES: dict[int | str, dict[str, Any]] = {
         (409, "Not possible in the present state"),
         (413, "The body is too large"),
         (422, "The request is invalid"),
-        (503, "The rig agent or the catalogue does not answer"),
+        (503, "The rig agent, the catalogue or the log store does not answer"),
     )
 }
 """Error responses of every route."""
@@ -155,6 +156,12 @@ _BENCH_PROBLEMS: tuple[tuple[type[BenchError], HTTPStatus, str, str], ...] = (
         HTTPStatus.SERVICE_UNAVAILABLE,
         "catalogue-unavailable",
         "The catalogue cannot be used at present",
+    ),
+    (
+        LogStoreUnavailableError,
+        HTTPStatus.SERVICE_UNAVAILABLE,
+        "log-store-unavailable",
+        "The log store cannot be used at present",
     ),
     (LogError, HTTPStatus.CONFLICT, "log-unusable", "The log cannot be used"),
     (BenchError, HTTPStatus.CONFLICT, "not-possible", "Not possible"),

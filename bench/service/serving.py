@@ -19,6 +19,7 @@ from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samp
 from bench.catalogue import keep_address, locate_catalogue, open_database
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr
+from bench.log_store import find_store, keep_store_url
 from bench.oidc import load_oidc_config
 from bench.processes import open_privately
 from bench.service.access import PLAIN_TOKEN_FILE, open_access, save_token
@@ -78,6 +79,10 @@ class ServeOptions:
     """Files of HTTPS; without them, the service answers plain HTTP."""
     catalogue: str | None = None
     """URL of the catalogue's database, which the data folder keeps; by default that of its last start."""
+    log_store: str | None = None
+    """URL of the store for copies of the logs, which the data folder keeps; by default that of its last start."""
+    keep_local: float | None = None
+    """Days after which a copied log is removed from this machine; None for never."""
     oidc: Path | None = None
     """``oidc.toml`` of the provider by which persons sign in."""
     is_terminal: bool = False
@@ -97,6 +102,7 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
         SecretFileError: a file with a secret is missing, or other users may read it.
         ConfigError: ``bench.toml``, ``oidc.toml`` or the address of the agent is invalid.
         CatalogueError: the catalogue cannot be opened, or another one is in the data folder.
+        LogStoreError: the address of the log store is not valid.
     """
     log_to_stderr()
     if options.tls is not None:
@@ -106,6 +112,8 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
     link, commands = _make_agent_link(options)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
         _prepare_catalogue(data, options.catalogue)
+        if options.log_store is not None:
+            keep_store_url(data, options.log_store)
         supervisor = _supervise_agent(options, link, data)
         # Until now a client is refused at once; it would wait in vain for as long as the agent takes to start.
         with _explain_address_error(options.host, options.port):
@@ -121,6 +129,8 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
                 has_local_logs=commands is None or _is_local(commands),
                 hosts=LOOPBACK_NAMES if loopback else ("*",),
                 oidc=oidc,
+                log_store=find_store(data),
+                keep_local=options.keep_local,
             )
         )
         host, port = listener.getsockname()[:2]

@@ -20,7 +20,7 @@ class View(BaseModel):
 
 
 class Health(View):
-    """State of agent, worker, disk, queue, audit trail and clocks, each in words."""
+    """State of agent, worker, disk, queue, audit trail, clocks and log store, each in words."""
 
     version: str
     agent: str = Field(description="`ok`, or the reason why it is not available")
@@ -32,6 +32,9 @@ class Health(View):
     calibration: str = Field(
         description="`ok`, or the channels whose calibration is overdue or due within 14 days, with the date, or "
         "whose latest check is out of control"
+    )
+    log_store: str = Field(
+        description="`ok`, `not used`, or the number of logs that wait for their copy, and why the store fails"
     )
 
 
@@ -123,6 +126,11 @@ class Integrity(View):
     recorded_sha256: str | None = Field(description="hash of the log as it was recorded; fits refer to it")
     found_sha256: str | None = Field(description="hash at the latest comparison; null if the log was missing")
     checked: datetime | None = Field(description="UTC of the latest comparison")
+    copy_url: str | None = Field(description="address of the verified copy in the log store; null without one")
+    copied: datetime | None = Field(description="UTC at which the copy was verified")
+    removed: datetime | None = Field(
+        description="UTC at which the log was removed from this machine; null while it is here"
+    )
 
 
 class RunPage(View):

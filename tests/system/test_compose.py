@@ -21,6 +21,8 @@ ROOT = Path(__file__).parents[2]
 FILE = ROOT / "docker-compose.yml"
 PROGRAMS = Path(sys.executable).parent
 COMPOSE = shutil.which("docker-compose")
+SERVERS = {"database": ["CMD", "pg_isready"], "objects": ["CMD", "mc", "ready"]}
+"""Health checks of the servers that are not ours."""
 ORDER = ("scheduler", "sim", "rig", "worker", "service")
 
 
@@ -37,19 +39,20 @@ def dockerfile(word):
     COMPOSE is None, reason="docker-compose is not installed; run `apt-get install docker-compose`"
 )
 def test_docker_compose_reads_the_file():
-    words = [COMPOSE, "-f", FILE, "--profile", "simulated", "--profile", "postgres", "config", "--services"]
+    profiles = [word for name in ("simulated", "postgres", "object-store") for word in ("--profile", name)]
+    words = [COMPOSE, "-f", FILE, *profiles, "config", "--services"]
     read = subprocess.run(words, capture_output=True, text=True, check=False)
     assert read.returncode == 0, read.stderr
-    assert set(read.stdout.split()) == {*ORDER, "database"}
+    assert set(read.stdout.split()) == {*ORDER, *SERVERS}
 
 
 def test_every_container_is_started_again_and_has_a_health_check_and_the_network_of_the_scheduler():
     for name, service in services().items():
         assert service["restart"] == "unless-stopped"
-        checks = ["CMD", "pg_isready"] if name == "database" else ["CMD", "mrbench", "health"]
+        checks = SERVERS.get(name, ["CMD", "mrbench", "health"])
         assert service["healthcheck"]["test"][: len(checks)] == checks
         assert service.get("network_mode") == (None if name == "scheduler" else "service:scheduler")
-    assert [name for name, service in services().items() if "profiles" in service] == ["sim", "database"]
+    assert [name for name, service in services().items() if "profiles" in service] == ["sim", *SERVERS]
     assert {"mem_limit", "cpus"} <= services()["worker"].keys()
 
 
@@ -58,6 +61,14 @@ def test_service_and_database_share_the_password_which_is_not_in_the_file():
     assert service["environment"]["PGPASSWORD"] == database["environment"]["POSTGRES_PASSWORD"]
     assert service["environment"]["PGPASSWORD"] == "${POSTGRES_PASSWORD:-}"
     assert "listen_addresses=127.0.0.1" in database["command"]
+
+
+def test_service_and_object_store_share_the_credentials_which_are_not_in_the_file():
+    service, objects = services()["service"]["environment"], services()["objects"]
+    assert service["AWS_ACCESS_KEY_ID"] == objects["environment"]["MINIO_ROOT_USER"]
+    assert service["AWS_SECRET_ACCESS_KEY"] == objects["environment"]["MINIO_ROOT_PASSWORD"]
+    assert service["AWS_SECRET_ACCESS_KEY"] == "${AWS_SECRET_ACCESS_KEY:-}"
+    assert "--address 127.0.0.1:9000" in objects["entrypoint"][-1]
 
 
 def test_the_image_contains_all_packages():

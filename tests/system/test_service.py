@@ -41,13 +41,13 @@ TINY = {
 class ServiceProcess:
     """A service process on a data folder."""
 
-    def __init__(self, data, token=None, command=MRBENCH, options=()):
+    def __init__(self, data, token=None, command=MRBENCH, options=(), environment=None):
         self.log = data.parent / "service.log"
         self.log.unlink(missing_ok=True)
         command = [*command, "serve", "--port", "0", "--data", str(data), *options]
         with self.log.open("w") as log:
             self.process = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=log, text=True, env=ENVIRONMENT
+                command, stdout=subprocess.PIPE, stderr=log, text=True, env=environment or ENVIRONMENT
             )
         line = self.process.stdout.readline()
         found = re.match(r"(http://127\.0\.0\.1:\d+/) \(the token is (new|unchanged)", line)

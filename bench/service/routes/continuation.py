@@ -65,7 +65,7 @@ def _find_continuation(context: ServiceContext, row: RunRow) -> tuple[Method, st
     if row.state == "running" or row.ending == "completed":
         present = "is in progress" if row.state == "running" else "was completed"
         raise make_conflict("nothing-to-resume", "Nothing to resume", f"run {row.id} {present}; start a new run")
-    path = context.catalogue.resolve_path(row.log)
+    path = context.locate_log(row)
     document, checkpoint = _read_plan(path)
     if not checkpoint:
         raise make_conflict(

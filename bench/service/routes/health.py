@@ -41,6 +41,7 @@ def _describe_parts(context: ServiceContext) -> dict[str, str]:
         "queue": _describe_from_catalogue(_describe_queue, context),
         "audit": context.audit.describe_state(),
         "clocks": describe_clocks(context.monitor.latest_status),
+        "log_store": "not used" if context.log_copier is None else context.log_copier.describe_state(),
         "calibration": _describe_from_catalogue(describe_calibration, context),
     }
 

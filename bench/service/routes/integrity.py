@@ -3,6 +3,7 @@
 from fastapi import APIRouter
 
 from bench.catalogue import RunRow, check_integrity
+from bench.log_store import hash_object
 from bench.service.context import Context
 from bench.service.problems import make_conflict
 from bench.service.views import Integrity
@@ -24,7 +25,7 @@ def check_run_integrity(run_id: str, context: Context) -> Integrity:
         raise make_conflict(
             "no-stored-hash", "No stored hash", f"run {run_id} is {row.state}; only a complete log has a hash"
         )
-    return _make_view(check_integrity(context.catalogue, row))
+    return _make_view(check_integrity(context.catalogue, row, lambda url: hash_object(url)[0]))
 
 
 def _make_view(row: RunRow) -> Integrity:
@@ -33,4 +34,7 @@ def _make_view(row: RunRow) -> Integrity:
         recorded_sha256=row.log_sha256,
         found_sha256=row.log_sha256 if row.integrity == "intact" else row.found_sha256,
         checked=row.checked,
+        copy_url=row.copy_url,
+        copied=row.copied,
+        removed=row.removed,
     )

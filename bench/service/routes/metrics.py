@@ -12,6 +12,7 @@ from prometheus_client.registry import Collector
 from bench.agent_protocol import AgentStatus, InstrumentStatus
 from bench.disk import find_free_space
 from bench.errors import RunError
+from bench.log_store import CopyCounts
 from bench.service.context import Context, ServiceContext
 
 router = APIRouter(tags=["service"])
@@ -43,6 +44,8 @@ class ServiceCollector(Collector):
         yield from _collect_disk(context)
         yield _make_counts("mrbench_jobs", "Jobs by state", context.catalogue.job_queue.count_states())
         yield _make_counts("mrbench_runs", "Runs by state", context.catalogue.count_runs())
+        if context.log_copier is not None:
+            yield from _collect_copies(context.log_copier.count())
         if status is not None:
             yield from _collect_bench(status)
 
@@ -53,6 +56,14 @@ def _collect_disk(context: ServiceContext) -> Iterator[Metric]:
     except RunError:  # without a value the metric is absent, which an alert can test
         return
     yield _make_gauge("mrbench_disk_free_bytes", "Free space of the data folder's disk", free)
+
+
+def _collect_copies(counts: CopyCounts) -> Iterator[Metric]:
+    yield _make_gauge("mrbench_log_store_up", "0 if the log store did not answer", counts.is_reachable)
+    yield _make_gauge("mrbench_logs_waiting", "Logs without a verified copy in the log store", counts.waiting)
+    copied, failed = "Logs copied since the start of the service", "Failed copies since the start of the service"
+    yield CounterMetricFamily("mrbench_logs_copied", copied, value=counts.copied)
+    yield CounterMetricFamily("mrbench_log_copies_failed", failed, value=counts.failed)
 
 
 def _collect_bench(status: AgentStatus) -> Iterator[Metric]:

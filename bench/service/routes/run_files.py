@@ -13,7 +13,7 @@ router = APIRouter(prefix="/runs", tags=["runs"])
 @router.get("/{run_id}/log", response_class=FileResponse, responses=describe_file("application/octet-stream"))
 def get_log(run_id: str, context: Context) -> SnapshotResponse:
     """Return the log as MCAP; during the run, the part written until the request. Ranges are supported."""
-    path = context.catalogue.resolve_path(context.get_run(run_id).log)
+    path = context.locate_log(context.get_run(run_id))
     try:
         return SnapshotResponse(path, "application/octet-stream", path.name)
     except FileNotFoundError:

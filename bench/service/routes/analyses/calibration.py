@@ -52,7 +52,7 @@ def get_calibrated_fit(run_id: str, context: Context) -> CalibratedFit:
     if list(fit.provenance.logs.values()) != [row.log_sha256] or "n" not in fit.parameters:
         detail = f"fit {job.id} is not of the log of run {run_id} alone; no certificates belong to it"
         raise make_conflict("several-logs", "The fit is of several logs", detail)
-    record = read_log_summary(context.catalogue.resolve_path(row.log)).calibration
+    record = read_log_summary(context.locate_log(row)).calibration
     coordinates, parameters = (_combine(part, fit, record) for part in (fit.coordinates, fit.parameters))
     return CalibratedFit(fit=job.id, formula=GAIN_FORMULA, coordinates=coordinates, parameters=parameters)
 

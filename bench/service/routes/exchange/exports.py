@@ -1,6 +1,7 @@
 """Route that returns the samples of a run for other tools."""
 
 import asyncio
+from pathlib import Path
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
@@ -28,10 +29,10 @@ async def export_samples(
     """Return the samples of a run with a complete log; the file is made at the request, in some seconds."""
     row = await asyncio.to_thread(context.get_run, run_id)
     check_complete(row, "exported")
-    log = context.catalogue.resolve_path(row.log)
 
     def write(out: str) -> None:
+        log = context.locate_log(row)
         run_command(["export", str(log), "--format", file_format, "--out", out], LogError)
 
-    name = f"{log.stem}.{file_format}"
+    name = f"{Path(row.log).stem}.{file_format}"
     return await asyncio.to_thread(send_temporary_file, context.data, name, MEDIA_TYPES[file_format], write)

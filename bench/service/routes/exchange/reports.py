@@ -107,7 +107,7 @@ def _make_report(
 
 
 def _run_report(context: ServiceContext, row: RunRow, results: list[JobRow], out: str) -> None:
-    log = context.catalogue.resolve_path(row.log)
+    log = context.locate_log(row)
     run_command(["report", str(log), *_list_documents(context, results), "--out", out], ReportError)
 
 

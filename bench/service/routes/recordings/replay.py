@@ -34,7 +34,7 @@ def replay_run(run_id: str, context: Context) -> ReplayView:
 
     Nothing is changed. The samples themselves are at `/runs/{run_id}/samples`.
     """
-    results = replay_frames(context.catalogue.resolve_path(context.get_run(run_id).log))
+    results = replay_frames(context.locate_log(context.get_run(run_id)))
     instruments = tuple(ReplayedInstrument.model_validate(one._asdict()) for one in results)
     return ReplayView(
         equal=all(one.is_equal for one in results), instruments=instruments, text=describe_replay(results)

@@ -73,7 +73,7 @@ def load_samples(context: ServiceContext, run_id: str) -> SampleTable:
         LogError: its log is missing, is still being written, is truncated or damaged.
     """
     row = context.get_run(run_id)
-    return context.sample_store.load(context.catalogue.resolve_path(row.log), row.log_sha256)
+    return context.sample_store.load(context.locate_log(row), row.log_sha256)
 
 
 def _select_channels(table: SampleTable, names: list[str] | None) -> SampleTable:

@@ -45,6 +45,24 @@ def test_waiting_jobs_are_counted(service):
     service.wait_for("/health", lambda health: health["queue"] == "0 running, 1 waiting")
 
 
+def test_the_log_store_has_words_and_numbers(service, tmp_path):
+    assert service.get("/health")["log_store"] == "not used"
+    write_complete_log(service.data / "one.mcap")
+    service.scan()
+    service.start(log_store=f"file://{tmp_path}/store")
+    service.wait_for("/health", lambda health: "bucket or folder of the log store" in health["log_store"])
+    metrics = read_metrics(service)
+    assert (metrics["mrbench_log_store_up",], metrics["mrbench_logs_waiting",]) == (0, 1)
+    (tmp_path / "store").mkdir()
+    service.start(log_store=f"file://{tmp_path}/store")
+    copied = service.wait_for("/runs/run-1/integrity", lambda integrity: integrity["copied"] is not None)
+    assert copied["copy_url"].startswith(f"file://{tmp_path}/store/one.")
+    service.wait_for("/health", lambda health: health["log_store"] == "ok")
+    metrics = read_metrics(service)
+    assert metrics["mrbench_log_store_up",] == metrics["mrbench_logs_copied_total",] == 1
+    assert metrics["mrbench_logs_waiting",] == metrics["mrbench_log_copies_failed_total",] == 0
+
+
 @pytest.mark.parametrize(
     ("bound", "words"),
     [(None, "ok"), (0.001, "ok"), (0.0034, "lvdt within 3.4 ms only")],

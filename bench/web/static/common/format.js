@@ -18,6 +18,9 @@ export function significant(value, digits = 4) {
 /** Writes a name of a document, such as `seal_friction`, with spaces. */
 export const spaced = (name) => name.replaceAll("_", " ");
 
+/** Writes a line of a command as a sentence whose numbers keep their unit; a coordinate at its beginning keeps its case. */
+export const sentence = (line) => `${line.replace(/^(?!(n|eta|rho)\b)[a-z]/, (letter) => letter.toUpperCase()).replace(/(\d) (?=[%A-Z])/g, "$1\u00a0")}.`;
+
 /** Formats a duration [s]: `42 s`, `2 min 14 s`, `1 h 05 min`. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";

@@ -29,10 +29,10 @@ const show = (selector) => page.locator(selector).first().evaluate((one) => {
 });
 const section = (name) => `section[aria-label="${name}"]`;
 
-/** Returns the newest run of a specimen and method whose diagnosis is stored. */
-async function findRun(specimen, method) {
+/** Returns the newest run of a specimen and method with a stored result, by default the diagnosis. */
+async function findRun(specimen, method, result = "diagnose") {
   const { items } = await ask(`runs?specimen=${specimen}&method=${method}&outcome=clean`);
-  return items.find(({ jobs }) => jobs.some(({ kind, state }) => kind === "diagnose" && state === "done")).id;
+  return items.find(({ jobs }) => jobs.some(({ kind, state }) => kind === result && state === "done")).id;
 }
 
 /** Starts a run in the page and waits until its plots are full. */
@@ -87,9 +87,9 @@ async function run() {
   const id = await findRun("MR-0042", "quick");
   await open(`#/runs/${id}`, section("Diagnosis"), "probability", SLOW);
   await take("run");
-  for (const [name, part] of [["diagnosis", "Diagnosis"], ["next-stroke", "Next stroke"], ["force", "Measured over simulated"], ["parameters", "Parameters"]]) {
+  for (const [name, part] of [["diagnosis", "Diagnosis"], ["force", "Measured over simulated"], ["parameters", "Parameters and force error by drive"]]) {
+    await page.waitForTimeout(2_000); // the figures above and in it are loaded
     await show(section(part));
-    await page.waitForTimeout(2_000); // figures are loaded
     await take(name);
   }
 }
@@ -104,15 +104,17 @@ async function replay() {
 }
 
 async function compare() {
-  const [first, second] = [await findRun("MR-0042", "quick"), await findRun("MR-0107", "quick")];
+  const [first, second] = [await findRun("MR-0042", "quick"), await findRun("MR-0107", "quick", "identify")];
   await open(`#/compare?run=${first}&run=${second}&reference=${first}`, section("Peak force against velocity"), "", SLOW);
+  await page.waitForTimeout(2_000); // figures are drawn
+  await show(section("Overlay of one stroke, cycles aligned by phase"));
   await take("compare");
-  await show(section("Tolerance band of the reference"));
-  await take("tolerance");
 }
 
 async function specimen() {
-  await open("#/specimens/MR-0107?quantity=gas_spring.preload", "#specimen-parts", "Cause");
+  await open("#/specimens/MR-0042?quantity=fit.k0", "#specimen-parts .drift", "");
+  await page.waitForTimeout(2_000);
+  await show("#specimen-parts section:nth-of-type(2)");
   await take("specimen");
 }
 
@@ -129,8 +131,10 @@ async function report() {
   await show("section[aria-labelledby=campaign-trends-title]");
   await take("campaign-trends");
   const text = await fetch(`${url}/api/v1/campaigns/${campaign}/report`, { headers: { Authorization: `Bearer ${token}` } });
+  await page.goto("about:blank");
   await page.setContent(await text.text());
   await take("campaign-report");
+  await page.goto("about:blank"); // the next address is opened as a new page
 }
 
 async function people() {

@@ -15,6 +15,12 @@ export function significant(value, digits = 4) {
   return text.replaceAll("-", "−").replace("e+", "e");
 }
 
+/** Returns the unit that suits the size of a quantity in SI, and the factor to it: small lengths in mm or µm, short times in ms. */
+export function suitUnit(unit, size) {
+  if (unit === "m" && Math.abs(size) < 1) return Math.abs(size) < 1e-3 ? ["µm", 1e6] : ["mm", 1e3];
+  return unit === "s" && Math.abs(size) < 1 ? ["ms", 1e3] : [unit, 1];
+}
+
 /** Writes a name of a document, such as `seal_friction`, with spaces. */
 export const spaced = (name) => name.replaceAll("_", " ");
 

@@ -50,7 +50,7 @@ async function walk() {
 }
 
 async function readBoard() {
-  await hasText("#campaign-trends", "hours since the start");
+  await hasText("#campaign-trends", "minutes since the start");
   seen.facts = await text("#campaign-facts");
   seen.matrix = await page.locator("#campaign-matrix tbody tr").allInnerTexts();
   seen.heads = await text("#campaign-matrix thead");

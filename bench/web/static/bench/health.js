@@ -6,6 +6,8 @@ import { byId, element, shortTime, spaced } from "../common/format.js";
 const PERIOD_MS = 5_000;
 /** Error of a clock [s] above which it is marked; a sample lasts a millisecond. */
 const CLOCK_ERROR_S = 1e-3;
+/** Order of the entries, whichever of them arrives first. */
+const ORDER = ["Service", "Agent", "Wires", "Clocks", "Worker", "Queue", "Disk", "Calibration"];
 
 export class HealthStrip {
   constructor() {
@@ -49,7 +51,8 @@ export class HealthStrip {
     const text = JSON.stringify(this.entries);
     if (text === this.shown) return;
     this.shown = text;
-    byId("health").replaceChildren(...Object.entries(this.entries).map(([name, { kind, text: words }]) =>
+    const shown = ORDER.filter((name) => this.entries[name]).map((name) => [name, this.entries[name]]);
+    byId("health").replaceChildren(...shown.map(([name, { kind, text: words }]) =>
       element("li", {}, element("span", { className: `mark ${kind}` }, name), ` ${words}`)));
   }
 }

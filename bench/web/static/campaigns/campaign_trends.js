@@ -9,7 +9,8 @@ import { runAddress } from "../common/router.js";
 import { rowTable } from "../common/tables.js";
 
 const HEIGHT = 150;
-const HOUR_MS = 3_600_000;
+/** Units of the time since the start; the first counts while the campaign is shorter than `below` of them. */
+const TIMES = [{ name: "minutes", unit: "min", ms: 60_000, below: 120 }, { name: "hours", unit: "h", ms: 3_600_000, below: Infinity }];
 
 export class CampaignTrends {
   /** Fills a node with a choice of the parameter, and the trends of the chosen one. */
@@ -42,9 +43,11 @@ export class CampaignTrends {
   figure(trend) {
     const name = `${spaced(trend.parameter)}${trend.unit === "1" ? "" : ` [${trend.unit}]`}`;
     const title = `${trend.specimen}, ${trend.method}, ${describeDrive(trend.drive, trend.drive_unit)}`;
+    const start = new Date(this.campaign.created);
+    const since = TIMES.find(({ ms, below }) => Math.max(...trend.points.map(({ at }) => new Date(at) - start)) < below * ms);
     const place = element("div", { className: "plot", role: "img", "aria-label": `${name} over time, ${title}; the table has the values` });
-    requestAnimationFrame(() => place.isConnected && this.plots.push(draw(trend, new Date(this.campaign.created), place)));
-    return element("figure", {}, element("figcaption", {}, `${title}: ${name} over hours since the start [h]`), place, makeTable(trend, title, name));
+    requestAnimationFrame(() => place.isConnected && this.plots.push(draw(trend, start, since, place)));
+    return element("figure", {}, element("figcaption", {}, `${title}: ${name} over ${since.name} since the start [${since.unit}]`), place, makeTable(trend, title, name));
   }
 }
 
@@ -59,33 +62,33 @@ function makeTable({ points }, title, name) {
 }
 
 /** Draws values as points with their intervals. */
-function draw({ points }, start, place) {
-  const hours = points.map(({ at }) => (new Date(at) - start) / HOUR_MS);
+function draw({ points }, start, { ms, unit }, place) {
+  const times = points.map(({ at }) => (new Date(at) - start) / ms);
   const values = points.map(({ value }) => value);
   const halves = points.map(({ half_width: half }) => half ?? 0);
   const low = Math.min(...values.map((value, k) => value - halves[k]));
   const high = Math.max(...values.map((value, k) => value + halves[k]));
   const margin = 0.1 * (high - low) || 0.05 * Math.abs(high) || 1;
-  const last = Math.max(...hours, 1e-3);
+  const last = Math.max(...times, 1e-3);
   return new AxesPlot(place, {
     least: { width: 160 }, height: HEIGHT, padding: [8, 16, 0, 0],
-    scales: { x: { time: false, range: () => [Math.min(0, ...hours), last * 1.05] }, y: { range: () => [low - margin, high + margin] } },
-    axes: [axis({ size: 28, space: 60, values: (u, all) => all.map((h) => `${h} h`) }), axis({ size: 64, space: 26, values: signed })],
+    scales: { x: { time: false, range: () => [Math.min(0, ...times), last * 1.05] }, y: { range: () => [low - margin, high + margin] } },
+    axes: [axis({ size: 28, space: 60, values: (u, all) => all.map((one) => `${one} ${unit}`) }), axis({ size: 64, space: 26, values: signed })],
     series: [{}, { stroke: () => colour("--accent"), width: 1, points: { show: true, size: 7, fill: () => colour("--accent") } }],
-    hooks: { draw: [(u) => drawIntervals(u, hours, values, halves)] },
-  }, [hours, values]);
+    hooks: { draw: [(u) => drawIntervals(u, times, values, halves)] },
+  }, [times, values]);
 }
 
-function drawIntervals(u, hours, values, halves) {
+function drawIntervals(u, times, values, halves) {
   const { ctx } = u;
   ctx.save();
   ctx.strokeStyle = colour("--accent");
   ctx.lineWidth = devicePixelRatio;
   ctx.beginPath();
-  hours.forEach((hour, k) => {
+  times.forEach((time, k) => {
     if (!halves[k]) return;
-    ctx.moveTo(...position(u, hour, values[k] - halves[k]));
-    ctx.lineTo(...position(u, hour, values[k] + halves[k]));
+    ctx.moveTo(...position(u, time, values[k] - halves[k]));
+    ctx.lineTo(...position(u, time, values[k] + halves[k]));
   });
   ctx.stroke();
   ctx.restore();

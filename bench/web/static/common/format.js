@@ -15,8 +15,17 @@ export function significant(value, digits = 4) {
   return text.replaceAll("-", "−").replace("e+", "e");
 }
 
+/** Returns the unit that suits the size of a quantity in SI, and the factor to it: small lengths in mm or µm, short times in ms. */
+export function suitUnit(unit, size) {
+  if (unit === "m" && Math.abs(size) < 1) return Math.abs(size) < 1e-3 ? ["µm", 1e6] : ["mm", 1e3];
+  return unit === "s" && Math.abs(size) < 1 ? ["ms", 1e3] : [unit, 1];
+}
+
 /** Writes a name of a document, such as `seal_friction`, with spaces. */
 export const spaced = (name) => name.replaceAll("_", " ");
+
+/** Writes a line of a command as a sentence whose numbers keep their unit; a coordinate at its beginning keeps its case. */
+export const sentence = (line) => `${line.replace(/^(?!(n|eta|rho)\b)[a-z]/, (letter) => letter.toUpperCase()).replace(/(\d) (?=[%A-Z])/g, "$1\u00a0")}.`;
 
 /** Formats a duration [s]: `42 s`, `2 min 14 s`, `1 h 05 min`. */
 export function duration(seconds) {

@@ -3,7 +3,7 @@
 import { clearPlots } from "../common/axes_plot.js";
 import { CurvePlot } from "../common/curve_plot.js";
 import { forceText, inForceUnit, percent, shareInterval } from "./fit_tables.js";
-import { element, significant, spaced } from "../common/format.js";
+import { element, significant, spaced, suitUnit } from "../common/format.js";
 import { gapOverStroke, makeGapTable } from "./gap_map.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { factList, table } from "../common/tables.js";
@@ -76,8 +76,10 @@ function effectTable(effects) {
 
 const lines = (texts) => element("span", {}, ...texts.map((text) => element("span", { className: "line" }, text)));
 
-function interval({ value, unit, ci95: [low, high] }) {
-  return `${significant(value, 3)}${unit === "1" ? "" : ` ${raised(unit)}`} (${significant(low, 3)} … ${significant(high, 3)})`;
+/** A value with its unit and its interval; symbols of a formula stay in SI. */
+function interval({ value, unit, ci95: [low, high] }, [shown, factor] = suitUnit(unit, value)) {
+  const [at, from, to] = [value, low, high].map((one) => significant(one * factor, 3));
+  return `${at}${shown === "1" ? "" : ` ${raised(shown)}`} (${from} … ${to})`;
 }
 
 /** Bars of the force error on strokes that no fit has read: without the effects, with them, and the noise. */
@@ -133,7 +135,7 @@ function describeRemainder(remainder) {
 function describeDiscovery(discovery) {
   if (!discovery) return {};
   const { place, variables, formula, shrinkage, shrinkage_ci95: range } = discovery;
-  const symbols = Object.entries(formula?.symbols ?? {}).map(([name, value]) => `${name} = ${interval(value)}`);
+  const symbols = Object.entries(formula?.symbols ?? {}).map(([name, value]) => `${name} = ${interval(value, [value.unit, 1])}`);
   return {
     "Outside the library": [`${spaced(place)} over ${variables.map(spaced).join(" and ")}`, formula && element("small", { className: "path" }, formula.expression),
       ...symbols.map((text) => element("small", {}, text)), shrinkage === null ? null : element("small", {}, `Gap closed with it: ${percent(shrinkage)}${shareInterval(range)}.`)],

@@ -36,8 +36,9 @@ export function describeFit(run) {
   const { rmse_n: rmse, noise_floor_n: floor } = run;
   if (!isFitted(run)) return ["–"];
   const ratio = floor > 0 ? `${fixed(rmse / floor, 2)} times the noise floor` : "noise floor not known";
-  return [element("span", { className: "number" }, `${newtons(rmse)} / ${newtons(floor)}`),
-    element("small", {}, run.result === "converged" ? ratio : `${ratio}; ${run.result}`)];
+  const result = run.result.replace(/^converged(; )?/, "");
+  const words = result.includes(ratio) ? result : [ratio, result].filter(Boolean).join("; ");
+  return [element("span", { className: "number" }, `${newtons(rmse)} / ${newtons(floor)}`), element("small", {}, words)];
 }
 
 /** Sentence that says why a run has no result of a kind of job, and what to do. */

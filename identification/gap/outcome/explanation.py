@@ -18,6 +18,8 @@ _EXPLAINABLE_THRESHOLD = 0.3
 """Explainable share above which the remainder counts as explainable."""
 _LIKELY_ALTERNATIVE = 0.1
 """Smallest probability of an alternative that is mentioned."""
+_SMALL_UNITS = {"m": ((1e6, "µm", 1e-3), (1e3, "mm", 1.0)), "s": ((1e3, "ms", 1.0),)}
+"""Units of small values, each with its factor and the value [SI] below which it is used."""
 _CHECKS: dict[str, str] = {
     "field_saturation": "step the drive upwards at one stroke, and find where the force stops increasing",
     "magnetic_remanence": "compare the force at one drive on the way up and on the way down, then demagnetise",
@@ -146,12 +148,18 @@ def _describe_effects(effects: Sequence[NamedEffect]) -> str:
 
 
 def _describe_parameters(effect: NamedEffect) -> str:
-    values = [
-        f"{name} {p.value:.3g} {'' if p.unit == '1' else p.unit}".strip() for name, p in effect.parameters.items()
-    ]
+    values = [f"{name.replace('_', ' ')} {_format(p.value, p.unit)}" for name, p in effect.parameters.items()]
     known = EFFECTS.get(effect.name)
     meaning = known.meaning if known else "an effect of the user's own"
     return "; ".join([meaning, ", ".join(values)]) if values else meaning
+
+
+def _format(value: float, unit: str) -> str:
+    """Return a value in SI with its unit; small lengths are in mm or µm, short times in ms."""
+    for factor, name, largest in _SMALL_UNITS.get(unit, ()):
+        if abs(value) < largest:
+            return f"{value * factor:.3g} {name}"
+    return f"{value:.3g}" if unit == "1" else f"{value:.3g} {unit}"
 
 
 def _describe_shrinkage(gap: Gap, count: int) -> str:

@@ -37,6 +37,22 @@ def write_scenario(tmp_path, **changed):
     return path
 
 
+@pytest.mark.parametrize(
+    ("value", "unit", "shown"),
+    [
+        (1.63e-5, "m", "gap width 16.3 µm)"),
+        (0.0123, "m", "gap width 12.3 mm)"),
+        (1.5, "m", "gap width 1.5 m)"),
+        (0.0042, "s", "gap width 4.2 ms)"),
+        (2e-4, "1/N", "gap width 0.0002 1/N)"),
+        (0.5, "1", "gap width 0.5)"),
+    ],
+)
+def test_sizes_have_units_that_suit_them(value, unit, shown):
+    size = {"gap_width": EffectValue(value=value, unit=unit, ci95=(value, value))}
+    assert shown in explain_diagnosis("explained", GAP, [MASS.model_copy(update={"parameters": size})], [], "")
+
+
 def test_an_explanation_states_sizes_cause_and_check_in_two_sentences():
     text = explain_diagnosis("explained", GAP, [MASS], [EffectSet(effects=["force_delay"], probability=0.2)], "")
     for word in ("12 N", "2.5 N", "moving_mass", "2.1 kg", "98 %", "weigh", "force_delay"):

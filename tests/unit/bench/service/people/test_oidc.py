@@ -174,15 +174,20 @@ def test_credentials_go_into_the_form_for_a_provider_that_wants_them_there(journ
         {"azp": "another"},
         {"aud": None},
         {"iss": "https://another.example"},
-        {"exp": int(time.time()) - 120},
         {"exp": None},
-        {"iat": int(time.time()) + 3600},
         {"sub": None},
     ],
     ids=str,
 )
 def test_an_id_token_for_something_else_is_refused(journey, provider, changes):
     provider.changes = changes
+    assert journey.fail() is Fault.TOKEN_INVALID
+
+
+# Offsets, because workers that run tests in parallel must collect the same names.
+@pytest.mark.parametrize(("claim", "offset"), [("exp", -120), ("iat", 3600)])
+def test_an_id_token_for_another_time_is_refused(journey, provider, claim, offset):
+    provider.changes = {claim: int(time.time()) + offset}
     assert journey.fail() is Fault.TOKEN_INVALID
 
 

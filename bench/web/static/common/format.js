@@ -24,8 +24,8 @@ export function suitUnit(unit, size) {
 /** Writes a name of a document, such as `seal_friction`, with spaces. */
 export const spaced = (name) => name.replaceAll("_", " ");
 
-/** Writes a line of a command as a sentence whose numbers keep their unit; a coordinate at its beginning keeps its case. */
-export const sentence = (line) => `${line.replace(/^(?!(n|eta|rho)\b)[a-z]/, (letter) => letter.toUpperCase()).replace(/(\d) (?=[%A-Z])/g, "$1\u00a0")}.`;
+/** Writes a line of a command as a sentence; a coordinate at its beginning, such as `k0` or `rho`, keeps its case. */
+export const sentence = (line) => `${line.replace(/^(?!(eta|rho) )[a-z](?=[a-z]+ )/, (letter) => letter.toUpperCase())}.`;
 
 /** Formats a duration [s]: `42 s`, `2 min 14 s`, `1 h 05 min`. */
 export function duration(seconds) {

@@ -2,8 +2,8 @@
 
 ``python docs/take_screenshots.py`` starts a simulated rig, agent, service and worker on loopback. It imports a
 recording, records a campaign over the wires, waits for fits and diagnoses, and writes the pictures of the page to
-`docs/images`. It is run by hand after a change of the page. It takes about half an hour on two quiet cores; a busy
-machine delays the setpoints of the rig.
+`docs/images`. It is run by hand after a change of the page, on a quiet machine: a busy one delays the setpoints of
+the rig.
 
 Needed are chromium, Node and ``npm ci --prefix tests/system/javascript``, as for the tests of the page.
 With ``--data FOLDER`` the recordings and results stay in that folder, and a second call with it only takes the
@@ -36,7 +36,7 @@ SEED = 1
 DEADLINE = 3600.0
 """Longest time [s] for all recordings or all results."""
 COLOURS = 256
-"""Colours of a picture; its file is a third of the original, without a visible difference."""
+"""Colours of a picture: a palette makes its file smaller, and a page has few colours."""
 DATA_KEPT = "prepared.json"
 """File of a data folder whose recordings and results are complete."""
 

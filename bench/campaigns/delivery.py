@@ -10,11 +10,9 @@ import os
 import smtplib
 import ssl
 from base64 import b64encode
-from collections.abc import Callable
 from email.message import EmailMessage
 from email.utils import formatdate, make_msgid
 from http.client import HTTPException
-from threading import Thread
 from typing import Any, NamedTuple
 from urllib.error import HTTPError, URLError
 from urllib.parse import unquote, urlsplit, urlunsplit
@@ -23,10 +21,13 @@ from urllib.request import HTTPRedirectHandler, HTTPSHandler, Request, build_ope
 from pydantic import TypeAdapter
 
 from bench.campaigns.document import CampaignError, Mail, Recipient, Webhook
+from bench.threads import run_within
 
 SERVER_VARIABLE, SENDER_VARIABLE = "MRBENCH_SMTP", "MRBENCH_SMTP_FROM"
 TIMEOUT = 10.0
 """[s] Time limit of one attempt."""
+_THREAD = "campaign-message"
+"""Name of the thread of an attempt."""
 RECIPIENT: TypeAdapter[Recipient] = TypeAdapter(Recipient)
 """Reads a recipient as the catalogue has it."""
 _PORTS = {"smtp": 25, "smtps": 465}
@@ -52,10 +53,10 @@ def deliver(recipient: Recipient, content: dict[str, Any]) -> None:
     """
     try:
         if isinstance(recipient, Webhook):
-            _run_within(TIMEOUT, lambda: _post(recipient.webhook, content))
+            run_within(TIMEOUT, lambda: _post(recipient.webhook, content), _THREAD)
         else:
             server = read_mail_server()
-            _run_within(TIMEOUT, lambda: _mail(server, recipient, content))
+            run_within(TIMEOUT, lambda: _mail(server, recipient, content), _THREAD)
     except Exception as error:  # also an error of a library that it does not document must stop nothing
         raise CampaignError(f"{name_recipient(recipient)} was not notified: {_describe(error)}") from None
 
@@ -86,29 +87,6 @@ def read_mail_server() -> MailServer:
     if not parts.hostname:
         raise CampaignError(f"the address of the mail server has no host; {form}")
     return MailServer(parts.hostname, port, parts.scheme == "smtps", user, password)
-
-
-def _run_within(seconds: float, act: Callable[[], None]) -> None:
-    """Run a function in a thread of its own; after the time it is left to itself, whatever holds it up.
-
-    Raises:
-        TimeoutError: it has not ended in time.
-    """
-    failures: list[Exception] = []
-
-    def attempt() -> None:
-        try:
-            act()
-        except Exception as error:
-            failures.append(error)
-
-    thread = Thread(target=attempt, name="campaign-message", daemon=True)
-    thread.start()
-    thread.join(seconds)
-    if thread.is_alive():
-        raise TimeoutError
-    if failures:
-        raise failures[0]
 
 
 class _RefusedRedirect(HTTPRedirectHandler):

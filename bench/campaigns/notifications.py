@@ -6,11 +6,9 @@ record. A message may arrive twice if a process is killed while it sends; its `i
 """
 
 import logging
-import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
-from types import TracebackType
 from typing import Any
 
 from bench.campaigns.delivery import RECIPIENT, TIMEOUT, deliver
@@ -18,6 +16,7 @@ from bench.campaigns.document import CampaignError, Recipient
 from bench.campaigns.store import CampaignStore, StoredCampaign
 from bench.catalogue import ClaimedNotification
 from bench.log_lines import RepeatedFailure
+from bench.threads import BackgroundThread
 
 RETRY_AFTER = (10.0, 60.0, 300.0, 1800.0)
 """[s] Waits after each attempt that has failed; after the attempt that follows the last wait there is none."""
@@ -29,26 +28,13 @@ _CLAIM = timedelta(seconds=6 * TIMEOUT)
 _LOG = logging.getLogger(__name__)
 
 
-class NotificationSender:
+class NotificationSender(BackgroundThread):
     """Thread that sends the messages of all campaigns of a catalogue."""
 
     def __init__(self, store: CampaignStore) -> None:
+        super().__init__("notifications")
         self._store = store
-        self._stopping = threading.Event()
         self._failures = RepeatedFailure(_LOG, "notifications_failed", "notifications_continue")
-        self._thread = threading.Thread(target=self._run, name="notifications", daemon=True)
-
-    def __enter__(self) -> "NotificationSender":
-        """Start the thread."""
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End the thread; an attempt in progress has its time limit."""
-        self._stopping.set()
-        self._thread.join()
 
     def _run(self) -> None:
         while not self._stopping.is_set():

@@ -4,10 +4,8 @@ Runs are recorded to the data folder only. So a store that is away delays copies
 """
 
 import logging
-import threading
 import time
 from collections.abc import Callable
-from types import TracebackType
 from typing import NamedTuple
 
 from bench.catalogue import Catalogue, RunRow
@@ -16,6 +14,7 @@ from bench.log_lines import RepeatedFailure
 from bench.log_store.copying import copy_log
 from bench.log_store.errors import LogStoreUnavailableError
 from bench.log_store.waits import GrowingWait
+from bench.threads import BackgroundThread
 
 PERIOD = 2.0
 """[s] Time between two looks for logs without a copy."""
@@ -37,7 +36,7 @@ class CopyCounts(NamedTuple):
     """False after an attempt at which the store did not answer."""
 
 
-class LogCopier:
+class LogCopier(BackgroundThread):
     """Thread that copies the logs of a catalogue to a log store.
 
     Args:
@@ -54,26 +53,13 @@ class LogCopier:
         remove_old: Callable[[], None] = lambda: None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        super().__init__("log-copier", _END_TIME)
         self._remove_old = remove_old
         self._catalogue, self._store, self._clock = catalogue, store, clock
         self._outage, self._store_wait = "", GrowingWait()
         self._run_waits: dict[str, GrowingWait] = {}
         self._waiting = self._copied = self._failed = 0
         self._failures = RepeatedFailure(_LOG, "log_store_failed", "log_store_works_again")
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="log-copier", daemon=True)
-
-    def __enter__(self) -> "LogCopier":
-        """Start the thread."""
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End the thread; a transfer in progress is given up after a moment."""
-        self._stopping.set()
-        self._thread.join(_END_TIME)
 
     def _run(self) -> None:
         while not self._stopping.is_set():

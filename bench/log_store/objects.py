@@ -11,7 +11,6 @@ import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
-from threading import Thread
 from typing import Any, TypeVar
 
 import fsspec
@@ -19,6 +18,7 @@ from fsspec.config import conf
 
 from bench.log import convert_file_errors
 from bench.log_store.errors import LogStoreError, LogStoreUnavailableError
+from bench.threads import run_within
 
 BLOCK_SIZE = 8 * 2**20
 """Size of a block [bytes]; S3 accepts parts of 5 MiB and more."""
@@ -107,31 +107,11 @@ def _call(act: Callable[[], _T], missing: LogStoreError) -> _T:
         missing: error if there is no such object, bucket or folder.
     """
     try:
-        return _run_within(TIME_LIMIT, act)
+        return run_within(TIME_LIMIT, act, "log-store")
     except FileNotFoundError:
         raise missing from None
     except Exception as error:
         raise LogStoreUnavailableError(f"the log store {_describe(error)}") from None
-
-
-def _run_within(seconds: float, act: Callable[[], _T]) -> _T:
-    results: list[_T] = []
-    failures: list[Exception] = []
-
-    def attempt() -> None:
-        try:
-            results.append(act())
-        except Exception as error:
-            failures.append(error)
-
-    thread = Thread(target=attempt, name="log-store", daemon=True)
-    thread.start()
-    thread.join(seconds)
-    if thread.is_alive():
-        raise TimeoutError
-    if failures:
-        raise failures[0]
-    return results[0]
 
 
 def _describe(error: Exception) -> str:

@@ -17,7 +17,7 @@ _PEAK_QUANTILE = 0.995
 _SLOW_ANGLE = 1000.0
 """Smallest time over which slow changes are observed, over half stroke divided by peak speed [1].
 
-A change that is faster than this many strokes could not be told from the strokes."""
+Within fewer strokes, a slow change could not be told from the strokes."""
 _SMALLEST = 1e-12
 """Lower limit of a scale, in its unit: a recording at rest has none, and nothing may be divided by zero."""
 
@@ -42,8 +42,8 @@ class RecordingScales:
     @property
     def damper_size(self) -> DamperSize:
         """Size of the damper, by which the ranges of effects are scaled."""
-        observation = max(self.duration, _SLOW_ANGLE / self.rate)
-        return DamperSize(self.force, self.length, self.velocity, self.drive, observation)
+        observation_time = max(self.duration, _SLOW_ANGLE / self.rate)
+        return DamperSize(self.force, self.length, self.velocity, self.drive, observation_time)
 
     @property
     def rate(self) -> float:

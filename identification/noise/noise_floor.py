@@ -58,7 +58,7 @@ class NoiseFloorEstimate:
     """Standard deviation of ``noise`` [N]; None if no cycles repeat."""
     scales: tuple[ScaleVariance, ...] = ()
     """Variance of the noise by time scale; empty if no cycles repeat, or if sampling rates differ."""
-    pink_variance: float = 0.0
+    slow_variance: float = 0.0
     """Variance of slow noise in each factor e of the frequency [N²]."""
 
     @property
@@ -77,8 +77,7 @@ class NoiseFloorEstimate:
         """Return the standard deviation of the mean square of some samples of noise, over its variance [1]."""
         if not self.scales:
             return math.sqrt(2.0 / samples)
-        # A difference every 2 m samples is independent, and a variance of k of them varies by sqrt(2 / k).
-        squares = sum(s.variance**2 * 4.0 * s.samples / samples for s in self.scales)
+        squares = sum(s.compute_chance(samples) ** 2 for s in self.scales)
         slower = max(self.noise**2 - sum(s.variance for s in self.scales), 0.0)
         squares += slower**2 * min(8.0 * self.scales[-1].samples / samples, 2.0)
         return math.sqrt(squares) / self.noise**2
@@ -108,7 +107,7 @@ class _StretchNoise(NamedTuple):
 
     windows: list[WindowNoise]
     line: MainsLine | None
-    pink_variance: float = 0.0
+    slow_variance: float = 0.0
     """Variance of slow noise in each factor e of the frequency [N²]."""
 
 
@@ -141,7 +140,7 @@ def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> N
     noise, combined = _mix(white, _average(repeated, fast), repeated)
     scales = _average_scales(windows) if len({s.rate for s in stretches}) == 1 else ()
     return NoiseFloorEstimate(
-        noise, cycle_to_cycle, high_frequency, basis, combined, scales, _average_pink_variance(parts)
+        noise, cycle_to_cycle, high_frequency, basis, combined, scales, _average_slow_variance(parts)
     )
 
 
@@ -219,10 +218,10 @@ def _average_scales(windows: Sequence[WindowNoise]) -> tuple[ScaleVariance, ...]
     return average_scales([w.scales for w in windows], [w.samples for w in windows])
 
 
-def _average_pink_variance(parts: Sequence[_StretchNoise]) -> float:
+def _average_slow_variance(parts: Sequence[_StretchNoise]) -> float:
     """Return the mean variance of slow noise in each factor e of the frequency [N²]."""
     weights = np.array([sum(w.samples for w in part.windows) for part in parts], float)
-    return float(weights @ [part.pink_variance for part in parts] / weights.sum())
+    return float(weights @ [part.slow_variance for part in parts] / weights.sum())
 
 
 def _combine_windows(noises: Sequence[WindowNoise]) -> tuple[float, float]:

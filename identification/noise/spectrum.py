@@ -116,7 +116,7 @@ def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, d
         duration: duration of the whole recording [s], whose mean is not noise.
     """
     values = _fill_harmonics(spectrum)
-    step, gain = float(spectrum.frequency[1]), spectrum.gain
+    step = float(spectrum.frequency[1])
     lowest = int(np.argmax(spectrum.is_known))
     values[1:lowest] = low.evaluate(spectrum.frequency[1:lowest])
     # A bin stands for half a step on both sides; the first one begins at one cycle a recording.
@@ -124,8 +124,7 @@ def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, d
     count = len(spectrum.window.force)
     last = values[-1] if count % 2 == 0 else 0.0
     variance = float(2.0 * values.sum() - last) / count
-    smooth = uniform_filter1d(values, min(_SMOOTHED_BINS, len(values)), mode="nearest")[1:]
-    deviation = 2.0 * float(np.sqrt((smooth**2).sum() / gain[1:].mean())) / count
+    deviation = _compute_deviation(values, spectrum)
     samples = int(np.count_nonzero(spectrum.window.valid))
     scales = tuple(_compute_scale_variance(values, spectrum, m) for m in list_scales(samples))
     return WindowNoise(
@@ -137,9 +136,13 @@ def _compute_scale_variance(values: Array, spectrum: WindowSpectrum, samples: in
     """Return the variance at a scale of noise with the power ``values`` (N // 2 + 1,) [N²]."""
     count = len(spectrum.window.force)
     seen = values * compute_gain(np.arange(len(values)) / count, samples)
-    smooth = uniform_filter1d(seen, min(_SMOOTHED_BINS, len(seen)), mode="nearest")[1:]
-    deviation = 2.0 * float(np.sqrt((smooth**2).sum() / spectrum.gain[1:].mean())) / count
-    return ScaleVariance(samples, 2.0 * float(seen[1:].sum()) / count, deviation)
+    return ScaleVariance(samples, 2.0 * float(seen[1:].sum()) / count, _compute_deviation(seen, spectrum))
+
+
+def _compute_deviation(values: Array, spectrum: WindowSpectrum) -> float:
+    """Return the standard deviation [N²] of the variance of noise with the power ``values`` (N // 2 + 1,) [N²]."""
+    smooth = uniform_filter1d(values, min(_SMOOTHED_BINS, len(values)), mode="nearest")[1:]
+    return 2.0 * float(np.sqrt((smooth**2).sum() / spectrum.gain[1:].mean())) / len(spectrum.window.force)
 
 
 def _fill_harmonics(spectrum: WindowSpectrum) -> Array:

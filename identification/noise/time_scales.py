@@ -5,6 +5,7 @@ shows an error of a model at this scale even if much stronger slow noise hides i
 m = 1, 2, 4, ... samples add up to that of the signal (Percival 1995, Biometrika 82:619).
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -25,6 +26,13 @@ class ScaleVariance(NamedTuple):
     """[N²]"""
     deviation: float
     """Its standard deviation [N²]."""
+
+    def compute_chance(self, differences: int) -> float:
+        """Return by how much the variance of another signal with some differences varies by chance [N²].
+
+        A difference every 2 m samples is independent, and the variance of k of them varies by sqrt(2 / k).
+        """
+        return self.variance * math.sqrt(4.0 * self.samples / differences)
 
 
 def list_scales(count: int) -> Iterator[int]:

@@ -5,17 +5,16 @@ nothing is imported twice or left out, whichever process is killed when.
 """
 
 import logging
-import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from pathlib import Path
-from types import TracebackType
 from typing import Final, TypeAlias
 
 from bench.agent_protocol import AuditCommand, AuditPage, Message, Reply
 from bench.audit import EMPTY_HEAD, Act, AuditEntry, Head, Source, find_entry, parse_entry
 from bench.errors import AgentUnreachableError, BenchError
 from bench.log_lines import RepeatedFailure
+from bench.threads import BackgroundThread
 
 PERIOD: Final = 5.0
 """[s] Time between two requests for new entries."""
@@ -29,7 +28,7 @@ SendFunction: TypeAlias = Callable[[Message], Reply]
 RecordFunction: TypeAlias = "Callable[[Act], Future[AuditEntry]]"
 
 
-class AgentImport:
+class AgentImport(BackgroundThread):
     """Import of new entries, by a thread of its own while it is a context manager."""
 
     def __init__(self, path: Path, send: SendFunction, record: RecordFunction) -> None:
@@ -40,6 +39,7 @@ class AgentImport:
             send: sends a command to the agent.
             record: writes an act to the service's trail.
         """
+        super().__init__("audit-import")
         self._path, self._send, self._record = path, send, record
         self.obstacle = ""
         """Reason why nothing can be imported, for a person; empty while it can or no agent answers."""
@@ -47,20 +47,6 @@ class AgentImport:
         self._position: Head | None = None
         self._written: list[Future[AuditEntry]] = []
         self._failures = RepeatedFailure(_LOG, "audit_import_failed", "audit_import_continues")
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="audit-import", daemon=True)
-
-    def __enter__(self) -> "AgentImport":
-        """Start the thread."""
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End the thread."""
-        self._stopping.set()
-        self._thread.join()
 
     def import_new(self) -> int:
         """Import what the agent has recorded since the last import; return the number of entries.

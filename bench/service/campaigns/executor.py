@@ -1,8 +1,7 @@
 """Executor of campaigns on the rig agent: a thread of the service that continues what is in progress."""
 
 import logging
-import threading
-from types import TracebackType
+from typing import Self
 
 from bench.agent_protocol import Sender, send_as
 from bench.campaigns import (
@@ -17,6 +16,7 @@ from bench.campaigns import (
 )
 from bench.catalogue import Catalogue
 from bench.log_lines import RepeatedFailure
+from bench.threads import BackgroundThread
 
 AGENT_BENCH = "agent"
 """Bench of the campaigns that the service executes."""
@@ -25,8 +25,11 @@ PERIOD = 0.5
 _LOG = logging.getLogger(__name__)
 
 
-class CampaignExecutor:
-    """Thread that executes the campaigns of the agent, one after the other, oldest first."""
+class CampaignExecutor(BackgroundThread):
+    """Thread that executes the campaigns of the agent, one after the other, oldest first.
+
+    At its end, a run in progress goes on in the agent, and the next service continues the campaign.
+    """
 
     def __init__(self, catalogue: Catalogue, agent: AgentConnection, *, is_local: bool) -> None:
         """Use a catalogue and an agent.
@@ -36,29 +39,18 @@ class CampaignExecutor:
             agent: connection to the agent.
             is_local: whether the agent writes into the data folder; else nothing is executed.
         """
+        super().__init__("campaigns")
         self.store = CampaignStore(catalogue)
         self.thermometer = Thermometer()
         self.is_local = is_local
-        self._stopping = threading.Event()
         self._failures = RepeatedFailure(_LOG, "campaign_failed", "campaign_continues")
         self.bench = AgentBench(catalogue, agent, self.thermometer, lambda: self._stopping.wait(PERIOD))
-        self._thread = threading.Thread(target=self._execute, name="campaigns", daemon=True)
 
-    def __enter__(self) -> "CampaignExecutor":
-        """Start the thread."""
-        if self.is_local:
-            self._thread.start()
-        return self
+    def __enter__(self) -> Self:
+        """Start the thread if the agent writes into the data folder."""
+        return super().__enter__() if self.is_local else self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End the thread; a run in progress goes on in the agent, and the next service continues the campaign."""
-        self._stopping.set()
-        if self._thread.is_alive():
-            self._thread.join()
-
-    def _execute(self) -> None:
+    def _run(self) -> None:
         while not self._stopping.is_set():
             try:
                 self._execute_oldest()

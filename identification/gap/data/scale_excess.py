@@ -39,6 +39,5 @@ def _compute_excess(residual: Residual, scale: ScaleVariance, input_square: floa
         total, count, start = total + variance * differences, count + differences, start + samples
     if not count:
         return ErrorSquare(0.0, math.inf)
-    # A difference every 2 m samples is independent, and a variance of k of them varies by sqrt(2 / k).
-    chance = scale.variance * math.sqrt(4.0 * scale.samples / count)
-    return ErrorSquare(total / count - scale.variance - input_square, math.hypot(chance, scale.deviation))
+    deviation = math.hypot(scale.compute_chance(count), scale.deviation)
+    return ErrorSquare(total / count - scale.variance - input_square, deviation)

@@ -19,13 +19,13 @@ Of 1500 simulated series of 1/f noise, 99 % stayed below 5.7 and 99.8 % below 8.
 expected variance is itself uncertain by a fifth."""
 
 
-def compute_noise_drift(fit: JointFit, problem: Problem, pink_variance: float) -> Array:
+def compute_noise_drift(fit: JointFit, problem: Problem, slow_variance: float) -> Array:
     """Return the fitted drift (N,) [N] of all pieces in sequence about its mean; zeros if it exceeds slow noise.
 
     Args:
         fit: fit of any effects.
         problem: the pieces whose forces are simulated.
-        pink_variance: variance of slow noise in each factor e of the frequency [N²].
+        slow_variance: variance of slow noise in each factor e of the frequency [N²].
     """
     drifts = [
         _evaluate_drift(fit, piece.excitation.time, piece.excitation.sampled_drive) for piece in problem.pieces
@@ -40,7 +40,7 @@ def compute_noise_drift(fit: JointFit, problem: Problem, pink_variance: float) -
         _find_highest_frequency(d, p.excitation.rate) for d, p in zip(drifts, problem.pieces, strict=True)
     )
     # The slowest part that a recording shows is half a wave. The sum of 1/i for i up to k is about ln k + 0.577.
-    expected = pink_variance * max(math.log(max(2.0 * duration * highest, 1.0)) + float(np.euler_gamma), 1.0)
+    expected = slow_variance * max(math.log(max(2.0 * duration * highest, 1.0)) + float(np.euler_gamma), 1.0)
     return values if variance < _NOISE_RATIO * expected else np.zeros(len(values))
 
 

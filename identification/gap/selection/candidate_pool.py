@@ -278,7 +278,7 @@ class CandidatePool:
         """Compute the residual of a fit on all samples; a drift that slow noise explains remains in it."""
         forces = self.full_problem.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
         estimate = self.noise_model.estimate
-        drift = compute_noise_drift(fit, self.full_problem, estimate.pink_variance)
+        drift = compute_noise_drift(fit, self.full_problem, estimate.slow_variance)
         residual = self.evaluation.compute_residual(
             [f - d for f, d in zip(forces, split_by_piece(drift, self.full_problem.pieces), strict=True)]
         )

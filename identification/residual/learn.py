@@ -15,11 +15,11 @@ from identification.simulate import Excitation
 
 _MAX_SAMPLES = 24_000
 """Approximate limit on the number of samples; more are thinned evenly."""
-_SUPPORT_POINTS = 128
+_SUPPORT_POINTS = 256
 """Number of support points."""
 _USUAL_RATE = 0.5
 """Reciprocal length scale of a variable from which the search starts [1]."""
-_FIRST_VARIABLES = 5
+_FIRST_VARIABLES = 7
 """Number of variables with which the search starts; it may leave some out and add others."""
 _MAX_ERROR = 0.98
 """Largest squared error on left-out conditions, over that without a residual, for which one is kept [1]."""

@@ -2,7 +2,8 @@
 
 Velocity, acceleration and travel since the last reversal are compressed: a residual changes fastest near a
 reversal, where all three are small or change their sign. The recent speed distinguishes a reversal from rest, and
-a slow stroke from the turn of a fast one. All other variables are alike there.
+a slow stroke from the turn of a fast one. All other variables are alike there. The changes of force and velocity
+over a short time show lags of coil, oil and channels, which the law has only in part.
 """
 
 from collections.abc import Mapping
@@ -20,8 +21,13 @@ _DEADBAND = 1e-3
 """Half width, over half the stroke [1], of the deadband within which a change of direction is no reversal."""
 _RECENT = 2.0
 """Time constant of the recent speed, over half the stroke at the peak speed [1]."""
+_CHANGE_TIME = 0.1
+"""Time constant of the mean from which a change is measured, over half the stroke at the peak speed [1]."""
+_FORCE_CHANGE = 0.25
+"""Change of the force, over its standard deviation [1], that counts as one."""
 VARIABLES = (
-    "travel_since_reversal", "velocity", "drive", "law_force", "recent_speed", "displacement", "acceleration",
+    "travel_since_reversal", "velocity", "drive", "law_force", "recent_speed", "force_change", "velocity_change",
+    "displacement", "acceleration",
 )  # fmt: skip
 """Names of the variables of a state, the likeliest first."""
 
@@ -64,6 +70,8 @@ def compute_state(excitation: Excitation, law_force: Array, units: StateUnits) -
         "drive": 2.0 * drive,
         "law_force": law_force / units.force,
         "recent_speed": _compress(_average_speed(v, excitation.rate, units) / units.velocity, _VELOCITY),
+        "force_change": _measure_change(law_force, excitation.rate, units) / (_FORCE_CHANGE * units.force),
+        "velocity_change": _compress(_measure_change(v, excitation.rate, units) / units.velocity, _VELOCITY),
         "displacement": 2.0 * (x - units.centre) / units.length,
         "acceleration": _compress(a * units.length / units.velocity**2, _ACCELERATION),
     }
@@ -71,12 +79,24 @@ def compute_state(excitation: Excitation, law_force: Array, units: StateUnits) -
 
 def _average_speed(velocity: Array, rate: float, units: StateUnits) -> Array:
     """Return the speed (N,) [m/s] averaged over the recent past, with weights that fall exponentially."""
-    samples = _RECENT * units.length / units.velocity * rate
-    weight, speed = 1.0 / (1.0 + samples), np.abs(velocity)
+    samples, speed = _RECENT * units.length / units.velocity * rate, np.abs(velocity)
     # As if the first stretch of this length had lasted for long before.
-    before = speed[: max(1, round(samples))].mean()
-    average, _ = lfilter([weight], [1.0, weight - 1.0], speed, zi=[(1.0 - weight) * before])
-    return np.asarray(average)
+    return _average_past(speed, samples, float(speed[: max(1, round(samples))].mean()))
+
+
+def _measure_change(values: Array, rate: float, units: StateUnits) -> Array:
+    """Return values (N,) less their mean over the recent past, with weights that fall exponentially."""
+    samples = _CHANGE_TIME * units.length / units.velocity * rate
+    return values - _average_past(values, samples, float(values[0]))
+
+
+def _average_past(values: Array, samples: float, before: float) -> Array:
+    """Return the mean (N,) of values (N,) and of their past, with weights that fall over so many samples.
+
+    ``before`` is the mean at the start.
+    """
+    weight = 1.0 / (1.0 + samples)
+    return np.asarray(lfilter([weight], [1.0, weight - 1.0], values, zi=[(1.0 - weight) * before])[0])
 
 
 def _compress(values: Array, threshold: float) -> Array:

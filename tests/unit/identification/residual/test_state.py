@@ -52,6 +52,20 @@ def test_the_recent_speed_tells_rest_from_a_reversal():
     assert speed[-1] < 0.02 * mean
 
 
+def test_a_change_follows_its_signal_and_is_forgotten_in_a_tenth_of_half_a_stroke():
+    excitation = make_excitation()
+    law = np.where(np.arange(2000) >= 1000, 300.0, 100.0)
+    change = compute_state(excitation, law, UNITS)["force_change"] * 0.25 * UNITS.force
+    assert change[:1000] == pytest.approx(0.0, abs=1e-9)
+    # Half the stroke lasts 0.1 s at the peak speed, so the time constant is ten samples.
+    assert change[1000] == pytest.approx(200.0 * 10.0 / 11.0)
+    assert change[1010] == pytest.approx(change[1000] * np.exp(-1.0), rel=0.06)
+    velocity = np.sinh(compute_state(excitation, law, UNITS)["velocity_change"]) * 0.03 * UNITS.velocity
+    settled = slice(100, 1900)
+    assert velocity[settled] == pytest.approx(0.01 * excitation.acceleration[settled], abs=0.15 * UNITS.velocity)
+    assert np.ptp(velocity[settled]) > 0.2 * UNITS.velocity
+
+
 def test_dampers_of_different_size_and_speed_have_the_same_state():
     law = np.linspace(-400.0, 400.0, 2000)
     small = compute_state(make_excitation(), law, UNITS)

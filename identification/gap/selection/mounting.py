@@ -1,7 +1,8 @@
 """Mounting effects: backlash and compliance, which are fitted independently of their screening.
 
 While the law's yield displacement is wrong, the law resembles either, and no gain is predicted for either. Each is
-started at several sizes. Richer forms are only fitted if a simpler one closes part of the gap.
+started at several sizes. Together with other effects, richer forms are only fitted if a simpler one closes part of
+the gap.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +31,11 @@ def fit_mounting(pool: CandidatePool, parent: Candidate, gains: Sequence[Screeni
 
 
 def _fit_forms(pool: CandidatePool, parent: Candidate, gains: Sequence[ScreeningResult]) -> None:
-    """Fit a set with the forms of a mounting effect, the simplest first, while each closes part of the gap."""
+    """Fit a set with the forms of a mounting effect, the simplest first.
+
+    With other effects, the first form that closes next to nothing is the last one. Alone, all forms are fitted: a
+    joint that stiffens under load may not resemble a linear spring at all.
+    """
     settings = pool.settings
     simpler: dict[str, float] = {}
     for gain in gains:
@@ -41,7 +46,8 @@ def _fit_forms(pool: CandidatePool, parent: Candidate, gains: Sequence[Screening
         values = [*_make_starts(simpler, gain.effect_model), *gain.effect_model.starts]
         extended = fit_extension(pool, parent, gain, values)
         simpler = extended.fit.values[gain.effect_model.name]
-        if pool.compute_excess(extended) > settings.richer_form_share * pool.compute_excess(parent):
+        share = settings.richer_form_share
+        if parent.names and pool.compute_excess(extended) > share * pool.compute_excess(parent):
             return
 
 

@@ -13,14 +13,18 @@ _STAGED_FIT = FitOptions(
     decimation=1,
     starts=0,
     descents=2,
-    iterations=25,
+    iterations=60,
     regression_start=False,
     start_decimation=2,
     law_steps=5,
     refit_full=False,
     tolerance=SEARCH_TOLERANCE,
 )
-"""Two descents, each after some steps of the law alone, on decimated data."""
+"""Two descents, each after some steps of the law alone, on decimated data.
+
+Origin of the limit on their steps: a stiffening joint takes more than 25 steps. A descent that stops before its end
+says nothing about its form.
+"""
 
 
 def fit_extension(

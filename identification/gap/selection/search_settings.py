@@ -51,7 +51,7 @@ class SearchSettings:
     mounting_excess: float = 0.02
     """Threshold on the excess of a set: below it, backlash and compliance are not fitted."""
     richer_form_share: float = 0.8
-    """Part of the excess that the simplest form may leave for richer forms of a mounting effect to be fitted."""
+    """Part of a set's excess that a form of a mounting effect may leave for richer ones to be fitted with it."""
     helpful_mounting_share: float = 0.97
     """Part of the excess that a mounting effect alone may leave to be fitted with other effects as well."""
 

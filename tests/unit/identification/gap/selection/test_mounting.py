@@ -1,4 +1,4 @@
-"""Backlash and compliance are fitted form by form: a richer one where a simpler one closes part of the gap."""
+"""Backlash and compliance are fitted form by form: alone all, with others while each closes part of the gap."""
 
 import numpy as np
 import pytest
@@ -39,10 +39,13 @@ def test_a_richer_form_starts_where_a_simpler_one_ended(joint):
     assert any(not np.isclose(c, own_starts).any() for c in compliances[1])
 
 
-def test_no_richer_form_is_fitted_where_the_simplest_closes_nothing(pin):
-    pool = pin.copy()
-    assert fit_forms(pool, "fixture_compliance") == ["linear"]
-    assert pool.get_excess("fixture_compliance") > 0.9 * pool.baseline_excess
+def test_alone_every_form_is_fitted_even_where_the_simplest_closes_nothing(pin):
+    assert fit_forms(pin.copy(), "fixture_compliance") == ["linear", "stiffening", "closing_joint"]
+
+
+def test_with_other_effects_no_richer_form_is_fitted_where_the_simplest_closes_too_little(pin):
+    pool = pin.copy(richer_form_share=0.0)
+    assert fit_forms(pool, "fixture_compliance", frozenset({"gas_spring"})) == ["linear"]
 
 
 def test_every_action_of_backlash_is_tried_alone(pin):

@@ -16,7 +16,7 @@ from identification.gap.data import compute_residual_correlation_length
 from identification.gap.discovery.curve_effects import CurvePlace
 from identification.gap.discovery.curve_fit import fit_best_curves, screen_curves
 from identification.gap.fits import Candidate
-from identification.gap.selection import CandidatePool, Posterior, normalise_scores
+from identification.gap.selection import BlockEvidence, CandidatePool, Posterior, normalise_scores
 from identification.threads import use_one_thread
 
 _STATIC_ACTIONS: frozenset[Action] = frozenset(
@@ -64,11 +64,15 @@ def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
     """Return the posterior with the best curve outside the library as one of the alternatives.
 
     Curves are only fitted where the most probable set leaves more than the noise floor; else nothing changes.
+    Block evidence can raise the odds of a set far above those that its excess gives, so the curve has it too.
     """
     names = posterior.most_probable_set
     if not names or pool.reaches_floor(pool.candidates[names]):
         return posterior
     pool.unlisted = find_unlisted_cause(pool)
+    if pool.unlisted is not None:
+        log_odds = pool.compute_held_out_evidence(pool.candidates[names], pool.unlisted)
+        pool.unlisted_evidence = BlockEvidence(names, log_odds)
     return pool.compute_posterior()
 
 

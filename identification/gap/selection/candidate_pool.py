@@ -80,6 +80,8 @@ class CandidatePool:
     """Block evidence on the held-out samples over sets with one effect less, where it was computed."""
     unlisted: Candidate | None = None
     """The law with the best curve outside the library, where curves were fitted."""
+    unlisted_evidence: BlockEvidence | None = None
+    """Block evidence of this curve on the held-out samples over the most probable set."""
     fit_count: int = 0
     """Number of fits."""
     notes: list[str] = field(default_factory=list)
@@ -160,10 +162,16 @@ class CandidatePool:
 
     def compute_posterior(self) -> Posterior:
         """Compute the posterior of all fitted sets."""
-        floor = self._find_lowest_floor()
-        unlisted = None if self.unlisted is None else self.unlisted.compute_relative_excess(self.baseline, floor)
         coloured_share = self.noise_model.estimate.coloured_share
+        unlisted = self._collect_unlisted_evidence()
         return compute_posterior(self.collect_evidence(), self.full_problem.samples, coloured_share, unlisted)
+
+    def _collect_unlisted_evidence(self) -> SetEvidence | None:
+        """Return the evidence of the curve outside the library; None without one."""
+        if self.unlisted is None:
+            return None
+        excess = self.unlisted.compute_relative_excess(self.baseline, self._find_lowest_floor())
+        return SetEvidence(self.unlisted.names, excess, block_evidence=self.unlisted_evidence)
 
     def _find_lowest_floor(self) -> float:
         """Return a floor [N] that lies below the residual of every candidate."""

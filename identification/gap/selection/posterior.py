@@ -107,7 +107,7 @@ class Posterior:
 
 
 def compute_posterior(
-    sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0, unlisted_excess: float | None = None
+    sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0, unlisted: SetEvidence | None = None
 ) -> Posterior:
     """Compute the probabilities of sets of effects and of an unknown cause.
 
@@ -115,7 +115,7 @@ def compute_posterior(
         sets: evidence of every fitted set, the empty one included.
         samples: number of fitted samples.
         coloured_share: part of the variance of the noise [1] that is not white; slow noise varies more by chance.
-        unlisted_excess: excess [1] that a curve outside the library leaves, where one was fitted.
+        unlisted: evidence of a curve outside the library, where one was fitted; it counts as one rare effect.
     """
     gap = max(next(s.excess for s in sets if not s.names), 0.0)
     resolution = (
@@ -127,8 +127,8 @@ def compute_posterior(
     scores = _compute_scores(sets, resolution, gap)
     best = max(sets, key=lambda s: scores[s.names])
     unknown = _score_unknown(best, gap, resolution, samples)
-    if unlisted_excess is not None:
-        unknown = float(np.logaddexp(unknown, _score_unlisted(unlisted_excess, resolution)))
+    if unlisted is not None:
+        unknown = float(np.logaddexp(unknown, _score_unlisted(unlisted, scores, resolution, gap)))
     shares = normalise_scores(np.array([*scores.values(), unknown]))
     remaining = (max(best.excess, 0.0) + resolution) / (gap + resolution)
     any_effect = 1.0 - float(shares[list(scores).index(frozenset())])
@@ -143,11 +143,7 @@ def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) 
     A set with an effect that increases the error on held-out samples is less probable than the set without it.
     """
     prior = {s.names: compute_log_prior(s.names) + math.log(s.weight) for s in sets}
-    loss = {
-        s.names: _LIKELIHOOD_EXPONENT * math.log(max(s.excess, 0.0) + resolution) + _penalise_incomplete(s, gap)
-        for s in sets
-    }
-    scores = {names: prior[names] - loss[names] for names in prior}
+    scores = {s.names: prior[s.names] - _compute_loss(s, resolution, gap) for s in sets}
     with_blocks = [(s.names, s.block_evidence) for s in sets if s.block_evidence]
     for names, (parent, log_odds) in sorted(with_blocks, key=lambda item: len(item[0])):
         scores[names] = max(scores[names], scores[parent] + log_odds + prior[names] - prior[parent])
@@ -156,6 +152,24 @@ def _compute_scores(sets: Sequence[SetEvidence], resolution: float, gap: float) 
             if log_odds < 0.0:
                 scores[s.names] = min(scores[s.names], scores[parent] + log_odds)
     return scores
+
+
+def _compute_loss(evidence: SetEvidence, resolution: float, gap: float) -> float:
+    """Return the loss in log odds that the excess of a set causes."""
+    loss = _LIKELIHOOD_EXPONENT * math.log(max(evidence.excess, 0.0) + resolution)
+    return loss + _penalise_incomplete(evidence, gap)
+
+
+def _score_unlisted(
+    unlisted: SetEvidence, scores: Mapping[frozenset[str], float], resolution: float, gap: float
+) -> float:
+    """Return the log odds of a curve outside the library, from the same evidence as those of a set."""
+    prior = compute_log_prior(unlisted.names)
+    score = prior - _compute_loss(unlisted, resolution, gap)
+    if unlisted.block_evidence is None:
+        return score
+    parent, log_odds = unlisted.block_evidence
+    return max(score, scores[parent] + log_odds + prior - compute_log_prior(parent))
 
 
 def _score_unknown(best: SetEvidence, gap: float, resolution: float, samples: int) -> float:
@@ -169,12 +183,6 @@ def _score_unknown(best: SetEvidence, gap: float, resolution: float, samples: in
     score -= _penalise_incomplete(best, gap)
     weight = _compute_logistic(best.excess - insignificant, _LOGISTIC_WIDTH * insignificant)
     return score + math.log(max(weight, 1e-9))
-
-
-def _score_unlisted(excess: float, resolution: float) -> float:
-    """Return the log odds of a curve outside the library: those of one rare effect that leaves an excess [1]."""
-    prior = math.log(_COUNT_PRIOR[1] / len(COMMON_EFFECTS) * _COMPLEXITY_FACTOR * _RARE_WEIGHT)
-    return prior - _LIKELIHOOD_EXPONENT * math.log(max(excess, 0.0) + resolution)
 
 
 def _penalise_incomplete(evidence: SetEvidence, gap: float) -> float:

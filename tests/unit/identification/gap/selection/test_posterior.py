@@ -214,22 +214,39 @@ def test_a_set_that_harms_held_out_samples_is_less_probable_than_the_one_without
 SEVERAL = "end_stop__gas_spring__displacement_nonlinearity"
 
 
+def make_curve(excess: float, block_evidence: BlockEvidence | None = None) -> SetEvidence:
+    return SetEvidence(frozenset({"curve"}), excess, block_evidence=block_evidence)
+
+
 def test_a_curve_outside_the_library_that_leaves_less_is_more_probable_than_several_effects():
     sets = make_sets(none=100.0, **{SEVERAL: 1.6})
     assert compute_posterior(sets, SAMPLES).rank_sets()[0][1] > 0.5
-    posterior = compute_posterior(sets, SAMPLES, unlisted_excess=0.02)
+    posterior = compute_posterior(sets, SAMPLES, unlisted=make_curve(0.02))
     assert posterior.unknown > 0.95
     assert posterior.compute_effect_probability("end_stop") < 0.05
 
 
 def test_a_curve_outside_the_library_that_leaves_more_changes_nothing():
     sets = make_sets(none=100.0, gas_spring=0.3)
-    posterior = compute_posterior(sets, SAMPLES, unlisted_excess=20.0)
+    posterior = compute_posterior(sets, SAMPLES, unlisted=make_curve(20.0))
     assert posterior.unknown == pytest.approx(compute_posterior(sets, SAMPLES).unknown, abs=1e-3)
 
 
 def test_of_two_causes_that_leave_as_much_the_one_in_the_library_is_more_probable():
     sets = make_sets(none=100.0, gas_spring=0.3)
-    posterior = compute_posterior(sets, SAMPLES, unlisted_excess=0.3)
+    posterior = compute_posterior(sets, SAMPLES, unlisted=make_curve(0.3))
     assert posterior.compute_effect_probability("gas_spring") > 0.7
     assert posterior.unknown > compute_posterior(sets, SAMPLES).unknown
+
+
+def test_block_evidence_of_a_set_does_not_hide_a_curve_that_has_more_of_it():
+    first, both = frozenset({"end_stop"}), frozenset({"end_stop", "gas_spring"})
+    sets = [
+        *make_sets(none=70.0, end_stop=6.0),
+        SetEvidence(both, 3.7, block_evidence=BlockEvidence(first, 60.0)),
+    ]
+    assert compute_posterior(sets, SAMPLES, unlisted=make_curve(0.02)).sets[both] > 0.5
+    curve = make_curve(0.02, BlockEvidence(both, 40.0))
+    assert compute_posterior(sets, SAMPLES, unlisted=curve).unknown > 0.95
+    worse = make_curve(4.0, BlockEvidence(both, -40.0))
+    assert compute_posterior(sets, SAMPLES, unlisted=worse).sets[both] > 0.5

@@ -14,9 +14,12 @@ from bench.errors import ReportError
 def render_png(figure: Figure, dpi: int = 160) -> bytes:
     """Render a figure as PNG with the resolution of a dense screen; cached, as page and file use the same."""
     buffer = BytesIO()
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        # The layout is computed once, without the trial drawing of `savefig`; an SVG then has the same one.
+        engine.execute(figure)
+        figure.set_layout_engine("none")
     figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": "mrbench"})
-    # Computing the layout takes as long as drawing, and the SVG has the same layout.
-    figure.set_layout_engine("none")
     return buffer.getvalue()
 
 

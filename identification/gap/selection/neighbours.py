@@ -22,7 +22,7 @@ _STAGED_FIT = FitOptions(
 )
 """Two descents, each after some steps of the law alone, on decimated data.
 
-Origin of the limit on their steps: a stiffening joint takes more than 25 steps. A descent that stops before its end
+Origin of the limit: a stiffening joint takes more than 25 steps, and a descent that stops before its end
 says nothing about its form.
 """
 

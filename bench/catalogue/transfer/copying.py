@@ -1,6 +1,7 @@
 """Copy of the rows of a table to another database, and the comparison of both tables."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from itertools import islice, zip_longest
 from typing import NamedTuple, TypeAlias
 
@@ -31,12 +32,12 @@ def copy_table(source: Connection, target: Connection, table: StoredTable, advan
         CatalogueError: the target refuses a row.
     """
     rows, replaced = 0, 0
-    adapted = _read_adapted(source, target, table)
-    while batch := list(islice(adapted, BATCH)):
-        _insert(target, table, [row for row, _ in batch])
-        rows += len(batch)
-        replaced += sum(count for _, count in batch)
-        advance(len(batch))
+    with closing(read_rows(source, table)) as originals:
+        while batch := [_adapt(row, target, table) for row in islice(originals, BATCH)]:
+            _insert(target, table, [row for row, _ in batch])
+            rows += len(batch)
+            replaced += sum(count for _, count in batch)
+            advance(len(batch))
     return TableCount(rows, replaced)
 
 
@@ -52,12 +53,12 @@ def compare_table(source: Connection, target: Connection, table: StoredTable, ad
             f"table {table.name}: {counts[1]} rows were copied, expected {counts[0]}; nothing was changed; repeat "
             "the transfer"
         )
-    originals = (row for row, _ in _read_adapted(source, target, table))
-    pairs = zip_longest(originals, read_rows(target, table))
-    while batch := list(islice(pairs, BATCH)):
-        for original, copy in batch:
-            _compare(table, original, copy)
-        advance(len(batch))
+    with closing(read_rows(source, table)) as originals, closing(read_rows(target, table)) as copies:
+        pairs = zip_longest((_adapt(row, target, table)[0] for row in originals), copies)
+        while batch := list(islice(pairs, BATCH)):
+            for original, copy in batch:
+                _compare(table, original, copy)
+            advance(len(batch))
 
 
 def _compare(table: StoredTable, original: StoredRow | None, copy: StoredRow | None) -> None:
@@ -74,11 +75,9 @@ def _compare(table: StoredTable, original: StoredRow | None, copy: StoredRow | N
     )
 
 
-def _read_adapted(source: Connection, target: Connection, table: StoredTable) -> Iterator[tuple[StoredRow, int]]:
-    """Yield the rows as the target can store them, with the number of texts that were changed for this."""
-    is_server = target.dialect.name == POSTGRES
-    for row in read_rows(source, table):
-        yield replace_nul(row, table.json_places) if is_server else (row, 0)
+def _adapt(row: StoredRow, target: Connection, table: StoredTable) -> tuple[StoredRow, int]:
+    """Return a row as the target can store it, and the number of texts that were changed for this."""
+    return replace_nul(row, table.json_places) if target.dialect.name == POSTGRES else (row, 0)
 
 
 def _insert(target: Connection, table: StoredTable, rows: Sequence[StoredRow]) -> None:

@@ -5,7 +5,7 @@ value. Columns that the database computes itself (`runs.texts` in PostgreSQL) an
 (`newest_values`) are not part of the models, and so they are not copied.
 """
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from typing import Any, NamedTuple, TypeAlias
 
 from sqlalchemy import (
@@ -95,12 +95,16 @@ def _find_stored_type(model: TypeEngine[Any]) -> TypeEngine[Any]:
     return DateTime() if isinstance(model, UtcTime) else model
 
 
-def read_rows(connection: Connection, source: StoredTable) -> Iterator[StoredRow]:
-    """Yield the rows of a table in the order of their primary keys, which is the same in every database."""
+def read_rows(connection: Connection, source: StoredTable) -> Generator[StoredRow, None, None]:
+    """Yield the rows of a table in the order of their primary keys, which is the same in every database.
+
+    The caller closes the generator: a server keeps the query open until then.
+    """
     order = [_sort_by(source.clause.c[key], connection.dialect.name) for key in source.keys]
     query = select(*source.clause.c).order_by(*order)
-    for row in connection.execute(query, execution_options={"yield_per": BATCH}):
-        yield tuple(row)
+    with connection.execute(query, execution_options={"yield_per": BATCH}) as result:
+        for row in result:
+            yield tuple(row)
 
 
 def _sort_by(key: ColumnElement[Any], dialect: str) -> ColumnElement[Any]:

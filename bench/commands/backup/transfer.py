@@ -63,7 +63,9 @@ def _summarise(done: "Transferred", seconds: float) -> dict[str, Any]:
 
 def _describe(result: dict[str, Any]) -> str:
     """Return the result in lines for a person."""
-    lines = [f"{rows:>10} rows  {table}" for table, rows in result["tables"].items()]
+    lines = [f"{rows:>10} rows  {table}" for table, rows in result["tables"].items() if rows]
+    if empty := [table for table, rows in result["tables"].items() if not rows]:
+        lines.append(f"{'0 rows':>15}  {', '.join(empty)}")
     lines.append(
         f"{result['rows']:>10} rows  in all, each compared with its copy, in {result['duration_s']:.1f} s"
     )

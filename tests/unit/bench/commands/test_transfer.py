@@ -31,7 +31,8 @@ def test_the_command_names_rows_and_both_databases_without_a_password(data, post
     answer = call("--data", str(data), env={"MRBENCH_CATALOGUE": url})
     assert answer.exit_code == 0, answer.output
     lines = [" ".join(line.split()) for line in answer.stdout.splitlines()]
-    assert {"3 rows runs", "12 rows jobs", "1 rows notes", "0 rows users"} <= set(lines)
+    assert {"3 rows runs", "12 rows jobs", "1 rows notes"} <= set(lines)
+    assert any(line.startswith("0 rows ") and " users" in line for line in lines)
     assert lines[-3].startswith("16 rows in all, each compared with its copy")
     assert lines[-2].startswith("used from now on: postgresql://mrbench:***@/")
     assert lines[-1] == f"no longer used, and unchanged: {make_sqlite_url(data / 'catalogue.db')}"

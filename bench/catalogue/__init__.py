@@ -62,10 +62,12 @@ from bench.catalogue.records import ReportKind, SignatureMeaning, SignatureRow, 
 from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.run_plan import RunPlan, read_plan
 from bench.catalogue.scan import catalogue_log, scan_logs
+from bench.catalogue.transfer import FILE_TARGET, Transferred, transfer_catalogue
 from bench.catalogue.trash import move_to_trash, restore_from_trash
 
 __all__ = [
     "CATALOGUE_FILE",
+    "FILE_TARGET",
     "REPEATABLE_STATES",
     "SHIPPED_VERSION",
     "SQLITE",
@@ -114,6 +116,7 @@ __all__ = [
     "StoredCertificate",
     "TokenRow",
     "TokenStore",
+    "Transferred",
     "UserRow",
     "UserStore",
     "back_up",
@@ -138,4 +141,5 @@ __all__ = [
     "restore_backup",
     "restore_from_trash",
     "scan_logs",
+    "transfer_catalogue",
 ]

@@ -25,10 +25,11 @@ from bench.catalogue.database import (
 )
 from bench.catalogue.errors import CatalogueError
 from bench.errors import BenchError
+from bench.folder_lock import LOCK_FILE
 
 DUMP_FILE = "catalogue.dump"
 """File in a backup with a catalogue of PostgreSQL, in the format of `pg_dump --format=custom`."""
-_NOT_COPIED = ("service.lock", "scheduler.address", "token", "jobs.pem", ADDRESS_FILE, DUMP_FILE)
+_NOT_COPIED = (LOCK_FILE, "scheduler.address", "token", "jobs.pem", ADDRESS_FILE, DUMP_FILE)
 """Files of a running service, and secrets."""
 _NOT_COPIED_ENDINGS = (".log", f"{CATALOGUE_FILE}-wal", f"{CATALOGUE_FILE}-shm", CATALOGUE_FILE)
 

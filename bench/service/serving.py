@@ -1,13 +1,12 @@
 """Start of the service: data folder, port, agent, token, web server."""
 
-import fcntl
 import logging
 import signal
 import socket
 import ssl
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import AbstractAsyncContextManager, contextmanager, nullcontext
+from contextlib import AbstractAsyncContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -17,11 +16,11 @@ import uvicorn
 
 from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samples_address, find_agent
 from bench.catalogue import keep_address, locate_catalogue, open_database
+from bench.folder_lock import hold_lock
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr
 from bench.log_store import find_store, keep_store_url
 from bench.oidc import load_oidc_config
-from bench.processes import open_privately
 from bench.service.access import PLAIN_TOKEN_FILE, open_access, save_token
 from bench.service.agent_monitor import AgentLink, NoAgent
 from bench.service.agent_supervisor import SupervisedAgent
@@ -169,17 +168,16 @@ def _format_address(page: str, token: str | None, data: Path, *, is_terminal: bo
 @contextmanager
 def _lock_data_folder(data: Path) -> Iterator[None]:
     """Lock the data folder for one service at a time."""
-    # The operating system holds the lock, so that it is released when a service is killed.
-    try:
-        data.mkdir(parents=True, exist_ok=True)
-        lock = open_privately(data / "service.lock")
-    except OSError as error:
-        raise ServiceError(f"{data}: cannot be written to ({error.strerror}); use another --data") from error
-    with lock:
+    with ExitStack() as stack:
         try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise ServiceError(f"another service uses {data}; end it, or use another --data") from None
+            data.mkdir(parents=True, exist_ok=True)
+            is_free = stack.enter_context(hold_lock(data))
+        except OSError as error:
+            raise ServiceError(f"{data}: cannot be written to ({error.strerror}); use another --data") from error
+        if not is_free:
+            raise ServiceError(
+                f"another service uses {data}, or a transfer of its catalogue; end it, or use another --data"
+            )
         yield
 
 

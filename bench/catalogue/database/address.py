@@ -79,19 +79,29 @@ def keep_address(folder: Path, url: str) -> None:
         SecretFileError: the folder cannot be written to.
     """
     shown = describe_address(parse_server_address(url))
-    former, path = folder / CATALOGUE_FILE, folder / ADDRESS_FILE
-    if former.is_file():
+    own, path = folder / CATALOGUE_FILE, folder / ADDRESS_FILE
+    # Beside an address, the file is what a transfer has left, and is no longer used.
+    if own.is_file() and not path.is_file():
         raise CatalogueError(
-            f"{former}: the folder has a catalogue of its own, and {shown} was given; use another --data, or move "
-            "the file away: then the logs are catalogued again, without its notes, users and campaigns"
+            f"{own}: the folder has a catalogue of its own, and {shown} was given; call "
+            f"`mrbench transfer --data {folder}` with this address first, or use another --data"
         )
     if path.is_file() and path.read_text().strip() == url:
         return
     # Replaced in one step: a folder without it would get a new SQLite catalogue at the next start.
-    written = path.with_name(f".{ADDRESS_FILE}")
+    write_address(folder, url).replace(path)
+
+
+def write_address(folder: Path, url: str) -> Path:
+    """Write the URL of a catalogue to a file beside `catalogue.url`, and return that file, which is to replace it.
+
+    Raises:
+        SecretFileError: the folder cannot be written to.
+    """
+    written = folder / f".{ADDRESS_FILE}"
     written.unlink(missing_ok=True)
     create_private_file(written, lambda: f"{url}\n")
-    written.replace(path)
+    return written
 
 
 def parse_address(url: str) -> URL:

@@ -1,6 +1,5 @@
 """`mrbench campaign run --config`: a campaign on the instruments, executed by the service of the data folder."""
 
-import fcntl
 import time
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from bench.campaigns import (
 from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
 from bench.config import load_config
+from bench.folder_lock import is_locked
 
 AGENT_BENCH = "agent"
 """Bench of the campaigns that the service executes."""
@@ -58,14 +58,8 @@ def check_served(data: Path, config: Path) -> None:
     Raises:
         CampaignError: none does.
     """
-    path = data / "service.lock"
-    if path.is_file():
-        with path.open("rb") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
-            except OSError:
-                return
-    raise CampaignError(f"no service uses {data}; start it: mrbench serve --config {config} --data {data}")
+    if not is_locked(data):
+        raise CampaignError(f"no service uses {data}; start it: mrbench serve --config {config} --data {data}")
 
 
 def find_or_create(store: CampaignStore, path: Path, operator: str) -> StoredCampaign:

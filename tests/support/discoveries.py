@@ -45,6 +45,8 @@ GROWING = define(
 """Force over the displacement that grows with the drive."""
 SPRING = define("parallel_force", f"a*(displacement/{LENGTH})**2", ("displacement",), a=40.0)
 """Force over the displacement that does not grow with the drive."""
+WAVE = define("parallel_force", "a*sin(displacement/s)", ("displacement",), a=40.0, s=0.003)
+"""Force over the displacement in a form that no effect of the library has."""
 FILM = define(
     "parallel_force",
     "velocity*a*exp(-travel_since_reversal/s)",

@@ -1,9 +1,8 @@
-"""Excess of a curve outside the library, as evidence against named effects with a larger excess.
+"""Curves as evidence against named effects with a larger excess.
 
 Effects of the library can together resemble a cause that none of them is. A curve at the place of that cause, over
 its variable, then has a smaller excess than they have. Curves where the library has an effect are fitted as well.
-Where one of them has the smallest excess, the cause may be that effect in another form. This is no evidence
-against the library.
+Where one of them has the smallest excess, the cause may be that effect in another form.
 """
 
 from collections.abc import Mapping
@@ -14,9 +13,15 @@ from identification.damper.definitions import STAGE_OF
 from identification.damper.effects import STAGES, Action, Effect, Place, Stage, Variable
 from identification.gap.data import compute_residual_correlation_length
 from identification.gap.discovery.curve_effects import CurvePlace
-from identification.gap.discovery.curve_fit import fit_best_curves, screen_curves
+from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, screen_curves
 from identification.gap.fits import Candidate
-from identification.gap.selection import BlockEvidence, CandidatePool, Posterior, normalise_scores
+from identification.gap.selection import (
+    BlockEvidence,
+    CandidatePool,
+    CurveAlternative,
+    Posterior,
+    normalise_scores,
+)
 from identification.threads import use_one_thread
 
 _STATIC_ACTIONS: frozenset[Action] = frozenset(
@@ -61,27 +66,42 @@ def list_pairs(library: Mapping[str, Effect]) -> set[tuple[Place, Variable]]:
 
 
 def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
-    """Return the posterior with the best curve outside the library as one of the alternatives.
+    """Return the posterior with the best curve as one of the alternatives.
 
-    Curves are only fitted where the most probable set leaves more than the noise floor; else nothing changes.
+    Curves are only fitted where the most probable set leaves more than the noise floor; else nothing changes. A
+    curve outside the library stands for an unknown cause. One at the place of an effect stands for that effect in
+    another form, if it alone reaches the floor: several effects that leave more only repair the form of that one.
     Block evidence can raise the odds of a set far above those that its excess gives, so the curve has it too.
     """
     names = posterior.most_probable_set
     if not names or pool.reaches_floor(pool.candidates[names]):
         return posterior
-    pool.unlisted = find_unlisted_cause(pool)
-    if pool.unlisted is not None:
-        log_odds = pool.compute_held_out_evidence(pool.candidates[names], pool.unlisted)
-        pool.unlisted_evidence = BlockEvidence(names, log_odds)
+    best = find_best_curve(pool)
+    alternative = frozenset[str]() if best is None else _name_alternative(pool, best)
+    if best is None or not alternative:
+        return posterior
+    evidence = BlockEvidence(names, pool.compute_held_out_evidence(pool.candidates[names], best.candidate))
+    pool.curve = CurveAlternative(alternative, best.candidate, evidence)
+    pool.fit_most_probable_set(CandidatePool.compute_posterior)
     return pool.compute_posterior()
 
 
-def find_unlisted_cause(pool: CandidatePool) -> Candidate | None:
-    """Return the law with the best curve, if the library has no effect there; else None."""
+def find_best_curve(pool: CandidatePool) -> FittedCurve | None:
+    """Return the best curve with the law; None if the recording can show none."""
     curves = fit_best_curves(pool, pool.baseline, screen_curves(pool, pool.baseline))
-    if not curves or not is_unlisted(curves[0].curve.at, pool.library):
-        return None
-    return curves[0].candidate
+    return curves[0] if curves else None
+
+
+def _name_alternative(pool: CandidatePool, best: FittedCurve) -> frozenset[str]:
+    """Return the name of the cause that a curve stands for; empty if it is no alternative to the sets."""
+    if is_unlisted(best.curve.at, pool.library):
+        return best.candidate.names
+    if not pool.reaches_floor(best.candidate):
+        return frozenset()
+    pair = (best.curve.at.place, best.curve.at.variables[0])
+    single = [names for names in pool.candidates if len(names) == 1]
+    alike = [names for names in single if pair in list_pairs({name: pool.library[name] for name in names})]
+    return min(alike, key=lambda names: pool.compute_excess(pool.candidates[names]), default=frozenset())
 
 
 def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage, float]:

@@ -1,7 +1,7 @@
 """Selection of the sets of effects that explain a recording."""
 
 from identification.gap.selection.block_evidence import compute_evidence
-from identification.gap.selection.candidate_pool import CandidatePool
+from identification.gap.selection.candidate_pool import CandidatePool, CurveAlternative
 from identification.gap.selection.partial_sets import find_partial_sets
 from identification.gap.selection.plan import compute_final_posterior, search_forward
 from identification.gap.selection.posterior import (
@@ -23,6 +23,7 @@ __all__ = [
     "UNKNOWN_THRESHOLD",
     "BlockEvidence",
     "CandidatePool",
+    "CurveAlternative",
     "Posterior",
     "SearchSettings",
     "compute_evidence",

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,6 +57,17 @@ _LAW_SEARCH = replace(_SEARCH, restarts=2)
 """Search of the law alone, on which all sets rest: also from the mixed start."""
 
 
+class CurveAlternative(NamedTuple):
+    """A curve that is an alternative to the fitted sets."""
+
+    names: frozenset[str]
+    """Name of the effect whose form it stands for; another name for a cause outside the library."""
+    candidate: Candidate
+    """The law with the curve."""
+    evidence: BlockEvidence
+    """Block evidence on the held-out samples over the most probable set."""
+
+
 @dataclass
 class CandidatePool:
     """The sets of effects that were fitted to one recording."""
@@ -78,10 +90,8 @@ class CandidatePool:
     """Block evidence of the sets for which it was computed."""
     held_out_evidence: dict[frozenset[str], tuple[BlockEvidence, ...]] = field(default_factory=dict)
     """Block evidence on the held-out samples over sets with one effect less, where it was computed."""
-    unlisted: Candidate | None = None
-    """The law with the best curve outside the library, where curves were fitted."""
-    unlisted_evidence: BlockEvidence | None = None
-    """Block evidence of this curve on the held-out samples over the most probable set."""
+    curve: CurveAlternative | None = None
+    """The law with the best curve, where curves were fitted and it is an alternative to the sets."""
     fit_count: int = 0
     """Number of fits."""
     notes: list[str] = field(default_factory=list)
@@ -163,15 +173,16 @@ class CandidatePool:
     def compute_posterior(self) -> Posterior:
         """Compute the posterior of all fitted sets."""
         coloured_share = self.noise_model.estimate.coloured_share
-        unlisted = self._collect_unlisted_evidence()
-        return compute_posterior(self.collect_evidence(), self.full_problem.samples, coloured_share, unlisted)
+        curve = self._collect_curve_evidence()
+        return compute_posterior(self.collect_evidence(), self.full_problem.samples, coloured_share, curve)
 
-    def _collect_unlisted_evidence(self) -> SetEvidence | None:
-        """Return the evidence of the curve outside the library; None without one."""
-        if self.unlisted is None:
+    def _collect_curve_evidence(self) -> SetEvidence | None:
+        """Return the evidence of the curve that is an alternative to the sets; None without one."""
+        if self.curve is None:
             return None
-        excess = self.unlisted.compute_relative_excess(self.baseline, self._find_lowest_floor())
-        return SetEvidence(self.unlisted.names, excess, block_evidence=self.unlisted_evidence)
+        names, candidate, evidence = self.curve
+        excess = candidate.compute_relative_excess(self.baseline, self._find_lowest_floor())
+        return SetEvidence(names, excess, block_evidence=evidence)
 
     def _find_lowest_floor(self) -> float:
         """Return a floor [N] that lies below the residual of every candidate."""

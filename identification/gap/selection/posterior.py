@@ -107,7 +107,7 @@ class Posterior:
 
 
 def compute_posterior(
-    sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0, unlisted: SetEvidence | None = None
+    sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0, curve: SetEvidence | None = None
 ) -> Posterior:
     """Compute the probabilities of sets of effects and of an unknown cause.
 
@@ -115,7 +115,8 @@ def compute_posterior(
         sets: evidence of every fitted set, the empty one included.
         samples: number of fitted samples.
         coloured_share: part of the variance of the noise [1] that is not white; slow noise varies more by chance.
-        unlisted: evidence of a curve outside the library, where one was fitted; it counts as one rare effect.
+        curve: evidence of a fitted curve, where it is an alternative to the sets. With the name of an effect it is
+            that effect in another form, with another name a cause outside the library.
     """
     gap = max(next(s.excess for s in sets if not s.names), 0.0)
     resolution = (
@@ -125,10 +126,15 @@ def compute_posterior(
         + _FORM_ERROR * gap
     )
     scores = _compute_scores(sets, resolution, gap)
+    if curve is not None:
+        score = _score_curve(curve, scores, resolution, gap)
+        if score > scores.get(curve.names, math.inf):
+            scores[curve.names] = score
+            sets = [curve if s.names == curve.names else s for s in sets]
     best = max(sets, key=lambda s: scores[s.names])
     unknown = _score_unknown(best, gap, resolution, samples)
-    if unlisted is not None:
-        unknown = float(np.logaddexp(unknown, _score_unlisted(unlisted, scores, resolution, gap)))
+    if curve is not None and curve.names not in scores:
+        unknown = float(np.logaddexp(unknown, score))
     shares = normalise_scores(np.array([*scores.values(), unknown]))
     remaining = (max(best.excess, 0.0) + resolution) / (gap + resolution)
     any_effect = 1.0 - float(shares[list(scores).index(frozenset())])
@@ -160,15 +166,15 @@ def _compute_loss(evidence: SetEvidence, resolution: float, gap: float) -> float
     return loss + _penalise_incomplete(evidence, gap)
 
 
-def _score_unlisted(
-    unlisted: SetEvidence, scores: Mapping[frozenset[str], float], resolution: float, gap: float
+def _score_curve(
+    curve: SetEvidence, scores: Mapping[frozenset[str], float], resolution: float, gap: float
 ) -> float:
-    """Return the log odds of a curve outside the library, from the same evidence as those of a set."""
-    prior = compute_log_prior(unlisted.names)
-    score = prior - _compute_loss(unlisted, resolution, gap)
-    if unlisted.block_evidence is None:
+    """Return the log odds of a curve, from the same evidence as those of a set."""
+    prior = compute_log_prior(curve.names)
+    score = prior - _compute_loss(curve, resolution, gap)
+    if curve.block_evidence is None:
         return score
-    parent, log_odds = unlisted.block_evidence
+    parent, log_odds = curve.block_evidence
     return max(score, scores[parent] + log_odds + prior - compute_log_prior(parent))
 
 

@@ -6,13 +6,14 @@ from identification.damper.effects import EFFECTS
 from identification.gap.discovery import compare_with_curves
 from identification.gap.discovery.curve_effects import CURVE_PLACES, CurvePlace
 from identification.gap.discovery.unlisted_cause import (
-    find_unlisted_cause,
+    find_best_curve,
     is_unlisted,
     list_pairs,
     locate_unlisted_cause,
 )
 from identification.gap.selection import Posterior
-from tests.support.discoveries import GAIN, MOUNTING, SPRING, pool_with
+from tests.support.discoveries import GAIN, MOUNTING, WAVE, pool_with
+from tests.support.effects import active
 
 
 @pytest.mark.parametrize(
@@ -38,21 +39,55 @@ def test_a_smaller_library_has_fewer_places():
     assert {(at.place, at.variables[0]) for at in CURVE_PLACES} > list_pairs(without)
 
 
+def compare(cause, *names):
+    """A pool with a set of effects that is the most probable one, and its posterior after the comparison."""
+    pool = pool_with(cause).copy()
+    pool.extend(*names[:1])
+    if names[1:]:
+        pool.extend(*names)
+    return pool, compare_with_curves(pool, Posterior({frozenset(names): 0.9}, 0.1))
+
+
 def test_a_gain_over_the_displacement_is_a_cause_outside_the_library():
     pool = pool_with(GAIN)
-    found = find_unlisted_cause(pool)
-    assert found is not None
-    assert found.held_out_rmse < 0.2 * pool.baseline.held_out_rmse
+    found = find_best_curve(pool)
+    assert is_unlisted(found.curve.at, EFFECTS)
+    assert found.candidate.held_out_rmse < 0.2 * pool.baseline.held_out_rmse
 
 
-def test_a_force_over_the_displacement_may_be_an_effect_of_the_library():
-    assert find_unlisted_cause(pool_with(SPRING)) is None
+def test_a_cause_outside_the_library_is_more_probable_than_effects_that_leave_more():
+    pool, posterior = compare(GAIN, "gas_spring", "end_stop")
+    assert pool.curve.names == {"curve"}
+    assert posterior.unknown > 0.9
+
+
+def test_a_curve_at_the_place_of_an_effect_is_that_effect_in_another_form():
+    pool, posterior = compare(WAVE, "gas_spring", "displacement_nonlinearity")
+    assert pool.curve.names == {"gas_spring"}
+    assert posterior.most_probable_set == {"gas_spring"}
+    assert posterior.most_probable_set in pool.full_fits
+    assert posterior.unknown < 0.2
+
+
+def test_a_curve_at_the_place_of_an_effect_counts_only_if_it_reaches_the_floor(monkeypatch):
+    pool = pool_with(WAVE).copy()
+    posterior = Posterior({pool.extend("gas_spring"): 0.9}, 0.1)
+    monkeypatch.setattr(pool, "reaches_floor", lambda candidate: False)
+    assert compare_with_curves(pool, posterior) is posterior
+    assert pool.curve is None
+
+
+def test_a_set_at_the_floor_is_not_compared():
+    pool = pool_with(active("end_stop")).copy()
+    posterior = Posterior({pool.extend("end_stop"): 0.9}, 0.1)
+    assert compare_with_curves(pool, posterior) is posterior
+    assert pool.curve is None
 
 
 def test_without_named_effects_nothing_is_compared():
     pool, posterior = pool_with(GAIN), Posterior({frozenset(): 0.4}, 0.6)
     assert compare_with_curves(pool, posterior) is posterior
-    assert pool.unlisted is None
+    assert pool.curve is None
 
 
 @pytest.mark.parametrize(("cause", "stage"), [(GAIN, "damper"), (MOUNTING, "mounting")])

@@ -221,20 +221,20 @@ def make_curve(excess: float, block_evidence: BlockEvidence | None = None) -> Se
 def test_a_curve_outside_the_library_that_leaves_less_is_more_probable_than_several_effects():
     sets = make_sets(none=100.0, **{SEVERAL: 1.6})
     assert compute_posterior(sets, SAMPLES).rank_sets()[0][1] > 0.5
-    posterior = compute_posterior(sets, SAMPLES, unlisted=make_curve(0.02))
+    posterior = compute_posterior(sets, SAMPLES, curve=make_curve(0.02))
     assert posterior.unknown > 0.95
     assert posterior.compute_effect_probability("end_stop") < 0.05
 
 
 def test_a_curve_outside_the_library_that_leaves_more_changes_nothing():
     sets = make_sets(none=100.0, gas_spring=0.3)
-    posterior = compute_posterior(sets, SAMPLES, unlisted=make_curve(20.0))
+    posterior = compute_posterior(sets, SAMPLES, curve=make_curve(20.0))
     assert posterior.unknown == pytest.approx(compute_posterior(sets, SAMPLES).unknown, abs=1e-3)
 
 
 def test_of_two_causes_that_leave_as_much_the_one_in_the_library_is_more_probable():
     sets = make_sets(none=100.0, gas_spring=0.3)
-    posterior = compute_posterior(sets, SAMPLES, unlisted=make_curve(0.3))
+    posterior = compute_posterior(sets, SAMPLES, curve=make_curve(0.3))
     assert posterior.compute_effect_probability("gas_spring") > 0.7
     assert posterior.unknown > compute_posterior(sets, SAMPLES).unknown
 
@@ -245,8 +245,21 @@ def test_block_evidence_of_a_set_does_not_hide_a_curve_that_has_more_of_it():
         *make_sets(none=70.0, end_stop=6.0),
         SetEvidence(both, 3.7, block_evidence=BlockEvidence(first, 60.0)),
     ]
-    assert compute_posterior(sets, SAMPLES, unlisted=make_curve(0.02)).sets[both] > 0.5
+    assert compute_posterior(sets, SAMPLES, curve=make_curve(0.02)).sets[both] > 0.5
     curve = make_curve(0.02, BlockEvidence(both, 40.0))
-    assert compute_posterior(sets, SAMPLES, unlisted=curve).unknown > 0.95
+    assert compute_posterior(sets, SAMPLES, curve=curve).unknown > 0.95
     worse = make_curve(4.0, BlockEvidence(both, -40.0))
-    assert compute_posterior(sets, SAMPLES, unlisted=worse).sets[both] > 0.5
+    assert compute_posterior(sets, SAMPLES, curve=worse).sets[both] > 0.5
+
+
+def test_a_curve_with_the_name_of_an_effect_raises_the_odds_of_that_effect():
+    several = frozenset({"end_stop", "gas_spring", "displacement_nonlinearity"})
+    sets = make_sets(none=5.0, displacement_nonlinearity=2.0, **{SEVERAL: 1.2})
+    assert compute_posterior(sets, SAMPLES).compute_effect_probability("displacement_nonlinearity") < 0.1
+    curve = SetEvidence(
+        frozenset({"displacement_nonlinearity"}), 0.02, block_evidence=BlockEvidence(several, 40.0)
+    )
+    posterior = compute_posterior(sets, SAMPLES, curve=curve)
+    assert posterior.most_probable_set == {"displacement_nonlinearity"}
+    assert posterior.compute_effect_probability("gas_spring") < 0.01
+    assert posterior.unknown < 0.1

@@ -74,14 +74,15 @@ def compile_inline(function: Function) -> Function:
 
 def _borrow(typing_context: Any, array: Any) -> Any:
     def make_view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        view = cgutils.create_struct_proxy(signature.return_type)(context, builder, value=arguments[0])
-        view.meminfo = cgutils.get_null_value(view.meminfo.type)
+        make_struct = cgutils.create_struct_proxy(signature.return_type)  # type: ignore[no-untyped-call]
+        view = make_struct(context, builder, value=arguments[0])
+        view.meminfo = cgutils.get_null_value(view.meminfo.type)  # type: ignore[no-untyped-call]
         return view._getvalue()  # noqa: SLF001  # the accessor that extensions of numba use
 
     return array(array), make_view
 
 
-borrow: Callable[[Any], Any] = intrinsic(_borrow)
+borrow = cast(Callable[[Any], Any], intrinsic(_borrow))
 """Return an array on the same memory that counts no references, for compiled code only.
 
 Otherwise every slice and every call by an address counts them, which takes longer than an effect's form. The

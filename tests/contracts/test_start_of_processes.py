@@ -1,4 +1,4 @@
-"""What a process loads at its start: packages that only draw or compute take seconds, and many processes start."""
+"""Processes of the bench start without the packages that only draw or compute, which take seconds to load."""
 
 import subprocess
 import sys

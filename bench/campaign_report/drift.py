@@ -7,12 +7,12 @@ A straight line is fitted by least squares, weighted by the intervals of the val
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import sqrt
+from statistics import NormalDist
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import norm, t
 
-Z95 = float(norm.ppf(0.975))
+Z95 = NormalDist().inv_cdf(0.975)
 """Half of a 95 % interval over its standard deviation."""
 MIN_RUNS = 3
 """Smallest number of runs of a drift."""
@@ -75,6 +75,9 @@ def fit_drift(
     Returns:
         The line; None with fewer than three values with an interval, or with all of them at one place.
     """
+    # Only here: the service loads this module at its start, and the package takes most of a second.
+    from scipy.stats import t
+
     rows = [
         (1.0, place, value, Z95 / half) for place, value, half in zip(x, values, half_widths, strict=True) if half
     ]
@@ -109,6 +112,8 @@ def _is_outlier(
     k: int, x: Sequence[float], values: Sequence[float], half_widths: Sequence[float | None], level: float
 ) -> bool:
     """Return whether one value is an outlier at a level of significance [1]."""
+    from scipy.stats import t
+
     half = half_widths[k]
     others = fit_drift(*([*one[:k], *one[k + 1 :]] for one in (x, values, half_widths)))  # type: ignore[arg-type]
     if not half or others is None:

@@ -1,17 +1,20 @@
 """Plots of a campaign: each parameter over the runs of a specimen, with intervals, drift, outliers, remounts."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from itertools import islice, pairwise
 from math import floor, log10
-
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
+from typing import TYPE_CHECKING
 
 from bench.campaign_report.content import CampaignReport, Cell, Series
 from bench.campaign_report.results import MAX_PICTURES, name_picture
 from bench.report import FAINT_COLOUR, INK_COLOUR, format_unit, make_figure, style_axes
 from bench.report.layout import Picture, render_png
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _COLUMNS = 3
 _WIDTH, _HEIGHT = 9.0, 1.75
@@ -97,6 +100,8 @@ def _label_time(places: Sequence[Axes], shown: int) -> None:
 
 def _draw_legend(figure: Figure, shown: Sequence[Series]) -> None:
     """Draw one legend above all axes, with what the plot contains."""
+    from matplotlib.lines import Line2D
+
     handles = [Line2D([], [], color=_VALUE_COLOUR, marker="o", linestyle="", label="run with 95 % interval")]
     if any(one.drift_per_hour for one in shown):
         handles.append(Line2D([], [], color=_DRIFT_COLOUR, linestyle=_DASHES, label="drift"))

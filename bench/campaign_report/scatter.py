@@ -23,7 +23,6 @@ from math import sqrt
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
 
 LIMIT_FACTOR = 2.8
 """95 % limit of the difference of two values, over the standard deviation of one (1.96 √2)."""
@@ -105,6 +104,9 @@ def _estimate_between(
 
 def _make_interval(variance: float, freedom: int) -> tuple[float, float]:
     """Return the 95 % interval of the standard deviation of a variance with degrees of freedom."""
+    # Only here: the service loads this module at its start, and the package takes most of a second.
+    from scipy.stats import chi2
+
     lower, upper = (float(chi2.ppf(share, freedom)) for share in ((1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2))
     return sqrt(freedom * variance / upper), sqrt(freedom * variance / lower)
 

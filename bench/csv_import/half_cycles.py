@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 Array = npt.NDArray[np.float64]
 
@@ -121,6 +120,9 @@ def find_holds(
         travel: largest travel [m] of a motion at rest.
         rate: sampling rate [Hz].
     """
+    # Only here: the service loads this module at its start, and the package takes half a second.
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
     window = max(3, round(_MIN_HOLD_TIME * rate))
     travels = maximum_filter1d(displacement, window) - minimum_filter1d(displacement, window)
     holds = []

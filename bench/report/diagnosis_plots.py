@@ -1,17 +1,22 @@
 """Plots of a diagnosis: force errors, probabilities of the stages, gap map, curves outside the library."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.image import AxesImage
 
 from bench.report.diagnosis import Diagnosis, MapPoint, join_names
 from bench.report.discovery import DiscoveredCurve, get_quantity, get_variable_unit
 from bench.report.drawing import INK_COLOUR, draw_bars, draw_colour_bar, make_figure, style_axes
 from bench.report.values import format_name, format_significant, format_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.image import AxesImage
 
 _GAP_COLOUR, _REMAINDER_COLOUR, _PALE_COLOUR = "#b5473c", "#3f7d58", "#c9ced4"
 _LABEL_BOX = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}

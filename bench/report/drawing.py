@@ -1,26 +1,32 @@
-"""Elements of the plots: colours by drive, pairs of recorded and simulated lines, envelopes of many samples."""
+"""Elements of the plots: colours by drive, pairs of recorded and simulated lines, envelopes of many samples.
+
+Matplotlib is imported by the functions that draw: service and worker read results at once, and never draw.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection
-from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from bench.report.recording import Array, Recording
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 Colour = tuple[float, float, float]
 
 INK_COLOUR, FAINT_COLOUR = "#33393f", "#d5d9de"
 MAX_POINTS = 2000
 """Largest number of points of one line."""
-_DRIVE_COLOURMAP = ListedColormap(colormaps["plasma"](np.linspace(0.0, 0.82, 256)), "drives")
 _WHITE_SHARE = 0.45
 """Share of white in the colour of a recorded line."""
 
@@ -36,7 +42,7 @@ class DriveColours:
     unit: str
 
     @classmethod
-    def from_recording(cls, recording: Recording) -> "DriveColours":
+    def from_recording(cls, recording: Recording) -> DriveColours:
         """Return the colours for the drives of a recording."""
         low, high = np.percentile(recording.drive, [0.2, 99.8])
         return cls(float(low), float(high), recording.drive_unit)
@@ -49,13 +55,24 @@ class DriveColours:
     @property
     def scale(self) -> ScalarMappable:
         """Mapping from drive to colour."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+
         spread = max(self.high - self.low, 1e-9)
-        return ScalarMappable(Normalize(self.low, self.low + spread), _DRIVE_COLOURMAP)
+        return ScalarMappable(Normalize(self.low, self.low + spread), _make_drive_colourmap())
 
     def get_colour(self, drive: float) -> Colour:
         """Return the colour of one drive [V or A]."""
         red, green, blue, _ = np.asarray(self.scale.to_rgba(np.array([drive])))[0]
         return float(red), float(green), float(blue)
+
+
+@cache
+def _make_drive_colourmap() -> ListedColormap:
+    from matplotlib import colormaps
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(colormaps["plasma"](np.linspace(0.0, 0.82, 256)), "drives")
 
 
 def lighten(colour: Colour) -> Colour:
@@ -66,6 +83,8 @@ def lighten(colour: Colour) -> Colour:
 
 def make_figure(width: float, height: float) -> Figure:
     """Return an empty figure of a size [inch]."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height), layout="constrained", facecolor="white")
 
 
@@ -119,6 +138,8 @@ def draw_varying(
 
 
 def _draw_coloured_line(axes: Axes, x: Array, y: Array, rgb: npt.NDArray[np.floating], width: float) -> None:
+    from matplotlib.collections import LineCollection
+
     points = np.stack([x, y], axis=1)
     lines = np.stack([points[:-1], points[1:]], axis=1)
     axes.add_collection(LineCollection(list(lines), colors=list(rgb[:-1]), linewidths=width, capstyle="round"))
@@ -144,6 +165,8 @@ def draw_legend(
 def _make_legend_handles(
     colours: DriveColours, drives: Sequence[tuple[float, str]], has_simulation: bool
 ) -> list[Line2D]:
+    from matplotlib.lines import Line2D
+
     handles: list[Line2D] = []
     if has_simulation:
         handles.append(Line2D([], [], color="#b9bec4", linewidth=0.8, label="recorded"))
@@ -194,6 +217,8 @@ def compute_plot_envelope(time: Array, values: Array, drive: Array, bins: int = 
 
 def draw_envelope(axes: Axes, envelope: PlotEnvelope, colours: DriveColours | str) -> None:
     """Draw an envelope as vertical lines in colours by drive or one colour, with a line through their middles."""
+    from matplotlib.collections import LineCollection
+
     low, high = np.stack([envelope.time, envelope.low], 1), np.stack([envelope.time, envelope.high], 1)
     line_colours = colours if isinstance(colours, str) else list(colours.scale.to_rgba(envelope.drive))
     verticals = list(np.stack([low, high], axis=1))

@@ -1,14 +1,14 @@
 """Page of a report: one self-contained HTML file."""
 
+from __future__ import annotations
+
 import hashlib
 import math
 from dataclasses import dataclass
 from datetime import datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Any
 
 from bench.calibration import GAIN_FORMULA
 from bench.errors import ReportError
@@ -27,6 +27,9 @@ from bench.report.series import predict
 from bench.report.summary import make_findings
 from bench.report.truth import Truth, judge, make_answer_rows, make_truth_rows, read_truth
 from bench.report.values import format_force, format_percent, format_rounded
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CAPTIONS = {
     "loops": (

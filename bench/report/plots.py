@@ -1,10 +1,11 @@
 """Plots of a recording and of a fit on it, as separate figures."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bench.errors import ReportError
 from bench.report.documents import DriveError
@@ -25,6 +26,10 @@ from bench.report.drawing import (
 from bench.report.recording import Array, Recording
 from bench.report.strokes import Stroke, Trace, choose_strokes
 from bench.report.values import format_drive
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 DISPLACEMENT, VELOCITY, FORCE = "displacement [mm]", "velocity [m/s]", "force [N]"
 

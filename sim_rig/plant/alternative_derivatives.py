@@ -23,7 +23,7 @@ from sim_rig.plant.alternative_states import (
     Y,
     Z,
 )
-from sim_rig.plant.jit import Array, compile_function
+from sim_rig.plant.jit import Array, compile_function, compile_inline
 from sim_rig.plant.law import (
     compute_field_rate,
     compute_force,
@@ -61,14 +61,14 @@ _FORCE_TOLERANCE = 1e-6
 """[N] difference up to which the two forces count as equal."""
 
 
-@compile_function
+@compile_inline
 def _evaluate_form(i: int, s: Array, now: Array, forms: Any, rate: Array) -> float:
     """Evaluate the i-th form, which writes the rates of its own states."""
     start = DAMPER + 1 + i * MAX_STATES
     return float(forms[0][i](now, s[start : start + MAX_STATES], forms[2][i], rate[start : start + MAX_STATES]))
 
 
-@compile_function
+@compile_inline
 def _compute_damper_force(
     v: float, s: Array, now: Array, forms: Any, p: Array, rate: Array
 ) -> tuple[float, float]:
@@ -95,7 +95,7 @@ def _compute_damper_force(
     return float(compute_force(y_rate, x, c1, p[11], p[13]) + parallel_force), float(y_rate)
 
 
-@compile_function
+@compile_inline
 def _compute_mounting_force(v: float, s: Array, now: Array, forms: Any, rate: Array) -> float:
     """Return the force [N] of the mounting while the damper moves at v [m/s]."""
     now[_ELONGATION], now[_ELONGATION_RATE] = s[POSITION] - s[DAMPER], s[VELOCITY] - v
@@ -105,23 +105,24 @@ def _compute_mounting_force(v: float, s: Array, now: Array, forms: Any, rate: Ar
     return 0.0
 
 
-@compile_function
-def _solve_damper_velocity(s: Array, now: Array, forms: Any, p: Array, rate: Array) -> float:
-    """Return the velocity [m/s] at which the damper's force equals that of its mounting."""
+@compile_inline
+def _balance_mounting(s: Array, now: Array, forms: Any, p: Array, rate: Array) -> tuple[float, float, float]:
+    """Return the velocity [m/s] at which damper and mounting have equal forces; force and inner velocity there."""
     v = now[_V]
     for _ in range(_NEWTON_STEPS):
-        imbalance = (
-            _compute_mounting_force(v, s, now, forms, rate) - _compute_damper_force(v, s, now, forms, p, rate)[0]
-        )
+        mounting_force = _compute_mounting_force(v, s, now, forms, rate)
+        force, y_rate = _compute_damper_force(v, s, now, forms, p, rate)
+        imbalance = mounting_force - force
         if abs(imbalance) < _FORCE_TOLERANCE:
-            break
+            return float(v), force, y_rate
         shifted = v + _VELOCITY_INCREMENT
         shifted_imbalance = (
             _compute_mounting_force(shifted, s, now, forms, rate)
             - _compute_damper_force(shifted, s, now, forms, p, rate)[0]
         )
         v -= imbalance * _VELOCITY_INCREMENT / (shifted_imbalance - imbalance)
-    return float(v)
+    force, y_rate = _compute_damper_force(v, s, now, forms, p, rate)
+    return float(v), force, y_rate
 
 
 @compile_function
@@ -150,12 +151,12 @@ def compute_rates(
     for i in range(MAX_FORMS):
         if forms[1][i] == _FIELD_PLACE:
             now[_FIELD] = _evaluate_form(i, s, now, forms, rate)
-    v = s[VELOCITY]
-    now[_X] = s[POSITION]
     if k[HAS_MOUNTING] != 0.0:
         now[_X] = s[DAMPER]
-        v = _solve_damper_velocity(s, now, forms, p, rate)
-    force, y_rate = _compute_damper_force(v, s, now, forms, p, rate)
+        v, force, y_rate = _balance_mounting(s, now, forms, p, rate)
+    else:
+        now[_X], v = s[POSITION], s[VELOCITY]
+        force, y_rate = _compute_damper_force(v, s, now, forms, p, rate)
     now[_POWER] = abs(force * v)
     _compute_servo_rates(s, command, force, k, rate)
     rate[Y], rate[PATH], rate[DAMPER] = y_rate, abs(v), v

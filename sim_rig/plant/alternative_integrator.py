@@ -4,7 +4,6 @@ import math
 from typing import Any
 
 import numba
-import numpy as np
 
 from sim_rig.effect_forms import X
 from sim_rig.plant.alternative_derivatives import compute_rates
@@ -20,7 +19,7 @@ from sim_rig.plant.alternative_states import (
     VELOCITY,
     Z,
 )
-from sim_rig.plant.jit import Array, compile_function
+from sim_rig.plant.jit import Array, borrow, compile_function
 from sim_rig.plant.law import evaluate_coefficient
 from sim_rig.plant.states import ACTUATOR_COMPLIANCE, AMPLIFIER_RATE, SERVO_BANDWIDTH, Z_SATURATION
 
@@ -34,7 +33,8 @@ MAX_STEPS = 20_000
 _VECTOR, _MATRIX, _SCALAR = numba.float64[::1], numba.float64[:, ::1], numba.float64
 FORM_SIGNATURE = _SCALAR(_VECTOR, _VECTOR, _VECTOR, _VECTOR)
 """Signature of every form's function."""
-_FORM_TYPE = numba.types.FunctionType(FORM_SIGNATURE)
+FORM_TYPE = numba.types.FunctionType(FORM_SIGNATURE)
+"""Type of such a function as an argument."""
 
 
 @compile_function
@@ -106,6 +106,7 @@ def _integrate(
     outputs: Array,
     damper: Array,
     states: Array,
+    work: Array,
 ) -> int:
     """Integrate the states through M command samples, in place.
 
@@ -124,12 +125,14 @@ def _integrate(
         outputs: (M,) filled with the amplifier's output half way through each sample.
         damper: (M, 2) filled with displacement [m] and velocity [m/s] of the damper at each sample.
         states: (M, STATE_COUNT) filled with the states at each sample.
+        work: (6, STATE_COUNT) memory of one integration step.
 
     Returns:
         The sample in which the motion diverged, or M.
     """
-    work, rate = np.zeros((5, STATE_COUNT)), np.zeros(STATE_COUNT)
-    forms = ((first, second, third), places, values, exponents)
+    s, now, k, p, work = borrow(s), borrow(now), borrow(k), borrow(p), borrow(work)
+    rate = work[5]
+    forms = ((first, second, third), borrow(places), borrow(values), borrow(exponents))
     for i in range(len(drive)):
         states[i] = s
         for j in range(substeps):
@@ -163,9 +166,9 @@ integrate = compile_function(
     (
         *(_VECTOR, _VECTOR, _SCALAR, _VECTOR, _VECTOR, _SCALAR, numba.int64, _VECTOR, _VECTOR),
         *(
-            _FORM_TYPE,
-            _FORM_TYPE,
-            _FORM_TYPE,
+            FORM_TYPE,
+            FORM_TYPE,
+            FORM_TYPE,
             _INDEX_VECTOR,
             _MATRIX,
             _MATRIX,
@@ -173,6 +176,7 @@ integrate = compile_function(
             _VECTOR,
             _VECTOR,
             _VECTOR,
+            _MATRIX,
             _MATRIX,
             _MATRIX,
         ),

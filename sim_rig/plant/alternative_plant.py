@@ -10,7 +10,7 @@ from sim_rig.errors import PlantError
 from sim_rig.plant import alternative_integrator as integrator
 from sim_rig.plant import alternative_states as states
 from sim_rig.plant.constants import compute_rig_rate, make_rig_constants
-from sim_rig.plant.jit import Array, compile_function
+from sim_rig.plant.jit import Array, FixedAddress, compile_function
 from sim_rig.plant.plant import Plant, TrueSignals, count_substeps
 from sim_rig.plant.states import ACTUATOR_COMPLIANCE, AMBIENT, Z_SATURATION
 from sim_rig.scenario import ActiveEffect, Scenario, find_form, get_size
@@ -39,6 +39,7 @@ class AlternativePlant(Plant):
         self._constants = _make_constants(scenario, self._law, forms, effects)
         self._command, self._samples = displacement, 0
         self._inputs, self._time = np.zeros(INPUT_COUNT), -_SETTLING_TIME
+        self._work = np.zeros((6, states.STATE_COUNT))
         self._states = _make_rest_states(self._law, self._constants, displacement, drive)
         self._settle(displacement, drive)
 
@@ -61,6 +62,7 @@ class AlternativePlant(Plant):
             np.ascontiguousarray(drive, float), dt / substeps, substeps, self._constants, self._law,
             *self._forms.functions, self._forms.places, self._forms.values, self._forms.exponents,
             force, position, velocity, output, damper, record,
+            self._work,
         )  # fmt: skip
         if done < count:
             raise PlantError(
@@ -122,7 +124,7 @@ def _return_zero(now: Any, memory: Any, values: Any, rate: Any) -> float:
 class _CompiledForms(NamedTuple):
     """Forms as the compiled integrator takes them, padded to their largest number."""
 
-    functions: tuple[Any, Any, Any]
+    functions: tuple[FixedAddress, FixedAddress, FixedAddress]
     places: Any
     values: Array
     exponents: Array
@@ -131,7 +133,10 @@ class _CompiledForms(NamedTuple):
 def _compile_forms(forms: Sequence[AlternativeForm], effects: Sequence[ActiveEffect]) -> _CompiledForms:
     empty = states.MAX_FORMS - len(forms)
     functions = [form.function for form in forms] + [_return_zero] * empty
-    first, second, third = (compile_function(function, integrator.FORM_SIGNATURE) for function in functions)
+    first, second, third = (
+        FixedAddress(compile_function(function, integrator.FORM_SIGNATURE), integrator.FORM_TYPE)
+        for function in functions
+    )
     places = np.array([int(form.place) for form in forms] + [int(Place.NONE)] * empty, np.int64)
     values, exponents = np.zeros((states.MAX_FORMS, MAX_PARAMETERS)), np.zeros((states.MAX_FORMS, 3))
     for i, (form, effect) in enumerate(zip(forms, effects, strict=True)):

@@ -10,6 +10,8 @@ from typing import Any, TypeAlias, TypeVar, cast
 import numba
 import numpy as np
 import numpy.typing as npt
+from numba.core import cgutils
+from numba.extending import intrinsic
 from platformdirs import user_cache_dir
 
 _SOURCE_FOLDERS = ("sim_rig", "identification/damper")
@@ -70,6 +72,24 @@ def compile_inline(function: Function) -> Function:
     return cast(Function, numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(function))
 
 
+def _borrow(typing_context: Any, array: Any) -> Any:
+    def make_view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        make_struct = cgutils.create_struct_proxy(signature.return_type)  # type: ignore[no-untyped-call]
+        view = make_struct(context, builder, value=arguments[0])
+        view.meminfo = cgutils.get_null_value(view.meminfo.type)  # type: ignore[no-untyped-call]
+        return view._getvalue()  # noqa: SLF001  # the accessor that extensions of numba use
+
+    return array(array), make_view
+
+
+borrow = cast(Callable[[Any], Any], intrinsic(_borrow))
+"""Return an array on the same memory that counts no references, for compiled code only.
+
+Otherwise every slice and every call by an address counts them, which takes longer than an effect's form. The
+memory must belong to an argument of the function that is called from Python: nothing else keeps it alive.
+"""
+
+
 def _compile_uncached(function: Function, signature: Any = None) -> Function:
     """Return the function as machine code of this process only: a closure over values cannot be cached."""
     return cast(Function, numba.njit(signature, nogil=True, error_model="numpy")(function))
@@ -79,7 +99,7 @@ class FixedAddress:
     """A compiled function with a fixed address; numba looks those of other arguments up at each call."""
 
     def __init__(self, function: Any, kind: Any) -> None:
-        """Find the address of a function of a type: `BINARY_TYPE`, `QUATERNARY_TYPE` or `SCALE_TYPE`."""
+        """Find the address of a function of a type, such as `BINARY_TYPE`."""
         self._function, self._numba_type_ = function, kind
         compiled = function.get_compile_result(kind.signature)
         self._address = int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name))

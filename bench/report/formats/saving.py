@@ -1,15 +1,18 @@
 """A report as a file in the format that its name ends with."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
-from typing import Literal, TypeAlias, get_args
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING, Literal, TypeAlias, get_args
 
 from bench.report.formats.pdf import write_pdf
 from bench.report.formats.workbook import write_workbook
 from bench.report.page import Report, make_context, make_pictures, render
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 ReportFormat: TypeAlias = Literal["html", "pdf", "xlsx"]
 REPORT_FORMATS: tuple[ReportFormat, ...] = get_args(ReportFormat)

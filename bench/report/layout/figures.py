@@ -1,13 +1,16 @@
 """Figures as files: PNG in the resolution of a dense screen, and SVG."""
 
+from __future__ import annotations
+
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
-
-import matplotlib
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from bench.errors import ReportError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @lru_cache(maxsize=16)
@@ -29,6 +32,8 @@ def save_figures(figures: dict[str, Figure], folder: Path) -> None:
     Raises:
         ReportError: the folder cannot be written to.
     """
+    import matplotlib
+
     try:
         folder.mkdir(parents=True, exist_ok=True)
         # A fixed salt and no date make equal figures equal files.

@@ -25,7 +25,10 @@ def finish(service, run, outcome="clean"):
 
 
 def get_last_job(service, run):
-    return service.wait_for(f"/runs/{run}", lambda found: found["jobs"])["jobs"][-1]
+    """Return the last job of a run, once the engine has it: its row is in the catalogue earlier."""
+    return service.wait_for(
+        f"/runs/{run}", lambda found: found["jobs"] and found["jobs"][-1]["id"] in service.engine.specs
+    )["jobs"][-1]
 
 
 def complete(service, job):

@@ -77,11 +77,11 @@ def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
     if not names or pool.reaches_floor(pool.candidates[names]):
         return posterior
     best = find_best_curve(pool)
-    alternative = frozenset[str]() if best is None else _name_alternative(pool, best)
-    if best is None or not alternative:
+    cause = _name_cause(pool, best) if best else None
+    if best is None or cause is None:
         return posterior
     evidence = BlockEvidence(names, pool.compute_held_out_evidence(pool.candidates[names], best.candidate))
-    pool.curve = CurveAlternative(alternative, best.candidate, evidence)
+    pool.curve = CurveAlternative(cause, best.candidate, evidence)
     pool.fit_most_probable_set(CandidatePool.compute_posterior)
     return pool.compute_posterior()
 
@@ -92,16 +92,16 @@ def find_best_curve(pool: CandidatePool) -> FittedCurve | None:
     return curves[0] if curves else None
 
 
-def _name_alternative(pool: CandidatePool, best: FittedCurve) -> frozenset[str]:
-    """Return the name of the cause that a curve stands for; empty if it is no alternative to the sets."""
+def _name_cause(pool: CandidatePool, best: FittedCurve) -> frozenset[str] | None:
+    """Return the name of the cause that a curve stands for; None if it is no alternative to the sets."""
     if is_unlisted(best.curve.at, pool.library):
         return best.candidate.names
     if not pool.reaches_floor(best.candidate):
-        return frozenset()
+        return None
     pair = (best.curve.at.place, best.curve.at.variables[0])
     single = [names for names in pool.candidates if len(names) == 1]
     alike = [names for names in single if pair in list_pairs({name: pool.library[name] for name in names})]
-    return min(alike, key=lambda names: pool.compute_excess(pool.candidates[names]), default=frozenset())
+    return min(alike, key=lambda names: pool.compute_excess(pool.candidates[names]), default=None)
 
 
 def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage, float]:

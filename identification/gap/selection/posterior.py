@@ -60,10 +60,10 @@ UNKNOWN_THRESHOLD = 0.5
 
 
 class BlockEvidence(NamedTuple):
-    """Block evidence of a set over another with one effect less."""
+    """Block evidence of a set over another with one effect less, or of a curve over a set."""
 
     parent: frozenset[str]
-    """Names of the smaller set."""
+    """Names of the set that it is compared with."""
     log_odds: float
     """Natural logarithm of the odds, before the complexity penalty."""
 
@@ -126,15 +126,15 @@ def compute_posterior(
         + _FORM_ERROR * gap
     )
     scores = _compute_scores(sets, resolution, gap)
-    if curve is not None:
-        score = _score_curve(curve, scores, resolution, gap)
-        if score > scores.get(curve.names, math.inf):
-            scores[curve.names] = score
-            sets = [curve if s.names == curve.names else s for s in sets]
+    curve_score = -math.inf if curve is None else _score_curve(curve, scores, resolution, gap)
+    is_other_form = curve is not None and curve.names in scores
+    if curve is not None and is_other_form and curve_score > scores[curve.names]:
+        scores[curve.names] = curve_score
+        sets = [curve if s.names == curve.names else s for s in sets]
     best = max(sets, key=lambda s: scores[s.names])
     unknown = _score_unknown(best, gap, resolution, samples)
-    if curve is not None and curve.names not in scores:
-        unknown = float(np.logaddexp(unknown, score))
+    if not is_other_form:
+        unknown = float(np.logaddexp(unknown, curve_score))
     shares = normalise_scores(np.array([*scores.values(), unknown]))
     remaining = (max(best.excess, 0.0) + resolution) / (gap + resolution)
     any_effect = 1.0 - float(shares[list(scores).index(frozenset())])

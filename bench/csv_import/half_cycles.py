@@ -19,8 +19,8 @@ MIN_TRAVEL = 20e-6
 _MIN_HOLD_TIME = 0.25
 """Shortest rest [s] that counts as a hold."""
 
-_MIN_SINE_COUNT = 4
-"""Smallest number of repeating half cycles that count as a sine: two cycles."""
+_MIN_SINE_COUNT = 3
+"""Smallest number of repeating half cycles that count as a sine: in two cycles from zero to zero."""
 
 _AMPLITUDE_TOLERANCE, _TIME_TOLERANCE = 0.05, 0.04
 """Largest relative differences in amplitude and time between half cycles that repeat."""
@@ -144,7 +144,7 @@ def find_true_intervals(mask: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 
 def find_steady_groups(half_cycles: Sequence[HalfCycle]) -> list[list[HalfCycle]]:
-    """Find groups of at least four successive half cycles that repeat in amplitude and duration."""
+    """Find groups of at least three successive half cycles that repeat in amplitude and duration."""
     groups: list[list[HalfCycle]] = []
     group: list[HalfCycle] = []
     for half_cycle in half_cycles:

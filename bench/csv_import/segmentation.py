@@ -33,6 +33,9 @@ _MIN_RANDOM_COUNT = 8
 _MIN_RANDOM_SPREAD = 0.2
 """Smallest relative deviation of the amplitudes of a random motion; that of a sweep is smaller."""
 
+_MIN_SINE_CYCLES = 1.9
+"""Shortest sine [cycles]: two cycles, of which noise may hide the ends."""
+
 _MAX_SINE_MISFIT = 0.06
 """Largest misfit of a sine over its amplitude; that of a triangle is twice as large."""
 
@@ -176,6 +179,8 @@ def _find_sines(
         kind = "sine" if misfit < _MAX_SINE_MISFIT and _is_single_sine(group, travel) else "other"
         first = _extend_sine(displacement, group[:2], half_period, start, travel)
         last = _extend_sine(displacement, group[-2:], half_period, stop, travel)
+        if last - first < _MIN_SINE_CYCLES * 2 * half_period:
+            continue
         motion = _Motion(first, last, kind, half_period, tuple(group))
         if motions and motions[-1].stop > motion.start:
             boundary = _find_boundary(displacement, motions[-1], motion)

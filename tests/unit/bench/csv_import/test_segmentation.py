@@ -152,6 +152,24 @@ def test_soft_start_and_stop_are_separate_segments():
     assert segments[2].stop == pytest.approx(5000, abs=40)
 
 
+@pytest.mark.parametrize("cycles", [3, 4])
+def test_a_few_cycles_that_fade_in_and_out_are_a_sine_between_its_fades(cycles):
+    motion = sine(0.01, 1, cycles)
+    fade = np.minimum(np.minimum(np.arange(len(motion)), np.arange(len(motion))[::-1]) / 250, 1.0)
+
+    segments, names = segment(motion * (0.5 - 0.5 * np.cos(np.pi * fade)), 0.2)
+
+    assert [s.motion for s in segments] == ["other", "sine", "other"]
+    assert segments[1].stop - segments[1].start >= 0.95 * (cycles - 1) * 500
+    assert names[1] == "10mm_1Hz_0.2V"
+
+
+def test_three_half_cycles_within_less_than_two_cycles_of_a_sine_are_no_sine():
+    motion = np.concatenate([np.linspace(0, 0.01, 400), 0.01 * np.cos(2 * np.pi * np.arange(750) / 500)])
+
+    assert not any(s.motion == "sine" for s in segment(np.append(motion, np.linspace(-0.01, 0, 400)), 0.2)[0])
+
+
 def test_slow_sine_has_no_holds_at_its_turning_points():
     assert segment(np.concatenate([sine(0.025, 1, 8), sine(0.005, 0.25, 16)]), 0.1)[1] == [
         "25mm_1Hz_0.1V",

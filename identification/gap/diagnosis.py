@@ -11,7 +11,7 @@ from identification.gap.data import (
     check_sliding_recorded,
 )
 from identification.gap.discovery import compare_with_curves
-from identification.gap.noise import NoiseModel
+from identification.gap.noise import NoiseModel, ResidualRegression, settle_unknown_floor
 from identification.gap.outcome import DiagnosisResult, ReportBuilder, cross_check_effects
 from identification.gap.selection import (
     DEFAULT_SETTINGS,
@@ -127,6 +127,8 @@ def diagnose_prepared(
         pool.progress = enter_stage(progress, "search", 1, _STAGE_COUNT)
         search_forward(pool)
         pool.progress = enter_stage(progress, "compare", 2, _STAGE_COUNT)
+        regression = ResidualRegression(evaluation, pool.floor)
+        settle_unknown_floor(pool.noise_model, pool.candidates.values(), regression)
         posterior = compare_with_curves(pool, compute_final_posterior(pool))
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]

@@ -1,6 +1,6 @@
 """Noise of the recorded force: its floor, with an interval, from the recording alone."""
 
 from identification.noise.noise_floor import NoiseFloorEstimate, estimate_floor
-from identification.noise.time_scales import ScaleVariance, measure_scale_variance
+from identification.noise.time_scales import ScaleVariance, list_scales, measure_scale_variance
 
-__all__ = ["NoiseFloorEstimate", "ScaleVariance", "estimate_floor", "measure_scale_variance"]
+__all__ = ["NoiseFloorEstimate", "ScaleVariance", "estimate_floor", "list_scales", "measure_scale_variance"]

@@ -55,21 +55,21 @@ class NoiseFloorEstimate:
     basis: str
     """Estimate on which ``noise`` rests, and the reason, as text for a person."""
     deviation: float | None = None
-    """Standard deviation of ``noise`` [N]; None if no cycles repeat."""
+    """Standard deviation of ``noise`` [N]; None if it is only a lower bound."""
     scales: tuple[ScaleVariance, ...] = ()
-    """Variance of the noise by time scale; empty if no cycles repeat, or if sampling rates differ."""
+    """Variance of the noise by time scale; empty if it is not known, or if sampling rates differ."""
     slow_variance: float = 0.0
     """Variance of slow noise in each factor e of the frequency [N²]."""
 
     @property
     def is_known(self) -> bool:
-        """True if cycles repeat, so that the floor is more than a lower bound."""
+        """True if the floor is more than a lower bound."""
         return self.deviation is not None
 
     @property
     def coloured_share(self) -> float:
-        """Part of the variance that is not white [1]; 0 where no cycles repeat."""
-        if self.cycle_to_cycle is None:
+        """Part of the variance that is not white [1]; 0 where the floor is not known."""
+        if not self.is_known:
             return 0.0
         return max(1.0 - (self.high_frequency / max(self.noise, 1e-300)) ** 2, 0.0)
 

@@ -11,7 +11,7 @@ from identification.gap.data.quality import (
 )
 from identification.gap.data.repeated_residual import estimate_repeated_residual
 from identification.gap.data.residual_map import Residual, compute_harmonics, estimate_drift, map_gap
-from identification.gap.data.scale_excess import estimate_scale_excess
+from identification.gap.data.scale_excess import estimate_scale_excess, measure_residual_scales
 from identification.gap.data.shrinkage import NEAR_FLOOR_RATIO, Shrinkage
 
 __all__ = [
@@ -32,5 +32,6 @@ __all__ = [
     "estimate_repeated_residual",
     "estimate_scale_excess",
     "map_gap",
+    "measure_residual_scales",
     "split_by_piece",
 ]

@@ -59,8 +59,9 @@ def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> 
     if len(amplitudes) == 1:
         notes.append("only one amplitude: gas spring, end stop and displacement nonlinearity look alike")
     if floor.cycle_to_cycle is None:
-        notes.append(f"the noise floor is estimated from high frequencies only: {floor.basis}")
-    if floor.is_known and floor.get_interval(floor.noise)[0] > floor.high_frequency:
+        source = "the" if floor.is_known else "high frequencies only:"
+        notes.append(f"the noise floor is estimated from {source} {floor.basis}")
+    elif floor.is_known and floor.get_interval(floor.noise)[0] > floor.high_frequency:
         ratio = floor.noise / floor.high_frequency
         notes.append(
             f"the noise floor is {ratio:.2f} times the noise at high frequencies: part of the force does not "

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from identification.gap.data.error_square import ErrorSquare
 from identification.gap.data.residual_map import Residual
-from identification.noise import ScaleVariance, measure_scale_variance
+from identification.noise import ScaleVariance, list_scales, measure_scale_variance
 
 
 def estimate_scale_excess(
@@ -30,14 +30,33 @@ def estimate_scale_excess(
     return ErrorSquare(sum(e.square for e in certain), math.hypot(*(e.deviation for e in certain)))
 
 
+def measure_residual_scales(residual: Residual) -> tuple[ScaleVariance, ...]:
+    """Measure the variance of a residual by time scale; at no scale if sampling rates differ."""
+    if len({rate for _, rate in residual.rates}) != 1:
+        return ()
+    found = []
+    for samples in list_scales(min(count for count, _ in residual.rates)):
+        variance, differences = _measure_scale(residual, samples)
+        if differences:
+            scale = ScaleVariance(samples, variance, 0.0)
+            found.append(scale._replace(deviation=scale.compute_chance(differences)))
+    return tuple(found)
+
+
 def _compute_excess(residual: Residual, scale: ScaleVariance, input_square: float) -> ErrorSquare:
     """Return the part of a residual beyond the noise at one scale."""
-    total, count, start = 0.0, 0, 0
-    for samples, _ in residual.rates:
-        part = slice(start, start + samples)
-        variance, differences = measure_scale_variance(residual.values[part], residual.valid[part], scale.samples)
-        total, count, start = total + variance * differences, count + differences, start + samples
-    if not count:
+    variance, differences = _measure_scale(residual, scale.samples)
+    if not differences:
         return ErrorSquare(0.0, math.inf)
-    deviation = math.hypot(scale.compute_chance(count), scale.deviation)
-    return ErrorSquare(total / count - scale.variance - input_square, deviation)
+    deviation = math.hypot(scale.compute_chance(differences), scale.deviation)
+    return ErrorSquare(variance - scale.variance - input_square, deviation)
+
+
+def _measure_scale(residual: Residual, samples: int) -> tuple[float, int]:
+    """Return the variance of a residual at a scale [N²] and the number of differences within its recordings."""
+    total, count, start = 0.0, 0, 0
+    for length, _ in residual.rates:
+        part = slice(start, start + length)
+        variance, differences = measure_scale_variance(residual.values[part], residual.valid[part], samples)
+        total, count, start = total + variance * differences, count + differences, start + length
+    return total / max(count, 1), count

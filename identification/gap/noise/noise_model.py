@@ -15,6 +15,7 @@ from identification.gap.data import (
     EvaluationData,
     estimate_repeated_residual,
     estimate_scale_excess,
+    measure_residual_scales,
     split_by_piece,
 )
 from identification.gap.fits import NO_GAP_RATIO, Candidate
@@ -115,6 +116,20 @@ class NoiseModel:
         low, high = self.estimate.get_interval(self.noise)
         if low <= rest <= high:
             self.estimate = replace(self.estimate, noise=rest, deviation=0.5 * error.deviation / rest)
+
+    def take_residual(self, candidate: Candidate) -> None:
+        """Take the floor from the residual of a set, where no cycles repeat and nothing predicts that residual."""
+        residual = candidate.residual
+        values = residual.values[residual.valid]
+        square = max(float(np.mean(values**2)) - (self.input_noise or 0.0) ** 2, self.noise**2)
+        estimate = replace(self.estimate, noise=math.sqrt(square), scales=measure_residual_scales(residual))
+        deviation = 0.5 * estimate.noise * estimate.compute_chance(len(values))
+        ratio = estimate.noise / self.estimate.high_frequency
+        basis = (
+            f"residual of the model, {ratio:.2f} times the noise at high frequencies: no function of stroke, "
+            "drive and time predicts it, and no cycles repeat"
+        )
+        self.estimate = replace(estimate, deviation=deviation, basis=basis)
 
     def estimate_noise(self, candidate: Candidate) -> float:
         """Return the noise of the recorded force [N], limited by the residual of a candidate fitted later."""

@@ -10,7 +10,7 @@ from identification.documents import Remainder
 from identification.gap.data import NEAR_FLOOR_RATIO, Cycles, EvaluationData, Indices, Residual, map_gap
 from identification.gap.discovery import locate_unlisted_cause
 from identification.gap.fits import Candidate
-from identification.gap.outcome.explainable_share import FEATURE_VARIABLES, ResidualRegression
+from identification.gap.noise import FEATURE_VARIABLES, ResidualRegression
 from identification.gap.selection import CandidatePool, compute_expected_gain
 
 _MIN_VARIABLE_SHARE = 0.05

@@ -29,9 +29,9 @@ from identification.gap.data import (
 )
 from identification.gap.discovery import DiscoveredEffect, discover_effect, locate_unlisted_cause
 from identification.gap.fits import Candidate
+from identification.gap.noise import ResidualRegression
 from identification.gap.outcome.diagnosis_result import DiagnosisResult
 from identification.gap.outcome.discovery_document import build_discovery
-from identification.gap.outcome.explainable_share import ResidualRegression
 from identification.gap.outcome.explanation import (
     describe_discovery,
     describe_learned_residual,
@@ -139,7 +139,7 @@ class ReportBuilder:
                 *self._describe_nearest(verdict),
                 *self._describe_search(verdict, discovery),
                 *self._describe_residual(residual),
-                *describe_unobservable_effects(self.evaluation.cycles, self.dataset.floor),
+                *describe_unobservable_effects(self.evaluation.cycles, self.pool.noise_model.estimate),
             ],
             provenance=self._make_provenance(),
         )

@@ -8,7 +8,7 @@ from numpy.random import default_rng
 
 from identification.gap.data.cycles import Cycles, StrokeCondition
 from identification.gap.data.residual_map import Residual
-from identification.gap.outcome.explainable_share import ResidualRegression
+from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.outcome.remainder import describe_remainder, estimate_not_repeating
 from tests.support.candidate_pools import make_pool
 

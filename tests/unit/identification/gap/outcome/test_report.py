@@ -12,8 +12,8 @@ from identification.gap.data.cycles import Cycles, StrokeCondition
 from identification.gap.data.residual_map import Residual
 from identification.gap.data.shrinkage import Shrinkage
 from identification.gap.fits.candidate import Candidate
+from identification.gap.noise.explainable_share import Explained
 from identification.gap.outcome import report
-from identification.gap.outcome.explainable_share import Explained
 from identification.gap.outcome.report import ReportBuilder
 from identification.gap.selection.posterior import Posterior
 from identification.noise.noise_floor import NoiseFloorEstimate

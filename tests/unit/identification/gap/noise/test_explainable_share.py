@@ -5,7 +5,7 @@ import pytest
 from numpy.random import default_rng
 
 from identification.fitting import Piece, assemble
-from identification.gap.outcome.explainable_share import (
+from identification.gap.noise.explainable_share import (
     _build_piece_features,
     _subsample,
     build_features,

@@ -1,0 +1,92 @@
+"""Where no cycles repeat, the floor is the residual that no function of stroke, drive and time predicts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.gap.fits import Candidate
+from identification.gap.noise import ResidualRegression, settle_unknown_floor
+from identification.gap.noise.noise_model import NoiseModel
+from tests.support.candidate_pools import NOISE, fit_baseline
+
+BOUND = 0.7 * NOISE
+"""Noise at high frequencies, where the noise is slow."""
+
+
+@pytest.fixture(scope="module")
+def pool():
+    return fit_baseline()
+
+
+class NamedCandidate(Candidate):
+    """A candidate whose effects are stated."""
+
+    stated: frozenset[str] = frozenset()
+
+    @property
+    def names(self):
+        return self.stated
+
+
+def make_candidate(pool, values, *names):
+    """The law with a stated residual, as if some effects were fitted."""
+    residual = replace(pool.baseline.residual, values=np.asarray(values))
+    candidate = NamedCandidate(pool.baseline.fit, residual, *pool.evaluation.compute_rmse(residual), 0.0)
+    object.__setattr__(candidate, "stated", frozenset(names))
+    return candidate
+
+
+def settle(pool, *candidates, **changes):
+    """Return the noise model after candidates with unknown floor, or with a changed estimate."""
+    estimate = replace(pool.noise_model.estimate, **{
+        "noise": BOUND, "high_frequency": BOUND, "cycle_to_cycle": None, "deviation": None, "scales": (),
+        **changes,
+    })  # fmt: skip
+    model = NoiseModel(estimate, pool.noise_model.stretches)
+    settle_unknown_floor(model, candidates, ResidualRegression(pool.evaluation, model.floor))
+    return model
+
+
+def draw_noise(pool, seed=1):
+    return NOISE * np.random.default_rng(seed).standard_normal(len(pool.evaluation.force))
+
+
+def find_structure(pool):
+    """A part of the residual that depends on the stroke."""
+    x = np.concatenate([p.excitation.displacement for p in pool.evaluation.pieces])
+    return 4.0 * NOISE * np.sin(2.0 * x / x.std())
+
+
+def test_a_residual_that_nothing_predicts_is_the_floor_with_an_interval(pool):
+    model = settle(pool, make_candidate(pool, draw_noise(pool)))
+
+    assert model.noise == pytest.approx(NOISE, rel=0.05)
+    assert model.estimate.is_known
+    low, high = model.estimate.get_interval(model.noise)
+    assert BOUND < low < NOISE < high
+    assert "no cycles repeat" in model.estimate.basis
+    assert model.estimate.coloured_share == pytest.approx(1.0 - (BOUND / model.noise) ** 2)
+
+
+def test_a_residual_that_depends_on_the_stroke_leaves_the_lower_bound(pool):
+    model = settle(pool, make_candidate(pool, find_structure(pool) + draw_noise(pool)))
+
+    assert (model.noise, model.estimate.is_known) == (BOUND, False)
+
+
+def test_the_smallest_set_without_structure_gives_the_floor(pool):
+    law = make_candidate(pool, find_structure(pool) + draw_noise(pool))
+    one = make_candidate(pool, draw_noise(pool), "gas_spring")
+    two = make_candidate(pool, 0.99 * draw_noise(pool, seed=2), "gas_spring", "end_stop")
+
+    model = settle(pool, law, one, two)
+
+    assert model.noise == pytest.approx(np.sqrt(np.mean(one.residual.values[one.residual.valid] ** 2)))
+
+
+def test_a_set_at_the_noise_of_high_frequencies_and_a_known_floor_change_nothing(pool):
+    white = make_candidate(pool, 0.7 * draw_noise(pool))
+    assert settle(pool, white).noise == BOUND
+    known = settle(pool, make_candidate(pool, draw_noise(pool)), cycle_to_cycle=BOUND, deviation=0.1 * BOUND)
+    assert known.noise == BOUND

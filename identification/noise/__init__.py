@@ -2,5 +2,14 @@
 
 from identification.noise.noise_floor import NoiseFloorEstimate, estimate_floor
 from identification.noise.time_scales import ScaleVariance, list_scales, measure_scale_variance
+from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 
-__all__ = ["NoiseFloorEstimate", "ScaleVariance", "estimate_floor", "list_scales", "measure_scale_variance"]
+__all__ = [
+    "NoiseFloorEstimate",
+    "ScaleVariance",
+    "WhiteningFilter",
+    "design_whitening_filter",
+    "estimate_floor",
+    "list_scales",
+    "measure_scale_variance",
+]

@@ -34,6 +34,8 @@ _HIGH_FREQUENCY_SCATTER = 1.6
 """Relative standard deviation of the high-frequency estimate times the root of its samples [1]; measured."""
 _MIN_SAMPLES = 200
 """Smallest number of samples in repeated windows for an estimate."""
+_MAX_DEVIATION = 0.15
+"""Largest relative standard deviation of the floor [1]; a less precise one could hide a gap of its own size."""
 _MOTION_RATIO = 2.0
 """Threshold on the motion difference of a cycle over that of the best quarter: above it, it does not repeat."""
 _SAME_MOTION = 2e-4
@@ -138,6 +140,9 @@ def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> N
     white = _compute_white_probability(repeated, fast)
     basis = f"{basis}; {_compare(cycle_to_cycle, high_frequency, white)}{_describe_lines(parts)}"
     noise, combined = _mix(white, _average(repeated, fast), repeated)
+    if combined > _MAX_DEVIATION * noise:
+        reason = f"{samples} samples in repeated cycles only give {noise:.2g} ± {combined:.1g} N"
+        return NoiseFloorEstimate(high_frequency, None, high_frequency, f"high frequency: {reason}")
     scales = _average_scales(windows) if len({s.rate for s in stretches}) == 1 else ()
     return NoiseFloorEstimate(
         noise, cycle_to_cycle, high_frequency, basis, combined, scales, _average_slow_variance(parts)

@@ -3,6 +3,7 @@
 A recording that cannot determine a damper is refused with the reason. Invalid samples are excluded with a note.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -176,9 +177,15 @@ def _check_motion(stretches: Sequence[Stretch]) -> None:
             _check_sampling(s)
 
 
+def _estimate_force_noise(force: Array) -> float:
+    """Return the noise of a force [N]; a mains line near half the sampling rate is no noise."""
+    pairs = force[: len(force) // 2 * 2].reshape(-1, 2).mean(axis=1)
+    return min(estimate_white_noise(force, 4), math.sqrt(2.0) * estimate_white_noise(pairs, 4))
+
+
 def _check_force(stretches: Sequence[Stretch]) -> None:
     deviation = max(float(s.force.std()) for s in stretches)
-    noise = min(estimate_white_noise(s.force, 4) for s in stretches)
+    noise = min(_estimate_force_noise(s.force) for s in stretches)
     if deviation <= _FORCE_RATIO * noise or deviation <= 0.0:
         raise UnusableDataError(
             f"the force hardly changes: its standard deviation is {deviation:.3g} N with a noise of "

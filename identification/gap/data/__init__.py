@@ -1,5 +1,6 @@
 """Cycles of a recording, held-out samples, data quality, and the residual on them."""
 
+from identification.gap.data.block_squares import compute_block_squares
 from identification.gap.data.correlation import compute_correlation_length, compute_residual_correlation_length
 from identification.gap.data.cycles import Cycles, Indices, split_by_piece
 from identification.gap.data.error_square import ErrorSquare
@@ -24,6 +25,7 @@ __all__ = [
     "Shrinkage",
     "check_cycle_count",
     "check_sliding_recorded",
+    "compute_block_squares",
     "compute_correlation_length",
     "compute_harmonics",
     "compute_residual_correlation_length",

@@ -3,13 +3,14 @@
 The gap of a part of the recording is the mean square of its residual beyond the variance of the noise floor.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.documents import Drift, GapMapEntry, ResidualHarmonic
 from identification.gap.data.cycles import Cycles, Indices, StrokeCondition
+from identification.noise import WhiteningFilter
 
 _PHASE_BINS = 8
 """Parts of a cycle in the gap map."""
@@ -45,6 +46,14 @@ class Residual:
     """(N,) False where a sample was not measured or precedes the first motion of its stretch."""
     rates: tuple[tuple[int, float], ...]
     """Number of samples and rate [Hz] of each stretch."""
+
+    def whiten(self, whitening: WhiteningFilter) -> "Residual":
+        """Return the residual behind a filter; samples that are not valid count as zero before it."""
+        if len(whitening.taps) == 1:
+            return self
+        known, parts = np.where(self.valid, self.values, 0.0), np.cumsum([count for count, _ in self.rates])[:-1]
+        values = np.concatenate([whitening.apply(part) for part in np.split(known, parts)])
+        return replace(self, values=values)
 
 
 def map_gap(residual: Residual, cycles: Cycles, floor: float) -> list[GapMapEntry]:

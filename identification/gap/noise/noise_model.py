@@ -21,7 +21,7 @@ from identification.gap.data import (
 from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
-from identification.noise import NoiseFloorEstimate
+from identification.noise import NoiseFloorEstimate, WhiteningFilter, design_whitening_filter
 
 _NORMAL_95 = 1.96
 """Half the width of a 95 % interval [standard deviations]."""
@@ -63,6 +63,11 @@ class NoiseModel:
     def highest_floor(self) -> float:
         """Upper end of the floor's 95 % interval [N]; the floor itself where no cycles repeat."""
         return math.hypot(self.estimate.get_interval(self.noise)[1], self.input_noise or 0.0)
+
+    @property
+    def whitening(self) -> WhiteningFilter:
+        """Filter that makes the noise of the force white; of one tap where its colour is not known."""
+        return design_whitening_filter(self.estimate.scales, self.estimate.high_frequency)
 
     def compute_highest_rmse(self, samples: int) -> float:
         """Return the RMSE [N] that noise alone hardly exceeds on some samples.
@@ -117,8 +122,8 @@ class NoiseModel:
         if low <= rest <= high:
             self.estimate = replace(self.estimate, noise=rest, deviation=0.5 * error.deviation / rest)
 
-    def take_residual(self, candidate: Candidate) -> None:
-        """Take the floor from the residual of a set, where no cycles repeat and nothing predicts that residual."""
+    def describe_residual(self, candidate: Candidate) -> NoiseFloorEstimate:
+        """Return the estimate of the noise if the residual of a candidate is noise; no cycles repeat then."""
         residual = candidate.residual
         values = residual.values[residual.valid]
         square = max(float(np.mean(values**2)) - (self.input_noise or 0.0) ** 2, self.noise**2)
@@ -129,7 +134,7 @@ class NoiseModel:
             f"residual of the model, {ratio:.2f} times the noise at high frequencies: no function of stroke, "
             "drive and time predicts it, and no cycles repeat"
         )
-        self.estimate = replace(estimate, deviation=deviation, basis=basis)
+        return replace(estimate, deviation=deviation, basis=basis)
 
     def estimate_noise(self, candidate: Candidate) -> float:
         """Return the noise of the recorded force [N], limited by the residual of a candidate fitted later."""

@@ -1,29 +1,39 @@
 """Noise floor where no cycles repeat: the residual that no function of stroke, drive and time predicts.
 
 Without repeated cycles, only the noise at high frequencies is known, which slow noise exceeds. The error of a
-fitted model is an upper bound. A flexible regression decides between them: if it predicts nothing of the residual
-on strokes that it has not seen, the residual is noise.
+fitted model is an upper bound. A residual is noise if a flexible regression predicts nothing of it on strokes that
+it has not seen, and if its size changes from block to block as much as that of noise of its spectrum does. The
+regression cannot learn an error that follows a rare event, such as a step of the drive. Such an error is strong in
+few blocks.
 """
 
+import math
 from collections.abc import Collection
 
+import numpy as np
+
+from identification.gap.data import Residual, compute_block_squares
 from identification.gap.fits import EXPLAINED_RATIO, Candidate
 from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
+from identification.noise import NoiseFloorEstimate
+
+_CHANCE_DEVIATIONS = 4.0
+"""Standard deviations by which the logarithm of the scatter of blocks hardly differs from that of noise."""
 
 
 def settle_unknown_floor(
-    noise_model: NoiseModel, candidates: Collection[Candidate], regression: ResidualRegression
+    noise_model: NoiseModel, candidates: Collection[Candidate], regression: ResidualRegression, block_length: float
 ) -> None:
     """Take the floor from the smallest set of effects whose residual is noise; change nothing if there is none.
 
-    The residual of a set is noise if neither the regression nor another set has a materially smaller error. White
-    noise needs no such estimate: a set that reaches the noise at high frequencies shows it.
+    White noise needs no such estimate: a set that reaches the noise at high frequencies shows it.
 
     Args:
         noise_model: its floor is replaced.
         candidates: the fitted sets, the law included.
         regression: regression on their residuals on held-out strokes.
+        block_length: length of a block [s], part of a stroke.
     """
     if noise_model.estimate.is_known:
         return
@@ -31,9 +41,24 @@ def settle_unknown_floor(
     if lowest < EXPLAINED_RATIO * noise_model.floor:
         return
     adequate = [c for c in candidates if c.held_out_rmse < EXPLAINED_RATIO * lowest]
-    if adequate:
-        chosen = min(adequate, key=lambda c: (len(c.names), c.held_out_rmse))
-        noise_model.take_residual(chosen)
+    for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
+        estimate = noise_model.describe_residual(candidate)
+        if is_stationary(candidate.residual, estimate, block_length):
+            noise_model.estimate = estimate
+            return
+
+
+def is_stationary(residual: Residual, estimate: NoiseFloorEstimate, block_length: float) -> bool:
+    """Return True if the mean square of blocks [s] scatters as that of noise of the same spectrum.
+
+    An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all.
+    """
+    squares = compute_block_squares(residual, block_length) / float(np.mean(residual.values[residual.valid] ** 2))
+    if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:
+        return False
+    samples = math.ceil(block_length * residual.rates[0][1])
+    ratio = float(np.var(squares, ddof=1)) / estimate.compute_chance(samples) ** 2
+    return abs(math.log(ratio)) < _CHANCE_DEVIATIONS * math.sqrt(2.0 / (len(squares) - 1))
 
 
 def _select_best(candidates: Collection[Candidate]) -> list[Candidate]:

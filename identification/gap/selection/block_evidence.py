@@ -7,17 +7,12 @@ size. An active effect reduces the error wherever it acts. An effect that only a
 reduces it in one block and increases it in the next.
 """
 
-import math
-
 import numpy as np
 
-from identification.arrays import Array
-from identification.gap.data import Residual, compute_correlation_length
+from identification.gap.data import Residual, compute_block_squares, compute_correlation_length
 
 _EFFECTIVE_SAMPLES = 1.6
 """Independent samples in a block. Origin: chosen between the evidence of true effects and of confusable ones."""
-_MIN_VALID_SHARE = 0.5
-"""Share of valid samples above which a block counts."""
 
 
 def compute_evidence(
@@ -28,7 +23,7 @@ def compute_evidence(
     A block lasts ``block_length`` [s]: less than a stroke, more than the field takes to settle. It counts as
     ``samples`` independent samples.
     """
-    ratios = _compute_mean_squares(before, block_length) / _compute_mean_squares(after, block_length)
+    ratios = compute_block_squares(before, block_length) / compute_block_squares(after, block_length)
     return 0.5 * samples * float(np.sum(np.log(ratios)))
 
 
@@ -51,20 +46,5 @@ def count_independent_samples(residual: Residual, block_length: float) -> float:
 
 def bound_evidence(residual: Residual, floor: float, block_length: float) -> float:
     """Compute the evidence for a candidate whose error would be the floor [N] in every block above it."""
-    ratios = np.maximum(_compute_mean_squares(residual, block_length) / floor**2, 1.0)
+    ratios = np.maximum(compute_block_squares(residual, block_length) / floor**2, 1.0)
     return 0.5 * _EFFECTIVE_SAMPLES * float(np.sum(np.log(ratios)))
-
-
-def _compute_mean_squares(residual: Residual, block_length: float) -> Array:
-    """Return the mean squared residual of each block [N²], (blocks,)."""
-    means, start = [], 0
-    for count, rate in residual.rates:
-        size = max(math.ceil(block_length * rate), 1)
-        part = slice(start, start + count // size * size)
-        valid = residual.valid[part].reshape(-1, size)
-        sums = np.sum(np.where(valid, residual.values[part].reshape(-1, size) ** 2, 0.0), axis=1)
-        counts = valid.sum(axis=1)
-        used = counts > _MIN_VALID_SHARE * size
-        means.append(sums[used] / counts[used])
-        start += count
-    return np.concatenate(means)

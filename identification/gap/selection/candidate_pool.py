@@ -25,7 +25,7 @@ from identification.gap.fits import (
     refit_all_samples,
 )
 from identification.gap.noise import NoiseModel, compute_noise_drift, find_mains_frequency
-from identification.gap.selection.block_evidence import compute_evidence
+from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
 from identification.gap.selection.screening import ScreeningResult
 from identification.gap.selection.screening_cache import ScreeningCache
@@ -230,14 +230,30 @@ class CandidatePool:
             self.candidates[candidate.names] = candidate
         return self.candidates[candidate.names]
 
-    def select_held_out(self, candidate: Candidate) -> Residual:
-        """Return the residual of a candidate on the held-out samples."""
-        residual = candidate.residual
+    def select_held_out(self, residual: Residual) -> Residual:
+        """Return a residual on the held-out samples."""
         return replace(residual, valid=residual.valid & self.evaluation.held_out_samples)
+
+    def whiten(self, candidate: Candidate) -> Residual:
+        """Return the residual of a candidate behind the filter that makes the noise white.
+
+        Block evidence compares errors with white noise. Slow noise would hide a faster error that is certain.
+        """
+        return candidate.residual.whiten(self.noise_model.whitening)
+
+    def compute_evidence(self, before: Candidate, after: Candidate) -> float:
+        """Compute the block evidence for one candidate over another on all samples."""
+        return compute_evidence(self.whiten(before), self.whiten(after), self.block_length)
 
     def compute_held_out_evidence(self, before: Candidate, after: Candidate) -> float:
         """Compute the block evidence for one candidate over another on the held-out samples."""
-        return compute_evidence(self.select_held_out(before), self.select_held_out(after), self.block_length)
+        first, second = (self.select_held_out(self.whiten(c)) for c in (before, after))
+        return compute_evidence(first, second, self.block_length)
+
+    def bound_evidence(self, candidate: Candidate) -> float:
+        """Compute the block evidence for a candidate at the noise floor over a known one."""
+        floor = math.hypot(self.noise_model.whitening.deviation, self.noise_model.input_noise or 0.0)
+        return bound_evidence(self.whiten(candidate), floor, self.block_length)
 
     def fit_fully(self, names: frozenset[str]) -> None:
         """Fit a set on all samples, once, starting from its best fit on decimated data."""

@@ -7,7 +7,6 @@ evidence cannot separate the two. A confusable effect therefore pays an addition
 search has already fitted are considered.
 """
 
-from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.neighbours import find_subset, fit_extension
 from identification.gap.selection.posterior import BlockEvidence, compute_complexity_penalty
@@ -33,9 +32,7 @@ def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
     extended = _fit_extensions(pool, names, names | confusable)
     for larger in extended:
         pool.fit_fully(larger)
-        evidence = compute_evidence(
-            pool.candidates[names].residual, pool.candidates[larger].residual, pool.block_length
-        )
+        evidence = pool.compute_evidence(pool.candidates[names], pool.candidates[larger])
         confusion = pool.settings.confusion_penalty if larger & confusable - names else 0.0
         pool.block_evidence[larger] = BlockEvidence(names, evidence - confusion)
     accepted = [larger for larger in extended if pool.block_evidence[larger].log_odds > penalty]
@@ -63,5 +60,4 @@ def _is_extension_promising(pool: CandidatePool, names: frozenset[str]) -> bool:
         return False
     known = pool.candidates[names]
     explains = pool.compute_excess(known) < pool.settings.max_remaining_share * pool.baseline_excess
-    bound = bound_evidence(known.residual, pool.floor, pool.block_length)
-    return explains and bound > compute_complexity_penalty(names)
+    return explains and pool.bound_evidence(known) > compute_complexity_penalty(names)

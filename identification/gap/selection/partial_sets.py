@@ -73,15 +73,18 @@ def _fit_extensions(pool: CandidatePool, names: frozenset[str]) -> None:
 
 def compute_partial_posterior(pool: CandidatePool) -> Posterior:
     """Compute the probabilities of the fitted sets from block evidence on the held-out strokes."""
-    before = pool.select_held_out(pool.baseline)
+    held_out = {n: pool.select_held_out(c.residual) for n, c in pool.candidates.items()}
+    before = held_out[frozenset()]
     samples = count_independent_samples(before, pool.block_length)
-    names = list(pool.candidates)
+    names = list(held_out)
     weights = {s.names: s.weight for s in pool.collect_evidence()}
     scores = np.array(
         [
             compute_log_prior(n)
             + math.log(weights[n])
-            + compute_evidence(before, pool.select_held_out(pool.candidates[n]), pool.block_length, samples)
+            + compute_evidence(
+                before, pool.select_held_out(pool.candidates[n].residual), pool.block_length, samples
+            )
             for n in names
         ]
     )

@@ -135,6 +135,15 @@ def test_too_few_repeated_samples_fall_back_to_high_frequency():
     assert "samples in repeated cycles" in floor.basis
 
 
+def test_slow_noise_in_too_few_cycles_falls_back_to_high_frequency():
+    displacement, velocity = sine(10e-3, 8.0, 0.3)
+    force = hysteresis(velocity) + lfilter([1.0], [1.0, -np.exp(-0.2)], white(len(velocity)))
+    floor = floor_of(displacement, force, frequency=8.0)
+    assert (floor.deviation, floor.cycle_to_cycle) == (None, None)
+    assert floor.noise == floor.high_frequency
+    assert "samples in repeated cycles only give" in floor.basis
+
+
 def test_slow_noise_is_measured_and_lies_in_the_interval():
     displacement, velocity = sine(10e-3, 1.0, 40.0)
     slow = lfilter([1.0], [1.0, -np.exp(-0.05)], white(len(velocity)))

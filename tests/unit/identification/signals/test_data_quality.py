@@ -66,6 +66,12 @@ def test_a_recording_that_cannot_determine_a_damper_is_refused_with_the_reason(g
     assert reason in refusal(given)
 
 
+def test_a_strong_mains_line_near_half_the_sampling_rate_is_no_noise_of_the_force():
+    slow = decimated(stretch("slow", 0.01, 1.0, 1, seconds=60.0), 5)
+    line = 0.3 * slow.force.std() * np.cos(0.98 * np.pi * np.arange(len(slow.force)))
+    assert len(clean_recordings([recording(replace(slow, force=slow.force + line))])[0]) == 1
+
+
 def test_logs_of_different_specimens_are_refused():
     other = replace(recording(FAST), metadata={"run": {"specimen": "another"}})
     with pytest.raises(UnusableDataError, match="different specimens"):

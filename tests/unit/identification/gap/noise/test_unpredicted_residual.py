@@ -8,7 +8,7 @@ import pytest
 from identification.gap.fits import Candidate
 from identification.gap.noise import ResidualRegression, settle_unknown_floor
 from identification.gap.noise.noise_model import NoiseModel
-from tests.support.candidate_pools import NOISE, fit_baseline
+from tests.support.candidate_pools import NOISE, RATE, fit_baseline
 
 BOUND = 0.7 * NOISE
 """Noise at high frequencies, where the noise is slow."""
@@ -44,7 +44,7 @@ def settle(pool, *candidates, **changes):
         **changes,
     })  # fmt: skip
     model = NoiseModel(estimate, pool.noise_model.stretches)
-    settle_unknown_floor(model, candidates, ResidualRegression(pool.evaluation, model.floor))
+    settle_unknown_floor(model, candidates, ResidualRegression(pool.evaluation, model.floor), pool.block_length)
     return model
 
 
@@ -90,3 +90,14 @@ def test_a_set_at_the_noise_of_high_frequencies_and_a_known_floor_change_nothing
     assert settle(pool, white).noise == BOUND
     known = settle(pool, make_candidate(pool, draw_noise(pool)), cycle_to_cycle=BOUND, deviation=0.1 * BOUND)
     assert known.noise == BOUND
+
+
+def test_an_error_that_is_strong_in_few_blocks_is_not_the_floor(pool):
+    bursts = np.where(np.arange(len(pool.evaluation.force)) % 997 < 40, 8.0, 0.5)
+    assert not settle(pool, make_candidate(pool, bursts * draw_noise(pool))).estimate.is_known
+
+
+def test_a_line_of_one_size_is_not_the_floor(pool):
+    time = np.arange(len(pool.evaluation.force)) / RATE
+    line = 3.0 * NOISE * np.sin(2.0 * np.pi * 51.3 * time)
+    assert not settle(pool, make_candidate(pool, line + 0.5 * draw_noise(pool))).estimate.is_known

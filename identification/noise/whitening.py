@@ -1,0 +1,75 @@
+"""Filter that makes coloured noise white.
+
+Errors of a model are then compared with the noise at their own frequencies. Slow noise would otherwise hide an
+error that is certain. The spectrum follows from the variances by time scale. The filter is causal and of minimum
+phase, from the cepstrum (Oppenheim and Schafer, Discrete-Time Signal Processing, chapter 13).
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.noise.time_scales import ScaleVariance, compute_gain
+
+_GRID = 8192
+"""Number of frequencies at which the spectrum is evaluated."""
+_TAPS_PER_SCALE = 8
+"""Length of the filter over the longest scale [1]."""
+_CORRECTIONS = 8
+"""Corrections of the power at the frequencies between which the spectrum is interpolated."""
+_DEVIATIONS = 2.0
+"""Standard deviations by which the spectrum differs from that of white noise where it is taken for coloured."""
+
+
+class WhiteningFilter(NamedTuple):
+    """Filter of a force; the first of its taps is 1."""
+
+    taps: Array
+    """(T,) [1]"""
+    deviation: float
+    """Standard deviation of the noise behind the filter [N]."""
+
+    def apply(self, values: Array) -> Array:
+        """Return the filtered values (N,)."""
+        length = 1 << (len(values) + len(self.taps) - 1).bit_length()
+        product = np.fft.rfft(values, length) * np.fft.rfft(self.taps, length)
+        return np.asarray(np.fft.irfft(product, length)[: len(values)])
+
+
+def design_whitening_filter(scales: Sequence[ScaleVariance], white: float) -> WhiteningFilter:
+    """Return the filter for noise with some variances by time scale.
+
+    Args:
+        scales: variances of the noise; without any, the noise is white.
+        white: standard deviation of its white part [N], from high frequencies.
+    """
+    coloured = [s for s in scales if abs(s.variance - white**2 / (2.0 * s.samples)) > _DEVIATIONS * s.deviation]
+    if not coloured or min(s.variance for s in scales) <= 0.0 or white == 0.0:
+        return WhiteningFilter(np.ones(1), white)
+    level = _fit_spectrum(scales, coloured, white)
+    cepstrum = np.fft.irfft(-0.5 * np.log(level))
+    folded = np.concatenate([cepstrum[:1], 2.0 * cepstrum[1 : _GRID // 2], cepstrum[_GRID // 2 : _GRID // 2 + 1]])
+    taps = np.fft.irfft(np.exp(np.fft.rfft(folded, _GRID)))
+    count = min(_TAPS_PER_SCALE * coloured[-1].samples, _GRID // 2)
+    return WhiteningFilter(taps[:count] / taps[0], 1.0 / float(taps[0]))
+
+
+def _fit_spectrum(scales: Sequence[ScaleVariance], coloured: Sequence[ScaleVariance], white: float) -> Array:
+    """Return the power (_GRID // 2 + 1,) [N²] of noise with these variances.
+
+    It is interpolated between one frequency for each scale. A scale also contains a part of its neighbours'
+    frequencies, so the power at all of them is corrected until the variances are right.
+    """
+    variance = np.array([s.variance if s in coloured else white**2 / (2.0 * s.samples) for s in scales])
+    samples = np.array([s.samples for s in scales])
+    grid = np.asarray(np.fft.rfftfreq(_GRID)[1:], float)
+    gains = np.array([compute_gain(grid, m) for m in samples])
+    # Half of the variance at a scale of m samples is above and half below this frequency, if the noise is white.
+    middle = np.log(1.0 / (2.0**1.5 * samples))
+    power = 2.0 * samples * variance
+    for _ in range(_CORRECTIONS):
+        level = np.exp(np.interp(np.log(grid), middle[::-1], np.log(power)[::-1]))
+        power = power * variance / (gains @ level / len(grid))
+    return np.concatenate([level[:1], level])

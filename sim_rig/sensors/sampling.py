@@ -56,7 +56,7 @@ def design_low_pass(order: int, cutoff: float, dt: float) -> tuple[Array, Array]
         others = np.delete(np.arange(order), k)
         residue = np.prod(-poles) / np.prod(poles[k] - poles[others])
         numerator += residue * np.convolve([new[k], old[k]], np.poly(decays[others]))
-    return numerator.real.copy(), np.poly(decays).real.copy()
+    return np.array(numerator.real), np.array(np.poly(decays).real, np.float64)
 
 
 def interpolate_cubic(values: Array, dt: float, instants: Array, first: int = 0) -> Array:

@@ -41,8 +41,8 @@ check: $(READY)
 	$(BIN)/pytest -q tests/contracts/test_packages.py
 
 # Tests of processes run in real time: what a busy machine has made late is repeated alone, and named at the end.
-# They also wait: one process of pytest more than two cores keeps both busy. Wires share a core with one other test
-# at most, and the tests of a file stay together, because they share a bench.
+# A third of their time they wait, so three at a time keep two cores busy. Of the tests on wires only two run at a
+# time, because their instruments send in real time. The tests of a file stay together, because they share a bench.
 AGAIN := --last-failed --last-failed-no-failures none
 unit: $(READY)
 	@rm -rf $(RESULTS) && mkdir -p $(RESULTS)

@@ -46,8 +46,7 @@ def _compute_slope_weights(window: int, order: int) -> npt.NDArray[np.float64]:
 
     They are cached because live views need them ten times a second.
     """
-    # Most commands read logs and compute no velocity; the package takes a second to load.
-    from scipy.signal import savgol_coeffs
-
-    weights = [savgol_coeffs(window, order, deriv=1, pos=position, use="dot") for position in range(window)]
-    return np.asarray(weights, dtype=np.float64)
+    # Not of scipy.signal, which takes a second to load in every process that records.
+    place, powers = np.arange(window) - window // 2, np.arange(1, order + 1)
+    fit = np.linalg.pinv(np.vander(place, order + 1, increasing=True).astype(np.float64))
+    return np.asarray((powers * place[:, np.newaxis] ** (powers - 1)) @ fit[1:], dtype=np.float64)

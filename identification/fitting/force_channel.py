@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import signal
 
 from identification.arrays import Array
 from identification.logs import ChannelFilter
+from identification.simulate import compute_settled_state, design_low_pass, filter_series
 
 
 @dataclass(frozen=True)
@@ -36,24 +36,20 @@ class LowPass:
         """
         numerator, denominator = self._coefficients
         # Settled at the first force: starting from zero, the filter would ring at the start of every stretch.
-        settled = signal.lfilter_zi(numerator, denominator)
+        settled = compute_settled_state(numerator, denominator)
         series = values.reshape(len(values), -1)
         recorded = np.empty((1 + (len(values) - 1) // self.oversampling, series.shape[1]))
         # Series by series: all together would need their memory once more at the oversampled rate.
         for column, one in zip(recorded.T, series.T, strict=True):
-            filtered = signal.lfilter(numerator, denominator, one, zi=settled * one[0])[0]
+            filtered = filter_series(numerator, denominator, one, settled * one[0])
             column[:] = filtered[:: self.oversampling]
         return recorded.reshape(-1, *values.shape[1:])
 
     @cached_property
     def _coefficients(self) -> tuple[Array, Array]:
         """Numerator and denominator of the Butterworth filter at the oversampled rate."""
-        analogue = signal.butter(self.channel_filter.order, 2 * np.pi * self.channel_filter.cutoff, analog=True)
-        numerator, denominator, _ = signal.cont2discrete(
-            analogue, 1 / (self.rate * self.oversampling), method="foh"
-        )
-        # cont2discrete returns the numerator as a matrix with one row.
-        return np.ravel(numerator), np.ravel(denominator)
+        reported = self.channel_filter
+        return design_low_pass(reported.order, reported.cutoff, 1 / (self.rate * self.oversampling))
 
 
 def compute_filter_delay(reported: ChannelFilter | None) -> float:

@@ -10,10 +10,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
 from identification.arrays import Array
-from identification.simulate import Excitation, apply_deadband, trace_last_reversal
+from identification.simulate import Excitation, apply_deadband, filter_series, trace_last_reversal
 
 _TRAVEL, _VELOCITY, _ACCELERATION = 0.01, 0.03, 0.1
 """Travel over half the stroke, velocity and acceleration over their peaks [1], from which each is compressed."""
@@ -96,7 +95,8 @@ def _average_past(values: Array, samples: float, before: float) -> Array:
     ``before`` is the mean at the start.
     """
     weight = 1.0 / (1.0 + samples)
-    return np.asarray(lfilter([weight], [1.0, weight - 1.0], values, zi=[(1.0 - weight) * before])[0])
+    b, a = np.array([weight, 0.0]), np.array([1.0, weight - 1.0])
+    return filter_series(b, a, values, np.array([(1.0 - weight) * before]))
 
 
 def _compress(values: Array, threshold: float) -> Array:

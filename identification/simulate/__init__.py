@@ -6,6 +6,7 @@ from identification.simulate.channel import (
     compute_parallel_force,
     differentiate_parallel_force,
 )
+from identification.simulate.digital_filter import compute_settled_state, design_low_pass, filter_series
 from identification.simulate.inputs import COIL_ACTIONS, compute_damper_field
 from identification.simulate.kernel import StepCounts
 from identification.simulate.motion import DamperMotion, compute_damper_motion
@@ -41,7 +42,10 @@ __all__ = [
     "compute_damper_motion",
     "compute_parallel_force",
     "compute_scale_factors",
+    "compute_settled_state",
+    "design_low_pass",
     "differentiate_parallel_force",
+    "filter_series",
     "make_coil_variables",
     "simulate",
     "trace_last_reversal",

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy import signal
 
 from identification.arrays import Array
 from identification.damper import Quantity
+from identification.simulate.digital_filter import filter_series
 
 _RELATIVE_STEP = 1e-6
 """Step of a difference relative to the parameter [1]; errors of rounding and curvature both stay below 1e-9."""
@@ -70,5 +70,7 @@ def apply_lag(values: Array, lag: float, h: float) -> Array:
     fade = float(np.exp(-h / lag))
     new = 1.0 - lag / h * (1.0 - fade)
     old = 1.0 - fade - new
-    start = values[:1] * (fade + old)
-    return np.asarray(signal.lfilter([new, old], [1.0, -fade], values, axis=0, zi=start)[0])
+    b, a = np.array([new, old]), np.array([1.0, -fade])
+    series = values.reshape(len(values), -1).T
+    lagged = [filter_series(b, a, one, one[:1] * (fade + old)) for one in series]
+    return np.stack(lagged, axis=1).reshape(values.shape)

@@ -1,9 +1,9 @@
 """Energy that the damper has dissipated along an excitation and not yet lost."""
 
 import numpy as np
-from scipy import signal
 
 from identification.arrays import Array
+from identification.simulate.digital_filter import filter_series
 from identification.simulate.simulation_model import Excitation
 
 
@@ -21,4 +21,4 @@ def compute_stored_energy(excitation: Excitation, recovery: float) -> Array:
     # Exact for a power that is constant over a sample. expm1, because a recovery takes many samples.
     gain = -recovery * np.expm1(-h / recovery)
     power = np.concatenate([[0.0], 0.5 * (excitation.power[1:] + excitation.power[:-1])])
-    return np.asarray(signal.lfilter([gain], [1.0, -fade], power))
+    return filter_series(np.array([gain, 0.0]), np.array([1.0, -fade]), power)

@@ -120,9 +120,7 @@ class Containers:
             )
 
     def is_healthy(self, name):
-        """Execute the health check of a container; start its process again if it has ended."""
-        if self.processes[name].poll() is not None:
-            self.start(name)
+        """Execute the health check of a container."""
         words = self.make_words(services()[name]["healthcheck"]["test"][2:])
         words += ["--url", self.url] if words[2] in ("service", "worker") else []
         return subprocess.run(words, capture_output=True, timeout=DEADLINE, check=False).returncode == 0
@@ -132,10 +130,23 @@ class Containers:
         for name in ORDER:
             self.start(name)
             if name == "scheduler":
-                until(lambda: self.is_healthy("scheduler"), DEADLINE)
-        # Every one is asked each time, so that every process that has ended is started again.
-        until(lambda: not [name for name in ORDER if not self.is_healthy(name)], DEADLINE)
+                self.wait_for_health(["scheduler"])
+        self.wait_for_health(ORDER)
         self.token = (self.folder / "runs" / "token").read_text().strip()
+
+    def wait_for_health(self, names):
+        """Wait until each container was healthy since its start; start every process again that has ended."""
+        waiting = set(names)
+
+        def are_healthy():
+            for name in [name for name in names if self.processes[name].poll() is not None]:
+                self.start(name)
+                waiting.add(name)
+            # Each check is a process of its own, so only those are asked that have not answered yet.
+            waiting.difference_update([name for name in names if name in waiting and self.is_healthy(name)])
+            return not waiting
+
+        until(are_healthy, DEADLINE)
 
     def end_all(self, number):
         for process in self.processes.values():

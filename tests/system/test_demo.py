@@ -17,6 +17,7 @@ from bench.log.reader import read_log
 from bench.report import format_force, format_percent, format_ratio
 from bench.samples.store import FOLDER as SAMPLE_FOLDER
 from sim_rig.hidden_effect import draw_scenario, make_truth
+from tests.support.bench_processes import ENVIRONMENT
 
 pytestmark = [pytest.mark.wire, pytest.mark.timeout(600)]
 COMMAND = Path(sys.executable).parent / "mrbench"
@@ -25,7 +26,9 @@ SEED = 1
 
 
 def mrbench(*arguments):
-    return subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=500)
+    return subprocess.run(
+        [COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=500, env=ENVIRONMENT
+    )
 
 
 @pytest.fixture(scope="module")

@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import lfilter
 
 from identification.arrays import Array, BoolArray
 from identification.damper.effects import Variable
 from identification.fitting import Piece
 from identification.gap.data import NEAR_FLOOR_RATIO, EvaluationData
 from identification.gap.fits import Candidate
+from identification.simulate import filter_series
 
 Indices = npt.NDArray[np.intp]
 
@@ -74,7 +74,8 @@ def _build_piece_features(piece: Piece) -> Array:
 def _low_pass(values: Array, samples: float) -> Array:
     """Filter values with a low-pass of this time constant [samples], settled at the first value."""
     decay = float(np.exp(-1.0 / max(samples, 1e-3)))
-    return np.asarray(lfilter([1.0 - decay], [1.0, -decay], values, zi=np.array([decay * values[0]]))[0])
+    b, a = np.array([1.0 - decay, 0.0]), np.array([1.0, -decay])
+    return filter_series(b, a, values, np.array([decay * values[0]]))
 
 
 def _find_last_reversal(x: Array, v: Array) -> Array:

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
-from scipy.signal import lfilter
 
 from identification.arrays import Array
 from identification.fitting import Piece
+from identification.simulate import filter_series
 
 _DRIVE_STEP = 0.02
 """Threshold on the change of the drive between two samples, over its range [1]: a larger one is a step."""
@@ -39,6 +39,8 @@ class PieceInputs:
         self._x = CubicHermiteSpline(time, excitation.displacement, excitation.velocity)
         self._v = CubicHermiteSpline(time, excitation.velocity, excitation.acceleration)
         self._drive = excitation.drive
+        self._field: tuple[float, tuple[Array, Array]] | None = None
+        """Field at the samples for the last eta: every batch of elements of a piece asks for it."""
         self.rms_velocity = float(np.sqrt(np.mean(excitation.velocity**2)))
         """Root mean square velocity [m/s]."""
 
@@ -54,7 +56,9 @@ class PieceInputs:
 
     def evaluate_field(self, time: Array, eta: float, delay: float) -> FieldSamples:
         """Return the field at times [s] for a drive that is ``delay`` [s] late."""
-        u, du_deta = _filter_drive(self._drive, eta, self.h)
+        if self._field is None or self._field[0] != eta:
+            self._field = eta, _filter_drive(self._drive, eta, self.h)
+        u, du_deta = self._field[1]
         position = np.clip((time - delay) / self.h, 0.0, len(u) - 1.0)
         i = np.minimum(position.astype(np.int64), len(u) - 2)
         since, drive = (position - i) * self.h, self._drive[i]
@@ -81,7 +85,8 @@ class PieceInputs:
 def _filter_drive(drive: Array, eta: float, h: float) -> tuple[Array, Array]:
     """Return field (N,) and its derivative over eta at the samples of a held drive (N,); it starts settled."""
     decay = float(np.exp(-eta * h))
-    denominator = [1.0, -decay]
-    u = drive[0] + np.concatenate([[0.0], lfilter([1.0 - decay], denominator, drive[:-1] - drive[0])])
-    du_deta = np.concatenate([[0.0], lfilter([-h * decay], denominator, u[:-1] - drive[:-1])])
+    a = np.array([1.0, -decay])
+    # A coefficient of the sample before: the output begins one sample after the input.
+    u = drive[0] + filter_series(np.array([0.0, 1.0 - decay]), a, drive - drive[0])
+    du_deta = filter_series(np.array([0.0, -h * decay]), a, u - drive)
     return u, du_deta

@@ -9,7 +9,7 @@ const VIEWS = ["#/bench", "#/plan/quick", "#/runs", "#/runs/run-1", "#/runs/run-
 const seen = { errors: [], titles: {}, violations: {}, small: {}, overflow: {} };
 const { page, close } = await openPage(chromium, { width: 1400, height: 900 });
 page.on("pageerror", (error) => seen.errors.push(String(error)));
-const { audit, findSmall, findOverflow } = makeChecks(page);
+const { audit, auditColours, findSmall, findOverflow } = makeChecks(page);
 
 const { until, hasText } = makeWaits(page);
 const shownTitle = () => page.evaluate(() => [...document.querySelectorAll("h1")].find((one) => one.checkVisibility()).innerText);
@@ -31,7 +31,7 @@ async function openDirectly(hash) {
     seen.overflow[`${hash} ${width}`] = await findOverflow();
   }
   await page.emulateMedia({ colorScheme: "dark" });
-  seen.violations[`${hash} dark`] = await audit();
+  seen.violations[`${hash} dark`] = await auditColours();
   await page.emulateMedia({ colorScheme: "light" });
 }
 

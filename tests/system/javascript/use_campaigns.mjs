@@ -17,7 +17,7 @@ page.on("request", (request) => {
 
 const text = (selector) => page.locator(selector).innerText();
 const { hasText } = makeWaits(page);
-const { audit, findOverflow, findSmall } = makeChecks(page);
+const { audit, auditColours, findOverflow, findSmall } = makeChecks(page);
 const hasState = (word) => page.waitForFunction((wanted) => document.getElementById("state-word").innerText === wanted, word);
 
 async function check(name) {
@@ -28,7 +28,7 @@ async function check(name) {
   }
   seen.violations[name] = await audit();
   await page.emulateMedia({ colorScheme: "dark" });
-  seen.violations[`${name} dark`] = await audit();
+  seen.violations[`${name} dark`] = await auditColours();
   await page.emulateMedia({ colorScheme: "light" });
   await page.setViewportSize({ width: 1400, height: 900 });
 }

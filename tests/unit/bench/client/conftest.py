@@ -8,6 +8,7 @@ import pytest
 import uvicorn
 
 from bench.client import Bench
+from bench.service import run_registry
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from tests.support.fake_service import FakeAgent, FakeEngine
@@ -44,7 +45,9 @@ class RunningService:
 
 
 @pytest.fixture
-def service(tmp_path):
+def service(tmp_path, monkeypatch):
+    # Tests put logs into the data folder and wait until they are listed.
+    monkeypatch.setattr(run_registry, "SCAN_PERIOD", 0.1)
     with RunningService(tmp_path) as running:
         yield running
 

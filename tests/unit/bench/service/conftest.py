@@ -2,12 +2,15 @@
 
 import time
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 
 import pytest
+from argon2 import PasswordHasher
 from fastapi.testclient import TestClient
 
 from bench.catalogue import keep_address
+from bench.people import passwords
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from tests.support.fake_service import FakeAgent, FakeEngine
@@ -92,6 +95,13 @@ class Service:
     @asynccontextmanager
     async def _engine(self):
         yield self.engine
+
+
+@pytest.fixture(autouse=True)
+def quick_hashes(monkeypatch):
+    """Hash passwords with the same function at its least cost: at its real one, each takes a third of a second."""
+    cheap = partial(PasswordHasher, time_cost=1, memory_cost=8, parallelism=1)
+    monkeypatch.setattr(passwords, "PasswordHasher", cheap)
 
 
 @pytest.fixture

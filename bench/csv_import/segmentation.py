@@ -158,14 +158,10 @@ def _find_gaps(motions: Sequence[_Motion], stop: int, start: int = 0) -> list[tu
 def _make_unsteady_motion(half_cycles: Sequence[HalfCycle], start: int, stop: int) -> _Motion:
     """Make a motion between sines: random if it has many half cycles of different amplitude."""
     inside = [cycle for cycle in half_cycles if start <= cycle.middle < stop]
-    half_period = (
-        float(np.median([cycle.stop - cycle.start for cycle in inside])) if inside else float(stop - start)
-    )
-    amplitudes = [cycle.amplitude for cycle in inside]
-    is_random = len(inside) >= _MIN_RANDOM_COUNT and float(np.std(amplitudes)) > _MIN_RANDOM_SPREAD * float(
-        np.mean(amplitudes)
-    )
-    return _Motion(start, stop, "random" if is_random else "other", half_period)
+    durations = [cycle.stop - cycle.start for cycle in inside] or [stop - start]
+    amplitudes = np.array([cycle.amplitude for cycle in inside])
+    is_random = len(inside) >= _MIN_RANDOM_COUNT and amplitudes.std() > _MIN_RANDOM_SPREAD * amplitudes.mean()
+    return _Motion(start, stop, "random" if is_random else "other", float(np.median(durations)))
 
 
 def _find_sines(

@@ -8,6 +8,7 @@ of functions of their effect (`benchmarks.common.drawn_forms`), so that no list 
 that of the identification: only the forms are independent of it, not the integrator.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
@@ -25,6 +26,7 @@ from identification.arrays import Array
 from identification.damper import Coordinates, DamperSize
 from identification.damper.effects import EFFECTS, Stage
 from identification.documents import Diagnosis
+from identification.errors import IdentificationError
 from identification.gap import diagnose
 from identification.logs import Recording
 from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
@@ -79,14 +81,20 @@ class Outcome(NamedTuple):
         if self.kind == "none":
             return self.verdict == "no_gap"
         if self.kind == "unknown":
-            return not self.blamed
+            return not self.blamed and self.verdict != "refused"
         return self.named == self.truth
 
 
 def try_case(job: tuple[int, str]) -> Outcome:
-    """Draw, record and diagnose one case of a kind."""
+    """Draw, record and diagnose one case of a kind; a refused recording is a wrong answer."""
     case = draw_case(*job)
-    return judge(case, diagnose([case.recording]).diagnosis)
+    try:
+        return judge(case, diagnose([case.recording]).diagnosis)
+    except IdentificationError:
+        nothing: frozenset[str] = frozenset()
+        return Outcome(
+            case.label, case.kind, case.effects, nothing, "refused", None, False, math.nan, math.nan, False, False
+        )
 
 
 def judge(case: Case, diagnosis: Diagnosis) -> Outcome:

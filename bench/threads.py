@@ -31,9 +31,13 @@ class BackgroundThread(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the thread if it was started; what it is doing is finished within the time for its end."""
-        self._stopping.set()
+        self.request_end()
         if self._thread.is_alive():
             self._thread.join(self._end_time)
+
+    def request_end(self) -> None:
+        """Let the thread end, without waiting for it."""
+        self._stopping.set()
 
     @abstractmethod
     def _run(self) -> None:

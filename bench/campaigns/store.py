@@ -30,7 +30,7 @@ class StoredCampaign(NamedTuple):
 
     id: str
     bench: str
-    """`agent`, or `scenario NAME`."""
+    """`agent`, name of one of several benches, or `scenario NAME`."""
     created: datetime
     methods: dict[str, Method]
     state: CampaignState
@@ -55,7 +55,7 @@ class CampaignStore:
         Args:
             campaign: the document.
             methods: all its methods by name.
-            bench: `agent`, or `scenario NAME`.
+            bench: `agent`, name of one of several benches, or `scenario NAME`.
             now: UTC [s].
             operator: person who started it.
         """

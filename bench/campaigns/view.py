@@ -108,7 +108,9 @@ class CampaignView(FrozenModel):
 
     id: str
     name: str
-    bench: str = Field(description="`agent`, or `scenario NAME` for the simulated plant")
+    bench: str = Field(
+        description="`agent`, name of one of several benches, or `scenario NAME` for the simulated plant"
+    )
     status: str = Field(description="running, pausing, paused, stopping, done or stopped")
     reason: str = Field(description="reason of the status")
     created: datetime = Field(description="UTC")

@@ -54,6 +54,7 @@ class RunRow(Base):
     __table_args__ = (
         Index("runs_newest_first", "started", "id"),
         Index("runs_of_specimen", "specimen", "started", "id"),
+        Index("runs_of_bench", "bench", "started", "id"),
     )
 
     id: Mapped[str] = mapped_column(Text, primary_key=True)
@@ -64,6 +65,8 @@ class RunRow(Base):
     """Hash of the content of the method; None in runs of older versions and in imports."""
     specimen: Mapped[str] = mapped_column(Text, default="")
     operator: Mapped[str] = mapped_column(Text, default="")
+    bench: Mapped[str | None] = mapped_column(Text, default=None)
+    """Name of the bench in the service; None in runs of older versions, in imports and in logs found later."""
     source: Mapped[str] = mapped_column(Text, default="run")
     """``run``, or ``import`` for a recording made elsewhere."""
     started: Mapped[datetime] = mapped_column(UtcTime)
@@ -193,6 +196,8 @@ class EventRow(Base):
     id: Mapped[int] = mapped_column(primary_key=True)
     run_id: Mapped[str | None] = mapped_column(ForeignKey("runs.id"), index=True)
     """Run that the event belongs to; None outside runs."""
+    bench: Mapped[str | None] = mapped_column(Text, default=None)
+    """Name of the bench in the service; None in events of older versions and of imports."""
     at: Mapped[datetime] = mapped_column(UtcTime)
     """UTC; of an import without a start time, counted from the time of its log."""
     time_s: Mapped[float | None] = mapped_column(default=None)
@@ -211,7 +216,7 @@ class CampaignRow(Base):
     key: Mapped[str] = mapped_column(Text, index=True)
     """Hash of document and methods: equal campaigns have equal keys."""
     bench: Mapped[str] = mapped_column(Text, default="")
-    """Executor: `agent`, or `scenario NAME` for the simulated plant."""
+    """Executor: `agent`, name of one of several benches, or `scenario NAME` for the simulated plant."""
     status: Mapped[str] = mapped_column(Text, index=True)
     created: Mapped[datetime] = mapped_column(UtcTime)
     methods: Mapped[dict[str, Any]] = mapped_column(JSON)

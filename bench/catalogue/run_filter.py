@@ -21,6 +21,7 @@ class RunFilter:
     """Selection of runs; None selects all. All given conditions have to be met."""
 
     specimen: str | None = None
+    bench: str | None = None
     method: str | None = None
     outcome: RunOutcome | None = None
     ending: RunEnding | None = None
@@ -50,6 +51,7 @@ class RunFilter:
         given: list[ColumnElement[bool] | None] = [
             RunRow.trashed.is_not(None) if self.is_trashed else RunRow.trashed.is_(None),
             None if self.specimen is None else RunRow.specimen == self.specimen,
+            None if self.bench is None else RunRow.bench == self.bench,
             None if self.method is None else RunRow.method == self.method,
             None if self.outcome is None else RunRow.outcome == self.outcome,
             None if self.ending is None else RunRow.ending == self.ending,

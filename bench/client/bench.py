@@ -27,13 +27,27 @@ class Bench:
         url: address of the service, such as ``http://127.0.0.1:8600``; it may contain ``#token=...``.
         token: token of the service; by default that of the address.
         certificate: file with the certificate that an ``https`` service must have; by default those of the system.
+        name: name of the bench; needed if the service has several, see `list_benches`.
 
     Raises:
         ClientError: there is no token, or the file with the certificate cannot be read.
     """
 
-    def __init__(self, url: str, token: str | None = None, certificate: Path | None = None) -> None:
+    def __init__(
+        self, url: str, token: str | None = None, certificate: Path | None = None, name: str | None = None
+    ) -> None:
         self._session = Session(url, token, certificate)
+        self._name = name
+        self._path = "/bench" if name is None else f"/benches/{quote_name(name)}"
+        self._choice = {} if name is None else {"bench": name}  # a service of an older version knows no name
+
+    def list_benches(self) -> list[dict[str, Any]]:
+        """Return the benches of the service: name, state, description, run in progress and kind of drive.
+
+        Raises:
+            ClientError: the service cannot be reached.
+        """
+        return list(self._session.get("/benches")["items"])
 
     def get_state(self) -> str:
         """Return the state of the rig agent: idle, preparing, running, stopping or tripped.
@@ -41,7 +55,7 @@ class Bench:
         Raises:
             ClientError: the service or its agent cannot be reached.
         """
-        return str(self._session.get("/bench")["state"])
+        return str(self._session.get(self._path)["state"])
 
     def list_methods(self) -> list[dict[str, Any]]:
         """Return the newest version of each method: name, version, title, duration and kind of drive.
@@ -49,7 +63,7 @@ class Bench:
         Raises:
             ClientError: the service cannot be reached.
         """
-        return list(self._session.get("/methods", limit=_MOST_METHODS)["items"])
+        return list(self._session.get("/methods", limit=_MOST_METHODS, bench=self._name)["items"])
 
     def run(self, run_id: str) -> Run:
         """Return a run by its id; nothing is requested yet."""
@@ -60,7 +74,7 @@ class Bench:
 
         Args:
             limit: largest number of runs.
-            search: conditions, as `GET /runs` has them: specimen, method, outcome, ending, started_from,
+            search: conditions, as `GET /runs` has them: specimen, bench, method, outcome, ending, started_from,
                 started_to, effect, parameter with parameter_min and parameter_max (unit of the fit), text.
 
         Raises:
@@ -88,7 +102,13 @@ class Bench:
         Raises:
             ClientError: the method or the start is refused, or the service or its agent cannot be reached.
         """
-        request = {"method": method, "specimen": specimen, "operator": operator, "resume_after": resume_after}
+        request = {
+            "method": method,
+            "specimen": specimen,
+            "operator": operator,
+            "resume_after": resume_after,
+            **self._choice,
+        }
         return self.run(str(self._session.post("/runs", request, key=uuid.uuid4().hex)["id"]))
 
     def start_campaign(self, campaign: Mapping[str, Any], operator: str = "") -> Campaign:
@@ -101,7 +121,7 @@ class Bench:
         Raises:
             ClientError: the campaign is refused, or the service cannot be reached.
         """
-        request = {"campaign": campaign, "operator": operator}
+        request = {"campaign": campaign, "operator": operator, **self._choice}
         return self.campaign(str(self._session.post("/campaigns", request, key=uuid.uuid4().hex)["id"]))
 
     def plan_campaign(self, campaign: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,7 +138,7 @@ class Bench:
         Raises:
             ClientError: the service cannot be reached.
         """
-        held = self._session.get("/queue")["campaign"]
+        held = self._session.get("/queue", bench=self._name)["campaign"]
         return None if held is None else self.campaign(str(held["id"]))
 
     def campaign(self, campaign_id: str) -> Campaign:
@@ -226,7 +246,7 @@ class Bench:
         Raises:
             ClientError: the start is refused, or the service or its agent cannot be reached.
         """
-        method = self._session.get("/checks/charts")["method"]
+        method = self._session.get("/checks/charts", bench=self._name)["method"]
         if method is None:
             raise ClientError("the rig agent does not answer; start it, then repeat the check")
         return self.start(str(method), specimen, operator)
@@ -240,7 +260,7 @@ class Bench:
         Raises:
             ClientError: the service refuses, cannot be reached or falls silent.
         """
-        return iterate_live(self._session, rate_hz)
+        return iterate_live(self._session, rate_hz, self._name)
 
     def stop(self) -> None:
         """Stop a run or a setup step in a controlled way; harmless when nothing moves.
@@ -248,7 +268,7 @@ class Bench:
         Raises:
             ClientError: the service or its agent cannot be reached.
         """
-        self._session.post("/bench/stop")
+        self._session.post(f"{self._path}/stop")
 
     def _iterate_runs(self, page_size: int, conditions: Mapping[str, str | float]) -> Iterator[RunState]:
         before = None

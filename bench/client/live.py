@@ -43,18 +43,21 @@ class LiveSamples(Arrays):
         return time.time() - self._end_utc_s
 
 
-def iterate_live(session: Session, rate_hz: float = math.inf) -> Iterator[LiveSamples]:
+def iterate_live(session: Session, rate_hz: float = math.inf, bench: str | None = None) -> Iterator[LiveSamples]:
     """Yield live samples until the caller stops.
 
     Args:
         session: session with the service.
         rate_hz: largest rate of the samples [Hz]; a faster bench is decimated, which keeps every extreme.
+        bench: name of the bench; needed if the service has several.
 
     Raises:
         ClientError: the service refuses, cannot be reached or falls silent.
     """
     channels: tuple[Channel, ...] = ()
-    wishes = {} if math.isinf(rate_hz) else {"rate_hz": rate_hz}
+    wishes: dict[str, object] = {} if math.isinf(rate_hz) else {"rate_hz": rate_hz}
+    if bench is not None:  # a service of an older version has one bench
+        wishes["bench"] = bench
     with session.connect("/live", {"acknowledge": True, **wishes}) as socket:
         while True:
             message = socket.recv(_SILENCE_LIMIT)

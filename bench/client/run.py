@@ -46,6 +46,8 @@ class RunState(BaseModel):
     method: str
     specimen: str
     operator: str
+    bench: str | None = None
+    """Name of the bench in the service; None in runs of older versions and in imports."""
     source: str = "run"
     """run for a run of the bench, import for a recording made elsewhere."""
     state: str

@@ -14,6 +14,15 @@ def serve(
             metavar="FILE", help="bench.toml of the rig; its agent is started, and started again when it dies."
         ),
     ] = None,
+    bench: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FILE",
+            help="One of several benches: a name ([a-z0-9_-]) and its bench.toml, or "
+            "NAME=tcp://HOST:PORT,KEYFILE for a running agent elsewhere. Repeat it for each bench, in place of "
+            "--config and --agent.",
+        ),
+    ] = None,
     host: Annotated[
         str, typer.Option(metavar="HOST", help="Address to listen on; use TLS for other than loopback.")
     ] = "127.0.0.1",
@@ -90,24 +99,32 @@ def serve(
         typer.Option(metavar="FILE", help="oidc.toml of the provider (OpenID Connect) by which persons sign in."),
     ] = None,
 ) -> None:
-    """Serve the REST interface, the live values and the web page.
+    """Serve the REST interface, the live values and the web page, for one bench or for several.
 
-    Starts a rig agent and one worker, unless their addresses are given. Prints the page's address. A new token is
-    printed on a terminal only; otherwise it is written to the file `token` in the data folder.
+    Starts a rig agent for each bench.toml and one worker, unless their addresses are given. Prints the page's
+    address. A new token is printed on a terminal only; otherwise it is written to the file `token` in the data
+    folder.
     """
-    from bench.service import ServeOptions, TlsFiles
+    from bench.errors import ConfigError
+    from bench.service import BenchPlace, ServeOptions, TlsFiles, parse_benches
     from bench.service import serve as run_service
 
     if (tls_cert is None) != (tls_key is None):
         raise typer.BadParameter("a certificate and its key belong together; give --tls-cert and --tls-key")
+    if bench and (config or agent or agent_key):
+        raise typer.BadParameter(
+            "--bench names its file or its agent; leave out --config, --agent and --agent-key"
+        )
+    try:
+        benches = parse_benches(bench) if bench else (BenchPlace(config=config, address=agent, key=agent_key),)
+    except ConfigError as error:
+        raise typer.BadParameter(f"--bench: {error}") from error
     options = ServeOptions(
         data=data,
         host=host,
         port=port,
-        config=config,
-        agent=agent,
+        benches=benches,
         start_agent=start_agent,
-        agent_key=agent_key,
         scheduler=scheduler,
         new_token=new_token,
         scheduler_tls=scheduler_tls,

@@ -93,8 +93,17 @@ class AgentMonitor:
 
     def __exit__(self, *error: object) -> None:
         """Stop the subscribing thread."""
-        self._stopping.set()
+        self.request_end()
         self._thread.join()
+
+    def request_end(self) -> None:
+        """Let the subscribing thread end, without waiting for it."""
+        self._stopping.set()
+
+    @property
+    def last_status(self) -> AgentStatus | None:
+        """Last status, however old it is; None before the first."""
+        return self._status
 
     @property
     def latest_status(self) -> AgentStatus | None:

@@ -13,23 +13,20 @@ from fastapi import Depends, FastAPI
 from fastapi.security import HTTPBearer
 from fastapi.staticfiles import StaticFiles
 from prometheus_client import CollectorRegistry
-from pydantic import BaseModel
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 
-from bench.agent_protocol import AgentEvent, AgentStatus
-from bench.campaigns import NotificationSender
+from bench.campaigns import CampaignStore, NotificationSender
 from bench.catalogue import Catalogue, JobRow, RunRow, locate_catalogue, open_database
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager, make_job_view
-from bench.live import LiveBatch, LiveBroadcaster, serialise_message
+from bench.live import serialise_message
 from bench.log_store import LocalLogs, LogCopier
 from bench.oidc import OidcConfig, Provider
 from bench.samples import SampleStore
 from bench.service import problems
 from bench.service.access import Access, Authenticator, PeopleStores
-from bench.service.agent_monitor import AgentLink, AgentMonitor
-from bench.service.audit import AuditTrail, RecordedConnection
-from bench.service.campaigns import CampaignExecutor
+from bench.service.audit import AuditTrail
+from bench.service.benches import BenchMaker, BenchSettings, ServedBenches
 from bench.service.context import ServiceContext
 from bench.service.middleware import (
     AccessCheckMiddleware,
@@ -56,11 +53,10 @@ PUBLIC_OPERATIONS = (
     f"GET {API}/session/oidc/callback",
 )
 """Operations that need no sign-in."""
-_LISTS = ("events", "jobs", "methods", "runs")
-KEPT_PATHS = frozenset(
-    f"{API}/{name}" for name in ("bench", "bench/channels", "bench/instruments", "bench/limits", *_LISTS)
-)
-"""Paths whose answers depend only on the catalogue, the agent's status and the query."""
+_LISTS = ("benches", "events", "jobs", "methods", "runs")
+_BENCH_PARTS = ("", "/channels", "/instruments", "/limits")
+KEPT_PATHS = frozenset(f"{API}/{path}" for path in (*_LISTS, *(f"bench{part}" for part in _BENCH_PARTS)))
+"""Paths whose answers depend only on the catalogue, the agents' statuses and the query."""
 COMPUTATIONS = frozenset((f"{API}/methods/dry-run", f"{API}/campaigns/plan"))
 """Paths whose POST only computes an answer; nothing of it is recorded."""
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]", "::1")
@@ -70,15 +66,14 @@ PAGE_FOLDER = Path(__file__).parent.parent / "web" / "static"
 
 @dataclass(frozen=True)
 class AppSettings:
-    """Folder, access, agent and engine of the application."""
+    """Folder, access, benches and engine of the application."""
 
     data: Path
     """Data folder, absolute."""
     access: Access
-    link: AgentLink
+    benches: tuple[BenchSettings, ...]
+    """Benches with different names; at least one."""
     engine: Callable[[], AbstractAsyncContextManager[JobEngine]]
-    has_local_logs: bool = True
-    """True if the agent writes into the data folder."""
     hosts: tuple[str, ...] = LOOPBACK_NAMES
     """Accepted host names; `*` for any. Protects the loopback interface against DNS rebinding."""
     oidc: OidcConfig | None = None
@@ -107,7 +102,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
     # The middleware that is added last sees a request first.
-    app.add_middleware(KeptAnswerMiddleware, paths=KEPT_PATHS)
+    app.add_middleware(KeptAnswerMiddleware, paths=_list_kept_paths(settings))
     app.add_middleware(HeadMiddleware, below="/api/")
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(AccessCheckMiddleware, below=API, public=PUBLIC_OPERATIONS)
@@ -137,6 +132,12 @@ _BEARER = HTTPBearer(auto_error=False, description="token of the bench or of a p
 """Description of the token for OpenAPI; `AccessCheckMiddleware` checks it, or the cookie of a session."""
 
 
+def _list_kept_paths(settings: AppSettings | None) -> frozenset[str]:
+    """Return the paths in `KEPT_PATHS`, and the same parts of the named benches."""
+    benches = () if settings is None else settings.benches
+    return KEPT_PATHS.union(f"{API}/benches/{bench.name}{part}" for bench in benches for part in _BENCH_PARTS)
+
+
 @asynccontextmanager
 async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[None]:
     """Run catalogue, engine, agent monitor and scans; they end in reverse order, also after an error."""
@@ -149,60 +150,47 @@ async def _run_lifespan(app: FastAPI, settings: AppSettings) -> AsyncIterator[No
         context = app.state.context = _make_context(settings, catalogue, engine)
         stack.push_async_callback(engine.close)
         await engine.start(context.job_manager)
-        stack.enter_context(context.monitor)
+        for bench in context.benches:
+            stack.enter_context(bench.monitor)
         stack.enter_context(context.audit)
-        stack.enter_context(NotificationSender(context.campaigns.store))
-        stack.enter_context(context.campaigns)
+        stack.enter_context(NotificationSender(context.campaign_store))
+        for bench in context.benches:
+            stack.enter_context(bench.campaigns)
         if context.log_copier is not None:
             stack.enter_context(context.log_copier)
         stack.push_async_callback(_cancel_task, asyncio.create_task(context.registry.scan_periodically()))
-        stack.push_async_callback(_cancel_task, asyncio.create_task(context.live.publish_clock()))
+        for bench in context.benches:
+            stack.push_async_callback(_cancel_task, asyncio.create_task(bench.live.publish_clock()))
+        stack.callback(context.benches.request_end)  # the first to be called: no thread then waits for another
         yield
 
 
 def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine) -> ServiceContext:
     """Create the objects of the routes and connect their callbacks; called in the event loop."""
-    loop, broadcaster = asyncio.get_running_loop(), LiveBroadcaster()
 
     def on_job_changed(row: JobRow) -> None:
-        broadcaster.publish("job", serialise_message("job", make_job_view(row)), row.id)
+        benches.publish("job", serialise_message("job", make_job_view(row)), row.id)
 
     async def on_run_changed(row: RunRow) -> None:
         view = (await asyncio.to_thread(context.make_run_views, row))[0]
-        broadcaster.publish("run", serialise_message("run", view), row.id)
-
-    def on_status(status: AgentStatus) -> None:
-        if not loop.is_closed():
-            asyncio.run_coroutine_threadsafe(registry.observe(status), loop)
-
-    publish = broadcaster.make_publisher(loop)
-
-    def on_message(topic: str, message: BaseModel | LiveBatch) -> None:
-        publish(topic, message)
-        if isinstance(message, AgentEvent):
-            registry.record_event(message)
-        elif isinstance(message, LiveBatch):
-            campaigns.thermometer.take(message)
+        benches.publish("run", serialise_message("run", view), row.id)
 
     local_logs = LocalLogs(catalogue)
     job_manager = JobManager(catalogue, engine, on_job_changed, local_logs.locate)
-    monitor = AgentMonitor(settings.link, on_message, on_status)
-    audit = AuditTrail(settings.data, settings.link.send)
-    recorded = RecordedConnection(monitor, audit.record)
-    campaigns = CampaignExecutor(catalogue, recorded, is_local=settings.has_local_logs)
-    registry = RunRegistry(catalogue, job_manager, lambda: monitor.latest_status, on_run_changed)
+    audit = AuditTrail(settings.data, {bench.name: bench.link.send for bench in settings.benches})
+    registry = RunRegistry(catalogue, job_manager, lambda: benches.find_statuses(), on_run_changed)
+    maker = BenchMaker(catalogue, registry, audit, asyncio.get_running_loop())
+    benches = ServedBenches([maker.make(bench) for bench in settings.benches])
     context = ServiceContext(
         Authenticator(settings.access, PeopleStores(catalogue.users, catalogue.tokens, catalogue.sessions)),
         catalogue,
-        monitor,
-        broadcaster,
+        benches,
         engine,
         job_manager,
         registry,
-        settings.has_local_logs,
         SpaceMonitor(settings.data),
         SampleStore(settings.data),
-        campaigns,
+        CampaignStore(catalogue),
         audit,
         local_logs,
         provider=None if settings.oidc is None else Provider(settings.oidc),

@@ -11,18 +11,18 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from bench.agent_protocol import AgentStatus
+from bench.bench_names import DEFAULT_BENCH
+from bench.campaigns import CampaignStore
 from bench.catalogue import Catalogue, JobRow, RunRow
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
-from bench.live import LiveBroadcaster
 from bench.log_store import LocalLogs, LogCopier
 from bench.oidc import Provider
 from bench.people import AttemptCounter, SignInCodes
 from bench.samples import SampleStore
 from bench.service.access import Authenticator
-from bench.service.agent_monitor import AgentMonitor
 from bench.service.audit import AuditTrail
-from bench.service.campaigns import CampaignExecutor
+from bench.service.benches import ServedBench, ServedBenches
 from bench.service.problems import make_not_found
 from bench.service.run_registry import RunRegistry
 from bench.service.views import Run, make_run_view
@@ -33,15 +33,16 @@ MAX_JOBS = 50
 
 @dataclass(frozen=True)
 class Shown:
-    """State that lists show: one state of the catalogue, and one status of the agent."""
+    """State that lists show: one state of the catalogue, and one status of each agent."""
 
     changes: int
     """Number of the catalogue's state, from `ChangeCounter`."""
-    status: AgentStatus | None
+    statuses: tuple[AgentStatus | None, ...]
 
     def is_same(self, other: "Shown") -> bool:
-        """Return whether both are the same state and the same message of the agent."""
-        return self.changes == other.changes and self.status is other.status
+        """Return whether both are the same state and the same messages of the agents."""
+        pairs = zip(self.statuses, other.statuses, strict=True)
+        return self.changes == other.changes and all(one is another for one, another in pairs)
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,13 @@ class ServiceContext:
 
     authenticator: Authenticator
     catalogue: Catalogue
-    monitor: AgentMonitor
-    live: LiveBroadcaster
+    benches: ServedBenches
     engine: JobEngine
     job_manager: JobManager
     registry: RunRegistry
-    has_local_logs: bool
-    """True if the agent writes into the service's data folder."""
     space_monitor: SpaceMonitor
     sample_store: SampleStore
-    campaigns: CampaignExecutor
+    campaign_store: CampaignStore
     audit: AuditTrail
     local_logs: LocalLogs
     key_locks: WeakValueDictionary[str, asyncio.Lock] = field(default_factory=WeakValueDictionary)
@@ -81,7 +79,17 @@ class ServiceContext:
     def find_shown(self) -> Shown | None:
         """Return what lists show at present; None if the database cannot tell a change."""
         changes = self.catalogue.change_counter.read()
-        return None if changes is None else Shown(changes, self.monitor.latest_status)
+        return None if changes is None else Shown(changes, self.benches.list_statuses())
+
+    def get_bench_of_run(self, run_id: str) -> ServedBench:
+        """Return the bench of a run; one in progress need not be in the catalogue.
+
+        Raises:
+            ProblemError: there is no such run, or its bench is not served.
+        """
+        if not self.benches.are_several:  # nothing delays a stop
+            return self.benches.get(None)
+        return self.benches.find_with_run(run_id) or self.benches.get(self.get_run(run_id).bench or DEFAULT_BENCH)
 
     def get_run(self, run_id: str) -> RunRow:
         """Return the run with this id.
@@ -115,10 +123,10 @@ class ServiceContext:
 
     def make_run_views(self, *rows: RunRow) -> list[Run]:
         """Return the views of runs, each with its jobs."""
-        status, jobs = self.monitor.latest_status, defaultdict(list)
+        statuses, jobs = self.benches.list_statuses(), defaultdict(list)
         for job in self.catalogue.list_jobs_of_runs([row.id for row in rows], MAX_JOBS):
             jobs[job.run_id].append(job)
-        return [make_run_view(row, jobs[row.id], status) for row in rows]
+        return [make_run_view(row, jobs[row.id], *statuses) for row in rows]
 
 
 def _get_context(connection: HTTPConnection) -> ServiceContext:
@@ -127,3 +135,12 @@ def _get_context(connection: HTTPConnection) -> ServiceContext:
 
 
 Context = Annotated[ServiceContext, Depends(_get_context)]
+
+
+async def _get_addressed_bench(connection: HTTPConnection, context: Context) -> ServedBench:
+    advice = "use /api/v1/benches/NAME/... in place of /api/v1/bench/..."
+    return context.benches.get(connection.path_params.get("name"), advice)
+
+
+AddressedBench = Annotated[ServedBench, Depends(_get_addressed_bench)]
+"""Bench in the path of a request below ``/benches/{name}``, or the only bench below ``/bench``."""

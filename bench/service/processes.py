@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 
 from bench.agent_protocol import ShutDownCommand, StatusCommand
+from bench.bench_names import DEFAULT_BENCH
 from bench.errors import AgentUnreachableError
 from bench.jobs import DaskEngine, SchedulerLocation, start_scheduler
 from bench.processes import MRBENCH_COMMAND, open_privately, terminate
@@ -87,31 +88,31 @@ def is_answering(link: AgentLink, timeout: float = 1.0) -> bool:
         return False
 
 
-def launch_agent(config: Path, data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> "subprocess.Popen[bytes]":
-    """Start a rig agent that continues when the service ends; ``agent.log`` in the data folder has its output."""
-    return _start_process([*mrbench, "rig", "--config", str(config)], get_agent_log(data))
+def launch_agent(config: Path, log: Path, mrbench: Sequence[str] = MRBENCH_COMMAND) -> "subprocess.Popen[bytes]":
+    """Start a rig agent that continues when the service ends, and writes its output to a file."""
+    return _start_process([*mrbench, "rig", "--config", str(config)], log)
 
 
-def get_agent_log(data: Path) -> Path:
-    """Return the file with the agent's output in a data folder."""
-    return data / "agent.log"
+def get_agent_log(data: Path, bench: str = DEFAULT_BENCH) -> Path:
+    """Return the file with the output of a bench's agent in a data folder."""
+    return data / ("agent.log" if bench == DEFAULT_BENCH else f"agent-{bench}.log")
 
 
 def start_agent(
-    config: Path, link: AgentLink, data: Path, mrbench: Sequence[str] = MRBENCH_COMMAND
+    config: Path, link: AgentLink, log: Path, mrbench: Sequence[str] = MRBENCH_COMMAND
 ) -> "subprocess.Popen[bytes]":
     """Start a rig agent as `launch_agent` does, and wait until it answers.
 
     Args:
         config: ``bench.toml``.
         link: connection to the agent.
-        data: data folder.
+        log: file that receives its output.
         mrbench: command that starts mrbench.
 
     Raises:
         ServiceError: the agent ends, or does not answer within `AGENT_TIMEOUT`.
     """
-    process, log = launch_agent(config, data, mrbench), get_agent_log(data)
+    process = launch_agent(config, log, mrbench)
     deadline = time.monotonic() + AGENT_TIMEOUT
     while not is_answering(link):
         if process.poll() is not None:

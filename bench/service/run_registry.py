@@ -3,7 +3,8 @@
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable
+from collections import defaultdict
+from collections.abc import Awaitable, Callable, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -37,63 +38,65 @@ _LOG = logging.getLogger(__name__)
 
 
 class RunRegistry:
-    """Record of runs in the catalogue as they start and end."""
+    """Record of the runs of all benches in the catalogue as they start and end."""
 
     def __init__(
         self,
         catalogue: Catalogue,
         job_manager: JobManager,
-        status: Callable[[], AgentStatus | None],
+        statuses: Callable[[], Mapping[str, AgentStatus | None]],
         notify: Callable[[RunRow], Awaitable[None]],
     ) -> None:
-        """Use a catalogue, a job manager and an agent.
+        """Use a catalogue, a job manager and the agents of the benches.
 
         Args:
             catalogue: catalogue of the runs.
             job_manager: creates the identification jobs.
-            status: returns the current status of the agent, or None if it does not answer.
+            statuses: returns by bench the current status of its agent, or None if it does not answer.
             notify: receives every changed run.
         """
         self._catalogue, self._job_manager = catalogue, job_manager
-        self._get_status, self._on_changed = status, notify
+        self._get_statuses, self._on_changed = statuses, notify
         self._known_states: set[tuple[str, bool]] = set()
         self.lock = asyncio.Lock()
         """Held while logs are catalogued or moved."""
-        self._failures = RepeatedFailure(_LOG, "runs_not_recorded", "runs_recorded_again")
+        self._failures = defaultdict[str, RepeatedFailure](
+            lambda: RepeatedFailure(_LOG, "runs_not_recorded", "runs_recorded_again")
+        )
 
-    async def observe(self, status: AgentStatus) -> None:
-        """Record the runs in a status; runs without a change are skipped.
+    async def observe(self, status: AgentStatus, bench: str) -> None:
+        """Record the runs in a status of a bench; runs without a change are skipped.
 
         A failure, such as a full disk, is logged when it begins and when it ends. The next status tries again.
         """
         try:
-            await self._record_runs(status)
+            await self._record_runs(status, bench)
         except Exception as error:  # the agent's runs go on, whatever prevents their record
-            self._failures.note(error)
+            self._failures[bench].note(error)
         else:
-            self._failures.clear()
+            self._failures[bench].clear()
 
-    async def _record_runs(self, status: AgentStatus) -> None:
+    async def _record_runs(self, status: AgentStatus, bench: str) -> None:
         runs = {run.id: run for run in (*status.finished, *([status.run] if status.run else []))}
         for run in runs.values():
             key = (run.id, run.outcome is not None)  # a run is recorded when it starts and when it ends
             if key not in self._known_states:
                 async with self.lock:
-                    await (self._finish_run(run) if run.outcome else self._add_run(run))
+                    await (self._finish_run(run, bench) if run.outcome else self._add_run(run, bench))
                 # Added last, so that a failed update is tried again with the next status.
                 self._known_states.add(key)
 
-    def record_event(self, event: AgentEvent) -> None:
-        """Store an event with the run in progress; called from any thread.
+    def record_event(self, event: AgentEvent, bench: str) -> None:
+        """Store an event of a bench with its run in progress; called from any thread.
 
         A failure, such as a full disk, is logged; the log of the run contains its events in any case.
         """
-        status = self._get_status()
+        status = self._get_statuses()[bench]
         run = status.run if status and status.run and status.run.outcome is None else None
         try:
-            self._catalogue.event_journal.record(event.kind, event.text, run.id if run else None)
+            self._catalogue.event_journal.record(event.kind, event.text, run.id if run else None, bench)
         except CatalogueUnavailableError as error:
-            self._failures.note(error)
+            self._failures[bench].note(error)
 
     async def scan(self) -> None:
         """Scan the data folder once; identify also what a kill has left without an identification."""
@@ -138,17 +141,19 @@ class RunRegistry:
             log.rename(found)
         return row
 
-    async def _add_run(self, run: RunStatus) -> RunRow:
+    async def _add_run(self, run: RunStatus, bench: str) -> RunRow:
         row = await asyncio.to_thread(self._catalogue.get_run, run.id)
         if row is None:
-            row = make_run_row(run, self._catalogue)
+            row = make_run_row(run, self._catalogue, bench)
             await asyncio.to_thread(self._catalogue.add, row)
             _LOG.info("run_began", extra={"run": row.id, "method": row.method, "specimen": row.specimen})
             await self._on_changed(row)
         return row
 
-    async def _finish_run(self, run: RunStatus) -> None:
-        row = await self._add_run(run)
+    async def _finish_run(self, run: RunStatus, bench: str) -> None:
+        row = await self._add_run(run, bench)
+        if row.bench is None:  # a scan has found the log before the agent has reported its run
+            row = await asyncio.to_thread(self._catalogue.update_run, run.id, bench=bench)
         # A scan may have found the log first; if it has no end, only the agent knows how the run ended.
         if row.state == "running" or (row.ending is None and run.ending is not None):
             await self._handle_change(await asyncio.to_thread(self._record_end, run))
@@ -184,19 +189,31 @@ class RunRegistry:
             await self._job_manager.identify(row, IdentifySettings())
 
     def _is_being_written(self, path: Path) -> bool:
-        status = self._get_status()
-        run = status.run if status else None
-        if run is not None and run.outcome is None and Path(run.log) == path:
+        statuses = self._get_statuses()
+        if any(_is_writing(status, path) for status in statuses.values()):
             return True
-        # The agent answers and does not write this known log.
-        if status is not None and self._catalogue.find_run_by_log(path) is not None:
+        # Its agent answers and does not write this known log.
+        known = self._catalogue.find_run_by_log(path)
+        if known is not None and _is_answering(statuses, known.bench):
             return False
         # Another program may record into the folder, or an agent that does not answer at present.
         return path.exists() and time.time() - path.stat().st_mtime < SETTLING_TIME and not is_complete(path)
 
 
-def make_run_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
-    """Return the row of a run that has begun, as the agent describes it; it is not added."""
+def _is_writing(status: AgentStatus | None, path: Path) -> bool:
+    run = status.run if status else None
+    return run is not None and run.outcome is None and Path(run.log) == path
+
+
+def _is_answering(statuses: Mapping[str, AgentStatus | None], bench: str | None) -> bool:
+    """Return whether the agent of a bench answers; of an unknown bench, whether all agents do."""
+    if bench is not None and bench in statuses:
+        return statuses[bench] is not None
+    return all(status is not None for status in statuses.values())
+
+
+def make_run_row(run: RunStatus, catalogue: Catalogue, bench: str) -> RunRow:
+    """Return the row of a run that has begun on a bench, as its agent describes it; it is not added."""
     return RunRow(
         id=run.id,
         method=run.method,
@@ -204,6 +221,7 @@ def make_run_row(run: RunStatus, catalogue: Catalogue) -> RunRow:
         method_sha256=run.method_sha256 or None,
         specimen=run.specimen,
         operator=run.operator,
+        bench=bench,
         source="run",
         continues=run.continues or None,
         calibration_overdue=list(run.calibration_overdue),

@@ -1,20 +1,19 @@
 """Start of the service: data folder, port, agent, token, web server."""
 
-import logging
 import signal
 import socket
 import ssl
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import AbstractAsyncContextManager, ExitStack, contextmanager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import AbstractAsyncContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
-from urllib.parse import urlsplit
 
 import uvicorn
 
-from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samples_address, find_agent
+from bench.bench_names import write_benches
 from bench.catalogue import keep_address, locate_catalogue, open_database
 from bench.folder_lock import hold_lock
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
@@ -22,21 +21,11 @@ from bench.log_lines import log_to_stderr
 from bench.log_store import find_store, keep_store_url
 from bench.oidc import load_oidc_config
 from bench.service.access import PLAIN_TOKEN_FILE, open_access, save_token
-from bench.service.agent_monitor import AgentLink, NoAgent
-from bench.service.agent_supervisor import SupervisedAgent
 from bench.service.application import LOOPBACK_NAMES, AppSettings, create_app
+from bench.service.bench_agents import BenchAgent, BenchPlace, make_agents
 from bench.service.errors import ServiceError
-from bench.service.processes import (
-    connect_engine,
-    get_agent_log,
-    is_answering,
-    launch_agent,
-    shut_down_idle_agent,
-    start_agent,
-    start_local_engine,
-)
+from bench.service.processes import connect_engine, start_local_engine
 
-_LOG = logging.getLogger(__name__)
 _SWITCH_INTERVAL = 2e-4
 """Time after which a computing thread yields the interpreter to the one that answers requests [s]."""
 _SHUTDOWN_TIMEOUT = 5
@@ -60,14 +49,10 @@ class ServeOptions:
     host: str = "127.0.0.1"
     port: int = 8600
     """Port; 0 for any free one."""
-    config: Path | None = None
-    """``bench.toml`` of the rig."""
-    agent: str | None = None
-    """Address of the agent's command socket; the agent publishes at the next port, or at NAME.samples."""
+    benches: tuple[BenchPlace, ...] = (BenchPlace(),)
+    """Benches with different names; at least one."""
     start_agent: bool = True
-    """Start an agent if none answers, and again when it dies."""
-    agent_key: Path | None = None
-    """Key file of an agent at a TCP address."""
+    """Start the agent of a ``bench.toml`` if none answers, and again when it dies."""
     scheduler: str | None = None
     new_token: bool = False
     scheduler_tls: Path | None = None
@@ -99,7 +84,7 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
         ServiceError: the data folder, the port or the agent is not available.
         WorkerError: the address of the scheduler is not valid, or is refused because it has no TLS.
         SecretFileError: a file with a secret is missing, or other users may read it.
-        ConfigError: ``bench.toml``, ``oidc.toml`` or the address of the agent is invalid.
+        ConfigError: a ``bench.toml``, ``oidc.toml`` or the address of an agent is invalid.
         CatalogueError: the catalogue cannot be opened, or another one is in the data folder.
         LogStoreError: the address of the log store is not valid.
     """
@@ -108,12 +93,13 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
         check_tls(options.tls)
     oidc = None if options.oidc is None else load_oidc_config(options.oidc)
     data = options.data.resolve()
-    link, commands = _make_agent_link(options)
+    agents = make_agents(options.benches)
     with _lock_data_folder(data), _open_listener(options.host, options.port) as listener:
         _prepare_catalogue(data, options.catalogue)
         if options.log_store is not None:
             keep_store_url(data, options.log_store)
-        supervisor = _supervise_agent(options, link, data)
+        _supervise_agents(agents, data, is_started=options.start_agent)
+        write_benches(data, {agent.name: str(agent.place) for agent in agents})
         # Until now a client is refused at once; it would wait in vain for as long as the agent takes to start.
         with _explain_address_error(options.host, options.port):
             listener.listen()
@@ -123,9 +109,8 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
             AppSettings(
                 data=data,
                 access=access,
-                link=supervisor or link,
+                benches=tuple(agent.make_settings() for agent in agents),
                 engine=_choose_engine(options, data),
-                has_local_logs=commands is None or _is_local(commands),
                 hosts=LOOPBACK_NAMES if loopback else ("*",),
                 oidc=oidc,
                 log_store=find_store(data),
@@ -137,10 +122,22 @@ def serve(options: ServeOptions, print_line: Callable[[str], None]) -> None:
         print_line(_format_address(page, token, data, is_terminal=options.is_terminal))
         if not loopback and options.tls is None:
             print_line("this address is open to the network and not encrypted; give --tls-cert and --tls-key")
-        with supervisor or nullcontext():
+        with ExitStack() as supervision:
+            for agent in agents:
+                supervision.enter_context(agent.supervision)
             _run_server(app, listener, options.tls)
-        if supervisor is not None and supervisor.has_started:
-            print_line(shut_down_idle_agent(link))
+        for agent in agents:
+            if (state := agent.shut_down_if_started()) is not None:
+                print_line(state if len(agents) == 1 else f"{agent.name}: {state}")
+
+
+def _supervise_agents(agents: Sequence[BenchAgent], data: Path, *, is_started: bool) -> None:
+    """Prepare the supervision of all agents at once, because each one that is silent costs a second."""
+    is_only = len(agents) == 1
+    with ThreadPoolExecutor(len(agents)) as threads:
+        made = [threads.submit(agent.supervise, data, is_started=is_started, is_only=is_only) for agent in agents]
+    for one in made:
+        one.result()
 
 
 def _prepare_catalogue(data: Path, url: str | None) -> None:
@@ -202,36 +199,6 @@ def _explain_address_error(host: str, port: int) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or str(error)
         raise ServiceError(f"{host} port {port}: {reason.lower()}; use another --port") from error
-
-
-def _make_agent_link(options: ServeOptions) -> tuple[AgentLink, str | None]:
-    """Return the connection to the agent and its address; the address is None without an agent."""
-    if options.agent is not None:
-        endpoint = AgentEndpoint(options.agent, derive_samples_address(options.agent), options.agent_key)
-    elif options.config is not None:
-        endpoint = find_agent(options.config)
-    else:
-        return NoAgent(), None
-    return AgentClient(*endpoint, sender=Sender(actor="service")), endpoint.commands
-
-
-def _is_local(address: str) -> bool:
-    return not address.startswith("tcp://") or urlsplit(address).hostname in LOOPBACK_NAMES
-
-
-def _supervise_agent(options: ServeOptions, link: AgentLink, data: Path) -> SupervisedAgent | None:
-    """Return the supervision of the agent of a ``bench.toml``; start a missing one if this is wanted."""
-    config = options.config
-    if config is None or options.agent is not None:
-        return None
-    if not options.start_agent:
-        return SupervisedAgent(config, link, get_agent_log(data), None)
-    process = None
-    if is_answering(link):
-        _LOG.info("agent_found", extra={"config": str(config)})
-    else:
-        process = start_agent(config, link, data)
-    return SupervisedAgent(config, link, get_agent_log(data), lambda: launch_agent(config, data), process)
 
 
 def _choose_engine(options: ServeOptions, data: Path) -> Callable[[], AbstractAsyncContextManager[JobEngine]]:

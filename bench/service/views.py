@@ -1,8 +1,10 @@
 """Request and response models of the REST interface, frozen, with units in the descriptions."""
 
+from collections.abc import Iterable
 from datetime import datetime
-from typing import Any, Self
+from typing import Annotated, Any, Self, TypeAlias
 
+from fastapi import Query
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from bench.agent_protocol import AgentStatus
@@ -19,11 +21,24 @@ class View(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+BenchName: TypeAlias = Annotated[str, Field(max_length=100)]
+"""Name of a bench in a request; whether there is such a bench is checked by the route."""
+
+
+BenchChoice: TypeAlias = Annotated[
+    str | None, Query(max_length=100, description="name of the bench; needed if there are several")
+]
+"""Name of a bench in the query of a request."""
+
+
 class Health(View):
     """State of agent, worker, disk, queue, audit trail, clocks and log store, each in words."""
 
     version: str
-    agent: str = Field(description="`ok`, or the reason why it is not available")
+    agent: str = Field(description="`ok`, or the reason why it is not available; with several benches by bench")
+    benches: dict[str, str] = Field(
+        description="by bench: `ok`, or the reason why its rig agent is not available, or of its trip"
+    )
     worker: str = Field(description="`ok`, or the reason why it is not available")
     disk: str = Field(description="`ok`, or the free space of the data folder where it is little")
     queue: str = Field(description="`empty`, or the numbers of running and waiting jobs")
@@ -76,6 +91,10 @@ class Run(View):
     )
     specimen: str
     operator: str
+    bench: str | None = Field(
+        description="name of the bench in the service; null in runs of older versions, in imports and in logs "
+        "that were found later"
+    )
     source: str = Field(description="`run`, or `import` for a recording made elsewhere")
     started: datetime = Field(description="UTC; time of the log file for an import without a start time")
     duration_s: float | None = Field(
@@ -152,6 +171,7 @@ class StartRunRequest(View):
         description="serial number of the damper, registered at its first use; by default that of bench.toml",
     )
     operator: str = Field(default="", max_length=200, description="name of the operator")
+    bench: BenchName | None = Field(default=None, description="name of the bench; required if there are several")
     resume_after: str = Field(
         default="", description="checkpoint of the method (segment) after which an interrupted run continues"
     )
@@ -163,13 +183,13 @@ class ResumeRunRequest(View):
     after: str = Field(default="", description="checkpoint to continue after; by default the last one passed")
 
 
-def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -> Run:
+def make_run_view(row: RunRow, jobs: list[JobRow], *statuses: AgentStatus | None) -> Run:
     """Return the view of a run.
 
     Args:
         row: run in the catalogue.
         jobs: jobs of the run, newest first.
-        status: status of the agent, for the progress; None if it is not known.
+        statuses: statuses of the agents, for the progress; None for one that is not known.
     """
     newest_fit, newest_diagnosis = (find_newest_done(jobs, kind) for kind in ("identify", "diagnose"))
     fit = make_job_view(newest_fit) if newest_fit else None
@@ -180,6 +200,7 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         method_sha256=row.method_sha256,
         specimen=row.specimen,
         operator=row.operator,
+        bench=row.bench,
         source=row.source,
         started=row.started,
         duration_s=row.duration_s,
@@ -198,7 +219,7 @@ def make_run_view(row: RunRow, jobs: list[JobRow], status: AgentStatus | None) -
         trashed=row.trashed,
         log_sha256=row.log_sha256,
         integrity=row.integrity,
-        progress=_find_progress(row, status),
+        progress=_find_progress(row, statuses),
         rmse_n=fit.rmse_n if fit else None,
         noise_floor_n=fit.noise_floor_n if fit else None,
         result=fit.result if fit else "",
@@ -212,8 +233,9 @@ def make_run_tag(row: RunRow) -> str:
     return f'"{row.revision}"'
 
 
-def _find_progress(row: RunRow, status: AgentStatus | None) -> RunProgress | None:
-    run = status.run if status else None
-    if row.state != "running" or run is None or run.id != row.id:
+def _find_progress(row: RunRow, statuses: Iterable[AgentStatus | None]) -> RunProgress | None:
+    runs = (status.run for status in statuses if status is not None)
+    run = next((run for run in runs if run is not None and run.id == row.id), None)
+    if row.state != "running" or run is None:
         return None
     return RunProgress(elapsed_s=run.elapsed_s, duration_s=run.duration_s, segment=run.segment)

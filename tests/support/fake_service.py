@@ -26,7 +26,9 @@ from bench.methods import parse_method
 class FakeAgent:
     """Accepts runs as the agent does, without a rig; the test ends them."""
 
-    def __init__(self):
+    def __init__(self, prefix="run"):
+        """Use a prefix for the ids of its runs."""
+        self.prefix = prefix
         self.status = AgentStatus(state="idle")
         self.published = queue.Queue()
         self.reachable = True
@@ -106,13 +108,13 @@ class FakeAgent:
     def _begin(self, command):
         number = len(self.status.finished) + 1
         run = RunStatus(
-            id=f"run-{number}",
+            id=f"{self.prefix}-{number}",
             method=command.method["name"],
             method_sha256=parse_method(command.method, "the command").compute_sha256(),
             specimen=command.specimen,
             continues=command.continues,
             operator=command.operator,
-            log=command.log or f"/elsewhere/run-{number}.mcap",
+            log=command.log or f"/elsewhere/{self.prefix}-{number}.mcap",
             started=f"2026-03-0{number}T10:00:00+00:00",
             duration_s=23.1,
             calibration_overdue=self.overdue,

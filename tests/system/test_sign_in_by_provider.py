@@ -13,6 +13,7 @@ import uvicorn
 from bench.oidc import Fault, OidcConfig
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
+from bench.service.benches import BenchSettings
 from tests.support.fake_page_service import STATIC
 from tests.support.fake_service import FakeAgent, FakeEngine
 from tests.support.page_in_browser import CHROMIUM, FOLDER, NODE, browser_test
@@ -49,7 +50,11 @@ def served_bench(data, provider):
         yield FakeEngine()
 
     access, _ = open_access(data)
-    app = create_app(AppSettings(data=data, access=access, link=FakeAgent(), engine=open_engine, oidc=config))
+    app = create_app(
+        AppSettings(
+            data=data, access=access, benches=(BenchSettings(FakeAgent()),), engine=open_engine, oidc=config
+        )
+    )
     server = uvicorn.Server(uvicorn.Config(app, port=0, log_config=None))
     thread = Thread(target=server.run)
     thread.start()

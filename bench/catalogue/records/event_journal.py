@@ -20,18 +20,26 @@ class EventJournal:
         """Use an open database."""
         self._sessions = sessionmaker(engine, expire_on_commit=False)
 
-    def record(self, kind: str, text: str, run_id: str | None) -> None:
-        """Add an event that has just happened; ``run_id`` is the run in progress, if the catalogue knows it."""
+    def record(self, kind: str, text: str, run_id: str | None, bench: str | None = None) -> None:
+        """Add an event that has just happened.
+
+        Args:
+            kind: kind of the event.
+            text: the event for a person.
+            run_id: run in progress; left out if the catalogue does not know it.
+            bench: name of the bench.
+        """
         with self._sessions.begin() as session:
             known = run_id if run_id is not None and session.get(RunRow, run_id) is not None else None
-            session.add(EventRow(run_id=known, at=datetime.now(UTC), kind=kind, text=text))
+            session.add(EventRow(run_id=known, bench=bench, at=datetime.now(UTC), kind=kind, text=text))
 
     def replace(self, run_id: str, events: Sequence[LogEvent]) -> None:
         """Store the events of a complete log in place of those that were recorded live, and mark the alarms."""
         with self._sessions.begin() as session:
             session.execute(delete(EventRow).where(EventRow.run_id == run_id))
-            session.add_all(EventRow(run_id=run_id, **event._asdict()) for event in events)
-            session.get_one(RunRow, run_id).alarms = [event.text for event in events if event.kind == ALARM]
+            run = session.get_one(RunRow, run_id)
+            session.add_all(EventRow(run_id=run_id, bench=run.bench, **event._asdict()) for event in events)
+            run.alarms = [event.text for event in events if event.kind == ALARM]
 
     def list_of_run(self, run_id: str, limit: int, after: int = 0) -> Sequence[EventRow]:
         """Return the events of a run in their order, those with a greater number than ``after``."""
@@ -39,9 +47,17 @@ class EventJournal:
         with self._sessions() as session:
             return session.scalars(query.order_by(EventRow.id).limit(limit)).all()
 
-    def list_newest(self, limit: int, before: int | None = None) -> Sequence[EventRow]:
-        """Return the events of bench and runs, the newest first, those with a smaller number than ``before``."""
+    def list_newest(self, limit: int, before: int | None = None, bench: str | None = None) -> Sequence[EventRow]:
+        """Return the events of benches and runs, the newest first.
+
+        Args:
+            limit: largest number of events.
+            before: only those with a smaller number.
+            bench: only those of this bench; None for all.
+        """
         query = select(EventRow).order_by(EventRow.id.desc()).limit(limit)
+        if bench is not None:
+            query = query.where(EventRow.bench == bench)
         if before is not None:
             query = query.where(EventRow.id < before)
         with self._sessions() as session:

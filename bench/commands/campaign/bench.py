@@ -5,6 +5,7 @@ from pathlib import Path
 
 import typer
 
+from bench.bench_names import find_bench, get_executor
 from bench.campaigns import (
     CampaignError,
     CampaignStore,
@@ -19,8 +20,6 @@ from bench.commands.campaign.catalogue import open_store
 from bench.config import load_config
 from bench.folder_lock import is_locked
 
-AGENT_BENCH = "agent"
-"""Bench of the campaigns that the service executes."""
 _POLL_PERIOD = 0.5
 """[s] Time between two looks at the catalogue."""
 _EVENTS = 200
@@ -34,7 +33,7 @@ def run_on_bench(path: Path, config: Path, data: Path, operator: str, *, as_json
 
     Args:
         path: file of the campaign.
-        config: ``bench.toml``.
+        config: ``bench.toml``, which tells the benches of the service apart.
         data: data folder of the service.
         operator: person, for the record.
         as_json: print the final state as JSON.
@@ -45,7 +44,8 @@ def run_on_bench(path: Path, config: Path, data: Path, operator: str, *, as_json
     load_config(config)
     check_served(data, config)
     with open_store(data) as store:
-        campaign = find_or_create(store, path, operator)
+        executor = get_executor(find_bench(data, config))
+        campaign = find_or_create(store, path, operator, executor)
         ended = _follow(store, campaign, is_quiet=as_json)
         if as_json:
             events = store.table.list_newest_events(ended.id, _EVENTS)
@@ -62,22 +62,28 @@ def check_served(data: Path, config: Path) -> None:
         raise CampaignError(f"no service uses {data}; start it: mrbench serve --config {config} --data {data}")
 
 
-def find_or_create(store: CampaignStore, path: Path, operator: str) -> StoredCampaign:
-    """Return the unfinished campaign of an equal document, or a new one.
+def find_or_create(store: CampaignStore, path: Path, operator: str, executor: str) -> StoredCampaign:
+    """Return the unfinished campaign of an equal document on a bench, or a new one.
+
+    Args:
+        store: campaigns of the data folder.
+        path: file of the campaign.
+        operator: person, for the record.
+        executor: executor of the bench, as the catalogue calls it.
 
     Raises:
         BenchError: the campaign is invalid or cannot be run, or another one holds the bench.
     """
     document = load_campaign(path)
     methods = collect_methods(document, allow_files=True)
-    unfinished = store.find_unfinished(document, methods, AGENT_BENCH)
+    unfinished = store.find_unfinished(document, methods, executor)
     if unfinished is not None:
         return unfinished
-    if held := store.list_in_progress(AGENT_BENCH):
+    if held := store.list_in_progress(executor):
         raise CampaignError(f"campaign {held[0].id} holds the bench; stop it, or wait for its end")
     if problems := plan_campaign(document, methods).problems:
         raise CampaignError(f"the campaign cannot be run: {problems[0]}")
-    created = store.create(document, methods, AGENT_BENCH, time.time(), operator)
+    created = store.create(document, methods, executor, time.time(), operator)
     record(store.catalogue.folder, "campaign run", created.id, {}, {"name": document.name, "operator": operator})
     return created
 

@@ -1,12 +1,35 @@
 """Right that each operation needs."""
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 
 from starlette.routing import compile_path
 
 from bench.people import Right
 
+_BENCH_RIGHTS: Mapping[str, Right] = {
+    "POST /stop": "stop",
+    "POST /abort": "stop",
+    "POST /prepare": "operate",
+    "POST /reset": "operate",  # after a trip: reset_trip, see `AFTER_TRIP`
+}
+"""Right by method and path below that of a bench."""
+_BENCH_PATHS = ("/bench", "/benches/{name}")
+"""Paths of the only bench, and of a named one."""
+
+
+def _add_benches(rights: Mapping[str, Right]) -> dict[str, Right]:
+    """Return rights below the paths of benches by the whole path."""
+    return {
+        f"{verb} {start}{path}": right
+        for start in _BENCH_PATHS
+        for operation, right in rights.items()
+        for verb, path in (operation.split(" "),)
+    }
+
+
 OPERATION_RIGHTS: Mapping[str, Right] = {
+    **_add_benches(_BENCH_RIGHTS),
     "GET /users": "administer",
     "POST /users": "administer",
     "PATCH /users/{name}": "view",  # one's own password; the route checks the rest
@@ -20,10 +43,6 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "DELETE /tokens/{token_id}": "view",
     "DELETE /session": "view",
     "POST /session/codes": "view",
-    "POST /bench/stop": "stop",
-    "POST /bench/abort": "stop",
-    "POST /bench/prepare": "operate",
-    "POST /bench/reset": "operate",  # after a trip: reset_trip, see `AFTER_TRIP`
     "POST /runs": "operate",
     "PATCH /runs/{run_id}": "operate",
     "DELETE /runs/{run_id}": "manage_runs",
@@ -70,7 +89,7 @@ OPERATION_RIGHTS: Mapping[str, Right] = {
     "PATCH /queue": "operate",
 }
 """Right by method and path; other operations that read need `view`, other ones that change need `administer`."""
-AFTER_TRIP: Mapping[str, Right] = {"POST /bench/reset": "reset_trip"}
+AFTER_TRIP: Mapping[str, Right] = _add_benches({"POST /reset": "reset_trip"})
 """Right in place of that in `OPERATION_RIGHTS` while a trip is latched."""
 _READING = ("GET", "HEAD", "OPTIONS")
 
@@ -86,16 +105,23 @@ class OperationRights:
             for verb, path in (operation.split(" "),)
         ]
 
-    def find(self, method: str, path: str, *, is_tripped: bool = False) -> Right:
+    def find(self, method: str, path: str, is_tripped: Callable[[str | None], bool] = lambda name: False) -> Right:
         """Return the right for a method and a path.
 
         Args:
             method: HTTP method.
             path: path of the request.
-            is_tripped: whether a trip is latched.
+            is_tripped: returns whether the trip of a bench is latched, by the name in the path; None for none.
         """
         verb = "GET" if method == "HEAD" else method
-        found = next((key for one, regex, key in self._patterns if one == verb and regex.match(path)), None)
-        if found is None:
+        found, match = next(self._find_operations(verb, path), (None, None))
+        if found is None or match is None:
             return "view" if method in _READING else "administer"
-        return AFTER_TRIP.get(found, OPERATION_RIGHTS[found]) if is_tripped else OPERATION_RIGHTS[found]
+        if found in AFTER_TRIP and is_tripped(match.groupdict().get("name")):
+            return AFTER_TRIP[found]
+        return OPERATION_RIGHTS[found]
+
+    def _find_operations(self, verb: str, path: str) -> Iterator[tuple[str, re.Match[str]]]:
+        """Yield the operations of a request, with the match of their path."""
+        matches = ((key, regex.match(path)) for one, regex, key in self._patterns if one == verb)
+        yield from ((key, match) for key, match in matches if match is not None)

@@ -11,14 +11,15 @@ from bench.errors import BenchError
 class RecordedConnection:
     """Connection that records each command with its sender and its outcome."""
 
-    def __init__(self, connection: AgentConnection, record: Callable[[Act], None]) -> None:
+    def __init__(self, connection: AgentConnection, record: Callable[[Act], None], bench: str) -> None:
         """Use a connection.
 
         Args:
             connection: connection to the agent.
             record: writes an act to the audit trail.
+            bench: name of the bench, for the record.
         """
-        self._connection, self._record = connection, record
+        self._connection, self._record, self._bench = connection, record, bench
 
     def get_status(self) -> AgentStatus:
         """Return the current status.
@@ -56,6 +57,7 @@ class RecordedConnection:
                     actor=sender.actor,
                     origin=sender.origin,
                     action=f"{name} by the service",
+                    target=self._bench,
                     new=redact(values) if values else None,
                     outcome=outcome,
                 )

@@ -3,7 +3,7 @@
 import asyncio
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import TimeoutError as FutureTimeoutError
 from contextlib import suppress
 from pathlib import Path
@@ -26,17 +26,21 @@ _MINUTE = 60.0
 class AuditTrail:
     """Audit trail of a service; as a context manager, it writes, imports and is verified once."""
 
-    def __init__(self, folder: Path, send: SendFunction, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, folder: Path, agents: Mapping[str, SendFunction], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         """Use a data folder.
 
         Args:
             folder: data folder.
-            send: sends a command to the rig agent.
+            agents: by bench the function that sends a command to its rig agent; each agent has a trail of its own.
             clock: time [s].
         """
         self.path = folder / AUDIT_FILE
         self._writer = AuditWriter(self.path)
-        self._import = AgentImport(self.path, send, self._writer.record)
+        self._imports = {
+            bench: AgentImport(self.path, send, self._writer.record) for bench, send in agents.items()
+        }
         self._clock, self._minute, self._refusals = clock, float("-inf"), 0
         self._fault = ""
         self._verification = threading.Thread(target=self._verify, name="audit-verification", daemon=True)
@@ -46,14 +50,18 @@ class AuditTrail:
         self._verification.start()
         self._writer.__enter__()
         self.record(Act(actor="service", action="service start", outcome="ok"))
-        self._import.__enter__()
+        for one in self._imports.values():
+            one.__enter__()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the import, and write what waits."""
-        self._import.__exit__(kind, error, trace)
+        """End the imports, and write what waits."""
+        for one in self._imports.values():
+            one.request_end()
+        for one in self._imports.values():
+            one.__exit__(kind, error, trace)
         self.record(Act(actor="service", action="service end", outcome="ok" if error is None else repr(error)))
         self._writer.__exit__(kind, error, trace)
 
@@ -89,8 +97,14 @@ class AuditTrail:
         return self._writer.find_obstacle()
 
     def describe_state(self) -> str:
-        """Return ``ok``, or what is wrong with the trail or with that of the rig agent, for a person."""
-        return self.find_obstacle() or self._fault or self._import.obstacle or "ok"
+        """Return ``ok``, or what is wrong with the trail or with that of a rig agent, for a person."""
+        return self.find_obstacle() or self._fault or self._describe_imports() or "ok"
+
+    def _describe_imports(self) -> str:
+        obstacles = {bench: one.obstacle for bench, one in self._imports.items() if one.obstacle}
+        if len(self._imports) == 1:
+            return "".join(obstacles.values())
+        return "; ".join(f"{bench}: {obstacle}" for bench, obstacle in obstacles.items())
 
     def get_head(self) -> Head:
         """Return the last entry."""

@@ -1,5 +1,5 @@
 """Campaigns in the service: their executor on the rig agent."""
 
-from bench.service.campaigns.executor import AGENT_BENCH, CampaignExecutor
+from bench.service.campaigns.executor import CampaignExecutor
 
-__all__ = ["AGENT_BENCH", "CampaignExecutor"]
+__all__ = ["CampaignExecutor"]

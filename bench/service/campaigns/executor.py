@@ -18,28 +18,28 @@ from bench.catalogue import Catalogue
 from bench.log_lines import RepeatedFailure
 from bench.threads import BackgroundThread
 
-AGENT_BENCH = "agent"
-"""Bench of the campaigns that the service executes."""
 PERIOD = 0.5
 """[s] Time between two observations of a campaign, and between two looks for a new one."""
 _LOG = logging.getLogger(__name__)
 
 
 class CampaignExecutor(BackgroundThread):
-    """Thread that executes the campaigns of the agent, one after the other, oldest first.
+    """Thread that executes the campaigns of one bench, one after the other, oldest first.
 
     At its end, a run in progress goes on in the agent, and the next service continues the campaign.
     """
 
-    def __init__(self, catalogue: Catalogue, agent: AgentConnection, *, is_local: bool) -> None:
+    def __init__(self, catalogue: Catalogue, agent: AgentConnection, executor: str, *, is_local: bool) -> None:
         """Use a catalogue and an agent.
 
         Args:
             catalogue: catalogue of the data folder.
             agent: connection to the agent.
+            executor: name of the bench's executor in the catalogue.
             is_local: whether the agent writes into the data folder; else nothing is executed.
         """
-        super().__init__("campaigns")
+        super().__init__(f"campaigns-{executor}")
+        self.executor = executor
         self.store = CampaignStore(catalogue)
         self.thermometer = Thermometer()
         self.is_local = is_local
@@ -61,7 +61,7 @@ class CampaignExecutor(BackgroundThread):
             self._stopping.wait(PERIOD)
 
     def _execute_oldest(self) -> None:
-        in_progress = self.store.list_in_progress(AGENT_BENCH)
+        in_progress = self.store.list_in_progress(self.executor)
         if not in_progress:
             return
         self._check_needs(in_progress[0])

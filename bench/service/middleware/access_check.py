@@ -62,11 +62,18 @@ class AccessCheckMiddleware:
             return problems.make_unauthorised()
         if identity.session is not None and not _has_csrf_value(scope):
             return problems.make_csrf_missing()
-        context: ServiceContext = scope["app"].state.context
-        status = context.monitor.latest_status
-        is_tripped = status is None or status.state == "tripped"  # an unknown state may be a trip
-        right = self._rights.find(scope["method"], scope["path"], is_tripped=is_tripped)
+        right = self._rights.find(scope["method"], scope["path"], lambda name: _may_be_tripped(scope, name))
         return None if right in identity.rights else problems.make_right_missing(right, identity)
+
+
+def _may_be_tripped(scope: Scope, name: str | None) -> bool:
+    """Return whether the trip of a bench may be latched; without a name the only bench is meant."""
+    context: ServiceContext = scope["app"].state.context
+    bench = context.benches.find(name)
+    if bench is None:  # the route says so
+        return False
+    status = bench.monitor.latest_status
+    return status is None or status.state == "tripped"  # an unknown state may be a trip
 
 
 async def _identify(scope: Scope) -> tuple[Identity | None, problems.ProblemError | None]:

@@ -4,7 +4,7 @@ from bench.service.routes import (
     analyses,
     audit,
     batches,
-    bench_control,
+    benches,
     campaigns,
     continuation,
     exchange,
@@ -26,7 +26,7 @@ from bench.service.routes.unknown_paths import refuse_unknown_paths
 PUBLIC_ROUTERS = (health.router, live.router, *people.PUBLIC_ROUTERS)
 """Routers that need no sign-in; `live` checks its own first message."""
 PROTECTED_ROUTERS = (
-    bench_control.router,
+    *benches.ROUTERS,
     metrics.router,
     *people.ROUTERS,
     *planning.ROUTERS,

@@ -25,9 +25,10 @@ def pause_run(run_id: str, context: Context) -> AgentStatus:
 
     If no checkpoint follows, the pause takes effect after the run, and the answer says so.
     """
-    if not is_in_progress(context, run_id):
+    bench = context.get_bench_of_run(run_id)
+    if not is_in_progress(context, bench, run_id):
         raise make_conflict("run-ended", "The run has ended", f"run {run_id} cannot be paused; it has ended")
-    return context.monitor.send_command(PauseCommand())
+    return bench.monitor.send_command(PauseCommand())
 
 
 @router.post("/{run_id}/resume", status_code=201, dependencies=[IDEMPOTENT])
@@ -43,6 +44,7 @@ async def resume_run(
     The new run names the first part in `continues`; both logs are complete recordings of their own.
     """
     row = await asyncio.to_thread(context.get_run, run_id)
+    bench = await asyncio.to_thread(context.get_bench_of_run, run_id)
     method, checkpoint = await asyncio.to_thread(_find_continuation, context, row)
     start = StartRunRequest.model_construct(  # the first part was accepted with these values
         method=method.name,
@@ -51,7 +53,7 @@ async def resume_run(
         resume_after=(request.after if request else "") or checkpoint,
     )
     return await begin_run(
-        context, response, method, start, continues=run_id, first_request=find_first_request(http)
+        context, bench, response, method, start, continues=run_id, first_request=find_first_request(http)
     )
 
 

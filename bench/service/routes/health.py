@@ -2,14 +2,17 @@
 
 import asyncio
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib.metadata import version
+from typing import Any
 
 from fastapi import APIRouter
 
 from bench.agent_protocol import AgentStatus
 from bench.catalogue import CatalogueUnavailableError
 from bench.errors import BenchError
+from bench.service.benches import ServedBench, ServedBenches
 from bench.service.context import Context, ServiceContext
 from bench.service.routes.planning import describe_calibration
 from bench.service.views import Health
@@ -34,13 +37,15 @@ def _read_version() -> str:
     return version("mrbench")  # reads files
 
 
-def _describe_parts(context: ServiceContext) -> dict[str, str]:
+def _describe_parts(context: ServiceContext) -> dict[str, Any]:
+    agents = _describe_agents(context.benches)
     return {
-        "agent": _describe_agent(context),
+        "agent": _join(agents),
+        "benches": agents,
         "disk": context.space_monitor.describe() or "ok",
         "queue": _describe_from_catalogue(_describe_queue, context),
         "audit": context.audit.describe_state(),
-        "clocks": describe_clocks(context.monitor.latest_status),
+        "clocks": _join({name: describe_clocks(one) for name, one in context.benches.find_statuses().items()}),
         "log_store": "not used" if context.log_copier is None else context.log_copier.describe_state(),
         "calibration": _describe_from_catalogue(describe_calibration, context),
     }
@@ -54,9 +59,22 @@ def _describe_from_catalogue(describe: Callable[[ServiceContext], str], context:
         return "not known: the catalogue cannot be used at present; see the log of the service"
 
 
-def _describe_agent(context: ServiceContext) -> str:
+def _describe_agents(benches: ServedBenches) -> dict[str, str]:
+    """Return the state of each agent in words; all are asked at once, so that silent ones cost one time limit."""
+    with ThreadPoolExecutor(len(benches.names), "health") as threads:
+        return dict(zip(benches.names, threads.map(_describe_agent, benches), strict=True))
+
+
+def _join(states: dict[str, str]) -> str:
+    """Return the state of the only bench, or those of several benches that are not ``ok``, with their names."""
+    if len(states) == 1:
+        return next(iter(states.values()))
+    return "; ".join(f"{name}: {state}" for name, state in states.items() if state != "ok") or "ok"
+
+
+def _describe_agent(bench: ServedBench) -> str:
     try:
-        status = context.monitor.get_status()
+        status = bench.monitor.get_status()
     except BenchError as error:
         return str(error)
     trip = f"tripped: {status.trip}" if status.state == "tripped" else ""

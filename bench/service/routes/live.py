@@ -11,11 +11,16 @@ from pydantic import BaseModel, Field, ValidationError
 from bench.catalogue import CatalogueUnavailableError
 from bench.live import Listener, ListenerSettings
 from bench.service.access import CredentialKind, compute_csrf, read_cookie
+from bench.service.benches import ServedBenches
 from bench.service.context import Context, ServiceContext
 
 router = APIRouter()
 _CLOSE_UNAUTHORISED = 4401
 """Close code for a sign-in that is missing, wrong, or has ended."""
+_CLOSE_UNKNOWN = 4404
+"""Close code for a bench that the service does not have, or for several benches of which none is named."""
+_MAX_REASON = 123
+"""Longest reason with which a websocket can be closed [bytes]."""
 _CHECK_INTERVAL = 10.0
 """Time after which it is checked again whether a client is signed in [s]."""
 _SIGN_IN_TIMEOUT = 10.0
@@ -28,6 +33,7 @@ class SignIn(BaseModel):
     token: str | None = None
     csrf: str | None = Field(default=None, description="value of the session whose cookie came with the handshake")
     rate_hz: float = Field(default=float("inf"), gt=0, description="largest rate of the samples [Hz]")
+    bench: str | None = Field(default=None, description="name of the bench; needed if there are several")
     acknowledge: bool = Field(default=False, description="whether the client acknowledges the batches")
 
 
@@ -42,8 +48,9 @@ async def stream_live(websocket: WebSocket, context: Context) -> None:
     """Send messages `{"topic": ..., "data": ...}` and samples in binary live batches.
 
     The first message of the client is `{"token": ...}`, or `{"csrf": ...}` of the session whose cookie came with
-    the handshake. An address would appear in the logs of proxies. A client that acknowledges the batches gets
-    fresh ones when it resumes, instead of those in the buffers of the network.
+    the handshake. An address would appear in the logs of proxies. With several benches, `bench` in the same
+    message names one. A client that acknowledges the batches gets fresh ones when it resumes, instead of those in
+    the buffers of the network.
     """
     # Accepted before the token is checked: a browser receives the close code only of an open connection.
     await websocket.accept()
@@ -52,7 +59,11 @@ async def stream_live(websocket: WebSocket, context: Context) -> None:
     if not await identify():
         await websocket.close(_CLOSE_UNAUTHORISED, "the first message has no valid token or session")
         return
-    with context.live.listen(ListenerSettings(sign_in.rate_hz, sign_in.acknowledge)) as listener:
+    bench = context.benches.find(sign_in.bench)
+    if bench is None:
+        await websocket.close(_CLOSE_UNKNOWN, _describe_unknown(context.benches))
+        return
+    with bench.live.listen(ListenerSettings(sign_in.rate_hz, sign_in.acknowledge)) as listener:
         sender = asyncio.create_task(_send(websocket, listener))
         guard = asyncio.create_task(_close_after_sign_out(websocket, identify))
         try:
@@ -64,6 +75,10 @@ async def stream_live(websocket: WebSocket, context: Context) -> None:
         finally:
             sender.cancel()
             guard.cancel()
+
+
+def _describe_unknown(benches: ServedBenches) -> str:
+    return f"name the bench in the first message: {', '.join(benches.names)}"[:_MAX_REASON]
 
 
 def _make_check(websocket: WebSocket, sign_in: SignIn, context: ServiceContext) -> Callable[[], Awaitable[bool]]:

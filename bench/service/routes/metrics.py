@@ -13,6 +13,7 @@ from bench.agent_protocol import AgentStatus, InstrumentStatus
 from bench.disk import find_free_space
 from bench.errors import RunError
 from bench.log_store import CopyCounts
+from bench.service.benches import ServedBenches
 from bench.service.context import Context, ServiceContext
 
 router = APIRouter(tags=["service"])
@@ -36,18 +37,15 @@ class ServiceCollector(Collector):
         self._context, self._has_worker = context, has_worker
 
     def collect(self) -> Iterator[Metric]:
-        """Yield the metrics; those of instruments only while the agent is known."""
-        context, status = self._context, self._context.monitor.latest_status
-        yield _make_gauge("mrbench_agent_up", "1 if the status of the rig agent is known", status is not None)
+        """Yield the metrics; those of instruments only while their agent is known."""
+        context = self._context
+        yield from _collect_benches(context.benches)
         yield _make_gauge("mrbench_worker_up", "1 if a worker is connected", self._has_worker)
-        yield _make_gauge("mrbench_live_listeners", "Websocket clients of live data", context.live.count)
         yield from _collect_disk(context)
         yield _make_counts("mrbench_jobs", "Jobs by state", context.catalogue.job_queue.count_states())
         yield _make_counts("mrbench_runs", "Runs by state", context.catalogue.count_runs())
         if context.log_copier is not None:
             yield from _collect_copies(context.log_copier.count())
-        if status is not None:
-            yield from _collect_bench(status)
 
 
 def _collect_disk(context: ServiceContext) -> Iterator[Metric]:
@@ -66,15 +64,35 @@ def _collect_copies(counts: CopyCounts) -> Iterator[Metric]:
     yield CounterMetricFamily("mrbench_log_copies_failed", failed, value=counts.failed)
 
 
-def _collect_bench(status: AgentStatus) -> Iterator[Metric]:
-    state = GaugeMetricFamily("mrbench_bench_state", "1 for the present state of the bench", labels=["state"])
-    state.add_metric([status.state], 1)
-    yield state
-    yield _make_gauge("mrbench_status_timestamp_seconds", "UTC at which the agent made its status", status.utc_s)
-    for name, text, read in _INSTRUMENT_GAUGES:
-        yield _add_instruments(GaugeMetricFamily(name, text, labels=["instrument"]), status, read)
-    for name, text, read in _INSTRUMENT_COUNTERS:
-        yield _add_instruments(CounterMetricFamily(name, text, labels=["instrument"]), status, read)
+def _collect_benches(benches: ServedBenches) -> Iterator[Metric]:
+    """Yield the metrics of all benches; with several benches each value has the label `bench`."""
+    names = ["bench"] if benches.are_several else []
+    labels = {bench.name: [bench.name] if names else [] for bench in benches}
+    statuses = benches.find_statuses()
+    up = GaugeMetricFamily("mrbench_agent_up", "1 if the status of the rig agent is known", labels=names)
+    listeners = GaugeMetricFamily("mrbench_live_listeners", "Websocket clients of live data", labels=names)
+    for bench in benches:
+        up.add_metric(labels[bench.name], float(statuses[bench.name] is not None))
+        listeners.add_metric(labels[bench.name], float(bench.live.count))
+    known = [(labels[name], status) for name, status in statuses.items() if status is not None]
+    yield from (up, listeners)
+    if known:
+        yield from _collect_known(names, known)
+
+
+def _collect_known(names: list[str], known: list[tuple[list[str], AgentStatus]]) -> Iterator[Metric]:
+    """Yield the metrics of the statuses that are known, each with its labels."""
+    present, stamp = "1 for the present state of the bench", "UTC at which the agent made its status"
+    state = GaugeMetricFamily("mrbench_bench_state", present, labels=[*names, "state"])
+    made = GaugeMetricFamily("mrbench_status_timestamp_seconds", stamp, labels=names)
+    for labels, status in known:
+        state.add_metric([*labels, status.state], 1)
+        made.add_metric(labels, status.utc_s)
+    yield from (state, made)
+    for name, text, field in _INSTRUMENT_GAUGES:
+        yield _add_instruments(GaugeMetricFamily(name, text, labels=[*names, "instrument"]), known, field)
+    for name, text, field in _INSTRUMENT_COUNTERS:
+        yield _add_instruments(CounterMetricFamily(name, text, labels=[*names, "instrument"]), known, field)
 
 
 _INSTRUMENT_GAUGES = (
@@ -92,12 +110,13 @@ _INSTRUMENT_COUNTERS = (
 
 
 def _add_instruments(
-    family: GaugeMetricFamily | CounterMetricFamily, status: AgentStatus, field: str
+    family: GaugeMetricFamily | CounterMetricFamily, known: list[tuple[list[str], AgentStatus]], field: str
 ) -> GaugeMetricFamily | CounterMetricFamily:
-    for one in status.instruments:
-        value = _read(one, field)
-        if value is not None:
-            family.add_metric([one.name], value)
+    for labels, status in known:
+        for one in status.instruments:
+            value = _read(one, field)
+            if value is not None:
+                family.add_metric([*labels, one.name], value)
     return family
 
 

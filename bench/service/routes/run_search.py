@@ -19,6 +19,7 @@ _Text = Annotated[str | None, Query(max_length=_MAX_TEXT)]
 
 def _read_search(
     specimen: Annotated[_Text, Query(description="serial number, exactly")] = None,
+    bench: Annotated[_Text, Query(description="name of the bench, exactly")] = None,
     method: Annotated[_Text, Query(description="name of the method, exactly")] = None,
     outcome: RunOutcome | None = None,
     ending: RunEnding | None = None,
@@ -60,6 +61,7 @@ def _read_search(
     _check_range(parameter, parameter_min, parameter_max)
     return RunFilter(
         specimen=specimen,
+        bench=bench,
         method=method,
         outcome=outcome,
         ending=ending,

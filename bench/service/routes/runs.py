@@ -15,6 +15,7 @@ from bench.catalogue import CatalogueUnavailableError, RunRow, catalogue_log
 from bench.errors import RunError
 from bench.log import salvage_log
 from bench.methods import Method, compile_method, parse_method
+from bench.service.benches import ServedBench
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict
 from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, find_first_request, get_operator
@@ -36,12 +37,14 @@ async def start_run(
 ) -> Run:
     """Start a run; the agent executes and records it even if the service ends."""
     request = request.model_copy(update={"operator": get_operator(sender, request.operator)})
-    method = await asyncio.to_thread(_check_method, context, request)
-    return await begin_run(context, response, method, request, first_request=find_first_request(http))
+    bench = context.benches.get(request.bench)
+    method = await asyncio.to_thread(_check_method, context, bench, request)
+    return await begin_run(context, bench, response, method, request, first_request=find_first_request(http))
 
 
 async def begin_run(
     context: ServiceContext,
+    bench: ServedBench,
     response: Response,
     method: Method,
     request: StartRunRequest,
@@ -53,6 +56,7 @@ async def begin_run(
 
     Args:
         context: objects of the service.
+        bench: bench of the run.
         response: receives the address.
         method: what to run.
         request: specimen, operator and checkpoint.
@@ -64,50 +68,54 @@ async def begin_run(
         AgentUnreachableError: the agent does not answer.
         ProblemError: the first request has started a run that is not in the catalogue yet.
     """
-    log = _choose_log(context, method, first_request)
-    present = await asyncio.to_thread(_find_started, context, log) if first_request else None
+    log = _choose_log(context, bench, method, first_request)
+    present = await asyncio.to_thread(_find_started, context, bench, log) if first_request else None
     if present is None:
-        run, status = await asyncio.to_thread(_request_start, context, method, request, continues, log)
-        await _record(context, status)
-        present = await asyncio.to_thread(_make_started_view, context, run, status)
+        run, status = await asyncio.to_thread(_request_start, context, bench, method, request, continues, log)
+        await _record(context, bench, status)
+        present = await asyncio.to_thread(_make_started_view, context, bench, run, status)
     response.headers["Location"] = f"/api/v1/runs/{present.id}"
     return present
 
 
-async def _record(context: ServiceContext, status: AgentStatus) -> None:
+async def _record(context: ServiceContext, bench: ServedBench, status: AgentStatus) -> None:
     """Record a started run. The next status records it as well, so that the answer need not wait for ever."""
     with suppress(TimeoutError):
         async with asyncio.timeout(_RECORD_TIMEOUT):
             # Not cancelled, because a thread that writes cannot be.
-            await asyncio.shield(context.registry.observe(status))
+            await asyncio.shield(context.registry.observe(status, bench.name))
 
 
-def _choose_log(context: ServiceContext, method: Method, first_request: datetime | None) -> Path | None:
+def _choose_log(
+    context: ServiceContext, bench: ServedBench, method: Method, first_request: datetime | None
+) -> Path | None:
     """Return the file of a new log, equal for each repetition of a request; None if the agent chooses it."""
-    if not context.has_local_logs:
+    if not bench.has_local_logs:
         return None
     utc = first_request or datetime.now(UTC)
-    return context.data / f"{utc:%Y%m%dT%H%M%S}.{utc.microsecond // 1000:03d}Z-{method.name}.mcap"
+    # Several benches may begin the same method in the same millisecond.
+    name = f"{bench.name}-{method.name}" if context.benches.are_several else method.name
+    return context.data / f"{utc:%Y%m%dT%H%M%S}.{utc.microsecond // 1000:03d}Z-{name}.mcap"
 
 
-def _find_started(context: ServiceContext, log: Path | None) -> Run | None:
+def _find_started(context: ServiceContext, bench: ServedBench, log: Path | None) -> Run | None:
     """Return the run that an earlier request with the same key has started; None if there is none."""
     if log is None:
         return None
     row = context.catalogue.find_run_by_log(log)
     if row is not None:
         return context.make_run_views(row)[0]
-    status = context.monitor.send_command(StatusCommand())
+    status = bench.monitor.send_command(StatusCommand())
     known = (run for run in (status.run, *status.finished) if run is not None and Path(run.log) == log)
     for run in known:
-        return make_run_view(make_run_row(run, context.catalogue), [], status)
+        return make_run_view(make_run_row(run, context.catalogue, bench.name), [], status)
     if log.exists():
         detail = f"the first request with this key has started a run, {log.name}; it is listed within 15 s"
         raise make_conflict("run-not-listed-yet", "The run is not listed yet", detail)
     return None
 
 
-def _make_started_view(context: ServiceContext, run: RunStatus, status: AgentStatus) -> Run:
+def _make_started_view(context: ServiceContext, bench: ServedBench, run: RunStatus, status: AgentStatus) -> Run:
     """Return the view of a run that the agent has begun; as the agent describes it if the catalogue fails.
 
     An error here would be a lie: the rig moves already, and a second request would only be refused.
@@ -115,21 +123,21 @@ def _make_started_view(context: ServiceContext, run: RunStatus, status: AgentSta
     try:
         return _make_view(context, run.id)
     except (ProblemError, CatalogueUnavailableError):
-        return make_run_view(make_run_row(run, context.catalogue), [], status)
+        return make_run_view(make_run_row(run, context.catalogue, bench.name), [], status)
 
 
 def _make_view(context: ServiceContext, run_id: str) -> Run:
     return context.make_run_views(context.get_run(run_id))[0]
 
 
-def _check_method(context: ServiceContext, request: StartRunRequest) -> Method:
+def _check_method(context: ServiceContext, bench: ServedBench, request: StartRunRequest) -> Method:
     """Return a method, by name or from its document, after it was compiled within its limits.
 
     Raises:
         MethodError: the document is invalid, or the method exceeds its limits.
         ProblemError: there is no method with this name and version, or nothing names a specimen.
     """
-    if request.specimen is None and not context.monitor.describe_bench().specimen:
+    if request.specimen is None and not bench.monitor.describe_bench().specimen:
         detail = "specimen: give the serial number of the damper under test; bench.toml names none"
         raise ProblemError(HTTPStatus.UNPROCESSABLE_ENTITY, "invalid-request", "Invalid request", detail)
     if isinstance(request.method, str):
@@ -140,11 +148,16 @@ def _check_method(context: ServiceContext, request: StartRunRequest) -> Method:
 
 
 def _request_start(
-    context: ServiceContext, method: Method, request: StartRunRequest, continues: str, log: Path | None
+    context: ServiceContext,
+    bench: ServedBench,
+    method: Method,
+    request: StartRunRequest,
+    continues: str,
+    log: Path | None,
 ) -> tuple[RunStatus, AgentStatus]:
     """Send the command, and wait until the agent reports the id of the new run."""
     # Until the new run has an id, the agent reports the previous run.
-    before = context.monitor.get_status().run
+    before = bench.monitor.get_status().run
     command = RunCommand(
         method=method.model_dump(mode="json", by_alias=True, exclude_defaults=True),
         specimen=request.specimen or "",
@@ -155,12 +168,12 @@ def _request_start(
         checks=context.catalogue.checks.list_latest(),
         log=None if log is None else str(log),
     )
-    status = context.monitor.send_command(command)
+    status = bench.monitor.send_command(command)
     deadline = time.monotonic() + _START_TIMEOUT
     while status.run is None or (before is not None and status.run.id == before.id):
         if time.monotonic() > deadline:
             raise RunError(f"the rig agent accepted the run but did not start it within {_START_TIMEOUT:g} s")
-        status = context.monitor.send_command(StatusCommand())
+        status = bench.monitor.send_command(StatusCommand())
     return status.run, status
 
 
@@ -194,30 +207,32 @@ def get_run(run_id: str, context: Context, response: Response) -> Run:
 def stop_run(run_id: str, context: Context) -> AgentStatus:
     """Stop a run in a controlled way: the motion fades out, the coil goes to zero. Harmless if it has ended.
 
-    Refused while another run is in progress. A run in progress need not be in the catalogue.
+    Refused while another run is in progress on its bench. A run in progress need not be in the catalogue.
     """
-    is_in_progress(context, run_id)
+    bench = context.get_bench_of_run(run_id)
+    is_in_progress(context, bench, run_id)
     # Also after the end of the run, because a stop is harmless then and the latest status may be old.
-    return context.monitor.send_command(StopCommand())
+    return bench.monitor.send_command(StopCommand())
 
 
 @router.post("/{run_id}/abort")
 def abort_run(run_id: str, context: Context) -> AgentStatus:
     """Stop a run at once by the path of a trip, which latches until a reset. Harmless if the run has ended.
 
-    Refused while another run is in progress; `POST /bench/abort` aborts whatever moves.
+    Refused while another run is in progress on its bench; `POST /bench/abort` aborts whatever moves.
     """
-    command = AbortCommand() if is_in_progress(context, run_id) else StatusCommand()
-    return context.monitor.send_command(command)
+    bench = context.get_bench_of_run(run_id)
+    command = AbortCommand() if is_in_progress(context, bench, run_id) else StatusCommand()
+    return bench.monitor.send_command(command)
 
 
-def is_in_progress(context: ServiceContext, run_id: str) -> bool:
-    """Return whether a run is in progress; False for one that has ended.
+def is_in_progress(context: ServiceContext, bench: ServedBench, run_id: str) -> bool:
+    """Return whether a run is in progress on its bench; False for one that has ended.
 
     Raises:
         ProblemError: another run is in progress, or there is no such run.
     """
-    run = context.monitor.send_command(StatusCommand()).run
+    run = bench.monitor.send_command(StatusCommand()).run
     if run is None or run.outcome is not None:
         # The catalogue is asked only now, so that nothing delays the end of a run in progress.
         context.get_run(run_id)

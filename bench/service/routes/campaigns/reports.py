@@ -25,7 +25,7 @@ def get_campaign_report(
     report_format: Annotated[CampaignReportFormat, Query(alias="format", description="page or PDF")] = "html",
 ) -> FileResponse:
     """Return the report of a campaign with the present results; it is made at the request, in some seconds."""
-    if context.campaigns.store.table.get(campaign_id) is None:
+    if context.campaign_store.table.get(campaign_id) is None:
         raise make_not_found("campaign", campaign_id)
 
     def write(out: str) -> None:

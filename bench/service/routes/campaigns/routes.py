@@ -31,7 +31,7 @@ from bench.campaigns import (
 )
 from bench.disk import RESERVE, find_free_space
 from bench.service.audit import note_old
-from bench.service.campaigns import AGENT_BENCH
+from bench.service.benches import ServedBench
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_conflict, make_not_found
@@ -50,6 +50,7 @@ from bench.service.routes.campaigns.views import (
     TestMessageResult,
     make_summary,
 )
+from bench.service.views import BenchChoice
 
 router = APIRouter(tags=["campaigns"], route_class=IdempotentRoute)
 _PHOTO = describe_file("image/jpeg", "image/png")
@@ -64,7 +65,7 @@ def list_campaigns(
     before: Annotated[str | None, Query(description="`next` of the previous page")] = None,
 ) -> CampaignPage:
     """List the campaigns, newest first."""
-    store = context.campaigns.store
+    store = context.campaign_store
     if before is not None:
         _get(store, before)
     found = store.list_campaigns(limit + 1, before)
@@ -79,19 +80,22 @@ async def start_campaign(
     """Start a campaign on the bench; it continues after any crash. Refused if a condition can never be met."""
     worker = await context.engine.describe_state()
     operator = get_operator(sender, request.operator)
-    campaign = await asyncio.to_thread(_start, context, request.campaign, operator, worker)
+    bench = context.benches.get(request.bench)
+    campaign = await asyncio.to_thread(_start, context, bench, request.campaign, operator, worker)
     response.headers["Location"] = f"/api/v1/campaigns/{campaign.id}"
     return campaign
 
 
-def _start(context: ServiceContext, content: dict[str, Any], operator: str, worker: str) -> CampaignView:
-    executor = context.campaigns
+def _start(
+    context: ServiceContext, bench: ServedBench, content: dict[str, Any], operator: str, worker: str
+) -> CampaignView:
+    executor, store = bench.campaigns, context.campaign_store
     document = parse_campaign(content, "the request")
     methods = collect_methods(document)
     plan = plan_campaign(document, methods)
     if not executor.is_local:
         raise CampaignError("the agent writes its logs on another machine; campaigns need them in the data folder")
-    if held := executor.store.list_in_progress(AGENT_BENCH):
+    if held := store.list_in_progress(bench.executor):
         raise make_conflict(
             "bench-held",
             "The bench is held",
@@ -104,8 +108,8 @@ def _start(context: ServiceContext, content: dict[str, Any], operator: str, work
     if plan.problems:
         raise CampaignError(f"the campaign cannot be run: {plan.problems[0]}")
     executor.bench.check_needs(document, steps)
-    campaign = executor.store.create(document, methods, AGENT_BENCH, time.time(), operator)
-    return _show(executor.store, campaign)
+    campaign = store.create(document, methods, bench.executor, time.time(), operator)
+    return _show(store, campaign)
 
 
 @router.post("/campaigns/plan")
@@ -119,13 +123,13 @@ def plan(request: PlanCampaignRequest, context: Context) -> CampaignPlan:
 @router.get("/campaigns/{campaign_id}")
 def get_campaign(campaign_id: str, context: Context) -> CampaignView:
     """Return a campaign with its queue, its cells, its trends and its newest events."""
-    return _show(context.campaigns.store, _get(context.campaigns.store, campaign_id))
+    return _show(context.campaign_store, _get(context.campaign_store, campaign_id))
 
 
 @router.patch("/campaigns/{campaign_id}", dependencies=[IDEMPOTENT])
 def edit_campaign(campaign_id: str, request: EditRequest, context: Context, sender: Sender) -> CampaignView:
     """Edit the queue of a campaign while it runs; the edit is recorded with who made it and when."""
-    store = context.campaigns.store
+    store = context.campaign_store
     stored = _get(store, campaign_id)
     note_old(_describe(stored))
     check_approvals(context, stored.state.campaign, collect_edit_methods(request.edit))
@@ -152,15 +156,22 @@ def stop_campaign(
     """Stop after the run in progress; with `now`, that run is stopped in a controlled way, too."""
     who = get_author(sender, request.who)
     view = _change(context, campaign_id, lambda state, now: stop(state, now, who))
-    if request.now and view.bench == AGENT_BENCH and view.phase in ("starting", "stroking"):
-        context.monitor.send_command(StopCommand())
+    if request.now and view.phase in ("starting", "stroking"):
+        _stop_run(context, view.bench)
     return view
+
+
+def _stop_run(context: ServiceContext, executor: str) -> None:
+    """Stop the run of a campaign; one on the simulated plant ends with its campaign."""
+    bench = context.benches.find_by_executor(executor)
+    if bench is not None:
+        bench.monitor.send_command(StopCommand())
 
 
 @router.post("/campaigns/{campaign_id}/answer", dependencies=[IDEMPOTENT])
 def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context, sender: Sender) -> CampaignView:
     """Answer a prompt with a note and a photo, or decide on a failed step."""
-    stored = _get(context.campaigns.store, campaign_id)
+    stored = _get(context.campaign_store, campaign_id)
     active = stored.state.active
     photo, who = "", get_author(sender, request.who)
     if request.photo and active is not None and stored.state.needs_person:
@@ -175,7 +186,7 @@ def answer_campaign(campaign_id: str, request: AnswerRequest, context: Context, 
 @router.get("/campaigns/{campaign_id}/photos/{item_id}", response_class=FileResponse, responses=_PHOTO)
 def get_photo(campaign_id: str, item_id: str, context: Context) -> SnapshotResponse:
     """Return the photo that a person has added to the answer of a step."""
-    items = _get(context.campaigns.store, campaign_id).state.items
+    items = _get(context.campaign_store, campaign_id).state.items
     photo = next((item.photo for item in items if item.id == item_id), "")
     path = context.data / photo
     if not photo or not path.is_file():
@@ -186,21 +197,21 @@ def get_photo(campaign_id: str, item_id: str, context: Context) -> SnapshotRespo
 @router.post("/campaigns/{campaign_id}/test-message", dependencies=[IDEMPOTENT])
 def send_test_message(campaign_id: str, context: Context) -> TestMessageResult:
     """Send a test message to the recipients of a campaign."""
-    return TestMessageResult(result=send_test(_get(context.campaigns.store, campaign_id)))
+    return TestMessageResult(result=send_test(_get(context.campaign_store, campaign_id)))
 
 
 @router.get("/queue")
-def get_queue(context: Context) -> QueueView:
+def get_queue(context: Context, bench: BenchChoice = None) -> QueueView:
     """Return the campaign that holds the bench, with its queue."""
-    store = context.campaigns.store
-    held = store.list_in_progress(AGENT_BENCH)
+    store = context.campaign_store
+    held = store.list_in_progress(context.benches.get(bench).executor)
     return QueueView(campaign=_show(store, held[0]) if held else None)
 
 
 @router.patch("/queue", dependencies=[IDEMPOTENT])
-def edit_queue(request: EditRequest, context: Context, sender: Sender) -> CampaignView:
+def edit_queue(request: EditRequest, context: Context, sender: Sender, bench: BenchChoice = None) -> CampaignView:
     """Edit the queue of the campaign that holds the bench."""
-    held = context.campaigns.store.list_in_progress(AGENT_BENCH)
+    held = context.campaign_store.list_in_progress(context.benches.get(bench).executor)
     if not held:
         raise make_not_found("campaign", "in progress; start one: POST /api/v1/campaigns")
     return edit_campaign(held[0].id, request, context, sender)
@@ -226,7 +237,7 @@ def _change(
     context: ServiceContext, campaign_id: str, transition: Callable[[CampaignState, float], CampaignState]
 ) -> CampaignView:
     """Change a stored campaign; its executor acts on it at its next step."""
-    store = context.campaigns.store
+    store = context.campaign_store
     stored = _get(store, campaign_id)
     note_old(_describe(stored))
     now = stored.read_time()

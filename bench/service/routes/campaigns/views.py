@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import Field
 
 from bench.campaigns import CampaignView, Choice, QueueEdit, StoredCampaign
-from bench.service.views import View
+from bench.service.views import BenchName, View
 
 _WHO = Field(default="", max_length=200, description="person or program, for the record")
 
@@ -16,6 +16,7 @@ class StartCampaignRequest(View):
 
     campaign: dict[str, Any] = Field(description="document `mrbench.campaign/1`")
     operator: str = Field(default="", max_length=200, description="name of the operator")
+    bench: BenchName | None = Field(default=None, description="name of the bench; required if there are several")
 
 
 class PlanCampaignRequest(View):
@@ -58,7 +59,9 @@ class CampaignSummary(View):
 
     id: str
     name: str
-    bench: str = Field(description="`agent`, or `scenario NAME` for the simulated plant")
+    bench: str = Field(
+        description="`agent`, name of one of several benches, or `scenario NAME` for the simulated plant"
+    )
     status: str
     reason: str
     created: datetime = Field(description="UTC")

@@ -13,8 +13,9 @@ from bench.service.routes.planning import (
 from bench.service.routes.planning.certificates import describe_calibration
 from bench.service.routes.planning.method_library import find_method
 
+BENCH_ROUTER = bench_facts.router
+"""Routes below the path of a bench."""
 ROUTERS = (
-    bench_facts.router,
     certificates.router,
     checks.router,
     previews.router,
@@ -25,4 +26,4 @@ ROUTERS = (
 )
 """All routers; those with longer paths come first."""
 
-__all__ = ["ROUTERS", "describe_calibration", "find_method"]
+__all__ = ["BENCH_ROUTER", "ROUTERS", "describe_calibration", "find_method"]

@@ -1,4 +1,4 @@
-"""Facts of the bench: limits, channels, instruments, and who holds it."""
+"""Facts of a bench: limits, channels, instruments, and who holds it."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -6,10 +6,10 @@ from fastapi import APIRouter
 from pydantic import Field
 
 from bench.agent_protocol import AgentStatus, BenchChannel, BenchLimit, InstrumentStatus, RunStatus
-from bench.service.context import Context
+from bench.service.context import AddressedBench
 from bench.service.views import View
 
-router = APIRouter(prefix="/bench", tags=["bench"])
+router = APIRouter(tags=["bench"])
 
 
 class Lease(View):
@@ -24,27 +24,27 @@ class Lease(View):
 
 
 @router.get("/limits")
-def get_limits(context: Context) -> dict[str, BenchLimit]:
+def get_limits(bench: AddressedBench) -> dict[str, BenchLimit]:
     """Return the limits of the fixture by quantity; the limits of a method apply in addition."""
-    return context.monitor.describe_bench().limits
+    return bench.monitor.describe_bench().limits
 
 
 @router.get("/channels")
-def get_channels(context: Context) -> dict[str, BenchChannel]:
+def get_channels(bench: AddressedBench) -> dict[str, BenchChannel]:
     """Return the recorded channels with unit, rate and delay."""
-    return context.monitor.describe_bench().channels
+    return bench.monitor.describe_bench().channels
 
 
 @router.get("/instruments")
-def get_bench_instruments(context: Context) -> tuple[InstrumentStatus, ...]:
+def get_bench_instruments(bench: AddressedBench) -> tuple[InstrumentStatus, ...]:
     """Return the instruments with the state of their wires."""
-    return context.monitor.get_status().instruments
+    return bench.monitor.get_status().instruments
 
 
 @router.get("/lease")
-def get_lease(context: Context) -> Lease:
+def get_lease(bench: AddressedBench) -> Lease:
     """Return who holds the bench: a run, or a setup step; other starts are refused meanwhile."""
-    return _make_lease(context.monitor.get_status())
+    return _make_lease(bench.monitor.get_status())
 
 
 def _make_lease(status: AgentStatus) -> Lease:

@@ -12,7 +12,7 @@ from bench.service.context import Context
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
 from bench.service.routes.planning.certificate_views import Reason
 from bench.service.routes.planning.certificates import find_author
-from bench.service.views import View
+from bench.service.views import BenchChoice, View
 from bench.validation import SerialNumber
 
 router = APIRouter(prefix="/checks", tags=["checks"], route_class=IdempotentRoute)
@@ -58,14 +58,15 @@ def list_checks(
 
 
 @router.get("/charts")
-def list_charts(context: Context) -> ChartList:
+def list_charts(context: Context, bench: BenchChoice = None) -> ChartList:
     """Return the control chart of each checked channel, for the specimen of its latest check."""
+    served = context.benches.get(bench)
     items = tuple(context.catalogue.checks.make_latest_charts())
     try:
-        bench = context.monitor.describe_bench()
+        description = served.monitor.describe_bench()
     except AgentUnreachableError:  # the charts need no agent
         return ChartList(method=None, specimen="", items=items)
-    return ChartList(method=CHECK_METHODS[bench.drive_kind], specimen=bench.specimen, items=items)
+    return ChartList(method=CHECK_METHODS[description.drive_kind], specimen=description.specimen, items=items)
 
 
 @router.get("/{channel}/chart")

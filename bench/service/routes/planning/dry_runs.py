@@ -2,6 +2,7 @@
 
 import threading
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from fastapi import APIRouter
@@ -52,7 +53,7 @@ def dry_run(request: DryRunRequest, context: Context) -> DryRun:
         mean_heat_w=envelope.heat_j / programme.duration if programme.duration else 0.0,
         preview=make_preview(programme),
         checkpoints=list_checkpoints(programme),
-        bench=_check_bench(context, method, envelope),
+        bench=_check_bench(context, request.bench, method, envelope),
         identifiability_error=error,
     )
 
@@ -69,10 +70,14 @@ def _assess(document: str) -> dict[str, Any]:
     return assess_design(programme, command=(*_LOWEST_PRIORITY, *FORESEE_COMMAND))
 
 
-def _check_bench(context: ServiceContext, method: Method, envelope: Envelope) -> BenchCheck:
-    free = _find_free_bytes(context)
+def _check_bench(context: ServiceContext, name: str | None, method: Method, envelope: Envelope) -> BenchCheck:
+    if name is None and context.benches.are_several:
+        unknown = f"the service has several benches; name one of {', '.join(context.benches.names)}"
+        return BenchCheck(limits={}, obstacles=(), unknown=unknown, log_bytes=None, free_bytes=None)
+    served = context.benches.get(name)
+    free = _find_free_bytes(context.data) if served.has_local_logs else None
     try:
-        bench = context.monitor.describe_bench()
+        bench = served.monitor.describe_bench()
     except AgentUnreachableError as error:
         return BenchCheck(limits={}, obstacles=(), unknown=str(error), log_bytes=None, free_bytes=free)
     rates = (channel.rate_hz for name, channel in bench.channels.items() if name != "coil_drive")
@@ -99,8 +104,8 @@ def _find_excesses(bench: BenchDescription, envelope: Envelope) -> list[str]:
     return found
 
 
-def _find_free_bytes(context: ServiceContext) -> int | None:
+def _find_free_bytes(folder: Path) -> int | None:
     try:
-        return find_free_space(context.data).free if context.has_local_logs else None
+        return find_free_space(folder).free
     except RunError:
         return None

@@ -19,6 +19,7 @@ from bench.service.routes.planning.method_library import (
     list_versions,
 )
 from bench.service.routes.planning.views import MethodPage, MethodSummary, MethodVersions
+from bench.service.views import BenchChoice
 
 router = APIRouter(prefix="/methods", tags=["methods"], route_class=IdempotentRoute)
 _SAME: dict[int | str, dict[str, Any]] = {
@@ -32,9 +33,10 @@ def list_all_methods(
     context: Context,
     limit: Annotated[int, Query(ge=1, le=500, description="largest number of items")] = 200,
     before: Annotated[str | None, Query(description="`next` of the previous page")] = None,
+    bench: BenchChoice = None,
 ) -> MethodPage:
     """List the newest version of each method, in the order of the names; unusable ones say why."""
-    drive_kind = _find_drive_kind(context)
+    drive_kind = _find_drive_kind(context, bench)
     found = [one for one in list_methods(context) if before is None or one.method.name > before]
     approvals = context.catalogue.approvals.find(describe_facts(one.method).sha256 for one in found[:limit])
     items = tuple(_summarise(one, drive_kind, approvals) for one in found[:limit])
@@ -89,9 +91,9 @@ def get_method_version(name: str, version: int, context: Context) -> Method:
 
 
 @router.get("/{name}/versions")
-def list_method_versions(name: str, context: Context) -> MethodVersions:
+def list_method_versions(name: str, context: Context, bench: BenchChoice = None) -> MethodVersions:
     """List all versions of a method with their approvals, the newest first."""
-    found, drive_kind = list_versions(context, name), _find_drive_kind(context)
+    found, drive_kind = list_versions(context, name), _find_drive_kind(context, bench)
     approvals = context.catalogue.approvals.find(describe_facts(one.method).sha256 for one in found)
     return MethodVersions(items=tuple(_summarise(one, drive_kind, approvals) for one in found))
 
@@ -126,9 +128,11 @@ def _show(context: ServiceContext, one: StoredMethod) -> MethodSummary:
     return _summarise(one, _find_drive_kind(context), approvals)
 
 
-def _find_drive_kind(context: ServiceContext) -> str:
-    """Return the drive of this bench; empty if no bench answers."""
-    status = context.monitor.latest_status
+def _find_drive_kind(context: ServiceContext, name: str | None = None) -> str:
+    """Return the drive of a bench, or of the only one; empty if it does not answer, or if several are meant."""
+    if name is None and context.benches.are_several:
+        return ""
+    status = context.benches.get(name).monitor.latest_status
     return "" if status is None else status.drive_kind
 
 

@@ -7,7 +7,7 @@ from pydantic import Field, PositiveFloat
 
 from bench.agent_protocol import BenchLimit
 from bench.methods import DriveKind, Envelope
-from bench.service.views import View
+from bench.service.views import BenchName, View
 from bench.validation import SerialNumber
 
 
@@ -79,6 +79,7 @@ class DryRunRequest(View):
     identifiability: bool = Field(
         default=True, description="also assess what the strokes can identify, which takes some seconds"
     )
+    bench: BenchName | None = Field(default=None, description="name of the bench; needed if there are several")
 
 
 class BenchCheck(View):

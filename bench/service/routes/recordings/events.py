@@ -1,4 +1,4 @@
-"""Routes of the events of a run, and of bench and runs together."""
+"""Routes of the events of a run, and of benches and runs together."""
 
 from typing import Annotated
 
@@ -28,12 +28,15 @@ def list_events(
     context: Context,
     limit: Limit = 200,
     before: Annotated[int | None, Query(ge=0, le=MAX_NUMBER, description="`next` of the previous page")] = None,
+    bench: Annotated[str | None, Query(max_length=100, description="only those of this bench")] = None,
 ) -> EventPage:
-    """List the events of bench and runs, the newest first."""
-    rows = context.catalogue.event_journal.list_newest(limit + 1, before)
+    """List the events of benches and runs, the newest first."""
+    rows = context.catalogue.event_journal.list_newest(limit + 1, before, bench)
     items = tuple(_make_view(row) for row in rows[:limit])
     return EventPage(items=items, next=items[-1].id if len(rows) > limit else None)
 
 
 def _make_view(row: EventRow) -> EventView:
-    return EventView(id=row.id, run=row.run_id, at=row.at, time_s=row.time_s, kind=row.kind, text=row.text)
+    return EventView(
+        id=row.id, run=row.run_id, bench=row.bench, at=row.at, time_s=row.time_s, kind=row.kind, text=row.text
+    )

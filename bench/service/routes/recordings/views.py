@@ -40,6 +40,7 @@ class EventView(View):
 
     id: int = Field(description="number; greater for later events")
     run: str | None = Field(description="id of the run; null outside runs")
+    bench: str | None = Field(description="name of the bench; null in events of older versions and of imports")
     at: datetime = Field(description="UTC")
     time_s: float | None = Field(
         description="time since the first sample of the run [s]; null until the run has ended"

@@ -66,7 +66,7 @@ def sign_campaign_report(
 
 
 def _get(context: ServiceContext, campaign_id: str) -> StoredCampaign:
-    store = context.campaigns.store
+    store = context.campaign_store
     if store.table.get(campaign_id) is None:
         raise make_not_found("campaign", campaign_id)
     return store.get(campaign_id)

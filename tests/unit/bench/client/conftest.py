@@ -11,6 +11,7 @@ from bench.client import Bench
 from bench.service import run_registry
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
+from bench.service.benches import BenchSettings
 from tests.support.fake_service import FakeAgent, FakeEngine
 
 TIMEOUT = 20.0
@@ -22,7 +23,9 @@ class RunningService:
     def __init__(self, data):
         self.data, self.agent, self.fake_engine = data, FakeAgent(), FakeEngine()
         access, self.token = open_access(data)
-        app = create_app(AppSettings(data=data, access=access, link=self.agent, engine=self._engine))
+        app = create_app(
+            AppSettings(data=data, access=access, benches=(BenchSettings(self.agent),), engine=self._engine)
+        )
         self._server = uvicorn.Server(uvicorn.Config(app, port=0, log_config=None))
         self._thread = threading.Thread(target=self._server.run)
 

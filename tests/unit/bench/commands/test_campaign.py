@@ -34,10 +34,10 @@ def test_a_service_is_recognised_by_its_lock(tmp_path):
 
 def test_an_equal_campaign_is_followed_and_another_one_is_refused(tmp_path):
     with open_store(tmp_path / "data", is_created=True) as store:
-        first = find_or_create(store, write(tmp_path / "a.json"), "B")
-        assert find_or_create(store, tmp_path / "a.json", "B").id == first.id
+        first = find_or_create(store, write(tmp_path / "a.json"), "B", "agent")
+        assert find_or_create(store, tmp_path / "a.json", "B", "agent").id == first.id
         with pytest.raises(CampaignError, match=f"{first.id} holds the bench"):
-            find_or_create(store, write(tmp_path / "b.json", seed=4), "B")
+            find_or_create(store, write(tmp_path / "b.json", seed=4), "B", "agent")
 
 
 def test_the_queue_is_edited_and_stopped_by_the_command_line_also_without_a_service(tmp_path, capsys):
@@ -48,7 +48,7 @@ def test_the_queue_is_edited_and_stopped_by_the_command_line_also_without_a_serv
 
     with serve_webhook() as (address, received):
         with open_store(tmp_path / "data", is_created=True) as store:
-            find_or_create(store, write(tmp_path / "a.json", notify=[{"webhook": address}]), "B")
+            find_or_create(store, write(tmp_path / "a.json", notify=[{"webhook": address}]), "B", "agent")
         edit = '{"edit": "do_now", "step": {"rest": {"seconds": 7}}}'
         view = json.loads(act("edit", edit=edit))
         assert [item["label"] for item in view["items"]] == ["rest 7 s", "rest 5 s"]

@@ -13,6 +13,7 @@ from bench.catalogue import keep_address
 from bench.people import passwords
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
+from bench.service.benches import BenchSettings
 from tests.support.fake_service import FakeAgent, FakeEngine
 
 TIMEOUT = 20.0
@@ -47,7 +48,9 @@ class Service:
     def start(self, **changes):
         self.end()
         self.engine = FakeEngine()
-        given = {"data": self.data, "access": self.access, "link": self.agent, "engine": self._engine}
+        only = {name: changes.pop(name) for name in ("link", "has_local_logs") if name in changes}
+        benches = (BenchSettings(**{"link": self.agent, **only}),)
+        given = {"data": self.data, "access": self.access, "benches": benches, "engine": self._engine}
         app = create_app(AppSettings(**{**given, **changes}))
         self.client = TestClient(app, base_url="http://127.0.0.1:8600", raise_server_exceptions=False)
         self.client.headers["Authorization"] = f"Bearer {self.token}"

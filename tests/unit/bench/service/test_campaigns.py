@@ -275,7 +275,7 @@ def list_messages(campaign, state):
 
 def test_a_campaign_from_the_command_line_that_cannot_be_met_ends_with_the_reason(service):
     document = parse_campaign({"name": "night", "steps": [COOL]}, "the test")
-    store = service.client.app.state.context.campaigns.store
+    store = service.client.app.state.context.campaign_store
     campaign = store.create(document, {}, "agent", time.time())
     ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
     assert "no thermometer" in ended["reason"]

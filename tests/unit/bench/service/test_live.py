@@ -134,13 +134,13 @@ def test_a_status_keeps_the_time_at_which_it_was_true_for_a_late_client(service)
     made = time.time() - 33.0
     service.agent.publish(service.agent.status.model_copy(update={"utc_s": made}))
     with subscribe(service) as socket:
-        wait_until(lambda: service.client.app.state.context.live._last_status is not None)
+        wait_until(lambda: service.client.app.state.context.benches.get(None).live._last_status is not None)
     with subscribe(service) as socket:
         assert next(messages(socket, "status"))["utc_s"] == pytest.approx(made)
 
 
 def test_a_status_that_waited_in_a_queue_is_not_the_present_one(service):
-    monitor = service.client.app.state.context.monitor
+    monitor = service.client.app.state.context.benches.get(None).monitor
     service.agent.publish()
     wait_until(lambda: monitor.latest_status is not None)
     service.agent.publish(service.agent.status.model_copy(update={"utc_s": time.time() - 3.0}))
@@ -186,10 +186,10 @@ def test_a_status_that_cannot_be_recorded_is_logged_and_tried_again(service, cap
     registry = service.client.app.state.context.registry
     add_run, failures = registry._add_run, iter([RuntimeError("the catalogue is locked")])
 
-    async def fail_once(run):
+    async def fail_once(*given):
         if (error := next(failures, None)) is not None:
             raise error
-        return await add_run(run)
+        return await add_run(*given)
 
     monkeypatch.setattr(registry, "_add_run", fail_once)
     service.agent.send(RunCommand(method=load_method("quick").model_dump(mode="json", by_alias=True)))

@@ -15,6 +15,7 @@ from bench.log_lines import KeyValueFormatter
 from bench.processes import terminate
 from bench.service import processes, serving
 from bench.service.access import open_access, save_token
+from bench.service.bench_agents import BenchPlace, is_local, make_agents
 from bench.service.errors import ServiceError
 from bench.service.middleware.request_log import RequestLogMiddleware
 from bench.service.processes import is_answering, shut_down_idle_agent, start_agent
@@ -131,7 +132,7 @@ class TestServing:
             port = free.getsockname()[1]
         refusals = []
 
-        def supervise(*_):
+        def supervise(*_, **options):
             with socket.socket() as client:
                 refusals.append(client.connect_ex(("127.0.0.1", port)))
 
@@ -139,7 +140,7 @@ class TestServing:
             with socket.create_connection(listener.getsockname()):
                 refusals.append(0)
 
-        monkeypatch.setattr(serving, "_supervise_agent", supervise)
+        monkeypatch.setattr(serving, "_supervise_agents", supervise)
         monkeypatch.setattr(serving, "_run_server", run_server)
         monkeypatch.setattr(serving, "log_to_stderr", lambda: None)
         serving.serve(ServeOptions(tmp_path, port=port), lambda line: None)
@@ -152,11 +153,11 @@ class TestServing:
         with socket.socket() as other:
             other.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
 
-            def supervise(*_):
+            def supervise(*_, **options):
                 other.bind(("127.0.0.1", port))
                 other.listen()
 
-            monkeypatch.setattr(serving, "_supervise_agent", supervise)
+            monkeypatch.setattr(serving, "_supervise_agents", supervise)
             monkeypatch.setattr(serving, "log_to_stderr", lambda: None)
             with pytest.raises(ServiceError, match=f"port {port}: address already in use; use another --port"):
                 serving.serve(ServeOptions(tmp_path, port=port), lambda line: None)
@@ -164,7 +165,7 @@ class TestServing:
     @pytest.mark.parametrize("address", ["5570", "tcp://host", "http://host:1", "tcp://host:port"])
     def test_an_invalid_address_of_the_agent_is_refused(self, address, tmp_path):
         with pytest.raises(ConfigError, match="not an address of a rig agent; give tcp://HOST:PORT"):
-            serving._make_agent_link(ServeOptions(tmp_path, agent=address))
+            make_agents([BenchPlace(address=address)])
 
     @pytest.mark.parametrize(
         ("address", "here"),
@@ -176,7 +177,7 @@ class TestServing:
         ],
     )
     def test_a_local_agent_is_recognised(self, address, here):
-        assert serving._is_local(address) is here
+        assert is_local(address) is here
 
     def test_a_new_token_is_printed_on_a_terminal_only(self, tmp_path):
         shown = serving._format_address("http://h:1/", "abc", tmp_path, is_terminal=True)
@@ -228,7 +229,7 @@ class TestProcesses:
     def test_the_message_of_an_agent_that_ends_at_once_is_reported(self, tmp_path):
         command = make_failing_command("mrbench: bench.toml: cannot be read", 1)
         with pytest.raises(ServiceError, match=r"ended at once: bench\.toml: cannot be read"):
-            start_agent(tmp_path / "bench.toml", FakeLink(silent=10**9), tmp_path, command)
+            start_agent(tmp_path / "bench.toml", FakeLink(silent=10**9), tmp_path / "agent.log", command)
 
     def test_an_agent_that_never_answers_is_ended(self, tmp_path, monkeypatch):
         monkeypatch.setattr(processes, "AGENT_TIMEOUT", 0.05)
@@ -238,7 +239,7 @@ class TestProcesses:
         )
         command = (sys.executable, "-c", "import time; time.sleep(60)")
         with pytest.raises(ServiceError, match=r"did not answer within 0\.05 s; see"):
-            start_agent(tmp_path / "bench.toml", FakeLink(silent=10**9), tmp_path, command)
+            start_agent(tmp_path / "bench.toml", FakeLink(silent=10**9), tmp_path / "agent.log", command)
         assert ended == [processes._TERMINATE_TIMEOUT]
 
     def test_an_answering_agent_is_recognised(self):

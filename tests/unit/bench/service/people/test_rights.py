@@ -12,11 +12,13 @@ from tests.unit.bench.service.people.conftest import PASSWORD
 LOWEST = {
     "viewer": """
         DELETE /session, POST /session/codes, GET /tokens, DELETE /tokens/{token_id}, POST /bench/stop,
-        POST /bench/abort, POST /runs/{run_id}/stop, POST /runs/{run_id}/abort, POST /campaigns/{campaign_id}/stop,
+        POST /bench/abort, POST /benches/{name}/stop, POST /benches/{name}/abort, POST /runs/{run_id}/stop,
+        POST /runs/{run_id}/abort, POST /campaigns/{campaign_id}/stop,
         POST /runs/{run_id}/replay, POST /comparisons, POST /methods/dry-run, POST /campaigns/plan
     """,
     "technician": """
-        POST /bench/prepare, POST /bench/reset, POST /runs, PATCH /runs/{run_id}, POST /runs/{run_id}/pause,
+        POST /bench/prepare, POST /bench/reset, POST /benches/{name}/prepare,
+        POST /benches/{name}/reset, POST /runs, PATCH /runs/{run_id}, POST /runs/{run_id}/pause,
         POST /runs/{run_id}/resume, POST /runs/{run_id}/notes, POST /runs/{run_id}/predict,
         POST /runs/{run_id}/identify, POST /runs/{run_id}/diagnose, POST /runs/{run_id}/integrity, POST /batches,
         POST /jobs/{job_id}/cancel, POST /jobs/{job_id}/retry, POST /logs, POST /specimens,
@@ -53,7 +55,7 @@ def list_operations(client):
 
 
 def find_lowest(operation, state):
-    if operation == "POST /bench/reset" and state == "tripped":
+    if operation in ("POST /bench/reset", "POST /benches/{name}/reset") and state == "tripped":
         return "engineer"
     for role, text in LOWEST.items():
         if operation in [" ".join(one.split()) for one in text.split(",")]:
@@ -71,14 +73,14 @@ def test_every_operation_that_changes_something_has_its_right(client):
 
 @pytest.mark.parametrize("state", STATES)
 def test_each_role_can_do_what_it_may_and_nothing_else(service, people, open_browser, monkeypatch, state):
-    monitor = service.client.app.state.context.monitor
+    monitor = service.client.app.state.context.benches.get(None).monitor
     monkeypatch.setattr(type(monitor), "latest_status", property(lambda self: AgentStatus(state=state)))
     operations = [one for one in list_operations(service.client) if one not in BY_CONTENT | PUBLIC]
     assert len(operations) > 70
     for role in ROLES:
         browser, refused = open_browser(role), set()
         for operation in operations:
-            method, path = operation.split(" ")
+            method, path = operation.replace("/benches/{name}", "/benches/bench").split(" ")
             answer = browser.send(method, re.sub(r"\{\w+\}", "1", path), {})
             assert answer.status_code != 401, operation
             if answer.status_code == 403:
@@ -93,13 +95,13 @@ def test_each_role_can_do_what_it_may_and_nothing_else(service, people, open_bro
 def test_a_reset_needs_the_right_for_a_trip_while_the_state_is_not_known(
     service, people, open_browser, monkeypatch
 ):
-    monitor = service.client.app.state.context.monitor
+    monitor = service.client.app.state.context.benches.get(None).monitor
     monkeypatch.setattr(type(monitor), "latest_status", property(lambda self: None))
     assert open_browser("technician").send("POST", "/bench/reset").status_code == 403
 
 
 def test_one_person_has_a_further_right(service, people, bench, open_browser, monkeypatch):
-    monitor = service.client.app.state.context.monitor
+    monitor = service.client.app.state.context.benches.get(None).monitor
     monkeypatch.setattr(type(monitor), "latest_status", property(lambda self: AgentStatus(state="tripped")))
     technician = open_browser("technician")
     refused = technician.send("POST", "/bench/reset")

@@ -1,0 +1,55 @@
+"""Creation of a bench: its objects, connected with those that all benches share."""
+
+import asyncio
+
+from pydantic import BaseModel
+
+from bench.agent_protocol import AgentEvent, AgentStatus
+from bench.bench_names import get_executor
+from bench.catalogue import Catalogue
+from bench.live import LiveBatch, LiveBroadcaster
+from bench.service.agent_monitor import AgentMonitor
+from bench.service.audit import AuditTrail, RecordedConnection
+from bench.service.benches.served_bench import BenchSettings, ServedBench
+from bench.service.campaigns import CampaignExecutor
+from bench.service.run_registry import RunRegistry
+
+
+class BenchMaker:
+    """Maker of the benches of one service."""
+
+    def __init__(
+        self, catalogue: Catalogue, registry: RunRegistry, audit: AuditTrail, loop: asyncio.AbstractEventLoop
+    ) -> None:
+        """Use what all benches share.
+
+        Args:
+            catalogue: catalogue of the data folder.
+            registry: records the runs of all benches.
+            audit: audit trail of the service.
+            loop: event loop of the service.
+        """
+        self._catalogue, self._registry, self._audit, self._loop = catalogue, registry, audit, loop
+
+    def make(self, settings: BenchSettings) -> ServedBench:
+        """Return a bench; its threads are not started."""
+        name, live = settings.name, LiveBroadcaster()
+        publish = live.make_publisher(self._loop)
+
+        def on_status(status: AgentStatus) -> None:
+            if not self._loop.is_closed():
+                asyncio.run_coroutine_threadsafe(self._registry.observe(status, name), self._loop)
+
+        def on_message(topic: str, message: BaseModel | LiveBatch) -> None:
+            publish(topic, message)
+            if isinstance(message, AgentEvent):
+                self._registry.record_event(message, name)
+            elif isinstance(message, LiveBatch):
+                campaigns.thermometer.take(message)
+
+        monitor = AgentMonitor(settings.link, on_message, on_status)
+        recorded = RecordedConnection(monitor, self._audit.record, name)
+        campaigns = CampaignExecutor(
+            self._catalogue, recorded, get_executor(name), is_local=settings.has_local_logs
+        )
+        return ServedBench(name, monitor, live, campaigns, settings.has_local_logs)

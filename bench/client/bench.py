@@ -173,7 +173,7 @@ class Bench:
         Raises:
             ClientError: the certificate is refused or stored already, or the service cannot be reached.
         """
-        return dict(self._session.post("/certificates", certificate, key=uuid.uuid4().hex))
+        return dict(self._session.post(self._add_choice("/certificates"), certificate, key=uuid.uuid4().hex))
 
     def correct_certificate(self, certificate_id: str, reason: str, **changes: object) -> dict[str, Any]:
         """Store a correction of a certificate as its next version, and return that.
@@ -208,7 +208,7 @@ class Bench:
         Raises:
             ClientError: there is no such channel, or the service cannot be reached.
         """
-        return list(self._session.get("/checks", channel=channel, limit=limit)["items"])
+        return list(self._session.get("/checks", channel=channel, limit=limit, bench=self._name)["items"])
 
     def get_check_chart(self, channel: str, specimen: str | None = None) -> dict[str, Any]:
         """Return the control chart of a channel: centre, limits, points, state in words.
@@ -220,7 +220,7 @@ class Bench:
         Raises:
             ClientError: there is no such channel, or the service cannot be reached.
         """
-        return dict(self._session.get(f"/checks/{quote_name(channel)}/chart", specimen=specimen))
+        return dict(self._session.get(f"/checks/{quote_name(channel)}/chart", specimen=specimen, bench=self._name))
 
     def begin_check_baseline(self, channel: str, reason: str, specimen: str | None = None) -> dict[str, Any]:
         """Let only checks from now on count in the chart of a channel, and return that chart.
@@ -233,8 +233,9 @@ class Bench:
         Raises:
             ClientError: it is refused, or the service cannot be reached.
         """
+        path = self._add_choice(f"/checks/{quote_name(channel)}/baseline")
         request = {"reason": reason, "specimen": specimen}
-        return dict(self._session.post(f"/checks/{quote_name(channel)}/baseline", request, key=uuid.uuid4().hex))
+        return dict(self._session.post(path, request, key=uuid.uuid4().hex))
 
     def start_zero_check(self, specimen: str, operator: str = "") -> Run:
         """Start the zero check of this bench: the rod rests at the middle without drive for 25 s.
@@ -269,6 +270,10 @@ class Bench:
             ClientError: the service or its agent cannot be reached.
         """
         self._session.post(f"{self._path}/stop")
+
+    def _add_choice(self, path: str) -> str:
+        """Return a path with the name of the bench in its query, if there is one."""
+        return path if self._name is None else f"{path}?bench={quote_name(self._name)}"
 
     def _iterate_runs(self, page_size: int, conditions: Mapping[str, str | float]) -> Iterator[RunState]:
         before = None

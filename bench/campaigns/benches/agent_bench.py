@@ -16,6 +16,7 @@ from bench.agent_protocol import (
     RunStatus,
     StatusCommand,
 )
+from bench.bench_names import DEFAULT_BENCH
 from bench.campaigns.benches.recovery import make_end_report, recover_execution
 from bench.campaigns.benches.results import read_result
 from bench.campaigns.document import Campaign, CampaignError, Step
@@ -89,6 +90,7 @@ class AgentBench:
         thermometer: Thermometer,
         wait: Callable[[], object],
         sleep: Callable[[float], None] = time.sleep,
+        name: str = DEFAULT_BENCH,
     ) -> None:
         """Use an agent.
 
@@ -98,7 +100,9 @@ class AgentBench:
             thermometer: latest temperature.
             wait: lets time pass until the next observation.
             sleep: waits for a time [s] while a run starts.
+            name: name of the bench in the service.
         """
+        self._name = name
         self._catalogue, self._agent, self._thermometer = catalogue, agent, thermometer
         self._wait, self._sleep = wait, sleep
 
@@ -147,14 +151,15 @@ class AgentBench:
         item, execution = state.get_item(state.active.item), state.active.execution
         method = make_method(state, item, campaign.methods)
         path = self._catalogue.folder / execution.log
+        certificates = self._catalogue.certificates.list_current(datetime.now(UTC).date(), self._name)
         command = RunCommand(
             method=method.model_dump(mode="json", by_alias=True, exclude_defaults=True),
             specimen=find_spec(state, item).specimen,
             operator=state.operator,
             resume_after=execution.resume_after,
             continues=execution.continues,
-            certificates=tuple(self._catalogue.certificates.list_current(datetime.now(UTC).date()).values()),
-            checks=self._catalogue.checks.list_latest(),
+            certificates=tuple(certificates.values()),
+            checks=self._catalogue.checks.list_latest(self._name),
             log=str(path),
         )
         status = self._agent.send_command(command)

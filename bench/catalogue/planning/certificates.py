@@ -11,6 +11,7 @@ from sqlalchemy import JSON, Engine, Text, func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Mapped, Session, mapped_column, sessionmaker
 
+from bench.bench_names import DEFAULT_BENCH
 from bench.calibration import (
     Certificate,
     CertificateState,
@@ -29,6 +30,8 @@ class CertificateRow(Base):
     id: Mapped[str] = mapped_column(Text, primary_key=True)
     version: Mapped[int] = mapped_column(primary_key=True)
     channel: Mapped[str] = mapped_column(Text, index=True)
+    bench: Mapped[str] = mapped_column(Text, default=DEFAULT_BENCH)
+    """Name of the bench that has the channel."""
     document: Mapped[dict[str, Any]] = mapped_column(JSON)
     """`mrbench.certificate/1`."""
     created: Mapped[datetime] = mapped_column(UtcTime)
@@ -70,17 +73,26 @@ class CertificateStore:
         """Use an open database."""
         self._sessions = sessionmaker(engine, expire_on_commit=False)
 
-    def add(self, certificate: Certificate, author: str) -> StoredCertificate | None:
-        """Store the first version of a certificate; None if the laboratory's number is known for its channel."""
+    def add(self, certificate: Certificate, author: str, bench: str = DEFAULT_BENCH) -> StoredCertificate | None:
+        """Store the first version of a certificate; None if the laboratory's number is known for its channel.
+
+        Args:
+            certificate: document.
+            author: user or token.
+            bench: name of the bench that has the channel.
+        """
+        row = CertificateRow(id=make_id(certificate), version=1, bench=bench, reason="")
         try:
-            return self._store(make_id(certificate), 1, certificate, author, "")
+            return self._store(row, certificate, author)
         except IntegrityError:
             return None
 
     def correct(self, version: StoredCertificate, certificate: Certificate, author: str, reason: str) -> bool:
         """Store a correction as the version after another one; False if somebody has stored that version."""
+        before = version.row
+        row = CertificateRow(id=before.id, version=before.version + 1, bench=before.bench, reason=reason)
         try:
-            self._store(version.row.id, version.row.version + 1, certificate, author, reason)
+            self._store(row, certificate, author)
         except IntegrityError:
             return False
         return True
@@ -118,22 +130,15 @@ class CertificateStore:
         with self._sessions() as session:
             return _add_withdrawals(session, session.scalars(query).all())
 
-    def list_current(self, day: date) -> dict[str, IssuedCertificate]:
-        """Return by channel the certificate that applies on a day of UTC."""
-        return choose_current((one.issued for one in self.list_newest() if one.withdrawal is None), day)
+    def list_current(self, day: date, bench: str = DEFAULT_BENCH) -> dict[str, IssuedCertificate]:
+        """Return by channel of a bench the certificate that applies on a day of UTC."""
+        present = (one for one in self.list_newest() if one.withdrawal is None and one.row.bench == bench)
+        return choose_current((one.issued for one in present), day)
 
-    def _store(
-        self, certificate_id: str, version: int, certificate: Certificate, author: str, reason: str
-    ) -> StoredCertificate:
-        row = CertificateRow(
-            id=certificate_id,
-            version=version,
-            channel=certificate.channel,
-            document=certificate.model_dump(mode="json", by_alias=True),
-            created=datetime.now(UTC),
-            created_by=author,
-            reason=reason,
-        )
+    def _store(self, row: CertificateRow, certificate: Certificate, author: str) -> StoredCertificate:
+        row.channel = certificate.channel
+        row.document = certificate.model_dump(mode="json", by_alias=True)
+        row.created, row.created_by = datetime.now(UTC), author
         with self._sessions.begin() as session:
             session.add(row)
         return StoredCertificate(row, None)
@@ -152,7 +157,7 @@ def find_stored_state(
 
     Args:
         stored: its newest version.
-        current: certificates that apply on the day, by channel.
+        current: certificates of its bench that apply on the day, by channel.
         day: day of UTC.
     """
     certificate = stored.issued.document

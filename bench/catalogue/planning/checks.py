@@ -3,9 +3,10 @@
 from collections.abc import Iterable
 from datetime import UTC, datetime
 
-from sqlalchemy import ColumnElement, Engine, ForeignKey, Select, Text, delete, select
+from sqlalchemy import ColumnElement, Engine, ForeignKey, Select, Text, delete, func, select
 from sqlalchemy.orm import Mapped, mapped_column, sessionmaker
 
+from bench.bench_names import DEFAULT_BENCH
 from bench.calibration import LatestCheck
 from bench.catalogue.models import Base, RunRow, UtcTime
 from bench.checks import CheckRecord, CheckSeries, CheckValue, ControlChart, describe_latest, make_chart
@@ -48,6 +49,8 @@ class BaselineRow(Base):
     check: Mapped[str] = mapped_column("check_kind", Text)
     channel: Mapped[str] = mapped_column(Text, index=True)
     specimen: Mapped[str] = mapped_column(Text)
+    bench: Mapped[str] = mapped_column(Text, default=DEFAULT_BENCH)
+    """Name of the bench in the service."""
     since: Mapped[datetime] = mapped_column(UtcTime)
     author: Mapped[str] = mapped_column(Text)
     reason: Mapped[str] = mapped_column(Text)
@@ -66,67 +69,71 @@ class CheckStore:
             session.execute(delete(CheckRow).where(CheckRow.run == run_id))
             session.add_all(CheckRow(**record.model_dump()) for record in records)
 
-    def list_newest(self, limit: int, channel: str | None = None) -> list[CheckRecord]:
+    def list_newest(self, limit: int, channel: str | None = None, bench: str | None = None) -> list[CheckRecord]:
         """Return the newest records, without those of runs in the trash.
 
         Args:
             limit: largest number of records.
             channel: only those of this channel; None for all.
+            bench: only those of this bench of the service; None for all.
         """
-        query = _select_present().order_by(CheckRow.measured.desc(), CheckRow.run.desc(), CheckRow.channel)
+        query = _select_present(bench).order_by(CheckRow.measured.desc(), CheckRow.run.desc(), CheckRow.channel)
         if channel is not None:
             query = query.where(CheckRow.channel == channel)
         with self._sessions() as session:
             return [row.to_record() for row in session.scalars(query.limit(limit))]
 
-    def find_latest(self, channel: str) -> CheckRecord | None:
-        """Return the latest record of a channel, or None."""
-        return next(iter(self.list_newest(1, channel)), None)
+    def find_latest(self, channel: str, bench: str = DEFAULT_BENCH) -> CheckRecord | None:
+        """Return the latest record of a channel of a bench, or None."""
+        return next(iter(self.list_newest(1, channel, bench)), None)
 
-    def find_series(self, channel: ChannelName, specimen: str | None) -> CheckSeries:
+    def find_series(self, channel: ChannelName, specimen: str | None, bench: str = DEFAULT_BENCH) -> CheckSeries:
         """Return the series of a channel with a specimen; with None that of the channel's latest check."""
         if specimen is None:
-            latest = self.find_latest(channel)
+            latest = self.find_latest(channel, bench)
             specimen = "" if latest is None else latest.specimen
         return CheckSeries(check="zero", channel=channel, specimen=specimen)
 
-    def make_chart(self, series: CheckSeries) -> ControlChart:
-        """Return the control chart of a series."""
-        since, checks = self._list_counting(series)
+    def make_chart(self, series: CheckSeries, bench: str = DEFAULT_BENCH) -> ControlChart:
+        """Return the control chart of a series on a bench."""
+        since, checks = self._list_counting(series, bench)
         return make_chart(series, checks, since)
 
-    def make_latest_charts(self) -> list[ControlChart]:
-        """Return for each channel the chart that its latest check belongs to."""
-        return [self.make_chart(series) for series in self._list_series()]
+    def make_latest_charts(self, bench: str = DEFAULT_BENCH) -> list[ControlChart]:
+        """Return for each channel of a bench the chart that its latest check belongs to."""
+        return [self.make_chart(series, bench) for series in self._list_series(bench)]
 
-    def list_latest(self) -> tuple[LatestCheck, ...]:
-        """Return the latest check of each channel that counts, with its state in its chart."""
-        found = ((series, self._list_counting(series)[1]) for series in self._list_series())
+    def list_latest(self, bench: str = DEFAULT_BENCH) -> tuple[LatestCheck, ...]:
+        """Return the latest check of each channel of a bench that counts, with its state in its chart."""
+        found = ((series, self._list_counting(series, bench)[1]) for series in self._list_series(bench))
         return tuple(_describe_latest(series, checks) for series, checks in found if checks)
 
-    def begin_baseline(self, series: CheckSeries, author: str, reason: str) -> None:
-        """Let only checks from now on count in a series."""
-        row = BaselineRow(**series.model_dump(), since=datetime.now(UTC), author=author, reason=reason)
+    def begin_baseline(self, series: CheckSeries, author: str, reason: str, bench: str = DEFAULT_BENCH) -> None:
+        """Let only checks from now on count in a series on a bench."""
+        facts = series.model_dump() | {"bench": bench, "author": author, "reason": reason}
+        row = BaselineRow(**facts, since=datetime.now(UTC))
         with self._sessions.begin() as session:
             session.add(row)
 
-    def find_baseline(self, series: CheckSeries) -> BaselineRow | None:
-        """Return the latest begin of a baseline; None if all checks of the series count."""
-        query = select(BaselineRow).where(*_match(BaselineRow, series)).order_by(BaselineRow.id.desc()).limit(1)
+    def find_baseline(self, series: CheckSeries, bench: str = DEFAULT_BENCH) -> BaselineRow | None:
+        """Return the latest begin of a baseline on a bench; None if all checks of the series count."""
+        matching = select(BaselineRow).where(*_match(BaselineRow, series), BaselineRow.bench == bench)
+        query = matching.order_by(BaselineRow.id.desc()).limit(1)
         with self._sessions() as session:
             return session.scalar(query)
 
-    def _list_series(self) -> list[CheckSeries]:
-        """Return the series that the latest check of each channel belongs to."""
+    def _list_series(self, bench: str) -> list[CheckSeries]:
+        """Return the series that the latest check of each channel of a bench belongs to."""
         with self._sessions() as session:
             channels = session.scalars(select(CheckRow.channel).distinct().order_by(CheckRow.channel)).all()
-        latest = (self.find_latest(channel) for channel in channels)
+        latest = (self.find_latest(channel, bench) for channel in channels)
         return [_find_series(record) for record in latest if record is not None]
 
-    def _list_counting(self, series: CheckSeries) -> tuple[datetime | None, list[CheckValue]]:
+    def _list_counting(self, series: CheckSeries, bench: str) -> tuple[datetime | None, list[CheckValue]]:
         """Return the UTC from which checks count, None for all, and these checks, the oldest first."""
-        baseline = self.find_baseline(series)
-        query = _select_present().where(*_match(CheckRow, series)).order_by(CheckRow.measured, CheckRow.run)
+        baseline = self.find_baseline(series, bench)
+        query = _select_present(bench).where(*_match(CheckRow, series))
+        query = query.order_by(CheckRow.measured, CheckRow.run)
         if baseline is not None:
             query = query.where(CheckRow.measured >= baseline.since)
         # Columns only: rows of years are read for each start of a run.
@@ -151,8 +158,10 @@ def _describe_latest(series: CheckSeries, checks: list[CheckValue]) -> LatestChe
     )
 
 
-def _select_present() -> Select[CheckRow]:
-    return select(CheckRow).join(RunRow, RunRow.id == CheckRow.run).where(RunRow.trashed.is_(None))
+def _select_present(bench: str | None) -> Select[CheckRow]:
+    """Return the query for the records outside the trash; a run without a bench counts for `DEFAULT_BENCH`."""
+    query = select(CheckRow).join(RunRow, RunRow.id == CheckRow.run).where(RunRow.trashed.is_(None))
+    return query if bench is None else query.where(func.coalesce(RunRow.bench, DEFAULT_BENCH) == bench)
 
 
 def _match(table: type[CheckRow | BaselineRow], series: CheckSeries) -> tuple[ColumnElement[bool], ...]:

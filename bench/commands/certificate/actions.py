@@ -3,11 +3,12 @@
 from datetime import UTC, date, datetime
 from pathlib import Path
 
+from bench.bench_names import DEFAULT_BENCH
 from bench.calibration import CertificateError, IssuedCertificate, read_certificate
 from bench.catalogue import StoredCertificate, find_stored_state, open_catalogue
 
 
-def add_certificate(path: Path, data: Path, author: str) -> str:
+def add_certificate(path: Path, data: Path, author: str, bench: str = DEFAULT_BENCH) -> str:
     """Store the certificate in a file, and return what was stored in one line.
 
     Raises:
@@ -16,7 +17,7 @@ def add_certificate(path: Path, data: Path, author: str) -> str:
     """
     certificate = read_certificate(path)
     with open_catalogue(data, is_created=True) as catalogue:
-        stored = catalogue.certificates.add(certificate, author)
+        stored = catalogue.certificates.add(certificate, author, bench)
     if stored is None:
         raise CertificateError(
             f"{path}: certificate {certificate.number} of {certificate.laboratory} for channel "
@@ -48,13 +49,16 @@ def list_certificates(data: Path) -> list[str]:
     """
     day = datetime.now(UTC).date()
     with open_catalogue(data) as catalogue:
-        found, current = catalogue.certificates.list_newest(), catalogue.certificates.list_current(day)
-    return [_describe(one, current, day) for one in found] or ["no certificates"]
+        found = catalogue.certificates.list_newest()
+        benches = {one.row.bench for one in found}
+        current = {bench: catalogue.certificates.list_current(day, bench) for bench in benches}
+    return [_describe(one, current[one.row.bench], day) for one in found] or ["no certificates"]
 
 
 def _describe(stored: StoredCertificate, current: dict[str, IssuedCertificate], day: date) -> str:
     certificate, state = stored.issued.document, find_stored_state(stored, current, day).replace("_", " ")
+    of = "" if stored.row.bench == DEFAULT_BENCH else f" of {stored.row.bench}"
     return (
-        f"{stored.row.id}: {certificate.channel}, {state}, due on {certificate.due}, "
+        f"{stored.row.id}: {certificate.channel}{of}, {state}, due on {certificate.due}, "
         f"certificate {certificate.number} of {certificate.laboratory}, version {stored.row.version}"
     )

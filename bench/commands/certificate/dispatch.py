@@ -29,6 +29,9 @@ def certificate(
     reason: Annotated[str, typer.Option(metavar="TEXT", help="With withdraw: reason, for people.")] = "",
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
+    bench: Annotated[
+        str, typer.Option(metavar="NAME", help="With add: bench that has the channel, if the service has several.")
+    ] = "bench",
 ) -> None:
     """Add, list and withdraw calibration certificates.
 
@@ -39,12 +42,13 @@ def certificate(
         raise typer.BadParameter("give a FILE to add or an ID to withdraw; list takes neither")
     if (action is Action.WITHDRAW) != bool(reason.strip()):
         raise typer.BadParameter("withdraw needs --reason TEXT, and no other action takes it")
+    from bench.bench_names import check_bench_name
     from bench.commands.audit import record
     from bench.commands.certificate.actions import add_certificate, list_certificates, withdraw_certificate
 
     author = f"command:{operator}" if operator else "command"
     if action is Action.ADD:
-        typer.echo(add_certificate(Path(target), data, author))
+        typer.echo(add_certificate(Path(target), data, author, check_bench_name(bench)))
         record(data, "certificate add", target, {}, {"operator": operator})
     elif action is Action.WITHDRAW:
         typer.echo(withdraw_certificate(target, data, author, reason.strip()))

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 
+from bench.bench_names import DEFAULT_BENCH
 from bench.catalogue import open_catalogue
 from bench.checks import CheckRecord, ControlChart, compute_records
 from bench.config import ChannelName
@@ -44,7 +45,7 @@ def describe_log(path: Path) -> list[str]:
     return [_describe_record(one) for one in records]
 
 
-def describe_charts(data: Path, channel: str, specimen: str | None) -> list[str]:
+def describe_charts(data: Path, channel: str, specimen: str | None, bench: str = DEFAULT_BENCH) -> list[str]:
     """Return the state of all channels, one line for each; for one channel also its limits and points.
 
     Raises:
@@ -53,12 +54,14 @@ def describe_charts(data: Path, channel: str, specimen: str | None) -> list[str]
     """
     with open_catalogue(data) as catalogue:
         if not channel:
-            return [chart.text for chart in catalogue.checks.make_latest_charts()] or ["no checks"]
-        series = catalogue.checks.find_series(_check_channel(channel), specimen)
-        return list(_describe_chart(catalogue.checks.make_chart(series)))
+            return [chart.text for chart in catalogue.checks.make_latest_charts(bench)] or ["no checks"]
+        series = catalogue.checks.find_series(_check_channel(channel), specimen, bench)
+        return list(_describe_chart(catalogue.checks.make_chart(series, bench)))
 
 
-def begin_baseline(data: Path, channel: str, specimen: str | None, author: str, reason: str) -> str:
+def begin_baseline(
+    data: Path, channel: str, specimen: str | None, author: str, reason: str, bench: str = DEFAULT_BENCH
+) -> str:
     """Let only checks from now on count in a chart, and return that in one line.
 
     Raises:
@@ -66,8 +69,8 @@ def begin_baseline(data: Path, channel: str, specimen: str | None, author: str, 
         CatalogueError: there is no catalogue, or it cannot be opened.
     """
     with open_catalogue(data) as catalogue:
-        series = catalogue.checks.find_series(_check_channel(channel), specimen)
-        catalogue.checks.begin_baseline(series, author, reason)
+        series = catalogue.checks.find_series(_check_channel(channel), specimen, bench)
+        catalogue.checks.begin_baseline(series, author, reason, bench)
     return f"{channel}: only checks from now on count; the earlier ones stay in the list"
 
 

@@ -38,6 +38,9 @@ def check(
     reason: Annotated[str, typer.Option(metavar="TEXT", help="With baseline: reason, for people.")] = "",
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
+    bench: Annotated[
+        str, typer.Option(metavar="NAME", help="With chart and baseline: bench, if the service has several.")
+    ] = "bench",
 ) -> None:
     """Show zero checks and their control charts.
 
@@ -54,10 +57,10 @@ def check(
     if action is Action.LIST:
         typer.echo("\n".join(list_checks(data, target)))
     elif action is Action.CHART:
-        typer.echo("\n".join(describe_charts(data, target, specimen)))
+        typer.echo("\n".join(describe_charts(data, target, specimen, bench)))
     elif action is Action.SHOW:
         typer.echo("\n".join(describe_log(Path(target))))
     else:
         author = f"command:{operator}" if operator else "command"
-        typer.echo(begin_baseline(data, target, specimen, author, reason.strip()))
+        typer.echo(begin_baseline(data, target, specimen, author, reason.strip(), bench))
         record(data, "check baseline", target, {}, {"operator": operator, "reason": reason.strip()})

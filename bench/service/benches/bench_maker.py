@@ -5,7 +5,6 @@ import asyncio
 from pydantic import BaseModel
 
 from bench.agent_protocol import AgentEvent, AgentStatus
-from bench.bench_names import get_executor
 from bench.catalogue import Catalogue
 from bench.live import LiveBatch, LiveBroadcaster
 from bench.service.agent_monitor import AgentMonitor
@@ -49,7 +48,5 @@ class BenchMaker:
 
         monitor = AgentMonitor(settings.link, on_message, on_status)
         recorded = RecordedConnection(monitor, self._audit.record, name)
-        campaigns = CampaignExecutor(
-            self._catalogue, recorded, get_executor(name), is_local=settings.has_local_logs
-        )
+        campaigns = CampaignExecutor(self._catalogue, recorded, name, is_local=settings.has_local_logs)
         return ServedBench(name, monitor, live, campaigns, settings.has_local_logs)

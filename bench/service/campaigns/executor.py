@@ -4,6 +4,7 @@ import logging
 from typing import Self
 
 from bench.agent_protocol import Sender, send_as
+from bench.bench_names import get_executor
 from bench.campaigns import (
     AgentBench,
     AgentConnection,
@@ -29,22 +30,25 @@ class CampaignExecutor(BackgroundThread):
     At its end, a run in progress goes on in the agent, and the next service continues the campaign.
     """
 
-    def __init__(self, catalogue: Catalogue, agent: AgentConnection, executor: str, *, is_local: bool) -> None:
+    def __init__(self, catalogue: Catalogue, agent: AgentConnection, bench: str, *, is_local: bool) -> None:
         """Use a catalogue and an agent.
 
         Args:
             catalogue: catalogue of the data folder.
             agent: connection to the agent.
-            executor: name of the bench's executor in the catalogue.
+            bench: name of the bench in the service.
             is_local: whether the agent writes into the data folder; else nothing is executed.
         """
-        super().__init__(f"campaigns-{executor}")
-        self.executor = executor
+        super().__init__(f"campaigns-{bench}")
+        self.executor = get_executor(bench)
+        """Name that the catalogue gives to this executor."""
         self.store = CampaignStore(catalogue)
         self.thermometer = Thermometer()
         self.is_local = is_local
         self._failures = RepeatedFailure(_LOG, "campaign_failed", "campaign_continues")
-        self.bench = AgentBench(catalogue, agent, self.thermometer, lambda: self._stopping.wait(PERIOD))
+        self.bench = AgentBench(
+            catalogue, agent, self.thermometer, lambda: self._stopping.wait(PERIOD), name=bench
+        )
 
     def __enter__(self) -> Self:
         """Start the thread if the agent writes into the data folder."""

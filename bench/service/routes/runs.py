@@ -3,7 +3,7 @@
 import asyncio
 import time
 from contextlib import suppress
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from http import HTTPStatus
 from pathlib import Path
 from typing import Annotated
@@ -147,6 +147,10 @@ def _check_method(context: ServiceContext, bench: ServedBench, request: StartRun
     return parsed
 
 
+def _get_day() -> date:
+    return datetime.now(UTC).date()
+
+
 def _request_start(
     context: ServiceContext,
     bench: ServedBench,
@@ -164,8 +168,8 @@ def _request_start(
         operator=request.operator,
         resume_after=request.resume_after,
         continues=continues,
-        certificates=tuple(context.catalogue.certificates.list_current(datetime.now(UTC).date()).values()),
-        checks=context.catalogue.checks.list_latest(),
+        certificates=tuple(context.catalogue.certificates.list_current(_get_day(), bench.name).values()),
+        checks=context.catalogue.checks.list_latest(bench.name),
         log=None if log is None else str(log),
     )
     status = bench.monitor.send_command(command)

@@ -1,22 +1,27 @@
-"""Column `bench` of runs and events: the name of the bench in a service that has several."""
+"""Column `bench`: the name of the bench in a service that has several."""
 
 import sqlalchemy as sa
 from alembic import op
 
 revision = "0019"
 down_revision = "0018"
-_TABLES = ("runs", "events")
+_OPEN = ("runs", "events")
+"""Tables whose earlier rows name no bench."""
+_OWNED = ("certificates", "check_baselines")
+"""Tables whose earlier rows belong to the bench that was the only one."""
 
 
 def upgrade() -> None:
-    """Add the columns; earlier runs and events name no bench."""
-    for table in _TABLES:
+    """Add the columns."""
+    for table in _OPEN:
         op.add_column(table, sa.Column("bench", sa.Text()))
+    for table in _OWNED:
+        op.add_column(table, sa.Column("bench", sa.Text(), nullable=False, server_default="bench"))
     op.create_index("runs_of_bench", "runs", ["bench", "started", "id"])
 
 
 def downgrade() -> None:
     """Drop them."""
     op.drop_index("runs_of_bench", "runs")
-    for table in _TABLES:
+    for table in (*_OPEN, *_OWNED):
         op.drop_column(table, "bench")

@@ -32,6 +32,7 @@ class CertificateView(View):
     due_text: str = Field(
         description="in words, if this certificate applies and is overdue or due soon; else empty"
     )
+    bench: str = Field(description="name of the bench that has the channel")
     document: Certificate = Field(description="document `mrbench.certificate/1`")
     gain_error: float = Field(description="[1] slope of the indication over the reference, less one")
     gain_standard_uncertainty: float = Field(description="[1] relative standard uncertainty of the gain")
@@ -80,6 +81,7 @@ def make_certificate_view(stored: StoredCertificate, state: CertificateState, du
         version=row.version,
         state=state,
         due_text=due_text,
+        bench=row.bench,
         document=document,
         gain_error=document.gain_error,
         gain_standard_uncertainty=document.gain_uncertainty,

@@ -20,6 +20,7 @@ from bench.service.routes.planning.certificate_views import (
     Reason,
     make_certificate_view,
 )
+from bench.service.views import BenchChoice
 
 router = APIRouter(prefix="/certificates", tags=["certificates"], route_class=IdempotentRoute)
 _TOKEN_HOLDER = "bench"
@@ -37,10 +38,15 @@ def list_certificates(
 
 @router.post("", status_code=201, dependencies=[IDEMPOTENT])
 def add_certificate(
-    certificate: Certificate, context: Context, request: Request, response: Response
+    certificate: Certificate,
+    context: Context,
+    request: Request,
+    response: Response,
+    bench: BenchChoice = None,
 ) -> CertificateView:
-    """Store a certificate. It never changes; runs that start from now on name it in their log."""
-    stored = context.catalogue.certificates.add(certificate, find_author(request))
+    """Store a certificate. It never changes; runs of its bench that start from now on name it in their log."""
+    name = context.benches.get(bench).name
+    stored = context.catalogue.certificates.add(certificate, find_author(request), name)
     if stored is None:
         detail = (
             f"certificate {certificate.number} of {certificate.laboratory} for channel {certificate.channel} is "
@@ -103,12 +109,20 @@ def withdraw_certificate(
 
 def describe_calibration(context: ServiceContext) -> str:
     """Return `ok`, or the channels whose calibration is overdue or due soon, or whose check is out of control."""
+    states = {name: _describe_bench(context, name) for name in context.benches.names}
+    if not context.benches.are_several:
+        return "".join(states.values()) or "ok"
+    return "; ".join(f"{name}: {state}" for name, state in states.items() if state) or "ok"
+
+
+def _describe_bench(context: ServiceContext, bench: str) -> str:
+    """Return the channels of a bench that need attention; empty for none."""
     day = datetime.now(UTC).date()
-    current = [one.document for one in context.catalogue.certificates.list_current(day).values()]
+    current = [one.document for one in context.catalogue.certificates.list_current(day, bench).values()]
     by_due = sorted(current, key=lambda certificate: certificate.due)
     due = (describe_due(one, day) for one in by_due)
-    checks = (one.text for one in context.catalogue.checks.list_latest() if one.state == "out_of_control")
-    return "; ".join(filter(None, (*due, *checks))) or "ok"
+    checks = (one.text for one in context.catalogue.checks.list_latest(bench) if one.state == "out_of_control")
+    return "; ".join(filter(None, (*due, *checks)))
 
 
 def find_author(request: Request) -> str:
@@ -143,11 +157,11 @@ def _make_list(
     """Return the views of versions; the state is that of the newest version of the certificate."""
     day, store = datetime.now(UTC).date(), context.catalogue.certificates
     newest = {one.row.id: one for one in store.list_newest()}
-    current = store.list_current(day)
-    applying = {one.id: describe_due(one.document, day) for one in current.values()}
+    current = {bench: store.list_current(day, bench) for bench in {one.row.bench for one in stored}}
+    applying = {one.id: describe_due(one.document, day) for found in current.values() for one in found.values()}
     items = (
         make_certificate_view(
-            one, find_stored_state(newest[one.row.id], current, day), applying.get(one.row.id, "")
+            one, find_stored_state(newest[one.row.id], current[one.row.bench], day), applying.get(one.row.id, "")
         )
         for one in stored
         if channel in (None, one.row.channel)

@@ -52,16 +52,17 @@ def list_checks(
     context: Context,
     channel: Annotated[ChannelName | None, Query(description="only those of this channel")] = None,
     limit: Annotated[int, Query(ge=1, le=1000, description="largest number of items")] = 50,
+    bench: Annotated[str | None, Query(max_length=100, description="only those of this bench")] = None,
 ) -> CheckList:
     """List the newest records of checks, one for each run and channel; runs in the trash have none."""
-    return CheckList(items=tuple(context.catalogue.checks.list_newest(limit, channel)))
+    return CheckList(items=tuple(context.catalogue.checks.list_newest(limit, channel, bench)))
 
 
 @router.get("/charts")
 def list_charts(context: Context, bench: BenchChoice = None) -> ChartList:
     """Return the control chart of each checked channel, for the specimen of its latest check."""
     served = context.benches.get(bench)
-    items = tuple(context.catalogue.checks.make_latest_charts())
+    items = tuple(context.catalogue.checks.make_latest_charts(served.name))
     try:
         description = served.monitor.describe_bench()
     except AgentUnreachableError:  # the charts need no agent
@@ -70,18 +71,24 @@ def list_charts(context: Context, bench: BenchChoice = None) -> ChartList:
 
 
 @router.get("/{channel}/chart")
-def get_chart(channel: ChannelName, context: Context, specimen: SpecimenName = None) -> ControlChart:
-    """Return the control chart of a channel. Checks with different specimens are never compared."""
-    store = context.catalogue.checks
-    return store.make_chart(store.find_series(channel, specimen))
+def get_chart(
+    channel: ChannelName, context: Context, specimen: SpecimenName = None, bench: BenchChoice = None
+) -> ControlChart:
+    """Return the control chart of a channel. Checks with different specimens or benches are never compared."""
+    store, name = context.catalogue.checks, context.benches.get(bench).name
+    return store.make_chart(store.find_series(channel, specimen, name), name)
 
 
 @router.post("/{channel}/baseline", status_code=201, dependencies=[IDEMPOTENT])
 def begin_baseline(
-    channel: ChannelName, baseline: BaselineRequest, context: Context, request: Request
+    channel: ChannelName,
+    baseline: BaselineRequest,
+    context: Context,
+    request: Request,
+    bench: BenchChoice = None,
 ) -> ControlChart:
     """Let only checks from now on count in the chart of a channel; the earlier records stay in the list."""
-    store = context.catalogue.checks
-    series = store.find_series(channel, baseline.specimen)
-    store.begin_baseline(series, find_author(request), baseline.reason)
-    return store.make_chart(series)
+    store, name = context.catalogue.checks, context.benches.get(bench).name
+    series = store.find_series(channel, baseline.specimen, name)
+    store.begin_baseline(series, find_author(request), baseline.reason, name)
+    return store.make_chart(series, name)

@@ -195,6 +195,7 @@ def test_the_list_says_what_each_bench_does(service, agents):
 
 def test_each_listener_gets_the_samples_of_its_bench(service, agents):
     with subscribe(service, bench="left") as left, subscribe(service, bench="right") as right:
+        next(messages(left, "clock")), next(messages(right, "clock"))  # both listen from now on
         for number in range(3):
             agents["left"].publish(batch(number, 1.0))
             agents["right"].publish(batch(number, 2.0))
@@ -206,6 +207,7 @@ def test_each_listener_gets_the_samples_of_its_bench(service, agents):
 
 def test_each_listener_hears_of_all_runs(service, agents):
     with subscribe(service, bench="left") as socket:
+        next(messages(socket, "clock"))
         start(service, "right")
         assert next(messages(socket, "run"))["bench"] == "right"
 

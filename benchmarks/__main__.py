@@ -13,6 +13,7 @@ MODULES = {
     "catalogue": "speed.catalogue",
     "rest_load": "speed.rest_load",
     "rig_load": "speed.rig_load",
+    "benches": "speed.benches",
     "live_page": "live.page",
     "dead_bench": "live.dead_bench",
     "campaign": "live.campaign",

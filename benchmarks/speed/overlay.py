@@ -100,9 +100,9 @@ def record_run(data: Path, number: int) -> Path:
 
 
 @contextmanager
-def serve(data: Path) -> Iterator[httpx2.Client]:
-    """Start a service without a rig on a data folder, and yield a client with its token."""
-    command = [*MRBENCH_COMMAND, "serve", "--data", str(data), "--port", "0"]
+def serve(data: Path, *options: str) -> Iterator[httpx2.Client]:
+    """Start a service on a data folder, by default without a rig, and yield a client with its token."""
+    command = [*MRBENCH_COMMAND, "serve", "--data", str(data), "--port", "0", *options]
     environment = os.environ | {"PYTHONUNBUFFERED": "1"}
     with (data / "service.log").open("w") as output:
         process = subprocess.Popen(command, stdout=output, stderr=output, env=environment)

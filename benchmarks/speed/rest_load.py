@@ -104,28 +104,52 @@ def start_empty_server() -> Iterator[str]:
         process.wait()
 
 
-async def measure_load(address: str, routes: tuple[str, ...], headers: dict[str, str]) -> np.ndarray:
-    """Return the latency of each request [s]; a refused one ends the benchmark."""
-    barrier = asyncio.Barrier(CLIENTS)
+async def measure_load(
+    address: str,
+    routes: tuple[str, ...],
+    headers: dict[str, str],
+    clients: int = CLIENTS,
+    rate: float = RATE,
+    seconds: float = SECONDS,
+) -> np.ndarray:
+    """Return the latency of each request [s]; a refused one ends the benchmark.
+
+    Args:
+        address: start of all paths.
+        routes: paths, in turn.
+        headers: headers of each request.
+        clients: number of clients.
+        rate: requests of all clients [1/s].
+        seconds: duration [s].
+    """
+    barrier = asyncio.Barrier(clients)
+    period, count = clients / rate, round(seconds * rate / clients)
     async with asyncio.TaskGroup() as group:
         tasks = [
-            group.create_task(_request_periodically(address, routes, headers, number, barrier))
-            for number in range(CLIENTS)
+            group.create_task(
+                _request_periodically(address, routes, headers, count, period, number / rate, barrier)
+            )
+            for number in range(clients)
         ]
     return np.concatenate([task.result() for task in tasks])
 
 
 async def _request_periodically(
-    address: str, routes: tuple[str, ...], headers: dict[str, str], number: int, barrier: asyncio.Barrier
+    address: str,
+    routes: tuple[str, ...],
+    headers: dict[str, str],
+    count: int,
+    period: float,
+    offset: float,
+    barrier: asyncio.Barrier,
 ) -> np.ndarray:
-    period, count = CLIENTS / RATE, round(SECONDS * RATE / CLIENTS)
     parts = urlsplit(address)
     # A client library would need more processor time for a request than the server, on the same machine.
     reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
     latencies = []
     with closing(writer):
         await barrier.wait()
-        begin = time.perf_counter() + number / RATE
+        begin = time.perf_counter() + offset
         for turn, route in zip(range(count), itertools.cycle(routes), strict=False):
             due = begin + turn * period
             await asyncio.sleep(max(0.0, due - time.perf_counter()))

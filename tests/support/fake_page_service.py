@@ -249,6 +249,7 @@ def application(bench: FakeBench) -> FastAPI:
 
     for routes in (
         rig_routes,
+        list_routes,
         method_routes,
         run_routes,
         run_control_routes,
@@ -328,6 +329,18 @@ def rig_routes(bench: FakeBench) -> APIRouter:
     @router.post("/silence")
     async def disconnect_agent() -> Any:
         bench.silent = True
+
+    return router
+
+
+def list_routes(bench: FakeBench) -> APIRouter:
+    """Create the list of the benches, which has one."""
+    router = APIRouter()
+
+    @router.get("/benches")
+    async def benches() -> Any:
+        state = {"state": bench.state, "description": bench.state}
+        return {"items": [{"name": "bench", "run": None, "drive_kind": "coil_v", **state}]}
 
     return router
 

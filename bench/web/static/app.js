@@ -2,6 +2,8 @@
 
 import { Account } from "./account/account.js";
 import { AuditView } from "./account/audit_trail.js";
+import { BenchList } from "./bench/bench_list.js";
+import { benchPath } from "./common/bench.js";
 import { get, readSession } from "./common/api.js";
 import { CampaignView } from "./campaigns/campaigns.js";
 import { CertificateView } from "./calibration/certificates.js";
@@ -70,6 +72,7 @@ const bar = new TopBar({
     if (state === "unknown") greyInstruments();
   },
 });
+const benches = new BenchList({ onProblem: (text) => bar.showDetail(text, true) });
 const preparation = new Preparation();
 const health = new HealthStrip();
 const events = new EventList();
@@ -180,7 +183,7 @@ async function requestStatus() {
   requesting = true;
   requestedAt = performance.now();
   try {
-    HANDLERS.status(await get("bench"));
+    HANDLERS.status(await get(benchPath()));
   } catch (problem) {
     withoutRig = problem.hasNoRig;
     if (!problem.unauthorised) bar.showFailure(problem.after(withoutRig ? "No rig" : "Trying again"));
@@ -219,7 +222,15 @@ async function arrive() {
   }
 }
 
-function begin() {
+async function begin() {
+  try {
+    await benches.begin(); // all that follows belongs to one bench
+  } catch (problem) {
+    if (problem.unauthorised) return;
+    bar.showFailure(problem.after("Trying again"));
+    setTimeout(begin, ASK_AGAIN_MS);
+    return;
+  }
   form.load();
   runs.load();
   health.open();

@@ -1,6 +1,7 @@
 // Preparation of the bench as guided steps: tare, home, clamp, centre. Home and move move the rod; home asks first.
 
 import { start } from "../common/api.js";
+import { benchPath } from "../common/bench.js";
 import { onAnswer, openDialog } from "../common/dialogs.js";
 import { byId, write } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
@@ -60,7 +61,7 @@ export class Preparation {
   async execute(step) {
     try {
       const position = step === "move" ? byId("move-to").valueAsNumber / QUANTITIES.displacement.scale : 0;
-      this.update(await start("bench/prepare", { step, position_m: position }));
+      this.update(await start(benchPath("/prepare"), { step, position_m: position }));
     } catch (problem) {
       write(byId("prepare-note"), problem.after("Nothing was done"));
     }

@@ -1,6 +1,7 @@
 // Pause and Abort beside Stop. Pause ends a run at its next checkpoint, Abort stops at once by the path of a trip.
 
 import { post } from "../common/api.js";
+import { benchPath } from "../common/bench.js";
 import { byId } from "../common/format.js";
 
 const MOVING = ["preparing", "running", "stopping"];
@@ -36,7 +37,7 @@ export class RunControl {
   async abort() {
     this.onDetail("Abort was sent.");
     try {
-      await post("bench/abort", undefined, TIMEOUT_MS);
+      await post(benchPath("/abort"), undefined, TIMEOUT_MS);
     } catch (problem) {
       this.onDetail(problem.after("Abort was not confirmed, use the emergency stop of the hardware"), true);
     }

@@ -1,6 +1,7 @@
 // Form that starts a run: method, specimen and operator.
 
 import { get, start } from "../common/api.js";
+import { benchQuery, withBench } from "../common/bench.js";
 import { byId, describeDriveKind, duration, element, write } from "../common/format.js";
 import { followOperator, keepOperatorName } from "../common/session.js";
 
@@ -32,7 +33,7 @@ export class StartForm {
   /** Loads the methods, the shortest first; the selection is kept. */
   async load() {
     try {
-      const methods = (await get("methods")).items;
+      const methods = (await get(benchQuery("methods"))).items;
       const chosen = this.method() ?? this.wanted;
       this.methods = methods.sort((a, b) => a.duration_s - b.duration_s);
       this.list(chosen);
@@ -92,7 +93,7 @@ export class StartForm {
     this.busy = true;
     this.show({ problem: "" });
     try {
-      const run = await start("runs", { method, specimen, operator }); // returns once the run has started
+      const run = await start("runs", withBench({ method, specimen, operator })); // returns once the run has started
       keepOperatorName(operator);
       this.onStarted(run);
     } catch (problem) {

@@ -2,6 +2,7 @@
 
 import { TripAlarm } from "./alarm.js";
 import { get, post } from "../common/api.js";
+import { benchPath } from "../common/bench.js";
 import { leaveDialogs, onAnswer, openDialog } from "../common/dialogs.js";
 import { byId, clock, duration, fixed, write, zone } from "../common/format.js";
 import { RunControl } from "./run_control.js";
@@ -141,9 +142,9 @@ export class TopBar {
     this.showDetail("Stop was sent.");
     try {
       // The latest status may be old: another page may have started something since.
-      if (this.stale && !this.moving) this.update(await get("bench", STOP_TIMEOUT_MS));
+      if (this.stale && !this.moving) this.update(await get(benchPath(), STOP_TIMEOUT_MS));
       if (!this.moving) return this.showDetail("Nothing to stop: no run or setup step is in progress.");
-      const target = this.run ? `runs/${encodeURIComponent(this.run.id)}` : "bench";
+      const target = this.run ? `runs/${encodeURIComponent(this.run.id)}` : benchPath();
       await post(`${target}/stop`, undefined, STOP_TIMEOUT_MS);
       if (this.state === "running") this.showDetail("Stop was accepted: the motion fades out.");
     } catch (problem) {
@@ -159,7 +160,7 @@ export class TopBar {
   async reset() {
     this.showDetail("Reset was sent.");
     try {
-      await post("bench/reset");
+      await post(benchPath("/reset"));
       this.showDetail("");
     } catch (problem) {
       this.showDetail(problem.after("Not reset"), true);

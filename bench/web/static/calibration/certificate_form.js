@@ -1,6 +1,7 @@
 // Form of one certificate: a new one, or the correction of one, which is stored as its next version.
 
 import { patch, start } from "../common/api.js";
+import { benchQuery } from "../common/bench.js";
 import { element, spaced, write } from "../common/format.js";
 
 /** SI unit of each channel, in which points and uncertainty are entered. */
@@ -104,7 +105,7 @@ export class CertificateForm {
       const { version } = await patch(`certificates/${encodeURIComponent(this.view.id)}`, { reason: reason.value.trim(), ...content });
       return this.onStored(`The correction is stored as version ${version}; the earlier ones stay.`);
     }
-    await start("certificates", {
+    await start(benchQuery("certificates"), {
       ...content, channel: channel.value, unit: UNITS[channel.value], laboratory: laboratory.value.trim(), number: number.value.trim(),
     });
     return this.onStored("The certificate is stored. Runs that start from now on name it.");

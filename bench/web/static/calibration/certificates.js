@@ -1,6 +1,7 @@
 // Calibration certificates of the channels: state in words, a form to add and to correct one, withdrawal.
 
 import { get, remove } from "../common/api.js";
+import { shownBench } from "../common/bench.js";
 import { byId, element, instant, significant, spaced, write } from "../common/format.js";
 import { CertificateForm } from "./certificate_form.js";
 
@@ -38,7 +39,7 @@ export class CertificateView {
     const { state, due_text: dueText, document: one, withdrawal } = view;
     const withdrawn = withdrawal && `withdrawn ${instant(withdrawal.withdrawn)} by ${withdrawal.withdrawn_by}: ${withdrawal.reason}`;
     return element("tr", {},
-      element("th", { scope: "row" }, spaced(one.channel)),
+      element("th", { scope: "row" }, spaced(one.channel), shownBench() ? element("small", {}, `of ${view.bench}`) : null),
       element("td", {}, element("span", { className: `mark ${STATES[state]}` }, spaced(state)), element("small", {}, withdrawn || shortDue(dueText))),
       element("td", {}, one.number, element("small", {}, one.laboratory), element("small", {}, describeVersion(view))),
       element("td", { className: "number" }, one.date), element("td", { className: "number" }, one.due),

@@ -1,6 +1,7 @@
 // Control chart of one channel: state in words, figure, table of the checks, and the begin of a new baseline.
 
 import { start } from "../common/api.js";
+import { benchQuery } from "../common/bench.js";
 import { byId, element, localTime, spaced, write, zone } from "../common/format.js";
 import { need } from "../common/rights.js";
 import { runAddress } from "../common/router.js";
@@ -64,7 +65,7 @@ export class CheckChart {
     form.addEventListener("submit", async (event) => {
       event.preventDefault();
       try {
-        await start(`checks/${channel}/baseline`, { specimen: specimen || null, reason: form.elements.reason.value.trim() });
+        await start(benchQuery(`checks/${channel}/baseline`), { specimen: specimen || null, reason: form.elements.reason.value.trim() });
         await this.onChanged(`A new baseline of the ${spaced(channel)} has begun.`);
       } catch (problem) {
         write(note, problem.after("Not changed"));

@@ -1,6 +1,7 @@
 // Zero checks of the channels: state, latest check and its age, start of a check, and the chart of a chosen channel.
 
 import { get, start } from "../common/api.js";
+import { benchQuery, withBench } from "../common/bench.js";
 import { byId, element, instant, spaced, write } from "../common/format.js";
 import { CheckChart } from "./check_chart.js";
 import { age, describeState, withUnit } from "./check_words.js";
@@ -29,7 +30,7 @@ export class CheckView {
 
   async load(answer = "") {
     try {
-      const { items, method, specimen } = await get("checks/charts");
+      const { items, method, specimen } = await get(benchQuery("checks/charts"));
       Object.assign(this, { charts: items, method });
       if (!this.form.elements.specimen.value) this.form.elements.specimen.value = specimen;
       write(byId("checks-note"), items.length ? "" : "No checks yet. Start one at rest, with the same specimen each time.");
@@ -58,7 +59,7 @@ export class CheckView {
       if (!this.method) return write(byId("checks-answer"), "Not started: the rig agent does not answer. Start it, then repeat the check.");
     }
     try {
-      const run = await start("runs", { method: this.method, specimen: this.form.elements.specimen.value.trim() });
+      const run = await start("runs", withBench({ method: this.method, specimen: this.form.elements.specimen.value.trim() }));
       write(byId("checks-answer"), "The zero check has started. Its result appears here after its end.");
       this.onStarted(run);
     } catch (problem) {

@@ -1,6 +1,7 @@
 // Start of a campaign from its document: pasted or from a file; the dry run is shown before it can be started.
 
 import { post, start } from "../common/api.js";
+import { withBench } from "../common/bench.js";
 import { describeDrive, describeKind } from "./campaign_words.js";
 import { duration, element, significant, write, byId } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
@@ -66,7 +67,7 @@ export class CampaignStart {
     if (!this.planned) return;
     byId("campaign-begin").disabled = true;
     try {
-      const campaign = await start("campaigns", { campaign: this.planned, operator: byId("campaign-operator").value.trim() });
+      const campaign = await start("campaigns", withBench({ campaign: this.planned, operator: byId("campaign-operator").value.trim() }));
       this.forget();
       this.onStarted(campaign);
     } catch (problem) {

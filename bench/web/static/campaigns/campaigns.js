@@ -1,6 +1,7 @@
 // Campaigns at their addresses: the list with a start, and one campaign with its board, which follows it.
 
 import { get } from "../common/api.js";
+import { shownBench } from "../common/bench.js";
 import { CampaignActions } from "./campaign_actions.js";
 import { CampaignBoard } from "./campaign_board.js";
 import { isAsking } from "../account/sign_in.js";
@@ -110,7 +111,7 @@ function makeRow(campaign) {
   const link = keep(element("a", { href: campaignAddress(id) }, name), id);
   const asks = isAsking ? element("small", { className: "attention" }, "A person is needed.") : null;
   return element("tr", {},
-    element("th", { scope: "row" }, link, element("small", {}, bench === "agent" ? "on this bench" : bench)),
+    element("th", { scope: "row" }, link, element("small", {}, bench === "agent" ? (shownBench() ? "bench" : "on this bench") : bench)),
     element("td", { className: "number" }, localTime(created)),
     element("td", {}, markStatus(campaign), element("small", {}, reason), asks),
     element("td", { className: "number" }, `${done} of ${steps} done`));

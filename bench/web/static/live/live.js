@@ -1,6 +1,7 @@
 // Websocket to the service.
 
 import { liveAddress } from "../common/api.js";
+import { withBench } from "../common/bench.js";
 import { signedIn } from "../common/session.js";
 import { parseBatch } from "./live_batch.js";
 
@@ -32,7 +33,7 @@ export class LiveLink {
     socket.binaryType = "arraybuffer";
     this.lastMessageAt = performance.now();
     socket.onopen = () => {
-      socket.send(JSON.stringify({ csrf: signedIn()?.csrf ?? "", acknowledge: true })); // another site does not know this value
+      socket.send(JSON.stringify(withBench({ csrf: signedIn()?.csrf ?? "", acknowledge: true }))); // another site does not know this value
       if (this.failures) this.onReopened();
     };
     socket.onmessage = ({ data }) => {

@@ -1,6 +1,7 @@
 // Forecast of a run by its dry run: peaks beside the limits, heat, disk, and what the strokes can identify.
 
 import { post } from "../common/api.js";
+import { withBench } from "../common/bench.js";
 import { duration, element, sentence, significant } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { rowTable } from "../common/tables.js";
@@ -31,13 +32,13 @@ export function makeForecast(method) {
 
 /** Returns sentences on what the strokes of a method can identify; the method is a name or a document. */
 export async function assess(method) {
-  const { envelope, identifiability_error: error } = await post("methods/dry-run", { method }, ASSESSMENT_MS);
+  const { envelope, identifiability_error: error } = await post("methods/dry-run", withBench({ method }), ASSESSMENT_MS);
   return envelope.design?.messages.map(sentence) ?? [`Not known: ${error}`];
 }
 
 async function fill(method, section, numbers, words) {
   try {
-    const forecast = await post("methods/dry-run", { method, identifiability: false });
+    const forecast = await post("methods/dry-run", withBench({ method, identifiability: false }));
     numbers.replaceChildren(...describeNumbers(forecast));
     if (!section.isConnected) return; // another method was chosen meanwhile
     words.replaceChildren(...(await assess(method)).map((line) => element("li", {}, line)));

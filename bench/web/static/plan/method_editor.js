@@ -1,6 +1,7 @@
 // Editor of a method: form or JSON, preview and forecast after each change, problems beside their fields, storage as a version.
 
 import { get, post, start } from "../common/api.js";
+import { withBench } from "../common/bench.js";
 import { clearPlots } from "../common/axes_plot.js";
 import { assess, describeNumbers } from "./forecast.js";
 import { element, write } from "../common/format.js";
@@ -118,7 +119,7 @@ export class MethodEditor {
     clearTimeout(this.timer);
     const number = (this.checks += 1);
     try {
-      const forecast = await post("methods/dry-run", { method: this.method, identifiability: false });
+      const forecast = await post("methods/dry-run", withBench({ method: this.method, identifiability: false }));
       if (number !== this.checks || this.isClosed) return false; // it was changed or left meanwhile
       this.showProblem("");
       this.showForecast(forecast);

@@ -1,6 +1,7 @@
 // Plan: choose a method, see its strokes and limits, preview motion and drive over time, and forecast the run.
 
 import { get } from "../common/api.js";
+import { benchQuery } from "../common/bench.js";
 import { clearPlots } from "../common/axes_plot.js";
 import { makeForecast } from "./forecast.js";
 import { byId, describeDriveKind, duration, element, fixed, significant, write } from "../common/format.js";
@@ -37,7 +38,7 @@ export class PlanView {
   }
 
   async list() {
-    const methods = (await get("methods")).items.sort((a, b) => a.duration_s - b.duration_s);
+    const methods = (await get(benchQuery("methods"))).items.sort((a, b) => a.duration_s - b.duration_s);
     byId("plan-methods").replaceChildren(...methods.map(({ name, title, duration_s: length, version, obstacle, approved }) => {
       const link = element("a", { href: `#/plan/${encodeURIComponent(name)}` }, element("strong", {}, name),
         ` ${duration(length)}${version > 1 ? `, version ${version}` : ""}${approved ? ", approved" : ""}`);

@@ -1,6 +1,7 @@
 // The stroke that a diagnosis proposes: in words, and as a run of the same method with this stroke at its end.
 
 import { get, post, start } from "../common/api.js";
+import { withBench } from "../common/bench.js";
 import { ask } from "../common/dialogs.js";
 import { forceText, inForceUnit } from "./fit_tables.js";
 import { byId, duration, element, significant, write } from "../common/format.js";
@@ -57,7 +58,7 @@ async function offer(run, segment, text, answer) {
   try {
     write(answer, "Checking the method with this stroke …");
     const method = extendMethod(await findMethod(run), segment);
-    const forecast = await post("methods/dry-run", { method, identifiability: false });
+    const forecast = await post("methods/dry-run", withBench({ method, identifiability: false }));
     write(answer, "");
     if (!(await ask({ title: "Start with this stroke?", texts: describeStart(run, method, text, forecast), action: "Start" }))) return;
     write(answer, "Starting …");
@@ -86,7 +87,7 @@ function describeStart(run, method, text, { envelope, bench }) {
 async function startMethod(run, method) {
   const { name, version } = await post("methods", method);
   const operator = operatorName();
-  await start("runs", { method: name, method_version: version, operator, ...(run.specimen && { specimen: run.specimen }) });
+  await start("runs", withBench({ method: name, method_version: version, operator, ...(run.specimen && { specimen: run.specimen }) }));
   // The next key can stop a run that was started here. The router moves the focus to the title of the view before.
   addEventListener("hashchange", () => byId("stop").focus(), { once: true });
   location.hash = "#/bench";

@@ -1,12 +1,13 @@
 // Actions on a run: files, identification, diagnosis, repair. Each leaves a visible answer beside the run.
 
 import { get, post, remove, saveFile, start } from "../common/api.js";
+import { shownBench } from "../common/bench.js";
 import { selectionAddress } from "../compare/compare_address.js";
 import { ask } from "../common/dialogs.js";
 import { element, instant } from "../common/format.js";
 import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
 import { need } from "../common/rights.js";
-import { runAddress } from "../common/router.js";
+import { addressOf, runAddress } from "../common/router.js";
 
 const encode = encodeURIComponent;
 /** Rights that the buttons need, by the first word of their keys; files need none beyond reading. */
@@ -132,7 +133,7 @@ export class RunActions {
     return this.attempt(run, "Not resumed", async () => {
       const next = await start(`runs/${encode(run.id)}/resume`);
       this.onRun(next);
-      location.hash = "#/bench";
+      location.hash = next.bench && shownBench() ? addressOf(next.bench, "#/bench") : "#/bench";
       return "The run was resumed; the new run continues it.";
     });
   }

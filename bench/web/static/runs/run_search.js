@@ -3,7 +3,7 @@
 import { byId } from "../common/format.js";
 
 const FIELDS = [
-  "text", "specimen", "method", "outcome", "ending", "from", "to", "effect", "parameter", "parameter_min", "parameter_max",
+  "text", "specimen", "bench", "method", "outcome", "ending", "from", "to", "effect", "parameter", "parameter_min", "parameter_max",
 ];
 const DAY_MS = 86_400_000;
 

@@ -1,6 +1,7 @@
 // Table of the runs with outcome, fit, jobs and actions.
 
 import { get } from "../common/api.js";
+import { shownBench } from "../common/bench.js";
 import { byId, duration, element, localTime, write, zone } from "../common/format.js";
 import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, isUnfinished } from "./run_facts.js";
@@ -101,7 +102,7 @@ export class RunList {
     link.dataset.key = `${run.id}/open`;
     return element("tr", {},
       element("td", {}, this.selection.box(run)),
-      element("th", { scope: "row", className: "number" }, link, element("small", {}, run.operator)),
+      element("th", { scope: "row", className: "number" }, link, element("small", {}, run.operator), shownBench() && run.bench ? element("small", {}, `on ${run.bench}`) : null),
       element("td", {}, this.specimen(run), element("small", {}, `${run.method}, ${duration(run.duration_s)}`)),
       element("td", {}, ...describeOutcome(run)),
       element("td", {}, ...describeFit(run), run.diagnosis ? element("small", {}, `Gap ${describeVerdict(run.diagnosis)}`) : null),

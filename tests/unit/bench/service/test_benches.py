@@ -11,6 +11,7 @@ from bench.agent_protocol import AbortCommand, AgentStatus, PauseCommand, Prepar
 from bench.agent_protocol.messages import AgentEvent
 from bench.service.benches import BenchSettings
 from tests.support.audit_trails import list_all
+from tests.support.certificates import make_certificate
 from tests.support.fake_service import FakeAgent
 from tests.support.service_logs import write_complete_log
 from tests.unit.bench.service.test_live import batch, batches, messages, subscribe
@@ -250,6 +251,17 @@ def test_what_depends_on_the_bench_names_it(service, agents):
     assert service.get("/checks/charts?bench=right")["method"] == "zero_check_current"
 
 
+def test_a_certificate_applies_to_the_runs_of_its_bench(service, agents):
+    assert "left, right" in service.post("/certificates", make_certificate(), 409)["detail"]
+    stored = service.post("/certificates?bench=right", make_certificate(), 201)
+    assert (stored["bench"], stored["state"]) == ("right", "valid")
+    for name in NAMES:
+        start(service, name)
+    sent = {name: [one for one in agent.commands if isinstance(one, RunCommand)] for name, agent in agents.items()}
+    named = {name: [one.id for one in commands[0].certificates] for name, commands in sent.items()}
+    assert named == {"left": [], "right": [stored["id"]]}
+
+
 def test_a_repeated_key_starts_one_run_on_its_bench(service, agents):
     key = {"Idempotency-Key": "k-1"}
     for _ in range(2):
@@ -282,9 +294,8 @@ def test_campaigns_of_two_benches_run_at_the_same_time(service, agents):
 
 
 def test_a_trip_of_one_bench_needs_no_further_right_on_another(service, agents):
-    service.post("/users", {"name": "t", "full_name": "T", "role": "technician", "password": "correct horse"}, 201)
     publish(service, agents, left="tripped", right="idle")
-    token = service.post("/tokens", {"name": "t", "role": "technician"}, 201)["token"]
+    token = service.post("/tokens", {"label": "script", "role": "technician", "expires_in_days": 1}, 201)["token"]
     answers = {
         name: service.client.post(f"/api/v1/benches/{name}/reset", headers={"Authorization": f"Bearer {token}"})
         for name in NAMES
@@ -303,8 +314,9 @@ def test_the_trails_of_all_agents_are_imported(service, agents, tmp_path, monkey
         service.start(benches=tuple(BenchSettings(agents[name], name=name) for name in NAMES))
         own = service.data / "audit.jsonl"
         wait_until(lambda: {"local:left", "local:right"} <= {one.actor for one in list_all(own)})
-        chains = [one.source.chain for one in list_all(own) if one.source is not None]
-        assert len(set(chains)) == len(chains) == 2
+        sources = [(one.source.chain, one.source.seq) for one in list_all(own) if one.source is not None]
+        assert len(set(sources)) == len(sources)
+        assert len({chain for chain, _ in sources}) == 2
         service.end()
 
 

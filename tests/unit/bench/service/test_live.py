@@ -174,6 +174,7 @@ def test_health_reports_a_silent_agent(service):
 def test_an_unusable_message_does_not_end_the_subscription(service, caplog, monkeypatch):
     monkeypatch.setattr("bench.service.agent_monitor._RETRY_TIME", 0.001)
     with subscribe(service) as socket:
+        next(messages(socket, "clock"))  # it listens from now on
         service.agent.publish(
             AgentEvent.model_construct(time_ns=object(), kind="alarm", text="of another version")
         )

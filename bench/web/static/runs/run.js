@@ -1,6 +1,7 @@
 // View of one run at an address of its own: facts, results, records and report, the most important first.
 
 import { get } from "../common/api.js";
+import { shownBench } from "../common/bench.js";
 import { byId, duration, element, instant, write } from "../common/format.js";
 import { Replay } from "../live/replay.js";
 import { makeReport } from "./report.js";
@@ -106,7 +107,7 @@ export class RunView {
       Started: [instant(run.started)],
       Duration: [duration(run.duration_s)],
       Operator: [run.operator || "not given"],
-      Source: [run.source === "import" ? "import of a recording made elsewhere" : "run on this bench"],
+      Source: [run.source === "import" ? "import of a recording made elsewhere" : `run on ${(shownBench() && run.bench) || "this bench"}`],
       Outcome: describeOutcome(run),
       "Fit RMSE / noise floor": describeFit(run),
       Diagnosis: [run.diagnosis ? describeVerdict(run.diagnosis) : "–"],

@@ -1,5 +1,6 @@
 """Tables of the catalogue, their migrations, and the scan of logs."""
 
+import json
 import os
 import sqlite3
 from datetime import UTC, datetime, timedelta, timezone
@@ -9,15 +10,17 @@ from alembic import command
 from alembic.autogenerate import compare_metadata
 from alembic.config import Config
 from alembic.migration import MigrationContext
-from sqlalchemy import create_engine
+from sqlalchemy import create_engine, text
 
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.database import make_sqlite_url, open_database
 from bench.catalogue.errors import CatalogueError
 from bench.catalogue.log_summary import is_complete, read_log_summary
 from bench.catalogue.models import Base, JobRow, RunRow
+from bench.catalogue.run_filter import RunFilter
 from bench.catalogue.scan import scan_logs
 from bench.errors import LogError
+from tests.support.certificates import make_certificate
 from tests.support.service_logs import write_complete_log, write_truncated_log
 
 POSTGRES_ONLY = ("newest_values", "texts", "runs_texts", "notes_texts")
@@ -83,6 +86,27 @@ def test_a_catalogue_of_revision_0001_is_opened_and_its_state_renamed(tmp_path):
     job = catalogue.get_job("j")
     assert (job.activity, job.submissions, job.retries, job.inputs) == ("identify", 1, [], {})
     assert catalogue.update_job("j", activity="report").activity == "report"
+    catalogue.close()
+
+
+def test_what_older_catalogues_have_of_the_only_bench_belongs_to_it(tmp_path, catalogue_url):
+    engine = migrate_to(catalogue_url, "0018")
+    at, document = "2026-03-01 10:00:00", json.dumps(make_certificate())
+    certificate = {"id": "c", "version": 1, "channel": "force", "document": document, "created": at,
+                   "created_by": "ada", "reason": ""}  # fmt: skip
+    run = {"id": "a", "method": "quick", "specimen": "", "operator": "", "source": "run", "started": at,
+           "state": "ended", "reason": "", "log": "a.mcap", "tags": "[]", "revision": 0}  # fmt: skip
+    with engine.begin() as connection:
+        for table, row in (("certificates", certificate), ("runs", run)):
+            places = ", ".join(f":{name}" for name in row)
+            connection.execute(text(f"INSERT INTO {table} ({', '.join(row)}) VALUES ({places})"), row)
+    engine.dispose()
+    catalogue = Catalogue(open_database(catalogue_url), tmp_path)
+    today = datetime.now(UTC).date()
+    assert set(catalogue.certificates.list_current(today)) == {"force"}
+    assert catalogue.certificates.list_current(today, "left") == {}
+    assert catalogue.get_run("a").bench is None
+    assert catalogue.list_runs(9, selection=RunFilter(bench="left")) == []
     catalogue.close()
 
 

@@ -40,6 +40,14 @@ def test_an_equal_campaign_is_followed_and_another_one_is_refused(tmp_path):
             find_or_create(store, write(tmp_path / "b.json", seed=4), "B", "agent")
 
 
+def test_campaigns_of_two_benches_do_not_hold_each_other(tmp_path):
+    with open_store(tmp_path / "data", is_created=True) as store:
+        left = find_or_create(store, write(tmp_path / "a.json"), "B", "left")
+        right = find_or_create(store, tmp_path / "a.json", "B", "right")
+        assert [left.bench, right.bench] == ["left", "right"]
+        assert [one.id for one in store.list_in_progress("left")] == [left.id]
+
+
 def test_the_queue_is_edited_and_stopped_by_the_command_line_also_without_a_service(tmp_path, capsys):
     def act(action, **more):
         given = {"note": None, "choice": None, "edit": "", "as_json": True} | more

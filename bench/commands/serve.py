@@ -99,11 +99,11 @@ def serve(
         typer.Option(metavar="FILE", help="oidc.toml of the provider (OpenID Connect) by which persons sign in."),
     ] = None,
 ) -> None:
-    """Serve the REST interface, the live values and the web page, for one bench or for several.
+    """Serve the REST interface, the live values and the web page.
 
-    Starts a rig agent for each bench.toml and one worker, unless their addresses are given. Prints the page's
-    address. A new token is printed on a terminal only; otherwise it is written to the file `token` in the data
-    folder.
+    Serves one bench, or several by name. Starts a rig agent for each bench.toml and one worker, unless their
+    addresses are given. Prints the page's address. A new token is printed on a terminal only; otherwise it is written
+    to the file `token` in the data folder.
     """
     from bench.errors import ConfigError
     from bench.service import BenchPlace, ServeOptions, TlsFiles, parse_benches

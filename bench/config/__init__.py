@@ -1,4 +1,4 @@
-"""Configuration of a bench (``bench.toml``)."""
+"""Configuration of a bench (``bench.toml``), and names of the benches of a service."""
 
 from bench.config.bench_config import (
     CHANNEL_UNITS,
@@ -9,6 +9,14 @@ from bench.config.bench_config import (
     ChannelSection,
     compute_identity,
     load_config,
+)
+from bench.config.bench_names import (
+    BENCHES_FILE,
+    DEFAULT_BENCH,
+    check_bench_name,
+    find_bench,
+    get_executor,
+    write_benches,
 )
 from bench.config.instruments import (
     ActuatorSection,
@@ -22,7 +30,9 @@ from bench.config.instruments import (
 )
 
 __all__ = [
+    "BENCHES_FILE",
     "CHANNEL_UNITS",
+    "DEFAULT_BENCH",
     "ActuatorSection",
     "AgentSection",
     "AsciiLoadCellSection",
@@ -36,6 +46,10 @@ __all__ = [
     "LvdtSection",
     "ModbusSection",
     "ThermometerSection",
+    "check_bench_name",
     "compute_identity",
+    "find_bench",
+    "get_executor",
     "load_config",
+    "write_benches",
 ]

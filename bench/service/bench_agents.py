@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from bench.agent_protocol import AgentClient, AgentEndpoint, Sender, derive_samples_address, find_agent
-from bench.bench_names import DEFAULT_BENCH, check_bench_name
+from bench.config import DEFAULT_BENCH, check_bench_name
 from bench.errors import ConfigError
 from bench.service.agent_monitor import AgentLink, NoAgent
 from bench.service.agent_supervisor import SupervisedAgent

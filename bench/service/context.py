@@ -11,9 +11,9 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from bench.agent_protocol import AgentStatus
-from bench.bench_names import DEFAULT_BENCH
 from bench.campaigns import CampaignStore
 from bench.catalogue import Catalogue, JobRow, RunRow
+from bench.config import DEFAULT_BENCH
 from bench.disk import SpaceMonitor
 from bench.jobs import JobEngine, JobManager
 from bench.log_store import LocalLogs, LogCopier

@@ -9,7 +9,7 @@ from collections.abc import AsyncIterator, Sequence
 from pathlib import Path
 
 from bench.agent_protocol import ShutDownCommand, StatusCommand
-from bench.bench_names import DEFAULT_BENCH
+from bench.config import DEFAULT_BENCH
 from bench.errors import AgentUnreachableError
 from bench.jobs import DaskEngine, SchedulerLocation, start_scheduler
 from bench.processes import MRBENCH_COMMAND, open_privately, terminate

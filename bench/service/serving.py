@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import uvicorn
 
-from bench.bench_names import write_benches
 from bench.catalogue import keep_address, locate_catalogue, open_database
+from bench.config import write_benches
 from bench.folder_lock import hold_lock
 from bench.jobs import JobEngine, get_tls_file, locate_scheduler
 from bench.log_lines import log_to_stderr

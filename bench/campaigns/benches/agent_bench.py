@@ -16,7 +16,6 @@ from bench.agent_protocol import (
     RunStatus,
     StatusCommand,
 )
-from bench.bench_names import DEFAULT_BENCH
 from bench.campaigns.benches.recovery import make_end_report, recover_execution
 from bench.campaigns.benches.results import read_result
 from bench.campaigns.document import Campaign, CampaignError, Step
@@ -30,6 +29,7 @@ from bench.campaigns.engine import (
 )
 from bench.campaigns.store import StoredCampaign
 from bench.catalogue import Catalogue
+from bench.config import DEFAULT_BENCH
 from bench.errors import BenchError, RunError
 from bench.live import LiveBatch
 

@@ -11,7 +11,6 @@ from sqlalchemy import JSON, Engine, Text, func, select
 from sqlalchemy.exc import IntegrityError
 from sqlalchemy.orm import Mapped, Session, mapped_column, sessionmaker
 
-from bench.bench_names import DEFAULT_BENCH
 from bench.calibration import (
     Certificate,
     CertificateState,
@@ -20,6 +19,7 @@ from bench.calibration import (
     find_state,
 )
 from bench.catalogue.models import Base, UtcTime
+from bench.config import DEFAULT_BENCH
 
 
 class CertificateRow(Base):

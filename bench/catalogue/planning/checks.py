@@ -6,11 +6,10 @@ from datetime import UTC, datetime
 from sqlalchemy import ColumnElement, Engine, ForeignKey, Select, Text, delete, func, select
 from sqlalchemy.orm import Mapped, mapped_column, sessionmaker
 
-from bench.bench_names import DEFAULT_BENCH
 from bench.calibration import LatestCheck
 from bench.catalogue.models import Base, RunRow, UtcTime
 from bench.checks import CheckRecord, CheckSeries, CheckValue, ControlChart, describe_latest, make_chart
-from bench.config import ChannelName
+from bench.config import DEFAULT_BENCH, ChannelName
 
 
 class CheckRow(Base):

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import typer
 
-from bench.bench_names import find_bench, get_executor
 from bench.campaigns import (
     CampaignError,
     CampaignStore,
@@ -17,7 +16,7 @@ from bench.campaigns import (
 )
 from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
-from bench.config import load_config
+from bench.config import find_bench, get_executor, load_config
 from bench.folder_lock import is_locked
 
 _POLL_PERIOD = 0.5

@@ -3,9 +3,9 @@
 from datetime import UTC, date, datetime
 from pathlib import Path
 
-from bench.bench_names import DEFAULT_BENCH
 from bench.calibration import CertificateError, IssuedCertificate, read_certificate
 from bench.catalogue import StoredCertificate, find_stored_state, open_catalogue
+from bench.config import DEFAULT_BENCH
 
 
 def add_certificate(path: Path, data: Path, author: str, bench: str = DEFAULT_BENCH) -> str:

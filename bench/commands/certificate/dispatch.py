@@ -42,9 +42,9 @@ def certificate(
         raise typer.BadParameter("give a FILE to add or an ID to withdraw; list takes neither")
     if (action is Action.WITHDRAW) != bool(reason.strip()):
         raise typer.BadParameter("withdraw needs --reason TEXT, and no other action takes it")
-    from bench.bench_names import check_bench_name
     from bench.commands.audit import record
     from bench.commands.certificate.actions import add_certificate, list_certificates, withdraw_certificate
+    from bench.config import check_bench_name
 
     author = f"command:{operator}" if operator else "command"
     if action is Action.ADD:

@@ -4,10 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import get_args
 
-from bench.bench_names import DEFAULT_BENCH
 from bench.catalogue import open_catalogue
 from bench.checks import CheckRecord, ControlChart, compute_records
-from bench.config import ChannelName
+from bench.config import DEFAULT_BENCH, ChannelName
 from bench.errors import BenchError
 from bench.log import read_log
 

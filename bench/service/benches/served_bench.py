@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from bench.bench_names import DEFAULT_BENCH
+from bench.config import DEFAULT_BENCH
 from bench.live import LiveBroadcaster
 from bench.service.agent_monitor import AgentLink, AgentMonitor
 from bench.service.campaigns import CampaignExecutor

@@ -4,7 +4,6 @@ import logging
 from typing import Self
 
 from bench.agent_protocol import Sender, send_as
-from bench.bench_names import get_executor
 from bench.campaigns import (
     AgentBench,
     AgentConnection,
@@ -16,6 +15,7 @@ from bench.campaigns import (
     stop,
 )
 from bench.catalogue import Catalogue
+from bench.config import get_executor
 from bench.log_lines import RepeatedFailure
 from bench.threads import BackgroundThread
 

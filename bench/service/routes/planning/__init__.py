@@ -1,7 +1,6 @@
-"""Routes of planning: methods with their dry runs, specimens, certificates, checks, facts of the bench."""
+"""Routes of planning: methods with their dry runs, specimens, certificates, checks."""
 
 from bench.service.routes.planning import (
-    bench_facts,
     certificates,
     checks,
     dry_runs,
@@ -13,8 +12,6 @@ from bench.service.routes.planning import (
 from bench.service.routes.planning.certificates import describe_calibration
 from bench.service.routes.planning.method_library import find_method
 
-BENCH_ROUTER = bench_facts.router
-"""Routes below the path of a bench."""
 ROUTERS = (
     certificates.router,
     checks.router,
@@ -26,4 +23,4 @@ ROUTERS = (
 )
 """All routers; those with longer paths come first."""
 
-__all__ = ["BENCH_ROUTER", "ROUTERS", "describe_calibration", "find_method"]
+__all__ = ["ROUTERS", "describe_calibration", "find_method"]

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.bench_names import BENCHES_FILE, check_bench_name, find_bench, get_executor, write_benches
+from bench.config import BENCHES_FILE, check_bench_name, find_bench, get_executor, write_benches
 from bench.errors import ConfigError
 
 

@@ -1,18 +1,14 @@
-"""Routes of the benches: their list, and the parts of each; those of an only bench are also below `/bench`."""
+"""Route that lists the benches with their states."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from fastapi import APIRouter, Depends, Path
+from fastapi import APIRouter
 from pydantic import Field
 
 from bench.agent_protocol import AgentStatus
 from bench.service.benches import ServedBench
 from bench.service.context import Context
-from bench.service.routes import bench_control
-from bench.service.routes.planning import BENCH_ROUTER
 from bench.service.views import View
-
-_PARTS = (bench_control.router, BENCH_ROUTER)
 
 
 class BenchSummary(View):
@@ -33,10 +29,10 @@ class BenchList(View):
     items: tuple[BenchSummary, ...]
 
 
-listing = APIRouter(tags=["bench"])
+router = APIRouter(tags=["bench"])
 
 
-@listing.get("/benches")
+@router.get("/benches")
 def list_benches(context: Context) -> BenchList:
     """List the benches with their states; an agent that does not answer delays nothing."""
     return BenchList(items=tuple(_summarise(bench) for bench in context.benches))
@@ -61,20 +57,3 @@ def _describe(status: AgentStatus) -> str:
     if status.step is not None and status.step.outcome == "running":
         return f"{status.state}: {status.step.step}"
     return status.state
-
-
-def _name_bench(name: Annotated[str, Path(description="name of the bench", max_length=100)]) -> None:
-    """Describe the name in the path; `AddressedBench` finds the bench."""
-
-
-def _make_routers() -> tuple[APIRouter, APIRouter]:
-    """Return the routes of the only bench, and the same ones of a named bench."""
-    only, named = APIRouter(), APIRouter()
-    for router in _PARTS:
-        only.include_router(router, prefix="/bench")
-        named.include_router(router, prefix="/benches/{name}", dependencies=[Depends(_name_bench)])
-    return only, named
-
-
-ROUTERS = (listing, *_make_routers())
-"""All routers."""

@@ -102,8 +102,8 @@ def serve(
     """Serve the REST interface, the live values and the web page.
 
     Serves one bench, or several by name. Starts a rig agent for each bench.toml and one worker, unless their
-    addresses are given. Prints the page's address. A new token is printed on a terminal only; otherwise it is written
-    to the file `token` in the data folder.
+    addresses are given. Prints the page's address. A new token is printed on a terminal only; otherwise it is
+    written to the file `token` in the data folder.
     """
     from bench.errors import ConfigError
     from bench.service import BenchPlace, ServeOptions, TlsFiles, parse_benches

@@ -67,11 +67,30 @@ def find_bench(data: Path, config: Path) -> str:
     return found
 
 
+def choose_bench(data: Path, name: str = "") -> str:
+    """Return a bench of the service of a data folder.
+
+    Args:
+        data: data folder.
+        name: name of the bench; empty for the only one.
+
+    Raises:
+        ConfigError: there are several benches and none is named, or there is none with this name.
+    """
+    places = _read_benches(data)
+    if not name and len(places) == 1:
+        return next(iter(places))
+    if name in places:
+        return name
+    fault = f"there is no bench {name!r}" if name else "several benches"
+    raise ConfigError(f"{fault}; the service of {data} has {', '.join(places)}: name one with --bench")
+
+
 def _read_benches(data: Path) -> dict[str, str]:
     path = data / BENCHES_FILE
     try:
         places = json.loads(path.read_text("utf-8"))
-    except FileNotFoundError:  # a service of an older version has one bench
+    except FileNotFoundError:  # before its first start, and of an older version, a service has one bench
         return {DEFAULT_BENCH: ""}
     except (OSError, ValueError) as error:
         raise ConfigError(f"{path}: not readable ({error}); start the service again") from error

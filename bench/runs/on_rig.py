@@ -11,7 +11,7 @@ from bench.agent import Agent, CommandTrail, acquire_agent_lock, handle_command
 from bench.agent_protocol import CommandServer, RunCommand, RunStatus, StopCommand, get_sender, make_endpoint
 from bench.audit import make_agent_trail
 from bench.catalogue import has_catalogue, open_catalogue
-from bench.config import load_config
+from bench.config import find_bench, load_config
 from bench.errors import RunError
 from bench.methods import Method
 from bench.processes import set_on_signals
@@ -73,7 +73,7 @@ def run_on_rig(
             method=document,
             specimen=specimen,
             operator=operator,
-            **_read_catalogue(config.parent / bench_config.rig.folder),
+            **_read_catalogue(config.parent / bench_config.rig.folder, config),
             log=str(out),
         )
         _start(agent, trail, command)
@@ -99,13 +99,18 @@ def _start(agent: Agent, trail: CommandTrail, command: RunCommand) -> None:
         raise RunError(reply.error)
 
 
-def _read_catalogue(data: Path) -> dict[str, Any]:
-    """Return today's certificates and the latest checks from the catalogue of a folder, if it has one."""
+def _read_catalogue(data: Path, config: Path) -> dict[str, Any]:
+    """Return today's certificates and the latest checks of a bench from the catalogue of a folder, if it has one.
+
+    Raises:
+        ConfigError: the service of this folder has several benches, and none of them is this one.
+    """
     if not has_catalogue(data):
         return {}
+    bench = find_bench(data, config)
     with open_catalogue(data) as catalogue:
-        certificates = catalogue.certificates.list_current(datetime.now(UTC).date())
-        return {"certificates": tuple(certificates.values()), "checks": catalogue.checks.list_latest()}
+        certificates = catalogue.certificates.list_current(datetime.now(UTC).date(), bench)
+        return {"certificates": tuple(certificates.values()), "checks": catalogue.checks.list_latest(bench)}
 
 
 @contextlib.contextmanager

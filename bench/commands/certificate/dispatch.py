@@ -31,7 +31,7 @@ def certificate(
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
     bench: Annotated[
         str, typer.Option(metavar="NAME", help="With add: bench that has the channel, if the service has several.")
-    ] = "bench",
+    ] = "",
 ) -> None:
     """Add, list and withdraw calibration certificates.
 
@@ -44,11 +44,11 @@ def certificate(
         raise typer.BadParameter("withdraw needs --reason TEXT, and no other action takes it")
     from bench.commands.audit import record
     from bench.commands.certificate.actions import add_certificate, list_certificates, withdraw_certificate
-    from bench.config import check_bench_name
+    from bench.config import choose_bench
 
     author = f"command:{operator}" if operator else "command"
     if action is Action.ADD:
-        typer.echo(add_certificate(Path(target), data, author, check_bench_name(bench)))
+        typer.echo(add_certificate(Path(target), data, author, choose_bench(data, bench)))
         record(data, "certificate add", target, {}, {"operator": operator})
     elif action is Action.WITHDRAW:
         typer.echo(withdraw_certificate(target, data, author, reason.strip()))

@@ -40,7 +40,7 @@ def check(
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
     bench: Annotated[
         str, typer.Option(metavar="NAME", help="With chart and baseline: bench, if the service has several.")
-    ] = "bench",
+    ] = "",
 ) -> None:
     """Show zero checks and their control charts.
 
@@ -53,14 +53,15 @@ def check(
         raise typer.BadParameter("baseline needs a CHANNEL, show needs a LOG")
     from bench.commands.audit import record
     from bench.commands.check.actions import begin_baseline, describe_charts, describe_log, list_checks
+    from bench.config import choose_bench
 
     if action is Action.LIST:
         typer.echo("\n".join(list_checks(data, target)))
     elif action is Action.CHART:
-        typer.echo("\n".join(describe_charts(data, target, specimen, bench)))
+        typer.echo("\n".join(describe_charts(data, target, specimen, choose_bench(data, bench))))
     elif action is Action.SHOW:
         typer.echo("\n".join(describe_log(Path(target))))
     else:
         author = f"command:{operator}" if operator else "command"
-        typer.echo(begin_baseline(data, target, specimen, author, reason.strip(), bench))
+        typer.echo(begin_baseline(data, target, specimen, author, reason.strip(), choose_bench(data, bench)))
         record(data, "check baseline", target, {}, {"operator": operator, "reason": reason.strip()})

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.config import BENCHES_FILE, check_bench_name, find_bench, get_executor, write_benches
+from bench.config import BENCHES_FILE, check_bench_name, choose_bench, find_bench, get_executor, write_benches
 from bench.errors import ConfigError
 
 
@@ -47,6 +47,18 @@ def test_any_file_means_an_only_bench(tmp_path):
     assert find_bench(tmp_path, tmp_path / "bench.toml") == "bench"
     write_benches(tmp_path, {"left": "/x/left.toml"})
     assert find_bench(tmp_path, tmp_path / "copy.toml") == "left"
+
+
+def test_a_command_names_one_of_several_benches(tmp_path):
+    assert choose_bench(tmp_path) == "bench"
+    write_benches(tmp_path, {"left": "/x/left.toml"})
+    assert choose_bench(tmp_path) == "left"
+    write_benches(tmp_path, {"left": "/x/left.toml", "right": "/x/right.toml"})
+    assert choose_bench(tmp_path, "right") == "right"
+    with pytest.raises(ConfigError, match=r"several benches; .* has left, right: name one with --bench"):
+        choose_bench(tmp_path)
+    with pytest.raises(ConfigError, match=r"there is no bench 'up'; .* has left, right"):
+        choose_bench(tmp_path, "up")
 
 
 def test_a_damaged_file_is_refused(tmp_path):

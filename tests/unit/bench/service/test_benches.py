@@ -320,6 +320,16 @@ def test_the_trails_of_all_agents_are_imported(service, agents, tmp_path, monkey
         service.end()
 
 
+def test_a_request_to_a_bench_is_recorded_with_its_name(service, agents):
+    service.post("/benches/left/stop")
+    service.post("/runs", {**START, "bench": "right"}, 201)
+    own = service.data / "audit.jsonl"
+    wait_until(
+        lambda: ("POST /benches/{name}/stop", "left") in {(one.action, one.target) for one in list_all(own)}
+    )
+    assert {one.new["bench"] for one in list_all(own) if one.action == "POST /runs"} == {"right"}
+
+
 def test_an_altered_trail_names_its_bench(service, agents):
     service.client.app.state.context.audit._imports["right"].obstacle = "the trail was altered"
     assert service.get("/health")["audit"] == "right: the trail was altered"

@@ -105,7 +105,7 @@ def test_a_search_is_continued_page_by_page(service):
         ("parameter=k0&parameter_min=nan", "parameter_min"),
         ("outcome=good", "outcome"),
         ("text=", "text"),
-        ("speciman=damper", "known are before, effect, ending, from"),
+        ("speciman=damper", "known are before, bench, effect, ending, from"),
     ],
 )
 def test_a_wrong_condition_is_refused_with_its_name(service, query, message):

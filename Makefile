@@ -41,12 +41,11 @@ check: $(READY)
 	$(BIN)/pytest -q tests/contracts/test_packages.py
 
 # Tests of processes run in real time: what a busy machine has made late is repeated alone, and named at the end.
-# A third of their time they wait, so three at a time keep two cores busy. Of the tests on wires only two run at a
-# time, because their instruments send in real time. The tests of a file stay together, because they share a bench.
+# The tests of a file on wires stay together, because they share a bench.
 AGAIN := --last-failed --last-failed-no-failures none
 unit: $(READY)
 	@rm -rf $(RESULTS) && mkdir -p $(RESULTS)
-	$(BIN)/pytest -n 3 --junitxml=$(RESULTS)/unit_1.xml $(TEST_OPTIONS) || \
+	$(BIN)/pytest -n 2 --junitxml=$(RESULTS)/unit_1.xml $(TEST_OPTIONS) || \
 		$(BIN)/pytest --junitxml=$(RESULTS)/unit_2.xml $(AGAIN) $(TEST_OPTIONS)
 
 wire: $(READY)

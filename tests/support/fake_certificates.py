@@ -4,7 +4,7 @@ import json
 from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 from weakref import WeakValueDictionary
 
 from fastapi import APIRouter, FastAPI
@@ -13,6 +13,8 @@ from sqlalchemy import StaticPool, create_engine
 from bench.calibration import GAIN_FORMULA, combine_estimates, make_log_text, parse_certificate
 from bench.catalogue import CertificateStore, IdempotencyKeys
 from bench.catalogue.models import Base
+from bench.config import DEFAULT_BENCH
+from bench.service.benches import ServedBench, ServedBenches
 from bench.service.problems import install_handlers
 from bench.service.routes.planning import certificates, checks
 from tests.support.certificates import issue_certificate, make_certificate, shift
@@ -39,8 +41,9 @@ def add_certificate_routes(app: FastAPI, fit: Path) -> None:
     catalogue = SimpleNamespace(
         certificates=store, checks=fill_checks(engine), idempotency_keys=IdempotencyKeys(engine)
     )
-    monitor = SimpleNamespace(describe_bench=describe_bench)
-    app.state.context = SimpleNamespace(catalogue=catalogue, monitor=monitor, key_locks=WeakValueDictionary())
+    only = SimpleNamespace(name=DEFAULT_BENCH, monitor=SimpleNamespace(describe_bench=describe_bench))
+    benches = ServedBenches(cast("list[ServedBench]", [only]))
+    app.state.context = SimpleNamespace(catalogue=catalogue, benches=benches, key_locks=WeakValueDictionary())
     install_handlers(app)
     for router in (certificates.router, checks.router):
         app.include_router(router, prefix="/api/v1")

@@ -114,7 +114,7 @@ def fit_job(run_id: str, state: str, **more: Any) -> dict[str, Any]:
 def run(number: int, outcome: str | None, **more: Any) -> dict[str, Any]:
     """Return a run of the list."""
     return {
-        "id": f"run-{number}", "method": "quick", "specimen": "MR-0042", "operator": "A. Meyer",
+        "id": f"run-{number}", "method": "quick", "specimen": "MR-0042", "operator": "A. Meyer", "bench": "bench",
         "source": "run", "started": f"2025-03-04T09:{10 + number}:30Z", "duration_s": 14.0, "state": "ended",
         "ending": None, "outcome": outcome, "reason": "", "log": "", "progress": None, "rmse_n": None,
         "noise_floor_n": None, "result": "", "jobs": [], "continues": None, "log_sha256": None, "integrity": None,

@@ -11,7 +11,7 @@ from concurrent.futures import ProcessPoolExecutor
 from typing import NamedTuple
 
 from benchmarks.accuracy.drawn_effects import Case, draw_case
-from benchmarks.common.drawn_table import list_seeds, make_parser
+from benchmarks.common.drawn_table import list_seeds, make_parser, run_trial
 from identification.damper.effects import EFFECTS, Place, Variable
 from identification.documents import Diagnosis
 from identification.gap import diagnose
@@ -27,6 +27,7 @@ _SAME_PLACE: dict[Place, Place] = {"field": "drive"}
 """Before and behind the lag of the coil, which only its transients tell apart."""
 _CLOSED = 0.8
 """Part of the gap that a discovery should close."""
+COLUMNS = ("case", "error of the law over the floor", "verdict", "found", "formula", "closed", "right")
 _VISIBLE = 1.05
 """Smallest error of the law alone over the noise floor at which there is something to find."""
 
@@ -115,19 +116,9 @@ def format_row(o: Outcome) -> str:
 def main() -> None:
     """Print every case and the summary; also write them to a page."""
     options = make_parser(__doc__, "recordings", 40).parse_args()
-    lines = ["| case | error of the law over the floor | verdict | found | formula | closed | right |"]
-    lines.append("| --- | --- | --- | --- | --- | --- | --- |")
-    print("\n".join(lines), flush=True)
-    outcomes = []
+    jobs = [(seed, n) for n, seed in enumerate(list_seeds(options))]
     with ProcessPoolExecutor(options.jobs) as pool:
-        for outcome in pool.map(try_case, [(s, n) for n, s in enumerate(list_seeds(options))]):
-            outcomes.append(outcome)
-            lines.append(format_row(outcome))
-            print(lines[-1], flush=True)
-    summary = format_summary(outcomes)
-    print("\n".join(summary))
-    if options.out:
-        options.out.write_text("\n".join([*summary, "", *lines]) + "\n", "utf-8")
+        run_trial(COLUMNS, pool.map(try_case, jobs), format_row, format_summary, options.out)
 
 
 if __name__ == "__main__":

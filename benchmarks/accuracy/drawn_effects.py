@@ -8,10 +8,12 @@ of functions of their effect (`benchmarks.common.drawn_forms`), so that no list 
 that of the identification: only the forms are independent of it, not the integrator.
 """
 
+import argparse
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from itertools import cycle
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,7 +23,7 @@ from benchmarks.accuracy.noise_floor import SIZES, Size, draw_damper
 from benchmarks.accuracy.null_verdicts import DRIVES, RATE, STROKES, make_strokes
 from benchmarks.common.drawn_forms import DRAWN_EFFECTS, DrawnForm, draw_form
 from benchmarks.common.drawn_noise import RELATIVE_NOISE, SPECTRA, draw_noise, make_stretch, round_to
-from benchmarks.common.drawn_table import list_seeds, make_parser
+from benchmarks.common.drawn_table import list_seeds, make_parser, run_trial
 from identification.arrays import Array
 from identification.damper import Coordinates, DamperSize
 from identification.damper.effects import EFFECTS, Stage
@@ -33,6 +35,7 @@ from identification.simulate import ActiveEffect, Excitation, SimulationModel, s
 
 KINDS = ("none", "one", "one", "one", "two", "unknown")
 """Kinds of cases, in turn."""
+COLUMNS = ("case", "error of the law over the floor", "verdict", "named", "stage", "with them", "right")
 SMALLEST_CHANGE, LARGEST_CHANGE = 2.0, 30.0
 """Change of the force by an effect, over the noise [1]; a refit of the law removes a part of it."""
 UNKNOWN_CAUSES: dict[str, Stage] = {
@@ -86,8 +89,12 @@ class Outcome(NamedTuple):
 
 
 def try_case(job: tuple[int, str]) -> Outcome:
-    """Draw, record and diagnose one case of a kind; a refused recording is a wrong answer."""
-    case = draw_case(*job)
+    """Draw, record and diagnose one case of a kind."""
+    return diagnose_case(draw_case(*job))
+
+
+def diagnose_case(case: Case) -> Outcome:
+    """Diagnose a case and judge the answer; a refused recording is a wrong one."""
     try:
         return judge(case, diagnose([case.recording]).diagnosis)
     except IdentificationError:
@@ -252,26 +259,19 @@ def format_row(o: Outcome) -> str:
     )
 
 
-def main() -> None:
-    """Print every case and the summary; also write them to a page."""
-    parser = make_parser(__doc__, "recordings", 60)
+def read_options(description: str | None, count: int) -> tuple[argparse.Namespace, list[tuple[int, str]]]:
+    """Return the options of the command line, and the seed and kind of each case; ``count`` cases by default."""
+    parser = make_parser(description, "recordings", count)
     parser.add_argument("--kinds", default=",".join(KINDS), help="kinds of cases, in turn")
     options = parser.parse_args()
-    kinds = options.kinds.split(",")
-    jobs = [(seed, kinds[n % len(kinds)]) for n, seed in enumerate(list_seeds(options))]
-    lines = ["| case | error of the law over the floor | verdict | named | stage | with them | right |"]
-    lines.append("| --- | --- | --- | --- | --- | --- | --- |")
-    print("\n".join(lines), flush=True)
-    outcomes = []
+    return options, list(zip(list_seeds(options), cycle(options.kinds.split(",")), strict=False))
+
+
+def main() -> None:
+    """Print every case and the summary; also write them to a page."""
+    options, jobs = read_options(__doc__, 60)
     with ProcessPoolExecutor(options.jobs) as pool:
-        for outcome in pool.map(try_case, jobs):
-            outcomes.append(outcome)
-            lines.append(format_row(outcome))
-            print(lines[-1], flush=True)
-    summary = format_summary(outcomes)
-    print("\n".join(summary))
-    if options.out:
-        options.out.write_text("\n".join([*summary, "", *lines]) + "\n", "utf-8")
+        run_trial(COLUMNS, pool.map(try_case, jobs), format_row, format_summary, options.out)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,11 @@
 """Command line and table of a benchmark that draws its cases at random."""
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeVar
+
+Outcome = TypeVar("Outcome")
 
 
 def make_parser(description: str | None, count: str, default: int) -> argparse.ArgumentParser:
@@ -35,6 +38,31 @@ def print_table(columns: Sequence[str], rows: Iterable[str], page: Path | None) 
         lines.append(line)
     if page:
         page.write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def run_trial(
+    columns: Sequence[str],
+    outcomes: Iterable[Outcome],
+    format_row: Callable[[Outcome], str],
+    format_summary: Callable[[Sequence[Outcome]], list[str]],
+    page: Path | None,
+) -> None:
+    """Print a table row by row as the outcomes are ready, then their summary; also write both to a page."""
+    known: list[Outcome] = []
+
+    def format_rows() -> Iterator[str]:
+        for outcome in outcomes:
+            known.append(outcome)
+            yield format_row(outcome)
+
+    lines = []
+    for line in _make_lines(columns, format_rows()):
+        print(line, flush=True)
+        lines.append(line)
+    summary = format_summary(known)
+    print("\n".join(summary))
+    if page:
+        page.write_text("\n".join([*summary, "", *lines]) + "\n", "utf-8")
 
 
 def _make_lines(columns: Sequence[str], rows: Iterable[str]) -> Iterable[str]:

@@ -1,3 +1,3 @@
-"""Diagnoses of recordings from a simulator that shares no equation and no code with the product."""
+"""Diagnoses of recordings from a simulator that shares no code with the product's, only the law of the damper."""
 
 __all__: list[str] = []

@@ -15,7 +15,7 @@ from benchmarks.independent.rig import FieldMap, Rig, follow_with_play
 from benchmarks.independent.strokes import Strokes
 from identification.damper.effects import Stage
 
-_NOMINAL_STEPS = 1.0
+_STIFFEST = 0.7
 """Largest stiffness of a mounting times the step, over the damping behind it [1]: the integration stays stable."""
 
 
@@ -149,7 +149,7 @@ def _mount(rig: Rig, s: Scales, **changes: float) -> Rig:
     """Return the rig with a mounting that is not too stiff for the step."""
     plant = rig.plant._replace(**changes)
     damping = min(plant.c0_base, plant.c0_base + s.drive * plant.c0_slope)
-    stiffest = 0.7 * _NOMINAL_STEPS * damping / s.strokes.step
+    stiffest = _STIFFEST * damping / s.strokes.step
     return replace(rig, plant=plant._replace(mount_stiffness=min(plant.mount_stiffness, stiffest)))
 
 

@@ -1,7 +1,8 @@
 """Damper, its effects and its mounting as ordinary differential equations, by the classical Runge-Kutta method.
 
-Nothing of the product is imported: equations, forms of the effects and integration are written again, so that an
-error in the product's simulation cannot hide in both. The step is fixed, and far shorter than a sample.
+Nothing of the product is imported. The law is the same; its code, the forms of the effects and the integration are
+others, so that an error of the product's simulation is not made twice. The step is fixed, and far shorter than a
+sample.
 """
 
 import math

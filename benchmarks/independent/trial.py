@@ -1,4 +1,4 @@
-"""Diagnoses of recordings from an independent simulator: its own equations, integration, effects and methods.
+"""Diagnoses of recordings from an independent simulator: its own integration, effects and methods.
 
     python -m benchmarks.independent.trial [--recordings 30] [--seed 1] [--kinds one,none] [--out PAGE.md]
 
@@ -18,16 +18,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.accuracy.drawn_effects import KINDS, Case, Outcome, format_row, format_summary, judge
+from benchmarks.accuracy.drawn_effects import (
+    COLUMNS,
+    Case,
+    Outcome,
+    diagnose_case,
+    format_row,
+    format_summary,
+    read_options,
+)
 from benchmarks.common import run_mrbench
 from benchmarks.common.drawn_noise import SPECTRA, draw_noise, round_to
-from benchmarks.common.drawn_table import list_seeds, make_parser
+from benchmarks.common.drawn_table import run_trial
 from benchmarks.independent.causes import KNOWN, UNKNOWN, Cause, Scales
 from benchmarks.independent.plant import Array, Plant
 from benchmarks.independent.rig import Rig
 from benchmarks.independent.strokes import METHODS, Strokes, draw_strokes
 from identification.damper.effects import EFFECTS
-from identification.gap import diagnose
 from identification.logs import load
 
 _FORCES = (4.0, 9e4)
@@ -62,8 +69,7 @@ class _Drawn(NamedTuple):
 
 def try_case(job: tuple[int, str], folder: Path) -> Outcome:
     """Draw, record, import and diagnose one case of a kind."""
-    case = record_case(*job, folder)
-    return judge(case, diagnose([case.recording]).diagnosis)
+    return diagnose_case(record_case(*job, folder))
 
 
 def record_case(seed: int, kind: str, folder: Path) -> Case:
@@ -179,24 +185,10 @@ def _write_log(log: Path, drawn: _Drawn, rig: Rig, noise: _Noise, random: np.ran
 
 def main() -> None:
     """Print every case and the summary; also write them to a page."""
-    parser = make_parser(__doc__, "recordings", 30)
-    parser.add_argument("--kinds", default=",".join(KINDS), help="kinds of cases, in turn")
-    options = parser.parse_args()
-    kinds = options.kinds.split(",")
-    jobs = [(seed, kinds[n % len(kinds)]) for n, seed in enumerate(list_seeds(options))]
-    lines = ["| case | error of the law over the floor | verdict | named | stage | with them | right |"]
-    lines.append("| --- | --- | --- | --- | --- | --- | --- |")
-    print("\n".join(lines), flush=True)
-    outcomes = []
+    options, jobs = read_options(__doc__, 30)
     with TemporaryDirectory() as folder, ProcessPoolExecutor(options.jobs) as pool:
-        for outcome in pool.map(partial(try_case, folder=Path(folder)), jobs):
-            outcomes.append(outcome)
-            lines.append(format_row(outcome))
-            print(lines[-1], flush=True)
-    summary = format_summary(outcomes)
-    print("\n".join(summary))
-    if options.out:
-        options.out.write_text("\n".join([*summary, "", *lines]) + "\n", "utf-8")
+        outcomes = pool.map(partial(try_case, folder=Path(folder)), jobs)
+        run_trial(COLUMNS, outcomes, format_row, format_summary, options.out)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ model.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from identification.noise.spectrum import (
     make_spectrum,
 )
 from identification.noise.time_scales import ScaleVariance, average_scales
+from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 from identification.noise.window_fit import CycleFit, WindowFit
 from identification.signals import Motion
 from identification.threads import use_one_thread
@@ -74,6 +76,11 @@ class NoiseFloorEstimate:
         if not self.is_known:
             return 0.0
         return max(1.0 - (self.high_frequency / max(self.noise, 1e-300)) ** 2, 0.0)
+
+    @cached_property
+    def whitening(self) -> WhiteningFilter:
+        """Filter that makes the noise white; of one tap where its colour is not known."""
+        return design_whitening_filter(self.scales, self.high_frequency)
 
     def compute_chance(self, samples: int) -> float:
         """Return the standard deviation of the mean square of some samples of noise, over its variance [1]."""

@@ -45,27 +45,27 @@ def design_whitening_filter(scales: Sequence[ScaleVariance], white: float) -> Wh
         scales: variances of the noise; without any, the noise is white.
         white: standard deviation of its white part [N], from high frequencies.
     """
-    coloured = [s for s in scales if abs(s.variance - white**2 / (2.0 * s.samples)) > _DEVIATIONS * s.deviation]
-    if not coloured or min(s.variance for s in scales) <= 0.0 or white == 0.0:
+    samples, variance, deviation = (np.array([s[k] for s in scales], float) for k in range(3))
+    white_variance = white**2 / (2.0 * samples)
+    is_coloured = np.abs(variance - white_variance) > _DEVIATIONS * deviation
+    if not is_coloured.any() or variance.min() <= 0.0 or white == 0.0:
         return WhiteningFilter(np.ones(1), white)
-    level = _fit_spectrum(scales, coloured, white)
+    level = _fit_spectrum(samples, np.where(is_coloured, variance, white_variance))
     cepstrum = np.fft.irfft(-0.5 * np.log(level))
     folded = np.concatenate([cepstrum[:1], 2.0 * cepstrum[1 : _GRID // 2], cepstrum[_GRID // 2 : _GRID // 2 + 1]])
     taps = np.fft.irfft(np.exp(np.fft.rfft(folded, _GRID)))
-    count = min(_TAPS_PER_SCALE * coloured[-1].samples, _GRID // 2)
+    count = min(_TAPS_PER_SCALE * int(samples[is_coloured][-1]), _GRID // 2)
     return WhiteningFilter(taps[:count] / taps[0], 1.0 / float(taps[0]))
 
 
-def _fit_spectrum(scales: Sequence[ScaleVariance], coloured: Sequence[ScaleVariance], white: float) -> Array:
-    """Return the power (_GRID // 2 + 1,) [N²] of noise with these variances.
+def _fit_spectrum(samples: Array, variance: Array) -> Array:
+    """Return the power (_GRID // 2 + 1,) [N²] of noise with variances (S,) [N²] at scales (S,) [samples].
 
     It is interpolated between one frequency for each scale. A scale also contains a part of its neighbours'
     frequencies, so the power at all of them is corrected until the variances are right.
     """
-    variance = np.array([s.variance if s in coloured else white**2 / (2.0 * s.samples) for s in scales])
-    samples = np.array([s.samples for s in scales])
     grid = np.asarray(np.fft.rfftfreq(_GRID)[1:], float)
-    gains = np.array([compute_gain(grid, m) for m in samples])
+    gains = np.array([compute_gain(grid, int(m)) for m in samples])
     # Half of the variance at a scale of m samples is above and half below this frequency, if the noise is white.
     middle = np.log(1.0 / (2.0**1.5 * samples))
     power = 2.0 * samples * variance

@@ -64,7 +64,7 @@ class ServedBenches:
 
     def list_statuses(self) -> tuple[AgentStatus | None, ...]:
         """Return the present status of each bench; None for one whose agent does not answer."""
-        return tuple(bench.monitor.latest_status for bench in self)
+        return tuple(self.find_statuses().values())
 
     def find_statuses(self) -> dict[str, AgentStatus | None]:
         """Return the present status by bench; None for one whose agent does not answer."""

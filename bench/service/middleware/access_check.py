@@ -70,7 +70,7 @@ def _may_be_tripped(scope: Scope, name: str | None) -> bool:
     """Return whether the trip of a bench may be latched; without a name the only bench is meant."""
     context: ServiceContext = scope["app"].state.context
     bench = context.benches.find(name)
-    if bench is None:  # the route says so
+    if bench is None:  # the route refuses the request
         return False
     status = bench.monitor.latest_status
     return status is None or status.state == "tripped"  # an unknown state may be a trip

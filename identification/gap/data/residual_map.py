@@ -3,6 +3,7 @@
 The gap of a part of the recording is the mean square of its residual beyond the variance of the noise floor.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,13 +48,20 @@ class Residual:
     rates: tuple[tuple[int, float], ...]
     """Number of samples and rate [Hz] of each stretch."""
 
+    @property
+    def parts(self) -> Iterator[tuple[slice, float]]:
+        """Samples and rate [Hz] of each stretch."""
+        start = 0
+        for count, rate in self.rates:
+            yield slice(start, start + count), rate
+            start += count
+
     def whiten(self, whitening: WhiteningFilter) -> "Residual":
         """Return the residual behind a filter; samples that are not valid count as zero before it."""
         if len(whitening.taps) == 1:
             return self
-        known, parts = np.where(self.valid, self.values, 0.0), np.cumsum([count for count, _ in self.rates])[:-1]
-        values = np.concatenate([whitening.apply(part) for part in np.split(known, parts)])
-        return replace(self, values=values)
+        known = np.where(self.valid, self.values, 0.0)
+        return replace(self, values=np.concatenate([whitening.apply(known[part]) for part, _ in self.parts]))
 
 
 def map_gap(residual: Residual, cycles: Cycles, floor: float) -> list[GapMapEntry]:
@@ -160,13 +168,8 @@ def _fit_slope(times: Array, values: Array, weights: Array) -> float:
 
 def find_strongest_line(residual: Residual) -> tuple[float | None, float]:
     """Return frequency [Hz] and amplitude [N] of the strongest line of any stretch; (None, 0) without one."""
-    start = 0
-    best: tuple[float | None, float] = (None, 0.0)
-    for count, rate in residual.rates:
-        line = _find_line(residual.values[start : start + count], rate)
-        best = max(best, line, key=lambda frequency_and_amplitude: frequency_and_amplitude[1])
-        start += count
-    return best
+    lines = (_find_line(residual.values[part], rate) for part, rate in residual.parts)
+    return max(lines, key=lambda frequency_and_amplitude: frequency_and_amplitude[1], default=(None, 0.0))
 
 
 def _find_line(values: Array, rate: float) -> tuple[float | None, float]:

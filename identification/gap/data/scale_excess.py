@@ -54,9 +54,8 @@ def _compute_excess(residual: Residual, scale: ScaleVariance, input_square: floa
 
 def _measure_scale(residual: Residual, samples: int) -> tuple[float, int]:
     """Return the variance of a residual at a scale [N²] and the number of differences within its recordings."""
-    total, count, start = 0.0, 0, 0
-    for length, _ in residual.rates:
-        part = slice(start, start + length)
+    total, count = 0.0, 0
+    for part, _ in residual.parts:
         variance, differences = measure_scale_variance(residual.values[part], residual.valid[part], samples)
-        total, count, start = total + variance * differences, count + differences, start + length
+        total, count = total + variance * differences, count + differences
     return total / max(count, 1), count

@@ -21,7 +21,7 @@ from identification.gap.data import (
 from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
-from identification.noise import NoiseFloorEstimate, WhiteningFilter, design_whitening_filter
+from identification.noise import NoiseFloorEstimate
 
 _NORMAL_95 = 1.96
 """Half the width of a 95 % interval [standard deviations]."""
@@ -63,11 +63,6 @@ class NoiseModel:
     def highest_floor(self) -> float:
         """Upper end of the floor's 95 % interval [N]; the floor itself where no cycles repeat."""
         return math.hypot(self.estimate.get_interval(self.noise)[1], self.input_noise or 0.0)
-
-    @property
-    def whitening(self) -> WhiteningFilter:
-        """Filter that makes the noise of the force white; of one tap where its colour is not known."""
-        return design_whitening_filter(self.estimate.scales, self.estimate.high_frequency)
 
     def compute_highest_rmse(self, samples: int) -> float:
         """Return the RMSE [N] that noise alone hardly exceeds on some samples.

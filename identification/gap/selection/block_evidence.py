@@ -33,11 +33,9 @@ def count_independent_samples(residual: Residual, block_length: float) -> float:
     Use it where the residual is the error of a model, not noise. It is never below the number that holds between
     confusable effects.
     """
-    times, weights, start = [], [], 0
-    for count, rate in residual.rates:
-        part = slice(start, start + count)
+    times, weights = [], []
+    for part, rate in residual.parts:
         values = np.where(residual.valid[part], residual.values[part], 0.0)
-        start += count
         if values.any():
             times.append(compute_correlation_length(values) / rate)
             weights.append(float(values @ values))

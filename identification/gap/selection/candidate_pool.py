@@ -239,7 +239,7 @@ class CandidatePool:
 
         Block evidence compares errors with white noise. Slow noise would hide a faster error that is certain.
         """
-        return candidate.residual.whiten(self.noise_model.whitening)
+        return candidate.residual.whiten(self.noise_model.estimate.whitening)
 
     def compute_evidence(self, before: Candidate, after: Candidate) -> float:
         """Compute the block evidence for one candidate over another on all samples."""
@@ -252,7 +252,7 @@ class CandidatePool:
 
     def bound_evidence(self, candidate: Candidate) -> float:
         """Compute the block evidence for a candidate at the noise floor over a known one."""
-        floor = math.hypot(self.noise_model.whitening.deviation, self.noise_model.input_noise or 0.0)
+        floor = math.hypot(self.noise_model.estimate.whitening.deviation, self.noise_model.input_noise or 0.0)
         return bound_evidence(self.whiten(candidate), floor, self.block_length)
 
     def fit_fully(self, names: frozenset[str]) -> None:

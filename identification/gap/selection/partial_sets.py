@@ -82,10 +82,8 @@ def compute_partial_posterior(pool: CandidatePool) -> Posterior:
         [
             compute_log_prior(n)
             + math.log(weights[n])
-            + compute_evidence(
-                before, pool.select_held_out(pool.candidates[n].residual), pool.block_length, samples
-            )
-            for n in names
+            + compute_evidence(before, after, pool.block_length, samples)
+            for n, after in held_out.items()
         ]
     )
     shares = normalise_scores(scores)

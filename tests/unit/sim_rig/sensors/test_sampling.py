@@ -9,7 +9,7 @@ from scipy import signal
 from sim_rig.scenario import ChannelFault
 from sim_rig.sensors.channels import compute_true_values, read_channel
 from sim_rig.sensors.faults import apply_channel_faults
-from sim_rig.sensors.sampling import apply_filter, interpolate_cubic, sample_held
+from sim_rig.sensors.sampling import apply_filter, design_low_pass, interpolate_cubic, sample_held
 
 CUBE = np.arange(6.0) ** 3
 
@@ -81,3 +81,13 @@ def test_a_filter_in_parts_has_the_output_of_scipy():
     expected, _ = signal.lfilter(b, a, values, zi=state)
     parts = [apply_filter(b, a, part, state) for part in (values[:7], values[7:8], values[8:])]
     assert np.concatenate(parts) == pytest.approx(expected, abs=1e-14)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("share", [0.04, 0.3])
+def test_a_low_pass_has_the_coefficients_of_scipy(order, share):
+    analogue = signal.butter(order, 2 * np.pi * share * 1e3, analog=True)
+    numerator, denominator, _ = signal.cont2discrete(analogue, 1e-3, method="foh")
+    b, a = design_low_pass(order, share * 1e3, 1e-3)
+    assert b == pytest.approx(np.ravel(numerator), abs=1e-12)
+    assert a == pytest.approx(denominator, abs=1e-12)

@@ -128,7 +128,9 @@ def diagnose_prepared(
         search_forward(pool)
         pool.progress = enter_stage(progress, "compare", 2, _STAGE_COUNT)
         regression = ResidualRegression(evaluation, pool.floor)
-        settle_unknown_floor(pool.noise_model, pool.candidates.values(), regression, pool.block_length)
+        candidates = pool.candidates.values()
+        if settle_unknown_floor(pool.noise_model, candidates, regression, pool.block_length, pool.evaluate):
+            pool.update_residuals()
         posterior = compare_with_curves(pool, compute_final_posterior(pool))
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None
         notes = [*prepared.notes, *pool.notes]

@@ -1,7 +1,12 @@
 """Noise of the recorded force: its floor, with an interval, from the recording alone."""
 
 from identification.noise.noise_floor import NoiseFloorEstimate, estimate_floor
-from identification.noise.time_scales import ScaleVariance, list_scales, measure_scale_variance
+from identification.noise.time_scales import (
+    ScaleVariance,
+    estimate_slow_variance,
+    list_scales,
+    measure_scale_variance,
+)
 from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 
 __all__ = [
@@ -10,6 +15,7 @@ __all__ = [
     "WhiteningFilter",
     "design_whitening_filter",
     "estimate_floor",
+    "estimate_slow_variance",
     "list_scales",
     "measure_scale_variance",
 ]

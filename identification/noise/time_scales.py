@@ -10,11 +10,16 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import nnls
 
 from identification.arrays import Array, BoolArray
 
 _FEWEST_DIFFERENCES = 8
 """Smallest number of separate differences in a signal for a variance at a scale."""
+_SLOW_SCALES = 4
+"""Number of the longest scales that determine slow noise: about a decade of the frequency."""
+_ITERATIONS = 10
+"""Steps of their fit, each with the weights of the step before."""
 
 
 class ScaleVariance(NamedTuple):
@@ -77,3 +82,23 @@ def average_scales(
         )
         for same in zip(*parts, strict=False)
     )
+
+
+def estimate_slow_variance(scales: Sequence[ScaleVariance]) -> float:
+    """Return the variance of 1/f noise in each factor e of the frequency [N²], from the longest scales.
+
+    White noise has half of the variance of each scale at the next longer one. 1/f noise has the same at all, and
+    each scale contains one octave.
+    """
+    slowest = scales[-_SLOW_SCALES:]
+    if not slowest or min(s.variance for s in slowest) <= 0.0:
+        return 0.0
+    variance = np.array([s.variance for s in slowest])
+    columns = np.array([[slowest[0].samples / s.samples, 1.0] for s in slowest])
+    relative, level = np.array([s.deviation / s.variance for s in slowest]), variance
+    for _ in range(_ITERATIONS):
+        # A variance that is small by chance also has a small standard deviation, so that of the fit counts.
+        weights = 1.0 / (relative * level)
+        parts = nnls(columns * weights[:, None], variance * weights)[0]
+        level = columns @ parts
+    return float(parts[1]) / math.log(2.0)

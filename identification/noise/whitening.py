@@ -19,6 +19,11 @@ _TAPS_PER_SCALE = 8
 """Length of the filter over the longest scale [1]."""
 _CORRECTIONS = 8
 """Corrections of the power at the frequencies between which the spectrum is interpolated."""
+_LARGEST_CORRECTION = 2.0
+"""Largest factor of all corrections, either way [1]; a variance that is small by chance would demand more.
+
+Origin: 0.45 to 1.9 on 100 series of five spectra, 8 and 60 seconds long at 1 kHz.
+"""
 _DEVIATIONS = 2.0
 """Standard deviations by which the spectrum differs from that of white noise where it is taken for coloured."""
 
@@ -50,7 +55,9 @@ def design_whitening_filter(scales: Sequence[ScaleVariance], white: float) -> Wh
     is_coloured = np.abs(variance - white_variance) > _DEVIATIONS * deviation
     if not is_coloured.any() or variance.min() <= 0.0 or white == 0.0:
         return WhiteningFilter(np.ones(1), white)
-    level = _fit_spectrum(samples, np.where(is_coloured, variance, white_variance))
+    # Where the slowest scales are too uncertain to tell, the spectrum goes on as at the last certain one.
+    known = slice(np.flatnonzero(is_coloured)[-1] + 1)
+    level = _fit_spectrum(samples[known], np.where(is_coloured, variance, white_variance)[known])
     cepstrum = np.fft.irfft(-0.5 * np.log(level))
     folded = np.concatenate([cepstrum[:1], 2.0 * cepstrum[1 : _GRID // 2], cepstrum[_GRID // 2 : _GRID // 2 + 1]])
     taps = np.fft.irfft(np.exp(np.fft.rfft(folded, _GRID)))
@@ -68,8 +75,9 @@ def _fit_spectrum(samples: Array, variance: Array) -> Array:
     gains = np.array([compute_gain(grid, int(m)) for m in samples])
     # Half of the variance at a scale of m samples is above and half below this frequency, if the noise is white.
     middle = np.log(1.0 / (2.0**1.5 * samples))
-    power = 2.0 * samples * variance
+    first = power = 2.0 * samples * variance
     for _ in range(_CORRECTIONS):
         level = np.exp(np.interp(np.log(grid), middle[::-1], np.log(power)[::-1]))
-        power = power * variance / (gains @ level / len(grid))
+        corrected = power * variance / (gains @ level / len(grid))
+        power = np.clip(corrected, first / _LARGEST_CORRECTION, first * _LARGEST_CORRECTION)
     return np.concatenate([level[:1], level])

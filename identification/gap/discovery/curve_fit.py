@@ -172,7 +172,7 @@ def _replace_law(problem: Problem, unknowns: Array, law: Array) -> Array:
 def _evaluate_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, fit: JointFit) -> FittedCurve:
     """Return a fitted curve with its block evidence over the set without it."""
     candidate = pool.evaluate(fit)
-    return FittedCurve(curve, candidate, parent, pool.compute_held_out_evidence(parent, candidate))
+    return FittedCurve(curve, candidate, parent, pool.comparison.compute_held_out_evidence(parent, candidate))
 
 
 def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:

@@ -80,7 +80,9 @@ def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
     cause = _name_cause(pool, best) if best else None
     if best is None or cause is None:
         return posterior
-    evidence = BlockEvidence(names, pool.compute_held_out_evidence(pool.candidates[names], best.candidate))
+    evidence = BlockEvidence(
+        names, pool.comparison.compute_held_out_evidence(pool.candidates[names], best.candidate)
+    )
     pool.curve = CurveAlternative(cause, best.candidate, evidence)
     pool.fit_most_probable_set(CandidatePool.compute_posterior)
     return pool.compute_posterior()

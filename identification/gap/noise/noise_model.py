@@ -21,7 +21,7 @@ from identification.gap.data import (
 from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
-from identification.noise import NoiseFloorEstimate
+from identification.noise import NoiseFloorEstimate, estimate_slow_variance
 
 _NORMAL_95 = 1.96
 """Half the width of a 95 % interval [standard deviations]."""
@@ -122,7 +122,10 @@ class NoiseModel:
         residual = candidate.residual
         values = residual.values[residual.valid]
         square = max(float(np.mean(values**2)) - (self.input_noise or 0.0) ** 2, self.noise**2)
-        estimate = replace(self.estimate, noise=math.sqrt(square), scales=measure_residual_scales(residual))
+        scales = measure_residual_scales(residual)
+        estimate = replace(
+            self.estimate, noise=math.sqrt(square), scales=scales, slow_variance=estimate_slow_variance(scales)
+        )
         deviation = 0.5 * estimate.noise * estimate.compute_chance(len(values))
         ratio = estimate.noise / self.estimate.high_frequency
         basis = (

@@ -8,12 +8,12 @@ few blocks.
 """
 
 import math
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import numpy as np
 
 from identification.gap.data import Residual, compute_block_squares
-from identification.gap.fits import EXPLAINED_RATIO, Candidate
+from identification.gap.fits import EXPLAINED_RATIO, Candidate, JointFit
 from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
 from identification.noise import NoiseFloorEstimate
@@ -23,9 +23,13 @@ _CHANCE_DEVIATIONS = 4.0
 
 
 def settle_unknown_floor(
-    noise_model: NoiseModel, candidates: Collection[Candidate], regression: ResidualRegression, block_length: float
-) -> None:
-    """Take the floor from the smallest set of effects whose residual is noise; change nothing if there is none.
+    noise_model: NoiseModel,
+    candidates: Collection[Candidate],
+    regression: ResidualRegression,
+    block_length: float,
+    evaluate: Callable[[JointFit], Candidate],
+) -> bool:
+    """Take the floor from the smallest set of effects whose residual is noise; return False if there is none.
 
     White noise needs no such estimate: a set that reaches the noise at high frequencies shows it.
 
@@ -34,18 +38,21 @@ def settle_unknown_floor(
         candidates: the fitted sets, the law included.
         regression: regression on their residuals on held-out strokes.
         block_length: length of a block [s], part of a stroke.
+        evaluate: computes the residual of a fit; a drift that slow noise explains is then a part of it.
     """
     if noise_model.estimate.is_known:
-        return
+        return False
     lowest = regression.find_explainable_rmse(_select_best(candidates), noise_model.floor)
     if lowest < EXPLAINED_RATIO * noise_model.floor:
-        return
+        return False
     adequate = [c for c in candidates if c.held_out_rmse < EXPLAINED_RATIO * lowest]
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         estimate = noise_model.describe_residual(candidate)
         if is_stationary(candidate.residual, estimate, block_length):
             noise_model.estimate = estimate
-            return
+            noise_model.estimate = noise_model.describe_residual(evaluate(candidate.fit))
+            return True
+    return False
 
 
 def is_stationary(residual: Residual, estimate: NoiseFloorEstimate, block_length: float) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.damper.effects import EFFECTS, Effect
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, make_starting_points
-from identification.gap.data import EvaluationData, Residual, split_by_piece
+from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import (
     EXPLAINED_RATIO,
     Candidate,
@@ -25,7 +25,7 @@ from identification.gap.fits import (
     refit_all_samples,
 )
 from identification.gap.noise import NoiseModel, compute_noise_drift, find_mains_frequency
-from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
+from identification.gap.selection.error_comparison import ErrorComparison
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
 from identification.gap.selection.screening import ScreeningResult
 from identification.gap.selection.screening_cache import ScreeningCache
@@ -137,6 +137,11 @@ class CandidatePool:
         """Excess of the baseline [1]."""
         return self.compute_excess(self.baseline)
 
+    @property
+    def comparison(self) -> ErrorComparison:
+        """Comparison of the errors of two candidates by block evidence."""
+        return ErrorComparison(self.noise_model, self.evaluation.held_out_samples, self.block_length)
+
     def compute_excess(self, candidate: Candidate) -> float:
         """Compute the excess of a candidate over the present noise floor [1]."""
         return candidate.compute_excess(self.floor)
@@ -230,31 +235,6 @@ class CandidatePool:
             self.candidates[candidate.names] = candidate
         return self.candidates[candidate.names]
 
-    def select_held_out(self, residual: Residual) -> Residual:
-        """Return a residual on the held-out samples."""
-        return replace(residual, valid=residual.valid & self.evaluation.held_out_samples)
-
-    def whiten(self, candidate: Candidate) -> Residual:
-        """Return the residual of a candidate behind the filter that makes the noise white.
-
-        Block evidence compares errors with white noise. Slow noise would hide a faster error that is certain.
-        """
-        return candidate.residual.whiten(self.noise_model.estimate.whitening)
-
-    def compute_evidence(self, before: Candidate, after: Candidate) -> float:
-        """Compute the block evidence for one candidate over another on all samples."""
-        return compute_evidence(self.whiten(before), self.whiten(after), self.block_length)
-
-    def compute_held_out_evidence(self, before: Candidate, after: Candidate) -> float:
-        """Compute the block evidence for one candidate over another on the held-out samples."""
-        first, second = (self.select_held_out(self.whiten(c)) for c in (before, after))
-        return compute_evidence(first, second, self.block_length)
-
-    def bound_evidence(self, candidate: Candidate) -> float:
-        """Compute the block evidence for a candidate at the noise floor over a known one."""
-        floor = math.hypot(self.noise_model.estimate.whitening.deviation, self.noise_model.input_noise or 0.0)
-        return bound_evidence(self.whiten(candidate), floor, self.block_length)
-
     def fit_fully(self, names: frozenset[str]) -> None:
         """Fit a set on all samples, once, starting from its best fit on decimated data."""
         if names not in self.full_fits:
@@ -320,6 +300,10 @@ class CandidatePool:
         held_out = max(int(np.count_nonzero(self.evaluation.held_out_samples)), 1)
         chance = _CHANCE_DEVIATIONS * estimate.compute_chance(held_out)
         return Candidate(fit, residual, *self.evaluation.compute_rmse(residual), chance)
+
+    def update_residuals(self) -> None:
+        """Compute the residuals of all fits again, after the estimate of slow noise has changed."""
+        self.candidates = {names: self.evaluate(c.fit) for names, c in self.candidates.items()}
 
     def _continue_fit(self, names: frozenset[str]) -> None:
         """Continue a descent that stopped at its limit of iterations."""

@@ -32,7 +32,7 @@ def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
     extended = _fit_extensions(pool, names, names | confusable)
     for larger in extended:
         pool.fit_fully(larger)
-        evidence = pool.compute_evidence(pool.candidates[names], pool.candidates[larger])
+        evidence = pool.comparison.compute_evidence(pool.candidates[names], pool.candidates[larger])
         confusion = pool.settings.confusion_penalty if larger & confusable - names else 0.0
         pool.block_evidence[larger] = BlockEvidence(names, evidence - confusion)
     accepted = [larger for larger in extended if pool.block_evidence[larger].log_odds > penalty]
@@ -60,4 +60,4 @@ def _is_extension_promising(pool: CandidatePool, names: frozenset[str]) -> bool:
         return False
     known = pool.candidates[names]
     explains = pool.compute_excess(known) < pool.settings.max_remaining_share * pool.baseline_excess
-    return explains and pool.bound_evidence(known) > compute_complexity_penalty(names)
+    return explains and pool.comparison.bound_evidence(known) > compute_complexity_penalty(names)

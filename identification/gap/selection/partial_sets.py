@@ -73,7 +73,7 @@ def _fit_extensions(pool: CandidatePool, names: frozenset[str]) -> None:
 
 def compute_partial_posterior(pool: CandidatePool) -> Posterior:
     """Compute the probabilities of the fitted sets from block evidence on the held-out strokes."""
-    held_out = {n: pool.select_held_out(c.residual) for n, c in pool.candidates.items()}
+    held_out = {n: pool.comparison.select_held_out(c.residual) for n, c in pool.candidates.items()}
     before = held_out[frozenset()]
     samples = count_independent_samples(before, pool.block_length)
     names = list(held_out)

@@ -172,7 +172,8 @@ def _check_effects(pool: CandidatePool) -> None:
         candidate = pool.candidates[names]
         subsets = [find_subset(pool, candidate, model) for model in candidate.fit.effects]
         pool.held_out_evidence[names] = tuple(
-            BlockEvidence(subset.names, pool.compute_held_out_evidence(subset, candidate)) for subset in subsets
+            BlockEvidence(subset.names, pool.comparison.compute_held_out_evidence(subset, candidate))
+            for subset in subsets
         )
 
 

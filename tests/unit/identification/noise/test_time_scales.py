@@ -1,5 +1,7 @@
 """Variance of a signal by time scale."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from identification.noise.time_scales import (
     ScaleVariance,
     average_scales,
     compute_gain,
+    estimate_slow_variance,
     list_scales,
     measure_scale_variance,
 )
@@ -60,3 +63,25 @@ def test_signals_are_averaged_at_the_scales_of_all():
     second = [ScaleVariance(1, 8.0, 0.4)]
     (mean,) = average_scales([first, second], [300, 100])
     assert mean == pytest.approx(ScaleVariance(1, 5.0, np.hypot(0.3, 0.1)))
+
+
+def make_scales(*variances):
+    """Scales with the variances by chance of a signal of 1000 samples."""
+    scales = [ScaleVariance(2**k, v, 0.0) for k, v in enumerate(variances)]
+    return [s._replace(deviation=s.compute_chance(1000)) for s in scales]
+
+
+def test_slow_noise_is_what_the_longest_scales_have_in_common():
+    assert estimate_slow_variance(make_scales(*[0.7] * 6)) == pytest.approx(0.7 / math.log(2.0))
+    assert estimate_slow_variance(make_scales(*(0.5**k for k in range(6)))) == pytest.approx(0.0, abs=1e-9)
+    mixed = make_scales(*(0.2 + 4.0 * 0.5**k for k in range(6)))
+    assert estimate_slow_variance(mixed) == pytest.approx(0.2 / math.log(2.0))
+
+
+def test_a_longest_scale_that_is_small_by_chance_does_not_decide():
+    assert estimate_slow_variance(make_scales(*[0.7] * 5, 0.05)) > 0.5
+
+
+def test_slow_noise_of_unknown_scales_is_zero():
+    assert estimate_slow_variance(()) == 0.0
+    assert estimate_slow_variance(make_scales(0.0, 0.0)) == 0.0

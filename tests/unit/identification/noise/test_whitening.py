@@ -37,6 +37,29 @@ def test_slow_noise_becomes_white_with_the_stated_deviation(slow):
     assert bands == pytest.approx([whitening.deviation**2] * 8, rel=0.2)
 
 
+def make_equal_scales(last_variance, last_deviation):
+    """Scales of 1/f noise of variance 1 at each; the slowest one is given."""
+    samples = 2 ** np.arange(10)
+    scales = [ScaleVariance(int(m), 1.0, np.sqrt(4.0 * m / 20_000)) for m in samples]
+    return [*scales, ScaleVariance(1024, last_variance, last_deviation)]
+
+
+def compute_slow_gain(scales):
+    """Gain of the filter at frequency zero."""
+    return float(design_whitening_filter(scales, np.sqrt(2.0)).taps.sum())
+
+
+def test_an_uncertain_slowest_scale_does_not_count_as_white():
+    certain = compute_slow_gain(make_equal_scales(1.0, 0.1))
+
+    assert certain < 0.2
+    assert compute_slow_gain(make_equal_scales(1.0, 0.8)) < 0.2
+
+
+def test_a_scale_that_is_small_by_chance_changes_the_filter_by_little():
+    assert compute_slow_gain(make_equal_scales(0.03, 0.01)) < 0.4
+
+
 def test_the_first_tap_is_one_and_nothing_precedes_the_signal():
     whitening = design_whitening_filter(measure_scales(draw_noise(0.9, 1)), np.sqrt(0.1))
     step = np.zeros(300)

@@ -32,7 +32,7 @@ class NamedCandidate(Candidate):
 def make_candidate(pool, values, *names):
     """The law with a stated residual, as if some effects were fitted."""
     residual = replace(pool.baseline.residual, values=np.asarray(values))
-    candidate = NamedCandidate(pool.baseline.fit, residual, *pool.evaluation.compute_rmse(residual), 0.0)
+    candidate = NamedCandidate(replace(pool.baseline.fit), residual, *pool.evaluation.compute_rmse(residual), 0.0)
     object.__setattr__(candidate, "stated", frozenset(names))
     return candidate
 
@@ -44,8 +44,16 @@ def settle(pool, *candidates, **changes):
         **changes,
     })  # fmt: skip
     model = NoiseModel(estimate, pool.noise_model.stretches)
-    settle_unknown_floor(model, candidates, ResidualRegression(pool.evaluation, model.floor), pool.block_length)
+    regression = ResidualRegression(pool.evaluation, model.floor)
+    settle_unknown_floor(
+        model, candidates, regression, pool.block_length, lambda fit: find_fitted(candidates, fit)
+    )
     return model
+
+
+def find_fitted(candidates, fit):
+    """Return the candidate of a fit; each has one of its own."""
+    return next(c for c in candidates if c.fit is fit)
 
 
 def draw_noise(pool, seed=1):

@@ -50,6 +50,10 @@ class ErrorComparison:
         recorded = WhiteningFilter(np.ones(1), self.noise_model.noise)
         return max(self.noise_model.estimate.whitening, recorded, key=lambda f: self._compute_ratio(candidate, f))
 
+    def select_held_out(self, residual: Residual) -> Residual:
+        """Return a residual on the held-out samples."""
+        return replace(residual, valid=residual.valid & self.held_out)
+
     def _compute_ratio(self, candidate: Candidate, chosen: WhiteningFilter) -> float:
         """Return the mean square of a filtered residual over that of the noise [1]."""
         residual = candidate.residual.whiten(chosen)
@@ -58,7 +62,3 @@ class ErrorComparison:
     def _find_floor(self, chosen: WhiteningFilter) -> float:
         """Return the noise behind a filter [N], with the propagated noise of the displacement."""
         return float(np.hypot(chosen.deviation, self.noise_model.input_noise or 0.0))
-
-    def select_held_out(self, residual: Residual) -> Residual:
-        """Return a residual on the held-out samples."""
-        return replace(residual, valid=residual.valid & self.held_out)

@@ -3,6 +3,7 @@
 from identification.noise.noise_floor import NoiseFloorEstimate, estimate_floor
 from identification.noise.time_scales import (
     ScaleVariance,
+    SlowVariance,
     estimate_slow_variance,
     list_scales,
     measure_scale_variance,
@@ -12,6 +13,7 @@ from identification.noise.whitening import WhiteningFilter, design_whitening_fil
 __all__ = [
     "NoiseFloorEstimate",
     "ScaleVariance",
+    "SlowVariance",
     "WhiteningFilter",
     "design_whitening_filter",
     "estimate_floor",

@@ -24,7 +24,7 @@ from identification.noise.spectrum import (
     fit_low_frequency_spectrum,
     make_spectrum,
 )
-from identification.noise.time_scales import ScaleVariance, average_scales
+from identification.noise.time_scales import ScaleVariance, SlowVariance, average_scales
 from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 from identification.noise.window_fit import CycleFit, WindowFit
 from identification.signals import Motion
@@ -62,8 +62,8 @@ class NoiseFloorEstimate:
     """Standard deviation of ``noise`` [N]; None if it is only a lower bound."""
     scales: tuple[ScaleVariance, ...] = ()
     """Variance of the noise by time scale; empty if it is not known, or if sampling rates differ."""
-    slow_variance: float = 0.0
-    """Variance of slow noise in each factor e of the frequency [N²]."""
+    slow_variance: SlowVariance = SlowVariance()
+    """Variance of slow noise in each factor e of the frequency."""
 
     @property
     def is_known(self) -> bool:
@@ -116,8 +116,8 @@ class _StretchNoise(NamedTuple):
 
     windows: list[WindowNoise]
     line: MainsLine | None
-    slow_variance: float = 0.0
-    """Variance of slow noise in each factor e of the frequency [N²]."""
+    slow_variance: SlowVariance = SlowVariance()
+    """Variance of slow noise in each factor e of the frequency."""
 
 
 def estimate_floor(stretches: Sequence[Stretch], motions: Sequence[Motion]) -> NoiseFloorEstimate:
@@ -199,7 +199,8 @@ def _estimate_stretch(stretch: Stretch, motion: Motion) -> _StretchNoise:
     spectra = [make_spectrum(fit, remainder, stretch.rate) for fit, remainder in zip(fits, cleaned, strict=True)]
     low, duration = fit_low_frequency_spectrum(spectra), len(stretch.force) / stretch.rate
     noises = [estimate_window_noise(spectrum, low, duration) for spectrum in spectra]
-    return _StretchNoise(noises, line, 2.0 * low.pink / stretch.rate)
+    slow = SlowVariance(2.0 * low.pink / stretch.rate, 2.0 * low.pink_deviation / stretch.rate)
+    return _StretchNoise(noises, line, slow)
 
 
 def _exclude_disturbed_cycles(windows: Sequence[RepeatedWindow], size: float) -> list[CycleFit]:
@@ -230,10 +231,12 @@ def _average_scales(windows: Sequence[WindowNoise]) -> tuple[ScaleVariance, ...]
     return average_scales([w.scales for w in windows], [w.samples for w in windows])
 
 
-def _average_slow_variance(parts: Sequence[_StretchNoise]) -> float:
-    """Return the mean variance of slow noise in each factor e of the frequency [N²]."""
+def _average_slow_variance(parts: Sequence[_StretchNoise]) -> SlowVariance:
+    """Return the mean variance of slow noise in each factor e of the frequency."""
     weights = np.array([sum(w.samples for w in part.windows) for part in parts], float)
-    return float(weights @ [part.slow_variance for part in parts] / weights.sum())
+    weights = weights / weights.sum()
+    variance, deviation = np.array([part.slow_variance for part in parts]).T
+    return SlowVariance(float(weights @ variance), float(np.linalg.norm(weights * deviation)))
 
 
 def _combine_windows(noises: Sequence[WindowNoise]) -> tuple[float, float]:

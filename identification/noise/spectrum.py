@@ -5,6 +5,7 @@ part is taken from the frequencies around them. Below the lowest bins, the spect
 noise, down to one cycle in the whole recording. No form of the spectrum is assumed elsewhere.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from scipy.optimize import nnls
 
 from identification.arrays import Array, BoolArray
 from identification.noise.repeated_windows import RepeatedWindow
-from identification.noise.time_scales import ScaleVariance, compute_gain, list_scales
+from identification.noise.time_scales import ScaleVariance, compute_deviations, compute_gain, list_scales
 from identification.noise.window_fit import WindowFit
 
 _KNOWN_GAIN = 0.5
@@ -51,6 +52,8 @@ class LowFrequencySpectrum(NamedTuple):
     """Power of the white part [N²]."""
     pink: float
     """Power of the other part at 1 Hz [N²]."""
+    pink_deviation: float = 0.0
+    """Standard deviation of ``pink`` [N²]."""
 
     def evaluate(self, frequency: Array) -> Array:
         """Return the power (B,) [N²] at frequencies (B,) [Hz]."""
@@ -59,6 +62,10 @@ class LowFrequencySpectrum(NamedTuple):
     def integrate(self, start: float, stop: float) -> float:
         """Return the integral of the power [N² Hz] from one frequency to another [Hz]."""
         return self.white * (stop - start) + self.pink * float(np.log(stop / start))
+
+    def integrate_deviation(self, start: float, stop: float) -> float:
+        """Return the standard deviation of that integral [N² Hz]; that of the white part is much smaller."""
+        return self.pink_deviation * float(np.log(stop / start))
 
 
 class WindowNoise(NamedTuple):
@@ -69,7 +76,7 @@ class WindowNoise(NamedTuple):
     deviation: float
     """Standard deviation of that variance where the spectrum was observed [N²]."""
     extrapolated: float
-    """Part of the variance below the observed frequencies [N²]."""
+    """Error of the part of the variance below the observed frequencies [N²]."""
     samples: int
     """Number of valid samples."""
     cycles: int
@@ -104,7 +111,9 @@ def fit_low_frequency_spectrum(spectra: Sequence[WindowSpectrum]) -> LowFrequenc
         # A power is exponentially distributed: its standard deviation is its mean (Whittle 1953).
         white, pink = nnls(columns / level[:, None], power / level)[0]
         level = np.maximum(columns @ [white, pink], 1e-6)
-    return LowFrequencySpectrum(scale * float(white), scale * float(pink) * float(frequency.min()))
+    deviation = float(compute_deviations(columns / level[:, None])[1])
+    lowest = float(frequency.min())
+    return LowFrequencySpectrum(scale * float(white), scale * float(pink) * lowest, scale * deviation * lowest)
 
 
 def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, duration: float) -> WindowNoise:
@@ -120,15 +129,19 @@ def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, d
     lowest = int(np.argmax(spectrum.is_known))
     values[1:lowest] = low.evaluate(spectrum.frequency[1:lowest])
     # A bin stands for half a step on both sides; the first one begins at one cycle a recording.
-    values[0] = low.integrate(min(1.0 / duration, 0.25 * step), 0.5 * step) / step
+    slowest = min(1.0 / duration, 0.25 * step)
+    values[0] = low.integrate(slowest, 0.5 * step) / step
     count = len(spectrum.window.force)
     last = values[-1] if count % 2 == 0 else 0.0
     variance = float(2.0 * values.sum() - last) / count
     deviation = _compute_deviation(values, spectrum)
+    # The spectrum below one cycle of the window may be wrong by all of it. Up to the observed frequencies it has
+    # the error of its fit.
+    extrapolated = math.hypot(values[0], low.integrate_deviation(slowest, (lowest - 0.5) * step) / step)
     samples = int(np.count_nonzero(spectrum.window.valid))
     scales = tuple(_compute_scale_variance(values, spectrum, m) for m in list_scales(samples))
     return WindowNoise(
-        variance, deviation, 2.0 * float(values[0]) / count, samples, spectrum.window.cycles, scales
+        variance, deviation, 2.0 * extrapolated / count, samples, spectrum.window.cycles, scales
     )
 
 

@@ -20,6 +20,8 @@ _SLOW_SCALES = 4
 """Number of the longest scales that determine slow noise: about a decade of the frequency."""
 _ITERATIONS = 10
 """Steps of their fit, each with the weights of the step before."""
+_NORMAL_95 = 1.96
+"""Half the width of a 95 % interval [standard deviations]."""
 
 
 class ScaleVariance(NamedTuple):
@@ -38,6 +40,20 @@ class ScaleVariance(NamedTuple):
         A difference every 2 m samples is independent, and the variance of k of them varies by sqrt(2 / k).
         """
         return self.variance * math.sqrt(4.0 * self.samples / differences)
+
+
+class SlowVariance(NamedTuple):
+    """Variance of 1/f noise in each factor e of the frequency; it is the same at all frequencies."""
+
+    variance: float = 0.0
+    """[N²]"""
+    deviation: float = 0.0
+    """Its standard deviation [N²]."""
+
+    @property
+    def highest(self) -> float:
+        """Upper end of the 95 % interval [N²]."""
+        return self.variance + _NORMAL_95 * self.deviation
 
 
 def list_scales(count: int) -> Iterator[int]:
@@ -69,6 +85,11 @@ def measure_scale_variance(values: Array, valid: BoolArray, samples: int) -> tup
     return float(np.mean(differences**2)) if len(differences) else 0.0, len(differences)
 
 
+def compute_deviations(columns: Array) -> Array:
+    """Return the standard deviations (P,) of a linear fit with columns (N, P) over the deviations of the data."""
+    return np.asarray(np.sqrt(np.diag(np.linalg.pinv(columns.T @ columns))))
+
+
 def average_scales(
     parts: Sequence[Sequence[ScaleVariance]], weights: Sequence[float]
 ) -> tuple[ScaleVariance, ...]:
@@ -84,15 +105,15 @@ def average_scales(
     )
 
 
-def estimate_slow_variance(scales: Sequence[ScaleVariance]) -> float:
-    """Return the variance of 1/f noise in each factor e of the frequency [N²], from the longest scales.
+def estimate_slow_variance(scales: Sequence[ScaleVariance]) -> SlowVariance:
+    """Estimate the variance of 1/f noise from the longest scales; it is zero without any.
 
     White noise has half of the variance of each scale at the next longer one. 1/f noise has the same at all, and
     each scale contains one octave.
     """
     slowest = scales[-_SLOW_SCALES:]
     if not slowest or min(s.variance for s in slowest) <= 0.0:
-        return 0.0
+        return SlowVariance()
     variance = np.array([s.variance for s in slowest])
     columns = np.array([[slowest[0].samples / s.samples, 1.0] for s in slowest])
     relative, level = np.array([s.deviation / s.variance for s in slowest]), variance
@@ -101,4 +122,5 @@ def estimate_slow_variance(scales: Sequence[ScaleVariance]) -> float:
         weights = 1.0 / (relative * level)
         parts = nnls(columns * weights[:, None], variance * weights)[0]
         level = columns @ parts
-    return float(parts[1]) / math.log(2.0)
+    deviation = compute_deviations(columns / (relative * level)[:, None])[1]
+    return SlowVariance(float(parts[1]) / math.log(2.0), deviation / math.log(2.0))

@@ -12,6 +12,8 @@ _CUTOFF_RATIO = 1.35
 """Ratio of successive trial cutoffs."""
 LOWEST_CUTOFF, _MAX_CUTOFF = 0.003, 0.25
 """Range of the trial cutoffs in cycles a sample."""
+_LENGTH_SLOPE = 0.25
+"""Largest change of the smoothing length in one smoothing length [1]: the penalty then changes fourfold."""
 _STROKE_BAND = 200.0
 """Frequency [Hz] above which no hydraulic or electric actuator moves: a sensor shows only noise there."""
 
@@ -51,3 +53,16 @@ def choose_cutoffs(
         # A high cutoff has a small remainder because the smooth follows the noise. The second term adds that part.
         cost += 2.0 * noise**2 * sizes * compute_step_covariance(cutoff, rate, twicing=twicing)
     return np.asarray(trials[np.argmin(costs, axis=0)])
+
+
+def limit_length_slope(cutoff: Array, rate: float) -> Array:
+    """Return the cutoff (N,) [Hz], raised where the smoothing length changes too fast along the signal.
+
+    The smoothing length is one cycle of the cutoff. Where the penalty jumps, the smoother distorts a motion of
+    which the third difference is not zero there, by far more than either penalty alone.
+    """
+    time, length = np.arange(len(cutoff)) / rate, 1.0 / cutoff
+    rise = _LENGTH_SLOPE * time
+    after = np.minimum.accumulate(length - rise) + rise
+    before = np.minimum.accumulate((length + rise)[::-1])[::-1] - rise
+    return np.asarray(1.0 / np.minimum(after, before))

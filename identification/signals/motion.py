@@ -10,7 +10,8 @@ turn:
 3. The remainder is smoothed with twicing (smoother.py), towards the third differences of parts 1 and 2. The cutoff
    of each region minimises the estimated error of the *velocity* (cutoff.py). Regions are periodic segments, the
    motion between them, and transitions (motion_regions.py). Rests have the lowest cutoff. A common cutoff for
-   fades, moves and holds would distort the fades by micrometres, and with them k0 and k1.
+   fades, moves and holds would distort the fades by micrometres, and with them k0 and k1. Between two regions
+   the cutoff changes gradually.
 """
 
 from functools import partial
@@ -21,7 +22,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.logs import PERIODIC_MOTIONS, Segment, Stretch
 from identification.signals.actuator_compliance import MAX_LAG, estimate_compliance_motion
-from identification.signals.cutoff import LOWEST_CUTOFF, choose_cutoffs
+from identification.signals.cutoff import LOWEST_CUTOFF, choose_cutoffs, limit_length_slope
 from identification.signals.harmonics import Harmonics, find_steady_cycles, fit_harmonics
 from identification.signals.motion_regions import (
     REST_CUTOFF,
@@ -109,7 +110,9 @@ def _choose_cutoff(
         undisturbed = choose(stretch.displacement, np.where(regions.disturbed, 0.0, weights), twicing=True)
         cutoff = np.where(regions.disturbed, cutoff, undisturbed[regions.regions])
     # The motion before and after a rest reaches into it through the smoother and would raise its cutoff.
-    return np.where(regions.rest, max(REST_CUTOFF, LOWEST_CUTOFF * stretch.rate), cutoff)
+    cutoff = np.where(regions.rest, max(REST_CUTOFF, LOWEST_CUTOFF * stretch.rate), cutoff)
+    # The third differences of rests and waves are predicted, so that a jump of the cutoff does not distort them.
+    return np.where(regions.unpredicted, limit_length_slope(cutoff, stretch.rate), cutoff)
 
 
 def estimate_recorded_noise(stretch: Stretch) -> float:

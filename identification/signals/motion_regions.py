@@ -41,6 +41,8 @@ class MotionRegions(NamedTuple):
     """Region of each sample: 0 for transitions, then repeating parts, motion between them, rests, disturbances."""
     rest: BoolArray
     """True where the rod rests."""
+    unpredicted: BoolArray
+    """True where neither a repeating part nor a rest predicts the motion."""
     disturbed: BoolArray
     """True in a disturbance."""
     unresolved: BoolArray
@@ -68,7 +70,8 @@ def divide_stretch(stretch: Stretch, waves: list[Harmonics], is_compliant: bool,
     occupied = transitions | disturbed | mark_runs([np.arange(w.start, w.stop) for w in waves], count)
     rest = _find_rest(stretch, noise) & ~occupied
     regions = _label_regions(waves, transitions, rest, disturbances, _SHORT_MOTION * stretch.rate)
-    return MotionRegions(regions, rest, disturbed, _widen(large, reach))
+    unpredicted = ~rest & ((regions == 0) | (regions > len(waves)))
+    return MotionRegions(regions, rest, unpredicted, disturbed, _widen(large, reach))
 
 
 def _find_rest(stretch: Stretch, noise: float) -> BoolArray:

@@ -13,6 +13,7 @@ from identification.arrays import Array
 from identification.fitting import Piece, Problem
 from identification.gap.data import (
     EvaluationData,
+    Residual,
     estimate_repeated_residual,
     estimate_scale_excess,
     measure_residual_scales,
@@ -133,6 +134,18 @@ class NoiseModel:
             "drive and time predicts it, and no cycles repeat"
         )
         return replace(estimate, deviation=deviation, basis=basis)
+
+    def bound_slow_variance(self, residual: Residual) -> float:
+        """Return the largest variance of slow noise in each factor e of the frequency [N²].
+
+        Few repeated cycles show it only at fast frequencies. A residual contains the noise of all frequencies, and
+        errors besides.
+
+        Args:
+            residual: residual of any candidate.
+        """
+        highest, scales = self.estimate.slow_variance.highest, measure_residual_scales(residual)
+        return min(highest, estimate_slow_variance(scales).highest) if scales else highest
 
     def estimate_noise(self, candidate: Candidate) -> float:
         """Return the noise of the recorded force [N], limited by the residual of a candidate fitted later."""

@@ -15,8 +15,7 @@ from identification.gap.fits import JointFit
 _NOISE_RATIO = 10.0
 """Largest variance of a drift that noise explains, over the expected one [1].
 
-Of 1500 simulated series of 1/f noise, 99 % stayed below 5.7 and 99.8 % below 8.7 with the best of all periods. The
-expected variance is itself uncertain by a fifth."""
+Of 1500 simulated series of 1/f noise, 99 % stayed below 5.7 and 99.8 % below 8.7 with the best of all periods."""
 
 
 def compute_noise_drift(fit: JointFit, problem: Problem, slow_variance: float) -> Array:
@@ -25,7 +24,7 @@ def compute_noise_drift(fit: JointFit, problem: Problem, slow_variance: float) -
     Args:
         fit: fit of any effects.
         problem: the pieces whose forces are simulated.
-        slow_variance: variance of slow noise in each factor e of the frequency [N²].
+        slow_variance: largest variance of slow noise in each factor e of the frequency [N²].
     """
     drifts = [
         _evaluate_drift(fit, piece.excitation.time, piece.excitation.sampled_drive) for piece in problem.pieces

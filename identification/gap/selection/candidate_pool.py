@@ -292,11 +292,12 @@ class CandidatePool:
     def evaluate(self, fit: JointFit) -> Candidate:
         """Compute the residual of a fit on all samples; a drift that slow noise explains remains in it."""
         forces = self.full_problem.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
+        residual = self.evaluation.compute_residual(forces)
+        drift = compute_noise_drift(fit, self.full_problem, self.noise_model.bound_slow_variance(residual))
+        if drift.any():
+            drifts = split_by_piece(drift, self.full_problem.pieces)
+            residual = self.evaluation.compute_residual([f - d for f, d in zip(forces, drifts, strict=True)])
         estimate = self.noise_model.estimate
-        drift = compute_noise_drift(fit, self.full_problem, estimate.slow_variance)
-        residual = self.evaluation.compute_residual(
-            [f - d for f, d in zip(forces, split_by_piece(drift, self.full_problem.pieces), strict=True)]
-        )
         held_out = max(int(np.count_nonzero(self.evaluation.held_out_samples)), 1)
         chance = _CHANCE_DEVIATIONS * estimate.compute_chance(held_out)
         return Candidate(fit, residual, *self.evaluation.compute_rmse(residual), chance)

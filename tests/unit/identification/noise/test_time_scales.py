@@ -7,6 +7,7 @@ import pytest
 
 from identification.noise.time_scales import (
     ScaleVariance,
+    SlowVariance,
     average_scales,
     compute_gain,
     estimate_slow_variance,
@@ -72,16 +73,28 @@ def make_scales(*variances):
 
 
 def test_slow_noise_is_what_the_longest_scales_have_in_common():
-    assert estimate_slow_variance(make_scales(*[0.7] * 6)) == pytest.approx(0.7 / math.log(2.0))
-    assert estimate_slow_variance(make_scales(*(0.5**k for k in range(6)))) == pytest.approx(0.0, abs=1e-9)
+    assert estimate_slow_variance(make_scales(*[0.7] * 6)).variance == pytest.approx(0.7 / math.log(2.0))
+    assert estimate_slow_variance(make_scales(*(0.5**k for k in range(6)))).variance == pytest.approx(0.0, abs=1e-9)
     mixed = make_scales(*(0.2 + 4.0 * 0.5**k for k in range(6)))
-    assert estimate_slow_variance(mixed) == pytest.approx(0.2 / math.log(2.0))
+    assert estimate_slow_variance(mixed).variance == pytest.approx(0.2 / math.log(2.0))
 
 
 def test_a_longest_scale_that_is_small_by_chance_does_not_decide():
-    assert estimate_slow_variance(make_scales(*[0.7] * 5, 0.05)) > 0.5
+    assert estimate_slow_variance(make_scales(*[0.7] * 5, 0.05)).variance > 0.5
 
 
 def test_slow_noise_of_unknown_scales_is_zero():
-    assert estimate_slow_variance(()) == 0.0
-    assert estimate_slow_variance(make_scales(0.0, 0.0)) == 0.0
+    assert estimate_slow_variance(()) == SlowVariance()
+    assert estimate_slow_variance(make_scales(0.0, 0.0)) == SlowVariance()
+
+
+def test_slow_variance_has_the_standard_deviation_of_its_estimates():
+    random = np.random.default_rng(11)
+    true = make_scales(*(0.7 + 30.0 * 0.5**k for k in range(6)))
+    found = [
+        estimate_slow_variance([s._replace(variance=abs(random.normal(s.variance, s.deviation))) for s in true])
+        for _ in range(400)
+    ]
+    spread = np.std([f.variance for f in found])
+    assert np.median([f.deviation for f in found]) == pytest.approx(spread, rel=0.25)
+    assert np.mean([f.highest > 0.7 / math.log(2.0) for f in found]) > 0.9

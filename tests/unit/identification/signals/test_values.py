@@ -11,7 +11,7 @@ from identification.signals.actuator_compliance import (
     _smooth_triangular,
     estimate_compliance_motion,
 )
-from identification.signals.cutoff import choose_cutoffs
+from identification.signals.cutoff import choose_cutoffs, limit_length_slope
 from identification.signals.harmonics import (
     Harmonics,
     _differentiate_by_phase,
@@ -227,6 +227,31 @@ def test_a_rest_is_smoothed_more_than_the_motion_beside_it():
     assert motion.cutoff[moving].min() > 2 * REST_CUTOFF
     assert np.std(error[resting]) < 0.2 * np.std(noise)
     assert np.std(error[moving]) < np.std(noise)
+
+
+def test_the_smoothing_length_changes_gradually():
+    cutoff = np.full(1000, 100.0)
+    cutoff[300:700] = 10.0
+    limited = limit_length_slope(cutoff, 1000.0)
+    assert np.abs(np.diff(1.0 / limited)).max() == pytest.approx(0.25e-3)
+    assert limited[500] == pytest.approx(1.0 / (0.01 + 0.25 * 0.2))
+    assert np.all(limited > cutoff * (1.0 - 1e-12))
+    np.testing.assert_array_equal(limited[:300], 100.0)
+
+
+def test_a_move_between_two_strokes_is_not_distorted_where_its_cutoff_changes():
+    """The cutoff of the part between is lower, and the motion is curved where it begins."""
+    rate, noise = 2000.0, 1e-6
+    time = np.arange(400) / rate
+    curved = 2e-3 * np.sin(2.0 * np.pi * 8.0 * time) + 1e-3 * (time / 0.2) ** 2
+    x = curved + noise * np.random.default_rng(3).standard_normal(400)
+    cutoff = np.full(400, 83.0)
+    cutoff[160:280] = 35.0
+    recorded = replace(stretch(x), rate=rate, time=time)
+    jump = estimate_motion(recorded, cutoff).displacement - curved
+    gradual = estimate_motion(recorded, limit_length_slope(cutoff, rate)).displacement - curved
+    inner = slice(100, 300)
+    assert np.std(gradual[inner]) < noise < np.std(jump[inner])
 
 
 def test_a_slow_stroke_is_no_rest():

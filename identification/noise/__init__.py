@@ -2,6 +2,7 @@
 
 from identification.noise.noise_floor import NoiseFloorEstimate, estimate_floor
 from identification.noise.time_scales import (
+    NO_SLOW_VARIANCE,
     ScaleVariance,
     SlowVariance,
     estimate_slow_variance,
@@ -11,6 +12,7 @@ from identification.noise.time_scales import (
 from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 
 __all__ = [
+    "NO_SLOW_VARIANCE",
     "NoiseFloorEstimate",
     "ScaleVariance",
     "SlowVariance",

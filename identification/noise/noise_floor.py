@@ -24,7 +24,7 @@ from identification.noise.spectrum import (
     fit_low_frequency_spectrum,
     make_spectrum,
 )
-from identification.noise.time_scales import ScaleVariance, SlowVariance, average_scales
+from identification.noise.time_scales import NO_SLOW_VARIANCE, ScaleVariance, SlowVariance, average_scales
 from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 from identification.noise.window_fit import CycleFit, WindowFit
 from identification.signals import Motion
@@ -62,7 +62,7 @@ class NoiseFloorEstimate:
     """Standard deviation of ``noise`` [N]; None if it is only a lower bound."""
     scales: tuple[ScaleVariance, ...] = ()
     """Variance of the noise by time scale; empty if it is not known, or if sampling rates differ."""
-    slow_variance: SlowVariance = SlowVariance()
+    slow_variance: SlowVariance = NO_SLOW_VARIANCE
     """Variance of slow noise in each factor e of the frequency."""
 
     @property
@@ -116,7 +116,7 @@ class _StretchNoise(NamedTuple):
 
     windows: list[WindowNoise]
     line: MainsLine | None
-    slow_variance: SlowVariance = SlowVariance()
+    slow_variance: SlowVariance = NO_SLOW_VARIANCE
     """Variance of slow noise in each factor e of the frequency."""
 
 

@@ -140,9 +140,7 @@ def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, d
     extrapolated = math.hypot(values[0], low.integrate_deviation(slowest, (lowest - 0.5) * step) / step)
     samples = int(np.count_nonzero(spectrum.window.valid))
     scales = tuple(_compute_scale_variance(values, spectrum, m) for m in list_scales(samples))
-    return WindowNoise(
-        variance, deviation, 2.0 * extrapolated / count, samples, spectrum.window.cycles, scales
-    )
+    return WindowNoise(variance, deviation, 2.0 * extrapolated / count, samples, spectrum.window.cycles, scales)
 
 
 def _compute_scale_variance(values: Array, spectrum: WindowSpectrum, samples: int) -> ScaleVariance:

@@ -45,15 +45,19 @@ class ScaleVariance(NamedTuple):
 class SlowVariance(NamedTuple):
     """Variance of 1/f noise in each factor e of the frequency; it is the same at all frequencies."""
 
-    variance: float = 0.0
+    variance: float
     """[N²]"""
-    deviation: float = 0.0
+    deviation: float
     """Its standard deviation [N²]."""
 
     @property
     def highest(self) -> float:
         """Upper end of the 95 % interval [N²]."""
         return self.variance + _NORMAL_95 * self.deviation
+
+
+NO_SLOW_VARIANCE = SlowVariance(0.0, 0.0)
+"""Of noise without a 1/f part, or where it is not known."""
 
 
 def list_scales(count: int) -> Iterator[int]:
@@ -113,7 +117,7 @@ def estimate_slow_variance(scales: Sequence[ScaleVariance]) -> SlowVariance:
     """
     slowest = scales[-_SLOW_SCALES:]
     if not slowest or min(s.variance for s in slowest) <= 0.0:
-        return SlowVariance()
+        return NO_SLOW_VARIANCE
     variance = np.array([s.variance for s in slowest])
     columns = np.array([[slowest[0].samples / s.samples, 1.0] for s in slowest])
     relative, level = np.array([s.deviation / s.variance for s in slowest]), variance

@@ -20,7 +20,7 @@ MOVING_MASS = Effect(
         Form(
             "rigid",
             "inertia",
-            (Quantity("mass", "kg", 0.0, 200.0, 2.0, "mass between load cell and damper"),),
+            (Quantity("mass", "kg", 0.0, 1000.0, 2.0, "mass between load cell and damper"),),
             ((0.0,),),
             compute_inertia,
         ),

@@ -138,14 +138,16 @@ class NoiseModel:
     def bound_slow_variance(self, residual: Residual) -> float:
         """Return the largest variance of slow noise in each factor e of the frequency [N²].
 
-        Few repeated cycles show it only at fast frequencies. A residual contains the noise of all frequencies, and
-        errors besides.
+        Few repeated cycles show it only at fast frequencies, and none do not show it. A residual contains the
+        noise of all frequencies, and errors besides.
 
         Args:
             residual: residual of any candidate.
         """
-        highest, scales = self.estimate.slow_variance.highest, measure_residual_scales(residual)
-        return min(highest, estimate_slow_variance(scales).highest) if scales else highest
+        scales = measure_residual_scales(residual)
+        bounds = [self.estimate.slow_variance.highest] if self.estimate.is_known else []
+        bounds += [estimate_slow_variance(scales).highest] if scales else []
+        return min(bounds, default=0.0)
 
     def estimate_noise(self, candidate: Candidate) -> float:
         """Return the noise of the recorded force [N], limited by the residual of a candidate fitted later."""

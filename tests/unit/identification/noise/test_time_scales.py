@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification.noise.time_scales import (
+    NO_SLOW_VARIANCE,
     ScaleVariance,
-    SlowVariance,
     average_scales,
     compute_gain,
     estimate_slow_variance,
@@ -74,7 +74,9 @@ def make_scales(*variances):
 
 def test_slow_noise_is_what_the_longest_scales_have_in_common():
     assert estimate_slow_variance(make_scales(*[0.7] * 6)).variance == pytest.approx(0.7 / math.log(2.0))
-    assert estimate_slow_variance(make_scales(*(0.5**k for k in range(6)))).variance == pytest.approx(0.0, abs=1e-9)
+    assert estimate_slow_variance(make_scales(*(0.5**k for k in range(6)))).variance == pytest.approx(
+        0.0, abs=1e-9
+    )
     mixed = make_scales(*(0.2 + 4.0 * 0.5**k for k in range(6)))
     assert estimate_slow_variance(mixed).variance == pytest.approx(0.2 / math.log(2.0))
 
@@ -84,8 +86,8 @@ def test_a_longest_scale_that_is_small_by_chance_does_not_decide():
 
 
 def test_slow_noise_of_unknown_scales_is_zero():
-    assert estimate_slow_variance(()) == SlowVariance()
-    assert estimate_slow_variance(make_scales(0.0, 0.0)) == SlowVariance()
+    assert estimate_slow_variance(()) == NO_SLOW_VARIANCE
+    assert estimate_slow_variance(make_scales(0.0, 0.0)) == NO_SLOW_VARIANCE
 
 
 def test_slow_variance_has_the_standard_deviation_of_its_estimates():

@@ -57,7 +57,7 @@ class SlowVariance(NamedTuple):
 
 
 NO_SLOW_VARIANCE = SlowVariance(0.0, 0.0)
-"""Of noise without a 1/f part, or where it is not known."""
+"""Slow variance of noise without a 1/f part, or of unknown noise."""
 
 
 def list_scales(count: int) -> Iterator[int]:

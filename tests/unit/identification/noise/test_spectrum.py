@@ -70,7 +70,7 @@ def test_the_low_spectrum_is_white_and_pink_noise_in_the_lowest_decade(white, pi
 
 
 def test_the_pink_part_of_few_bins_has_their_uncertainty():
-    """Of 200 fits to a tenth of the bins, each with its own standard deviation."""
+    """Each of 200 fits has few bins and its own standard deviation."""
     spectra = draw_spectra(lambda f: 2.0 + 3.0 / np.maximum(f, 0.1), 200)
     found = [fit_low_frequency_spectrum([s]) for s in spectra]
     spread = np.std([f.pink for f in found])

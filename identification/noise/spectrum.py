@@ -5,7 +5,6 @@ part is taken from the frequencies around them. Below the lowest bins, the spect
 noise, down to one cycle in the whole recording. No form of the spectrum is assumed elsewhere.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -63,10 +62,6 @@ class LowFrequencySpectrum(NamedTuple):
         """Return the integral of the power [N² Hz] from one frequency to another [Hz]."""
         return self.white * (stop - start) + self.pink * float(np.log(stop / start))
 
-    def integrate_deviation(self, start: float, stop: float) -> float:
-        """Return the standard deviation of that integral [N² Hz]; that of the white part is much smaller."""
-        return self.pink_deviation * float(np.log(stop / start))
-
 
 class WindowNoise(NamedTuple):
     """Noise of one window."""
@@ -76,7 +71,7 @@ class WindowNoise(NamedTuple):
     deviation: float
     """Standard deviation of that variance where the spectrum was observed [N²]."""
     extrapolated: float
-    """Error of the part of the variance below the observed frequencies [N²]."""
+    """Part of the variance below the observed frequencies [N²]."""
     samples: int
     """Number of valid samples."""
     cycles: int
@@ -129,18 +124,16 @@ def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, d
     lowest = int(np.argmax(spectrum.is_known))
     values[1:lowest] = low.evaluate(spectrum.frequency[1:lowest])
     # A bin stands for half a step on both sides; the first one begins at one cycle a recording.
-    slowest = min(1.0 / duration, 0.25 * step)
-    values[0] = low.integrate(slowest, 0.5 * step) / step
+    values[0] = low.integrate(min(1.0 / duration, 0.25 * step), 0.5 * step) / step
     count = len(spectrum.window.force)
     last = values[-1] if count % 2 == 0 else 0.0
     variance = float(2.0 * values.sum() - last) / count
     deviation = _compute_deviation(values, spectrum)
-    # The spectrum below one cycle of the window may be wrong by all of it. Up to the observed frequencies it has
-    # the error of its fit.
-    extrapolated = math.hypot(values[0], low.integrate_deviation(slowest, (lowest - 0.5) * step) / step)
     samples = int(np.count_nonzero(spectrum.window.valid))
     scales = tuple(_compute_scale_variance(values, spectrum, m) for m in list_scales(samples))
-    return WindowNoise(variance, deviation, 2.0 * extrapolated / count, samples, spectrum.window.cycles, scales)
+    return WindowNoise(
+        variance, deviation, 2.0 * float(values[0]) / count, samples, spectrum.window.cycles, scales
+    )
 
 
 def _compute_scale_variance(values: Array, spectrum: WindowSpectrum, samples: int) -> ScaleVariance:

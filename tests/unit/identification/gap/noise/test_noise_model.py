@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.data import ErrorSquare
+from identification.gap.data import ErrorSquare, Residual
 from identification.gap.fits import Candidate
 from identification.gap.noise import noise_model
 from identification.gap.noise.noise_model import NoiseModel
-from identification.noise import NoiseFloorEstimate, ScaleVariance
+from identification.noise import NoiseFloorEstimate, ScaleVariance, SlowVariance
 from tests.support.candidate_pools import NOISE, fit_baseline
 from tests.support.effects import active
 
@@ -144,3 +144,38 @@ def test_without_cycles_to_compare_the_floor_stays(pool):
     before = model.estimate
     model.narrow_floor(pool.baseline, pool.evaluation)
     assert model.estimate is before
+
+
+def make_slow_residual(size, rates=((8000, 1000.0),)):
+    """A residual of white noise, and of noise with the variance ``size``² in each factor e of the frequency."""
+    random, count = np.random.default_rng(5), sum(n for n, _ in rates)
+    spectrum = (random.standard_normal(count) + 1j * random.standard_normal(count)) / np.sqrt(
+        np.arange(1, count + 1)
+    )
+    slow = np.fft.irfft(np.concatenate([[0.0], spectrum]), 2 * count)[:count]
+    values = random.standard_normal(count) + size * slow / slow.std() * np.sqrt(np.log(count))
+    zero = np.zeros(count)
+    return Residual(values, zero, zero, zero, np.ones(count, bool), rates)
+
+
+@pytest.mark.parametrize(
+    ("known", "slow", "lowest", "highest"),
+    [
+        (SlowVariance(0.1, 0.05), 1.0, 0.19, 0.2),
+        (SlowVariance(0.1, 9.0), 1.0, 0.5, 3.0),
+        (SlowVariance(0.1, 9.0), 0.0, 0.0, 0.01),
+        (None, 1.0, 0.5, 3.0),
+    ],
+    ids=["few cycles show it", "the residual shows more noise", "the residual is white", "no floor is known"],
+)
+def test_slow_noise_is_bounded_by_repeated_cycles_and_by_the_residual(known, slow, lowest, highest):
+    estimate = NoiseFloorEstimate(2.0, None, 1.0, "", None if known is None else 0.1)
+    if known is not None:
+        estimate = replace(estimate, slow_variance=known)
+    found = NoiseModel(estimate, []).bound_slow_variance(make_slow_residual(slow))
+    assert lowest <= found <= highest
+
+
+def test_slow_noise_has_no_bound_from_a_residual_of_several_rates():
+    residual = make_slow_residual(1.0, ((4000, 1000.0), (4000, 500.0)))
+    assert NoiseModel(NoiseFloorEstimate(2.0, None, 1.0, ""), []).bound_slow_variance(residual) == 0.0

@@ -75,7 +75,7 @@ def try_case(job: tuple[int, str], folder: Path) -> Outcome:
 def record_case(seed: int, kind: str, folder: Path) -> Case:
     """Draw a damper and its cause, record it, and import the recording by a folder."""
     random = np.random.default_rng([seed, 41])
-    drawn, causes = _draw_damper(random), _draw_causes(random, kind)
+    drawn, causes = draw_damper(random), _draw_causes(random, kind)
     noise = _draw_noise(random, drawn)
     strengths = [_calibrate(drawn, cause, k, seed, noise.force, random) for k, cause in enumerate(causes.values())]
     log = folder / f"{seed}.mcap"
@@ -99,7 +99,7 @@ def _draw_log(random: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(random.uniform(math.log(low), math.log(high))))
 
 
-def _draw_damper(random: np.random.Generator) -> _Drawn:
+def draw_damper(random: np.random.Generator) -> _Drawn:
     """Draw a damper of any size, with strokes that fit it."""
     force = _draw_log(random, *_FORCES)
     amplitude = 0.003 * (force / 50.0) ** 0.27 * float(np.exp(0.4 * random.standard_normal()))

@@ -16,7 +16,9 @@ from bench.config.bench_names import (
     check_bench_name,
     choose_bench,
     find_bench,
+    get_bench_name,
     get_executor,
+    is_executor,
     write_benches,
 )
 from bench.config.instruments import (
@@ -51,7 +53,9 @@ __all__ = [
     "choose_bench",
     "compute_identity",
     "find_bench",
+    "get_bench_name",
     "get_executor",
+    "is_executor",
     "load_config",
     "write_benches",
 ]

@@ -37,6 +37,16 @@ def get_executor(bench: str) -> str:
     return _FIRST_EXECUTOR if bench == DEFAULT_BENCH else bench
 
 
+def get_bench_name(executor: str) -> str:
+    """Return the name of the bench of an executor of campaigns."""
+    return DEFAULT_BENCH if executor == _FIRST_EXECUTOR else executor
+
+
+def is_executor(text: str) -> bool:
+    """Return True for the executor of a bench, False for the scenario of a simulated plant."""
+    return _NAME.fullmatch(text) is not None
+
+
 def write_benches(data: Path, places: Mapping[str, str]) -> None:
     """Write the benches of a service into its data folder.
 

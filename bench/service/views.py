@@ -32,7 +32,7 @@ BenchChoice: TypeAlias = Annotated[
 
 
 class Health(View):
-    """State of agent, worker, disk, queue, audit trail, clocks and log store, each in words."""
+    """State of agent, worker, disk, queue, campaigns, audit trail, clocks and log store, each in words."""
 
     version: str
     agent: str = Field(description="`ok`, or the reason why it is not available; with several benches by bench")
@@ -42,6 +42,7 @@ class Health(View):
     worker: str = Field(description="`ok`, or the reason why it is not available")
     disk: str = Field(description="`ok`, or the free space of the data folder where it is little")
     queue: str = Field(description="`empty`, or the numbers of running and waiting jobs")
+    campaigns: str = Field(description="`ok`, or the campaigns whose bench this service does not have")
     audit: str = Field(description="`ok`, or why the audit trail cannot be written, or that it was altered")
     clocks: str = Field(description="`ok`, or the instruments whose clock has an error above 1 ms, with its bound")
     calibration: str = Field(

@@ -49,6 +49,7 @@ CHANNELS = (
     Channel("temperature", "degC"),
 )
 PAUSE = "at checkpoint 10mm_1Hz, in 4 s"
+WAITING = "waiting for bench left, which this service does not have: 1"
 OVERDUE = "coil_voltage: calibration overdue since 2025-02-20 (certificate E-77 of Testo Industrial Services)"
 TRIP = "load cell: force 1 523.4 N exceeds the specimen's limit of 1 500 N; lower the stroke or the drive"
 METHODS = [
@@ -300,6 +301,8 @@ def rig_routes(bench: FakeBench) -> APIRouter:
             "queue": "empty",
             "audit": "ok",
             "clocks": "ok",
+            "campaigns": WAITING,
+            "log_store": "ok",
             "calibration": OVERDUE,
         }
 

@@ -61,6 +61,8 @@ def test_a_certificate_is_added_corrected_and_withdrawn(seen):
 @browser_test
 def test_the_health_strip_and_a_run_name_the_overdue_channel(seen):
     assert "coil voltage overdue since 2025-02-20" in seen["health"]
+    assert "waiting for bench left" in seen["health"]
+    assert "Log store ready" in " ".join(seen["health"].split())
     assert OVERDUE in seen["marked"]
 
 

@@ -1,16 +1,19 @@
-"""Route of the health of the service: agent, worker, disk, queue, clocks and calibration, each in words."""
+"""Route of the health of the service, each part in words: agent, worker, disk, queue, clocks and others."""
 
 import asyncio
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib.metadata import version
+from itertools import starmap
 from typing import Any
 
 from fastapi import APIRouter
 
 from bench.agent_protocol import AgentStatus
 from bench.catalogue import CatalogueUnavailableError
+from bench.config import get_bench_name, is_executor
 from bench.errors import BenchError
 from bench.service.benches import ServedBench, ServedBenches
 from bench.service.context import Context, ServiceContext
@@ -44,6 +47,7 @@ def _describe_parts(context: ServiceContext) -> dict[str, Any]:
         "benches": agents,
         "disk": context.space_monitor.describe() or "ok",
         "queue": _describe_from_catalogue(_describe_queue, context),
+        "campaigns": _describe_from_catalogue(_describe_campaigns, context),
         "audit": context.audit.describe_state(),
         "clocks": _join({name: describe_clocks(one) for name, one in context.benches.find_statuses().items()}),
         "log_store": "not used" if context.log_copier is None else context.log_copier.describe_state(),
@@ -85,6 +89,21 @@ def _describe_queue(context: ServiceContext) -> str:
     counts = context.catalogue.job_queue.count_states()
     running, waiting = counts.get("running", 0), counts.get("queued", 0)
     return f"{running} running, {waiting} waiting" if running or waiting else "empty"
+
+
+def _describe_campaigns(context: ServiceContext) -> str:
+    """Return ``ok``, or how many campaigns stand still because this service does not have their bench."""
+    benches = [one.bench for one in context.campaign_store.list_in_progress() if is_executor(one.bench)]
+    waiting = Counter(bench for bench in benches if context.benches.find_by_executor(bench) is None)
+    return "; ".join(starmap(_describe_waiting, sorted(waiting.items()))) or "ok"
+
+
+def _describe_waiting(executor: str, count: int) -> str:
+    name = get_bench_name(executor)
+    return (
+        f"waiting for bench {name}, which this service does not have: {count}; "
+        f"start the service with --bench {name}=bench.toml, or stop the campaign"
+    )
 
 
 def describe_clocks(status: AgentStatus | None) -> str:

@@ -1,4 +1,4 @@
-// Health of the service in one strip: agent, worker, queue, disk, wires, clocks, calibration. Each entry is a word, with the reason of a fault.
+// Health of the service in one strip: agent, worker, queue, disk, wires, clocks, log store, calibration. Each entry is a word, with the reason of a fault.
 
 import { get } from "../common/api.js";
 import { byId, element, shortTime, spaced } from "../common/format.js";
@@ -7,7 +7,7 @@ const PERIOD_MS = 5_000;
 /** Error of a clock [s] above which it is marked; a sample lasts a millisecond. */
 const CLOCK_ERROR_S = 1e-3;
 /** Order of the entries, whichever of them arrives first. */
-const ORDER = ["Service", "Agent", "Wires", "Clocks", "Worker", "Queue", "Disk", "Calibration"];
+const ORDER = ["Service", "Agent", "Wires", "Clocks", "Worker", "Queue", "Campaigns", "Disk", "Log store", "Calibration"];
 
 export class HealthStrip {
   constructor() {
@@ -24,10 +24,12 @@ export class HealthStrip {
 
   async request() {
     try {
-      const { agent, worker, queue, disk, calibration } = await get("health");
+      const { agent, worker, queue, disk, calibration, campaigns, log_store: store } = await get("health");
       this.show({
         Agent: entry(agent), Worker: entry(worker), Queue: { kind: "good", text: queue }, Disk: entry(disk),
         Calibration: calibration === "ok" ? { kind: "good", text: "nothing due" } : { kind: "fair", text: shorten(calibration) },
+        Campaigns: campaigns === "ok" ? null : { kind: "fair", text: campaigns },
+        "Log store": store === "not used" ? null : entry(store),
       });
     } catch (problem) {
       this.show({ Service: { kind: "bad", text: problem.message } });

@@ -8,7 +8,7 @@ import pytest
 
 from bench import cli
 from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
-from bench.campaigns import parse_campaign
+from bench.campaigns import collect_methods, parse_campaign
 from tests.support.certificates import make_certificate
 from tests.support.message_servers import find_closed_port, serve_webhook
 from tests.support.service_logs import write_complete_log
@@ -279,3 +279,18 @@ def test_a_campaign_from_the_command_line_that_cannot_be_met_ends_with_the_reaso
     campaign = store.create(document, {}, "agent", time.time())
     ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
     assert "no thermometer" in ended["reason"]
+
+
+def test_a_campaign_on_a_bench_that_is_not_served_is_reported_and_can_be_stopped(service):
+    assert service.get("/health")["campaigns"] == "ok"
+    store = service.client.app.state.context.campaign_store
+    document = parse_campaign({"name": "night", "steps": [RUN]}, "the test")
+    store.create(document, collect_methods(document), "scenario default", time.time())
+    assert service.get("/health")["campaigns"] == "ok"
+    campaign = store.create(document, collect_methods(document), "left", time.time())
+    words = service.get("/health")["campaigns"]
+    assert words.startswith("waiting for bench left, which this service does not have: 1;")
+    assert "--bench left=bench.toml" in words
+    service.post(f"/campaigns/{campaign.id}/stop", {}, 200)
+    assert service.get(f"/campaigns/{campaign.id}")["status"] == "stopped"
+    assert service.get("/health")["campaigns"] == "ok"

@@ -77,6 +77,11 @@ def find_bench(data: Path, config: Path) -> str:
     return found
 
 
+def find_place(data: Path, name: str) -> str:
+    """Return the ``bench.toml`` or the address of a bench of the service of a data folder; empty if not known."""
+    return _read_benches(data).get(name, "")
+
+
 def choose_bench(data: Path, name: str = "") -> str:
     """Return a bench of the service of a data folder.
 

@@ -1,4 +1,4 @@
-"""`mrbench campaign run --config`: a campaign on the instruments, executed by the service of the data folder."""
+"""`mrbench campaign run` on a bench: its instruments, by the service of the data folder."""
 
 import time
 from pathlib import Path
@@ -16,7 +16,7 @@ from bench.campaigns import (
 )
 from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
-from bench.config import find_bench, get_executor, load_config
+from bench.config import choose_bench, find_bench, find_place, get_executor, load_config
 from bench.folder_lock import is_locked
 
 _POLL_PERIOD = 0.5
@@ -25,14 +25,15 @@ _EVENTS = 200
 """Number of events that are read at once."""
 
 
-def run_on_bench(path: Path, config: Path, data: Path, operator: str, *, as_json: bool) -> None:
+def run_on_bench(path: Path, config: Path | None, bench: str, data: Path, operator: str, *, as_json: bool) -> None:
     """Start a campaign on the bench of a running service, or follow it, until it ends.
 
     The campaign goes on if this command is ended.
 
     Args:
         path: file of the campaign.
-        config: ``bench.toml``, which tells the benches of the service apart.
+        config: ``bench.toml``, which tells the benches of the service apart; None if a bench is named.
+        bench: name of a bench of the service.
         data: data folder of the service.
         operator: person, for the record.
         as_json: print the final state as JSON.
@@ -40,15 +41,26 @@ def run_on_bench(path: Path, config: Path, data: Path, operator: str, *, as_json
     Raises:
         BenchError: configuration or campaign is invalid, no service runs, or the bench is held.
     """
-    load_config(config)
-    check_served(data, config)
+    if config is not None:
+        load_config(config)
+    check_served(data, config or Path("bench.toml"))
     with open_store(data) as store:
-        executor = get_executor(find_bench(data, config))
-        campaign = find_or_create(store, path, operator, executor)
+        name = _choose_named_bench(data, bench) if config is None else find_bench(data, config)
+        campaign = find_or_create(store, path, operator, get_executor(name))
         ended = _follow(store, campaign, is_quiet=as_json)
         if as_json:
             events = store.table.list_newest_events(ended.id, _EVENTS)
             typer.echo(make_view(ended, events).model_dump_json(indent=2))
+
+
+def _choose_named_bench(data: Path, bench: str) -> str:
+    """Return the name of a bench of the service whose agent writes into the data folder."""
+    name = choose_bench(data, bench)
+    if "://" in (place := find_place(data, name)):
+        raise CampaignError(
+            f"the agent of bench {name} is at {place}; start its campaigns in the page or over REST"
+        )
+    return name
 
 
 def check_served(data: Path, config: Path) -> None:

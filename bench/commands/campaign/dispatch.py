@@ -37,6 +37,9 @@ def campaign(
         Path | None,
         typer.Option(metavar="FILE", help="With run: on this bench.toml, by the service that uses --data."),
     ] = None,
+    bench: Annotated[
+        str, typer.Option(metavar="NAME", help="With run: on this bench of the service that uses --data.")
+    ] = "",
     scenario: Annotated[
         str | None,
         typer.Option(metavar="NAME|FILE", help="With run: on the simulated plant, faster than real time."),
@@ -82,9 +85,9 @@ def campaign(
 
         plan(Path(target), data, quick=quick, as_json=as_json)
     elif action is Action.RUN:
-        if (scenario is None) == (config is None):
-            raise typer.BadParameter("give one of --config bench.toml and --scenario NAME or FILE")
-        _run(Path(target), config, scenario, data, operator, identify=identify, is_new=new, as_json=as_json)
+        if sum((scenario is not None, config is not None, bool(bench))) != 1:
+            raise typer.BadParameter("give one of --config bench.toml, --bench NAME and --scenario NAME or FILE")
+        _run(Path(target), config, bench, scenario, data, operator, identify=identify, is_new=new, as_json=as_json)
     elif action is Action.REPORT:
         from bench.commands.campaign.report import report
 
@@ -98,6 +101,7 @@ def campaign(
 def _run(
     path: Path,
     config: Path | None,
+    bench: str,
     scenario: str | None,
     data: Path,
     operator: str,
@@ -106,11 +110,11 @@ def _run(
     is_new: bool,
     as_json: bool,
 ) -> None:
-    if config is not None:
+    if scenario is None:
         from bench.commands.campaign.bench import run_on_bench
 
-        run_on_bench(path, config, data, operator, as_json=as_json)
+        run_on_bench(path, config, bench, data, operator, as_json=as_json)
     else:
         from bench.commands.campaign.run import run_on_plant
 
-        run_on_plant(path, str(scenario), data, operator, identify=identify, is_new=is_new, as_json=as_json)
+        run_on_plant(path, scenario, data, operator, identify=identify, is_new=is_new, as_json=as_json)

@@ -12,6 +12,7 @@ from bench.commands.campaign.bench import check_served, find_or_create
 from bench.commands.campaign.catalogue import open_store
 from bench.commands.campaign.control import control
 from bench.commands.campaign.report import report
+from bench.config import write_benches
 from tests.support.audit_trails import list_all
 from tests.support.campaign_reports import STARTED, make_result, run_step, store_campaign
 from tests.support.message_servers import serve_webhook
@@ -38,6 +39,28 @@ def test_an_equal_campaign_is_followed_and_another_one_is_refused(tmp_path):
         assert find_or_create(store, tmp_path / "a.json", "B", "agent").id == first.id
         with pytest.raises(CampaignError, match=f"{first.id} holds the bench"):
             find_or_create(store, write(tmp_path / "b.json", seed=4), "B", "agent")
+
+
+def test_a_campaign_is_run_on_the_bench_that_is_named(tmp_path, monkeypatch, capsys):
+    data = tmp_path / "data"
+    with open_store(data, is_created=True):
+        write_benches(data, {"left": "/x/left.toml", "right": "/x/right.toml", "far": "tcp://rig:5570"})
+    monkeypatch.setattr("bench.commands.campaign.bench._follow", lambda store, campaign, **_: campaign)
+    command = ["campaign", "run", str(write(tmp_path / "a.json")), "--data", str(data), "--out", "-"]
+    with (data / "service.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        with pytest.raises(SystemExit) as end:
+            cli.main([*command, "--bench", "right"])
+        assert not end.value.code
+        assert json.loads(capsys.readouterr().out)["bench"] == "right"
+        for name, words in (("up", "there is no bench 'up'"), ("far", "of bench far is at tcp://rig:5570")):
+            with pytest.raises(SystemExit) as end:
+                cli.main([*command, "--bench", name])
+            assert end.value.code == 1
+            assert words in capsys.readouterr().err
+    with pytest.raises(SystemExit):
+        cli.main([*command, "--bench", "right", "--scenario", "default"])
+    assert "--bench NAME" in " ".join(capsys.readouterr().err.split())
 
 
 def test_campaigns_of_two_benches_do_not_hold_each_other(tmp_path):

@@ -3,6 +3,7 @@
 from identification.noise.noise_floor import NoiseFloorEstimate, estimate_floor
 from identification.noise.time_scales import (
     NO_SLOW_VARIANCE,
+    NORMAL_95,
     ScaleVariance,
     SlowVariance,
     estimate_slow_variance,
@@ -12,6 +13,7 @@ from identification.noise.time_scales import (
 from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 
 __all__ = [
+    "NORMAL_95",
     "NO_SLOW_VARIANCE",
     "NoiseFloorEstimate",
     "ScaleVariance",

@@ -24,7 +24,13 @@ from identification.noise.spectrum import (
     fit_low_frequency_spectrum,
     make_spectrum,
 )
-from identification.noise.time_scales import NO_SLOW_VARIANCE, ScaleVariance, SlowVariance, average_scales
+from identification.noise.time_scales import (
+    NO_SLOW_VARIANCE,
+    NORMAL_95,
+    ScaleVariance,
+    SlowVariance,
+    average_scales,
+)
 from identification.noise.whitening import WhiteningFilter, design_whitening_filter
 from identification.noise.window_fit import CycleFit, WindowFit
 from identification.signals import Motion
@@ -42,8 +48,6 @@ _MOTION_RATIO = 2.0
 """Threshold on the motion difference of a cycle over that of the best quarter: above it, it does not repeat."""
 _SAME_MOTION = 2e-4
 """Motion difference over the displacement's standard deviation up to which a cycle always repeats."""
-_NORMAL_95 = 1.96
-"""Half the width of a 95 % interval [standard deviations]."""
 
 
 @dataclass(frozen=True)
@@ -99,7 +103,7 @@ class NoiseFloorEstimate:
         """
         if self.deviation is None:
             return min(self.noise, error), max(self.noise, error)
-        return max(self.noise - _NORMAL_95 * self.deviation, 0.0), self.noise + _NORMAL_95 * self.deviation
+        return max(self.noise - NORMAL_95 * self.deviation, 0.0), self.noise + NORMAL_95 * self.deviation
 
 
 class _Estimate(NamedTuple):

@@ -20,7 +20,7 @@ _SLOW_SCALES = 4
 """Number of the longest scales that determine slow noise: about a decade of the frequency."""
 _ITERATIONS = 10
 """Steps of their fit, each with the weights of the step before."""
-_NORMAL_95 = 1.96
+NORMAL_95 = 1.96
 """Half the width of a 95 % interval [standard deviations]."""
 
 
@@ -53,7 +53,7 @@ class SlowVariance(NamedTuple):
     @property
     def highest(self) -> float:
         """Upper end of the 95 % interval [N²]."""
-        return self.variance + _NORMAL_95 * self.deviation
+        return self.variance + NORMAL_95 * self.deviation
 
 
 NO_SLOW_VARIANCE = SlowVariance(0.0, 0.0)

@@ -1,4 +1,4 @@
-"""`mrbench campaign run` on a bench: its instruments, by the service of the data folder."""
+"""`mrbench campaign run` on the instruments of a bench, executed by the service of the data folder."""
 
 import time
 from pathlib import Path

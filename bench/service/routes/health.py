@@ -93,7 +93,7 @@ def _describe_queue(context: ServiceContext) -> str:
 
 def _describe_campaigns(context: ServiceContext) -> str:
     """Return ``ok``, or how many campaigns stand still because this service does not have their bench."""
-    benches = [one.bench for one in context.campaign_store.list_in_progress() if is_executor(one.bench)]
+    benches = [one.bench for one in context.catalogue.campaigns.list_in_progress() if is_executor(one.bench)]
     waiting = Counter(bench for bench in benches if context.benches.find_by_executor(bench) is None)
     return "; ".join(starmap(_describe_waiting, sorted(waiting.items()))) or "ok"
 

@@ -3,7 +3,7 @@
 from identification.gap.noise.clock_drift import describe_drift_explanation, subtract_clock_drift
 from identification.gap.noise.explainable_share import FEATURE_VARIABLES, Explained, ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
-from identification.gap.noise.slow_drift import compute_noise_drift
+from identification.gap.noise.slow_drift import compute_noise_drift, has_drift
 from identification.gap.noise.spectral_line import MAINS_FREQUENCY, find_mains_frequency
 from identification.gap.noise.unpredicted_residual import settle_unknown_floor
 
@@ -16,6 +16,7 @@ __all__ = [
     "compute_noise_drift",
     "describe_drift_explanation",
     "find_mains_frequency",
+    "has_drift",
     "settle_unknown_floor",
     "subtract_clock_drift",
 ]

@@ -22,10 +22,8 @@ from identification.gap.data import (
 from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
-from identification.noise import NoiseFloorEstimate, estimate_slow_variance
+from identification.noise import NORMAL_95, NoiseFloorEstimate, estimate_slow_variance
 
-_NORMAL_95 = 1.96
-"""Half the width of a 95 % interval [standard deviations]."""
 _CHANCE_DEVIATIONS = 3.0
 """Standard deviations of a mean square that noise alone hardly exceeds: in one recording of 700."""
 _SEARCH_DRAWS = 2
@@ -73,7 +71,7 @@ class NoiseModel:
         """
         if self.has_certain_error:
             return self.highest_floor
-        uncertain = _CHANCE_DEVIATIONS / _NORMAL_95 * (self.highest_floor**2 - self.floor**2)
+        uncertain = _CHANCE_DEVIATIONS / NORMAL_95 * (self.highest_floor**2 - self.floor**2)
         chance = _CHANCE_DEVIATIONS * self.estimate.compute_chance(samples) * self.noise**2
         return math.sqrt(self.floor**2 + math.hypot(uncertain, chance))
 

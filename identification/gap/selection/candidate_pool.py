@@ -24,7 +24,7 @@ from identification.gap.fits import (
     fit_jointly,
     refit_all_samples,
 )
-from identification.gap.noise import NoiseModel, compute_noise_drift, find_mains_frequency
+from identification.gap.noise import NoiseModel, compute_noise_drift, find_mains_frequency, has_drift
 from identification.gap.selection.error_comparison import ErrorComparison
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
 from identification.gap.selection.screening import ScreeningResult
@@ -293,8 +293,9 @@ class CandidatePool:
         """Compute the residual of a fit on all samples; a drift that slow noise explains remains in it."""
         forces = self.full_problem.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
         residual = self.evaluation.compute_residual(forces)
-        drift = compute_noise_drift(fit, self.full_problem, self.noise_model.bound_slow_variance(residual))
-        if drift.any():
+        if has_drift(fit):
+            slow_variance = self.noise_model.bound_slow_variance(residual)
+            drift = compute_noise_drift(fit, self.full_problem, slow_variance)
             drifts = split_by_piece(drift, self.full_problem.pieces)
             residual = self.evaluation.compute_residual([f - d for f, d in zip(forces, drifts, strict=True)])
         estimate = self.noise_model.estimate

@@ -22,8 +22,7 @@ def make_pool(problem=None, evaluation=None, rate=10.0, **settings):
     settings = {"screening_rate": 100.0, "fit_budget": 3} | settings
     problem = SimpleNamespace() if problem is None else problem
     problem.space = SimpleNamespace(scales=SimpleNamespace(rate=rate, damper_size=LIBRARY_SIZE))
-    estimate = NoiseFloorEstimate(FLOOR, None, FLOOR, "")
-    noise_model = SimpleNamespace(floor=FLOOR, estimate=estimate, bound_slow_variance=lambda residual: 0.0)
+    noise_model = SimpleNamespace(floor=FLOOR, estimate=NoiseFloorEstimate(FLOOR, None, FLOOR, ""))
     pool = CandidatePool(problem, evaluation, noise_model, settings=SimpleNamespace(**settings))
     pool.candidates[frozenset()] = make_candidate((), 6.0, 6.0)
     return pool

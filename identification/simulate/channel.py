@@ -9,10 +9,10 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.effects import Form
 from identification.simulate.curves import apply_lag, differentiate_by_argument, differentiate_by_parameters
-from identification.simulate.inputs import trace_memory
+from identification.simulate.inputs import trace_path_memory
 from identification.simulate.motion import DamperMotion, compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
-from identification.simulate.variables import DEADBAND, DamperVariables, apply_deadband
+from identification.simulate.variables import DamperVariables, apply_deadband
 
 _DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-8, 1e-7
 """Steps of differences of parallel forces [m], [m/s]."""
@@ -22,6 +22,12 @@ _FORCE_STEP = 1e-6
 """Step of differences of a force channel, relative to the largest force [1]."""
 _LAG_STEP = 1e-7
 """Step of differences of the channel's lag [s]."""
+_PRESLIDING_DEADBAND = 0.005
+"""Half width of the deadband of the displacement over the presliding distance [1].
+
+Noise at rest would otherwise add up to a path that releases the deflected lip. A width in metres would hide the
+presliding of a small damper.
+"""
 
 
 def compute_parallel_force(model: SimulationModel, excitation: Excitation, motion: DamperMotion) -> Array:
@@ -38,12 +44,12 @@ def compute_parallel_force(model: SimulationModel, excitation: Excitation, motio
 
 def _compute_memory_force(form: Form, h: float, x: Array, v: Array, *values: float) -> Array:
     """Compute the parallel force (N,) [N] of a form with memory or relaxation."""
+    named = dict(zip((q.symbol for q in form.parameters), values, strict=True))
     if form.action == "relaxation_force":
-        exchange = values[[q.symbol for q in form.parameters].index("exchange_time")]
-        return np.asarray(form.function(x, v, apply_lag(x, exchange, h), *values))
-    return np.asarray(
-        form.function(x, v, trace_memory(compile_once(form.memory), apply_deadband(x, DEADBAND), *values), *values)
-    )
+        return np.asarray(form.function(x, v, apply_lag(x, named["exchange_time"], h), *values))
+    path = apply_deadband(x, _PRESLIDING_DEADBAND * named["presliding_distance"])
+    memory = trace_path_memory(compile_once(form.memory), path, v, *values)
+    return np.asarray(form.function(x, v, memory, *values))
 
 
 def differentiate_parallel_force(

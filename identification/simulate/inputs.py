@@ -132,6 +132,18 @@ def trace_memory(memory: Any, u: Array, *values: float) -> Array:
     return found
 
 
+@njit_uncached
+def trace_path_memory(memory: Any, x: Array, v: Array, *values: float) -> Array:
+    """Return the memory of a form along a displacement (N,) [m] at velocities (N,) [m/s]; it starts at zero."""
+    found = np.zeros(len(x))
+    for i in range(1, len(x)):
+        change = x[i] - x[i - 1]
+        found[i] = found[i - 1]
+        if change != 0.0:
+            found[i] = memory(found[i - 1], change, 0.5 * (v[i - 1] + v[i]), *values)
+    return found
+
+
 @njit_cached
 def apply_two_lags(drive: Array, eta: float, lag: float, delay: float, h: float) -> Array:
     """Return the field at half samples (2N-1,) after two lags and a dead time; exact for a held drive."""

@@ -63,7 +63,7 @@ def make_plant_constants(
     k[: states.Z_SATURATION + 1] = make_rig_constants(scenario, law)
     k[states.DEAD_TIME], lag, k[states.LAGGED_FRACTION], k[states.LAG_COUNT] = effects.get_coil_lag()
     k[states.SECOND_LAG_RATE] = 1.0 / lag if lag > _MIN_LAG else 0.0
-    k[states.BRISTLE_RATE] = effects.get_bristle_rate()
+    k[[states.BRISTLE_RATE, states.PEAK_RATIO, states.STRIBECK_SPEED]] = effects.get_bristles()
     slope = _compute_max_slope(effects.make_parallel_force())
     slope += compute_steepest_slope(defined) if defined is not None else 0.0
     k[states.BASE_RATE] = compute_rig_rate(scenario, law, slope)

@@ -4,6 +4,8 @@ The law is that of ``identification.damper.law``, compiled. The actuator is inte
 specimen, so that displacement, velocity and acceleration are continuous between command samples.
 """
 
+import math
+
 from identification.damper.effects import connection
 from sim_rig.plant.defined_effects import (
     FIELD_PLACE,
@@ -46,7 +48,9 @@ from sim_rig.plant.states import (
     IN_GAP_STIFFNESS,
     LIP_BEND,
     MASS,
+    PEAK_RATIO,
     POSITION,
+    STRIBECK_SPEED,
     VELOCITY,
     Y,
     Z,
@@ -252,7 +256,8 @@ def compute_rates(
     slip = v - y_rate
     rate[Y], rate[DAMPER] = y_rate, v
     rate[Z] = compute_hysteresis_rate(slip, s[Z], p[5], p[2], p[3], p[12])
-    rate[LIP_BEND] = k[BRISTLE_RATE] * (v - abs(v) * s[LIP_BEND])
+    limit = 1.0 + k[PEAK_RATIO] * math.exp(-((v / k[STRIBECK_SPEED]) ** 2))
+    rate[LIP_BEND] = k[BRISTLE_RATE] * (v - abs(v) * s[LIP_BEND] / limit)
     rate[GAS_POSITION] = k[HEAT_EXCHANGE_RATE] * (x - s[GAS_POSITION])
     compute_coil_rates(s, drive, delayed_output, p[4], k, defined, rate)
     compute_heat_rates(s, abs(force * v), k, rate)

@@ -62,9 +62,15 @@ class EffectFunctions:
         relaxing = [bind_all_but_third(form.function, values) for form, values in self.select("relaxation_force")]
         return add_functions(memoryless + hysteretic + relaxing)
 
-    def get_bristle_rate(self) -> float:
-        """Return the rate [1/m] over the path at which a seal's lip deflects."""
-        return self._get_rate("hysteretic_force", "presliding_distance")
+    def get_bristles(self) -> tuple[float, float, float]:
+        """Return the rate [1/m] at which a seal's lip deflects, its peak [1] and its Stribeck speed [m/s].
+
+        The peak is the further deflection while sticking, over that of fast sliding.
+        """
+        for form, values in self.select("hysteretic_force"):
+            named = dict(zip((q.symbol for q in form.parameters), values, strict=True))
+            return 1.0 / named["presliding_distance"], named.get("peak_ratio", 0.0), named["stribeck"]
+        return 0.0, 0.0, 1.0
 
     def get_exchange_rate(self) -> float:
         """Return the rate [1/s] at which gas takes the temperature of its wall."""

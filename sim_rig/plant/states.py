@@ -19,7 +19,7 @@ STATE_COUNT = 14
     GAS_POSITION,  # [m] displacement at which the gas would have the temperature of its wall
 ) = range(STATE_COUNT)
 
-CONSTANT_COUNT = 26
+CONSTANT_COUNT = 28
 """Constants of actuator, amplifier, coil, heat and mounting, in the order of the names below."""
 (
     COMMAND_LAG,  # [1/s] rate of the command's lag
@@ -48,4 +48,6 @@ CONSTANT_COUNT = 26
     BRISTLE_RATE,  # [1/m] rate over the path at which a seal's lip deflects, 0 without one
     LAG_COUNT,  # number of second lags in series, one or two
     HEAT_EXCHANGE_RATE,  # [1/s] rate at which gas takes the temperature of its wall, 0 without gas
+    PEAK_RATIO,  # [1] additional deflection of the lip while sticking, over that of fast sliding
+    STRIBECK_SPEED,  # [m/s] velocity over which that peak falls
 ) = range(CONSTANT_COUNT)

@@ -30,6 +30,7 @@ _CHOSEN: dict[str, dict[str, tuple[float, ...]]] = {
         "stribeck": (20.0, 10.0, 0.015),
         "stribeck_exponential": (20.0, 10.0, 0.015),
         "presliding": (20.0, 10.0, 0.015, 6e-5),
+        "bristle": (20.0, 0.5, 0.015, 6e-5),
     },
     "orifice_turbulence": {"quadratic": (1500.0,), "power": (15.0, 1.7)},
     "direction_asymmetry": {"proportional": (0.08, 0.15, 0.012), "one_sided": (120.0, 8.0, 0.01)},

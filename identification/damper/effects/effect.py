@@ -73,7 +73,8 @@ Action = Literal[
   lost: it leaves with the time constant ``recovery_time`` [s] among the parameters.
 - ``parallel_force``: displacement, velocity of the damper -> force that adds to the law's [N].
 - ``hysteretic_force``: displacement, velocity of the damper, memory [1] -> force that adds to the law's [N];
-  ``memory``: (memory, change of the displacement) -> memory, the same however a monotonic change is divided.
+  ``memory``: (memory, change of the displacement, velocity) -> memory, at one velocity the same however a
+  monotonic change is divided.
 - ``relaxation_force``: displacement, velocity of the damper, displacement that follows with the time constant
   ``exchange_time`` [s] among the parameters -> force that adds to the law's [N].
 - ``displacement_backlash``: previous displacement of the damper, displacement of the actuator [m] -> displacement

@@ -3,7 +3,8 @@
 force = (F_c + F_s exp(-(v/v_s)²)) v / sqrt(v² + v_0²); the last factor is a smooth sign. With
 ``stribeck_exponential`` the peak falls as an exponential of the speed. A soft lip deflects before it slides
 (Dahl). With ``presliding`` the sign is replaced by the lip's deflection, which depends on the travel since the
-last reversal.
+last reversal. With ``bristle`` the deflection itself follows the peak, as in the LuGre model without its viscous
+part (Canudas de Wit et al. 1995): F' = (v - |v| F / g(v)) F_c / d, with g = F_c (1 + r exp(-(v/v_s)²)).
 """
 
 from typing import Any
@@ -37,11 +38,33 @@ def compute_presliding_friction(
 
 
 def update_lip_deflection(
-    deflection: Any, change: Any, sliding: Any, peak: Any, stribeck: Any, presliding_distance: Any
+    deflection: Any, change: Any, velocity: Any, sliding: Any, peak: Any, stribeck: Any, presliding_distance: Any
 ) -> Any:
     """Return the relative deflection [1] of the lip after a monotonic change of the displacement [m]."""
     target = 1.0 if change > 0.0 else -1.0
     return target + (deflection - target) * np.exp(-abs(change) / presliding_distance)
+
+
+def compute_bristle_friction(
+    x: Any, velocity: Any, deflection: Any, sliding: Any, peak_ratio: Any, stribeck: Any, presliding_distance: Any
+) -> Any:
+    """Return the parallel force [N] of bristles with a deflection [1], relative to that of fast sliding."""
+    return sliding * deflection
+
+
+def update_bristle_deflection(
+    deflection: Any,
+    change: Any,
+    velocity: Any,
+    sliding: Any,
+    peak_ratio: Any,
+    stribeck: Any,
+    presliding_distance: Any,
+) -> Any:
+    """Return the relative deflection [1] of bristles after a change of displacement [m] at a velocity [m/s]."""
+    limit = 1.0 + peak_ratio * np.exp(-((velocity / stribeck) ** 2))
+    target = limit if change > 0.0 else -limit
+    return target + (deflection - target) * np.exp(-abs(change) / (presliding_distance * limit))
 
 
 _PARAMETERS = (
@@ -49,6 +72,8 @@ _PARAMETERS = (
     Quantity("peak", "N", 0.0, 1000.0, 10.0, "additional friction while sticking"),
     Quantity("stribeck", "m/s", 5e-4, 0.2, 0.015, "velocity over which the peak falls"),
 )
+_PRESLIDING_DISTANCE = Quantity("presliding_distance", "m", 2e-6, 2e-3, 5e-5, "travel over which the lip deflects")
+_PRESLIDING_STARTS = (3e-5, 2e-4)
 _STARTS = ((0.0, 0.0, 0.006), (0.0, 0.0, 0.02), (0.0, 0.0, 0.06))
 
 SEAL_FRICTION = Effect(
@@ -62,13 +87,25 @@ SEAL_FRICTION = Effect(
         Form(
             "presliding",
             "hysteretic_force",
-            (
-                *_PARAMETERS,
-                Quantity("presliding_distance", "m", 2e-6, 2e-3, 5e-5, "travel over which the lip deflects"),
-            ),
-            tuple((*start, distance) for start in _STARTS for distance in (3e-5, 2e-4)),
+            (*_PARAMETERS, _PRESLIDING_DISTANCE),
+            tuple((*start, distance) for start in _STARTS for distance in _PRESLIDING_STARTS),
             compute_presliding_friction,
             update_lip_deflection,
+        ),
+        Form(
+            "bristle",
+            "hysteretic_force",
+            (
+                _PARAMETERS[0],
+                Quantity(
+                    "peak_ratio", "1", 0.0, 3.0, 0.3, "further friction while sticking, over the sliding one"
+                ),
+                _PARAMETERS[2],
+                _PRESLIDING_DISTANCE,
+            ),
+            tuple((0.0, 0.3, start[2], distance) for start in _STARTS for distance in _PRESLIDING_STARTS),
+            compute_bristle_friction,
+            update_bristle_deflection,
         ),
     ),
 )

@@ -78,6 +78,7 @@ CASES = [
     ("seal_friction", "stribeck", (0.0, -0.1, 20.0, 10.0, 5e-4), -19.99975),
     ("seal_friction", "stribeck_exponential", (0.0, 5e-4, 20.0, 10.0, 2.5e-4), (20.0 + 10.0 * E2) / ROOT2),
     ("seal_friction", "presliding", (0.0, 0.015, 0.5, 20.0, 10.0, 0.015, 6e-5), 10.0 + 5.0 * E1),
+    ("seal_friction", "bristle", (0.0, 0.015, 0.5, 20.0, 0.5, 0.015, 6e-5), 10.0),
     ("shear_thinning", "proportional", (0.0, -0.08, 0.3, 0.08), (1.0, 0.85, 1.0)),
     ("side_load_friction", "linear", (0.011, 1e-3, 2000.0, 0.001), 20.0 / ROOT2),
     ("side_load_friction", "linear", (-0.009, -1e-3, 2000.0, 0.001), -20.0 / ROOT2),
@@ -91,8 +92,10 @@ MEMORY = [
     ("magnetic_remanence", "play_operator", (0.005, 0.01, 0.02), -0.005),
     ("magnetic_remanence", "play_operator", (0.005, 0.1, 0.02), -0.02),
     ("magnetic_remanence", "play_operator", (0.005, -0.1, 0.02), 0.02),
-    ("seal_friction", "presliding", (0.2, 6e-5, 20.0, 10.0, 0.015, 6e-5), 1.0 - 0.8 * E1),
-    ("seal_friction", "presliding", (0.2, -6e-5, 20.0, 10.0, 0.015, 6e-5), -1.0 + 1.2 * E1),
+    ("seal_friction", "presliding", (0.2, 6e-5, 0.1, 20.0, 10.0, 0.015, 6e-5), 1.0 - 0.8 * E1),
+    ("seal_friction", "presliding", (0.2, -6e-5, 0.1, 20.0, 10.0, 0.015, 6e-5), -1.0 + 1.2 * E1),
+    ("seal_friction", "bristle", (0.2, 9e-5, 0.0, 20.0, 0.5, 0.015, 6e-5), 1.5 - 1.3 * E1),
+    ("seal_friction", "bristle", (0.2, -6e-5, -1.0, 20.0, 0.5, 0.015, 6e-5), -1.0 + 1.2 * E1),
 ]
 
 
@@ -189,7 +192,7 @@ SCALES = {
     "force_filter": {"lag": 0.002},
     "gas_spring": {"preload": 90, "length": 0.05, "exchange_time": 0.5},
     "orifice_turbulence": {"coefficient": 1000, "force": 10, "exponent": 2},
-    "seal_friction": {"sliding": 20, "peak": 10, "stribeck": 0.015, "presliding_distance": 5e-5},
+    "seal_friction": {"sliding": 20, "peak": 10, "peak_ratio": 0.3, "stribeck": 0.015, "presliding_distance": 5e-5},
     "side_load_friction": {"growth": 1000, "middle": 0.005},
     "viscous_heating": {"softening": 2e-4, "recovery_time": 100, "yield_exponent": 0.5},
 }  # fmt: skip

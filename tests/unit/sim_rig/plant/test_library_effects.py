@@ -20,7 +20,7 @@ PLAIN = (None, None)
 TOLERANCE = {
     "coil_lag": 0.25,  # the rig interpolates the dead time between its substeps
     "clevis_backlash": 0.5,  # contacts begin and end within a sample
-    "seal_friction": 0.3,  # a lip ignores the last micrometre, so that noise does not deflect it
+    "seal_friction": 0.1,  # a lip ignores a small part of its presliding distance
     "force_filter": 0.6,  # the force is taken as linear between samples
 }
 """[N] rms tolerance of effects that need more than the usual one."""

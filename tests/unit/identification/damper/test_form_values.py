@@ -192,7 +192,9 @@ SCALES = {
     "force_filter": {"lag": 0.002},
     "gas_spring": {"preload": 90, "length": 0.05, "exchange_time": 0.5},
     "orifice_turbulence": {"coefficient": 1000, "force": 10, "exponent": 2},
-    "seal_friction": {"sliding": 20, "peak": 10, "peak_ratio": 0.3, "stribeck": 0.015, "presliding_distance": 5e-5},
+    "seal_friction": {
+        "sliding": 20, "peak": 10, "peak_ratio": 0.3, "stribeck": 0.015, "presliding_distance": 5e-5,
+    },
     "side_load_friction": {"growth": 1000, "middle": 0.005},
     "viscous_heating": {"softening": 2e-4, "recovery_time": 100, "yield_exponent": 0.5},
 }  # fmt: skip

@@ -6,6 +6,7 @@ from functools import cached_property
 from identification.arrays import Array
 from identification.fitting.force_channel import LowPass, compute_filter_delay
 from identification.fitting.log_correction import NO_CORRECTION, LogCorrection
+from identification.signals import StepShifts
 from identification.simulate import Excitation, SimulationModel, simulate
 
 _MAX_BACKLASH_OVERSAMPLING = 8
@@ -34,6 +35,8 @@ class Piece:
     """Index of its log."""
     correction: LogCorrection = NO_CORRECTION
     """Correction of its log."""
+    step_shifts: StepShifts | None = None
+    """Shifts of the steps that its drive contains; None for a drive as recorded."""
 
     def simulate(self, model: SimulationModel, *, sensitivities: bool = False) -> tuple[Array, Array]:
         """Return the force (N,) [N] as its channel would record it, and on request its sensitivities (N, U)."""

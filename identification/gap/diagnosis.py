@@ -121,11 +121,12 @@ def diagnose_prepared(
     learn_residual: bool = False,
 ) -> DiagnosisResult:
     """Diagnose prepared recordings; the arguments are those of ``diagnose``."""
-    dataset, evaluation = prepared.dataset, prepared.evaluation
+    dataset = prepared.dataset
     pool = make_candidate_pool(prepared, seed=seed, progress=progress, settings=settings, library=library)
     with use_one_thread():
         pool.progress = enter_stage(progress, "search", 1, _STAGE_COUNT)
         search_forward(pool)
+        evaluation = pool.evaluation
         pool.progress = enter_stage(progress, "compare", 2, _STAGE_COUNT)
         regression = ResidualRegression(evaluation, pool.floor)
         candidates = pool.candidates.values()

@@ -140,7 +140,9 @@ def _compute_scale_variance(values: Array, spectrum: WindowSpectrum, samples: in
     """Return the variance at a scale of noise with the power ``values`` (N // 2 + 1,) [N²]."""
     count = len(spectrum.window.force)
     seen = values * compute_gain(np.arange(len(values)) / count, samples)
-    return ScaleVariance(samples, 2.0 * float(seen[1:].sum()) / count, _compute_deviation(seen, spectrum))
+    lowest = int(np.argmax(spectrum.is_known))
+    variance, extrapolated = (2.0 * float(seen[1:stop].sum()) / count for stop in (len(seen), lowest))
+    return ScaleVariance(samples, variance, _compute_deviation(seen, spectrum), extrapolated)
 
 
 def _compute_deviation(values: Array, spectrum: WindowSpectrum) -> float:

@@ -32,7 +32,14 @@ class ScaleVariance(NamedTuple):
     variance: float
     """[N²]"""
     deviation: float
-    """Its standard deviation [N²]."""
+    """Its standard deviation where the noise was observed [N²]."""
+    extrapolated: float = 0.0
+    """Part of the variance at frequencies where it was not observed [N²]; all of it may be wrong."""
+
+    @property
+    def uncertainty(self) -> float:
+        """Standard deviation with that of the extrapolated part [N²]."""
+        return math.hypot(self.deviation, self.extrapolated)
 
     def compute_chance(self, differences: int) -> float:
         """Return by how much the variance of another signal with some differences varies by chance [N²].
@@ -104,6 +111,7 @@ def average_scales(
             same[0].samples,
             float(shares @ [s.variance for s in same]),
             float(np.linalg.norm(shares * [s.deviation for s in same])),
+            float(shares @ [s.extrapolated for s in same]),
         )
         for same in zip(*parts, strict=False)
     )

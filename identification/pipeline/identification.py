@@ -38,10 +38,12 @@ from identification.uncertainty import (
     correct_clock_drift,
     describe_clock_drift,
     estimate_covariance,
+    estimate_step_shifts,
     find_unobservable,
     reestimate_motion,
     remove_bias,
     resample_input_noise,
+    shift_steps,
 )
 
 if TYPE_CHECKING:
@@ -86,7 +88,7 @@ def fit_damper(
         result = _compare_stages(dataset, result, network) if network else result
     else:
         result = _take_network_fit(dataset, problem, network)
-    dataset = apply_corrections(dataset, problem, result.minimum.unknowns[problem.shared_columns])
+    dataset = apply_corrections(dataset, result.problem, result.minimum.unknowns[problem.shared_columns])
     fit = make_fit_document(dataset, result, _make_provenance(dataset, request, problem))
     if request.profile:
         progress = enter_stage(progress, "profile", stages.index("profile"), len(stages))
@@ -122,6 +124,10 @@ def _fit_output_error(
     minimum = fit_output_error(problem.make_fast(), settings, progress)
     # The search runs at the samples alone. Filter and backlash enter the final fit only (decision 0004).
     final_settings = replace(settings, restarts=0)
+    shifts = estimate_step_shifts(problem, minimum.unknowns)
+    if shifts is not None:
+        problem = shift_steps(problem, shifts)
+        minimum = fit_output_error(problem.make_fast(), final_settings, progress, minimum.unknowns)
     scatter, notes = None, tuple[str, ...]()
     if _compute_noise_ratio(problem, minimum) > MISFIT_RATIO:
         # The misfit outweighs the effect of input noise, which is not resampled then (decision 0005).
@@ -191,11 +197,20 @@ def _compute_errors(dataset: Dataset, problem: Problem, minimum: Minimum) -> lis
 
 
 def apply_corrections(dataset: Dataset, problem: Problem, shared: Array) -> Dataset:
-    """Return the dataset with the fitted log corrections, from the unknowns (C,) that all pieces share."""
-    if not problem.per_log:
-        return dataset
+    """Return the dataset with the steps of the problem's drives and the fitted corrections of its logs.
+
+    The corrections follow from the unknowns (C,) that all pieces share.
+    """
     corrections = {p.log: problem.find_correction(shared, i) for i, p in enumerate(problem.pieces)}
-    pieces = tuple(replace(p, correction=corrections.get(p.log, p.correction)) for p in dataset.pieces)
+    drives = {p.name: p.excitation.drive for p in problem.pieces if p.step_shifts is not None}
+    pieces = tuple(
+        replace(
+            p,
+            correction=corrections.get(p.log, p.correction),
+            excitation=replace(p.excitation, drive=drives.get(p.name, p.excitation.drive)),
+        )
+        for p in dataset.pieces
+    )
     return replace(dataset, pieces=pieces)
 
 

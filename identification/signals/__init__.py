@@ -7,7 +7,13 @@ from identification.signals.data_quality import (
     describe_outlier_logs,
     mask_clipping,
 )
-from identification.signals.drive import average_drive_levels, bin_drive, estimate_drive_noise
+from identification.signals.drive import (
+    StepShifts,
+    average_drive_levels,
+    bin_drive,
+    estimate_drive_noise,
+    find_level_changes,
+)
 from identification.signals.harmonics import find_steady_cycles
 from identification.signals.motion import Motion, estimate_motion, estimate_recorded_noise
 from identification.signals.noise import estimate_white_noise
@@ -15,6 +21,7 @@ from identification.signals.smoother import differentiate, smooth_below
 
 __all__ = [
     "Motion",
+    "StepShifts",
     "average_drive_levels",
     "bin_drive",
     "check_recordings",
@@ -26,6 +33,7 @@ __all__ = [
     "estimate_motion",
     "estimate_recorded_noise",
     "estimate_white_noise",
+    "find_level_changes",
     "find_steady_cycles",
     "mask_clipping",
     "smooth_below",

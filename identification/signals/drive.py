@@ -1,6 +1,7 @@
 """Levels, steps and noise of a measured drive."""
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -44,6 +45,27 @@ def average_drive_levels(drive: Array) -> Array:
         if stop - start >= _MIN_LEVEL_SAMPLES and level.std() <= _CONSTANT_RATIO * noise:
             result[start:stop] = level.mean()
     return result
+
+
+class StepShifts(NamedTuple):
+    """Steps of a drive, each with the part of a sample by which it is earlier than the first recorded sample."""
+
+    places: Indices
+    """(K,) first sample of each new level."""
+    advances: Array
+    """(K,) between 0 and 1 [samples]."""
+
+    def apply(self, drive: Array) -> Array:
+        """Return a drive (N,) [V or A] that is held between samples; one with a step has the mean."""
+        shifted = drive.copy()
+        shifted[self.places - 1] += self.advances * (drive[self.places] - drive[self.places - 1])
+        return shifted
+
+
+def find_level_changes(drive: Array) -> Indices:
+    """Return the first sample of each new level of a drive (N,) that is constant on both sides of the step."""
+    before, change, after = (np.diff(drive)[k : len(drive) - 3 + k] for k in range(3))
+    return np.asarray(np.flatnonzero((change != 0.0) & (before == 0.0) & (after == 0.0)) + 2)
 
 
 def bin_drive(drive: Array, max_bins: int = 8) -> list[tuple[float, Indices]]:

@@ -29,6 +29,7 @@ from identification.uncertainty.input_noise import (
 )
 from identification.uncertainty.interval import Z95, Z95_ROUNDED, Z99, clip_interval, make_interval
 from identification.uncertainty.profile import compute_profile_intervals
+from identification.uncertainty.step_instants import estimate_step_shifts, shift_steps
 
 __all__ = [
     "GAUGE_NOTE",
@@ -47,6 +48,7 @@ __all__ = [
     "correct_clock_drift",
     "describe_clock_drift",
     "estimate_covariance",
+    "estimate_step_shifts",
     "find_strong_correlations",
     "find_unobservable",
     "make_coordinate_estimates",
@@ -58,4 +60,5 @@ __all__ = [
     "remove_bias",
     "replace_motion",
     "resample_input_noise",
+    "shift_steps",
 ]

@@ -48,6 +48,8 @@ def replace_motion(piece: Piece, stretch: Stretch, cutoff: Array | None = None) 
     """
     x, v, a = estimate_motion(stretch, cutoff)[:3]
     drive = average_drive_levels(stretch.drive)
+    if piece.step_shifts is not None:
+        drive = piece.step_shifts.apply(drive)
     stroke = replace(piece.excitation, rate=stretch.rate, displacement=x, velocity=v, acceleration=a, drive=drive)
     return replace(piece, excitation=stroke)
 

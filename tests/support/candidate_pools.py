@@ -24,17 +24,26 @@ NOISE = 2.0
 STROKES = ((0.012, 1.0, 2.0), (0.006, 3.0, 1.0))
 """Amplitude [m], frequency [Hz] and duration [s] at each drive."""
 DRIVES = (0.0, 0.5, 0.2)
+_FINE = 10
+"""Parts of a sample at which the drive may step."""
 BASELINE_FIT = FitOptions(decimation=1, starts=1, descents=1, refit_full=False)
 
 
-def record(*effects: str | ActiveEffect, seed: int = 1) -> Recording:
-    """Return nine seconds of the laboratory damper with some effects at their medium sizes."""
+def record(*effects: str | ActiveEffect, seed: int = 1, advances: Sequence[float] = ()) -> Recording:
+    """Return nine seconds of the laboratory damper with some effects at their medium sizes.
+
+    The steps of the drive are earlier than their first samples by ``advances`` [samples], tenths of a sample.
+    """
     size, rate, drive, segments = _plan()
     angle = 2 * np.pi * np.cumsum(rate) / RATE
     x = size * np.sin(angle)
     v = np.gradient(x) * RATE
     model = SimulationModel(LABORATORY, effects=tuple(active(e) if isinstance(e, str) else e for e in effects))
-    force = simulate(model, Excitation(RATE, x, v, np.gradient(v) * RATE, drive)).force
+    fine = np.repeat(drive, _FINE)[: (len(drive) - 1) * _FINE + 1]
+    for place, advance in zip(np.flatnonzero(np.diff(drive)) + 1, advances, strict=False):
+        fine[place * _FINE - round(advance * _FINE) : place * _FINE] = drive[place]
+    stroke = Excitation(RATE, x, v, np.gradient(v) * RATE, fine, drive_oversampling=_FINE)
+    force = simulate(model, stroke).force
     random = default_rng(seed)
     displacement = x + 1e-6 * random.standard_normal(len(x))
     recorded = stretch(displacement, force + NOISE * random.standard_normal(len(x)), drive, segments, rate=RATE)

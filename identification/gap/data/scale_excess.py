@@ -48,7 +48,7 @@ def _compute_excess(residual: Residual, scale: ScaleVariance, input_square: floa
     variance, differences = _measure_scale(residual, scale.samples)
     if not differences:
         return ErrorSquare(0.0, math.inf)
-    deviation = math.hypot(scale.compute_chance(differences), scale.deviation)
+    deviation = math.hypot(scale.compute_chance(differences), scale.uncertainty)
     return ErrorSquare(variance - scale.variance - input_square, deviation)
 
 

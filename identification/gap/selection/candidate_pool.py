@@ -14,7 +14,14 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.damper.effects import EFFECTS, Effect
-from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, make_starting_points
+from identification.fitting import (
+    EffectModel,
+    OptimiserSettings,
+    Piece,
+    Problem,
+    fit_output_error,
+    make_starting_points,
+)
 from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import (
     EXPLAINED_RATIO,
@@ -32,6 +39,7 @@ from identification.gap.selection.screening_cache import ScreeningCache
 from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
 from identification.gap.selection.size_prior import compute_size_weight
 from identification.progress import Progress, advance, ignore_progress
+from identification.uncertainty import estimate_step_shifts, shift_steps
 
 _CHANCE_DEVIATIONS = 2.0
 """Standard deviations of a sample variance that count as chance."""
@@ -306,6 +314,26 @@ class CandidatePool:
     def update_residuals(self) -> None:
         """Compute the residuals of all fits again, after the estimate of slow noise has changed."""
         self.candidates = {names: self.evaluate(c.fit) for names, c in self.candidates.items()}
+
+    @cached_property
+    def _recorded_pieces(self) -> tuple[Piece, ...]:
+        """Pieces with the drives as recorded, before any step is moved."""
+        return self.evaluation.pieces
+
+    def place_drive_steps(self, candidate: Candidate) -> bool:
+        """Move the steps of the drives to the instants that a candidate shows; return True if any moved."""
+        recorded = replace(self.full_problem, pieces=self._recorded_pieces).replace_effects(candidate.fit.effects)
+        shifts = estimate_step_shifts(recorded, candidate.fit.minimum.unknowns)
+        if shifts is None:
+            return False
+        self.evaluation = replace(self.evaluation, pieces=shift_steps(recorded, shifts).pieces)
+        self.full_problem = replace(self.full_problem, pieces=self.evaluation.select_fitted_pieces())
+        for name in ("decimated_problem", "screening_problem"):
+            self.__dict__.pop(name, None)
+        self._screenings = ScreeningCache(self._resolve_rate(self.settings.screening_rate), self.library)
+        self.full_fits.clear()
+        self.update_residuals()
+        return True
 
     def _continue_fit(self, names: frozenset[str]) -> None:
         """Continue a descent that stopped at its limit of iterations."""

@@ -37,6 +37,8 @@ _CONTACT_ACTIONS = ("connection", "displacement_backlash")
 def search_forward(pool: CandidatePool) -> None:
     """Fit the sets of effects with the largest expected gains, on decimated data."""
     baseline = pool.fit_law()
+    if pool.place_drive_steps(baseline):
+        baseline = pool.fit((), [baseline.fit.minimum.unknowns])
     pool.noise_model.update(baseline, pool.full_problem, pool.evaluation)
     pool.noise_model.narrow_floor(baseline, pool.evaluation)
     if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
@@ -95,6 +97,8 @@ def _select_beam(pool: CandidatePool, size: int, sets: list[Candidate], parent: 
     settings = pool.settings
     if not sets or size > len(settings.beam_widths) or not _is_worth_extending(pool, sets[0], parent):
         return []
+    if pool.place_drive_steps(sets[0]):
+        sets = [pool.candidates[c.names] for c in sets]
     pool.noise_model.update(sets[0], pool.full_problem, pool.evaluation)
     limit = settings.beam_ratio * max(pool.compute_excess(sets[0]), settings.negligible_excess)
     return [c for c in sets if pool.compute_excess(c) < limit][: settings.beam_widths[size - 1]]

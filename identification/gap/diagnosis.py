@@ -130,7 +130,9 @@ def diagnose_prepared(
         pool.progress = enter_stage(progress, "compare", 2, _STAGE_COUNT)
         regression = ResidualRegression(evaluation, pool.floor)
         candidates = pool.candidates.values()
-        if settle_unknown_floor(pool.noise_model, candidates, regression, pool.block_length, pool.evaluate):
+        if settle_unknown_floor(
+            pool.noise_model, candidates, regression, pool.block_length, pool.evaluate, pool.propagate_input_noise
+        ):
             pool.update_residuals()
         posterior = compare_with_curves(pool, compute_final_posterior(pool))
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None

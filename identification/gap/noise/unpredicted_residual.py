@@ -9,9 +9,11 @@ few blocks.
 
 import math
 from collections.abc import Callable, Collection
+from dataclasses import replace
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.gap.data import Residual, compute_block_squares
 from identification.gap.fits import EXPLAINED_RATIO, Candidate, JointFit
 from identification.gap.noise.explainable_share import ResidualRegression
@@ -28,6 +30,7 @@ def settle_unknown_floor(
     regression: ResidualRegression,
     block_length: float,
     evaluate: Callable[[JointFit], Candidate],
+    propagate: Callable[[Candidate], Array],
 ) -> bool:
     """Take the floor from the smallest set of effects whose residual is noise; return False if there is none.
 
@@ -39,6 +42,7 @@ def settle_unknown_floor(
         regression: regression on their residuals on held-out strokes.
         block_length: length of a block [s], part of a stroke.
         evaluate: computes the residual of a fit; a drift that slow noise explains is then a part of it.
+        propagate: computes the mean square (N,) [N²] of a candidate's force for the noise of its inputs.
     """
     if noise_model.estimate.is_known:
         return False
@@ -48,23 +52,28 @@ def settle_unknown_floor(
     adequate = [c for c in candidates if c.held_out_rmse < EXPLAINED_RATIO * lowest]
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         estimate = noise_model.describe_residual(candidate)
-        if is_stationary(candidate.residual, estimate, block_length):
+        if is_stationary(candidate.residual, estimate, propagate(candidate), block_length):
             noise_model.estimate = estimate
             noise_model.estimate = noise_model.describe_residual(evaluate(candidate.fit))
             return True
     return False
 
 
-def is_stationary(residual: Residual, estimate: NoiseFloorEstimate, block_length: float) -> bool:
+def is_stationary(
+    residual: Residual, estimate: NoiseFloorEstimate, input_squares: Array, block_length: float
+) -> bool:
     """Return True if the mean square of blocks [s] scatters as that of noise of the same spectrum.
 
-    An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all.
+    An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all. The
+    noise of the displacement (N,) [N²] is strong where the force is steep, so each block has its own expectation.
     """
-    squares = compute_block_squares(residual, block_length) / float(np.mean(residual.values[residual.valid] ** 2))
+    propagated = replace(residual, values=np.sqrt(input_squares))
+    expected = estimate.noise**2 + compute_block_squares(propagated, block_length)
+    squares = compute_block_squares(residual, block_length) / expected
     if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:
         return False
     samples = math.ceil(block_length * residual.rates[0][1])
-    ratio = float(np.var(squares, ddof=1)) / estimate.compute_chance(samples) ** 2
+    ratio = float(np.var(squares / squares.mean(), ddof=1)) / estimate.compute_chance(samples) ** 2
     return abs(math.log(ratio)) < _CHANCE_DEVIATIONS * math.sqrt(2.0 / (len(squares) - 1))
 
 

@@ -311,6 +311,10 @@ class CandidatePool:
         chance = _CHANCE_DEVIATIONS * estimate.compute_chance(held_out)
         return Candidate(fit, residual, *self.evaluation.compute_rmse(residual), chance)
 
+    def propagate_input_noise(self, candidate: Candidate) -> Array:
+        """Return the mean square (N,) [N²] of a candidate's force for the noise of its inputs."""
+        return np.asarray(self.noise_model.sample_other_runs(candidate, self.full_problem).mean(axis=0))
+
     def update_residuals(self) -> None:
         """Compute the residuals of all fits again, after the estimate of slow noise has changed."""
         self.candidates = {names: self.evaluate(c.fit) for names, c in self.candidates.items()}

@@ -37,16 +37,23 @@ def make_candidate(pool, values, *names):
     return candidate
 
 
-def settle(pool, *candidates, **changes):
+def settle(pool, *candidates, input_squares=0.0, **changes):
     """Return the noise model after candidates with unknown floor, or with a changed estimate."""
+    propagated = np.broadcast_to(input_squares, len(pool.evaluation.force))
     estimate = replace(pool.noise_model.estimate, **{
         "noise": BOUND, "high_frequency": BOUND, "cycle_to_cycle": None, "deviation": None, "scales": (),
         **changes,
     })  # fmt: skip
     model = NoiseModel(estimate, pool.noise_model.stretches)
+    model.input_noise = float(np.sqrt(np.mean(propagated)))
     regression = ResidualRegression(pool.evaluation, model.floor)
     settle_unknown_floor(
-        model, candidates, regression, pool.block_length, lambda fit: find_fitted(candidates, fit)
+        model,
+        candidates,
+        regression,
+        pool.block_length,
+        lambda fit: find_fitted(candidates, fit),
+        lambda candidate: propagated,
     )
     return model
 
@@ -103,6 +110,14 @@ def test_a_set_at_the_noise_of_high_frequencies_and_a_known_floor_change_nothing
 def test_an_error_that_is_strong_in_few_blocks_is_not_the_floor(pool):
     bursts = np.where(np.arange(len(pool.evaluation.force)) % 997 < 40, 8.0, 0.5)
     assert not settle(pool, make_candidate(pool, bursts * draw_noise(pool))).estimate.is_known
+
+
+def test_bursts_by_the_noise_of_the_displacement_leave_the_rest_as_the_floor(pool):
+    place = np.arange(len(pool.evaluation.force))
+    bursts = np.where(place % 997 < 40, 3.0, 0.0) * NOISE
+    residual = draw_noise(pool) + bursts * np.random.default_rng(2).standard_normal(len(place))
+    assert not settle(pool, make_candidate(pool, residual)).estimate.is_known
+    assert settle(pool, make_candidate(pool, residual), input_squares=bursts**2).estimate.is_known
 
 
 def test_a_line_of_one_size_is_not_the_floor(pool):

@@ -65,16 +65,22 @@ def is_stationary(
     """Return True if the mean square of blocks [s] scatters as that of noise of the same spectrum.
 
     An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all. The
-    noise of the displacement (N,) [N²] is strong where the force is steep, so each block has its own expectation.
+    noise of the displacement (N,) [N²] is strong where the force is steep. Its estimate may be too large, so blocks
+    may also scatter as noise of the force alone.
     """
-    propagated = replace(residual, values=np.sqrt(input_squares))
-    expected = estimate.noise**2 + compute_block_squares(propagated, block_length)
-    squares = compute_block_squares(residual, block_length) / expected
+    squares = compute_block_squares(residual, block_length)
     if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:
         return False
+    propagated = compute_block_squares(replace(residual, values=np.sqrt(input_squares)), block_length)
     samples = math.ceil(block_length * residual.rates[0][1])
-    ratio = float(np.var(squares / squares.mean(), ddof=1)) / estimate.compute_chance(samples) ** 2
-    return abs(math.log(ratio)) < _CHANCE_DEVIATIONS * math.sqrt(2.0 / (len(squares) - 1))
+    chance, limit = estimate.compute_chance(samples), _CHANCE_DEVIATIONS * math.sqrt(2.0 / (len(squares) - 1))
+    scatters = [_compute_scatter(squares), _compute_scatter(squares / (estimate.noise**2 + propagated))]
+    return any(abs(math.log(scatter / chance**2)) < limit for scatter in scatters)
+
+
+def _compute_scatter(values: Array) -> float:
+    """Return the variance of some values over their squared mean [1]."""
+    return float(np.var(values, ddof=1) / np.mean(values) ** 2)
 
 
 def _select_best(candidates: Collection[Candidate]) -> list[Candidate]:

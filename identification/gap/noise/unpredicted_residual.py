@@ -65,8 +65,8 @@ def is_stationary(
     """Return True if the mean square of blocks [s] scatters as that of noise of the same spectrum.
 
     An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all. The
-    noise of the displacement (N,) [N²] is strong where the force is steep. Its estimate may be too large, so blocks
-    may also scatter as noise of the force alone.
+    noise of the displacement (N,) [N²] is strong where the force is steep. Its estimate may be too large, so
+    blocks may also scatter as noise of the force alone.
     """
     squares = compute_block_squares(residual, block_length)
     if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:

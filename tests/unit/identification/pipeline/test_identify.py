@@ -22,6 +22,7 @@ from identification.predict.predict import predict_log
 from identification.signals.motion import estimate_recorded_noise
 from identification.simulate import Excitation
 from identification.uncertainty.input_noise import remove_bias, replace_motion, resample_input_noise
+from tests.support import candidate_pools
 from tests.support.fit_problems import SCALES
 from tests.support.laboratory import FAST, LABORATORY, NOISE, RATE, SLOW, recording, stretch
 
@@ -41,6 +42,12 @@ def test_most_true_values_lie_inside_the_99_percent_intervals(fit):
     inside = [e.ci99[0] <= getattr(LABORATORY, name) <= e.ci99[1] for name, e in known.items()]
     assert len(known) >= 12
     assert sum(inside) >= len(inside) - 1
+
+
+def test_drive_steps_between_two_samples_leave_the_noise():
+    # With the drive as recorded the error is 1.15 times the noise.
+    fit = identify([candidate_pools.record(advances=(0.9, 0.1, 0.9, 0.0, 0.8))])
+    assert fit.rmse_n.train == pytest.approx(candidate_pools.NOISE, rel=0.03)
 
 
 def test_held_out_segments_are_named_by_the_fit_and_not_fitted(fit):

@@ -8,18 +8,23 @@ SCRIPT = """
 import sys
 import numpy as np
 from identification.damper.effects import EFFECTS
-from identification.simulate.inputs import trace_memory
+from identification.simulate.inputs import trace_memory, trace_path_memory
 from identification.simulate.motion import compile_once
 
 form = EFFECTS[sys.argv[1]].find_form(sys.argv[2])
 path = np.array([0.0, 1e-4, 3e-4])
-print(trace_memory(compile_once(form.memory), path, *(q.scale for q in form.parameters))[-1])
+values = [q.scale for q in form.parameters]
+memory = compile_once(form.memory)
+if form.action == "hysteretic_force":
+    print(trace_path_memory(memory, path, np.zeros(3), *values)[-1])
+else:
+    print(trace_memory(memory, path, *values)[-1])
 """
 FORMS = [
     ("magnetic_remanence", "exponential"),
     ("seal_friction", "presliding"),
     ("magnetic_remanence", "closing"),
-    ("seal_friction", "presliding"),
+    ("seal_friction", "bristle"),
 ]
 
 

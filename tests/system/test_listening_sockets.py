@@ -1,6 +1,7 @@
 """Listening sockets of a running bench: all are on loopback, and none executes a command without the secret."""
 
 import asyncio
+import contextlib
 import ipaddress
 import os
 import re
@@ -45,9 +46,11 @@ def list_sockets(process):
     """Return address, port and command of all listening TCP and bound UDP sockets of a process tree."""
     found = []
     for one in process_tree(process):
-        for socket in one.net_connections("inet"):
-            if socket.status in (psutil.CONN_LISTEN, psutil.CONN_NONE) and socket.laddr:
-                found.append((socket.laddr.ip, socket.laddr.port, " ".join(one.cmdline()[2:5])))
+        # A helper that has ended since has no sockets.
+        with contextlib.suppress(psutil.NoSuchProcess):
+            for socket in one.net_connections("inet"):
+                if socket.status in (psutil.CONN_LISTEN, psutil.CONN_NONE) and socket.laddr:
+                    found.append((socket.laddr.ip, socket.laddr.port, " ".join(one.cmdline()[2:5])))
     return found
 
 

@@ -104,3 +104,16 @@ def test_the_extrapolated_part_is_that_below_the_windows():
     found, law = estimate(pink)
     assert law.pink > 0.0
     assert 0.05 < np.mean([n.extrapolated for n in found]) / np.var(pink) < 0.5
+
+
+def test_two_cycles_show_fast_scales_and_extrapolate_slow_ones():
+    noise = lfilter([1.0], [1.0, -0.97], np.random.default_rng(5).standard_normal(8000))
+    two, _ = estimate(noise, windows=16, cycles=2)
+    many, _ = estimate(noise, windows=1, cycles=32)
+    shares = np.mean([[s.extrapolated / s.variance for s in n.scales] for n in two], axis=0)
+    assert shares[0] < 0.05
+    assert shares[-1] > 0.3
+    last = two[0].scales[-1]
+    assert last.uncertainty == pytest.approx(np.hypot(last.deviation, last.extrapolated))
+    seen = many[0].scales[len(two[0].scales) - 1]
+    assert seen.extrapolated < 0.05 * seen.variance

@@ -43,6 +43,11 @@ class WindowSpectrum(NamedTuple):
         """True in bins that show the noise itself."""
         return np.asarray((self.gain > _KNOWN_GAIN) & (self.frequency > 0.0))
 
+    @property
+    def lowest_known(self) -> int:
+        """Index of the first bin that shows the noise itself; 0 without any."""
+        return int(np.argmax(self.is_known))
+
 
 class LowFrequencySpectrum(NamedTuple):
     """Power of the noise at low frequencies: a white part and a part that falls with the frequency."""
@@ -121,7 +126,7 @@ def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, d
     """
     values = _fill_harmonics(spectrum)
     step = float(spectrum.frequency[1])
-    lowest = int(np.argmax(spectrum.is_known))
+    lowest = spectrum.lowest_known
     values[1:lowest] = low.evaluate(spectrum.frequency[1:lowest])
     # A bin stands for half a step on both sides; the first one begins at one cycle a recording.
     values[0] = low.integrate(min(1.0 / duration, 0.25 * step), 0.5 * step) / step
@@ -140,8 +145,9 @@ def _compute_scale_variance(values: Array, spectrum: WindowSpectrum, samples: in
     """Return the variance at a scale of noise with the power ``values`` (N // 2 + 1,) [N²]."""
     count = len(spectrum.window.force)
     seen = values * compute_gain(np.arange(len(values)) / count, samples)
-    lowest = int(np.argmax(spectrum.is_known))
-    variance, extrapolated = (2.0 * float(seen[1:stop].sum()) / count for stop in (len(seen), lowest))
+    variance, extrapolated = (
+        2.0 * float(seen[1:stop].sum()) / count for stop in (len(seen), spectrum.lowest_known)
+    )
     return ScaleVariance(samples, variance, _compute_deviation(seen, spectrum), extrapolated)
 
 

@@ -36,6 +36,12 @@ class ScaleVariance(NamedTuple):
     extrapolated: float = 0.0
     """Part of the variance at frequencies where it was not observed [N²]; all of it may be wrong."""
 
+    @classmethod
+    def from_signal(cls, samples: int, variance: float, differences: int) -> "ScaleVariance":
+        """Return the variance [N²] of a signal at a scale, as measured by some differences."""
+        scale = cls(samples, variance, 0.0)
+        return scale._replace(deviation=scale.compute_chance(differences))
+
     @property
     def uncertainty(self) -> float:
         """Standard deviation with that of the extrapolated part [N²]."""

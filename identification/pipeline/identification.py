@@ -201,8 +201,10 @@ def apply_corrections(dataset: Dataset, problem: Problem, shared: Array) -> Data
 
     The corrections follow from the unknowns (C,) that all pieces share.
     """
-    corrections = {p.log: problem.find_correction(shared, i) for i, p in enumerate(problem.pieces)}
     drives = {p.name: p.excitation.drive for p in problem.pieces if p.step_shifts is not None}
+    if not problem.per_log and not drives:
+        return dataset
+    corrections = {p.log: problem.find_correction(shared, i) for i, p in enumerate(problem.pieces)}
     pieces = tuple(
         replace(
             p,

@@ -44,7 +44,7 @@ def compute_parallel_force(model: SimulationModel, excitation: Excitation, motio
 
 def _compute_memory_force(form: Form, h: float, x: Array, v: Array, *values: float) -> Array:
     """Compute the parallel force (N,) [N] of a form with memory or relaxation."""
-    named = dict(zip((q.symbol for q in form.parameters), values, strict=True))
+    named = form.name_values(values)
     if form.action == "relaxation_force":
         return np.asarray(form.function(x, v, apply_lag(x, named["exchange_time"], h), *values))
     path = apply_deadband(x, _PRESLIDING_DEADBAND * named["presliding_distance"])

@@ -101,8 +101,7 @@ def _design_filter(residual: Array, valid: BoolArray) -> WhiteningFilter:
     for samples in list_scales(len(residual)):
         variance, differences = measure_scale_variance(residual, valid, samples)
         if differences:
-            scale = ScaleVariance(samples, variance, 0.0)
-            scales.append(scale._replace(deviation=scale.compute_chance(differences)))
+            scales.append(ScaleVariance.from_signal(samples, variance, differences))
     white = math.sqrt(2.0 * scales[0].variance) if scales else float(np.std(residual))
     return design_whitening_filter(scales, white)
 

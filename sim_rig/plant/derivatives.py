@@ -194,6 +194,13 @@ def _balance_mounting(
 
 
 @compile_function
+def _compute_lip_rate(v: float, deflection: float, k: Array) -> float:
+    """Return the rate of a lip's deflection [1/s]; sticking, it bends further than in fast sliding."""
+    limit = 1.0 + k[PEAK_RATIO] * math.exp(-((v / k[STRIBECK_SPEED]) ** 2))
+    return float(k[BRISTLE_RATE] * (v - abs(v) * deflection / limit))
+
+
+@compile_function
 def compute_rates(
     s: Array,
     last_damper: float,
@@ -256,8 +263,7 @@ def compute_rates(
     slip = v - y_rate
     rate[Y], rate[DAMPER] = y_rate, v
     rate[Z] = compute_hysteresis_rate(slip, s[Z], p[5], p[2], p[3], p[12])
-    limit = 1.0 + k[PEAK_RATIO] * math.exp(-((v / k[STRIBECK_SPEED]) ** 2))
-    rate[LIP_BEND] = k[BRISTLE_RATE] * (v - abs(v) * s[LIP_BEND] / limit)
+    rate[LIP_BEND] = _compute_lip_rate(v, s[LIP_BEND], k) if k[BRISTLE_RATE] > 0.0 else 0.0
     rate[GAS_POSITION] = k[HEAT_EXCHANGE_RATE] * (x - s[GAS_POSITION])
     compute_coil_rates(s, drive, delayed_output, p[4], k, defined, rate)
     compute_heat_rates(s, abs(force * v), k, rate)

@@ -68,7 +68,7 @@ class EffectFunctions:
         The peak is the further deflection while sticking, over that of fast sliding.
         """
         for form, values in self.select("hysteretic_force"):
-            named = dict(zip((q.symbol for q in form.parameters), values, strict=True))
+            named = form.name_values(values)
             return 1.0 / named["presliding_distance"], named.get("peak_ratio", 0.0), named["stribeck"]
         return 0.0, 0.0, 1.0
 
@@ -79,7 +79,7 @@ class EffectFunctions:
     def _get_rate(self, action: Action, constant: str) -> float:
         """Return one over the named time constant [s] or length [m] of the effect with this action, else 0."""
         for form, values in self.select(action):
-            return 1.0 / values[[q.symbol for q in form.parameters].index(constant)]
+            return 1.0 / form.name_values(values)[constant]
         return 0.0
 
     def make_backlash_map(self) -> BinaryFunction:

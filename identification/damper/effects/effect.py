@@ -9,7 +9,7 @@ uses numpy's elementary functions only, so it takes floats, arrays and compiled 
 floats.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple, get_args
 
 from identification.damper.effects.former_names import rename_form
@@ -140,6 +140,10 @@ class Form(NamedTuple):
     def place(self) -> Place:
         """Place in the chain at which the form acts."""
         return PLACES[self.action]
+
+    def name_values(self, values: Sequence[float]) -> dict[str, float]:
+        """Return the values of its parameters, in their order, by symbol."""
+        return dict(zip((q.symbol for q in self.parameters), values, strict=True))
 
 
 class Effect(NamedTuple):

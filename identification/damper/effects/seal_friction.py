@@ -67,14 +67,14 @@ def update_bristle_deflection(
     return target + (deflection - target) * np.exp(-abs(change) / (presliding_distance * limit))
 
 
-_PARAMETERS = (
-    Quantity("sliding", "N", 0.0, 1000.0, 20.0, "friction while sliding"),
-    Quantity("peak", "N", 0.0, 1000.0, 10.0, "additional friction while sticking"),
-    Quantity("stribeck", "m/s", 5e-4, 0.2, 0.015, "velocity over which the peak falls"),
-)
+_SLIDING = Quantity("sliding", "N", 0.0, 1000.0, 20.0, "friction while sliding")
+_PEAK = Quantity("peak", "N", 0.0, 1000.0, 10.0, "additional friction while sticking")
+_PEAK_RATIO = Quantity("peak_ratio", "1", 0.0, 3.0, 0.3, "further friction while sticking, over the sliding one")
+_STRIBECK = Quantity("stribeck", "m/s", 5e-4, 0.2, 0.015, "velocity over which the peak falls")
 _PRESLIDING_DISTANCE = Quantity("presliding_distance", "m", 2e-6, 2e-3, 5e-5, "travel over which the lip deflects")
-_PRESLIDING_STARTS = (3e-5, 2e-4)
-_STARTS = ((0.0, 0.0, 0.006), (0.0, 0.0, 0.02), (0.0, 0.0, 0.06))
+_PARAMETERS = (_SLIDING, _PEAK, _STRIBECK)
+_STRIBECK_STARTS, _PRESLIDING_STARTS = (0.006, 0.02, 0.06), (3e-5, 2e-4)
+_STARTS = tuple((0.0, 0.0, speed) for speed in _STRIBECK_STARTS)
 
 SEAL_FRICTION = Effect(
     name="seal_friction",
@@ -95,15 +95,8 @@ SEAL_FRICTION = Effect(
         Form(
             "bristle",
             "hysteretic_force",
-            (
-                _PARAMETERS[0],
-                Quantity(
-                    "peak_ratio", "1", 0.0, 3.0, 0.3, "further friction while sticking, over the sliding one"
-                ),
-                _PARAMETERS[2],
-                _PRESLIDING_DISTANCE,
-            ),
-            tuple((0.0, 0.3, start[2], distance) for start in _STARTS for distance in _PRESLIDING_STARTS),
+            (_SLIDING, _PEAK_RATIO, _STRIBECK, _PRESLIDING_DISTANCE),
+            tuple((0.0, 0.3, speed, distance) for speed in _STRIBECK_STARTS for distance in _PRESLIDING_STARTS),
             compute_bristle_friction,
             update_bristle_deflection,
         ),

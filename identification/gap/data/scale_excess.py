@@ -38,8 +38,7 @@ def measure_residual_scales(residual: Residual) -> tuple[ScaleVariance, ...]:
     for samples in list_scales(min(count for count, _ in residual.rates)):
         variance, differences = _measure_scale(residual, samples)
         if differences:
-            scale = ScaleVariance(samples, variance, 0.0)
-            found.append(scale._replace(deviation=scale.compute_chance(differences)))
+            found.append(ScaleVariance.from_signal(samples, variance, differences))
     return tuple(found)
 
 

@@ -76,6 +76,7 @@ def test_heat_softens_only_where_the_power_is_known():
 
 def test_a_lip_keeps_its_force_through_the_noise_of_a_rest():
     seal = replace(MODEL, effects=(active("seal_friction", "presliding"),))
+    # The estimated motion of resting rods had 0.04 to 0.2 um, most of it slow.
     noise = 1e-7 * np.random.default_rng(0).standard_normal(4000)
     x = np.concatenate([np.linspace(0.0, 1e-3, 1000), 1e-3 + noise])
     motion = DamperMotion(x, *np.zeros((2, len(x))), *np.zeros((3, 0, len(x))), ())

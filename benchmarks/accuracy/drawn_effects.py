@@ -44,6 +44,8 @@ UNKNOWN_CAUSES: dict[str, Stage] = {
     "load cell over force": "force_channel",
 }
 """Causes outside the library, with their stages."""
+_HEATING_ITERATIONS = 4
+"""Iterations between force and heat; each reduces the error by the softening of the force."""
 _CALIBRATIONS = 4
 """Steps in which the strength of an effect is set."""
 
@@ -189,13 +191,16 @@ def _calibrate(
 
 
 def _simulate(damper: Coordinates, stroke: Excitation, effects: tuple[ActiveEffect, ...]) -> Array:
-    """Simulate the force (N,) [N]; heating needs the power of the damper without it."""
+    """Simulate the force (N,) [N]; heating follows the power of the damper that it has softened."""
     model = SimulationModel(damper, effects=effects)
-    if any(e.form.action == "softening" for e in effects):
-        cold = SimulationModel(damper, effects=tuple(e for e in effects if e.form.action != "softening"))
-        force = simulate(cold, stroke, max_travel=0.005).force
-        stroke = replace(stroke, power=np.abs(force * stroke.velocity))
-    return simulate(model, stroke, max_travel=0.005).force
+    if not any(e.form.action == "softening" for e in effects):
+        return simulate(model, stroke, max_travel=0.005).force
+    cold = SimulationModel(damper, effects=tuple(e for e in effects if e.form.action != "softening"))
+    force = simulate(cold, stroke, max_travel=0.005).force
+    for _ in range(_HEATING_ITERATIONS):
+        heated = replace(stroke, power=np.abs(force * stroke.velocity))
+        force = simulate(model, heated, max_travel=0.005).force
+    return force
 
 
 def _add_unknown(damper: Coordinates, stroke: Excitation, cause: str, random: np.random.Generator) -> Array:

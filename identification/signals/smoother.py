@@ -21,6 +21,12 @@ from identification.arrays import Array, njit_cached
 
 _DERIVATIVE = np.array([-1.0, 9.0, -45.0, 0.0, 45.0, -9.0, 1.0]) / 60.0
 """Central difference of sixth order; it underestimates the velocity by 2e-5 at 40 samples a cycle."""
+_END_DERIVATIVES = (
+    np.array([-3.0, 4.0, -1.0]) / 2.0,
+    np.array([-1.0, 0.0, 1.0]) / 2.0,
+    np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / 12.0,
+)
+"""Differences at the first three samples: one-sided through three samples, then central through three and five."""
 
 
 def compute_penalty(cutoff: Array | float, rate: float) -> Array:
@@ -128,18 +134,13 @@ def compute_step_covariance(cutoff: float, rate: float, *, twicing: bool = False
 
 
 def differentiate(values: Array, rate: float) -> Array:
-    """Return the derivative [unit/s] of a smooth signal (N,) [unit], one-sided of equal order at the ends."""
+    """Return the derivative [unit/s] of a smooth signal (N,) [unit], of lower order towards the ends.
+
+    At its ends the smoother leaves a parabola. A one-sided difference of higher order would amplify its noise.
+    """
     slope = np.convolve(values, _DERIVATIVE[::-1], "same")
     # The convolution assumes zeros beyond the ends.
-    positions = np.arange(7.0)
-    for k in range(3):
-        row = _compute_slope_weights(positions - k)
-        slope[k] = row @ values[:7]
-        slope[-1 - k] = -row @ values[-1:-8:-1]
+    for k, row in enumerate(_END_DERIVATIVES):
+        slope[k] = row @ values[: len(row)]
+        slope[-1 - k] = -row @ values[: -1 - len(row) : -1]
     return np.asarray(slope * rate)
-
-
-def _compute_slope_weights(positions: Array) -> Array:
-    """Return weights (7,) of the values at these positions [samples] that give the slope at 0."""
-    powers = positions[None, :] ** np.arange(len(positions))[:, None]
-    return np.asarray(np.linalg.solve(powers, np.eye(len(positions))[1]))

@@ -94,7 +94,7 @@ class _SimulationChain:
         self._model, self._excitation = model, excitation
         self._motion, self._field, self._scales = motion, field, scales
         self._s = np.array([model.coordinates[i] for i in _STRUCTURAL_COLUMNS])
-        self._zeta0 = inputs.estimate_settled_hysteresis(motion.v[0])
+        self._zeta0 = inputs.estimate_settled_hysteresis(motion.v)
         self._h = 1.0 / excitation.rate
         self._parallel_force = channel.compute_parallel_force(model, excitation, motion)
         extra = (*field.columns, -1, *motion.columns, *scales.columns)

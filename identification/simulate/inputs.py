@@ -21,8 +21,8 @@ COIL_ACTIONS: tuple[Action, ...] = ("drive_delay", "field", "field_memory", "dri
 """Actions that change the field."""
 _MIN_LAG = 1e-6
 """Second lag below which the drive passes without lag [s]."""
-_REST_SPEED = 1e-3
-"""Initial velocity below which the damper counts as resting, not as sliding [m/s]."""
+_REST_SHARE = 0.05
+"""Initial speed over the highest speed [1] below which the damper counts as resting, not as sliding."""
 _ETA = Quantity("eta", "1/s", 0.0, math.inf, 100.0, "")
 _DELAY = Quantity("delay", "s", -math.inf, math.inf, 0.1, "")
 
@@ -244,7 +244,11 @@ def _advance_field(
     return new + (value - new) * fade, (slope - second * (value - new)) * fade
 
 
-@njit_cached
-def estimate_settled_hysteresis(velocity: float) -> float:
-    """Estimate the initial hysteretic variable [1] from the velocity [m/s]: saturated in motion, zero at rest."""
-    return velocity / (abs(velocity) + _REST_SPEED)
+def estimate_settled_hysteresis(velocity: Array) -> float:
+    """Estimate the initial hysteretic variable [1] from a velocity (N,) [m/s]: saturated in motion, zero at rest.
+
+    The first velocity contains noise. Near rest the variable follows its square, so that noise hardly moves it.
+    """
+    rest = _REST_SHARE * float(np.abs(velocity).max())
+    ratio = float(velocity[0]) / max(rest, np.finfo(float).tiny)
+    return ratio * abs(ratio) / (1.0 + ratio**2)

@@ -211,6 +211,16 @@ def test_the_step_covariance_is_that_of_smoothed_and_measured_differences(twicin
     assert compute_step_covariance(60.0, RATE, twicing=twicing) == pytest.approx(covariance, rel=0.05)
 
 
-def test_the_derivative_is_exact_for_polynomials_up_to_its_ends():
+def test_the_derivative_is_exact_for_a_parabola_up_to_its_ends_and_for_a_fifth_power_inside():
     time = np.arange(100) / RATE
-    assert np.allclose(differentiate(time**5, RATE), 5.0 * time**4, atol=1e-12)
+    assert np.allclose(differentiate(time**2, RATE), 2.0 * time, atol=1e-12)
+    assert np.allclose(differentiate(time**5, RATE)[3:-3], 5.0 * time[3:-3] ** 4, atol=1e-12)
+
+
+def test_the_velocity_at_an_end_of_a_recording_at_rest_is_small():
+    """A resting damper must not seem to slide: its hysteresis would start saturated (decision 0038)."""
+    noise = 1e-6
+    recorded = noise * default_rng(3).standard_normal((200, 400))
+    weights, penalty = np.ones(400), np.full(397, float(compute_penalty(150.0, RATE)))
+    ends = [differentiate(smooth_signal(x, weights, penalty, np.zeros(397)), RATE)[0] for x in recorded]
+    assert np.std(ends) < 1.5 * noise * RATE

@@ -119,9 +119,15 @@ def test_a_deadband_follows_only_what_leaves_it():
     np.testing.assert_allclose(found, [0.0, 0.0, 2e-6, 2e-6, 1.5e-6, -3e-6], atol=1e-18)
 
 
-@pytest.mark.parametrize(("velocity", "zeta"), [(1e-3, 0.5), (-3e-3, -0.75), (0.0, 0.0)])
-def test_the_hysteresis_starts_saturated_in_motion_and_empty_at_rest(velocity, zeta):
-    assert estimate_settled_hysteresis(velocity) == pytest.approx(zeta)
+@pytest.mark.parametrize("highest", [0.01, 0.2, 3.0])
+@pytest.mark.parametrize(("share", "zeta"), [(0.05, 0.5), (-0.1, -0.8), (0.0, 0.0), (0.001, 0.0004), (-1.0, -0.9975)])
+def test_the_hysteresis_starts_saturated_in_motion_and_empty_at_rest(highest, share, zeta):
+    velocity = highest * np.array([share, 0.3, -1.0, 0.5])
+    assert estimate_settled_hysteresis(velocity) == pytest.approx(zeta, abs=1e-4)
+
+
+def test_a_damper_that_never_moves_starts_with_an_empty_hysteresis():
+    assert estimate_settled_hysteresis(np.zeros(3)) == 0.0
 
 
 def cubic(t):

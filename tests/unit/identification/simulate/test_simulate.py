@@ -50,8 +50,8 @@ def reference(c: Coordinates, amplitude: float, frequency: float, seconds: float
         return [y_rate(t, *state), law.compute_hysteresis_rate(slip, state[1], A, beta, gamma, c.n)]
 
     t = np.arange(round(seconds * RATE)) / RATE
-    v0 = amplitude * w
-    start = [0.0, v0 / (v0 + 1e-3)]
+    # The stroke starts at its highest speed, twenty times that of rest.
+    start = [0.0, 400.0 / 401.0]
     found = solve_ivp(rates, (0, t[-1]), start, "Radau", t, rtol=1e-9, atol=1e-12, max_step=1e-3)
     return law.compute_force(y_rate(t, *found.y), amplitude * np.sin(w * t), c1, c.k1, c.f0 / c.k1)
 

@@ -54,6 +54,7 @@ QUICK_FIT = FitOptions(
     starts=0,
     descents=1,
     iterations=25,
+    law_steps=5,
     regression_start=False,
     refit_full=False,
     tolerance=SEARCH_TOLERANCE,
@@ -148,7 +149,8 @@ class CandidatePool:
     @property
     def comparison(self) -> ErrorComparison:
         """Comparison of the errors of two candidates by block evidence."""
-        return ErrorComparison(self.noise_model, self.evaluation.held_out_samples, self.block_length)
+        evaluation = self.evaluation
+        return ErrorComparison(self.noise_model, evaluation.held_out_samples, self.block_length, evaluation.cycles)
 
     def compute_excess(self, candidate: Candidate) -> float:
         """Compute the excess of a candidate over the present noise floor [1]."""

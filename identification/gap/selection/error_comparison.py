@@ -4,14 +4,19 @@ Block evidence compares mean squares, so an error counts by its size over all no
 makes the noise white shows a faster error that is certain. It hides an error as slow as the noise, because the
 squares then contain mostly fast noise. The error of the first fit decides between the filtered and the recorded
 residual.
+
+The closed share states instead how much of the error beyond the noise disappears, in the geometric mean over the
+conditions. A missing effect removes most of it wherever it acts. An effect that repairs the form of another
+removes little: the same form error returns in every block of a condition, and evidence over blocks counts it each
+time.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import BoolArray
-from identification.gap.data import Residual
+from identification.arrays import Array, BoolArray
+from identification.gap.data import Cycles, Residual
 from identification.gap.fits import Candidate
 from identification.gap.noise import NoiseModel
 from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
@@ -27,6 +32,8 @@ class ErrorComparison:
     """Mask (N,) of the held-out samples."""
     block_length: float
     """Length of a block of the block evidence [s]."""
+    cycles: Cycles
+    """Cycles of the recordings, which belong to conditions."""
 
     def compute_evidence(self, before: Candidate, after: Candidate) -> float:
         """Compute the block evidence for one candidate over another on all samples."""
@@ -44,6 +51,26 @@ class ErrorComparison:
         """Compute the block evidence for a candidate at the noise floor over a known one."""
         chosen = self.choose_filter(candidate)
         return bound_evidence(candidate.residual.whiten(chosen), self._find_floor(chosen), self.block_length)
+
+    def compute_closed_share(self, before: Candidate, after: Candidate) -> float:
+        """Compute the part of the error beyond the noise [1] that another candidate closes, over conditions."""
+        chosen = self.choose_filter(before)
+        (first, counts), (second, _) = (self._compute_condition_squares(c, chosen) for c in (before, after))
+        means = (float(s @ counts / counts.sum()) for s in (first, second))
+        # A floor above a residual is too high by as much.
+        noise = min(self._find_floor(chosen) ** 2, *means)
+        chance = noise * np.sqrt(2.0 / counts)
+        ratios = (np.maximum(second - noise, 0.0) + chance) / (np.maximum(first - noise, 0.0) + chance)
+        return 1.0 - float(np.exp(np.mean(np.log(ratios))))
+
+    def _compute_condition_squares(self, candidate: Candidate, chosen: WhiteningFilter) -> tuple[Array, Array]:
+        """Return mean square (conditions,) [N²] of a filtered residual, and the number of samples."""
+        residual = candidate.residual.whiten(chosen)
+        values = residual.values**2, np.ones(len(residual.values))
+        by_cycle = (self.cycles.sum_by_cycle(v, residual.valid) for v in values)
+        sums, counts = (np.bincount(self.cycles.segment, v).astype(float) for v in by_cycle)
+        used = counts > 0
+        return sums[used] / counts[used], counts[used]
 
     def choose_filter(self, candidate: Candidate) -> WhiteningFilter:
         """Return the filter behind which the residual of a candidate is largest over the noise."""

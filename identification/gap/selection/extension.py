@@ -24,7 +24,10 @@ _CONFUSABLE_EFFECTS = (
 
 
 def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
-    """Fit a set with one more effect; return True if block evidence of any exceeds the complexity penalty."""
+    """Fit a set with one more effect; return True if any is accepted.
+
+    Its block evidence has to exceed the complexity penalty, and it has to close enough of what the set leaves.
+    """
     if not _is_extension_promising(pool, names):
         return False
     confusable = set[str]().union(*(group for group in _CONFUSABLE_EFFECTS if names & group))
@@ -32,10 +35,13 @@ def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
     extended = _fit_extensions(pool, names, names | confusable)
     for larger in extended:
         pool.fit_fully(larger)
-        evidence = pool.comparison.compute_evidence(pool.candidates[names], pool.candidates[larger])
+        known, found = pool.candidates[names], pool.candidates[larger]
+        if pool.comparison.compute_closed_share(known, found) < pool.settings.min_closed_share:
+            continue
         confusion = pool.settings.confusion_penalty if larger & confusable - names else 0.0
-        pool.block_evidence[larger] = BlockEvidence(names, evidence - confusion)
-    accepted = [larger for larger in extended if pool.block_evidence[larger].log_odds > penalty]
+        evidence = pool.comparison.compute_evidence(known, found) - confusion
+        pool.block_evidence[larger] = BlockEvidence(names, evidence)
+    accepted = [n for n in extended if n in pool.block_evidence and pool.block_evidence[n].log_odds > penalty]
     for larger in accepted:
         for model in pool.candidates[larger].fit.effects:
             find_subset(pool, pool.candidates[larger], model)

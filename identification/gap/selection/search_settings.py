@@ -84,6 +84,10 @@ class SearchSettings:
     """Largest number of effects in a set."""
     max_remaining_share: float = 0.2
     """Part of the baseline's excess that a set may leave for an extension to be tried."""
+    min_closed_share: float = 0.3
+    """Smallest part of the remaining error that an extension closes, over conditions.
+
+    Origin: repairs of form errors closed up to 0.19, missing effects 0.49 and more."""
     max_partial_effects: int = 5
     """Largest number of effects in a set that is a part of an unknown cause."""
     confusion_penalty: float = 8.0

@@ -7,6 +7,7 @@ import pytest
 from numpy.random import default_rng
 from scipy.signal import lfilter
 
+from identification.gap.data.cycles import Cycles, StrokeCondition
 from identification.gap.data.residual_map import Residual
 from identification.gap.noise import NoiseModel
 from identification.gap.selection.error_comparison import ErrorComparison
@@ -15,6 +16,8 @@ from identification.noise import NoiseFloorEstimate, ScaleVariance, list_scales,
 RATE, COUNT, BLOCK = 1000.0, 40_000, 0.2
 TIME = np.arange(COUNT) / RATE
 EVERYWHERE = np.ones(COUNT, bool)
+CONDITION = (TIME // 10.0).astype(int)
+CYCLES = Cycles(TIME.astype(int), TIME % 1.0, np.arange(40) // 10, 4 * (StrokeCondition(1.0, 0.01, 1.0),))
 
 
 def make_candidate(values):
@@ -31,7 +34,7 @@ def make_comparison(noise, white, held_out=EVERYWHERE, input_noise=None):
         scales.append(scale._replace(deviation=scale.compute_chance(count)))
     floor = float(noise.std())
     estimate = NoiseFloorEstimate(floor, floor, white, "known", 0.01 * floor, tuple(scales))
-    return ErrorComparison(NoiseModel(estimate, [], input_noise=input_noise), held_out, BLOCK)
+    return ErrorComparison(NoiseModel(estimate, [], input_noise=input_noise), held_out, BLOCK, CYCLES)
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +84,28 @@ def test_propagated_noise_of_the_displacement_is_part_of_the_floor(slow_noise):
     before = make_candidate(slow_noise + 3.0 * np.sin(2.0 * np.pi * TIME))
     bounds = [make_comparison(slow_noise, np.sqrt(0.1), input_noise=n).bound_evidence(before) for n in (0.0, 2.0)]
     assert bounds[1] < 0.5 * bounds[0]
+
+
+def test_the_closed_share_is_the_part_of_the_error_that_disappears(slow_noise):
+    comparison = make_comparison(slow_noise, np.sqrt(0.1))
+    error = (1.0 + CONDITION) * np.sin(2.0 * np.pi * TIME)
+    candidates = {part: make_candidate(slow_noise + part * error) for part in (1.0, 0.9, 0.5)}
+    half, little = (comparison.compute_closed_share(candidates[1.0], candidates[part]) for part in (0.5, 0.9))
+    assert half == pytest.approx(0.75, abs=0.05)
+    assert little == pytest.approx(0.19, abs=0.05)
+
+
+def test_the_closed_share_counts_each_condition_once(slow_noise):
+    """One condition with most of the error does not mask the others."""
+    comparison = make_comparison(slow_noise, np.sqrt(0.1))
+    sine = np.sin(2.0 * np.pi * TIME)
+    remaining = np.where(CONDITION == 0, 20.0, 2.0) * sine
+    without_others = np.where(CONDITION == 0, 20.0, 1.0) * sine
+    before, after = make_candidate(slow_noise + remaining), make_candidate(slow_noise + without_others)
+    assert comparison.compute_closed_share(before, after) == pytest.approx(1.0 - 0.25**0.75, abs=0.05)
+
+
+def test_a_residual_below_the_floor_lowers_the_noise_of_the_closed_share(slow_noise):
+    comparison = make_comparison(2.0 * slow_noise, 2.0 * np.sqrt(0.1))
+    before, after = make_candidate(slow_noise + np.sin(2.0 * np.pi * TIME)), make_candidate(slow_noise)
+    assert comparison.compute_closed_share(before, after) > 0.8

@@ -1,4 +1,4 @@
-"""One effect more is added to the most probable set if its block evidence exceeds the complexity penalty."""
+"""One effect more is added to the most probable set if it closes enough, and its block evidence pays for it."""
 
 import pytest
 
@@ -31,7 +31,15 @@ def test_an_effect_with_block_evidence_is_accepted_and_its_subsets_are_fitted(po
     assert pool.block_evidence[BOTH].parent == GAS
     assert BOTH in pool.full_fits
     assert frozenset({"seal_friction"}) in pool.candidates
-    others = [e.log_odds for names, e in pool.block_evidence.items() if names != BOTH]
+
+
+def test_an_effect_that_closes_little_has_no_evidence(pool):
+    """A form error returns in every block, so that evidence over blocks would count it many times."""
+    found, counted = pool.copy(), pool.copy(min_closed_share=-1.0)
+    assert try_extension(found, GAS)
+    assert set(found.block_evidence) == {BOTH}
+    assert try_extension(counted, GAS)
+    others = [e.log_odds for names, e in counted.block_evidence.items() if names != BOTH]
     assert max(others) < 1.0
 
 
@@ -44,7 +52,7 @@ def test_confusable_effects_are_not_fitted(pool):
 
 
 def test_a_confusable_effect_that_the_search_has_fitted_pays_a_penalty(pool):
-    pool = pool.copy(extension_effects=0)
+    pool = pool.copy(extension_effects=0, min_closed_share=-1.0)
     assert not try_extension(pool, GAS)
     evidence = compute_evidence(pool.candidates[GAS].residual, pool.candidates[STOP].residual, pool.block_length)
     assert pool.block_evidence[STOP].log_odds == pytest.approx(evidence - 8.0)

@@ -2,8 +2,9 @@
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import binary_dilation, uniform_filter1d
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.signals.smoother import compute_penalty, compute_step_covariance, smooth_signal
 
 Indices = npt.NDArray[np.intp]
@@ -14,6 +15,10 @@ LOWEST_CUTOFF, _MAX_CUTOFF = 0.003, 0.25
 """Range of the trial cutoffs in cycles a sample."""
 _LENGTH_SLOPE = 0.25
 """Largest change of the smoothing length in one smoothing length [1]: the penalty then changes fourfold."""
+_DISTORTION_DEVIATIONS = 5.0
+"""Mean of the remainder that noise hardly reaches: once in a million [standard deviations]."""
+_MEDIAN_TO_DEVIATION = 1.4826
+"""Standard deviation of a normal distribution over its median absolute value [1]."""
 _STROKE_BAND = 200.0
 """Frequency [Hz] above which no hydraulic or electric actuator moves: a sensor shows only noise there."""
 
@@ -53,6 +58,32 @@ def choose_cutoffs(
         # A high cutoff has a small remainder because the smooth follows the noise. The second term adds that part.
         cost += 2.0 * noise**2 * sizes * compute_step_covariance(cutoff, rate, twicing=twicing)
     return np.asarray(trials[np.argmin(costs, axis=0)])
+
+
+def find_distortions(values: Array, weights: Array, expected: Array, cutoff: Array, rate: float) -> BoolArray:
+    """Return a mask (N,) of the samples where a cutoff distorts the motion, such as around a jump of acceleration.
+
+    The remainder of a smooth motion is noise without its part below the cutoff. Its mean over a quarter of the
+    smoothing length varies little. A distortion is larger there, and as long.
+
+    Args:
+        values: (N,) displacement [m].
+        weights: (N,) 1 where measured, 0 elsewhere.
+        expected: (N-3,) expected third differences [m].
+        cutoff: (N,) cutoff of the smoother [Hz].
+        rate: [Hz]
+    """
+    penalty = compute_penalty(cutoff[1:-2], rate)
+    smooth = smooth_signal(values, weights, penalty, expected, twicing=True)
+    remainder = np.where(weights > 0, values - smooth, 0.0)
+    distorted = np.zeros(len(values), bool)
+    for frequency in np.unique(cutoff):
+        window, here = max(int(0.25 * rate / frequency), 2), cutoff == frequency
+        size = np.abs(uniform_filter1d(remainder, window))
+        found = here & (size > _DISTORTION_DEVIATIONS * _MEDIAN_TO_DEVIATION * np.median(size[here]))
+        if found.any():
+            distorted |= binary_dilation(found, iterations=2 * window)
+    return distorted
 
 
 def limit_length_slope(cutoff: Array, rate: float) -> Array:

@@ -22,7 +22,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.logs import PERIODIC_MOTIONS, Segment, Stretch
 from identification.signals.actuator_compliance import MAX_LAG, estimate_compliance_motion
-from identification.signals.cutoff import LOWEST_CUTOFF, choose_cutoffs, limit_length_slope
+from identification.signals.cutoff import LOWEST_CUTOFF, choose_cutoffs, find_distortions, limit_length_slope
 from identification.signals.harmonics import Harmonics, find_steady_cycles, fit_harmonics
 from identification.signals.motion_regions import (
     REST_CUTOFF,
@@ -109,6 +109,12 @@ def _choose_cutoff(
         # Disturbances must not raise the cutoff of the undisturbed motion around them.
         undisturbed = choose(stretch.displacement, np.where(regions.disturbed, 0.0, weights), twicing=True)
         cutoff = np.where(regions.disturbed, cutoff, undisturbed[regions.regions])
+    distorted = regions.unpredicted & find_distortions(
+        stretch.displacement, weights, expected, cutoff, stretch.rate
+    )
+    if distorted.any():
+        separate = choose(stretch.displacement, weights, twicing=True, regions=distorted.astype(np.intp))[1]
+        cutoff = np.where(distorted, np.maximum(cutoff, separate), cutoff)
     # The motion before and after a rest reaches into it through the smoother and would raise its cutoff.
     cutoff = np.where(regions.rest, max(REST_CUTOFF, LOWEST_CUTOFF * stretch.rate), cutoff)
     # The third differences of rests and waves are predicted, so that a jump of the cutoff does not distort them.

@@ -11,7 +11,7 @@ from identification.signals.actuator_compliance import (
     _smooth_triangular,
     estimate_compliance_motion,
 )
-from identification.signals.cutoff import choose_cutoffs, limit_length_slope
+from identification.signals.cutoff import choose_cutoffs, find_distortions, limit_length_slope
 from identification.signals.harmonics import (
     Harmonics,
     _differentiate_by_phase,
@@ -252,6 +252,29 @@ def test_a_move_between_two_strokes_is_not_distorted_where_its_cutoff_changes():
     gradual = estimate_motion(recorded, limit_length_slope(cutoff, rate)).displacement - curved
     inner = slice(100, 300)
     assert np.std(gradual[inner]) < noise < np.std(jump[inner])
+
+
+def move_with_jump(count=6000, at=3000):
+    """Slow motion [m] whose acceleration jumps at one sample, and noise of 1 µm."""
+    time = np.arange(count) / 1000.0
+    x = 0.01 * np.sin(2.0 * np.pi * 0.7 * time) + 10.0 * np.maximum(time - 0.001 * at, 0.0) ** 2
+    return x, x + 1e-6 * np.random.default_rng(8).standard_normal(count)
+
+
+def test_a_jump_of_the_acceleration_is_a_distortion_and_smooth_motion_is_none():
+    cutoff = np.full(6000, 12.0)
+    for x, expected in ((move_with_jump()[1], True), (move_with_jump(at=6000)[1], False)):
+        found = find_distortions(x, np.ones(6000), np.zeros(5997), cutoff, 1000.0)
+        assert found[2990:3010].any() == expected
+        assert not found[100:2500].any()
+        assert not found[3500:-100].any()
+
+
+def test_the_motion_around_a_jump_of_the_acceleration_is_not_smoothed_away():
+    x, recorded = move_with_jump()
+    motion = estimate_motion(stretch(recorded))
+    assert motion.cutoff[3000] > 2.0 * motion.cutoff[1000]
+    assert np.abs(motion.displacement - x)[2900:3100].max() < 2e-6
 
 
 def test_a_slow_stroke_is_no_rest():

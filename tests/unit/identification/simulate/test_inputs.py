@@ -120,7 +120,9 @@ def test_a_deadband_follows_only_what_leaves_it():
 
 
 @pytest.mark.parametrize("highest", [0.01, 0.2, 3.0])
-@pytest.mark.parametrize(("share", "zeta"), [(0.05, 0.5), (-0.1, -0.8), (0.0, 0.0), (0.001, 0.0004), (-1.0, -0.9975)])
+@pytest.mark.parametrize(
+    ("share", "zeta"), [(0.05, 0.5), (-0.1, -0.8), (0.0, 0.0), (0.001, 0.0004), (-1.0, -0.9975)]
+)
 def test_the_hysteresis_starts_saturated_in_motion_and_empty_at_rest(highest, share, zeta):
     velocity = highest * np.array([share, 0.3, -1.0, 0.5])
     assert estimate_settled_hysteresis(velocity) == pytest.approx(zeta, abs=1e-4)

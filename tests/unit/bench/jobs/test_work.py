@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from bench.jobs.settings import DiagnoseSettings, IdentifySettings, PredictSetti
 from bench.jobs.work import WATCHDOG_COMMAND, JobCallbacks, execute_job
 from tests.support.logs import write_log
 from tests.support.reports import diagnosis_document, fit_document, prediction
+from tests.support.waiting import wait_until
 
 COMMAND = """
 import json, os, pathlib, sys, time
@@ -90,13 +90,6 @@ def is_running(pid):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + 30
-    while not (value := condition()):
-        assert time.monotonic() < deadline
-    return value
 
 
 def test_fit_and_report_appear_together_next_to_the_log(bench):

@@ -10,6 +10,7 @@ import pytest
 from bench.rig.acquisition import Acquisition, RetryPauses
 from drivers.channel import ClockReading, SampleBlock
 from drivers.errors import DriverError, NoReplyError
+from tests.support.waiting import wait_until
 
 MS = 1_000_000
 TIMEOUT = 10.0
@@ -56,13 +57,6 @@ class ClocklessInstrument(ScriptedInstrument):
 def block(*values, device_ns=None):
     times = None if device_ns is None else np.array(device_ns)
     return SampleBlock("force", 0, times, 5 * MS, np.array(values), np.array(values), "good")
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + TIMEOUT
-    while not condition():
-        assert time.monotonic() < deadline, "the condition did not become true in time"
-        time.sleep(0.001)
 
 
 @pytest.fixture

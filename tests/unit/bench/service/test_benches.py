@@ -1,7 +1,5 @@
 """Several benches in one service: each has what belongs to it, and none disturbs another."""
 
-import time
-
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from starlette.websockets import WebSocketDisconnect
@@ -14,6 +12,7 @@ from tests.support.audit_trails import list_all
 from tests.support.certificates import make_certificate
 from tests.support.fake_service import FakeAgent
 from tests.support.service_logs import write_complete_log
+from tests.support.waiting import wait_until
 from tests.unit.bench.service.test_live import batch, batches, messages, subscribe
 
 NAMES = ("left", "right")
@@ -55,13 +54,6 @@ def finish(service, agent):
 
 def count(agent, kind):
     return sum(isinstance(one, kind) for one in agent.commands)
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline, "the condition was not met in time"
-        time.sleep(0.01)
 
 
 def test_the_only_bench_has_a_name_and_both_paths(service):

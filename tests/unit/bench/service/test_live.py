@@ -15,6 +15,7 @@ from bench.live.listener import MAX_QUEUED_BATCHES, MAX_UNACKNOWLEDGED
 from bench.methods import load_method
 from bench.service import run_registry
 from tests.support.service_logs import write_complete_log
+from tests.support.waiting import wait_until
 
 LIVE = "ws://127.0.0.1:8600/api/v1/live"
 
@@ -32,13 +33,6 @@ def messages(socket, topic):
         assert set(message) == {"topic", "data"}
         if message["topic"] == topic:
             yield message["data"]
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline, "the condition was not met in time"
-        time.sleep(0.001)
 
 
 def batches(socket):

@@ -13,6 +13,7 @@ from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
 from bench.service.routes import runs
 from tests.support.certificates import issue_certificate, make_certificate, shift
 from tests.support.service_logs import STARTED, write_complete_log, write_truncated_log
+from tests.support.waiting import wait_until
 
 PAGE = "<!doctype html><title>report</title>"
 SUMMARY = {"result": "converged", "rmse_n": 2.5, "held_out_rmse_n": None, "noise_floor_n": 2.4}
@@ -246,6 +247,7 @@ def test_a_run_that_the_catalogue_cannot_record_is_started_nevertheless(service,
     monkeypatch.setattr(Catalogue, "add", add)
     service.agent.publish()
     assert service.wait_for("/runs", lambda found: found["items"])["items"][0]["id"] == "run-1"
+    wait_until(lambda: "runs_recorded_again" in caplog.text)
     assert sum("runs_not_recorded" in record.message for record in caplog.records) == 1
     assert sum("runs_recorded_again" in record.message for record in caplog.records) == 1
 

@@ -5,6 +5,7 @@ import numpy.typing as npt
 from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from identification.arrays import Array, BoolArray
+from identification.signals.noise import estimate_deviation
 from identification.signals.smoother import compute_penalty, compute_step_covariance, smooth_signal
 
 Indices = npt.NDArray[np.intp]
@@ -17,8 +18,6 @@ _LENGTH_SLOPE = 0.25
 """Largest change of the smoothing length in one smoothing length [1]: the penalty then changes fourfold."""
 _DISTORTION_DEVIATIONS = 5.0
 """Mean of the remainder that noise hardly reaches: once in a million [standard deviations]."""
-_MEDIAN_TO_DEVIATION = 1.4826
-"""Standard deviation of a normal distribution over its median absolute value [1]."""
 _STROKE_BAND = 200.0
 """Frequency [Hz] above which no hydraulic or electric actuator moves: a sensor shows only noise there."""
 
@@ -79,8 +78,8 @@ def find_distortions(values: Array, weights: Array, expected: Array, cutoff: Arr
     distorted = np.zeros(len(values), bool)
     for frequency in np.unique(cutoff):
         window, here = max(int(0.25 * rate / frequency), 2), cutoff == frequency
-        size = np.abs(uniform_filter1d(remainder, window))
-        found = here & (size > _DISTORTION_DEVIATIONS * _MEDIAN_TO_DEVIATION * np.median(size[here]))
+        mean = uniform_filter1d(remainder, window)
+        found = here & (np.abs(mean) > _DISTORTION_DEVIATIONS * estimate_deviation(mean[here]))
         if found.any():
             distorted |= binary_dilation(found, iterations=2 * window)
     return distorted

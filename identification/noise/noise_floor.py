@@ -18,8 +18,10 @@ from identification.logs import PERIODIC_MOTIONS, Stretch
 from identification.noise.high_frequency import estimate_high_frequency_noise
 from identification.noise.mains_line import MainsLine, find_mains_line
 from identification.noise.repeated_windows import MIN_CYCLES, RepeatedWindow, find_repeated_windows
+from identification.noise.smooth_spectrum import fit_smooth_spectrum
 from identification.noise.spectrum import (
     WindowNoise,
+    collect_known_bins,
     estimate_window_noise,
     fit_low_frequency_spectrum,
     make_spectrum,
@@ -90,9 +92,12 @@ class NoiseFloorEstimate:
         """Return the standard deviation of the mean square of some samples of noise, over its variance [1]."""
         if not self.scales:
             return math.sqrt(2.0 / samples)
-        squares = sum(s.compute_chance(samples) ** 2 for s in self.scales)
-        slower = max(self.noise**2 - sum(s.variance for s in self.scales), 0.0)
-        squares += slower**2 * min(8.0 * self.scales[-1].samples / samples, 2.0)
+        # Noise slower than the samples is the same in all of them: its parts add up before they are squared.
+        fast = [s for s in self.scales if 2 * s.samples < samples]
+        slower = max(self.noise**2 - sum(s.variance for s in fast), 0.0)
+        longest = fast[-1].samples if fast else samples
+        squares = sum(s.compute_chance(samples) ** 2 for s in fast)
+        squares += slower**2 * min(8.0 * longest / samples, 2.0)
         return math.sqrt(squares) / self.noise**2
 
     def get_interval(self, error: float) -> tuple[float, float]:
@@ -201,8 +206,12 @@ def _estimate_stretch(stretch: Stretch, motion: Motion) -> _StretchNoise:
     line = find_mains_line(fits, remainders, stretch.rate)
     cleaned = remainders if line is None else line.remainders
     spectra = [make_spectrum(fit, remainder, stretch.rate) for fit, remainder in zip(fits, cleaned, strict=True)]
-    low, duration = fit_low_frequency_spectrum(spectra), len(stretch.force) / stretch.rate
-    noises = [estimate_window_noise(spectrum, low, duration) for spectrum in spectra]
+    # A window whose fit takes nearly all of the noise tells nothing.
+    spectra = [spectrum for spectrum in spectra if spectrum.is_known.any()]
+    if not spectra:
+        return _StretchNoise([], line)
+    low, smooth = fit_low_frequency_spectrum(spectra), fit_smooth_spectrum(*collect_known_bins(spectra))
+    noises = [estimate_window_noise(s, smooth, len(stretch.force) / stretch.rate) for s in spectra]
     slow = SlowVariance(2.0 * low.pink / stretch.rate, 2.0 * low.pink_deviation / stretch.rate)
     return _StretchNoise(noises, line, slow)
 

@@ -1,8 +1,9 @@
 """Spectrum of the noise in repeated windows, completed where the windows' fits remove it.
 
 A fit removes the noise at the harmonics of the stroke and at the lowest frequencies. At the harmonics, the missing
-part is taken from the frequencies around them. Below the lowest bins, the spectrum is the sum of white and of 1/f
-noise, down to one cycle in the whole recording. No form of the spectrum is assumed elsewhere.
+part is taken from the frequencies around them. Below the lowest bins of a window, the spectrum is the smooth one
+that all windows of the stretch have in common, down to one cycle in the whole recording. Elsewhere no form of the
+spectrum is assumed.
 """
 
 from collections.abc import Sequence
@@ -14,13 +15,14 @@ from scipy.optimize import nnls
 
 from identification.arrays import Array, BoolArray
 from identification.noise.repeated_windows import RepeatedWindow
+from identification.noise.smooth_spectrum import MissingPart, SmoothSpectrum
 from identification.noise.time_scales import ScaleVariance, compute_deviations, compute_gain, list_scales
 from identification.noise.window_fit import WindowFit
 
-_KNOWN_GAIN = 0.5
-"""Gain from which a bin shows the noise itself [1]."""
+_KNOWN_GAIN = 0.2
+"""Gain from which a bin shows the noise itself [1]; below, it rather shows what leaks from other frequencies."""
 _LOW_DECADE = 10.0
-"""Ratio of the highest to the lowest frequency that determine the spectrum at low frequencies [1]."""
+"""Ratio of the highest to the lowest frequency that determine the 1/f part [1]."""
 _ITERATIONS = 30
 """Steps of its maximum-likelihood fit; the weights then change by less than a millionth."""
 _SMOOTHED_BINS = 9
@@ -59,14 +61,6 @@ class LowFrequencySpectrum(NamedTuple):
     pink_deviation: float = 0.0
     """Standard deviation of ``pink`` [N²]."""
 
-    def evaluate(self, frequency: Array) -> Array:
-        """Return the power (B,) [N²] at frequencies (B,) [Hz]."""
-        return np.asarray(self.white + self.pink / frequency)
-
-    def integrate(self, start: float, stop: float) -> float:
-        """Return the integral of the power [N² Hz] from one frequency to another [Hz]."""
-        return self.white * (stop - start) + self.pink * float(np.log(stop / start))
-
 
 class WindowNoise(NamedTuple):
     """Noise of one window."""
@@ -76,7 +70,7 @@ class WindowNoise(NamedTuple):
     deviation: float
     """Standard deviation of that variance where the spectrum was observed [N²]."""
     extrapolated: float
-    """Part of the variance below the observed frequencies [N²]."""
+    """Standard deviation of the part of the variance below the observed frequencies [N²]."""
     samples: int
     """Number of valid samples."""
     cycles: int
@@ -92,14 +86,17 @@ def make_spectrum(fit: WindowFit, remainder: Array, rate: float) -> WindowSpectr
     return WindowSpectrum(frequency, power, fit.gain, fit.window)
 
 
+def collect_known_bins(spectra: Sequence[WindowSpectrum]) -> tuple[Array, Array, Array]:
+    """Return frequency [Hz], power [N²] and gain (B,) of all bins that show the noise itself."""
+    columns = [np.stack([s.frequency, s.power, s.gain])[:, s.is_known] for s in spectra]
+    frequency, power, gain = np.concatenate(columns, axis=1)
+    return frequency, power, gain
+
+
 def fit_low_frequency_spectrum(spectra: Sequence[WindowSpectrum]) -> LowFrequencySpectrum:
     """Fit the spectrum to the lowest decade that the spectra of one stretch show, by maximum likelihood."""
-    frequency = np.concatenate([s.frequency[s.is_known] for s in spectra])
-    power = np.concatenate([(s.power / s.gain)[s.is_known] for s in spectra])
-    if not len(frequency):
-        return LowFrequencySpectrum(
-            sum(float(s.power.sum()) for s in spectra) / sum(float(s.gain.sum()) for s in spectra), 0.0
-        )
+    frequency, power, gain = collect_known_bins(spectra)
+    power = power / gain
     low = frequency <= _LOW_DECADE * frequency.min()
     frequency, scale = frequency[low], float(power[low].mean())
     if scale < 1e-300:
@@ -116,39 +113,38 @@ def fit_low_frequency_spectrum(spectra: Sequence[WindowSpectrum]) -> LowFrequenc
     return LowFrequencySpectrum(scale * float(white), scale * float(pink) * lowest, scale * deviation * lowest)
 
 
-def estimate_window_noise(spectrum: WindowSpectrum, low: LowFrequencySpectrum, duration: float) -> WindowNoise:
+def estimate_window_noise(spectrum: WindowSpectrum, smooth: SmoothSpectrum, duration: float) -> WindowNoise:
     """Return the noise of a window.
 
     Args:
-        spectrum: its spectrum.
-        low: spectrum at the lowest frequencies.
+        spectrum: its spectrum, which shows the noise itself in some bin.
+        smooth: smooth spectrum of the noise of its stretch.
         duration: duration of the whole recording [s], whose mean is not noise.
     """
+    count, lowest = len(spectrum.window.force), spectrum.lowest_known
+    missing = MissingPart(smooth, spectrum.frequency[: lowest + 1], count, duration)
     values = _fill_harmonics(spectrum)
-    step = float(spectrum.frequency[1])
-    lowest = spectrum.lowest_known
-    values[1:lowest] = low.evaluate(spectrum.frequency[1:lowest])
-    # A bin stands for half a step on both sides; the first one begins at one cycle a recording.
-    values[0] = low.integrate(min(1.0 / duration, 0.25 * step), 0.5 * step) / step
-    count = len(spectrum.window.force)
+    values[:lowest] = missing.power
     last = values[-1] if count % 2 == 0 else 0.0
-    variance = float(2.0 * values.sum() - last) / count
-    deviation = _compute_deviation(values, spectrum)
     samples = int(np.count_nonzero(spectrum.window.valid))
-    scales = tuple(_compute_scale_variance(values, spectrum, m) for m in list_scales(samples))
+    bins = np.arange(len(values)) / count
+    scales = []
+    for m in list_scales(samples):
+        # A scale contains nothing of the mean of a window.
+        gain = np.where(bins > 0.0, compute_gain(bins, m), 0.0)
+        deviation, extrapolated = (
+            _compute_deviation(gain * values, spectrum),
+            missing.compute_deviation(gain[:lowest]),
+        )
+        scales.append(ScaleVariance(m, 2.0 * float(gain @ values) / count, deviation, extrapolated))
     return WindowNoise(
-        variance, deviation, 2.0 * float(values[0]) / count, samples, spectrum.window.cycles, scales
+        float(2.0 * values.sum() - last) / count,
+        _compute_deviation(values, spectrum),
+        missing.compute_deviation(np.ones(lowest)),
+        samples,
+        spectrum.window.cycles,
+        tuple(scales),
     )
-
-
-def _compute_scale_variance(values: Array, spectrum: WindowSpectrum, samples: int) -> ScaleVariance:
-    """Return the variance at a scale of noise with the power ``values`` (N // 2 + 1,) [N²]."""
-    count = len(spectrum.window.force)
-    seen = values * compute_gain(np.arange(len(values)) / count, samples)
-    variance, extrapolated = (
-        2.0 * float(seen[1:stop].sum()) / count for stop in (len(seen), spectrum.lowest_known)
-    )
-    return ScaleVariance(samples, variance, _compute_deviation(seen, spectrum), extrapolated)
 
 
 def _compute_deviation(values: Array, spectrum: WindowSpectrum) -> float:

@@ -34,7 +34,7 @@ class ScaleVariance(NamedTuple):
     deviation: float
     """Its standard deviation where the noise was observed [N²]."""
     extrapolated: float = 0.0
-    """Part of the variance at frequencies where it was not observed [N²]; all of it may be wrong."""
+    """Standard deviation of the part at frequencies where it was not observed [N²]."""
 
     @classmethod
     def from_signal(cls, samples: int, variance: float, differences: int) -> "ScaleVariance":
@@ -46,6 +46,10 @@ class ScaleVariance(NamedTuple):
     def uncertainty(self) -> float:
         """Standard deviation with that of the extrapolated part [N²]."""
         return math.hypot(self.deviation, self.extrapolated)
+
+    def multiply(self, factor: float) -> "ScaleVariance":
+        """Return the variance of a signal whose power is larger by a factor [1]."""
+        return ScaleVariance(self.samples, *(factor * value for value in self[1:]))
 
     def compute_chance(self, differences: int) -> float:
         """Return by how much the variance of another signal with some differences varies by chance [N²].

@@ -120,8 +120,10 @@ class NoiseModel:
         """Return the estimate of the noise if the residual of a candidate is noise; no cycles repeat then."""
         residual = candidate.residual
         values = residual.values[residual.valid]
-        square = max(float(np.mean(values**2)) - (self.input_noise or 0.0) ** 2, self.noise**2)
-        scales = measure_residual_scales(residual)
+        total = float(np.mean(values**2))
+        square = max(total - (self.input_noise or 0.0) ** 2, self.noise**2)
+        # The input noise is taken from every scale alike, because its spectrum is not known.
+        scales = tuple(scale.multiply(square / total) for scale in measure_residual_scales(residual))
         estimate = replace(
             self.estimate, noise=math.sqrt(square), scales=scales, slow_variance=estimate_slow_variance(scales)
         )

@@ -19,7 +19,7 @@ from identification.noise.noise_floor import (
     _mix,
     estimate_floor,
 )
-from identification.noise.time_scales import ScaleVariance
+from identification.noise.time_scales import ScaleVariance, list_scales, measure_scale_variance
 from identification.signals.motion import estimate_motion
 from tests.support.strokes import RATE, hysteresis, random_motion, recorded, sine, sine_segment, stretch
 
@@ -268,6 +268,22 @@ def test_the_mean_square_of_slow_noise_varies_more():
     slower = NoiseFloorEstimate(2.0, 2.0, 1.0, "", 0.1, (ScaleVariance(1, 0.1, 0.0), ScaleVariance(64, 0.9, 0.0)))
     assert slower.compute_chance(5000) > 3.0 / 4.0 * math.sqrt(8.0 * 64 / 5000)
     assert slower.compute_chance(10) < 2.5
+
+
+def test_the_mean_square_of_short_blocks_varies_as_that_of_their_noise():
+    """Of a block, the parts of the noise that are slower add up to one value."""
+    bins = np.arange(1, 60_001)
+    random = default_rng(4)
+    power = (random.standard_normal(len(bins)) + 1j * random.standard_normal(len(bins))) / np.sqrt(bins)
+    pink = np.fft.irfft(np.concatenate([[0.0], power]), 2 * len(bins))[: len(bins)]
+    pink /= pink.std()
+    valid = np.ones(len(pink), bool)
+    measured = [(m, *measure_scale_variance(pink, valid, m)) for m in list_scales(len(pink))]
+    scales = tuple(ScaleVariance.from_signal(*scale) for scale in measured)
+    known = NoiseFloorEstimate(1.0, 1.0, 0.3, "", 0.1, scales)
+    for samples in (20, 70, 300):
+        blocks = pink[: len(pink) // samples * samples].reshape(-1, samples)
+        assert known.compute_chance(samples) == pytest.approx(np.std(np.mean(blocks**2, axis=1)), rel=0.3)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.8])

@@ -66,6 +66,10 @@ def test_signals_are_averaged_at_the_scales_of_all():
     assert mean == pytest.approx(ScaleVariance(1, 5.0, np.hypot(0.3, 0.1)))
 
 
+def test_a_stronger_signal_is_stronger_at_every_scale():
+    assert ScaleVariance(4, 2.0, 0.2, 0.1).multiply(3.0) == pytest.approx(ScaleVariance(4, 6.0, 0.6, 0.3))
+
+
 def make_scales(*variances):
     """Scales with the variances by chance of a signal of 1000 samples."""
     scales = [ScaleVariance(2**k, v, 0.0) for k, v in enumerate(variances)]

@@ -94,6 +94,16 @@ def test_the_uncertainty_of_the_floor_adds_to_the_chance():
     assert model.compute_highest_rmse(1800) ** 2 == pytest.approx(4.0 + np.hypot(uncertain, 0.4))
 
 
+def test_a_residual_that_is_noise_has_the_scales_of_the_force_noise_alone(pool):
+    residual = pool.baseline.residual
+    with_input = make_model(pool)
+    with_input.input_noise = 0.5 * float(np.sqrt(np.mean(residual.values[residual.valid] ** 2)))
+    plain, found = (model.describe_residual(pool.baseline) for model in (make_model(pool), with_input))
+    assert found.noise == pytest.approx(np.sqrt(0.75) * plain.noise, rel=1e-3)
+    for own, whole in zip(found.scales, plain.scales, strict=True):
+        assert own == pytest.approx(whole.multiply(0.75), rel=2e-3)
+
+
 def test_an_error_beyond_the_noise_at_its_scale_is_no_noise(pool, monkeypatch):
     residual = pool.baseline.residual
     square = float(np.mean(residual.values[residual.valid] ** 2))

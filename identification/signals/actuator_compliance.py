@@ -28,14 +28,20 @@ _MIN_SIGNIFICANCE = 4.0
 """Threshold on the explained variance over that explained by chance: below it, there is no compliance motion."""
 
 
-def estimate_compliance_motion(stretch: Stretch, weights: Array, noise: float) -> Array:
-    """Return the compliance motion (N,) [m]; zeros if the displacement does not follow the force."""
+def estimate_compliance_motion(stretch: Stretch, weights: Array, stroke_cutoff: float) -> Array:
+    """Return the compliance motion (N,) [m]; zeros if the displacement does not follow the force.
+
+    Args:
+        stretch: the recording.
+        weights: (N,) 1 where measured and undisturbed, 0 elsewhere.
+        stroke_cutoff: frequency [Hz] below which the displacement is the stroke.
+    """
     x, rate = stretch.displacement, stretch.rate
     zeros = np.zeros(len(x))
     # With fewer samples the gains would follow the noise.
     if len(x) < 50 * len(_LAGS):
         return zeros
-    high_frequency, penalty = _extract_high_frequency(x, weights, rate, noise)
+    high_frequency, penalty = _extract_high_frequency(x, weights, rate, stroke_cutoff)
     shifts = np.unique(np.rint(_LAGS * rate).astype(int))
     reach = int(np.max(np.abs(shifts))) + 1
     force = _smooth_triangular(stretch.force, int(shifts[1] - shifts[0]))
@@ -57,25 +63,37 @@ def estimate_compliance_motion(stretch: Stretch, weights: Array, noise: float) -
     return np.convolve(np.pad(fast_force, reach, "edge"), kernel, "valid")
 
 
-def _extract_high_frequency(values: Array, weights: Array, rate: float, noise: float) -> tuple[Array, Array]:
-    """Return the part of a displacement (N,) [m] above the stroke, and the penalty (N-3,) that separates it."""
+def choose_stroke_cutoff(values: Array, weights: Array, rate: float, noise: float) -> float:
+    """Return the frequency [Hz] below which a displacement is the stroke, and not compliance motion.
+
+    Args:
+        values: (N,) displacement [m].
+        weights: (N,) 1 where measured and undisturbed, 0 elsewhere.
+        rate: [Hz]
+        noise: standard deviation of the displacement's noise [m].
+    """
     expected = np.zeros(len(values) - 3)
 
-    def separate(block_samples: float) -> tuple[Array, Array]:
-        """Separate by the median cutoff of blocks of so many samples."""
+    def choose(block_samples: float) -> float:
+        """Return the median cutoff of blocks of so many samples."""
         blocks = (np.arange(len(values)) / block_samples).astype(np.intp)
         cutoffs = choose_cutoffs(values, weights, expected, blocks, rate, noise)
-        cutoff = float(np.quantile(cutoffs, 0.5, method="lower"))
-        penalty = np.full(len(expected), float(compute_penalty(cutoff, rate)))
-        # Smoothed once only: compliance motion stands out more clearly against that (decision 0012).
-        return (values - smooth_signal(values, weights, penalty, expected)) * weights, penalty
+        return float(np.quantile(cutoffs, 0.5, method="lower"))
 
     if not weights.all():
         # Small disturbances remain near large ones. They raise the cutoff of the whole, but not of most blocks.
-        high_frequency, penalty = separate(_BLOCK_LENGTH * rate)
+        cutoff = choose(_BLOCK_LENGTH * rate)
+        high_frequency, _ = _extract_high_frequency(values, weights, rate, cutoff)
         if np.quantile(np.abs(high_frequency[weights > 0.0]), 0.9) < _NOISE_LIMIT * noise:
-            return high_frequency, penalty
-    return separate(len(values))
+            return cutoff
+    return choose(len(values))
+
+
+def _extract_high_frequency(values: Array, weights: Array, rate: float, cutoff: float) -> tuple[Array, Array]:
+    """Return the part of a displacement (N,) [m] above a cutoff [Hz], and the penalty (N-3,) that separates it."""
+    penalty = np.full(len(values) - 3, float(compute_penalty(cutoff, rate)))
+    # Smoothed once only: compliance motion stands out more clearly against that (decision 0012).
+    return (values - smooth_signal(values, weights, penalty, np.zeros(len(penalty)))) * weights, penalty
 
 
 def _fit_lag_gains(lagged: Array, displacement: Array, reach: int) -> tuple[Array, float]:

@@ -21,7 +21,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.logs import PERIODIC_MOTIONS, Segment, Stretch
-from identification.signals.actuator_compliance import MAX_LAG, estimate_compliance_motion
+from identification.signals.actuator_compliance import MAX_LAG, choose_stroke_cutoff, estimate_compliance_motion
 from identification.signals.cutoff import LOWEST_CUTOFF, choose_cutoffs, find_distortions, limit_length_slope
 from identification.signals.harmonics import Harmonics, find_steady_cycles, fit_harmonics
 from identification.signals.motion_regions import (
@@ -56,18 +56,20 @@ class Motion(NamedTuple):
     """Standard deviation of the recorded displacement's noise [m]."""
     cutoff: Array
     """Cutoff of the smoother at each sample [Hz]."""
+    stroke_cutoff: float
+    """Frequency below which the displacement is the stroke, and not compliance motion [Hz]."""
     unresolved: BoolArray
     """True in a disturbance so large that the motion between samples is unknown."""
     description: tuple[str, ...]
     """Method of estimation as text, one entry a segment, or one for a stretch without segments."""
 
 
-def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
+def estimate_motion(stretch: Stretch, similar: Motion | None = None) -> Motion:
     """Estimate the motion behind the recorded displacement of a stretch.
 
     Args:
         stretch: stretch with the segments of its method, as far as they are known.
-        cutoff: (N,) cutoff of the smoother [Hz]; chosen if None.
+        similar: motion of a similar recording, whose cutoffs are taken; they are chosen if None.
 
     Returns:
         The motion on the stretch's own time base.
@@ -76,13 +78,18 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
     noise = estimate_recorded_noise(stretch)
     # Disturbances mask compliance motion in the regression, so they are found first (decision 0013).
     disturbed = _find_rough_disturbances(stretch, weights, noise)
-    compliance_motion = estimate_compliance_motion(stretch, np.where(disturbed, 0.0, weights), noise)
+    undisturbed = np.where(disturbed, 0.0, weights)
+    stroke_cutoff = (
+        similar.stroke_cutoff
+        if similar
+        else choose_stroke_cutoff(stretch.displacement, undisturbed, stretch.rate, noise)
+    )
+    compliance_motion = estimate_compliance_motion(stretch, undisturbed, stroke_cutoff)
     is_compliant = bool(np.any(compliance_motion))
     waves = _fit_periodic_parts(stretch, weights, compliance_motion, noise)
     regions = divide_stretch(stretch, waves, is_compliant, noise)
     expected = _make_expected_differences(compliance_motion, waves, int(MAX_LAG * stretch.rate))
-    if cutoff is None:
-        cutoff = _choose_cutoff(stretch, weights, expected, regions, noise)
+    cutoff = similar.cutoff if similar else _choose_cutoff(stretch, weights, expected, regions, noise)
     # A third difference spans four samples; its cutoff is that of the second.
     penalty = compute_penalty(_raise_end_cutoffs(cutoff, stretch.rate)[1:-2], stretch.rate)
     displacement = smooth_signal(stretch.displacement, weights, penalty, expected, twicing=True)
@@ -94,6 +101,7 @@ def estimate_motion(stretch: Stretch, cutoff: Array | None = None) -> Motion:
         differentiate(velocity, stretch.rate),
         float(np.std(remainder)),
         cutoff,
+        stroke_cutoff,
         regions.unresolved,
         _describe_motion(stretch, waves, cutoff, is_compliant, from_record),
     )

@@ -22,6 +22,7 @@ from identification.arrays import Array, BoolArray
 from identification.fitting import Minimum, Piece, Problem
 from identification.logs import Stretch
 from identification.signals import (
+    Motion,
     average_drive_levels,
     estimate_drive_noise,
     estimate_motion,
@@ -38,15 +39,15 @@ The standard deviation of so few replicas is itself only known to a fifth.
 """
 
 
-def replace_motion(piece: Piece, stretch: Stretch, cutoff: Array | None = None) -> Piece:
+def replace_motion(piece: Piece, stretch: Stretch, similar: Motion | None = None) -> Piece:
     """Return a piece with the motion and drive that are estimated from a stretch.
 
     Args:
         piece: any piece.
         stretch: the recording of the piece, or a similar one.
-        cutoff: (N,) cutoff frequency of the motion's smoother [Hz], where it is already known.
+        similar: motion of a similar recording, whose cutoffs are taken.
     """
-    x, v, a = estimate_motion(stretch, cutoff)[:3]
+    x, v, a = estimate_motion(stretch, similar)[:3]
     drive = average_drive_levels(stretch.drive)
     if piece.step_shifts is not None:
         drive = piece.step_shifts.apply(drive)
@@ -93,10 +94,10 @@ def resample_input_noise(
     sensitivities = [fitted.compute_residuals(minimum.unknowns, i)[1] for i in range(len(fitted.pieces))]
     simulated = [replace(s, force=p.force) for s, p in zip(stretches, fitted.pieces, strict=True)]
     # The fitted motion is smoother than the real one: a cutoff chosen from it would pass less noise.
-    cutoffs = [estimate_motion(s).cutoff for s in simulated]
+    motions = [estimate_motion(s) for s in simulated]
     plain, biased = np.zeros((2, REPLICAS, len(interior)))
     for number in range(REPLICAS):
-        pieces = _draw_replica(fitted, simulated, cutoffs, [seed, number])
+        pieces = _draw_replica(fitted, simulated, motions, [seed, number])
         replica = replace(fitted, pieces=tuple(_limit_drive(fitted, minimum.unknowns, p) for p in pieces))
         plain[number, interior], biased[number, interior] = _solve_steps(replica, minimum, sensitivities, interior)
     scatter = np.asarray(_STUDENT_FACTOR * (plain.T @ plain) / REPLICAS)
@@ -134,10 +135,10 @@ def _replace_recorded_force(problem: Problem, unknowns: Array) -> Problem:
 
 
 def _draw_replica(
-    problem: Problem, stretches: Sequence[Stretch], cutoffs: Sequence[Array], seed: Sequence[int]
+    problem: Problem, stretches: Sequence[Stretch], motions: Sequence[Motion], seed: Sequence[int]
 ) -> Iterator[Piece]:
     """Yield the pieces with motion and drive estimated from fresh noise on them."""
-    for i, (piece, stretch, cutoff) in enumerate(zip(problem.pieces, stretches, cutoffs, strict=True)):
+    for i, (piece, stretch, motion) in enumerate(zip(problem.pieces, stretches, motions, strict=True)):
         random = np.random.default_rng([*seed, i])
         count, s = len(piece.force), piece.excitation
         noisy = replace(
@@ -145,7 +146,7 @@ def _draw_replica(
             displacement=s.displacement + estimate_recorded_noise(stretch) * random.standard_normal(count),
             drive=s.drive + _estimate_level_noise(stretch.drive) * random.standard_normal(count),
         )
-        yield replace_motion(piece, noisy, cutoff)
+        yield replace_motion(piece, noisy, motion)
 
 
 def _limit_drive(problem: Problem, unknowns: Array, piece: Piece) -> Piece:

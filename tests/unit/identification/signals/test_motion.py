@@ -220,3 +220,15 @@ def test_the_velocity_at_an_end_of_a_recording_at_rest_is_small():
     weights, penalty = np.ones(400), np.full(397, float(compute_penalty(150.0, RATE)))
     ends = [differentiate(smooth_signal(x, weights, penalty, np.zeros(397)), RATE)[0] for x in recorded]
     assert np.std(ends) < 1.5 * noise * RATE
+
+
+def test_a_similar_recording_takes_the_same_cutoffs():
+    displacement, velocity = sine(10e-3, 2.0, 6.0)
+    first, second = (stretch(recorded(displacement, 2e-6, seed=s), hysteresis(velocity)) for s in (1, 2))
+    motion = estimate_motion(first)
+    similar = estimate_motion(second, motion)
+    assert similar.cutoff is motion.cutoff
+    assert similar.stroke_cutoff == motion.stroke_cutoff
+    assert np.std(similar.displacement - motion.displacement) < 2e-6
+    again = estimate_motion(first, motion)
+    np.testing.assert_array_equal(again.displacement, motion.displacement)

@@ -84,10 +84,10 @@ class SearchSettings:
     """Largest number of effects in a set."""
     max_remaining_share: float = 0.2
     """Part of the baseline's excess that a set may leave for an extension to be tried."""
-    min_closed_share: float = 0.3
+    min_closed_share: float = 0.4
     """Smallest part of the remaining error that an extension closes, over conditions.
 
-    Origin: missing effects closed 0.49 and more, repairs of form errors up to 0.19, but for one with 0.68.
+    Origin: missing effects closed 0.49 and more. Repairs of form errors closed up to 0.34, but for 0.42 and 0.68.
     """
     max_partial_effects: int = 5
     """Largest number of effects in a set that is a part of an unknown cause."""

@@ -271,7 +271,7 @@ def test_the_mean_square_of_slow_noise_varies_more():
 
 
 def test_the_mean_square_of_short_blocks_varies_as_that_of_their_noise():
-    """Of a block, the parts of the noise that are slower add up to one value."""
+    """The parts of the noise that are slower than a block add up to one value in it."""
     bins = np.arange(1, 60_001)
     random = default_rng(4)
     power = (random.standard_normal(len(bins)) + 1j * random.standard_normal(len(bins))) / np.sqrt(bins)

@@ -38,7 +38,7 @@ def test_observed_frequencies_have_their_mean_power(name, gain):
 
 @pytest.mark.parametrize("name", SPECTRA)
 def test_the_part_below_has_the_stated_uncertainty(name):
-    """Of the variance below the observed frequencies, most errors are within one standard deviation."""
+    """Most errors of the variance below the observed frequencies are within one standard deviation."""
     frequency = np.linspace(0.1, 1.9, 20_001)
     truth = 2.0 * np.trapezoid(SPECTRA[name](frequency), frequency) / STEP / 1000
     errors = []

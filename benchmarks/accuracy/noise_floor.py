@@ -28,7 +28,9 @@ MAINS_FREQUENCY = 50.02
 """Frequency of the mains line [Hz]."""
 
 
-COLUMNS = ("noise", "fourth differences", "floor", "least and largest", "inside the 95 % interval", "half width")
+COLUMNS = (
+    "noise", "fourth differences", "known", "floor", "least and largest", "inside the 95 % interval", "half width"
+)  # fmt: skip
 
 
 class Size(NamedTuple):
@@ -61,6 +63,8 @@ class Result(NamedTuple):
 
     ratio: float
     high_frequency: float
+    is_known: bool
+    """True if the floor is more than a lower bound."""
     is_inside: bool
     """True if the true noise lies in the 95 % interval."""
     width: float
@@ -144,7 +148,11 @@ def compare(floor: NoiseFloorEstimate, truth: float) -> Result:
     """Compare an estimate with the true noise [N]."""
     low, high = floor.get_interval(floor.noise)
     return Result(
-        floor.noise / truth, floor.high_frequency / truth, low <= truth <= high, (high - low) / 2.0 / truth
+        floor.noise / truth,
+        floor.high_frequency / truth,
+        floor.is_known,
+        low <= truth <= high,
+        (high - low) / 2.0 / truth,
     )
 
 
@@ -179,14 +187,16 @@ def record(size: Size, disturbance: Disturbance, random: np.random.Generator) ->
 
 
 def format_row(name: str, results: list[Result]) -> str:
-    """Return one row of the table."""
-    ratios = np.array([r.ratio for r in results])
-    high = np.mean([r.high_frequency for r in results])
-    width = np.mean([r.width for r in results])
-    inside = sum(r.is_inside for r in results)
+    """Return one row of the table; a floor that is not known counts in the second and third column only."""
+    high, known = np.mean([r.high_frequency for r in results]), [r for r in results if r.is_known]
+    start = f"| {name} | {high:.2f} | {len(known)} of {len(results)} |"
+    if not known:
+        return f"{start} - | - | - | - |"
+    ratios = np.array([r.ratio for r in known])
+    inside, width = sum(r.is_inside for r in known), np.mean([r.width for r in known])
     return (
-        f"| {name} | {high:.2f} | {ratios.mean():.3f} ± {ratios.std():.3f} "
-        f"| {ratios.min():.3f}-{ratios.max():.3f} | {inside} of {len(results)} | {100 * width:.1f} % |"
+        f"{start} {ratios.mean():.3f} ± {ratios.std():.3f} "
+        f"| {ratios.min():.3f}-{ratios.max():.3f} | {inside} of {len(known)} | {100 * width:.1f} % |"
     )
 
 

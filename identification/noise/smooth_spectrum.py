@@ -39,7 +39,14 @@ class Continuation(NamedTuple):
 
     @classmethod
     def fit(cls, corner: float, frequency: Array, level: Array, freedom: Array) -> "Continuation":
-        """Fit mean powers (B,) [N²] of bands by maximum likelihood (Whittle 1953), each of so many bins."""
+        """Fit the mean powers of bands by maximum likelihood (Whittle 1953).
+
+        Args:
+            corner: corner frequency of the slow part [Hz]; 0 for 1/f noise.
+            frequency: (B,) frequencies of the bands [Hz].
+            level: (B,) their mean powers [N²], positive.
+            freedom: (B,) number of bins in each [1].
+        """
         empty = cls(corner, float(frequency[0]), np.zeros(2), np.zeros((2, 2)), 0.0)
         columns, expected = empty.make_columns(frequency), level
         for _ in range(_ITERATIONS):

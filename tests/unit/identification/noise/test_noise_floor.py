@@ -21,6 +21,7 @@ from identification.noise.noise_floor import (
 )
 from identification.noise.time_scales import ScaleVariance, list_scales, measure_scale_variance
 from identification.signals.motion import estimate_motion
+from tests.support.noise import make_pink_noise
 from tests.support.strokes import RATE, hysteresis, random_motion, recorded, sine, sine_segment, stretch
 
 NOISE = 2.5
@@ -272,11 +273,7 @@ def test_the_mean_square_of_slow_noise_varies_more():
 
 def test_the_mean_square_of_short_blocks_varies_as_that_of_their_noise():
     """The parts of the noise that are slower than a block add up to one value in it."""
-    bins = np.arange(1, 60_001)
-    random = default_rng(4)
-    power = (random.standard_normal(len(bins)) + 1j * random.standard_normal(len(bins))) / np.sqrt(bins)
-    pink = np.fft.irfft(np.concatenate([[0.0], power]), 2 * len(bins))[: len(bins)]
-    pink /= pink.std()
+    pink = make_pink_noise(60_000, default_rng(4))
     valid = np.ones(len(pink), bool)
     measured = [(m, *measure_scale_variance(pink, valid, m)) for m in list_scales(len(pink))]
     scales = tuple(ScaleVariance.from_signal(*scale) for scale in measured)

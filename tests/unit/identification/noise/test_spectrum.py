@@ -14,6 +14,7 @@ from identification.noise.spectrum import (
     make_spectrum,
 )
 from identification.noise.window_fit import CycleFit, WindowFit
+from tests.support.noise import make_pink_noise
 
 RATE = 500.0
 
@@ -50,8 +51,7 @@ def test_the_variance_of_noise_of_any_spectrum_is_found(correlation):
     assert 0.3 * scatter < np.mean([n.deviation for n in found]) < 3.0 * scatter
 
 
-def test_slow_noise_is_found_with_two_cycles():
-    """Two cycles show little of it: the estimate is uncertain, and says so."""
+def test_two_cycles_show_slow_noise_within_a_large_uncertainty():
     noise = lfilter([1.0], [1.0, -0.9], np.random.default_rng(5).standard_normal(8000))
     found, _ = estimate(noise, windows=16, cycles=2)
     error = np.mean([n.variance for n in found]) - np.var(noise)
@@ -103,9 +103,7 @@ def test_only_bins_with_a_sufficient_gain_show_the_noise():
 def test_the_part_below_the_windows_is_uncertain_in_slow_noise():
     white, _ = estimate(np.random.default_rng(8).standard_normal(9000))
     assert white[0].extrapolated < 2e-3
-    random = np.random.default_rng(9)
-    spectrum = (random.standard_normal(9000) + 1j * random.standard_normal(9000)) / np.sqrt(np.arange(1, 9001))
-    pink = np.fft.irfft(np.concatenate([[0.0], spectrum]), 18_000)[:9000]
+    pink = make_pink_noise(9000, np.random.default_rng(9))
     found, _ = estimate(pink)
     assert 0.02 < np.mean([n.extrapolated for n in found]) / np.var(pink) < 0.5
 

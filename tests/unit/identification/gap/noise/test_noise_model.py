@@ -12,6 +12,7 @@ from identification.gap.noise.noise_model import NoiseModel
 from identification.noise import NoiseFloorEstimate, ScaleVariance, SlowVariance
 from tests.support.candidate_pools import NOISE, fit_baseline
 from tests.support.effects import active
+from tests.support.noise import make_pink_noise
 
 BACKLASH = frozenset({"clevis_backlash"})
 
@@ -159,11 +160,8 @@ def test_without_cycles_to_compare_the_floor_stays(pool):
 def make_slow_residual(size, rates=((8000, 1000.0),)):
     """A residual of white noise, and of noise with the variance ``size``² in each factor e of the frequency."""
     random, count = np.random.default_rng(5), sum(n for n, _ in rates)
-    spectrum = (random.standard_normal(count) + 1j * random.standard_normal(count)) / np.sqrt(
-        np.arange(1, count + 1)
-    )
-    slow = np.fft.irfft(np.concatenate([[0.0], spectrum]), 2 * count)[:count]
-    values = random.standard_normal(count) + size * slow / slow.std() * np.sqrt(np.log(count))
+    slow = make_pink_noise(count, random)
+    values = random.standard_normal(count) + size * slow * np.sqrt(np.log(count))
     zero = np.zeros(count)
     return Residual(values, zero, zero, zero, np.ones(count, bool), rates)
 

@@ -54,8 +54,9 @@ def _measure(recording: Recording, strokes: Strokes) -> str:
     prepared, true = prepare_recordings([recording]), _find_instants(recording, strokes)
     with use_one_thread():
         pool, known = make_candidate_pool(prepared), make_candidate_pool(prepared)
-        known.evaluation = replace(prepared.evaluation, pieces=shift_steps(known.full_problem, [true]).pieces)
-        known.full_problem = replace(known.full_problem, pieces=known.evaluation.pieces)
+        known.evaluation = replace(prepared.evaluation, pieces=shift_steps(known.problems.full, [true]).pieces)
+        full = replace(known.problems.full, pieces=known.evaluation.pieces)
+        known.problems = replace(known.problems, full=full)
         best, recorded = _fit_law(known), _fit_law(pool)
         cell = f"{recorded.train_rmse / best.train_rmse:.3f}"
         if not pool.place_drive_steps(recorded):

@@ -17,6 +17,7 @@ from identification.gap.selection import (
     DEFAULT_SETTINGS,
     UNKNOWN_THRESHOLD,
     CandidatePool,
+    SearchProblems,
     SearchSettings,
     compute_final_posterior,
     find_partial_sets,
@@ -131,7 +132,12 @@ def diagnose_prepared(
         regression = ResidualRegression(evaluation, pool.floor)
         candidates = pool.candidates.values()
         if settle_unknown_floor(
-            pool.noise_model, candidates, regression, pool.block_length, pool.evaluate, pool.propagate_input_noise
+            pool.noise_model,
+            candidates,
+            regression,
+            pool.problems.block_length,
+            pool.evaluate,
+            pool.propagate_input_noise,
         ):
             pool.update_residuals()
         posterior = compare_with_curves(pool, compute_final_posterior(pool))
@@ -154,7 +160,7 @@ def _add_cross_check(
         return result
     fit = pool.candidates[named].fit
     comparison = cross_check_effects(
-        fit, pool.full_problem.replace_effects(fit.effects), drive_unit, seed, progress
+        fit, pool.problems.full.replace_effects(fit.effects), drive_unit, seed, progress
     )
     return replace(result, diagnosis=result.diagnosis.model_copy(update={"cross_check": comparison}))
 
@@ -172,7 +178,8 @@ def make_candidate_pool(
     problem = make_diagnosis_problem(dataset, evaluation.select_fitted_pieces())
     noise_model = NoiseModel(dataset.floor, dataset.stretches, seed)
     clock_deviation = dataset.clock_deviation if dataset.clock_deviation > _CLOCK_DEVIATION else 0.0
-    return CandidatePool(problem, evaluation, noise_model, clock_deviation, progress, settings, library or EFFECTS)
+    problems = SearchProblems(problem, settings)
+    return CandidatePool(problems, evaluation, noise_model, clock_deviation, progress, library or EFFECTS)
 
 
 def make_diagnosis_problem(dataset: Dataset, pieces: tuple[Piece, ...]) -> Problem:

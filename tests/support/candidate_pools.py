@@ -12,8 +12,8 @@ from identification.fitting import EffectModel
 from identification.gap.diagnosis import make_candidate_pool, prepare_recordings
 from identification.gap.fits import Candidate, FitOptions
 from identification.gap.selection import CandidatePool, SearchSettings
-from identification.gap.selection.candidate_pool import QUICK_FIT
 from identification.gap.selection.neighbours import fit_extension
+from identification.gap.selection.search_settings import QUICK_FIT
 from identification.logs.recording import Recording, Segment
 from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
 from tests.support.effects import LABORATORY, active
@@ -90,7 +90,7 @@ class WatchedPool(CandidatePool):
         """Return a pool with the same candidates, no recorded fits, and other settings."""
         return replace(
             self,
-            settings=replace(self.settings, **settings),
+            problems=replace(self.problems, settings=replace(self.settings, **settings)),
             candidates=dict(self.candidates),
             full_fits=set(self.full_fits),
             block_evidence=dict(self.block_evidence),
@@ -116,9 +116,7 @@ def make_pool(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:
     """Return an empty pool of a short recording."""
     prepared = prepare_recordings([record(*effects)])
     pool = make_candidate_pool(prepared, settings=SearchSettings(**settings))
-    return WatchedPool(
-        pool.full_problem, pool.evaluation, pool.noise_model, pool.clock_deviation, settings=pool.settings
-    )
+    return WatchedPool(pool.problems, pool.evaluation, pool.noise_model, pool.clock_deviation)
 
 
 def fit_baseline(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:

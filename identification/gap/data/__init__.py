@@ -1,5 +1,6 @@
 """Cycles of a recording, held-out samples, data quality, and the residual on them."""
 
+from identification.gap.data.block_evidence import bound_evidence, compute_evidence, count_independent_samples
 from identification.gap.data.block_squares import compute_block_squares
 from identification.gap.data.correlation import compute_correlation_length, compute_residual_correlation_length
 from identification.gap.data.cycles import Cycles, Indices, split_by_piece
@@ -23,12 +24,15 @@ __all__ = [
     "Indices",
     "Residual",
     "Shrinkage",
+    "bound_evidence",
     "check_cycle_count",
     "check_sliding_recorded",
     "compute_block_squares",
     "compute_correlation_length",
+    "compute_evidence",
     "compute_harmonics",
     "compute_residual_correlation_length",
+    "count_independent_samples",
     "describe_unobservable_effects",
     "estimate_drift",
     "estimate_repeated_residual",

@@ -80,7 +80,7 @@ class FittedCurve:
 
 def screen_curves(pool: CandidatePool, parent: Candidate) -> list[ScreenedCurve]:
     """Return all curves that the recording can show, with their linear evidence, the largest first."""
-    problem = pool.screening_problem.replace_effects(parent.fit.effects)
+    problem = pool.problems.screening.replace_effects(parent.fit.effects)
     unknowns = parent.fit.minimum.unknowns
     simulated = problem.simulate(unknowns)
     curves = list_curve_effects(problem, simulated)
@@ -137,7 +137,7 @@ def _continue_linear_model(pool: CandidatePool, parent: Candidate, screened: Scr
     """Fit a curve with the law and the effects of a set, from the end of its linear model."""
     curve, evidence = screened
     model = _set_prior(curve, evidence.deviation)
-    parent_problem = pool.screening_problem.replace_effects(parent.fit.effects)
+    parent_problem = pool.problems.screening.replace_effects(parent.fit.effects)
     problem = parent_problem.replace_effects((*parent.fit.effects, model))
     start = insert_effect_unknowns(parent_problem, parent.fit.minimum.unknowns, np.zeros(len(model.quantities)))
     target = _find_linear_solution(parent_problem, parent.fit.minimum.unknowns, screened)
@@ -153,7 +153,7 @@ def _finish_fit(pool: CandidatePool, fitted: FittedCurve) -> FittedCurve:
         if not pool.is_at_floor(fitted.candidate):
             again = minimise(fit.problem, fit.minimum.unknowns, _ITERATIONS, ignore_progress)
             fit = JointFit(fit.problem, again)
-            fresh = _replace_law(fit.problem, fit.minimum.unknowns, pool.regression_start)
+            fresh = _replace_law(fit.problem, fit.minimum.unknowns, pool.problems.regression_start)
             other = fit_output_error(fit.problem, _FRESH_FIT, start=fresh)
             if other.evaluation.cost < fit.minimum.evaluation.cost:
                 fit = JointFit(fit.problem, other)

@@ -62,15 +62,15 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
 
     None if no formula does.
     """
-    pieces = pool.screening_problem.pieces
-    simulated = pool.screening_problem.replace_effects(fitted.parent.fit.effects).simulate(
+    pieces = pool.problems.screening.pieces
+    simulated = pool.problems.screening.replace_effects(fitted.parent.fit.effects).simulate(
         fitted.parent.fit.minimum.unknowns
     )
     variable = collect_variables(pieces, simulated)[fitted.curve.at.variables[0]]
     variable = variable[:: max(1, len(variable) // _MAX_POINTS)]
     count = fitted.curve.function.basis.size
     starts = rank_formulas(fitted.curve, np.array(fitted.values[:count]), variable)
-    errors = split_by_piece(fitted.candidate.residual.values, pool.full_problem.pieces)
+    errors = split_by_piece(fitted.candidate.residual.values, pool.problems.full.pieces)
     samples = len(fitted.candidate.residual.values) / compute_residual_correlation_length(errors)
     formulas = [_fit_formula(pool, fitted, start, variable, samples) for start in starts[:_FITTED_FORMULAS]]
     kept = [f for f in formulas if _keeps_gain(fitted, f.candidate)]
@@ -91,11 +91,11 @@ def _fit_formula(
     model = EffectModel(make_effect(file), "defined")
     parent = fitted.candidate.fit
     others = parent.effects[:-1]
-    problem = pool.screening_problem.replace_effects((*others, model))
+    problem = pool.problems.screening.replace_effects((*others, model))
     columns = parent.problem.layout.effect_slices[-1]
     law = np.delete(parent.minimum.unknowns, columns)
     unknowns = insert_effect_unknowns(
-        pool.screening_problem.replace_effects(others), law, model.to_search(model.starts[0])
+        pool.problems.screening.replace_effects(others), law, model.to_search(model.starts[0])
     )
     with use_one_thread():
         fit = JointFit(problem, minimise(problem, unknowns, _ITERATIONS, ignore_progress))

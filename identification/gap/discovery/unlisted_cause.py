@@ -113,7 +113,7 @@ def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage,
     the residual, because the errors of neighbouring samples are alike. It counts as far as the best one closes the
     gap. A cause that nothing resembles is equally probable at all stages.
     """
-    problem = pool.screening_problem.replace_effects(parent.fit.effects)
+    problem = pool.problems.screening.replace_effects(parent.fit.effects)
     with use_one_thread():
         screened = screen_curves(pool, parent)
         unknowns = parent.fit.minimum.unknowns

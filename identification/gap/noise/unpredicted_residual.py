@@ -42,7 +42,7 @@ def settle_unknown_floor(
         regression: regression on their residuals on held-out strokes.
         block_length: length of a block [s], part of a stroke.
         evaluate: computes the residual of a fit; a drift that slow noise explains is then a part of it.
-        propagate: computes the mean square (N,) [N²] of a candidate's force for the noise of its inputs.
+        propagate: computes the squared change of a candidate's force by the noise of its inputs, (runs, N) [N²].
     """
     if noise_model.estimate.is_known:
         return False
@@ -65,17 +65,40 @@ def is_stationary(
     """Return True if the mean square of blocks [s] scatters as that of noise of the same spectrum.
 
     An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all. The
-    noise of the displacement (N,) [N²] is strong where the force is steep. Its estimate may be too large, so
-    blocks may also scatter as noise of the force alone.
+    noise of the displacement (runs, N) [N²] is strong where the force is steep, in short bursts whose size differs
+    from run to run. Its estimate may be too large, so blocks may also scatter as noise of the force alone.
     """
     squares = compute_block_squares(residual, block_length)
     if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:
         return False
-    propagated = compute_block_squares(replace(residual, values=np.sqrt(input_squares)), block_length)
-    samples = math.ceil(block_length * residual.rates[0][1])
-    chance, limit = estimate.compute_chance(samples), _CHANCE_DEVIATIONS * math.sqrt(2.0 / (len(squares) - 1))
-    scatters = [_compute_scatter(squares), _compute_scatter(squares / (estimate.noise**2 + propagated))]
-    return any(abs(math.log(scatter / chance**2)) < limit for scatter in scatters)
+    runs = np.stack(
+        [compute_block_squares(replace(residual, values=np.sqrt(run)), block_length) for run in input_squares]
+    )
+    chance = estimate.compute_chance(math.ceil(block_length * residual.rates[0][1]))
+    total = estimate.noise**2 + runs.mean(axis=0)
+    limit = _CHANCE_DEVIATIONS * math.sqrt(2.0 / (len(squares) - 1))
+    return any(
+        abs(math.log(scatter / expected)) < limit
+        for scatter, expected in (
+            (_compute_scatter(squares), chance**2),
+            (_compute_scatter(squares / total), _expect_scatter(estimate.noise**2, runs, chance)),
+        )
+    )
+
+
+def _expect_scatter(square: float, runs: Array, chance: float) -> float:
+    """Return the scatter [1] of blocks of both noises over their expected mean square.
+
+    Args:
+        square: mean square of the noise of the force [N²].
+        runs: mean square [N²] of the propagated input noise in each block, (runs, blocks).
+        chance: standard deviation of the mean square of a block of noise of the force, over its mean [1].
+    """
+    mean = runs.mean(axis=0)
+    # The mean of the runs differs from the truth, too, by its own part of the variance.
+    between = (1.0 + 1.0 / len(runs)) * runs.var(axis=0, ddof=1)
+    variance = chance**2 * square * (square + 2.0 * mean) + between
+    return float(np.mean(variance / (square + mean) ** 2))
 
 
 def _compute_scatter(values: Array) -> float:

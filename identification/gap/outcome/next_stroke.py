@@ -91,7 +91,7 @@ def _find_limits(pool: CandidatePool) -> StrokeLimits:
     strokes = [p.excitation for p in pool.evaluation.pieces]
     low = min(float(s.displacement.min()) for s in strokes)
     high = max(float(s.displacement.max()) for s in strokes)
-    space = pool.full_problem.space
+    space = pool.problems.full.space
     return StrokeLimits(
         amplitude=0.5 * (high - low),
         centre=0.5 * (high + low),

@@ -210,7 +210,7 @@ class ReportBuilder:
         self, named: Candidate, modelled: Candidate, residual: TwinResidual | None
     ) -> HeldOutError | None:
         """Return the error of the named set on the user's held-out strokes, and of the twin with its residual."""
-        problem = self.pool.full_problem
+        problem = self.pool.problems.full
         error = measure_held_out_strokes(self.dataset, problem, named)
         if error is None or residual is None:
             return error

@@ -87,7 +87,7 @@ def estimate_expected_shrinkage(
     noise = pool.noise_model.estimate_noise(candidate)
     input_noise = np.zeros((1, len(evaluation.force)))
     if candidate.names:
-        input_noise = pool.noise_model.sample_other_runs(candidate, pool.full_problem)
+        input_noise = pool.noise_model.sample_other_runs(candidate, pool.problems.full)
     return evaluation.estimate_shrinkage(pool.baseline.residual, candidate.residual, noise, input_noise)
 
 

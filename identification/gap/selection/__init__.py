@@ -1,6 +1,5 @@
 """Selection of the sets of effects that explain a recording."""
 
-from identification.gap.selection.block_evidence import compute_evidence
 from identification.gap.selection.candidate_pool import CandidatePool, CurveAlternative
 from identification.gap.selection.partial_sets import find_partial_sets
 from identification.gap.selection.plan import compute_final_posterior, search_forward
@@ -14,6 +13,7 @@ from identification.gap.selection.posterior import (
     normalise_scores,
 )
 from identification.gap.selection.screening import compute_expected_gain
+from identification.gap.selection.search_problems import SearchProblems
 from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
 
 __all__ = [
@@ -25,8 +25,8 @@ __all__ = [
     "CandidatePool",
     "CurveAlternative",
     "Posterior",
+    "SearchProblems",
     "SearchSettings",
-    "compute_evidence",
     "compute_expected_gain",
     "compute_final_posterior",
     "compute_stage_probabilities",

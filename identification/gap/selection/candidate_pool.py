@@ -14,14 +14,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.damper.effects import EFFECTS, Effect
-from identification.fitting import (
-    EffectModel,
-    OptimiserSettings,
-    Piece,
-    Problem,
-    fit_output_error,
-    make_starting_points,
-)
+from identification.fitting import EffectModel, Piece, fit_output_error
 from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import (
     EXPLAINED_RATIO,
@@ -36,34 +29,14 @@ from identification.gap.selection.error_comparison import ErrorComparison
 from identification.gap.selection.posterior import BlockEvidence, Posterior, SetEvidence, compute_posterior
 from identification.gap.selection.screening import ScreeningResult
 from identification.gap.selection.screening_cache import ScreeningCache
-from identification.gap.selection.search_settings import DEFAULT_SETTINGS, SearchSettings
+from identification.gap.selection.search_problems import SearchProblems
+from identification.gap.selection.search_settings import LAW_SEARCH, QUICK_FIT, SET_SEARCH, SearchSettings
 from identification.gap.selection.size_prior import compute_size_weight
 from identification.progress import Progress, advance, ignore_progress
 from identification.uncertainty import estimate_step_shifts, shift_steps
 
 _CHANCE_DEVIATIONS = 2.0
 """Standard deviations of a sample variance that count as chance."""
-_BLOCK_ANGLE = 4.0
-"""Length of a block of the block evidence, over half stroke divided by peak speed [1]."""
-_USUAL_RATE = 10.0
-"""Peak speed over half stroke [1/s] of the recordings for which the sampling rates of the settings are stated."""
-SEARCH_TOLERANCE = 1e-4
-"""Part of the excess that a step of a search must be expected to remove, else its descent ends [1]."""
-QUICK_FIT = FitOptions(
-    decimation=1,
-    starts=0,
-    descents=1,
-    iterations=25,
-    law_steps=5,
-    regression_start=False,
-    refit_full=False,
-    tolerance=SEARCH_TOLERANCE,
-)
-"""One descent from the best of the given starts, on decimated data."""
-_SEARCH = OptimiserSettings(iterations=40, restarts=1, tolerance=SEARCH_TOLERANCE)
-"""Search from the regression and, if its minimum is not conclusive, from the low-slip start."""
-_LAW_SEARCH = replace(_SEARCH, restarts=2)
-"""Search of the law alone, on which all sets rest: also from the mixed start."""
 
 
 class CurveAlternative(NamedTuple):
@@ -81,14 +54,12 @@ class CurveAlternative(NamedTuple):
 class CandidatePool:
     """The sets of effects that were fitted to one recording."""
 
-    full_problem: Problem
-    """Problem of all fitted samples."""
+    problems: SearchProblems
     evaluation: EvaluationData
     noise_model: NoiseModel
     clock_deviation: float = 0.0
     """Standard deviation of the delay between the channels [s]; 0 where it is small enough to be ignored."""
     progress: Progress = ignore_progress
-    settings: SearchSettings = DEFAULT_SETTINGS
     library: Mapping[str, Effect] = field(default_factory=lambda: EFFECTS)
     """Effects that the search considers, by name."""
     candidates: dict[frozenset[str], Candidate] = field(default_factory=dict)
@@ -109,7 +80,12 @@ class CandidatePool:
 
     def __post_init__(self) -> None:
         """Create the cache of screenings."""
-        self._screenings = ScreeningCache(self._resolve_rate(self.settings.screening_rate), self.library)
+        self._screenings = ScreeningCache(self.problems.screening_rate, self.library)
+
+    @property
+    def settings(self) -> SearchSettings:
+        """Limits of the search."""
+        return self.problems.settings
 
     @property
     def budget_spent(self) -> bool:
@@ -132,11 +108,6 @@ class CandidatePool:
         return max(self.settings.no_gap_ratio * self.floor, highest)
 
     @property
-    def block_length(self) -> float:
-        """Length of a block of the block evidence [s]: part of a stroke of this recording."""
-        return _BLOCK_ANGLE / self.full_problem.space.scales.rate
-
-    @property
     def baseline(self) -> Candidate:
         """Candidate without effects."""
         return self.candidates[frozenset()]
@@ -150,7 +121,9 @@ class CandidatePool:
     def comparison(self) -> ErrorComparison:
         """Comparison of the errors of two candidates by block evidence."""
         evaluation = self.evaluation
-        return ErrorComparison(self.noise_model, evaluation.held_out_samples, self.block_length, evaluation.cycles)
+        return ErrorComparison(
+            self.noise_model, evaluation.held_out_samples, self.problems.block_length, evaluation.cycles
+        )
 
     def compute_excess(self, candidate: Candidate) -> float:
         """Compute the excess of a candidate over the present noise floor [1]."""
@@ -172,8 +145,8 @@ class CandidatePool:
     def collect_evidence(self) -> list[SetEvidence]:
         """Return the evidence of every set."""
         floor = self._find_lowest_floor()
-        x = np.concatenate([p.excitation.displacement for p in self.full_problem.pieces])
-        size = self.full_problem.space.scales.damper_size
+        x = np.concatenate([p.excitation.displacement for p in self.problems.full.pieces])
+        size = self.problems.full.space.scales.damper_size
         return [
             SetEvidence(
                 names,
@@ -189,7 +162,7 @@ class CandidatePool:
         """Compute the posterior of all fitted sets."""
         coloured_share = self.noise_model.estimate.coloured_share
         curve = self._collect_curve_evidence()
-        return compute_posterior(self.collect_evidence(), self.full_problem.samples, coloured_share, curve)
+        return compute_posterior(self.collect_evidence(), self.problems.full.samples, coloured_share, curve)
 
     def _collect_curve_evidence(self) -> SetEvidence | None:
         """Return the evidence of the curve that is an alternative to the sets; None without one."""
@@ -218,8 +191,8 @@ class CandidatePool:
         returns.
         """
         self.fit_count += 1
-        problem = self.decimated_problem.replace_effects(effects)
-        minimum = fit_output_error(problem, _SEARCH if effects else _LAW_SEARCH)
+        problem = self.problems.decimated.replace_effects(effects)
+        minimum = fit_output_error(problem, SET_SEARCH if effects else LAW_SEARCH)
         return self._keep(self.evaluate(JointFit(problem, minimum)))
 
     def fit(
@@ -233,7 +206,7 @@ class CandidatePool:
             The best known candidate of this set, which may come from an earlier fit.
         """
         self.fit_count += 1
-        return self._keep(self.evaluate(fit_jointly(self.decimated_problem, effects, None, options, starts)))
+        return self._keep(self.evaluate(fit_jointly(self.problems.decimated, effects, None, options, starts)))
 
     def _keep(self, candidate: Candidate) -> Candidate:
         """Keep a candidate if it is the best of its names, and return the best."""
@@ -264,49 +237,17 @@ class CandidatePool:
     def screen(self, parent: Candidate, without: frozenset[str]) -> list[ScreeningResult]:
         """Estimate the gain of every further effect in addition to a set, except of those named."""
         return self._screenings.find_gains(
-            parent, without, self.compute_excess(parent), self.decimated_problem, self._find_mains_frequency
+            parent, without, self.compute_excess(parent), self.problems.decimated, self._find_mains_frequency
         )
-
-    @cached_property
-    def screening_problem(self) -> Problem:
-        """Problem of the data on which further effects are screened."""
-        highest = max(p.excitation.rate for p in self.decimated_problem.pieces)
-        rate = self._resolve_rate(self.settings.screening_rate)
-        return self.decimated_problem.decimate(max(1, round(highest / rate)))
-
-    @cached_property
-    def decimated_problem(self) -> Problem:
-        """Problem of the decimated data on which sets are searched, as a fast variant."""
-        rate = max(p.excitation.rate for p in self.full_problem.pieces)
-        samples = sum(len(p.force) for p in self.full_problem.pieces)
-        factor = rate / self._resolve_rate(self.settings.decimation_rate)
-        factor = max(factor, samples / self.settings.long_recording)
-        # A long recording of a slow damper may lose the electronics, but not the motion.
-        factor = min(factor, rate / (self.settings.screening_rate * self._relative_rate))
-        return self.full_problem.make_fast().decimate(max(1, round(factor)))
-
-    def _resolve_rate(self, rate: float) -> float:
-        """Return a sampling rate [Hz] that resolves the electronics and the motion of this recording."""
-        return rate * max(1.0, self._relative_rate)
-
-    @property
-    def _relative_rate(self) -> float:
-        """Rate of the motion over that of the usual recordings [1]."""
-        return self.full_problem.space.scales.rate / _USUAL_RATE
-
-    @cached_property
-    def regression_start(self) -> Array:
-        """Unknowns (U,) of the law alone from the regression."""
-        return make_starting_points(self.decimated_problem)[0]
 
     def evaluate(self, fit: JointFit) -> Candidate:
         """Compute the residual of a fit on all samples; a drift that slow noise explains remains in it."""
-        forces = self.full_problem.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
+        forces = self.problems.full.replace_effects(fit.effects).simulate(fit.minimum.unknowns)
         residual = self.evaluation.compute_residual(forces)
         if has_drift(fit):
             slow_variance = self.noise_model.bound_slow_variance(residual)
-            drift = compute_noise_drift(fit, self.full_problem, slow_variance)
-            drifts = split_by_piece(drift, self.full_problem.pieces)
+            drift = compute_noise_drift(fit, self.problems.full, slow_variance)
+            drifts = split_by_piece(drift, self.problems.full.pieces)
             residual = self.evaluation.compute_residual([f - d for f, d in zip(forces, drifts, strict=True)])
         estimate = self.noise_model.estimate
         held_out = max(int(np.count_nonzero(self.evaluation.held_out_samples)), 1)
@@ -314,8 +255,8 @@ class CandidatePool:
         return Candidate(fit, residual, *self.evaluation.compute_rmse(residual), chance)
 
     def propagate_input_noise(self, candidate: Candidate) -> Array:
-        """Return the mean square (N,) [N²] of a candidate's force for the noise of its inputs."""
-        return np.asarray(self.noise_model.sample_other_runs(candidate, self.full_problem).mean(axis=0))
+        """Return the squared change of a candidate's force by the noise of its inputs, (runs, N) [N²]."""
+        return self.noise_model.sample_other_runs(candidate, self.problems.full)
 
     def update_residuals(self) -> None:
         """Compute the residuals of all fits again, after the estimate of slow noise has changed."""
@@ -328,15 +269,14 @@ class CandidatePool:
 
     def place_drive_steps(self, candidate: Candidate) -> bool:
         """Move the steps of the drives to the instants that a candidate shows; return True if any moved."""
-        recorded = replace(self.full_problem, pieces=self._recorded_pieces).replace_effects(candidate.fit.effects)
+        recorded = replace(self.problems.full, pieces=self._recorded_pieces).replace_effects(candidate.fit.effects)
         shifts = estimate_step_shifts(recorded, candidate.fit.minimum.unknowns)
         if shifts is None:
             return False
         self.evaluation = replace(self.evaluation, pieces=shift_steps(recorded, shifts).pieces)
-        self.full_problem = replace(self.full_problem, pieces=self.evaluation.select_fitted_pieces())
-        for name in ("decimated_problem", "screening_problem"):
-            self.__dict__.pop(name, None)
-        self._screenings = ScreeningCache(self._resolve_rate(self.settings.screening_rate), self.library)
+        moved = replace(self.problems.full, pieces=self.evaluation.select_fitted_pieces())
+        self.problems = replace(self.problems, full=moved)
+        self._screenings = ScreeningCache(self.problems.screening_rate, self.library)
         self.full_fits.clear()
         self.update_residuals()
         return True
@@ -352,8 +292,8 @@ class CandidatePool:
     def refit_all_samples(self, candidate: Candidate) -> Candidate:
         """Refine a candidate on all samples; it is not kept."""
         for _ in range(self.settings.refit_rounds):
-            simulated = split_by_piece(candidate.residual.simulated_force, self.full_problem.pieces)
-            fit = refit_all_samples(self.full_problem, candidate.fit, simulated, self.settings.refit_iterations)
+            simulated = split_by_piece(candidate.residual.simulated_force, self.problems.full.pieces)
+            fit = refit_all_samples(self.problems.full, candidate.fit, simulated, self.settings.refit_iterations)
             candidate = self.evaluate(fit)
             if abs(candidate.train_rmse - fit.rmse) < self.settings.refit_tolerance * self.floor:
                 break
@@ -361,7 +301,7 @@ class CandidatePool:
 
     def _find_mains_frequency(self, parent: Candidate) -> float:
         """Find the mains frequency [Hz] in the residual of the longest stretch, which resolves it best."""
-        pieces = self.full_problem.pieces
+        pieces = self.problems.full.pieces
         errors = split_by_piece(np.where(parent.residual.valid, parent.residual.values, 0.0), pieces)
         longest = max(range(len(pieces)), key=lambda i: len(errors[i]))
         return find_mains_frequency(errors[longest], pieces[longest].excitation.rate)

@@ -16,10 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.gap.data import Cycles, Residual
+from identification.gap.data import Cycles, Residual, bound_evidence, compute_evidence
 from identification.gap.fits import Candidate
 from identification.gap.noise import NoiseModel
-from identification.gap.selection.block_evidence import bound_evidence, compute_evidence
 from identification.noise import WhiteningFilter
 
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from identification.fitting import EffectModel
 from identification.gap.fits import Candidate, FitOptions, remove_effect_unknowns
-from identification.gap.selection.candidate_pool import QUICK_FIT, SEARCH_TOLERANCE, CandidatePool
+from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.screening import ScreeningResult
+from identification.gap.selection.search_settings import QUICK_FIT, SEARCH_TOLERANCE
 
 _STAGED_FIT = FitOptions(
     decimation=1,
@@ -35,8 +36,8 @@ def fit_extension(
     Without the effect, the law's coordinates may have moved to values that hide it. So the fit also starts at the
     coordinates of the regression.
     """
-    first, start = pool.decimated_problem.layout.effects.start, parent.fit.problem.layout.per_log.start
-    from_regression = np.concatenate([pool.regression_start[:first], gain.unknowns[first:]])
+    first, start = pool.problems.decimated.layout.effects.start, parent.fit.problem.layout.per_log.start
+    from_regression = np.concatenate([pool.problems.regression_start[:first], gain.unknowns[first:]])
     further = [from_regression.copy() for _ in values]
     for unknowns, tried in zip(further, values, strict=True):
         unknowns[start : start + len(tried)] = gain.effect_model.to_search(tried)

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from identification.gap.selection.block_evidence import compute_evidence, count_independent_samples
+from identification.gap.data import compute_evidence, count_independent_samples
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.neighbours import find_subset, fit_extension, fit_without_effect
 from identification.gap.selection.posterior import (
@@ -75,14 +75,14 @@ def compute_partial_posterior(pool: CandidatePool) -> Posterior:
     """Compute the probabilities of the fitted sets from block evidence on the held-out strokes."""
     held_out = {n: pool.comparison.select_held_out(c.residual) for n, c in pool.candidates.items()}
     before = held_out[frozenset()]
-    samples = count_independent_samples(before, pool.block_length)
+    samples = count_independent_samples(before, pool.problems.block_length)
     names = list(held_out)
     weights = {s.names: s.weight for s in pool.collect_evidence()}
     scores = np.array(
         [
             compute_log_prior(n)
             + math.log(weights[n])
-            + compute_evidence(before, after, pool.block_length, samples)
+            + compute_evidence(before, after, pool.problems.block_length, samples)
             for n, after in held_out.items()
         ]
     )

@@ -39,7 +39,7 @@ def search_forward(pool: CandidatePool) -> None:
     baseline = pool.fit_law()
     if pool.place_drive_steps(baseline):
         baseline = pool.fit((), [baseline.fit.minimum.unknowns])
-    pool.noise_model.update(baseline, pool.full_problem, pool.evaluation)
+    pool.noise_model.update(baseline, pool.problems.full, pool.evaluation)
     pool.noise_model.narrow_floor(baseline, pool.evaluation)
     if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
         return
@@ -80,7 +80,7 @@ def _search_best_sets(pool: CandidatePool, size: int) -> None:
 
     A single effect is searched in all its forms.
     """
-    scale = pool.full_problem.space.scales.damper_size
+    scale = pool.problems.full.space.scales.damper_size
     for candidate in _sort_sets(pool, size)[: pool.settings.searched_sets]:
         choices: list[tuple[EffectModel, ...]] = [candidate.fit.effects]
         if size == 1:
@@ -99,7 +99,7 @@ def _select_beam(pool: CandidatePool, size: int, sets: list[Candidate], parent: 
         return []
     if pool.place_drive_steps(sets[0]):
         sets = [pool.candidates[c.names] for c in sets]
-    pool.noise_model.update(sets[0], pool.full_problem, pool.evaluation)
+    pool.noise_model.update(sets[0], pool.problems.full, pool.evaluation)
     limit = settings.beam_ratio * max(pool.compute_excess(sets[0]), settings.negligible_excess)
     return [c for c in sets if pool.compute_excess(c) < limit][: settings.beam_widths[size - 1]]
 
@@ -115,7 +115,7 @@ def _is_explained_by_clocks(pool: CandidatePool) -> bool:
     if not pool.clock_deviation:
         return False
     corrected, drift = subtract_clock_drift(
-        pool.baseline, pool.full_problem, pool.evaluation, pool.clock_deviation
+        pool.baseline, pool.problems.full, pool.evaluation, pool.clock_deviation
     )
     if not _is_gap_negligible(pool, corrected):
         return False

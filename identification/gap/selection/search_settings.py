@@ -1,8 +1,27 @@
 """Settings of the search for sets of effects."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from identification.gap.fits import NO_GAP_RATIO
+from identification.fitting import OptimiserSettings
+from identification.gap.fits import NO_GAP_RATIO, FitOptions
+
+SEARCH_TOLERANCE = 1e-4
+"""Part of the excess that a step of a search must be expected to remove, else its descent ends [1]."""
+QUICK_FIT = FitOptions(
+    decimation=1,
+    starts=0,
+    descents=1,
+    iterations=25,
+    law_steps=5,
+    regression_start=False,
+    refit_full=False,
+    tolerance=SEARCH_TOLERANCE,
+)
+"""One descent from the best of the given starts, on decimated data."""
+SET_SEARCH = OptimiserSettings(iterations=40, restarts=1, tolerance=SEARCH_TOLERANCE)
+"""Search from the regression and, if its minimum is not conclusive, from the low-slip start."""
+LAW_SEARCH = replace(SET_SEARCH, restarts=2)
+"""Search of the law alone, on which all sets rest: also from the mixed start."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from tests.support.candidate_pools import make_pool
 @pytest.fixture(scope="module")
 def problem():
     """Recording with an end stop, which the law alone cannot follow: its excess stays large."""
-    return make_pool("end_stop").decimated_problem
+    return make_pool("end_stop").problems.decimated
 
 
 @pytest.fixture(scope="module")

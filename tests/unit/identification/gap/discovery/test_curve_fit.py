@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from identification.fitting import minimise
+from identification.gap.data import compute_evidence
 from identification.gap.discovery import curve_fit
 from identification.gap.discovery.curve_basis import MAX_GROWTH
 from identification.gap.discovery.curve_effects import CurvePlace, list_curve_effects
@@ -23,7 +24,6 @@ from identification.gap.discovery.curve_fit import (
     screen_curves,
 )
 from identification.gap.fits import JointFit, insert_effect_unknowns
-from identification.gap.selection import compute_evidence
 from identification.progress import ignore_progress
 from tests.support.candidate_pools import NOISE
 from tests.support.discoveries import FILM, GAIN, GROWING, LENGTH, SPRING, fitted_with, pool_with
@@ -40,7 +40,7 @@ def screen(*effects):
 def make_curve(place, *variables, effects=(GAIN,)):
     """Return a curve of a recording, with its problem and the unknowns at a curve of zero."""
     pool = pool_with(*effects)
-    problem, unknowns = pool.screening_problem, pool.baseline.fit.minimum.unknowns
+    problem, unknowns = pool.problems.screening, pool.baseline.fit.minimum.unknowns
     curves = list_curve_effects(problem, problem.simulate(unknowns))
     curve = next(c for c in curves if (c.at.place, c.at.variables) == (place, variables))
     joint = problem.replace_effects((_set_prior(curve, 0.1),))
@@ -100,8 +100,8 @@ def test_odds_are_those_on_held_out_strokes(monkeypatch):
     before, after = (
         replace(c.residual, valid=c.residual.valid & held_out) for c in (fitted.parent, fitted.candidate)
     )
-    assert fitted.log_odds == compute_evidence(before, after, pool.block_length)
-    everything = compute_evidence(fitted.parent.residual, fitted.candidate.residual, pool.block_length)
+    assert fitted.log_odds == compute_evidence(before, after, pool.problems.block_length)
+    everything = compute_evidence(fitted.parent.residual, fitted.candidate.residual, pool.problems.block_length)
     assert 5.0 < fitted.log_odds < everything
 
 

@@ -43,8 +43,8 @@ def test_a_gain_is_found_at_its_place_and_nothing_more():
 
 def test_the_reported_set_is_fitted_on_all_samples():
     found, pool = discovered_with(GAIN), pool_with(GAIN)
-    assert found.candidate.fit.problem.samples == pool.full_problem.samples
-    assert found.formula.candidate.fit.problem.samples < pool.full_problem.samples
+    assert found.candidate.fit.problem.samples == pool.problems.full.samples
+    assert found.formula.candidate.fit.problem.samples < pool.problems.full.samples
     assert found.candidate.names == {found.formula.file.name}
 
 

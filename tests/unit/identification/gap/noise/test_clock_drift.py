@@ -38,7 +38,7 @@ def subtract_drift(recording):
     """Excess [N²] of the law before and after the correction, and the drift [s]."""
     pool = make_candidate_pool(prepare_recordings([recording]))
     baseline = pool.fit_law()
-    corrected, drift = subtract_clock_drift(baseline, pool.full_problem, pool.evaluation, CLOCK_ERROR)
+    corrected, drift = subtract_clock_drift(baseline, pool.problems.full, pool.evaluation, CLOCK_ERROR)
     return baseline.train_rmse**2 - NOISE**2, corrected.train_rmse**2 - NOISE**2, drift
 
 

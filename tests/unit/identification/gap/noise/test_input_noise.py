@@ -14,7 +14,7 @@ from tests.support.candidate_pools import NOISE, make_pool
 def problem_and_stretch():
     pool = make_pool()
     (stretch,) = pool.noise_model.stretches
-    return pool.full_problem, stretch, pool.evaluation.fitted_samples
+    return pool.problems.full, stretch, pool.evaluation.fitted_samples
 
 
 def propagate(problem, stretch, draws):

@@ -29,7 +29,7 @@ def make_model(pool, *names):
     """A noise model after updates with some candidates."""
     model = NoiseModel(pool.noise_model.estimate, pool.noise_model.stretches)
     for name in names:
-        model.update(pool.candidates[name], pool.full_problem, pool.evaluation)
+        model.update(pool.candidates[name], pool.problems.full, pool.evaluation)
     return model
 
 
@@ -51,13 +51,13 @@ def test_a_candidate_at_the_floor_changes_nothing(pool):
     candidate = pool.candidates[BACKLASH]
     at_floor = replace(candidate, train_rmse=0.5 * NOISE, held_out_rmse=0.5 * NOISE)
     model = make_model(pool)
-    model.update(at_floor, pool.full_problem, pool.evaluation)
+    model.update(at_floor, pool.problems.full, pool.evaluation)
     assert model.input_noise is None
 
 
 def test_motions_are_drawn_for_the_first_candidate_and_reused(pool):
     model = make_model(pool, frozenset())
-    runs = model.sample_other_runs(pool.candidates[BACKLASH], pool.full_problem)
+    runs = model.sample_other_runs(pool.candidates[BACKLASH], pool.problems.full)
     assert runs.shape == (8, len(pool.evaluation.force))
     first_two = runs[:2][:, pool.evaluation.fitted_samples]
     updated = make_model(pool, frozenset(), BACKLASH).input_noise

@@ -12,6 +12,8 @@ from tests.support.candidate_pools import NOISE, RATE, fit_baseline
 
 BOUND = 0.7 * NOISE
 """Noise at high frequencies, where the noise is slow."""
+RUNS = 8
+"""Runs of the noise of the displacement."""
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,7 @@ def make_candidate(pool, values, *names):
 
 def settle(pool, *candidates, input_squares=0.0, **changes):
     """Return the noise model after candidates with unknown floor, or with a changed estimate."""
-    propagated = np.broadcast_to(input_squares, len(pool.evaluation.force))
+    propagated = np.broadcast_to(input_squares, (RUNS, len(pool.evaluation.force)))
     estimate = replace(pool.noise_model.estimate, **{
         "noise": BOUND, "high_frequency": BOUND, "cycle_to_cycle": None, "deviation": None, "scales": (),
         **changes,
@@ -51,7 +53,7 @@ def settle(pool, *candidates, input_squares=0.0, **changes):
         model,
         candidates,
         regression,
-        pool.block_length,
+        pool.problems.block_length,
         lambda fit: find_fitted(candidates, fit),
         lambda candidate: propagated,
     )
@@ -117,7 +119,24 @@ def test_bursts_by_the_noise_of_the_displacement_leave_the_rest_as_the_floor(poo
     bursts = np.where(place % 997 < 40, 3.0, 0.0) * NOISE
     residual = draw_noise(pool) + bursts * np.random.default_rng(2).standard_normal(len(place))
     assert not settle(pool, make_candidate(pool, residual)).estimate.is_known
-    assert settle(pool, make_candidate(pool, residual), input_squares=bursts**2).estimate.is_known
+    runs = bursts * np.random.default_rng(3).standard_normal((RUNS, len(place)))
+    assert settle(pool, make_candidate(pool, residual), input_squares=runs**2).estimate.is_known
+
+
+def draw_bursts(pool, random, length):
+    """Bursts of a length [samples], whose size differs from one to the next."""
+    place = np.arange(len(pool.evaluation.force))
+    sizes = random.standard_normal(len(place) // 997 + 1)
+    return np.where(place % 997 < length, 6.0 * NOISE, 0.0) * sizes[place // 997]
+
+
+def test_bursts_of_the_displacement_differ_in_size_from_run_to_run(pool):
+    residual = draw_noise(pool) + draw_bursts(pool, np.random.default_rng(4), 40)
+    runs = np.stack([draw_bursts(pool, np.random.default_rng(k), 40) for k in range(5, 5 + RUNS)])
+    candidate = make_candidate(pool, residual)
+    # Bursts of the same mean square in all runs would scatter less than these.
+    assert not settle(pool, candidate, input_squares=(runs**2).mean(axis=0)).estimate.is_known
+    assert settle(pool, candidate, input_squares=runs**2).estimate.is_known
 
 
 def test_a_line_of_one_size_is_not_the_floor(pool):

@@ -45,13 +45,13 @@ def with_curve():
 def simulate_definition(found, pool, definition):
     """Return the force of the chosen law with a definition, and that of the chosen set."""
     fit = found.candidate.fit
-    problem = pool.full_problem.replace_effects(fit.effects)
+    problem = pool.problems.full.replace_effects(fit.effects)
     columns = list(problem.iterate_effects())[-1][1]
     model = EffectModel(
         make_effect(EffectFile.model_validate_json(definition.model_dump_json(by_alias=True))), "defined"
     )
     assert len(fit.effects) == 1
-    other = pool.full_problem.replace_effects((model,))
+    other = pool.problems.full.replace_effects((model,))
     law = np.delete(fit.minimum.unknowns, columns)
     values = model.to_search(tuple(p.value for p in definition.parameters.values()))
     unknowns = np.insert(law, columns.start, values)
@@ -171,7 +171,7 @@ def test_the_twin_has_the_definition_with_the_law_of_its_fit(with_formula, tmp_p
     path = tmp_path / "twin.json"
     path.write_text(twin.model_dump_json(by_alias=True), encoding="utf-8")
     model = read_damper_model(path)
-    pieces = pool_with(GAIN).full_problem.pieces
+    pieces = pool_with(GAIN).problems.full.pieces
     errors = np.concatenate([model.simulate_force(p) - p.force for p in pieces])
     assert np.sqrt(np.mean(errors**2)) == pytest.approx(NOISE, rel=0.05)
 

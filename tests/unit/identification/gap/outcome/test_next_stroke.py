@@ -163,7 +163,7 @@ def test_the_limits_are_those_of_the_recording(recorded, frequency):
             pieces=(make_piece(-0.02, 0.01, 9.0), make_piece(-0.01, 0.03, 0.2)),
             cycles=SimpleNamespace(conditions=conditions),
         ),
-        full_problem=SimpleNamespace(space=SimpleNamespace(lowest_drive=0.1, highest_drive=0.6)),
+        problems=SimpleNamespace(full=SimpleNamespace(space=SimpleNamespace(lowest_drive=0.1, highest_drive=0.6))),
     )
     limits = _find_limits(pool)
     assert (limits.amplitude, limits.centre) == pytest.approx((0.025, 0.005))

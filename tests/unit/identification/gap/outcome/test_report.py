@@ -57,7 +57,7 @@ def make_builder(
         floor=FLOOR,
         no_gap_limits=(1.008 * FLOOR,) * 2,
         noise_model=noise_model,
-        full_problem=SimpleNamespace(),
+        problems=SimpleNamespace(full=SimpleNamespace()),
         baseline_excess=8.0,
         compute_excess=lambda candidate: candidate.compute_excess(FLOOR),
     )

@@ -88,7 +88,7 @@ def test_the_error_on_held_out_strokes_is_smaller_with_the_residual():
     pool.fit_law()
     residual = learn_twin_residual(pool.evaluation, pool.baseline, 1)
     physics, both = (
-        measure_held_out_strokes(prepared.dataset, pool.full_problem, pool.baseline, model)
+        measure_held_out_strokes(prepared.dataset, pool.problems.full, pool.baseline, model)
         for model in (None, LearnedResidual(residual))
     )
     assert both.rmse_n < physics.rmse_n

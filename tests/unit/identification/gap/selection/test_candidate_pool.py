@@ -67,8 +67,8 @@ def test_a_full_fit_uses_all_samples_and_happens_once(gas):
     search = pool.candidates[GAS]
     pool.fit_fully(GAS)
     full = pool.candidates[GAS]
-    assert search.fit.problem.samples < 0.3 * pool.full_problem.samples
-    assert full.fit.problem.samples == pool.full_problem.samples
+    assert search.fit.problem.samples < 0.3 * pool.problems.full.samples
+    assert full.fit.problem.samples == pool.problems.full.samples
     assert full.train_rmse <= search.train_rmse
     assert full.fit.rmse == pytest.approx(full.train_rmse, abs=2e-3 * pool.floor)
     assert pool.full_fits == {GAS}
@@ -96,7 +96,7 @@ def test_a_spent_budget_leaves_the_descent_as_it_is(gas):
 
 def test_the_data_are_decimated_to_the_screening_rate_at_most():
     rate = {
-        length: make_pool(long_recording=length).decimated_problem.pieces[0].excitation.rate
+        length: make_pool(long_recording=length).problems.decimated.pieces[0].excitation.rate
         for length in (10_000, 3000, 100)
     }
     assert rate == {10_000: 250.0, 3000: 250.0, 100: 125.0}

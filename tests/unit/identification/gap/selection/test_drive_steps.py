@@ -25,9 +25,9 @@ def pool(recording):
 
 def test_moved_steps_leave_the_noise(pool):
     pool.fit_fully(frozenset())
-    before, steps = pool.baseline, pool.full_problem.pieces[0].excitation.drive.copy()
+    before, steps = pool.baseline, pool.problems.full.pieces[0].excitation.drive.copy()
     assert pool.place_drive_steps(before)
-    moved = pool.full_problem.pieces[0].excitation.drive
+    moved = pool.problems.full.pieces[0].excitation.drive
     assert np.count_nonzero(moved != steps) == len(ADVANCES)
     assert np.array_equal(moved, pool.evaluation.pieces[0].excitation.drive)
     after = pool.fit((), [before.fit.minimum.unknowns])
@@ -35,14 +35,14 @@ def test_moved_steps_leave_the_noise(pool):
     assert after.train_rmse < 1.03 * NOISE
     # Seen from the recorded drive again, the estimate stays where it is.
     assert pool.place_drive_steps(after)
-    assert pool.full_problem.pieces[0].excitation.drive == pytest.approx(moved, abs=0.02)
+    assert pool.problems.full.pieces[0].excitation.drive == pytest.approx(moved, abs=0.02)
 
 
 def test_steps_at_the_samples_stay():
     pool = fit_baseline()
-    problem, candidate = pool.full_problem, pool.baseline
+    problem, candidate = pool.problems.full, pool.baseline
     assert not pool.place_drive_steps(candidate)
-    assert pool.full_problem is problem
+    assert pool.problems.full is problem
     assert pool.baseline is candidate
 
 

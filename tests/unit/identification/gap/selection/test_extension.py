@@ -3,7 +3,7 @@
 import pytest
 
 from identification.damper.effects import EFFECTS
-from identification.gap.selection.block_evidence import compute_evidence
+from identification.gap.data import compute_evidence
 from identification.gap.selection.extension import try_extension
 from identification.gap.selection.posterior import compute_complexity_penalty
 from identification.simulate import ActiveEffect
@@ -54,7 +54,9 @@ def test_confusable_effects_are_not_fitted(pool):
 def test_a_confusable_effect_that_the_search_has_fitted_pays_a_penalty(pool):
     pool = pool.copy(extension_effects=0, min_closed_share=-1.0)
     assert not try_extension(pool, GAS)
-    evidence = compute_evidence(pool.candidates[GAS].residual, pool.candidates[STOP].residual, pool.block_length)
+    evidence = compute_evidence(
+        pool.candidates[GAS].residual, pool.candidates[STOP].residual, pool.problems.block_length
+    )
     assert pool.block_evidence[STOP].log_odds == pytest.approx(evidence - 8.0)
     assert set(pool.block_evidence) == {STOP}
 

@@ -22,8 +22,8 @@ def test_an_extension_starts_at_its_screening_and_at_the_regression(pool):
     fit_extension(pool, pool.baseline, gain)
     at_screening, at_regression = pool.starts[0]
     assert at_screening is gain.unknowns
-    first = pool.decimated_problem.layout.effects.start
-    assert np.array_equal(at_regression[:first], pool.regression_start[:first])
+    first = pool.problems.decimated.layout.effects.start
+    assert np.array_equal(at_regression[:first], pool.problems.regression_start[:first])
     assert np.array_equal(at_regression[first:], gain.unknowns[first:])
 
 

@@ -8,7 +8,6 @@ import pytest
 from identification.fitting import EffectModel
 from identification.gap.fits import fit_jointly
 from identification.gap.noise import NoiseModel
-from identification.gap.selection.candidate_pool import QUICK_FIT
 from identification.gap.selection.neighbours import fit_extension
 from identification.gap.selection.plan import (
     _refit_law,
@@ -16,6 +15,7 @@ from identification.gap.selection.plan import (
     compute_final_posterior,
     search_forward,
 )
+from identification.gap.selection.search_settings import QUICK_FIT
 from tests.support.candidate_pools import make_pool
 
 BOTH = frozenset({"gas_spring", "moving_mass"})
@@ -80,9 +80,11 @@ def test_each_effect_of_the_most_probable_set_has_evidence_on_held_out_samples(s
 def test_a_law_in_a_wrong_minimum_is_fitted_again_from_the_law_of_the_best_set():
     pool = make_pool()
     right = pool.fit_law()
-    start = pool.regression_start.copy()
-    start[pool.decimated_problem.layout.coordinates] += 1.0
-    wrong = pool.evaluate(fit_jointly(pool.decimated_problem, (), None, replace(QUICK_FIT, iterations=0), [start]))
+    start = pool.problems.regression_start.copy()
+    start[pool.problems.decimated.layout.coordinates] += 1.0
+    wrong = pool.evaluate(
+        fit_jointly(pool.problems.decimated, (), None, replace(QUICK_FIT, iterations=0), [start])
+    )
     assert wrong.held_out_rmse > 2.0 * right.held_out_rmse
     pool.candidates[frozenset()] = wrong
     pool.fit((EffectModel.from_name("coil_crosstalk"),), [np.append(right.fit.minimum.unknowns, 0.0)])

@@ -8,6 +8,7 @@ import pytest
 from identification.damper import LIBRARY_SIZE
 from identification.gap.fits.candidate import Candidate
 from identification.gap.selection.candidate_pool import CandidatePool
+from identification.gap.selection.search_problems import SearchProblems
 from identification.noise import NoiseFloorEstimate
 
 FLOOR = 2.0
@@ -23,7 +24,7 @@ def make_pool(problem=None, evaluation=None, rate=10.0, **settings):
     problem = SimpleNamespace() if problem is None else problem
     problem.space = SimpleNamespace(scales=SimpleNamespace(rate=rate, damper_size=LIBRARY_SIZE))
     noise_model = SimpleNamespace(floor=FLOOR, estimate=NoiseFloorEstimate(FLOOR, None, FLOOR, ""))
-    pool = CandidatePool(problem, evaluation, noise_model, settings=SimpleNamespace(**settings))
+    pool = CandidatePool(SearchProblems(problem, SimpleNamespace(**settings)), evaluation, noise_model)
     pool.candidates[frozenset()] = make_candidate((), 6.0, 6.0)
     return pool
 
@@ -94,7 +95,7 @@ class Problem(SimpleNamespace):
 def test_data_are_decimated_by_rate_and_length(rates, length, motion, factor):
     pieces = [SimpleNamespace(excitation=SimpleNamespace(rate=r), force=np.zeros(length)) for r in rates]
     pool = make_pool(Problem(pieces=pieces), rate=motion, decimation_rate=250.0, long_recording=10_000)
-    assert pool.decimated_problem == factor
+    assert pool.problems.decimated == factor
 
 
 @pytest.mark.parametrize(("held_out", "chance"), [([1] * 8 + [0] * 2, 1.0), ([0] * 10, 2.0 * np.sqrt(2.0))])

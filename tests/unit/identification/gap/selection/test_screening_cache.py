@@ -26,7 +26,7 @@ def find_gains(pool):
     cache = ScreeningCache(125.0, EFFECTS)
 
     def find(names=frozenset(), without=OTHERS, excess=0.5):
-        return cache.find_gains(pool.candidates[names], without, excess, pool.decimated_problem, lambda _: 50.0)
+        return cache.find_gains(pool.candidates[names], without, excess, pool.problems.decimated, lambda _: 50.0)
 
     return find
 
@@ -62,7 +62,7 @@ def test_a_set_whose_effects_are_in_another_order_is_screened_again(pool):
     other = replace(known, fit=JointFit(reversed_problem, known.fit.minimum))
 
     def find(candidate):
-        return cache.find_gains(candidate, OTHERS | {"gas_spring"}, 0.5, pool.decimated_problem, lambda _: 50.0)
+        return cache.find_gains(candidate, OTHERS | {"gas_spring"}, 0.5, pool.problems.decimated, lambda _: 50.0)
 
     assert find(known)[0] is find(known)[0]
     assert find(other)[0] is not find(known)[0]

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from identification.gap.data.residual_map import Residual
-from identification.gap.selection.block_evidence import (
+from identification.gap.data.block_evidence import (
     bound_evidence,
     compute_evidence,
     count_independent_samples,
 )
+from identification.gap.data.residual_map import Residual
 
 RATE, SECONDS, FLOOR, BLOCK = 500.0, 40.0, 2.0, 0.4
 TIME = np.arange(round(RATE * SECONDS)) / RATE

@@ -9,7 +9,9 @@ reduces it in one block and increases it in the next.
 
 import numpy as np
 
-from identification.gap.data import Residual, compute_block_squares, compute_correlation_length
+from identification.gap.data.block_squares import compute_block_squares
+from identification.gap.data.correlation import compute_correlation_length
+from identification.gap.data.residual_map import Residual
 
 _EFFECTIVE_SAMPLES = 1.6
 """Independent samples in a block. Origin: chosen between the evidence of true effects and of confusable ones."""

@@ -1,6 +1,12 @@
 """Options for all tests."""
 
+import os
+
 import pytest
+
+# Two test processes share two cores. A matrix library that starts a thread for each core makes both of them wait.
+for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_variable, "1")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

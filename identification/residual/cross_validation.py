@@ -5,7 +5,7 @@ measures what a residual is needed for: strokes that were not recorded.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -51,12 +51,19 @@ class CrossValidation:
     """(N,) residual [N]."""
     condition: Indices
     """(N,) number of each sample's condition."""
-    support: Indices
-    """(M,) samples that are support points."""
+    points: Array
+    """(M, D) support points."""
+
+    def thin(self, samples: int) -> "CrossValidation":
+        """Return about as many samples as stated, taken evenly, with the same support points."""
+        every = slice(None, None, max(1, round(len(self.residual) / samples)))
+        return replace(
+            self, states=self.states[every], residual=self.residual[every], condition=self.condition[every]
+        )
 
     def choose(self, rates: Array) -> Choice:
         """Return the best settings near some reciprocal length scales (D,), one variable after the other."""
-        best = self._evaluate(rates)
+        best = self.evaluate(rates)
         for _ in range(_ROUNDS):
             before = best
             for column in range(self.states.shape[1]):
@@ -64,6 +71,15 @@ class CrossValidation:
             if best is before:
                 break
         return best
+
+    def evaluate(self, rates: Array) -> Choice:
+        """Return the settings with the best ridge for some reciprocal length scales (D,)."""
+        basis = self._make_basis(rates)
+        parts = [self.condition == c for c in np.unique(self.condition)]
+        moments = [basis.compute_moments(self.states[part] * rates, self.residual[part]) for part in parts]
+        errors = _compute_left_out_errors(moments, [r * self._samples_per_point for r in _RIDGES])
+        best = int(np.argmin(errors))
+        return Choice(rates, _RIDGES[best] * self._samples_per_point, float(errors[best]))
 
     def fit(self, choice: Choice) -> tuple[Basis, Posterior]:
         """Return basis and weights from all samples."""
@@ -100,25 +116,16 @@ class CrossValidation:
             rates = best.rates.copy()
             rates[column] = rates[column] * factor if rates[column] else (_USUAL_RATE if factor > 1.0 else 0.0)
             if rates[column] != best.rates[column] and rates.any():
-                other = self._evaluate(rates)
+                other = self.evaluate(rates)
                 best = other if other.error < best.error - _MIN_GAIN else best
         return best
 
     def _make_basis(self, rates: Array) -> Basis:
-        return Basis.make(self.states[self.support] * rates)
-
-    def _evaluate(self, rates: Array) -> Choice:
-        """Return the settings with the best ridge for some reciprocal length scales (D,)."""
-        values = self._make_basis(rates).evaluate(self.states * rates)
-        parts = [self.condition == c for c in np.unique(self.condition)]
-        moments = [Moments.make(values[part], self.residual[part]) for part in parts]
-        errors = _compute_left_out_errors(moments, [r * self._samples_per_point for r in _RIDGES])
-        best = int(np.argmin(errors))
-        return Choice(rates, _RIDGES[best] * self._samples_per_point, float(errors[best]))
+        return Basis.make(self.points * rates)
 
     @property
     def _samples_per_point(self) -> float:
-        return len(self.residual) / len(self.support)
+        return len(self.residual) / len(self.points)
 
 
 def _compute_left_out_errors(moments: Sequence[Moments], ridges: Sequence[float]) -> Array:

@@ -37,6 +37,16 @@ class Basis:
         covariance = _compute_covariance(self.points, states)
         return np.asarray(solve_triangular(self.factor, covariance, lower=True).T)
 
+    def compute_moments(self, states: Array, residual: Array) -> "Moments":
+        """Return the sums over scaled states (N, D) and their residual (N,) [N], without a basis for each state."""
+        sums = Moments.make(_compute_covariance(states, self.points), residual)
+        half = solve_triangular(self.factor, sums.gram, lower=True)
+        return Moments(
+            np.asarray(solve_triangular(self.factor, half.T, lower=True)),
+            np.asarray(solve_triangular(self.factor, sums.moment, lower=True)),
+            sums.square,
+        )
+
 
 class Moments(NamedTuple):
     """Sums over the samples of one condition, from which weights and errors follow."""

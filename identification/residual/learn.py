@@ -15,6 +15,8 @@ from identification.simulate import Excitation
 
 _MAX_SAMPLES = 24_000
 """Approximate limit on the number of samples; more are thinned evenly."""
+_SEARCH_SAMPLES = 6_000
+"""Approximate number of samples from which variables and length scales are chosen; neighbours hardly differ."""
 _SUPPORT_POINTS = 256
 """Number of support points."""
 _USUAL_RATE = 0.5
@@ -53,9 +55,9 @@ def learn_residual(stretches: Sequence[ResidualSamples], units: StateUnits, seed
     conditions = np.unique(condition)
     if len(conditions) < _MIN_CONDITIONS:
         return None
-    validation = CrossValidation(states, residual, condition, _draw_support(condition, seed))
+    validation = CrossValidation(states, residual, condition, states[_draw_support(condition, seed)])
     start = np.where(np.arange(len(VARIABLES)) < _FIRST_VARIABLES, _USUAL_RATE, 0.0)
-    choice = validation.choose(start)
+    choice = validation.evaluate(validation.thin(_SEARCH_SAMPLES).choose(start).rates)
     if choice.error > _MAX_ERROR:
         return None
     return _make_document(validation, choice, units, len(conditions))

@@ -22,7 +22,7 @@ def make_validation(compute, noise=0.1, seed=1, columns=3):
     states = random.uniform(-2.0, 2.0, (1000, columns))
     residual = compute(states) + noise * random.standard_normal(len(states))
     condition = np.repeat(np.arange(CONDITIONS), 200)
-    return CrossValidation(states, residual, condition, np.arange(0, 1000, 20))
+    return CrossValidation(states, residual, condition, states[::20])
 
 
 def test_a_variable_that_matters_is_kept_and_one_that_does_not_is_smooth_or_left_out():
@@ -56,6 +56,16 @@ def test_a_variable_without_which_the_search_starts_can_enter():
     assert validation.choose(np.array([0.5, 0.0, 0.0])).rates[2] > 0.0
 
 
+def test_a_choice_from_fewer_samples_is_that_from_all():
+    validation = make_validation(lambda s: 3.0 * np.sin(2.0 * s[:, 0]))
+    thinned = validation.thin(500)
+    assert len(thinned.residual) == 500
+    assert np.array_equal(thinned.points, validation.points)
+    rates = thinned.choose(np.array([0.5, 0.5, 0.0])).rates
+    assert validation.evaluate(rates).error == pytest.approx(thinned.evaluate(rates).error, abs=0.002)
+    assert len(validation.thin(2000).residual) == 1000
+
+
 def test_noise_is_not_predicted():
     assert make_validation(lambda s: 0.0 * s[:, 0], 1.0).choose(np.array([0.5, 0.5, 0.5])).error > 0.98
 
@@ -68,7 +78,7 @@ def test_a_force_that_only_one_condition_has_does_not_count_as_predicted():
 def test_the_error_is_that_of_fits_without_each_condition():
     validation = make_validation(lambda s: s[:, 0] * s[:, 1])
     choice = validation.choose(np.array([0.5, 0.5, 0.0]))
-    basis = Basis.make(validation.states[validation.support] * choice.rates)
+    basis = Basis.make(validation.points * choice.rates)
     values = basis.evaluate(validation.states * choice.rates)
     squares = 0.0
     for number in range(CONDITIONS):

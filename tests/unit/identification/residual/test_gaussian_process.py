@@ -41,6 +41,14 @@ def test_far_from_all_samples_it_is_zero_with_the_variance_of_the_prior(points):
     assert posterior.compute_variance(basis.evaluate(points)).max() < 0.1
 
 
+def test_sums_without_a_basis_for_each_state_are_the_same(points):
+    basis, values = Basis.make(points[:20]), np.cos(points[:, 0])
+    expected, sums = Moments.make(basis.evaluate(points), values), basis.compute_moments(points, values)
+    assert sums.gram == pytest.approx(expected.gram, rel=1e-9, abs=1e-9)
+    assert sums.moment == pytest.approx(expected.moment, rel=1e-9, abs=1e-9)
+    assert sums.square == expected.square
+
+
 def test_sums_of_conditions_add_and_are_taken_away(points):
     basis = Basis.make(points[:20]).evaluate(points)
     values = np.cos(points[:, 0])

@@ -123,20 +123,18 @@ def test_bursts_by_the_noise_of_the_displacement_leave_the_rest_as_the_floor(poo
     assert settle(pool, make_candidate(pool, residual), input_squares=runs**2).estimate.is_known
 
 
-def draw_bursts(pool, random, length):
-    """Bursts of a length [samples], whose size differs from one to the next."""
+def draw_bursts(pool, seed):
+    """Bursts in every block, whose size differs from one to the next."""
     place = np.arange(len(pool.evaluation.force))
-    sizes = random.standard_normal(len(place) // 997 + 1)
-    return np.where(place % 997 < length, 6.0 * NOISE, 0.0) * sizes[place // 997]
+    sizes = np.random.default_rng(seed).standard_normal(len(place) // 197 + 1)
+    return np.where(place % 197 < 20, 6.0 * NOISE, 0.0) * sizes[place // 197]
 
 
 def test_bursts_of_the_displacement_differ_in_size_from_run_to_run(pool):
-    residual = draw_noise(pool) + draw_bursts(pool, np.random.default_rng(4), 40)
-    runs = np.stack([draw_bursts(pool, np.random.default_rng(k), 40) for k in range(5, 5 + RUNS)])
-    candidate = make_candidate(pool, residual)
-    # Bursts of the same mean square in all runs would scatter less than these.
-    assert not settle(pool, candidate, input_squares=(runs**2).mean(axis=0)).estimate.is_known
-    assert settle(pool, candidate, input_squares=runs**2).estimate.is_known
+    candidate = make_candidate(pool, draw_noise(pool) + draw_bursts(pool, 4))
+    squares = np.stack([draw_bursts(pool, 5 + k) ** 2 for k in range(RUNS)])
+    assert not settle(pool, candidate, input_squares=squares.mean(axis=0)).estimate.is_known
+    assert settle(pool, candidate, input_squares=squares).estimate.is_known
 
 
 def test_a_line_of_one_size_is_not_the_floor(pool):

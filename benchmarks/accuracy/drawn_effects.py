@@ -264,10 +264,20 @@ def format_row(o: Outcome) -> str:
     )
 
 
-def read_options(description: str | None, count: int) -> tuple[argparse.Namespace, list[tuple[int, str]]]:
-    """Return the options of the command line, and the seed and kind of each case; ``count`` cases by default."""
+def read_options(
+    description: str | None, count: int, methods: Sequence[str] = ()
+) -> tuple[argparse.Namespace, list[tuple[int, str]]]:
+    """Return the options of the command line, and the seed and kind of each case.
+
+    Args:
+        description: text of the help.
+        count: usual number of cases.
+        methods: usual methods, as often as they are drawn; no option for them if empty.
+    """
     parser = make_parser(description, "recordings", count)
     parser.add_argument("--kinds", default=",".join(KINDS), help="kinds of cases, in turn")
+    if methods:
+        parser.add_argument("--methods", default=",".join(methods), help="methods to draw from, equally often")
     options = parser.parse_args()
     return options, list(zip(list_seeds(options), cycle(options.kinds.split(",")), strict=False))
 

@@ -9,11 +9,13 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 METHODS = ("rich", "rich", "rich", "campaign", "poor", "mixed", "random")
-"""Kinds of methods, as often as they are drawn."""
+"""Kinds of methods, as often as they are drawn; ``sweep`` is drawn only where it is asked for."""
 _STEP = 5e-5
 """Longest step of the integration [s]."""
 _RANDOM_WAVES = 12
 """Waves of a random motion."""
+_SWEEP = (0.25, 4.0)
+"""First and last frequency of a sweep, over that of the sines [1]."""
 _LONGEST = 140.0
 """Longest duration of the segments, without rounding [s]; a slower damper moves faster instead."""
 
@@ -64,7 +66,7 @@ def draw_strokes(
 
     Args:
         random: source of random numbers.
-        kind: one of `METHODS`.
+        kind: one of `METHODS`, or ``sweep``.
         amplitude: largest amplitude of a sine [m].
         frequency: its frequency [Hz].
         drive: highest drive [V or A].
@@ -96,6 +98,7 @@ def _draw_segments(
         "poor": ([(amplitude, frequency, u) for u in (levels[0], levels[-1], levels[0], levels[-1])], 8, 0),
         "mixed": ([(amplitude, frequency, levels[1])], 4, 3),
         "random": ([], 0, 4),
+        "sweep": ([], 0, 0),
     }
     sines, cycles, randoms = plans[kind]
     segments: list[_Segment] = []
@@ -104,6 +107,8 @@ def _draw_segments(
         if random.random() < 0.3:
             segments.append(_Segment("rest", 0.0, frequency, u, random.uniform(0.3, 1.2) / frequency))
     segments += [_Segment("random", amplitude, frequency, None, 16.0 / frequency)] * randoms
+    if kind == "sweep":
+        segments += [_Segment("sweep", amplitude, frequency, u, 16.0 / frequency) for u in levels]
     if kind == "rich" and random.random() < 0.4:
         segments.append(_Segment("triangle", amplitude, 0.7 * frequency, levels[1], 4.0 / frequency))
     return segments
@@ -140,6 +145,14 @@ def _make_triangle(random: np.random.Generator, time: Array, frequency: float) -
     return np.asarray(np.sum(waves, axis=0) / np.sum(1.0 / orders**2))
 
 
+def _make_sweep(random: np.random.Generator, time: Array, frequency: float) -> Array:
+    """Return a sine of rising frequency, whose amplitude falls so that the speed does not rise."""
+    low, high = _SWEEP
+    rate = frequency * low * (high / low) ** (time / time[-1])
+    phase = 2.0 * np.pi * np.cumsum(rate) * time[1]
+    return np.asarray(np.sin(phase) * np.minimum(frequency / rate, 1.0))
+
+
 def _make_random(random: np.random.Generator, time: Array, frequency: float) -> Array:
     rates = frequency * np.exp(random.uniform(np.log(0.4), np.log(3.0), _RANDOM_WAVES))
     phases = random.uniform(0.0, 2.0 * np.pi, _RANDOM_WAVES)
@@ -151,6 +164,7 @@ def _make_random(random: np.random.Generator, time: Array, frequency: float) -> 
 _SHAPES: dict[str, Callable[[np.random.Generator, Array, float], Array]] = {
     "sine": _make_sine,
     "rest": _make_rest,
+    "sweep": _make_sweep,
     "triangle": _make_triangle,
     "random": _make_random,
 }

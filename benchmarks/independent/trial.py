@@ -1,9 +1,10 @@
 """Diagnoses of recordings from an independent simulator: its own integration, effects and methods.
 
-    python -m benchmarks.independent.trial [--recordings 30] [--seed 1] [--kinds one,none] [--out PAGE.md]
+    python -m benchmarks.independent.trial [--recordings 30] [--seed 1] [--kinds one,none]
+        [--methods sweep] [--out PAGE.md]
 
-Each recording has a random damper of 4 N to 90 kN, a random method (rich, poor, of a campaign, random strokes) and
-noise of a random spectrum. It has no effect, one, two, or a cause outside the library. It is written as CSV,
+Each recording has a random damper of 4 N to 90 kN, a random method (rich, poor, of a campaign, random strokes; sweeps
+only where they are asked for) and noise of a random spectrum. It has no effect, one, two, or a cause outside the library. It is written as CSV,
 imported by `mrbench import`, and diagnosed from the log alone. An effect that a refit of the law absorbs cannot be
 named; it counts as wrong all the same.
 """
@@ -67,15 +68,15 @@ class _Drawn(NamedTuple):
     method: str
 
 
-def try_case(job: tuple[int, str], folder: Path) -> Outcome:
+def try_case(job: tuple[int, str], folder: Path, methods: Sequence[str]) -> Outcome:
     """Draw, record, import and diagnose one case of a kind."""
-    return diagnose_case(record_case(*job, folder))
+    return diagnose_case(record_case(*job, folder, methods))
 
 
-def record_case(seed: int, kind: str, folder: Path) -> Case:
+def record_case(seed: int, kind: str, folder: Path, methods: Sequence[str] = METHODS) -> Case:
     """Draw a damper and its cause, record it, and import the recording by a folder."""
     random = np.random.default_rng([seed, 41])
-    drawn, causes = draw_damper(random), _draw_causes(random, kind)
+    drawn, causes = draw_damper(random, methods), _draw_causes(random, kind)
     noise = _draw_noise(random, drawn)
     strengths = [_calibrate(drawn, cause, k, seed, noise.force, random) for k, cause in enumerate(causes.values())]
     log = folder / f"{seed}.mcap"
@@ -99,15 +100,15 @@ def _draw_log(random: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(random.uniform(math.log(low), math.log(high))))
 
 
-def draw_damper(random: np.random.Generator) -> _Drawn:
-    """Draw a damper of any size, with strokes that fit it."""
+def draw_damper(random: np.random.Generator, methods: Sequence[str] = METHODS) -> _Drawn:
+    """Draw a damper of any size, with strokes of one of some methods that fit it."""
     force = _draw_log(random, *_FORCES)
     amplitude = 0.003 * (force / 50.0) ** 0.27 * float(np.exp(0.4 * random.standard_normal()))
     amplitude = min(max(amplitude, 0.0012), 0.12)
     speed = _draw_log(random, 0.03, 0.5) * (amplitude / 0.01) ** 0.4
     frequency = float(np.clip(speed / (2.0 * np.pi * amplitude * 2.5), 0.1, 8.0))
     rate = max(float(random.choice([500.0, 1000.0, 1000.0, 2000.0])), 1000.0 if frequency > 4.0 else 0.0)
-    drive, method = float(random.choice([0.5, 1.0, 2.0, 5.0])), METHODS[random.integers(len(METHODS))]
+    drive, method = float(random.choice([0.5, 1.0, 2.0, 5.0])), methods[int(random.integers(len(methods)))]
     strokes = draw_strokes(random, method, amplitude, frequency, drive, rate)
     rise = _draw_log(random, 25.0, 200.0)
     rig = Rig(_draw_plant(random, force, drive, strokes), rise, rise)
@@ -185,9 +186,10 @@ def _write_log(log: Path, drawn: _Drawn, rig: Rig, noise: _Noise, random: np.ran
 
 def main() -> None:
     """Print every case and the summary; also write them to a page."""
-    options, jobs = read_options(__doc__, 30)
+    options, jobs = read_options(__doc__, 30, METHODS)
     with TemporaryDirectory() as folder, ProcessPoolExecutor(options.jobs) as pool:
-        outcomes = pool.map(partial(try_case, folder=Path(folder)), jobs)
+        run_one = partial(try_case, folder=Path(folder), methods=options.methods.split(","))
+        outcomes = pool.map(run_one, jobs)
         run_trial(COLUMNS, outcomes, format_row, format_summary, options.out)
 
 

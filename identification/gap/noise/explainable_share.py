@@ -18,7 +18,7 @@ import numpy.typing as npt
 from identification.arrays import Array, BoolArray
 from identification.damper.effects import Variable
 from identification.fitting import Piece
-from identification.gap.data import NEAR_FLOOR_RATIO, EvaluationData
+from identification.gap.data import NEAR_FLOOR_RATIO, EvaluationData, Residual
 from identification.gap.fits import Candidate
 from identification.simulate import filter_series
 
@@ -46,6 +46,14 @@ FEATURE_VARIABLES: dict[Variable, tuple[int, ...]] = {
     "time": (10,),
 }
 """Columns of the features that belong to each variable."""
+_NOISE_DRAWS = 8
+"""Draws of the noise of a residual's spectrum."""
+_NOISE_BANDS = 4
+"""Bands of an octave in which its spectrum is smooth."""
+_CHANCE_DEVIATIONS = 2.0
+"""Standard deviations between these draws that count as chance."""
+_MAX_CHANCE = 0.99
+"""Largest part of noise that counts as chance."""
 _REVERSAL_SHARE = 1e-3
 """Distance from the last reversal, over half the stroke, at which its logarithmic feature begins to grow [1]."""
 
@@ -110,6 +118,7 @@ class ResidualRegression:
                 self.evaluation.held_out_samples,
                 self.floor,
                 FEATURE_VARIABLES,
+                simulate_noise(candidate.residual),
             )
         return self._known[candidate.names]
 
@@ -137,8 +146,12 @@ def explain_residual(
     held_out: BoolArray,
     floor: float,
     variables: Mapping[Variable, Sequence[int]] = MappingProxyType({}),
+    noise: Array | None = None,
 ) -> Explained:
     """Estimate the part of the residual's excess variance that the features predict on held-out samples.
+
+    Slow noise hardly changes from fitted samples to the next held-out ones, so a part of it is predicted as well.
+    That part is measured on simulated noise, and does not count.
 
     Args:
         features: standardised features (N, k).
@@ -147,25 +160,67 @@ def explain_residual(
         held_out: mask (N,) of the samples that are predicted.
         floor: noise of the force [N].
         variables: columns of each variable whose loss is estimated.
+        noise: simulated noise (N, K) [N] of the residual's spectrum.
     """
     excess = float(np.mean(residual[held_out] ** 2)) - floor**2
     if excess <= 0.0:
         return Explained(0.0, dict.fromkeys(variables, 0.0))
     compute_basis = _draw_basis(features.shape[1])
     fitted, predicted = _subsample(train), _subsample(held_out)
-    basis, target = compute_basis(features[fitted]), residual[predicted]
-    gram, moment = basis.T @ basis, basis.T @ residual[fitted]
     table = features[predicted]
+    columns = residual[:, None] if noise is None else np.column_stack([residual, noise])
+    basis, target = compute_basis(table), columns[predicted]
+    weights = _fit_weights(compute_basis(features[fitted]), columns[fitted], basis, target)
+    errors, squares = np.mean((target - basis @ weights) ** 2, axis=0), np.mean(target**2, axis=0)
+    chance = _bound_chance(1.0 - errors[1:] / squares[1:])
+    share = (squares[0] - errors[0] - chance * squares[0]) / (1.0 - chance) / excess
 
-    def compute_error(weights: Array, rows: Array) -> float:
-        return float(np.mean((target - compute_basis(rows) @ weights) ** 2))
+    def compute_loss(columns: Sequence[int]) -> float:
+        exchanged = compute_basis(_exchange(table, columns)) @ weights[:, 0]
+        return float(np.mean((target[:, 0] - exchanged) ** 2) - errors[0]) / excess
 
+    return Explained(float(np.clip(share, 0.0, 1.0)), {v: compute_loss(c) for v, c in variables.items()})
+
+
+def _fit_weights(fitted: Array, values: Array, predicted: Array, target: Array) -> Array:
+    """Return the weights (B, K) [N] of ridge regressions, each with the best of the penalties.
+
+    Args:
+        fitted: basis (F, B) on the fitted samples.
+        values: values (F, K) [N] there.
+        predicted: basis (P, B) on the predicted samples.
+        target: values (P, K) [N] there.
+    """
+    gram, moments = fitted.T @ fitted, fitted.T @ values
     identity = 1e-2 * len(fitted) * np.eye(len(gram))
-    candidates = [np.asarray(np.linalg.solve(gram + r * identity, moment), float) for r in _RIDGE_PENALTIES]
-    error, best = min(((compute_error(w, table), w) for w in candidates), key=lambda pair: pair[0])
-    losses = {v: (compute_error(best, _exchange(table, c)) - error) / excess for v, c in variables.items()}
-    share = (float(np.mean(target**2)) - error) / excess
-    return Explained(float(np.clip(share, 0.0, 1.0)), losses)
+    weights = np.stack([np.linalg.solve(gram + r * identity, moments) for r in _RIDGE_PENALTIES])
+    errors = np.mean((target - predicted @ weights) ** 2, axis=1)
+    return np.asarray(weights[np.argmin(errors, axis=0), :, np.arange(values.shape[1])].T, float)
+
+
+def _bound_chance(shares: Array) -> float:
+    """Return the part of noise that the regression predicts by chance, from its parts (K,) in simulated noise."""
+    if not len(shares):
+        return 0.0
+    return float(np.clip(shares.mean() + _CHANCE_DEVIATIONS * shares.std(), 0.0, _MAX_CHANCE))
+
+
+def simulate_noise(residual: Residual) -> Array:
+    """Return noise (N, K) [N] of the smooth spectrum of a residual (surrogate data, Theiler et al. 1992).
+
+    The mean power of narrow bands is kept, and phases are random. What repeats with the strokes does not then.
+    """
+    random = np.random.default_rng(2)
+    noise = np.zeros((len(residual.values), _NOISE_DRAWS))
+    for part, _ in residual.parts:
+        values = np.where(residual.valid[part], residual.values[part], 0.0)
+        power = np.abs(np.fft.rfft(values)) ** 2
+        band = np.floor(_NOISE_BANDS * np.log2(np.maximum(np.arange(len(power)), 0.5))).astype(int) + _NOISE_BANDS
+        level = np.bincount(band, power) / np.maximum(np.bincount(band), 1)
+        draws = random.standard_normal((2, _NOISE_DRAWS, len(power)))
+        spectrum = np.sqrt(0.5 * level[band]) * (draws[0] + 1j * draws[1])
+        noise[part] = np.fft.irfft(spectrum, len(values)).T
+    return noise
 
 
 def _draw_basis(count: int) -> Callable[[Array], Array]:

@@ -12,14 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
-from identification.fitting import Piece
+from identification.fitting import Piece, measure_scales
 from identification.logs import PERIODIC_MOTIONS, Segment, Stretch
 
 Number = TypeVar("Number", bound=np.generic)
 Indices = npt.NDArray[np.intp]
 
-_PSEUDO_CYCLE = 1.0
-"""Length [s] of a cycle where the motion does not repeat."""
 _CYCLE_TOLERANCE = 0.1
 """Part of a cycle that may be missing at the end of a segment for the last cycle to count as whole."""
 _HOLD_OUT_STRIDE = 4
@@ -87,11 +85,13 @@ def cut_cycles(stretches: Sequence[Stretch], pieces: Sequence[Piece]) -> Cycles:
     segments: list[int] = []
     conditions: list[StrokeCondition] = []
     total = 0
+    # Where the motion does not repeat, a cycle lasts as long as that of a sine of this stroke and peak speed.
+    usual = 2.0 * np.pi / measure_scales(pieces).rate
     for stretch, piece in zip(stretches, pieces, strict=True):
         numbers, phase = np.full(len(stretch.time), -1), np.zeros(len(stretch.time))
         for segment in stretch.segments or (_make_whole_segment(stretch),):
             part = slice(segment.start, segment.stop)
-            local, phase[part] = _number_cycles(segment, piece, stretch.rate)
+            local, phase[part] = _number_cycles(segment, piece, stretch.rate, usual)
             numbers[part] = total + local
             count = int(local[-1]) + 1
             total += count
@@ -107,12 +107,19 @@ def _make_whole_segment(stretch: Stretch) -> Segment:
     return Segment(0, stretch.name, 0, len(stretch.time), "table", None, None, None)
 
 
-def _number_cycles(segment: Segment, piece: Piece, rate: float) -> tuple[Indices, Array]:
-    """Return cycle number and phase of each sample; a part of a cycle at the end joins the last whole one."""
+def _number_cycles(segment: Segment, piece: Piece, rate: float, usual: float) -> tuple[Indices, Array]:
+    """Return cycle number and phase of each sample; a part of a cycle at the end joins the last whole one.
+
+    Args:
+        segment: part of the piece.
+        piece: motion and force.
+        rate: sampling rate [Hz].
+        usual: length of a cycle [s] where the motion does not repeat.
+    """
     count = segment.stop - segment.start
     if segment.motion not in PERIODIC_MOTIONS or not segment.frequency:
-        last = max(int(count / rate / _PSEUDO_CYCLE) - 1, 0)
-        numbers = np.minimum((np.arange(count) / (_PSEUDO_CYCLE * rate)).astype(int), last)
+        last = max(int(count / rate / usual) - 1, 0)
+        numbers = np.minimum((np.arange(count) / (usual * rate)).astype(int), last)
         return numbers, np.zeros(count)
     turns = np.arange(count) * segment.frequency / rate
     part = slice(segment.start, segment.stop)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from identification.arrays import Array, BoolArray
 from identification.damper.effects import Variable
-from identification.fitting import Piece
+from identification.fitting import Piece, measure_scales
 from identification.gap.data import NEAR_FLOOR_RATIO, EvaluationData, Residual
 from identification.gap.fits import Candidate
 from identification.simulate import filter_series
@@ -50,10 +50,10 @@ _NOISE_DRAWS = 8
 """Draws of the noise of a residual's spectrum."""
 _NOISE_BANDS = 4
 """Bands of an octave in which its spectrum is smooth."""
+_SLOW = 0.5
+"""Highest frequency of slow noise, over the lowest one of the strokes [1]: a line of the strokes is above it."""
 _CHANCE_DEVIATIONS = 2.0
 """Standard deviations between these draws that count as chance."""
-_MAX_CHANCE = 0.99
-"""Largest part of noise that counts as chance."""
 _REVERSAL_SHARE = 1e-3
 """Distance from the last reversal, over half the stroke, at which its logarithmic feature begins to grow [1]."""
 
@@ -106,6 +106,12 @@ class ResidualRegression:
         """(N, k) features of the recording."""
         return build_features(self.evaluation.pieces)
 
+    @cached_property
+    def _lowest_frequency(self) -> float:
+        """Lowest frequency of the strokes [Hz]; where none repeat, that of a sine of their size and speed."""
+        found = [c.frequency for c in self.evaluation.cycles.conditions if c.frequency]
+        return min(found) if found else measure_scales(self.evaluation.pieces).rate / (2.0 * np.pi)
+
     def explain(self, candidate: Candidate) -> "Explained":
         """Return the part of a set's residual that the regression predicts; none near the noise floor."""
         if candidate.held_out_rmse < NEAR_FLOOR_RATIO * self.floor:
@@ -118,15 +124,22 @@ class ResidualRegression:
                 self.evaluation.held_out_samples,
                 self.floor,
                 FEATURE_VARIABLES,
-                simulate_noise(candidate.residual),
+                simulate_slow_noise(candidate.residual, _SLOW * self._lowest_frequency),
             )
         return self._known[candidate.names]
 
-    def find_explainable_rmse(self, candidates: Sequence[Candidate], noise: float) -> float:
-        """Return the lowest held-out RMSE [N] that the regression reaches on top of any of some sets."""
+    def find_explainable_rmse(self, candidates: Sequence[Candidate], noise: float, certain: bool = False) -> float:
+        """Return the lowest held-out RMSE [N] that the regression reaches on top of any of some sets.
+
+        Args:
+            candidates: sets of effects.
+            noise: noise of the force [N].
+            certain: True to leave out what slow noise explains.
+        """
+        explained = [(c, self.explain(c)) for c in candidates]
+        shares = [(c, e.certain_share if certain else e.share) for c, e in explained]
         return min(
-            math.sqrt(noise**2 + (1.0 - self.explain(c).share) * max(c.held_out_rmse**2 - noise**2, 0.0))
-            for c in candidates
+            math.sqrt(noise**2 + (1.0 - share) * max(c.held_out_rmse**2 - noise**2, 0.0)) for c, share in shares
         )
 
 
@@ -137,6 +150,13 @@ class Explained(NamedTuple):
     """Part of the excess variance, 0 to 1."""
     losses: dict[Variable, float]
     """Part of the excess variance that is lost when a variable is exchanged between samples, by variable."""
+    chance: float = 0.0
+    """Part of the excess variance that would be predicted if what is slower than the strokes were noise."""
+
+    @property
+    def certain_share(self) -> float:
+        """Part of the excess variance beyond what slow noise explains, 0 to 1."""
+        return max(self.share - self.chance, 0.0)
 
 
 def explain_residual(
@@ -150,8 +170,8 @@ def explain_residual(
 ) -> Explained:
     """Estimate the part of the residual's excess variance that the features predict on held-out samples.
 
-    Slow noise hardly changes from fitted samples to the next held-out ones, so a part of it is predicted as well.
-    That part is measured on simulated noise, and does not count.
+    Noise that is slower than a stroke hardly changes from fitted samples to the next held-out ones, so a part of
+    it is predicted as well. That part is measured on simulated noise.
 
     Args:
         features: standardised features (N, k).
@@ -160,7 +180,7 @@ def explain_residual(
         held_out: mask (N,) of the samples that are predicted.
         floor: noise of the force [N].
         variables: columns of each variable whose loss is estimated.
-        noise: simulated noise (N, K) [N] of the residual's spectrum.
+        noise: draws (N, K) [N] of the slow noise that the residual may contain.
     """
     excess = float(np.mean(residual[held_out] ** 2)) - floor**2
     if excess <= 0.0:
@@ -172,14 +192,14 @@ def explain_residual(
     basis, target = compute_basis(table), columns[predicted]
     weights = _fit_weights(compute_basis(features[fitted]), columns[fitted], basis, target)
     errors, squares = np.mean((target - basis @ weights) ** 2, axis=0), np.mean(target**2, axis=0)
-    chance = _bound_chance(1.0 - errors[1:] / squares[1:])
-    share = (squares[0] - errors[0] - chance * squares[0]) / (1.0 - chance) / excess
+    share, *by_chance = (squares - errors) / excess
 
     def compute_loss(columns: Sequence[int]) -> float:
         exchanged = compute_basis(_exchange(table, columns)) @ weights[:, 0]
         return float(np.mean((target[:, 0] - exchanged) ** 2) - errors[0]) / excess
 
-    return Explained(float(np.clip(share, 0.0, 1.0)), {v: compute_loss(c) for v, c in variables.items()})
+    losses = {v: compute_loss(c) for v, c in variables.items()}
+    return Explained(float(np.clip(share, 0.0, 1.0)), losses, _bound_chance(np.array(by_chance)))
 
 
 def _fit_weights(fitted: Array, values: Array, predicted: Array, target: Array) -> Array:
@@ -199,26 +219,26 @@ def _fit_weights(fitted: Array, values: Array, predicted: Array, target: Array) 
 
 
 def _bound_chance(shares: Array) -> float:
-    """Return the part of noise that the regression predicts by chance, from its parts (K,) in simulated noise."""
-    if not len(shares):
-        return 0.0
-    return float(np.clip(shares.mean() + _CHANCE_DEVIATIONS * shares.std(), 0.0, _MAX_CHANCE))
+    """Return the share that is predicted by chance, from those (K,) of draws of noise."""
+    return max(float(shares.mean() + _CHANCE_DEVIATIONS * shares.std()), 0.0) if len(shares) else 0.0
 
 
-def simulate_noise(residual: Residual) -> Array:
-    """Return noise (N, K) [N] of the smooth spectrum of a residual (surrogate data, Theiler et al. 1992).
+def simulate_slow_noise(residual: Residual, highest: float) -> Array:
+    """Return noise (N, K) [N] of the smooth spectrum of a residual up to a frequency [Hz].
 
-    The mean power of narrow bands is kept, and phases are random. What repeats with the strokes does not then.
+    The mean power of narrow bands is kept, and phases are random (surrogate data, Theiler et al. 1992). Above the
+    frequency of the strokes there is none: narrow-band noise there looks like an error that repeats.
     """
     random = np.random.default_rng(2)
     noise = np.zeros((len(residual.values), _NOISE_DRAWS))
-    for part, _ in residual.parts:
+    for part, rate in residual.parts:
         values = np.where(residual.valid[part], residual.values[part], 0.0)
         power = np.abs(np.fft.rfft(values)) ** 2
         band = np.floor(_NOISE_BANDS * np.log2(np.maximum(np.arange(len(power)), 0.5))).astype(int) + _NOISE_BANDS
         level = np.bincount(band, power) / np.maximum(np.bincount(band), 1)
+        slow = np.fft.rfftfreq(len(values), 1.0 / rate) < highest
         draws = random.standard_normal((2, _NOISE_DRAWS, len(power)))
-        spectrum = np.sqrt(0.5 * level[band]) * (draws[0] + 1j * draws[1])
+        spectrum = np.sqrt(0.5 * level[band] * slow) * (draws[0] + 1j * draws[1])
         noise[part] = np.fft.irfft(spectrum, len(values)).T
     return noise
 

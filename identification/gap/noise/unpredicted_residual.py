@@ -46,7 +46,7 @@ def settle_unknown_floor(
     """
     if noise_model.estimate.is_known:
         return False
-    lowest = regression.find_explainable_rmse(_select_best(candidates), noise_model.floor)
+    lowest = regression.find_explainable_rmse(_select_best(candidates), noise_model.floor, certain=True)
     if lowest < EXPLAINED_RATIO * noise_model.floor:
         return False
     adequate = [c for c in candidates if c.held_out_rmse < EXPLAINED_RATIO * lowest]

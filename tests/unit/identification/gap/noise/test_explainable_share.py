@@ -13,7 +13,7 @@ from identification.gap.noise.explainable_share import (
     _subsample,
     build_features,
     explain_residual,
-    simulate_noise,
+    simulate_slow_noise,
 )
 from identification.simulate import Excitation
 from tests.support.candidate_pools import record
@@ -50,18 +50,21 @@ def test_slow_noise_between_neighbouring_samples_is_not_explainable():
     train = np.arange(8000) // 100 % 4 != 2
     structure = 2.0 * np.sin(3.0 * features[:, 1])
     explain = partial(explain_residual, features, train=train, held_out=~train, floor=0.1)
-    noise = simulate_noise(make_residual(slow))
-    assert explain(slow).share > 0.2
-    assert explain(slow, noise=noise).share < 0.1
-    both = slow + structure
-    assert explain(both, noise=simulate_noise(make_residual(both))).share > 0.5
+    by_chance = explain(slow, noise=simulate_slow_noise(make_residual(slow), 0.25))
+    assert by_chance.share > 0.2
+    assert by_chance.certain_share < 0.05
+    both = slow + 3.0 * structure
+    found = explain(both, noise=simulate_slow_noise(make_residual(both), 0.25))
+    assert found.share > found.certain_share > 0.5
 
 
 def test_simulated_noise_has_the_power_of_the_residual_in_each_octave_but_other_phases():
     slow = make_pink_noise(8192, default_rng(4))
-    noise = simulate_noise(make_residual(slow))
+    noise = simulate_slow_noise(make_residual(slow), 20.0)
     powers = [np.mean(np.abs(np.fft.rfft(values, axis=0)) ** 2, axis=-1) for values in (slow[:, None], noise)]
-    for octave in range(5, 12):
+    highest = 1638  # 20 Hz of 8192 samples at 100 Hz
+    assert powers[1][highest + 1 :].max() < 1e-12
+    for octave in range(5, 10):
         bins = slice(2**octave, 2 ** (octave + 1))
         assert np.mean(powers[1][bins]) == pytest.approx(np.mean(powers[0][bins]), rel=0.3)
     assert np.abs(np.corrcoef(np.column_stack([slow, noise]).T)[0, 1:]).max() < 0.6

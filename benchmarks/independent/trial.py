@@ -3,10 +3,10 @@
     python -m benchmarks.independent.trial [--recordings 30] [--seed 1] [--kinds one,none]
         [--methods sweep] [--out PAGE.md]
 
-Each recording has a random damper of 4 N to 90 kN, a random method (rich, poor, of a campaign, random strokes; sweeps
-only where they are asked for) and noise of a random spectrum. It has no effect, one, two, or a cause outside the library. It is written as CSV,
-imported by `mrbench import`, and diagnosed from the log alone. An effect that a refit of the law absorbs cannot be
-named; it counts as wrong all the same.
+Each recording has a random damper of 4 N to 90 kN, a random method (rich, poor, of a campaign, random strokes;
+sweeps only where they are asked for) and noise of a random spectrum. It has no effect, one, two, or a cause
+outside the library. It is written as CSV, imported by `mrbench import`, and diagnosed from the log alone. An
+effect that a refit of the law absorbs cannot be named; it counts as wrong all the same.
 """
 
 import math

@@ -41,8 +41,7 @@ check: $(READY)
 	$(BIN)/pytest -q tests/contracts/test_packages.py
 
 # Tests of processes run in real time: what a busy machine has made late is repeated alone, and named at the end.
-# The tests of a file on wires stay together, because they share a bench. They run in the order of the files: sorted by
-# their number of tests, the longest files would come last, with one process idle.
+# The tests of a file on wires stay together, because they share a bench.
 AGAIN := --last-failed --last-failed-no-failures none
 unit: $(READY)
 	@rm -rf $(RESULTS) && mkdir -p $(RESULTS)
@@ -51,8 +50,7 @@ unit: $(READY)
 
 wire: $(READY)
 	@mkdir -p $(RESULTS) && rm -f $(RESULTS)/wire*.xml
-	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'wire and not slow' \
-		--junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
+	$(BIN)/pytest -n 2 --dist loadfile -m 'wire and not slow' --junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
 		$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_2.xml $(AGAIN) $(TEST_OPTIONS) || \
 		$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_3.xml $(AGAIN) $(TEST_OPTIONS)
 

@@ -51,6 +51,11 @@ class RecordingScales:
         return self.velocity / self.length
 
     @property
+    def cycle_duration(self) -> float:
+        """Duration of a cycle of that sine [s]."""
+        return 2.0 * np.pi / self.rate
+
+    @property
     def stiffness(self) -> float:
         """Unit of stiffness [N/m]."""
         return self.force / self.length

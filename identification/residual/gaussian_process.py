@@ -38,7 +38,7 @@ class Basis:
         return np.asarray(solve_triangular(self.factor, covariance, lower=True).T)
 
     def compute_moments(self, states: Array, residual: Array) -> "Moments":
-        """Return the sums over scaled states (N, D) and their residual (N,) [N] without a basis of each."""
+        """Return the sums over scaled states (N, D) and a residual (N,) [N]; their basis (N, M) is not needed."""
         sums = Moments.make(_compute_covariance(states, self.points), residual)
         half = solve_triangular(self.factor, sums.gram, lower=True)
         return Moments(

@@ -85,8 +85,7 @@ def cut_cycles(stretches: Sequence[Stretch], pieces: Sequence[Piece]) -> Cycles:
     segments: list[int] = []
     conditions: list[StrokeCondition] = []
     total = 0
-    # Where the motion does not repeat, a cycle lasts as long as that of a sine of this stroke and peak speed.
-    usual = 2.0 * np.pi / measure_scales(pieces).rate
+    usual = measure_scales(pieces).cycle_duration
     for stretch, piece in zip(stretches, pieces, strict=True):
         numbers, phase = np.full(len(stretch.time), -1), np.zeros(len(stretch.time))
         for segment in stretch.segments or (_make_whole_segment(stretch),):

@@ -47,7 +47,7 @@ FEATURE_VARIABLES: dict[Variable, tuple[int, ...]] = {
 }
 """Columns of the features that belong to each variable."""
 _NOISE_DRAWS = 8
-"""Draws of the noise of a residual's spectrum."""
+"""Number of draws of slow noise."""
 _NOISE_BANDS = 4
 """Bands of an octave in which its spectrum is smooth."""
 _SLOW = 0.5
@@ -110,7 +110,7 @@ class ResidualRegression:
     def _lowest_frequency(self) -> float:
         """Lowest frequency of the strokes [Hz]; where none repeat, that of a sine of their size and speed."""
         found = [c.frequency for c in self.evaluation.cycles.conditions if c.frequency]
-        return min(found) if found else measure_scales(self.evaluation.pieces).rate / (2.0 * np.pi)
+        return min(found) if found else 1.0 / measure_scales(self.evaluation.pieces).cycle_duration
 
     def explain(self, candidate: Candidate) -> "Explained":
         """Return the part of a set's residual that the regression predicts; none near the noise floor."""
@@ -188,11 +188,10 @@ def explain_residual(
     compute_basis = _draw_basis(features.shape[1])
     fitted, predicted = _subsample(train), _subsample(held_out)
     table = features[predicted]
-    columns = residual[:, None] if noise is None else np.column_stack([residual, noise])
-    basis, target = compute_basis(table), columns[predicted]
-    weights = _fit_weights(compute_basis(features[fitted]), columns[fitted], basis, target)
-    errors, squares = np.mean((target - basis @ weights) ** 2, axis=0), np.mean(target**2, axis=0)
-    share, *by_chance = (squares - errors) / excess
+    values = residual[:, None] if noise is None else np.column_stack([residual, noise])
+    target = values[predicted]
+    weights, errors = _fit_weights(compute_basis(features[fitted]), values[fitted], compute_basis(table), target)
+    share, *by_chance = (np.mean(target**2, axis=0) - errors) / excess
 
     def compute_loss(columns: Sequence[int]) -> float:
         exchanged = compute_basis(_exchange(table, columns)) @ weights[:, 0]
@@ -202,8 +201,8 @@ def explain_residual(
     return Explained(float(np.clip(share, 0.0, 1.0)), losses, _bound_chance(np.array(by_chance)))
 
 
-def _fit_weights(fitted: Array, values: Array, predicted: Array, target: Array) -> Array:
-    """Return the weights (B, K) [N] of ridge regressions, each with the best of the penalties.
+def _fit_weights(fitted: Array, values: Array, predicted: Array, target: Array) -> tuple[Array, Array]:
+    """Return the weights (B, K) [N] of ridge regressions with the best penalty each, and their errors (K,) [N²].
 
     Args:
         fitted: basis (F, B) on the fitted samples.
@@ -215,7 +214,8 @@ def _fit_weights(fitted: Array, values: Array, predicted: Array, target: Array) 
     identity = 1e-2 * len(fitted) * np.eye(len(gram))
     weights = np.stack([np.linalg.solve(gram + r * identity, moments) for r in _RIDGE_PENALTIES])
     errors = np.mean((target - predicted @ weights) ** 2, axis=1)
-    return np.asarray(weights[np.argmin(errors, axis=0), :, np.arange(values.shape[1])].T, float)
+    best = np.argmin(errors, axis=0), np.arange(values.shape[1])
+    return weights[best[0], :, best[1]].T, errors[best]
 
 
 def _bound_chance(shares: Array) -> float:

@@ -122,10 +122,12 @@ def collect_all_variables(stroke: Excitation) -> dict[str, np.ndarray]:
     return values | {"drive": stroke.drive, "velocity": stroke.velocity, "displacement": stroke.displacement}
 
 
-def make_curve_stub(place: Place, variables: tuple[Variable, ...], function, *, grows: bool = False):
+def make_curve_stub(
+    place: Place, variables: tuple[Variable, ...], function, *, grows: bool = False, period: float | None = None
+):
     """Return a stand-in of a curve that has exactly the values of a function of the variable."""
     basis = SimpleNamespace(size=1, evaluate=lambda variable, coefficients: coefficients[0] * function(variable))
-    at = CurvePlace(place, variables, grows)
+    at = CurvePlace(place, variables, grows, period=period)
     return SimpleNamespace(at=at, function=SimpleNamespace(scale=1.0, basis=basis), unit=find_unit(at))
 
 

@@ -12,7 +12,13 @@ from identification.gap.data.quality import (
     describe_unobservable_effects,
 )
 from identification.gap.data.repeated_residual import estimate_repeated_residual
-from identification.gap.data.residual_map import Residual, compute_harmonics, estimate_drift, map_gap
+from identification.gap.data.residual_map import (
+    Residual,
+    compute_harmonics,
+    estimate_drift,
+    find_strongest_line,
+    map_gap,
+)
 from identification.gap.data.scale_excess import estimate_scale_excess, measure_residual_scales
 from identification.gap.data.shrinkage import NEAR_FLOOR_RATIO, Shrinkage
 
@@ -37,6 +43,7 @@ __all__ = [
     "estimate_drift",
     "estimate_repeated_residual",
     "estimate_scale_excess",
+    "find_strongest_line",
     "map_gap",
     "measure_residual_scales",
     "split_by_piece",

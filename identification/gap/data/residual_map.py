@@ -190,4 +190,16 @@ def _find_line(values: Array, rate: float) -> tuple[float | None, float]:
     threshold = max(_LINE_POWER_RATIO * float(np.median(around)), _LINE_PEAK_RATIO * float(around.max()))
     if power[peak] < threshold:
         return None, 0.0
-    return float(frequency[peak]), float(2.0 * np.sqrt(power[peak]) / np.sum(window))
+    amplitude = float(2.0 * np.sqrt(power[peak]) / np.sum(window))
+    return float(frequency[peak]) + float(frequency[1]) * _locate_peak(power, peak), amplitude
+
+
+def _locate_peak(power: Array, peak: int) -> float:
+    """Return where a peak lies between its bins [bins], by a parabola through the logarithms of three of them.
+
+    The spectrum of a Hann window is nearly a parabola there, so the error is some hundredths of a bin.
+    """
+    if not 0 < peak < len(power) - 1:
+        return 0.0
+    left, middle, right = np.log(np.maximum(power[peak - 1 : peak + 2], 1e-300))
+    return float(0.5 * (left - right) / min(left - 2.0 * middle + right, -1e-12))

@@ -3,7 +3,7 @@
 A curve is a cubic spline with a penalty on its roughness. The coefficients are rotated and scaled so that the
 penalty becomes their sum of squares. The penalty is that of Eilers and Marx (1996), the rotation that of Wood
 (2017, 5.4). One prior deviation then sets smoothness and amplitude together. The amplitude hardly depends on the
-number of knots.
+number of knots. A curve that repeats is a Fourier series instead, with higher harmonics less probable.
 """
 
 from collections.abc import Mapping
@@ -32,6 +32,8 @@ _RESOLUTION = 2e-3
 """Smallest value that a warped scale resolves, relative to the largest."""
 MAX_GROWTH = 30.0
 """Largest growth with the drive, over the inverse of the highest drive [1]."""
+_HARMONICS = 3
+"""Number of harmonics of a curve that repeats."""
 _QUANTILES = (0.001, 0.999)
 """Quantiles of the variable between which the knots lie."""
 
@@ -43,7 +45,9 @@ class CurveBasis:
     positions: tuple[float, ...]
     """(G,) values of the variable, increasing."""
     table: tuple[tuple[float, ...], ...]
-    """(K, G) values of each basis curve there; beyond the ends they are constant."""
+    """(K, G) values of each basis curve there; beyond the ends they are constant, or repeat."""
+    period: float | None = None
+    """Period of the curves, in the unit of the variable; None where they do not repeat."""
 
     @property
     def size(self) -> int:
@@ -52,7 +56,8 @@ class CurveBasis:
 
     def evaluate(self, variable: Array, coefficients: Array) -> Array:
         """Return the curve (N,) with some coefficients (K,) at values (N,) of the variable."""
-        return np.asarray(np.interp(variable, self.positions, coefficients @ np.array(self.table)))
+        values = coefficients @ np.array(self.table)
+        return np.asarray(np.interp(variable, self.positions, values, period=self.period))
 
 
 def make_basis(values: Array, warp: Warp) -> CurveBasis:
@@ -66,6 +71,15 @@ def make_basis(values: Array, warp: Warp) -> CurveBasis:
     knots = np.concatenate([-step * np.arange(3, 0, -1), inner, 1.0 + step * np.arange(1, 4)])
     splines = BSpline.design_matrix(np.linspace(0.0, 1.0, _GRID_POINTS), knots, 3).toarray()
     return CurveBasis(tuple(positions.tolist()), tuple(map(tuple, (splines @ _compute_rotation()).T.tolist())))
+
+
+def make_periodic_basis(period: float) -> CurveBasis:
+    """Return a basis of curves with a period, whose curvature is as probable as that of other curves."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _GRID_POINTS, endpoint=False)
+    orders = range(1, _HARMONICS + 1)
+    waves = [wave(k * angle) / k**2 for k in orders for wave in (np.sin, np.cos)]
+    positions = period * angle / (2.0 * np.pi)
+    return CurveBasis(tuple(positions.tolist()), tuple(tuple(w.tolist()) for w in waves), period)
 
 
 def _compute_rotation() -> Array:

@@ -22,6 +22,7 @@ from identification.gap.discovery.curve_basis import (
     LinearGrowth,
     Warp,
     make_basis,
+    make_periodic_basis,
 )
 from identification.simulate import DamperVariables, make_coil_variables
 
@@ -55,6 +56,8 @@ class CurvePlace(NamedTuple):
     grows_with_drive: bool = False
     is_viscous: bool = False
     """True where the curve is proportional to the velocity; else it has its sign."""
+    period: float | None = None
+    """Period of the curve, in the unit of its variable; None where it does not repeat."""
 
     @property
     def direction(self) -> Direction:
@@ -71,7 +74,7 @@ class CurvePlace(NamedTuple):
     @property
     def label(self) -> str:
         """Description for a person."""
-        kind = "viscous " if self.is_viscous else ""
+        kind = "viscous " if self.is_viscous else "periodic " if self.period else ""
         return f"{kind}{self.place} over {' and '.join(self.variables)}".replace("_", " ")
 
 
@@ -138,17 +141,19 @@ class CurveEffect:
         return "N s/m" if self.at.is_viscous else _PLACE_UNITS[self.at.place]
 
 
-def list_curve_effects(problem: Problem, forces: Sequence[Array]) -> list[CurveEffect]:
+def list_curve_effects(problem: Problem, forces: Sequence[Array], line: float | None = None) -> list[CurveEffect]:
     """Return the curves that a recording can show.
 
     Args:
         problem: fitted pieces and their scales.
         forces: simulated force (N,) [N] of each piece.
+        line: frequency [Hz] of a disturbance that is independent of the motion; None without one.
     """
     values = collect_variables(problem.pieces, forces)
+    periodic = () if line is None else (CurvePlace("force_channel", ("time",), period=1.0 / line),)
     return [
         _make_curve_effect(problem, at, values[at.variables[0]])
-        for at in CURVE_PLACES
+        for at in (*CURVE_PLACES, *periodic)
         if _is_visible(at, values, problem)
     ]
 
@@ -181,7 +186,7 @@ def _is_visible(at: CurvePlace, values: dict[str, Array], problem: Problem) -> b
 def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> CurveEffect:
     scales = problem.space.scales
     function = CurveFunction(
-        make_basis(values, _WARPS.get(at.variables[0], "none")),
+        make_periodic_basis(at.period) if at.period else make_basis(values, _WARPS.get(at.variables[0], "none")),
         at.variables,
         _find_size(at, scales),
         at.direction,

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, minimise
+from identification.gap.data import find_strongest_line
 from identification.gap.discovery.curve_basis import LinearGrowth
 from identification.gap.discovery.curve_effects import (
     HISTORY_VARIABLES,
@@ -83,7 +84,8 @@ def screen_curves(pool: CandidatePool, parent: Candidate) -> list[ScreenedCurve]
     problem = pool.problems.screening.replace_effects(parent.fit.effects)
     unknowns = parent.fit.minimum.unknowns
     simulated = problem.simulate(unknowns)
-    curves = list_curve_effects(problem, simulated)
+    line, _ = find_strongest_line(parent.residual)
+    curves = list_curve_effects(problem, simulated, line)
     screened = [ScreenedCurve(c, _screen_curve(problem, unknowns, c)) for c in curves]
     return sorted(screened, key=lambda s: -s.evidence.log_odds)
 

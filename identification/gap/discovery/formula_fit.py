@@ -73,7 +73,8 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
     errors = split_by_piece(fitted.candidate.residual.values, pool.problems.full.pieces)
     samples = len(fitted.candidate.residual.values) / compute_residual_correlation_length(errors)
     formulas = [_fit_formula(pool, fitted, start, variable, samples) for start in starts[:_FITTED_FORMULAS]]
-    kept = [f for f in formulas if _keeps_gain(fitted, f.candidate)]
+    # A curve that repeats is one of its formulas; over one period, it would describe that period only.
+    kept = [f for f in formulas if fitted.curve.at.period or _keeps_gain(fitted, f.candidate)]
     return min(kept, key=lambda f: f.criterion, default=None)
 
 
@@ -162,7 +163,7 @@ def _make_parameter(
     unit, size = VARIABLE_UNITS[curve.at.variables[0]], max(float(np.abs(variable).max()), 1e-300)
     match start.formula.others.get(name):
         case "scale":
-            return EffectParameter(value=value, unit=unit, lo=1e-4 * size, hi=1e2 * size)
+            return EffectParameter(value=value, unit=unit, lo=min(1e-4 * size, 0.5 * value), hi=1e2 * size)
         case "size":
             return EffectParameter(value=value, unit=unit, lo=value, hi=value)
         case "power":

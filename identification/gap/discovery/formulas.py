@@ -79,6 +79,25 @@ FORMULAS: tuple[Formula, ...] = (
 )
 """Expressions that are tried, the shortest first."""
 
+_FIRST_HARMONIC = "a*sin(z/s)+b*sin(1.5707963+z/s)"
+PERIODIC_FORMULAS: tuple[Formula, ...] = (
+    Formula(_FIRST_HARMONIC, {"a": 0, "b": 0}, {"s": "scale"}),
+    *(
+        Formula(
+            f"{_FIRST_HARMONIC}+c*sin({k}*z/s)+d*sin(1.5707963+{k}*z/s)",
+            {"a": 0, "b": 0, "c": 0, "d": 0},
+            {"s": "scale"},
+        )
+        for k in (2, 3)
+    ),
+    Formula(
+        f"{_FIRST_HARMONIC}+c*sin(2*z/s)+d*sin(1.5707963+2*z/s)+f*sin(3*z/s)+g*sin(1.5707963+3*z/s)",
+        {"a": 0, "b": 0, "c": 0, "d": 0, "f": 0, "g": 0},
+        {"s": "scale"},
+    ),
+)
+"""Expressions for a curve that repeats: the fundamental, with the second harmonic, the third one, or both."""
+
 
 @dataclass(frozen=True)
 class FormulaStart:
@@ -102,7 +121,8 @@ def rank_formulas(curve: CurveEffect, coefficients: Array, variable: Array) -> l
     target = curve.function.scale * curve.function.basis.evaluate(variable, coefficients)
     others = _list_absorbed(curve, variable)
     remaining = target - _project(others, target)
-    starts = [_fit_formula(f, variable, remaining, others) for f in FORMULAS]
+    formulas = PERIODIC_FORMULAS if curve.at.period else FORMULAS
+    starts = [_fit_formula(f, variable, remaining, others, curve.at.period) for f in formulas]
     return sorted((s for s in starts if s.values), key=lambda s: s.error)
 
 
@@ -127,11 +147,11 @@ def _project(columns: Array, target: Array) -> Array:
     return np.asarray(columns @ np.linalg.lstsq(columns, target, rcond=None)[0])
 
 
-def _fit_formula(formula: Formula, z: Array, target: Array, others: Array) -> FormulaStart:
-    """Return the best start of a formula, over a grid of its scales, powers and positions."""
+def _fit_formula(formula: Formula, z: Array, target: Array, others: Array, period: float | None) -> FormulaStart:
+    """Return the best start of a formula, over a grid of its scales, powers and positions, or at its period."""
     total = max(float(target @ target), 1e-300)
     best = FormulaStart(formula, {}, np.inf)
-    for values in _iterate_grid(formula, z):
+    for values in _iterate_grid(formula, z, period):
         columns = np.stack([_evaluate(formula, name, values, z) for name in formula.amplitudes], axis=1)
         if not np.isfinite(columns).all():
             continue
@@ -154,10 +174,10 @@ def _has_large_terms(formula: Formula, columns: Array, amplitudes: Array, z: Arr
     return bool(terms > _CANCELLATION * largest or relative.max() > _EXTRAPOLATION * largest)
 
 
-def _iterate_grid(formula: Formula, z: Array) -> Iterator[dict[str, float]]:
+def _iterate_grid(formula: Formula, z: Array, period: float | None) -> Iterator[dict[str, float]]:
     size, low, high = max(float(np.abs(z).max()), 1e-300), float(z.min()), float(z.max())
     grids: dict[Role, list[float]] = {
-        "scale": [float(size * s) for s in _SCALES],
+        "scale": [period / (2.0 * np.pi)] if period else [float(size * s) for s in _SCALES],
         "size": [size],
         "power": list(_POWERS),
         "position": [float(0.5 * (low + high) + 0.5 * (high - low) * m) for m in _POSITIONS],

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from identification.gap.discovery import curve_basis
-from identification.gap.discovery.curve_basis import MAX_GROWTH, CurveFunction, LinearGrowth, make_basis
+from identification.gap.discovery.curve_basis import (
+    MAX_GROWTH,
+    CurveFunction,
+    LinearGrowth,
+    make_basis,
+    make_periodic_basis,
+)
 
 LOW, HIGH = -0.02, 0.03
 EVEN = np.linspace(LOW, HIGH, 3001)
@@ -63,6 +69,16 @@ def test_a_rough_curve_needs_larger_coefficients_than_a_smooth_one():
 def test_the_size_of_the_variable_does_not_matter():
     small, large = (np.array(make_basis(s * EVEN, "symmetric").table) for s in (1e-3, 1e3))
     np.testing.assert_allclose(small, large)
+
+
+def test_a_periodic_curve_repeats_and_follows_three_harmonics():
+    basis, time = make_periodic_basis(0.02), np.arange(40_000) / 1000.0
+    angle = 2.0 * np.pi * time / 0.02
+    target = 3.0 * np.sin(angle + 0.4) - np.cos(2.0 * angle) + 0.5 * np.sin(3.0 * angle)
+    table = np.stack([basis.evaluate(time, row) for row in np.eye(basis.size)], axis=1)
+    assert np.abs(table @ np.linalg.lstsq(table, target, rcond=None)[0] - target).max() < 2e-3
+    fourth = np.sin(4.0 * angle)
+    assert np.abs(table @ np.linalg.lstsq(table, fourth, rcond=None)[0]).max() < 1e-2
 
 
 @pytest.mark.parametrize(

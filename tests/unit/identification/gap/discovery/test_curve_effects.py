@@ -7,7 +7,12 @@ import pytest
 
 from identification.damper.definitions import STAGE_OF, VARIABLES_AT
 from identification.gap.discovery.curve_basis import MAX_GROWTH
-from identification.gap.discovery.curve_effects import CURVE_PLACES, CurvePlace, collect_variables
+from identification.gap.discovery.curve_effects import (
+    CURVE_PLACES,
+    CurvePlace,
+    collect_variables,
+    list_curve_effects,
+)
 from identification.simulate import ActiveEffect, DamperVariables, SimulationModel, make_coil_variables, simulate
 from tests.support.discoveries import all_curves, make_curves, make_problem, make_stroke
 from tests.support.effects import LABORATORY
@@ -36,6 +41,18 @@ def test_every_place_of_the_chain_is_tried_once_with_variables_that_exist_there(
 )
 def test_a_curve_needs_three_levels_of_the_drive_and_its_factor_two(levels, hidden):
     assert set(CURVE_PLACES) - set(make_curves(make_stroke(levels))) == hidden
+
+
+def test_a_spectral_line_adds_a_curve_that_repeats_with_its_period():
+    stroke = make_stroke()
+    forces = [1000.0 * stroke.velocity]
+    added = [c for c in list_curve_effects(make_problem(stroke), forces, 125.0) if c.at not in CURVE_PLACES]
+    assert [c.at for c in added] == [CurvePlace("force_channel", ("time",), period=0.008)]
+    assert added[0].at.label == "periodic force_channel over time".replace("_", " ")
+    values = np.random.default_rng(3).standard_normal(added[0].function.basis.size)
+    time = stroke.start + np.arange(200) / 1000.0
+    curve = added[0].function({"time": time}, *values)
+    np.testing.assert_allclose(curve[8:], curve[:-8], atol=1e-9 * np.abs(curve).max())
 
 
 def test_levels_may_be_in_different_pieces():

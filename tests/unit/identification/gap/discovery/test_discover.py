@@ -10,7 +10,7 @@ from identification.gap.discovery import curve_effects, curve_fit, discover
 from identification.gap.discovery.curve_effects import CurvePlace
 from identification.gap.discovery.discover import _find_further, _is_accepted, discover_effect
 from tests.support.candidate_pools import BASELINE_FIT, NOISE
-from tests.support.discoveries import GAIN, GROWING, MOUNTING, discovered_with, pool_with
+from tests.support.discoveries import GAIN, GROWING, MOUNTING, define, discovered_with, pool_with
 
 OVER_DISPLACEMENT = CurvePlace("damper_gain", ("displacement",))
 GROWING_OVER_DISPLACEMENT = CurvePlace("parallel_force", ("displacement", "drive"), grows_with_drive=True)
@@ -37,6 +37,20 @@ def test_a_gain_is_found_at_its_place_and_nothing_more():
     found = discovered_with(GAIN)
     assert found.fitted.curve.at == OVER_DISPLACEMENT
     assert found.formula.file.expression == "a*displacement**2+b*displacement**3"
+    assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
+    assert found.further == ()
+
+
+def test_a_disturbance_that_is_independent_of_the_motion_is_found_with_its_frequency():
+    """71.3 Hz is beyond the mains frequencies that the library knows, and above half of the screening rate."""
+    hum = define("force_channel", "a*sin(448*time)+b*sin(3*448*time)", ("time",), a=30.0, b=12.0)
+    found = discovered_with(hum)
+    assert (found.fitted.curve.at.place, found.fitted.curve.at.variables) == ("force_channel", ("time",))
+    assert found.fitted.curve.at.period == pytest.approx(2.0 * np.pi / 448.0, rel=1e-4)
+    assert found.formula.file.expression.count("sin") == 4
+    values = {name: p.value for name, p in found.formula.file.parameters.items()}
+    assert values["s"] == pytest.approx(1.0 / 448.0, rel=1e-5)
+    assert np.hypot(values["a"], values["b"]) == pytest.approx(30.0, rel=0.05)
     assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
     assert found.further == ()
 

@@ -8,13 +8,13 @@ import pytest
 from identification.damper.definitions import Expression
 from identification.damper.effects import Variable
 from identification.gap.discovery import formulas
-from identification.gap.discovery.formulas import FORMULAS, rank_formulas
+from identification.gap.discovery.formulas import FORMULAS, PERIODIC_FORMULAS, rank_formulas
 from tests.support.discoveries import make_curve_stub
 
 Z = np.sort(np.random.default_rng(1).uniform(-0.018, 0.02, 400))
 SIZE = float(np.abs(Z).max())
 MIDDLE, HALF = 0.5 * (Z.max() + Z.min()), 0.5 * (Z.max() - Z.min())
-AMPLITUDES = (30.0, -12.0, 7.0)
+AMPLITUDES = (30.0, -12.0, 7.0, 5.0, -3.0, 2.0)
 """Size of each amplitude's term at the largest value of the variable."""
 POSITIONS = {"m": MIDDLE + 0.4 * HALF, "l": MIDDLE - 0.4 * HALF}
 SCALES = {"s": SIZE * formulas._SCALES[6], "r": SIZE * formulas._SCALES[9]}
@@ -52,6 +52,17 @@ def test_a_formula_is_found_from_its_own_values(formula):
     if formula.text == TWO_EXPONENTIALS and found["s"] > found["r"]:
         found = {"a": found["b"], "b": found["a"], "s": found["r"], "r": found["s"]}
     assert found == pytest.approx(truth, rel=1e-5)
+
+
+@pytest.mark.parametrize("formula", PERIODIC_FORMULAS, ids=lambda f: f.text)
+def test_a_curve_that_repeats_has_the_formula_of_its_harmonics(formula):
+    truth = choose_values(formula) | {"s": 0.02 / (2.0 * np.pi)}
+    stub = make_curve_stub("force_channel", ("time",), lambda z: evaluate(formula, truth, z), period=0.02)
+    starts = rank_formulas(stub, np.ones(1), np.linspace(0.0, 30.0, 4000))
+    assert sorted(s.formula.text for s in starts) == sorted(f.text for f in PERIODIC_FORMULAS)
+    found = next(s for s in starts if s.formula == formula)
+    assert found.error < 1e-9
+    assert found.values == pytest.approx(truth, rel=1e-5)
 
 
 def test_a_formula_is_worse_on_the_values_of_another():
@@ -111,7 +122,7 @@ def test_frequent_values_count_more():
     assert fit_quadratic(np.concatenate([below[::20], above])) > 1.5
 
 
-@pytest.mark.parametrize("formula", FORMULAS, ids=lambda f: f.text)
+@pytest.mark.parametrize("formula", [*FORMULAS, *PERIODIC_FORMULAS], ids=lambda f: f.text)
 def test_a_formula_is_an_expression_of_any_variable(formula):
     truth = choose_values(formula)
     for variable in get_args(Variable):
@@ -120,7 +131,7 @@ def test_a_formula_is_an_expression_of_any_variable(formula):
         np.testing.assert_array_equal(written.evaluate({**truth, variable: Z}), evaluate(formula, truth))
 
 
-@pytest.mark.parametrize("formula", FORMULAS, ids=lambda f: f.text)
+@pytest.mark.parametrize("formula", [*FORMULAS, *PERIODIC_FORMULAS], ids=lambda f: f.text)
 def test_amplitudes_act_linearly_and_have_the_stated_power_of_the_unit(formula):
     truth = choose_values(formula)
     terms = [

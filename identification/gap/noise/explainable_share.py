@@ -18,8 +18,9 @@ import numpy.typing as npt
 from identification.arrays import Array, BoolArray
 from identification.damper.effects import Variable
 from identification.fitting import Piece, measure_scales
-from identification.gap.data import NEAR_FLOOR_RATIO, EvaluationData, Residual
+from identification.gap.data import NEAR_FLOOR_RATIO, EvaluationData
 from identification.gap.fits import Candidate
+from identification.gap.noise.simulated_noise import simulate_noise
 from identification.simulate import filter_series
 
 Indices = npt.NDArray[np.intp]
@@ -48,8 +49,6 @@ FEATURE_VARIABLES: dict[Variable, tuple[int, ...]] = {
 """Columns of the features that belong to each variable."""
 _NOISE_DRAWS = 8
 """Number of draws of slow noise."""
-_NOISE_BANDS = 4
-"""Bands of an octave in which its spectrum is smooth."""
 _SLOW = 0.5
 """Highest frequency of slow noise, over the lowest one of the strokes [1]: a line of the strokes is above it."""
 _CHANCE_DEVIATIONS = 2.0
@@ -124,7 +123,7 @@ class ResidualRegression:
                 self.evaluation.held_out_samples,
                 self.floor,
                 FEATURE_VARIABLES,
-                simulate_slow_noise(candidate.residual, _SLOW * self._lowest_frequency),
+                simulate_noise(candidate.residual, _NOISE_DRAWS, _SLOW * self._lowest_frequency),
             )
         return self._known[candidate.names]
 
@@ -221,26 +220,6 @@ def _fit_weights(fitted: Array, values: Array, predicted: Array, target: Array) 
 def _bound_chance(shares: Array) -> float:
     """Return the share that is predicted by chance, from those (K,) of draws of noise."""
     return max(float(shares.mean() + _CHANCE_DEVIATIONS * shares.std()), 0.0) if len(shares) else 0.0
-
-
-def simulate_slow_noise(residual: Residual, highest: float) -> Array:
-    """Return noise (N, K) [N] of the smooth spectrum of a residual up to a frequency [Hz].
-
-    The mean power of narrow bands is kept, and phases are random (surrogate data, Theiler et al. 1992). Above the
-    frequency of the strokes there is none: narrow-band noise there looks like an error that repeats.
-    """
-    random = np.random.default_rng(2)
-    noise = np.zeros((len(residual.values), _NOISE_DRAWS))
-    for part, rate in residual.parts:
-        values = np.where(residual.valid[part], residual.values[part], 0.0)
-        power = np.abs(np.fft.rfft(values)) ** 2
-        band = np.floor(_NOISE_BANDS * np.log2(np.maximum(np.arange(len(power)), 0.5))).astype(int) + _NOISE_BANDS
-        level = np.bincount(band, power) / np.maximum(np.bincount(band), 1)
-        slow = np.fft.rfftfreq(len(values), 1.0 / rate) < highest
-        draws = random.standard_normal((2, _NOISE_DRAWS, len(power)))
-        spectrum = np.sqrt(0.5 * level[band] * slow) * (draws[0] + 1j * draws[1])
-        noise[part] = np.fft.irfft(spectrum, len(values)).T
-    return noise
 
 
 def _draw_basis(count: int) -> Callable[[Array], Array]:

@@ -18,10 +18,12 @@ from identification.gap.data import Residual, compute_block_squares
 from identification.gap.fits import EXPLAINED_RATIO, Candidate, JointFit
 from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
-from identification.noise import NoiseFloorEstimate
+from identification.gap.noise.simulated_noise import simulate_noise
 
 _CHANCE_DEVIATIONS = 4.0
 """Standard deviations by which the logarithm of the scatter of blocks hardly differs from that of noise."""
+_NOISE_DRAWS = 16
+"""Number of draws of noise of the residual's spectrum."""
 
 
 def settle_unknown_floor(
@@ -52,38 +54,51 @@ def settle_unknown_floor(
     adequate = [c for c in candidates if c.held_out_rmse < EXPLAINED_RATIO * lowest]
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         estimate = noise_model.describe_residual(candidate)
-        if is_stationary(candidate.residual, estimate, propagate(candidate), block_length):
+        if is_stationary(candidate.residual, estimate.noise**2, propagate(candidate), block_length):
             noise_model.estimate = estimate
             noise_model.estimate = noise_model.describe_residual(evaluate(candidate.fit))
             return True
     return False
 
 
-def is_stationary(
-    residual: Residual, estimate: NoiseFloorEstimate, input_squares: Array, block_length: float
-) -> bool:
+def is_stationary(residual: Residual, square: float, input_squares: Array, block_length: float) -> bool:
     """Return True if the mean square of blocks [s] scatters as that of noise of the same spectrum.
 
     An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all. The
     noise of the displacement (runs, N) [N²] is strong where the force is steep, in short bursts whose size differs
     from run to run. Its estimate may be too large, so blocks may also scatter as noise of the force alone.
+
+    Args:
+        residual: residual of a model.
+        square: mean square of the noise of the force, if the residual is noise [N²].
+        input_squares: squared change of the force by the noise of the inputs, (runs, N) [N²].
+        block_length: length of a block [s].
     """
     squares = compute_block_squares(residual, block_length)
     if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:
         return False
-    runs = np.stack(
-        [compute_block_squares(replace(residual, values=np.sqrt(run)), block_length) for run in input_squares]
-    )
-    chance = estimate.compute_chance(math.ceil(block_length * residual.rates[0][1]))
-    total = estimate.noise**2 + runs.mean(axis=0)
-    limit = _CHANCE_DEVIATIONS * math.sqrt(2.0 / (len(squares) - 1))
-    return any(
-        abs(math.log(scatter / expected)) < limit
-        for scatter, expected in (
-            (_compute_scatter(squares), chance**2),
-            (_compute_scatter(squares / total), _expect_scatter(estimate.noise**2, runs, chance)),
-        )
-    )
+    runs = _collect_block_squares(residual, np.sqrt(input_squares), block_length)
+    chance, deviation = _simulate_scatter(residual, block_length)
+    scaled = squares / (square + runs.mean(axis=0))
+    pairs = (_compute_scatter(squares), chance), (_compute_scatter(scaled), _expect_scatter(square, runs, chance))
+    return any(abs(math.log(found / expected)) < _CHANCE_DEVIATIONS * deviation for found, expected in pairs)
+
+
+def _simulate_scatter(residual: Residual, block_length: float) -> tuple[float, float]:
+    """Return the scatter [1] of blocks of noise with the spectrum of a residual, and its standard deviation.
+
+    The deviation is that of the logarithm, at least that of independent blocks of white noise. In slow noise it is
+    larger, because a block has few independent samples, and neighbours are alike.
+    """
+    noise = _collect_block_squares(residual, simulate_noise(residual, _NOISE_DRAWS).T, block_length)
+    logarithms = np.log([_compute_scatter(row) for row in noise])
+    least = math.sqrt(2.0 / (noise.shape[1] - 1))
+    return math.exp(float(logarithms.mean())), max(float(logarithms.std(ddof=1)), least)
+
+
+def _collect_block_squares(residual: Residual, values: Array, block_length: float) -> Array:
+    """Return the mean squares (K, blocks) [N²] of other values (K, N) [N] in the blocks of a residual."""
+    return np.stack([compute_block_squares(replace(residual, values=row), block_length) for row in values])
 
 
 def _expect_scatter(square: float, runs: Array, chance: float) -> float:
@@ -92,12 +107,12 @@ def _expect_scatter(square: float, runs: Array, chance: float) -> float:
     Args:
         square: mean square of the noise of the force [N²].
         runs: mean square [N²] of the propagated input noise in each block, (runs, blocks).
-        chance: standard deviation of the mean square of a block of noise of the force, over its mean [1].
+        chance: variance of the mean square of a block of noise of the force, over its squared mean [1].
     """
     mean = runs.mean(axis=0)
     # The mean of the runs differs from the truth, too, by its own part of the variance.
     between = (1.0 + 1.0 / len(runs)) * runs.var(axis=0, ddof=1)
-    variance = chance**2 * square * (square + 2.0 * mean) + between
+    variance = chance * square * (square + 2.0 * mean) + between
     return float(np.mean(variance / (square + mean) ** 2))
 
 

@@ -7,17 +7,16 @@ import pytest
 from numpy.random import default_rng
 
 from identification.fitting import Piece, assemble
-from identification.gap.data import Residual
 from identification.gap.noise.explainable_share import (
     _build_piece_features,
     _subsample,
     build_features,
     explain_residual,
-    simulate_slow_noise,
 )
+from identification.gap.noise.simulated_noise import simulate_noise
 from identification.simulate import Excitation
 from tests.support.candidate_pools import record
-from tests.support.noise import make_pink_noise
+from tests.support.noise import make_pink_noise, make_residual
 
 
 def test_structure_is_explainable_and_noise_is_not():
@@ -36,12 +35,6 @@ def test_at_the_floor_nothing_is_explainable():
     assert explain_residual(features, 0.5 * noise, train, ~train, 1.0).share == 0.0
 
 
-def make_residual(values):
-    valid = np.ones(len(values), bool)
-    zeros = np.zeros(len(values))
-    return Residual(values, zeros, zeros, zeros, valid, ((len(values), 100.0),))
-
-
 def test_slow_noise_between_neighbouring_samples_is_not_explainable():
     # A sweep passes each state once, so slow noise looks like a function of the state.
     time = np.linspace(0.0, 1.0, 8000)
@@ -50,24 +43,12 @@ def test_slow_noise_between_neighbouring_samples_is_not_explainable():
     train = np.arange(8000) // 100 % 4 != 2
     structure = 2.0 * np.sin(3.0 * features[:, 1])
     explain = partial(explain_residual, features, train=train, held_out=~train, floor=0.1)
-    by_chance = explain(slow, noise=simulate_slow_noise(make_residual(slow), 0.25))
+    by_chance = explain(slow, noise=simulate_noise(make_residual(slow), 8, 0.25))
     assert by_chance.share > 0.2
     assert by_chance.certain_share < 0.05
     both = slow + 3.0 * structure
-    found = explain(both, noise=simulate_slow_noise(make_residual(both), 0.25))
+    found = explain(both, noise=simulate_noise(make_residual(both), 8, 0.25))
     assert found.share > found.certain_share > 0.5
-
-
-def test_simulated_noise_has_the_power_of_the_residual_in_each_octave_but_other_phases():
-    slow = make_pink_noise(8192, default_rng(4))
-    noise = simulate_slow_noise(make_residual(slow), 20.0)
-    powers = [np.mean(np.abs(np.fft.rfft(values, axis=0)) ** 2, axis=-1) for values in (slow[:, None], noise)]
-    highest = 1638  # 20 Hz of 8192 samples at 100 Hz
-    assert powers[1][highest + 1 :].max() < 1e-12
-    for octave in range(5, 10):
-        bins = slice(2**octave, 2 ** (octave + 1))
-        assert np.mean(powers[1][bins]) == pytest.approx(np.mean(powers[0][bins]), rel=0.3)
-    assert np.abs(np.corrcoef(np.column_stack([slow, noise]).T)[0, 1:]).max() < 0.6
 
 
 def test_features_of_a_recording_are_standardised():

@@ -8,7 +8,9 @@ import pytest
 from identification.gap.fits import Candidate
 from identification.gap.noise import ResidualRegression, settle_unknown_floor
 from identification.gap.noise.noise_model import NoiseModel
+from identification.gap.noise.unpredicted_residual import is_stationary
 from tests.support.candidate_pools import NOISE, RATE, fit_baseline
+from tests.support.noise import make_pink_noise, make_residual
 
 BOUND = 0.7 * NOISE
 """Noise at high frequencies, where the noise is slow."""
@@ -141,3 +143,12 @@ def test_a_line_of_one_size_is_not_the_floor(pool):
     time = np.arange(len(pool.evaluation.force)) / RATE
     line = 3.0 * NOISE * np.sin(2.0 * np.pi * 51.3 * time)
     assert not settle(pool, make_candidate(pool, line + 0.5 * draw_noise(pool))).estimate.is_known
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_blocks_of_slow_noise_scatter_as_those_of_simulated_noise(seed):
+    """Each has few independent samples. One such residual in five was refused with the error of white noise."""
+    noise, nothing = make_pink_noise(25_000, np.random.default_rng(seed)), np.zeros((8, 25_000))
+    assert is_stationary(make_residual(noise, 500.0), float(np.mean(noise**2)), nothing, 0.15)
+    bursts = noise * (1.0 + 4.0 * (np.arange(len(noise)) // 500 % 16 == 0))
+    assert not is_stationary(make_residual(bursts, 500.0), float(np.mean(bursts**2)), nothing, 0.15)

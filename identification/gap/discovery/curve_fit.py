@@ -68,6 +68,11 @@ class FittedCurve:
         return math.log(error) + _VARIABLE_PENALTY * (count + len(self.candidate.fit.effects))
 
     @property
+    def chance(self) -> float:
+        """Difference of two losses that the sampling of the noise alone can produce."""
+        return 0.5 * math.log1p(self.candidate.chance_excess)
+
+    @property
     def values(self) -> tuple[float, ...]:
         """Coefficients of the curve."""
         return self.candidate.fit.active_effects[-1].values

@@ -3,9 +3,14 @@
 A curve is tried at every place and over every variable, with the law alone and with the named effects. The most
 probable one is kept if it closes part of the gap on strokes that no fit used. A formula then replaces the curve if
 it does as well. The remaining residual is searched once more.
+
+Curves at several places may do equally well. The one with the shortest formula is then reported.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, screen_curves
 from identification.gap.discovery.formula_fit import FittedFormula, find_formula
@@ -40,16 +45,56 @@ def discover_effect(pool: CandidatePool, named: Candidate) -> DiscoveredEffect |
         named: the named set; the law alone if none is named.
     """
     parents = [pool.baseline] if not named.names else [pool.baseline, named]
-    found = [f for parent in parents for f in _find_curves(pool, parent)]
-    accepted = [f for f in found if _is_accepted(pool, f)]
-    if not accepted:
+    best = _choose_finding(pool, [f for parent in parents for f in _find_curves(pool, parent)])
+    if best is None:
         return None
-    best = min(accepted, key=lambda f: f.loss)
-    formula = find_formula(pool, best)
-    chosen = pool.refit_all_samples(formula.candidate if formula else best.candidate)
+    chosen = pool.refit_all_samples(best.judged.candidate)
     # The curve that is reported belongs to the law that is reported.
-    reported = best if formula else replace(best, candidate=chosen)
-    return DiscoveredEffect(reported, formula, chosen, _find_further(pool, best))
+    reported = best.fitted if best.formula else replace(best.fitted, candidate=chosen)
+    return DiscoveredEffect(reported, best.formula, chosen, _find_further(pool, best.fitted))
+
+
+class _Finding(NamedTuple):
+    """A fitted curve with its formula."""
+
+    fitted: FittedCurve
+    formula: FittedFormula | None
+    judged: FittedCurve
+    """The same curve with the set of its formula; without a formula, with its own."""
+
+    @property
+    def length(self) -> float:
+        """Number of fitted parameters of the formula; infinite without one."""
+        if self.formula is None:
+            return math.inf
+        return sum(p.lo < p.hi for p in self.formula.file.parameters.values())
+
+
+def _choose_finding(pool: CandidatePool, found: Sequence[FittedCurve]) -> _Finding | None:
+    """Return the curve that is reported; None if no curve closes part of the gap.
+
+    Of several whose errors differ by no more than chance, it is the one with the shortest formula.
+    """
+    accepted = [_Finding(f, None, f) for f in found if _is_accepted(pool, f)]
+    findings = [_find_formula(pool, x.fitted) for x in _select_equal(accepted)]
+    return min(_select_equal(findings), key=lambda x: (x.length, x.judged.loss), default=None)
+
+
+def _select_equal(findings: Sequence[_Finding]) -> list[_Finding]:
+    """Return the findings with the smallest error, or with one that differs from it by no more than chance."""
+    smallest = min((x.judged.loss for x in findings), default=math.inf)
+    return [x for x in findings if x.judged.loss <= smallest + x.judged.chance]
+
+
+def _find_formula(pool: CandidatePool, fitted: FittedCurve) -> _Finding:
+    """Return a curve with its formula, if there is one that closes part of the gap."""
+    formula = find_formula(pool, fitted)
+    if formula is not None:
+        odds = pool.comparison.compute_held_out_evidence(fitted.parent, formula.candidate)
+        judged = replace(fitted, candidate=formula.candidate, log_odds=odds)
+        if _is_accepted(pool, judged):
+            return _Finding(fitted, formula, judged)
+    return _Finding(fitted, None, fitted)
 
 
 def _find_curves(pool: CandidatePool, parent: Candidate) -> list[FittedCurve]:

@@ -8,7 +8,13 @@ import pytest
 from identification.fitting import EffectModel
 from identification.gap.discovery import curve_effects, curve_fit, discover
 from identification.gap.discovery.curve_effects import CurvePlace
-from identification.gap.discovery.discover import _find_further, _is_accepted, discover_effect
+from identification.gap.discovery.discover import (
+    _choose_finding,
+    _find_further,
+    _Finding,
+    _is_accepted,
+    discover_effect,
+)
 from tests.support.candidate_pools import BASELINE_FIT, NOISE
 from tests.support.discoveries import GAIN, GROWING, MOUNTING, define, discovered_with, pool_with
 
@@ -102,6 +108,33 @@ def test_named_effects_that_are_needed_stay(few_places):
     found = discover_effect(pool, named)
     assert found.candidate.names == {"moving_mass", "discovered_effect"}
     assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("losses", "lengths", "chosen"),
+    [
+        ((1.0, 1.02), (3, 1), 1),  # equal but for chance: the shorter formula
+        ((1.0, 1.02), (1, 3), 0),
+        ((1.02, 1.0), (2, 2), 1),  # formulas of one length: the smaller error
+        ((1.0, 1.06), (3, 1), 0),  # more than chance
+        ((1.0, 1.02), (3, None), 0),  # a curve without a formula is longer than any
+        ((1.0, 1.02), (None, None), 0),
+    ],
+)
+def test_of_curves_that_do_equally_well_the_shortest_formula_is_chosen(monkeypatch, losses, lengths, chosen):
+    curves = [SimpleNamespace(loss=loss, chance=0.05) for loss in losses]
+    formulas = dict(zip(map(id, curves), lengths, strict=True))
+
+    def describe(pool, fitted):
+        count = formulas[id(fitted)]
+        parameters = {f"p{k}": SimpleNamespace(lo=0.0, hi=1.0) for k in range(count or 0)}
+        parameters["fixed"] = SimpleNamespace(lo=2.0, hi=2.0)
+        file = SimpleNamespace(parameters=parameters)
+        return _Finding(fitted, SimpleNamespace(file=file) if count else None, fitted)
+
+    monkeypatch.setattr(discover, "_is_accepted", lambda pool, fitted: True)
+    monkeypatch.setattr(discover, "_find_formula", describe)
+    assert _choose_finding(None, curves).fitted is curves[chosen]
 
 
 def make_fitted(*, before=4.0, after=2.0, log_odds=20.0, variables=("displacement",)):

@@ -5,18 +5,26 @@ from identification.gap.noise.explainable_share import FEATURE_VARIABLES, Explai
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.slow_drift import compute_noise_drift, has_drift
 from identification.gap.noise.spectral_line import MAINS_FREQUENCY, find_mains_frequency
-from identification.gap.noise.unpredicted_residual import settle_unknown_floor
+from identification.gap.noise.unpredicted_residual import (
+    CHANCE_DEVIATIONS,
+    compute_scatter,
+    settle_unknown_floor,
+    simulate_scatter,
+)
 
 __all__ = [
+    "CHANCE_DEVIATIONS",
     "FEATURE_VARIABLES",
     "MAINS_FREQUENCY",
     "Explained",
     "NoiseModel",
     "ResidualRegression",
     "compute_noise_drift",
+    "compute_scatter",
     "describe_drift_explanation",
     "find_mains_frequency",
     "has_drift",
     "settle_unknown_floor",
+    "simulate_scatter",
     "subtract_clock_drift",
 ]

@@ -20,7 +20,7 @@ from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.simulated_noise import simulate_noise
 
-_CHANCE_DEVIATIONS = 4.0
+CHANCE_DEVIATIONS = 4.0
 """Standard deviations by which the logarithm of the scatter of blocks hardly differs from that of noise."""
 _NOISE_DRAWS = 16
 """Number of draws of noise of the residual's spectrum."""
@@ -78,20 +78,20 @@ def is_stationary(residual: Residual, square: float, input_squares: Array, block
     if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:
         return False
     runs = _collect_block_squares(residual, np.sqrt(input_squares), block_length)
-    chance, deviation = _simulate_scatter(residual, block_length)
+    chance, deviation = simulate_scatter(residual, block_length)
     scaled = squares / (square + runs.mean(axis=0))
-    pairs = (_compute_scatter(squares), chance), (_compute_scatter(scaled), _expect_scatter(square, runs, chance))
-    return any(abs(math.log(found / expected)) < _CHANCE_DEVIATIONS * deviation for found, expected in pairs)
+    pairs = (compute_scatter(squares), chance), (compute_scatter(scaled), _expect_scatter(square, runs, chance))
+    return any(abs(math.log(found / expected)) < CHANCE_DEVIATIONS * deviation for found, expected in pairs)
 
 
-def _simulate_scatter(residual: Residual, block_length: float) -> tuple[float, float]:
+def simulate_scatter(residual: Residual, block_length: float) -> tuple[float, float]:
     """Return the scatter [1] of blocks of noise with the spectrum of a residual, and its standard deviation.
 
     The deviation is that of the logarithm, at least that of independent blocks of white noise. In slow noise it is
     larger, because a block has few independent samples, and neighbours are alike.
     """
     noise = _collect_block_squares(residual, simulate_noise(residual, _NOISE_DRAWS).T, block_length)
-    logarithms = np.log([_compute_scatter(row) for row in noise])
+    logarithms = np.log([compute_scatter(row) for row in noise])
     least = math.sqrt(2.0 / (noise.shape[1] - 1))
     return math.exp(float(logarithms.mean())), max(float(logarithms.std(ddof=1)), least)
 
@@ -116,7 +116,7 @@ def _expect_scatter(square: float, runs: Array, chance: float) -> float:
     return float(np.mean(variance / (square + mean) ** 2))
 
 
-def _compute_scatter(values: Array) -> float:
+def compute_scatter(values: Array) -> float:
     """Return the variance of some values over their squared mean [1]."""
     return float(np.var(values, ddof=1) / np.mean(values) ** 2)
 

@@ -2,9 +2,12 @@
 
 from bench.csv_import.csv_file import COLUMN_NAMES, DRIVE_KINDS
 from bench.csv_import.importer import import_recordings
+from bench.csv_import.units import REVERSIBLE_COLUMNS, UNITS
 
 __all__ = [
     "COLUMN_NAMES",
     "DRIVE_KINDS",
+    "REVERSIBLE_COLUMNS",
+    "UNITS",
     "import_recordings",
 ]

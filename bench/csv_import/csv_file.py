@@ -1,5 +1,7 @@
 """CSV recordings: ``time_s, displacement_m, force_n`` and one of ``voltage_v | current_a``.
 
+Headers, units and senses may differ from those of a log; they are stated by the user and converted here.
+
 numpy parses the whole table. Only if that fails, or a value is invalid, the file is read again line by line to
 find the cell at fault.
 """
@@ -17,6 +19,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from bench.csv_import.units import Conversion
 from bench.errors import RecordingError
 
 Array = npt.NDArray[np.float64]
@@ -61,13 +64,19 @@ class CsvRecording:
         return 1e9 / float(np.median(np.diff(self.time_ns)))
 
 
-def read_csv(path: Path, headers: Mapping[str, str] | None = None, drive_kind: str | None = None) -> CsvRecording:
+def read_csv(
+    path: Path,
+    headers: Mapping[str, str] | None = None,
+    drive_kind: str | None = None,
+    conversions: Mapping[str, Conversion] | None = None,
+) -> CsvRecording:
     """Read and check one file.
 
     Args:
         path: CSV file, plain or compressed by gzip; the first line contains the headers.
         headers: header in the file by column name, where they differ.
         drive_kind: one of `DRIVE_KINDS`; selects the drive if the file has both.
+        conversions: of columns whose unit or sense differs, by column name.
 
     Raises:
         RecordingError: the file cannot be read, a column is missing, a cell is not a finite number, time does not
@@ -75,7 +84,7 @@ def read_csv(path: Path, headers: Mapping[str, str] | None = None, drive_kind: s
     """
     lines = _read_lines(path)
     columns = _find_columns(path, lines[0], headers or {}, drive_kind)
-    table = _parse_table(path, lines, columns)
+    table = _convert(path, _parse_table(path, lines, columns), conversions or {})
     time_ns = np.round((table["time_s"] - table["time_s"][0]) * 1e9).astype(np.int64)
     if (np.diff(time_ns) <= 0).any():
         row = int(np.argmax(np.diff(time_ns) <= 0)) + 1
@@ -172,6 +181,15 @@ def _parse_table(path: Path, lines: Sequence[str], columns: Mapping[str, int]) -
             f"{path.name}, row {last}: {len(table)} samples, fewer than {MIN_SAMPLES}; record for longer"
         )
     return {name: np.ascontiguousarray(table[:, i]) for i, name in enumerate(columns)}
+
+
+def _convert(path: Path, table: Mapping[str, Array], conversions: Mapping[str, Conversion]) -> dict[str, Array]:
+    """Return the columns in the units and senses of a log."""
+    for name in conversions:
+        if name not in table:
+            reason = f"no column {name}, whose unit or sense was given; leave that out"
+            raise RecordingError(f"{path.name}, row 1: {reason}")
+    return {**table, **{name: conversion.apply(table[name]) for name, conversion in conversions.items()}}
 
 
 def _find_line_numbers(lines: Sequence[str]) -> list[int]:

@@ -1,7 +1,7 @@
 """Import of CSV files into one log, one after the other on one clock."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Literal
@@ -12,9 +12,13 @@ import numpy.typing as npt
 from bench.csv_import.csv_file import DRIVE_KINDS, CsvRecording, read_csv
 from bench.csv_import.segmentation import find_segments, make_segment_names
 from bench.csv_import.stretch import ImportedSegment, write_stretch
+from bench.csv_import.units import make_conversions
 from bench.errors import RecordingError
 from bench.log import NS_PER_SECOND, ChannelInfo, LogWriter, RunHeader, smooth_velocity, write_atomically
 
+_LONGEST_TRAVEL = 2.0
+"""Travel above which the displacement was probably recorded in another unit [m]."""
+_MILLIMETRES = "import with --unit displacement_m=mm"
 FILE_GAP_NS = NS_PER_SECOND
 """Time [ns] from the last sample of a file to the first of the next."""
 
@@ -25,6 +29,8 @@ def import_recordings(
     headers: Mapping[str, str] | None = None,
     drive_kind: str | None = None,
     specimen: str = "unknown",
+    units: Mapping[str, str] | None = None,
+    reversed_columns: Collection[str] = (),
 ) -> str:
     """Write a log from files, or no log if one of them is refused.
 
@@ -34,15 +40,18 @@ def import_recordings(
         headers: header in the files by column name, where they differ.
         drive_kind: one of `csv_file.DRIVE_KINDS`; by default ``driver_command_v`` or ``coil_a``, by unit.
         specimen: damper under test, with its serial number.
+        units: unit in the files by column name, where it differs.
+        reversed_columns: names of columns that are recorded in the opposite sense.
 
     Returns:
         Summary of the log as text.
 
     Raises:
-        RecordingError: a file is refused, or the units of the drives differ.
+        RecordingError: a file or a unit is refused, or the units of the drives differ.
         LogError: the log cannot be written.
     """
-    recordings = [read_csv(path, headers, drive_kind) for path in files]
+    conversions = make_conversions(units or {}, reversed_columns)
+    recordings = [read_csv(path, headers, drive_kind, conversions) for path in files]
     unit = _check_drive_unit(recordings, files, drive_kind)
     use_velocity = all(recording.velocity is not None for recording in recordings)
     header = _make_header(recordings, unit, drive_kind, specimen, use_velocity)
@@ -69,6 +78,9 @@ def _collect_notes(recordings: Sequence[CsvRecording], use_velocity: bool) -> li
         steps = np.diff(recording.time_ns) / NS_PER_SECOND
         if np.max(steps) > 1.5 * np.median(steps):
             notes.append(f"{recording.name}: time steps from {np.min(steps):.3g} to {np.max(steps):.3g} s")
+        travel = float(np.ptp(recording.displacement))
+        if travel > _LONGEST_TRAVEL:
+            notes.append(f"{recording.name}: the travel is {travel:.3g} m; if these are mm, {_MILLIMETRES}")
     return notes
 
 

@@ -61,6 +61,7 @@ def test_the_version_is_printed(tmp_path):
         ("identify", "run.mcap", "--out", "fit.json", "--hold-out-after", "2"),
         ("import", "a.csv", "--out", "run.mcap", "--column", "force"),
         ("import", "a.csv", "--out", "run.mcap", "--drive-kind", "hand"),
+        ("import", "a.csv", "--out", "run.mcap", "--unit", "mm"),
         ("predict", "fit.json"),
         ("report", "run.mcap"),
         ("report", "run.mcap", "--out", "-"),

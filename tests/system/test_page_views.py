@@ -11,7 +11,9 @@ from tests.support.page_in_browser import browser_test, operate_page
 @pytest.fixture(scope="module")
 def seen():
     """Return what a person with bookmarks sees in each view."""
-    return operate_page(FakeBench(), "open_views.mjs")
+    bench = FakeBench()
+    found = operate_page(bench, "open_views.mjs")
+    return found | {"uploads": [fields for path, fields in bench.posted if path == "logs"]}
 
 
 @browser_test
@@ -102,3 +104,11 @@ def test_recordings_are_imported_by_a_button_and_by_dropping_them_onto_a_view(se
     assert seen["uploadLeft"]
     assert seen["dropped"].splitlines() == ["one.csv, 0.0 MB", "two.csv, 0.0 MB"]
     assert seen["imported"] == ["MR-0099, one, two", "#/runs/run-5"]
+
+
+@browser_test
+def test_units_and_senses_of_imported_files_are_sent_where_they_differ(seen):
+    assert seen["uploads"] == [
+        {"unit": None, "reverse": None},
+        {"unit": ["displacement_m=mm", "force_n=kN"], "reverse": ["force_n"]},
+    ]

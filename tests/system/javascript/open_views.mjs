@@ -61,9 +61,11 @@ async function importFiles() {
   await page.locator("#import").focus();
   await page.keyboard.press("Enter");
   await page.setInputFiles("#upload-files", { name: "bad.csv", mimeType: "text/csv", buffer: Buffer.from("force_n\nmuch\n") });
-  await page.locator("#upload-specimen").focus();
+  await page.locator("#upload-units").waitFor();
+  await page.locator("#upload-units summary").click();
   seen.violations.upload = await audit();
   seen.small.upload = await findSmall();
+  await page.locator("#upload-specimen").focus();
   await page.keyboard.press("Enter");
   await hasText("#upload-note", "Not imported");
   seen.refusedImport = await page.locator("#upload-note").innerText();
@@ -72,6 +74,9 @@ async function importFiles() {
   await drop(["one.csv", "two.csv"]);
   seen.dropped = await page.locator("#upload-list").innerText();
   await page.fill("#upload-specimen", "MR-0099");
+  await page.selectOption("#upload-displacement", { label: "mm" });
+  await page.selectOption("#upload-force", { label: "kN" });
+  await page.getByLabel("Force is positive in compression").check();
   await page.click("#upload-start");
   await hasText("#run", "import of a recording made elsewhere");
   seen.imported = [await shownTitle(), new URL(page.url()).hash];

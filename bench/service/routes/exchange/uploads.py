@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, File, Form, Response, UploadFile
 
 from bench.catalogue import RunRow
-from bench.csv_import import COLUMN_NAMES
+from bench.csv_import import COLUMN_NAMES, REVERSIBLE_COLUMNS, UNITS
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import make_conflict
 from bench.service.requests import IDEMPOTENT, IdempotentRoute
@@ -17,6 +17,9 @@ from bench.service.views import Run
 router = APIRouter(prefix="/logs", tags=["runs"], route_class=IdempotentRoute)
 _DriveKind = Literal["driver_command_v", "coil_v", "coil_a"]
 _Column = Annotated[str, Form(pattern=rf"^({'|'.join(COLUMN_NAMES)})=[^\x00]+$", max_length=200)]
+_UNIT_PAIRS = "|".join(f"{name}={unit}" for name, units in UNITS.items() for unit in units)
+_Unit = Annotated[str, Form(pattern=f"^({_UNIT_PAIRS})$")]
+_Reversed = Annotated[str, Form(pattern=f"^({'|'.join(REVERSIBLE_COLUMNS)})$")]
 
 
 @router.post("", status_code=201, dependencies=[IDEMPOTENT])
@@ -34,6 +37,12 @@ async def upload_recording(
     column: Annotated[
         list[_Column] | None, Form(description="NAME=HEADER where the header of a CSV file differs")
     ] = None,
+    unit: Annotated[
+        list[_Unit] | None, Form(description="NAME=UNIT where the unit of a column of CSV files differs")
+    ] = None,
+    reverse: Annotated[
+        list[_Reversed] | None, Form(description="columns of CSV files that are recorded in the opposite sense")
+    ] = None,
 ) -> Run:
     """Take a recording into the data folder; it is catalogued, identified and diagnosed as a recorded run.
 
@@ -42,6 +51,7 @@ async def upload_recording(
     """
     options = [f"--drive-kind={drive_kind}"] if drive_kind else []
     options += [f"--column={pair}" for pair in column or []]
+    options += [f"--unit={pair}" for pair in unit or []] + [f"--reverse={name}" for name in reverse or []]
     row = await _take(context, file, options, specimen)
     response.headers["Location"] = f"/api/v1/runs/{row.id}"
     return (await asyncio.to_thread(context.make_run_views, row))[0]

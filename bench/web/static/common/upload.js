@@ -14,6 +14,13 @@ function group(files) {
   return [...files.filter(isLog).map((file) => [file]), ...(tables.length ? [tables] : [])];
 }
 
+/** Adds to a form what holds for all CSV files: specimen, and units and senses that differ from those of a log. */
+function describeTables(form) {
+  const specimen = byId("upload-specimen").value.trim();
+  if (specimen) form.append("specimen", specimen);
+  for (const { name, value } of byId("upload-units").querySelectorAll("select, input:checked")) if (value) form.append(name, value);
+}
+
 export class UploadDialog {
   /** Takes a function that receives each new run. */
   constructor({ onRun }) {
@@ -65,8 +72,7 @@ export class UploadDialog {
   async send(files) {
     const form = new FormData();
     for (const file of files) form.append("file", file);
-    const specimen = byId("upload-specimen").value.trim();
-    if (!isLog(files[0]) && specimen) form.append("specimen", specimen);
+    if (!isLog(files[0])) describeTables(form);
     const run = await upload("logs", form, (fraction) => this.showProgress(fraction));
     this.onRun(run);
     this.choose(this.files.filter((file) => !files.includes(file)));

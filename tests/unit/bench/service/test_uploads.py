@@ -77,6 +77,7 @@ def test_a_truncated_log_is_taken_and_can_be_repaired(service, client, tmp_path)
         ([("a.csv", make_csv(force="much"))], {}, "a.csv, row 2, column force_n: 'much' is not a number"),
         ([("a.csv", make_csv()), ("b.csv", make_csv(150))], {}, "b.csv, row 151: 150 samples, fewer than 200"),
         ([("a.csv", make_csv())], {"column": "force_n=LOAD"}, "a.csv, row 1: no column LOAD"),
+        ([("a.csv", make_csv())], {"unit": "current_a=mA"}, "a.csv, row 1: no column current_a, whose unit"),
         ([("a.mcap", b"no log")], {}, "a.mcap: not an MCAP file"),
         ([("a.mcap", b""), ("b.csv", make_csv())], {}, "2 files with a log among them"),
         ([("a.mcap", b"")], {"specimen": "damper 7"}, "a log names its specimen and columns itself"),
@@ -102,6 +103,8 @@ def test_the_refusal_of_a_command_in_a_process_is_its_last_line(service, client)
 def test_invalid_fields_are_refused(client):
     assert upload(client, ("a.csv", make_csv()), drive_kind="watt").status_code == 422
     assert upload(client, ("a.csv", make_csv()), column="mass=m").status_code == 422
+    assert upload(client, ("a.csv", make_csv()), unit="force_n=stone").status_code == 422
+    assert upload(client, ("a.csv", make_csv()), reverse="time_s").status_code == 422
     assert client.post("/api/v1/logs", data={"specimen": "damper 7"}).status_code == 422
 
 

@@ -520,13 +520,7 @@ def upload_routes(bench: FakeBench) -> APIRouter:
     router = APIRouter()
 
     @router.post("/logs", status_code=201)
-    async def take(
-        file: list[UploadFile],
-        specimen: Annotated[str, Form()] = "",
-        unit: Annotated[list[str] | None, Form()] = None,
-        reverse: Annotated[list[str] | None, Form()] = None,
-    ) -> Any:
-        bench.posted.append(("logs", {"unit": unit, "reverse": reverse}))
+    async def take(file: list[UploadFile], specimen: Annotated[str, Form()] = "") -> Any:
         if b"much" in await file[0].read():
             return problem(422, "The recording was refused", BAD_CELL)
         method = ", ".join(Path(one.filename or "").stem for one in file)

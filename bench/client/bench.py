@@ -2,7 +2,7 @@
 
 import math
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 from bench.client.campaign import Campaign
 from bench.client.errors import ClientError
 from bench.client.live import LiveSamples, iterate_live
+from bench.client.multipart import Field
 from bench.client.run import Run, RunState, parse_run_state
 from bench.client.session import Session, quote_name
 
@@ -110,6 +111,36 @@ class Bench:
             **self._choice,
         }
         return self.run(str(self._session.post("/runs", request, key=uuid.uuid4().hex)["id"]))
+
+    def import_files(
+        self,
+        *files: Path | str,
+        specimen: str = "",
+        drive_kind: str | None = None,
+        columns: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
+        reversed_columns: Iterable[str] = (),
+    ) -> Run:
+        """Import recordings of another machine as one run; it is identified and diagnosed as a recorded one.
+
+        Args:
+            files: CSV files, each a stretch of the run, or one log.
+            specimen: serial number of the damper; a log names its own.
+            drive_kind: driver_command_v, coil_v or coil_a; by default by the unit of the drive.
+            columns: header in the files by column name, where they differ.
+            units: unit in the files by column name, such as ``{"displacement_m": "mm"}``.
+            reversed_columns: names of columns that are recorded in the opposite sense.
+
+        Raises:
+            ClientError: a file cannot be read or is refused, or the service cannot be reached.
+        """
+        fields: list[Field] = [("file", Path(file)) for file in files]
+        fields += [("specimen", specimen)] if specimen else []
+        fields += [("drive_kind", drive_kind)] if drive_kind else []
+        fields += [("column", f"{name}={header}") for name, header in (columns or {}).items()]
+        fields += [("unit", f"{name}={unit}") for name, unit in (units or {}).items()]
+        fields += [("reverse", name) for name in reversed_columns]
+        return self.run(str(self._session.upload("/logs", fields, uuid.uuid4().hex)["id"]))
 
     def start_campaign(self, campaign: Mapping[str, Any], operator: str = "") -> Campaign:
         """Start a campaign and return it; it continues if the script ends.

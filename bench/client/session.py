@@ -3,7 +3,7 @@
 import json
 import shutil
 import ssl
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from http.client import HTTPException
 from pathlib import Path
@@ -16,10 +16,13 @@ from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
 from bench.client.errors import ClientError
+from bench.client.multipart import Field, MultipartBody
 from bench.log import write_atomically
 
 _TIMEOUT = 30.0
 """Longest time [s] for one reply."""
+_UPLOAD_TIMEOUT = 600.0
+"""Longest time [s] for the reply to an upload, which is imported before."""
 _CHANNELS_HEADER = "X-Mrbench-Channels"
 """Header of binary samples with name and unit of each channel."""
 _TOKEN_FIELD = "token="
@@ -79,6 +82,20 @@ class Session:
         """
         return self._send("POST", path, b"" if content is None else json.dumps(content).encode(), key)
 
+    def upload(self, path: str, fields: Sequence[Field], key: str) -> Any:
+        """Return the reply to POST of fields and files, decoded from JSON.
+
+        Args:
+            path: path below ``/api/v1``.
+            fields: names with texts or files.
+            key: idempotency key, as for `post`.
+
+        Raises:
+            ClientError: a file cannot be read, or the service refuses or cannot be reached.
+        """
+        body = MultipartBody(fields)
+        return self._send("POST", path, body, key, body.headers, _UPLOAD_TIMEOUT)
+
     def patch(self, path: str, content: Mapping[str, Any], key: str | None = None) -> Any:
         """Return the reply to PATCH, decoded from JSON; path, content and key as for `post`.
 
@@ -113,19 +130,27 @@ class Session:
                 raise ClientError(f"{to}: {received} of {announced} bytes of {path} arrived; repeat the download")
         return to
 
-    def _send(self, method: str, path: str, body: bytes, key: str | None) -> Any:
-        if key is None:
-            return self._send_once(method, path, body, {})
-        headers = {"Idempotency-Key": key}
+    def _send(
+        self,
+        method: str,
+        path: str,
+        body: Iterable[bytes] | bytes,
+        key: str | None,
+        headers: Mapping[str, str] | None = None,
+        timeout: float = _TIMEOUT,
+    ) -> Any:
+        given = {**(headers or {}), **({} if key is None else {"Idempotency-Key": key})}
         try:
-            return self._send_once(method, path, body, headers)
+            return self._send_once(method, path, body, given, timeout)
         except ClientError as error:
-            if error.status is not None:
+            if key is None or error.status is not None:
                 raise
-            return self._send_once(method, path, body, headers)
+            return self._send_once(method, path, body, given, timeout)
 
-    def _send_once(self, method: str, path: str, body: bytes, headers: Mapping[str, str]) -> Any:
-        with self._request(method, path, body, headers) as reply:
+    def _send_once(
+        self, method: str, path: str, body: Iterable[bytes] | bytes, headers: Mapping[str, str], timeout: float
+    ) -> Any:
+        with self._request(method, path, body, headers, timeout) as reply:
             try:
                 content: bytes = reply.read()
             except (OSError, HTTPException) as error:
@@ -154,12 +179,17 @@ class Session:
             raise ClientError(f"the service at {self._base} does not reply to {path}: {reason}") from error
 
     def _request(
-        self, method: str, path: str, content: bytes | None = None, headers: Mapping[str, str] | None = None
+        self,
+        method: str,
+        path: str,
+        content: Iterable[bytes] | bytes | None = None,
+        headers: Mapping[str, str] | None = None,
+        timeout: float = _TIMEOUT,
     ) -> Any:
         given = {"Authorization": f"Bearer {self._token}", "Content-Type": "application/json", **(headers or {})}
         request = Request(self._base + path, content, given, method=method)
         try:
-            return urlopen(request, timeout=_TIMEOUT, context=self._tls)
+            return urlopen(request, timeout=timeout, context=self._tls)
         except HTTPError as error:
             with error:
                 raise _make_refusal(path, error) from None

@@ -11,6 +11,7 @@ import pytest
 from bench.catalogue import compute_sha256
 from bench.client import Bench, ClientError, RunState
 from tests.support.certificates import make_certificate
+from tests.support.logs import csv_columns, write_csv
 from tests.support.service_logs import write_complete_log, write_truncated_log
 
 TIMEOUT = 20.0
@@ -37,6 +38,41 @@ def test_three_lines_return_a_run_as_arrays_with_units(service, bench):
     assert set(arrays) == set(arrays.units)
     assert len({len(values) for values in arrays.values()}) == 1
     assert "1000 samples: time [s]" in repr(arrays)
+
+
+def test_recordings_of_another_machine_become_a_run(bench, tmp_path):
+    columns = csv_columns()
+    foreign = {
+        "Zeit": 1e3 * columns["time_s"],
+        "displacement_m": 1e3 * columns["displacement_m"],
+        "force_n": -1e-3 * columns["force_n"],
+        "voltage_v": columns["voltage_v"],
+    }
+    files = [write_csv(tmp_path / name, foreign) for name in ('tag "eins".csv', "zwölf.csv")]
+    run = bench.import_files(
+        *files,
+        specimen="MR-7",
+        drive_kind="coil_v",
+        columns={"time_s": "Zeit"},
+        units={"time_s": "ms", "displacement_m": "mm", "force_n": "kN"},
+        reversed_columns=["force_n"],
+    )
+    state = run.get_state()
+    assert (state.specimen, state.state) == ("MR-7", "ended")
+    assert "zwölf" in state.method
+    arrays = run.arrays()
+    count = len(columns["force_n"])
+    np.testing.assert_allclose(arrays["force"][:count], columns["force_n"], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(arrays["displacement"][:count], columns["displacement_m"], rtol=1e-6, atol=1e-9)
+
+
+def test_a_file_that_is_refused_or_cannot_be_read_is_named(bench, tmp_path):
+    path = write_csv(tmp_path / "a.csv", csv_columns())
+    with pytest.raises(ClientError, match=r"a\.csv, row 1: no column current_a, whose unit or sense was given"):
+        bench.import_files(path, units={"current_a": "mA"})
+    with pytest.raises(ClientError, match=r"b\.csv: no such file or directory; nothing was imported"):
+        bench.import_files(path, tmp_path / "b.csv")
+    assert bench.list_runs() == []
 
 
 def test_a_run_is_started_watched_and_stopped(service, bench):

@@ -1,5 +1,6 @@
 """Setup steps before a run, on the wires of the simulated rig."""
 
+import re
 import subprocess
 
 import pytest
@@ -70,7 +71,9 @@ def test_setup_from_an_empty_rig_to_a_centred_specimen(bench):
     results = [prepare(bench, *step) for step in steps]
     assert [code for code, _ in results] == [0] * 5, results
     assert [words.split(":")[0] for _, words in results] == ["homed", "homed", "mounted", "mounted", "centred"]
-    assert "10.0" in results[3][1]
+    shown = re.search(r"the rod is at ([\d.]+) mm", results[3][1])
+    assert shown is not None, results[3]
+    assert float(shown[1]) == pytest.approx(10.0, abs=0.05)
     assert bench.truth().position[-1] == pytest.approx(0.01, abs=1e-4)
     assert status(bench).reference_state == "centred"
 

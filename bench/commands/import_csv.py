@@ -51,7 +51,9 @@ def import_csv(
     units = _parse_pairs(unit or [], "UNIT", COLUMN_NAMES)
     if drive_kind is not None and drive_kind not in DRIVE_KINDS:
         raise typer.BadParameter(f"{drive_kind!r} is not one of {', '.join(DRIVE_KINDS)}")
-    summary = import_recordings(files, out, headers, drive_kind, specimen, units, reverse or [])
+    summary = import_recordings(
+        files, out, headers, drive_kind, specimen, units=units, reversed_columns=reverse or []
+    )
     typer.echo(f"{out}: {summary}", err=True)
 
 

@@ -18,7 +18,6 @@ from bench.log import NS_PER_SECOND, ChannelInfo, LogWriter, RunHeader, smooth_v
 
 _LONGEST_TRAVEL = 2.0
 """Travel above which the displacement was probably recorded in another unit [m]."""
-_MILLIMETRES = "import with --unit displacement_m=mm"
 FILE_GAP_NS = NS_PER_SECOND
 """Time [ns] from the last sample of a file to the first of the next."""
 
@@ -80,7 +79,8 @@ def _collect_notes(recordings: Sequence[CsvRecording], use_velocity: bool) -> li
             notes.append(f"{recording.name}: time steps from {np.min(steps):.3g} to {np.max(steps):.3g} s")
         travel = float(np.ptp(recording.displacement))
         if travel > _LONGEST_TRAVEL:
-            notes.append(f"{recording.name}: the travel is {travel:.3g} m; if these are mm, {_MILLIMETRES}")
+            advice = "if these are mm, import with --unit displacement_m=mm"
+            notes.append(f"{recording.name}: the travel is {travel:.3g} m; {advice}")
     return notes
 
 

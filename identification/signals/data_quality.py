@@ -203,7 +203,7 @@ def _check_passivity(stretches: Sequence[Stretch]) -> None:
         raise UnusableDataError(
             "the force drives the motion instead of resisting it (correlation with the velocity "
             f"{correlation:.2f}): one of the two has the wrong sign; extension and tension are positive. "
-            "A file of another machine can be imported with --reverse force_n"
+            "`mrbench import --reverse force_n` reverses a recording of another machine"
         )
 
 

@@ -74,7 +74,7 @@ def make_basis(values: Array, warp: Warp) -> CurveBasis:
 
 
 def make_periodic_basis(period: float) -> CurveBasis:
-    """Return a basis of curves with a period, whose curvature is as probable as that of other curves."""
+    """Return a Fourier basis with a period; the size of harmonic k is 1 / k², so all have the same curvature."""
     angle = np.linspace(0.0, 2.0 * np.pi, _GRID_POINTS, endpoint=False)
     orders = range(1, _HARMONICS + 1)
     waves = [wave(k * angle) / k**2 for k in orders for wave in (np.sin, np.cos)]

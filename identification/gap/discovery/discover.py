@@ -76,7 +76,7 @@ def _choose_finding(pool: CandidatePool, found: Sequence[FittedCurve]) -> _Findi
     Of several whose errors differ by no more than chance, it is the one with the shortest formula.
     """
     accepted = [_Finding(f, None, f) for f in found if _is_accepted(pool, f)]
-    findings = [_find_formula(pool, x.fitted) for x in _select_equal(accepted)]
+    findings = [_add_formula(pool, x.fitted) for x in _select_equal(accepted)]
     return min(_select_equal(findings), key=lambda x: (x.length, x.judged.loss), default=None)
 
 
@@ -86,8 +86,8 @@ def _select_equal(findings: Sequence[_Finding]) -> list[_Finding]:
     return [x for x in findings if x.judged.loss <= smallest + x.judged.chance]
 
 
-def _find_formula(pool: CandidatePool, fitted: FittedCurve) -> _Finding:
-    """Return a curve with its formula, if there is one that closes part of the gap."""
+def _add_formula(pool: CandidatePool, fitted: FittedCurve) -> _Finding:
+    """Return a curve with its formula, or without one if none closes part of the gap."""
     formula = find_formula(pool, fitted)
     if formula is not None:
         odds = pool.comparison.compute_held_out_evidence(fitted.parent, formula.candidate)

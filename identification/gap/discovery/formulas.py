@@ -48,6 +48,8 @@ class Formula:
         return self.text.replace("z", variable)
 
 
+_FIRST_HARMONIC = "a*sin(z/s)+b*sin(1.5707963+z/s)"
+
 FORMULAS: tuple[Formula, ...] = (
     Formula("a*z", {"a": 1}),
     Formula("a*z**2", {"a": 2}),
@@ -75,11 +77,10 @@ FORMULAS: tuple[Formula, ...] = (
     Formula("a*(abs(z-m)+z-m)+b*(abs(l-z)+l-z)", {"a": 1, "b": 1}, {"m": "position", "l": "position"}),
     Formula("a*tanh((z-m)/s)", {"a": 0}, {"m": "position", "s": "scale"}),
     Formula("a*exp(-((z-m)/s)**2)", {"a": 0}, {"m": "position", "s": "scale"}),
-    Formula("a*sin(z/s)+b*sin(1.5707963+z/s)", {"a": 0, "b": 0}, {"s": "scale"}),
+    Formula(_FIRST_HARMONIC, {"a": 0, "b": 0}, {"s": "scale"}),
 )
 """Expressions that are tried, the shortest first."""
 
-_FIRST_HARMONIC = "a*sin(z/s)+b*sin(1.5707963+z/s)"
 PERIODIC_FORMULAS: tuple[Formula, ...] = (
     Formula(_FIRST_HARMONIC, {"a": 0, "b": 0}, {"s": "scale"}),
     *(

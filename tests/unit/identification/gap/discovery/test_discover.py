@@ -133,7 +133,7 @@ def test_of_curves_that_do_equally_well_the_shortest_formula_is_chosen(monkeypat
         return _Finding(fitted, SimpleNamespace(file=file) if count else None, fitted)
 
     monkeypatch.setattr(discover, "_is_accepted", lambda pool, fitted: True)
-    monkeypatch.setattr(discover, "_find_formula", describe)
+    monkeypatch.setattr(discover, "_add_formula", describe)
     assert _choose_finding(None, curves).fitted is curves[chosen]
 
 

@@ -147,7 +147,7 @@ def test_a_line_of_one_size_is_not_the_floor(pool):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_blocks_of_slow_noise_scatter_as_those_of_simulated_noise(seed):
-    """Each has few independent samples. One such residual in five was refused with the error of white noise."""
+    """Each has few independent samples. One such residual in six was refused with the error of white noise."""
     noise, nothing = make_pink_noise(25_000, np.random.default_rng(seed)), np.zeros((8, 25_000))
     assert is_stationary(make_residual(noise, 500.0), float(np.mean(noise**2)), nothing, 0.15)
     bursts = noise * (1.0 + 4.0 * (np.arange(len(noise)) // 500 % 16 == 0))

@@ -25,17 +25,14 @@ from identification.simulate.motion import DamperMotion
 from identification.simulate.scaling import ScaleFactors
 from identification.simulate.step import (
     GAMMA,
-    MAX_ITERATIONS,
-    MAX_MOVE,
     RATE_WEIGHT,
-    TOLERANCE,
     WEIGHT_STAGE,
     WEIGHT_START,
     choose_steps,
     compute_hysteresis_rate,
-    differentiate_hysteresis_rate,
     evaluate_coefficient,
     interpolate_parabola,
+    solve_hysteresis,
 )
 
 FIXED_COUNT, INPUT_COUNT = 17, 7
@@ -188,17 +185,7 @@ def _solve_linearised(
     constant, slope = (c0 * Xk / w + k0 * yk + rho * q) * inverse, -F * inverse
     slip0 = (constant - Xk) / w - (rho - stiffness * constant) / c1
     slip1 = slope / w + stiffness * slope / c1
-    A = 1.0 / p[2]
-    beta = p[3] * A
-    for _ in range(MAX_ITERATIONS):
-        slip = slip0 + slip1 * zeta
-        rate = compute_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
-        over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, A - beta, p[4])
-        derivative = 1.0 - w * (over_zeta + over_slip * slip1)
-        move = (zk + w * rate - zeta) / max(derivative, 0.2)
-        zeta += min(max(move, -MAX_MOVE), MAX_MOVE)
-        if abs(move) < TOLERANCE:
-            break
+    zeta = solve_hysteresis(p, zk, w, slip0, slip1, zeta)
     X = constant + slope * zeta
     return yk + w * (rho - stiffness * X) / c1, zeta, X
 

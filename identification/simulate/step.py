@@ -107,6 +107,36 @@ def choose_steps(
 
 
 @njit_inline
+def solve_hysteresis(s: Array, zeta_known: float, weight: float, slip0: float, slip1: float, zeta: float) -> float:
+    """Solve zeta = known + weight * rate for a slip of ``slip0 + slip1 * zeta``, from ``zeta``.
+
+    This is Newton's method in a bracket. At a zeta of 1 or -1 its rate points inwards, whatever the slip. A
+    solution therefore lies between them, or between one of them and a known part beyond it. Without the bracket
+    the method can leave this range for good. An example is a compliant mount linearised far from its elongation.
+    """
+    A = 1.0 / s[2]
+    beta = s[3] * A
+    gamma = A - beta
+    low, high = min(-1.0, zeta_known), max(1.0, zeta_known)
+    for _ in range(MAX_ITERATIONS):
+        slip = slip0 + slip1 * zeta
+        rate = compute_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
+        over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
+        error = zeta_known + weight * rate - zeta
+        # Just after a reversal the derivative may be small or negative. A bounded change passes this region.
+        move = error / max(1.0 - weight * (over_zeta + over_slip * slip1), 0.2)
+        if abs(move) < TOLERANCE:
+            return float(zeta + move)
+        if error > 0.0:
+            low = max(low, zeta)
+        else:
+            high = min(high, zeta)
+        moved = zeta + min(max(move, -MAX_MOVE), MAX_MOVE)
+        zeta = moved if low <= moved <= high else 0.5 * (low + high)
+    return float(zeta)
+
+
+@njit_inline
 def solve_stage(
     s: Array, x: float, v: float, u: float, y_known: float, zeta_known: float, weight: float, zeta: float
 ) -> tuple[float, float]:
@@ -116,19 +146,8 @@ def solve_stage(
     inverse = 1.0 / (both + weight * s[9])
     constant = (both * y_known + weight * (c0 * v + s[9] * x)) * inverse
     slope = weight * evaluate_coefficient(s[0], s[1], u) * inverse
-    A = 1.0 / s[2]
-    beta = s[3] * A
-    gamma = A - beta
-    for _ in range(MAX_ITERATIONS):
-        slip = v - (constant + slope * zeta - y_known) / weight
-        rate = compute_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
-        over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
-        derivative = 1.0 - weight * over_zeta + over_slip * slope
-        # Just after a reversal the derivative may be small or negative. A bounded change passes this region.
-        move = (zeta_known + weight * rate - zeta) / max(derivative, 0.2)
-        zeta += min(max(move, -MAX_MOVE), MAX_MOVE)
-        if abs(move) < TOLERANCE:
-            break
+    slip0 = v - (constant - y_known) / weight
+    zeta = solve_hysteresis(s, zeta_known, weight, slip0, -slope / weight, zeta)
     return constant + slope * zeta, zeta
 
 

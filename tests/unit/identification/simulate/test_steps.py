@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from identification.damper import Coordinates
+from identification.damper.effects import EFFECTS
+from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
 from identification.simulate.compliant_mount import (
     _choose_elongation,
     choose_sample_steps,
@@ -114,3 +117,20 @@ def test_the_cell_shows_the_spring_and_the_film_of_the_connection():
 def test_on_a_compliant_mount_the_damper_may_reach_the_speed_of_the_actuator_in_a_sample(X_rate, steps):
     at = np.array([inputs(x=0.0), inputs(x=1e-4)]).T.copy()
     assert choose_sample_steps(0.1, mounting(), at, H, 0, X_rate, 0.08, 0.0, 0.0) == steps
+
+
+def test_a_hardening_mount_at_a_coarse_step_stays_near_the_rigid_one():
+    # A stage starts from an elongation that is far too large. Newton's
+    # method alone then left the range of zeta, and the force grew to 1e12 N.
+    law = Coordinates(
+        F_a=70.7e3, F_b=17e3, D_y=2.2e-3, rho=0.98, n=4.1, eta=8.3, c0_a=695e3, c0_b=-15e3, c1_a=4.5e6, c1_b=16e3,
+        k0=481e3, k1=174e3, f0=140e3,
+    )  # fmt: skip
+    w, t = 2.0 * np.pi * 0.25, 0.08 * np.arange(200)
+    x, v = 0.1 * np.sin(w * t), 0.1 * w * np.cos(w * t)
+    stroke = Excitation(12.5, x, v, -(w**2) * x, np.zeros(len(t)))
+    mount = ActiveEffect(EFFECTS["fixture_compliance"], (9.2e-9, 1e6), "stiffening")
+    found = simulate(SimulationModel(law, effects=(mount,)), stroke)
+    rigid = simulate(SimulationModel(law), stroke)
+    assert np.abs(found.zeta).max() < 1.1
+    assert (found.force - rigid.force).std() < 0.05 * rigid.force.std()

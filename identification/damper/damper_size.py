@@ -2,8 +2,9 @@
 
 The library states its bounds, scales and starts for a laboratory damper. For a damper of another size they follow
 the dimension of the unit: a force grows with the damper's force, a time derivative with its velocity over its
-length. A time of electronics or flow does not belong to the size, and keeps its value. A time of a slow change,
-such as a drift, follows the time over which the recording shows it.
+length. A time of electronics or flow does not belong to the size, and keeps its value. Only its upper bound grows
+where the motion is slower, because slow motion hides longer delays. A time of a slow change, such as a drift,
+follows the time over which the recording shows it.
 """
 
 import re
@@ -67,14 +68,24 @@ def compute_scale_factor(unit: str, size: DamperSize) -> float:
 def scale_quantity(quantity: Quantity, size: DamperSize) -> Quantity:
     """Return a quantity with bounds and scale for a damper of a size."""
     factor = compute_scale_factor(quantity.scaling_unit, size)
-    return quantity._replace(low=quantity.low * factor, high=quantity.high * factor, scale=quantity.scale * factor)
+    high = quantity.high * _compute_widening(quantity.scaling_unit, size)
+    return quantity._replace(low=quantity.low * factor, high=high, scale=quantity.scale * factor)
 
 
 def widen_bounds(quantity: Quantity) -> Quantity:
     """Return a quantity with bounds that admit a damper of any size."""
     factors = [compute_scale_factor(quantity.scaling_unit, size) for size in _list_extreme_sizes()]
     low = quantity.low * (min(factors) if quantity.low > 0.0 else max(factors))
-    return quantity._replace(low=low, high=quantity.high * max(factors))
+    widest = max(_compute_widening(quantity.scaling_unit, size) for size in _list_extreme_sizes())
+    return quantity._replace(low=low, high=quantity.high * widest)
+
+
+def _compute_widening(unit: str, size: DamperSize) -> float:
+    """Return by how much the upper bound of a quantity is larger in a damper of a size [1]."""
+    if unit != "s":
+        return compute_scale_factor(unit, size)
+    slowness = (size.length / size.velocity) / (LIBRARY_SIZE.length / LIBRARY_SIZE.velocity)
+    return max(slowness, 1.0)
 
 
 def _list_extreme_sizes() -> list[DamperSize]:

@@ -64,6 +64,13 @@ def test_bounds_and_scale_grow_together():
     assert (scaled.symbol, scaled.unit, scaled.meaning) == ("gap", "m", "stroke")
 
 
+@pytest.mark.parametrize(("slowness", "high"), [(0.2, 0.05), (1.0, 0.05), (9.0, 0.45)])
+def test_only_the_upper_bound_of_a_delay_grows_with_slower_motion(slowness, high):
+    size = LIBRARY_SIZE._replace(velocity=LIBRARY_SIZE.velocity / slowness)
+    scaled = scale_quantity(Quantity("delay", "s", 1e-4, 0.05, 2e-3, "delay"), size)
+    assert (scaled.low, scaled.high, scaled.scale) == pytest.approx((1e-4, high, 2e-3))
+
+
 def test_a_value_at_a_fixed_reference_follows_its_own_unit():
     quantity = Quantity("force", "N", 0.0, 5000.0, 10.0, "force at 0.1 m/s", "N s^2/m^2")
     assert scale_quantity(quantity, LARGER).scale == pytest.approx(10.0 * FORCE / VELOCITY**2)

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, minimise
-from identification.gap.data import find_strongest_line
+from identification.gap.data import compute_residual_correlation_length, find_strongest_line
 from identification.gap.discovery.curve_basis import LinearGrowth
 from identification.gap.discovery.curve_effects import (
     HISTORY_VARIABLES,
@@ -182,15 +182,35 @@ def _evaluate_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, 
     return FittedCurve(curve, candidate, parent, pool.comparison.compute_held_out_evidence(parent, candidate))
 
 
+def refit_curve(pool: CandidatePool, fitted: FittedCurve) -> Candidate:
+    """Refine a curve on all samples, most of which repeat the error of their neighbours."""
+    fit = fitted.candidate.fit
+    full = JointFit(pool.problems.full.replace_effects(fit.effects), fit.minimum)
+    factor = _count_alike(fit) / _count_alike(full)
+    model = fit.effects[-1]
+    size = fitted.curve.function.basis.size
+    deviations = tuple(d * factor**0.5 for d in model.prior_deviations[:size]) + model.prior_deviations[size:]
+    effects = (*fit.effects[:-1], replace(model, prior_deviations=deviations))
+    tempered = JointFit(fit.problem.replace_effects(effects), fit.minimum)
+    return pool.refit_all_samples(replace(fitted.candidate, fit=tempered))
+
+
+def _count_alike(fit: JointFit) -> float:
+    """Return the number of neighbouring samples with the same error; at least one."""
+    return compute_residual_correlation_length(fit.force_errors)
+
+
 def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
     """Continue a fit with the prior deviation that its coefficients suggest (MacKay 1992, eq. 2.17).
 
-    The linear model counts its whole residual as noise, so its prior is too narrow for a large curve.
+    The linear model counts its whole residual as noise, so its prior is too narrow for a large curve. Samples with
+    the same error count as one: in slow noise, all samples together would overrule the prior where the held-out
+    strokes leave a gap.
     """
     problem, unknowns = fit.problem, fit.minimum.unknowns
     columns = problem.layout.effect_slices[-1]
     inner = slice(columns.start, columns.start + curve.function.basis.size)
-    variance = max(fit.ratio**2, 1.0)
+    variance = max(fit.ratio**2, 1.0) * _count_alike(fit)
     # The curvature of a coefficient of which nothing is known is that of its prior alone.
     known = (
         1.0

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, screen_curves
+from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, refit_curve, screen_curves
 from identification.gap.discovery.formula_fit import FittedFormula, find_formula
 from identification.gap.fits import Candidate
 from identification.gap.selection import CandidatePool
@@ -48,7 +48,7 @@ def discover_effect(pool: CandidatePool, named: Candidate) -> DiscoveredEffect |
     best = _choose_finding(pool, [f for parent in parents for f in _find_curves(pool, parent)])
     if best is None:
         return None
-    chosen = pool.refit_all_samples(best.judged.candidate)
+    chosen = pool.refit_all_samples(best.judged.candidate) if best.formula else refit_curve(pool, best.fitted)
     # The curve that is reported belongs to the law that is reported.
     reported = best.fitted if best.formula else replace(best.fitted, candidate=chosen)
     return DiscoveredEffect(reported, best.formula, chosen, _find_further(pool, best.fitted))

@@ -25,7 +25,7 @@ _FITTED_FORMULAS = 6
 _ITERATIONS = 25
 """Largest number of iterations of a fit."""
 _SUFFICIENT_GAIN = 0.8
-"""Part of the curve's gain on held-out strokes that a formula has to keep."""
+"""Part of the curve's gain on fitted and on held-out strokes that a formula has to keep [1]."""
 _MAX_POINTS = 4000
 """Samples at which a formula is compared with a curve."""
 _RANGE = 100.0
@@ -79,9 +79,11 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
 
 
 def _keeps_gain(fitted: FittedCurve, candidate: Candidate) -> bool:
-    """Return True if a formula keeps most of the gain of its curve on held-out strokes."""
-    before, curve = fitted.parent.held_out_rmse**2, fitted.candidate.held_out_rmse**2
-    return before - candidate.held_out_rmse**2 > _SUFFICIENT_GAIN * (before - curve)
+    """Return True if a formula keeps most of the gain of its curve, on fitted and on held-out strokes."""
+    before, curve, formula = (
+        np.array([c.train_rmse, c.held_out_rmse]) ** 2 for c in (fitted.parent, fitted.candidate, candidate)
+    )
+    return bool(np.all(before - formula > _SUFFICIENT_GAIN * (before - curve)))
 
 
 def _fit_formula(

@@ -29,7 +29,7 @@ from identification.gap.data import (
 )
 from identification.gap.discovery import DiscoveredEffect, discover_effect, locate_unlisted_cause
 from identification.gap.fits import Candidate
-from identification.gap.noise import ResidualRegression
+from identification.gap.noise import ResidualRegression, settle_unknown_floor
 from identification.gap.outcome.diagnosis_result import DiagnosisResult
 from identification.gap.outcome.discovery_document import build_discovery
 from identification.gap.outcome.explanation import (
@@ -159,8 +159,28 @@ class ReportBuilder:
 
     def _discover(self, verdict: Verdict, named: Candidate) -> DiscoveredEffect | None:
         """Return a cause outside the library, if it is wanted and something is left to explain."""
-        wanted = self.discovers and verdict in ("partly_explained", "unexplained")
-        return discover_effect(self.pool, named) if wanted else None
+        if not self.discovers or verdict not in ("partly_explained", "unexplained"):
+            return None
+        found = discover_effect(self.pool, named)
+        if found is not None:
+            self._settle_floor(found.candidate)
+        return found
+
+    def _settle_floor(self, candidate: Candidate) -> None:
+        """Take an unknown noise floor from the residual of a discovered effect, if that is noise.
+
+        Without repeated cycles only the noise at high frequencies is known. No set of known effects left noise
+        alone, because none contains the cause.
+        """
+        pool = self.pool
+        settle_unknown_floor(
+            pool.noise_model,
+            (pool.baseline, candidate),
+            ResidualRegression(self.evaluation, pool.floor),
+            pool.problems.block_length,
+            pool.evaluate,
+            pool.propagate_input_noise,
+        )
 
     def _learn_residual(self, verdict: Verdict, modelled: Candidate) -> TwinResidual | None:
         """Return the learned residual of the twin's effects, if it is wanted and something is left."""

@@ -21,6 +21,7 @@ from identification.gap.discovery.curve_fit import (
     _set_prior,
     _update_prior,
     fit_best_curves,
+    refit_curve,
     screen_curves,
 )
 from identification.gap.fits import JointFit, insert_effect_unknowns
@@ -204,6 +205,34 @@ def test_the_prior_is_the_size_of_the_coefficients_over_those_that_are_determine
     coefficients = np.array(fitted.values[:count])
     determined = np.sum(coefficients**2) / deviation**2
     assert 1.0 < determined < count + 0.5
+
+
+def test_samples_with_the_same_error_count_as_one(monkeypatch):
+    # With a quarter of the information, the same size of the coefficients needs half the deviation.
+    fitted = fitted_with(GROWING)
+    deviations = []
+    for alike in (1.0, 4.0):
+        monkeypatch.setattr(curve_fit, "_count_alike", lambda fit, alike=alike: alike)
+        deviations.append(_update_prior(fitted.candidate.fit, fitted.curve).effects[-1].prior_deviations[0])
+    assert deviations[1] == pytest.approx(0.5 * deviations[0], rel=1e-9)
+
+
+def test_slow_errors_of_all_samples_do_not_overrule_the_prior(monkeypatch):
+    fitted, pool = fitted_with(GROWING), pool_with(GROWING)
+    few = fitted.candidate.fit.problem
+    monkeypatch.setattr(curve_fit, "_count_alike", lambda fit: 2.0 if fit.problem is few else 18.0)
+    monkeypatch.setattr(type(pool), "refit_all_samples", lambda self, candidate: candidate)
+    before, after = (f.effects[-1].prior_deviations for f in (fitted.candidate.fit, refit_curve(pool, fitted).fit))
+    count = fitted.curve.function.basis.size
+    assert after[:count] == pytest.approx([d / 3.0 for d in before[:count]])
+    assert after[count:] == before[count:]
+
+
+def test_neighbours_in_slow_noise_have_the_same_error():
+    noise = np.random.default_rng(3).standard_normal(4000)
+    slow = np.convolve(noise, np.ones(10) / 10.0, mode="same")
+    lengths = [curve_fit._count_alike(SimpleNamespace(force_errors=(values,))) for values in (noise, slow)]
+    assert lengths == pytest.approx([1.0, 10.0], rel=0.3)
 
 
 def test_a_curve_of_zero_keeps_a_prior():

@@ -80,13 +80,17 @@ def rank_of(fitted):
     return rank_formulas(fitted.curve, np.array(fitted.values[: fitted.curve.function.basis.size]), x)
 
 
-@pytest.mark.parametrize(("held_out", "kept"), [(2.0, True), (5.19, True), (5.21, False), (12.0, False)])
-def test_a_formula_keeps_four_fifths_of_the_gain_of_its_curve(held_out, kept):
+@pytest.mark.parametrize("error", [2.0, 5.19, 5.21, 12.0])
+@pytest.mark.parametrize(("other", "sufficient"), [(2.0, True), (5.21, False)])
+def test_a_formula_keeps_four_fifths_of_the_gain_of_its_curve_on_fitted_and_held_out_strokes(
+    error, other, sufficient
+):
     # The squared error falls from 123 to 3, so a formula may leave 27.
-    fitted = SimpleNamespace(
-        parent=SimpleNamespace(held_out_rmse=np.sqrt(123.0)), candidate=SimpleNamespace(held_out_rmse=np.sqrt(3.0))
-    )
-    assert _keeps_gain(fitted, SimpleNamespace(held_out_rmse=held_out)) == kept
+    before, after = (SimpleNamespace(train_rmse=e, held_out_rmse=e) for e in np.sqrt([123.0, 3.0]))
+    fitted = SimpleNamespace(parent=before, candidate=after)
+    for errors in ((error, other), (other, error)):
+        formula = SimpleNamespace(train_rmse=errors[0], held_out_rmse=errors[1])
+        assert _keeps_gain(fitted, formula) == (sufficient and error < 5.2)
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,9 @@ def make_builder(
         floor=FLOOR,
         no_gap_limits=(1.008 * FLOOR,) * 2,
         noise_model=noise_model,
-        problems=SimpleNamespace(full=SimpleNamespace()),
+        problems=SimpleNamespace(full=SimpleNamespace(), block_length=1.0),
+        evaluate=None,
+        propagate_input_noise=None,
         baseline_excess=8.0,
         compute_excess=lambda candidate: candidate.compute_excess(FLOOR),
     )
@@ -238,14 +240,25 @@ def test_a_note_offers_the_search_or_has_its_result(verdict, discovers):
 @pytest.mark.parametrize("verdict", VERDICTS)
 @pytest.mark.parametrize("discovers", [False, True])
 def test_a_cause_is_searched_for_if_it_is_wanted_and_something_is_left(monkeypatch, verdict, discovers):
-    builder, asked = replace(make_builder(), discovers=discovers), []
-    monkeypatch.setattr(report, "discover_effect", lambda *arguments: asked.append(arguments) or "found")
+    builder, asked, settled = replace(make_builder(), discovers=discovers), [], []
+    effect = SimpleNamespace(candidate="fitted")
+    monkeypatch.setattr(report, "discover_effect", lambda *arguments: asked.append(arguments) or effect)
+    monkeypatch.setattr(report, "ResidualRegression", lambda evaluation, floor: floor)
+    monkeypatch.setattr(report, "settle_unknown_floor", lambda noise, sets, *others: settled.append(sets))
     named = builder.pool.baseline
     found = builder._discover(verdict, named)
     if discovers and verdict in ("partly_explained", "unexplained"):
-        assert (found, asked) == ("found", [(builder.pool, named)])
+        assert (found, asked) == (effect, [(builder.pool, named)])
+        assert settled == [(named, "fitted")]
     else:
-        assert (found, asked) == (None, [])
+        assert (found, asked, settled) == (None, [], [])
+
+
+def test_without_a_found_cause_the_floor_stays(monkeypatch):
+    builder = replace(make_builder(), discovers=True)
+    monkeypatch.setattr(report, "discover_effect", lambda *arguments: None)
+    monkeypatch.setattr(report, "settle_unknown_floor", lambda *arguments: pytest.fail("the floor was changed"))
+    assert builder._discover("unexplained", builder.pool.baseline) is None
 
 
 def test_without_a_cause_there_is_no_document():

@@ -2,8 +2,9 @@
 
     python -m benchmarks.accuracy.discovery [--recordings 40] [--seed 1] [--out PAGE.md]
 
-A library effect is withheld from the diagnosis, and drawn in a form of its class. The search for a cause outside
-the library then has to find its place and variable, and to close the gap on held-out strokes.
+A library effect is withheld from the diagnosis, and drawn in a form of its class. The answer then has to have its
+place and variable, and to close the gap on held-out strokes. It is the discovered cause, or without one the named
+effect with the largest share: the library may have another effect at the same place over the same variable.
 """
 
 from collections.abc import Sequence
@@ -23,13 +24,24 @@ _UNKNOWN: dict[str, tuple[Place, Variable]] = {
     "drive over time": ("drive", "time"),
     "load cell over force": ("force_channel", "force"),
 }
-_SAME_PLACE: dict[Place, Place] = {"field": "drive"}
+_SAME_PLACE = {"field": "drive"}
 """Before and behind the lag of the coil, which only its transients tell apart."""
 _CLOSED = 0.8
 """Part of the gap that a discovery should close."""
 COLUMNS = ("case", "error of the law over the floor", "verdict", "found", "formula", "closed", "right")
 _VISIBLE = 1.05
 """Smallest error of the law alone over the noise floor at which there is something to find."""
+
+
+class Answer(NamedTuple):
+    """Place and variable of the cause that a diagnosis reports."""
+
+    place: str
+    variable: str
+    text: str
+
+
+_NO_ANSWER = Answer("", "", "-")
 
 
 class Outcome(NamedTuple):
@@ -62,19 +74,33 @@ def judge(case: Case, diagnosis: Diagnosis) -> Outcome:
     """Compare a discovery with the truth."""
     found, gap = diagnosis.discovery, diagnosis.gap
     place, variable = find_truth(case)
-    closed = None
-    if found is not None:
-        closed = 1.0 - (found.rmse_n**2 - gap.noise_floor_n**2) / (gap.before_n**2 - gap.noise_floor_n**2)
+    answer, closed = _describe_answer(diagnosis), None
+    if answer != _NO_ANSWER:
+        after = gap.after_n if found is None else found.rmse_n
+        closed = 1.0 - (after**2 - gap.noise_floor_n**2) / (gap.before_n**2 - gap.noise_floor_n**2)
     return Outcome(
         case.label,
         case.kind,
         diagnosis.verdict,
         gap.before_n / gap.noise_floor_n,
-        "-" if found is None else f"{found.place} over {', '.join(found.variables)}",
+        answer.text,
         "-" if found is None or found.formula is None else found.formula.expression,
-        found is not None and _SAME_PLACE.get(found.place, found.place) == _SAME_PLACE.get(place, place),
-        found is not None and found.variables[0] == variable,
+        _SAME_PLACE.get(answer.place, answer.place) == _SAME_PLACE.get(place, place),
+        answer.variable == variable,
         closed,
+    )
+
+
+def _describe_answer(diagnosis: Diagnosis) -> Answer:
+    """Return the discovered cause, or else the named effect with the largest share."""
+    found = diagnosis.discovery
+    if found is not None:
+        return Answer(found.place, found.variables[0], f"{found.place} over {', '.join(found.variables)}")
+    if not diagnosis.effects:
+        return _NO_ANSWER
+    first = max(diagnosis.effects, key=lambda effect: effect.share)
+    return Answer(
+        first.place or "", first.variable or "", f"named: {' and '.join(e.name for e in diagnosis.effects)}"
     )
 
 

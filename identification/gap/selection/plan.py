@@ -22,6 +22,7 @@ from identification.gap.selection.posterior import (
     UNKNOWN_THRESHOLD,
     BlockEvidence,
     Posterior,
+    compute_complexity_penalty,
 )
 from identification.gap.selection.screening import (
     MOUNTING_EFFECTS,
@@ -166,7 +167,8 @@ def compute_final_posterior(pool: CandidatePool) -> Posterior:
 def _check_effects(pool: CandidatePool) -> None:
     """Compute what each effect of the most probable set gains on held-out samples, until that set stays the same.
 
-    An effect that only absorbs the form error of another gains on the fitted samples, and hardly on others.
+    An effect that only absorbs the form error of another gains on the fitted samples, and hardly on others, or it
+    closes a small part of what the other leaves.
     """
     for _ in range(pool.settings.max_refits):
         names = pool.compute_posterior().most_probable_set
@@ -175,10 +177,19 @@ def _check_effects(pool: CandidatePool) -> None:
         pool.fit_fully(names)
         candidate = pool.candidates[names]
         subsets = [find_subset(pool, candidate, model) for model in candidate.fit.effects]
-        pool.held_out_evidence[names] = tuple(
-            BlockEvidence(subset.names, pool.comparison.compute_held_out_evidence(subset, candidate))
-            for subset in subsets
-        )
+        pool.held_out_evidence[names] = tuple(_compare_with_subset(pool, subset, candidate) for subset in subsets)
+
+
+def _compare_with_subset(pool: CandidatePool, subset: Candidate, candidate: Candidate) -> BlockEvidence:
+    """Return the evidence on held-out samples for a set over one with an effect less.
+
+    An effect that closes too little of what the others leave only repairs their form. Its set is then less
+    probable than the one without it, by the penalty for one more effect.
+    """
+    evidence = pool.comparison.compute_held_out_evidence(subset, candidate)
+    if pool.comparison.compute_closed_share(subset, candidate) < pool.settings.min_closed_share:
+        evidence = min(evidence, -compute_complexity_penalty(subset.names))
+    return BlockEvidence(subset.names, evidence)
 
 
 def _fit_probable_sets(pool: CandidatePool) -> None:

@@ -104,7 +104,7 @@ class SearchSettings:
     max_remaining_share: float = 0.2
     """Part of the baseline's excess that a set may leave for an extension to be tried."""
     min_closed_share: float = 0.4
-    """Smallest part of the remaining error that an extension closes, over conditions.
+    """Smallest part of the remaining error that a further effect of a set closes, over conditions.
 
     Origin: missing effects closed 0.49 and more. Repairs of form errors closed up to 0.34, but for 0.42 and 0.68.
     """

@@ -1,6 +1,7 @@
 """The plan fits sets from the law to the most probable set on all samples."""
 
 from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +11,14 @@ from identification.gap.fits import fit_jointly
 from identification.gap.noise import NoiseModel
 from identification.gap.selection.neighbours import fit_extension
 from identification.gap.selection.plan import (
+    _compare_with_subset,
     _refit_law,
     _search_best_sets,
     compute_final_posterior,
     search_forward,
 )
-from identification.gap.selection.search_settings import QUICK_FIT
+from identification.gap.selection.posterior import compute_complexity_penalty
+from identification.gap.selection.search_settings import QUICK_FIT, SearchSettings
 from tests.support.candidate_pools import make_pool
 
 BOTH = frozenset({"gas_spring", "moving_mass"})
@@ -75,6 +78,19 @@ def test_each_effect_of_the_most_probable_set_has_evidence_on_held_out_samples(s
     evidence = dict(searched.held_out_evidence[BOTH])
     assert set(evidence) == {frozenset({name}) for name in BOTH}
     assert min(evidence.values()) > 1.0
+
+
+@pytest.mark.parametrize(("closed", "kept"), [(0.39, False), (0.41, True)])
+def test_an_effect_that_closes_little_of_what_the_others_leave_repairs_their_form(closed, kept):
+    subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
+    comparison = SimpleNamespace(
+        compute_held_out_evidence=lambda before, after: 9.0, compute_closed_share=lambda before, after: closed
+    )
+    pool = SimpleNamespace(comparison=comparison, settings=SearchSettings())
+    parent, log_odds = _compare_with_subset(pool, subset, candidate)
+    assert parent == subset.names
+    assert log_odds == (9.0 if kept else -compute_complexity_penalty(subset.names))
+    assert log_odds > 0.0 or not kept
 
 
 def test_a_law_in_a_wrong_minimum_is_fitted_again_from_the_law_of_the_best_set():

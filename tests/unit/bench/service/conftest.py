@@ -84,12 +84,20 @@ class Service:
 
     def complete(self, job, summary, files):
         """Report a job as done, with its files by name."""
+        self.wait_until_submitted(job)
         self.report("on_started", job["id"])
         result = Path(self.engine.specs[job["id"]].result)
         result.mkdir()
         for name, text in files.items():
             (result / name).write_text(text)
         self.report("on_done", job["id"], summary)
+
+    def wait_until_submitted(self, job):
+        """Wait until the engine has a job; the catalogue shows it before."""
+        deadline = time.monotonic() + TIMEOUT
+        while job["id"] not in self.engine.specs:
+            assert time.monotonic() < deadline, f"job {job['id']} was not submitted"
+            time.sleep(0.01)
 
     def report(self, event, *given):
         """Have the engine report an event of a job, on the service's event loop."""

@@ -19,16 +19,23 @@ from bench.samples.store import FOLDER as SAMPLE_FOLDER
 from sim_rig.hidden_effect import draw_scenario, make_truth
 from tests.support.bench_processes import ENVIRONMENT
 
-pytestmark = [pytest.mark.wire, pytest.mark.timeout(600)]
+pytestmark = [pytest.mark.wire, pytest.mark.timeout(1000)]
 COMMAND = Path(sys.executable).parent / "mrbench"
 SEED = 1
 """Default seed of the demo."""
 
 
 def mrbench(*arguments):
-    return subprocess.run(
-        [COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=500, env=ENVIRONMENT
-    )
+    """Return a finished command; one that takes too long is asked to end, so that it stops its own processes."""
+    command = [str(COMMAND), *map(str, arguments)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=ENVIRONMENT)
+    try:
+        output, errors = process.communicate(timeout=900)
+    except subprocess.TimeoutExpired:
+        process.terminate()
+        output, errors = process.communicate(timeout=60)
+        raise AssertionError(f"{command} took more than 900 s: {output} {errors}") from None
+    return subprocess.CompletedProcess(command, process.returncode, output, errors)
 
 
 @pytest.fixture(scope="module")

@@ -68,19 +68,17 @@ def compute_scale_factor(unit: str, size: DamperSize) -> float:
 def scale_quantity(quantity: Quantity, size: DamperSize) -> Quantity:
     """Return a quantity with bounds and scale for a damper of a size."""
     factor = compute_scale_factor(quantity.scaling_unit, size)
-    high = quantity.high * _compute_widening(quantity.scaling_unit, size)
+    high = quantity.high * _compute_upper_bound_factor(quantity.scaling_unit, size)
     return quantity._replace(low=quantity.low * factor, high=high, scale=quantity.scale * factor)
 
 
 def widen_bounds(quantity: Quantity) -> Quantity:
     """Return a quantity with bounds that admit a damper of any size."""
-    factors = [compute_scale_factor(quantity.scaling_unit, size) for size in _list_extreme_sizes()]
-    low = quantity.low * (min(factors) if quantity.low > 0.0 else max(factors))
-    widest = max(_compute_widening(quantity.scaling_unit, size) for size in _list_extreme_sizes())
-    return quantity._replace(low=low, high=quantity.high * widest)
+    scaled = [scale_quantity(quantity, size) for size in _list_extreme_sizes()]
+    return quantity._replace(low=min(q.low for q in scaled), high=max(q.high for q in scaled))
 
 
-def _compute_widening(unit: str, size: DamperSize) -> float:
+def _compute_upper_bound_factor(unit: str, size: DamperSize) -> float:
     """Return by how much the upper bound of a quantity is larger in a damper of a size [1]."""
     if unit != "s":
         return compute_scale_factor(unit, size)

@@ -11,7 +11,7 @@ from identification.gap.data import (
     check_sliding_recorded,
 )
 from identification.gap.discovery import compare_with_curves
-from identification.gap.noise import NoiseModel, ResidualRegression, settle_unknown_floor
+from identification.gap.noise import NoiseModel
 from identification.gap.outcome import DiagnosisResult, ReportBuilder, cross_check_effects
 from identification.gap.selection import (
     DEFAULT_SETTINGS,
@@ -22,6 +22,7 @@ from identification.gap.selection import (
     compute_final_posterior,
     find_partial_sets,
     search_forward,
+    settle_floor,
 )
 from identification.logs import Recording
 from identification.pipeline import make_problem
@@ -129,16 +130,7 @@ def diagnose_prepared(
         search_forward(pool)
         evaluation = pool.evaluation
         pool.progress = enter_stage(progress, "compare", 2, _STAGE_COUNT)
-        regression = ResidualRegression(evaluation, pool.floor)
-        candidates = pool.candidates.values()
-        if settle_unknown_floor(
-            pool.noise_model,
-            candidates,
-            regression,
-            pool.problems.block_length,
-            pool.evaluate,
-            pool.propagate_input_noise,
-        ):
+        if settle_floor(pool, pool.candidates.values()):
             pool.update_residuals()
         posterior = compare_with_curves(pool, compute_final_posterior(pool))
         partial = find_partial_sets(pool, posterior) if posterior.unknown > UNKNOWN_THRESHOLD else None

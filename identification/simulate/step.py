@@ -24,11 +24,11 @@ WEIGHT_START = (1.0 - GAMMA) ** 2 / (GAMMA * (2.0 - GAMMA))
 STRUCTURAL_COUNT = 10
 """Number of structural coordinates."""
 
-TOLERANCE = 1e-11
+_TOLERANCE = 1e-11
 """Change of zeta below which the Newton iteration of a stage ends [1]."""
-MAX_MOVE = 0.5
+_MAX_MOVE = 0.5
 """Largest change of zeta in one iteration [1]; zeta lies between -1 and 1."""
-MAX_ITERATIONS = 40
+_MAX_ITERATIONS = 40
 _MAX_STEPS = 64
 """Largest number of steps in a sample; it bounds the time of a fit for all parameters inside the bounds."""
 _STEPS_AT_TURN = 4
@@ -118,20 +118,20 @@ def solve_hysteresis(s: Array, zeta_known: float, weight: float, slip0: float, s
     beta = s[3] * A
     gamma = A - beta
     low, high = min(-1.0, zeta_known), max(1.0, zeta_known)
-    for _ in range(MAX_ITERATIONS):
+    for _ in range(_MAX_ITERATIONS):
         slip = slip0 + slip1 * zeta
         rate = compute_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         over_slip, over_zeta = differentiate_hysteresis_rate(slip, zeta, A, beta, gamma, s[4])
         error = zeta_known + weight * rate - zeta
         # Just after a reversal the derivative may be small or negative. A bounded change passes this region.
         move = error / max(1.0 - weight * (over_zeta + over_slip * slip1), 0.2)
-        if abs(move) < TOLERANCE:
+        if abs(move) < _TOLERANCE:
             return float(zeta + move)
         if error > 0.0:
             low = max(low, zeta)
         else:
             high = min(high, zeta)
-        moved = zeta + min(max(move, -MAX_MOVE), MAX_MOVE)
+        moved = zeta + min(max(move, -_MAX_MOVE), _MAX_MOVE)
         zeta = moved if low <= moved <= high else 0.5 * (low + high)
     return float(zeta)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.fitting import EffectModel, OptimiserSettings, Problem, fit_output_error, minimise
-from identification.gap.data import compute_residual_correlation_length, find_strongest_line
+from identification.gap.data import compute_residual_correlation_length, find_strongest_line, split_by_piece
 from identification.gap.discovery.curve_basis import LinearGrowth
 from identification.gap.discovery.curve_effects import (
     HISTORY_VARIABLES,
@@ -183,21 +183,21 @@ def _evaluate_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, 
 
 
 def refit_curve(pool: CandidatePool, fitted: FittedCurve) -> Candidate:
-    """Refine a curve on all samples, most of which repeat the error of their neighbours."""
-    fit = fitted.candidate.fit
-    full = JointFit(pool.problems.full.replace_effects(fit.effects), fit.minimum)
-    factor = _count_alike(fit) / _count_alike(full)
-    model = fit.effects[-1]
-    size = fitted.curve.function.basis.size
-    deviations = tuple(d * factor**0.5 for d in model.prior_deviations[:size]) + model.prior_deviations[size:]
-    effects = (*fit.effects[:-1], replace(model, prior_deviations=deviations))
-    tempered = JointFit(fit.problem.replace_effects(effects), fit.minimum)
-    return pool.refit_all_samples(replace(fitted.candidate, fit=tempered))
+    """Refine a curve on all samples, with the prior deviation for the longer correlation of their errors."""
+    candidate, fit = fitted.candidate, fitted.candidate.fit
+    ratio = compute_residual_correlation_length(fit.force_errors) / compute_full_correlation_length(
+        pool, candidate
+    )
+    model = _set_prior(fitted.curve, fit.effects[-1].prior_deviations[0] * math.sqrt(ratio))
+    problem = fit.problem.replace_effects((*fit.effects[:-1], model))
+    return pool.refit_all_samples(replace(candidate, fit=JointFit(problem, fit.minimum)))
 
 
-def _count_alike(fit: JointFit) -> float:
-    """Return the number of neighbouring samples with the same error; at least one."""
-    return compute_residual_correlation_length(fit.force_errors)
+def compute_full_correlation_length(pool: CandidatePool, candidate: Candidate) -> float:
+    """Return the correlation length of a candidate's residual [samples], on all samples of the recording."""
+    return compute_residual_correlation_length(
+        split_by_piece(candidate.residual.values, pool.problems.full.pieces)
+    )
 
 
 def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
@@ -210,7 +210,7 @@ def _update_prior(fit: JointFit, curve: CurveEffect) -> JointFit:
     problem, unknowns = fit.problem, fit.minimum.unknowns
     columns = problem.layout.effect_slices[-1]
     inner = slice(columns.start, columns.start + curve.function.basis.size)
-    variance = max(fit.ratio**2, 1.0) * _count_alike(fit)
+    variance = max(fit.ratio**2, 1.0) * compute_residual_correlation_length(fit.force_errors)
     # The curvature of a coefficient of which nothing is known is that of its prior alone.
     known = (
         1.0

@@ -9,9 +9,8 @@ from identification.arrays import Array
 from identification.damper.definitions import STAGE_OF, Curve, EffectFile, EffectParameter, make_effect
 from identification.damper.effects import Variable
 from identification.fitting import EffectModel, minimise
-from identification.gap.data import compute_residual_correlation_length, split_by_piece
 from identification.gap.discovery.curve_effects import CurveEffect, CurvePlace, collect_variables
-from identification.gap.discovery.curve_fit import FittedCurve
+from identification.gap.discovery.curve_fit import FittedCurve, compute_full_correlation_length
 from identification.gap.discovery.formulas import FormulaStart, rank_formulas
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
 from identification.gap.selection import CandidatePool
@@ -70,8 +69,7 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
     variable = variable[:: max(1, len(variable) // _MAX_POINTS)]
     count = fitted.curve.function.basis.size
     starts = rank_formulas(fitted.curve, np.array(fitted.values[:count]), variable)
-    errors = split_by_piece(fitted.candidate.residual.values, pool.problems.full.pieces)
-    samples = len(fitted.candidate.residual.values) / compute_residual_correlation_length(errors)
+    samples = len(fitted.candidate.residual.values) / compute_full_correlation_length(pool, fitted.candidate)
     formulas = [_fit_formula(pool, fitted, start, variable, samples) for start in starts[:_FITTED_FORMULAS]]
     # A curve that repeats is one of its formulas; over one period, it would describe that period only.
     kept = [f for f in formulas if fitted.curve.at.period or _keeps_gain(fitted, f.candidate)]

@@ -29,7 +29,7 @@ from identification.gap.data import (
 )
 from identification.gap.discovery import DiscoveredEffect, discover_effect, locate_unlisted_cause
 from identification.gap.fits import Candidate
-from identification.gap.noise import ResidualRegression, settle_unknown_floor
+from identification.gap.noise import ResidualRegression
 from identification.gap.outcome.diagnosis_result import DiagnosisResult
 from identification.gap.outcome.discovery_document import build_discovery
 from identification.gap.outcome.explanation import (
@@ -58,6 +58,7 @@ from identification.gap.selection import (
     CandidatePool,
     Posterior,
     compute_stage_probabilities,
+    settle_floor,
 )
 from identification.residual import LearnedResidual
 
@@ -163,24 +164,9 @@ class ReportBuilder:
             return None
         found = discover_effect(self.pool, named)
         if found is not None:
-            self._settle_floor(found.candidate)
+            # No set of known effects left noise alone, because none contains the cause.
+            settle_floor(self.pool, (self.pool.baseline, found.candidate))
         return found
-
-    def _settle_floor(self, candidate: Candidate) -> None:
-        """Take an unknown noise floor from the residual of a discovered effect, if that is noise.
-
-        Without repeated cycles only the noise at high frequencies is known. No set of known effects left noise
-        alone, because none contains the cause.
-        """
-        pool = self.pool
-        settle_unknown_floor(
-            pool.noise_model,
-            (pool.baseline, candidate),
-            ResidualRegression(self.evaluation, pool.floor),
-            pool.problems.block_length,
-            pool.evaluate,
-            pool.propagate_input_noise,
-        )
 
     def _learn_residual(self, verdict: Verdict, modelled: Candidate) -> TwinResidual | None:
         """Return the learned residual of the twin's effects, if it is wanted and something is left."""

@@ -2,7 +2,7 @@
 
 from identification.gap.selection.candidate_pool import CandidatePool, CurveAlternative
 from identification.gap.selection.partial_sets import find_partial_sets
-from identification.gap.selection.plan import compute_final_posterior, search_forward
+from identification.gap.selection.plan import compute_final_posterior, search_forward, settle_floor
 from identification.gap.selection.posterior import (
     MAX_TIED_SETS,
     MIN_TIED_PROBABILITY,
@@ -33,4 +33,5 @@ __all__ = [
     "find_partial_sets",
     "normalise_scores",
     "search_forward",
+    "settle_floor",
 ]

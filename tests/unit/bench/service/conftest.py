@@ -15,6 +15,7 @@ from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from bench.service.benches import BenchSettings
 from tests.support.fake_service import FakeAgent, FakeEngine
+from tests.support.waiting import wait_until
 
 TIMEOUT = 20.0
 """Time limit for events in other threads [s]."""
@@ -84,20 +85,13 @@ class Service:
 
     def complete(self, job, summary, files):
         """Report a job as done, with its files by name."""
-        self.wait_until_submitted(job)
+        wait_until(lambda: job["id"] in self.engine.specs)  # the catalogue shows a job before
         self.report("on_started", job["id"])
         result = Path(self.engine.specs[job["id"]].result)
         result.mkdir()
         for name, text in files.items():
             (result / name).write_text(text)
         self.report("on_done", job["id"], summary)
-
-    def wait_until_submitted(self, job):
-        """Wait until the engine has a job; the catalogue shows it before."""
-        deadline = time.monotonic() + TIMEOUT
-        while job["id"] not in self.engine.specs:
-            assert time.monotonic() < deadline, f"job {job['id']} was not submitted"
-            time.sleep(0.01)
 
     def report(self, event, *given):
         """Have the engine report an event of a job, on the service's event loop."""

@@ -120,8 +120,8 @@ def test_on_a_compliant_mount_the_damper_may_reach_the_speed_of_the_actuator_in_
 
 
 def test_a_hardening_mount_at_a_coarse_step_stays_near_the_rigid_one():
-    # A stage starts from an elongation that is far too large. Newton's
-    # method alone then left the range of zeta, and the force grew to 1e12 N.
+    # A stage starts from an elongation that is far too large. Newton's method alone then left the range of zeta,
+    # and the force grew to 1e12 N.
     law = Coordinates(
         F_a=70.7e3, F_b=17e3, D_y=2.2e-3, rho=0.98, n=4.1, eta=8.3, c0_a=695e3, c0_b=-15e3, c1_a=4.5e6, c1_b=16e3,
         k0=481e3, k1=174e3, f0=140e3,

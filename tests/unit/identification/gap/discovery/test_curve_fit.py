@@ -20,6 +20,7 @@ from identification.gap.discovery.curve_fit import (
     _search_line,
     _set_prior,
     _update_prior,
+    compute_full_correlation_length,
     fit_best_curves,
     refit_curve,
     screen_curves,
@@ -211,16 +212,18 @@ def test_samples_with_the_same_error_count_as_one(monkeypatch):
     # With a quarter of the information, the same size of the coefficients needs half the deviation.
     fitted = fitted_with(GROWING)
     deviations = []
-    for alike in (1.0, 4.0):
-        monkeypatch.setattr(curve_fit, "_count_alike", lambda fit, alike=alike: alike)
+    for length in (1.0, 4.0):
+        monkeypatch.setattr(curve_fit, "compute_residual_correlation_length", lambda errors, length=length: length)
         deviations.append(_update_prior(fitted.candidate.fit, fitted.curve).effects[-1].prior_deviations[0])
     assert deviations[1] == pytest.approx(0.5 * deviations[0], rel=1e-9)
 
 
 def test_slow_errors_of_all_samples_do_not_overrule_the_prior(monkeypatch):
     fitted, pool = fitted_with(GROWING), pool_with(GROWING)
-    few = fitted.candidate.fit.problem
-    monkeypatch.setattr(curve_fit, "_count_alike", lambda fit: 2.0 if fit.problem is few else 18.0)
+    few = fitted.candidate.fit.force_errors
+    monkeypatch.setattr(
+        curve_fit, "compute_residual_correlation_length", lambda errors: 2.0 if errors is few else 18.0
+    )
     monkeypatch.setattr(type(pool), "refit_all_samples", lambda self, candidate: candidate)
     before, after = (f.effects[-1].prior_deviations for f in (fitted.candidate.fit, refit_curve(pool, fitted).fit))
     count = fitted.curve.function.basis.size
@@ -231,7 +234,9 @@ def test_slow_errors_of_all_samples_do_not_overrule_the_prior(monkeypatch):
 def test_neighbours_in_slow_noise_have_the_same_error():
     noise = np.random.default_rng(3).standard_normal(4000)
     slow = np.convolve(noise, np.ones(10) / 10.0, mode="same")
-    lengths = [curve_fit._count_alike(SimpleNamespace(force_errors=(values,))) for values in (noise, slow)]
+    pool = SimpleNamespace(problems=SimpleNamespace(full=SimpleNamespace(pieces=(SimpleNamespace(force=noise),))))
+    candidates = [SimpleNamespace(residual=SimpleNamespace(values=values)) for values in (noise, slow)]
+    lengths = [compute_full_correlation_length(pool, candidate) for candidate in candidates]
     assert lengths == pytest.approx([1.0, 10.0], rel=0.3)
 
 

@@ -57,9 +57,7 @@ def make_builder(
         floor=FLOOR,
         no_gap_limits=(1.008 * FLOOR,) * 2,
         noise_model=noise_model,
-        problems=SimpleNamespace(full=SimpleNamespace(), block_length=1.0),
-        evaluate=None,
-        propagate_input_noise=None,
+        problems=SimpleNamespace(full=SimpleNamespace()),
         baseline_excess=8.0,
         compute_excess=lambda candidate: candidate.compute_excess(FLOOR),
     )
@@ -243,8 +241,7 @@ def test_a_cause_is_searched_for_if_it_is_wanted_and_something_is_left(monkeypat
     builder, asked, settled = replace(make_builder(), discovers=discovers), [], []
     effect = SimpleNamespace(candidate="fitted")
     monkeypatch.setattr(report, "discover_effect", lambda *arguments: asked.append(arguments) or effect)
-    monkeypatch.setattr(report, "ResidualRegression", lambda evaluation, floor: floor)
-    monkeypatch.setattr(report, "settle_unknown_floor", lambda noise, sets, *others: settled.append(sets))
+    monkeypatch.setattr(report, "settle_floor", lambda pool, candidates: settled.append(candidates))
     named = builder.pool.baseline
     found = builder._discover(verdict, named)
     if discovers and verdict in ("partly_explained", "unexplained"):
@@ -257,7 +254,7 @@ def test_a_cause_is_searched_for_if_it_is_wanted_and_something_is_left(monkeypat
 def test_without_a_found_cause_the_floor_stays(monkeypatch):
     builder = replace(make_builder(), discovers=True)
     monkeypatch.setattr(report, "discover_effect", lambda *arguments: None)
-    monkeypatch.setattr(report, "settle_unknown_floor", lambda *arguments: pytest.fail("the floor was changed"))
+    monkeypatch.setattr(report, "settle_floor", lambda *arguments: pytest.fail("the floor was changed"))
     assert builder._discover("unexplained", builder.pool.baseline) is None
 
 

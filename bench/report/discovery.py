@@ -17,6 +17,8 @@ PLACE_QUANTITIES = {
     "displacement_channel": "added displacement",
 }
 """Quantity that the value of an effect is, by place."""
+_ELONGATION = "elongation of the mounting"
+"""The same for a function of the force in the mounting."""
 VARIABLE_UNITS = {
     "displacement": "m",
     "velocity": "m/s",
@@ -88,7 +90,7 @@ def join_words(names: tuple[str, ...] | list[str]) -> str:
 
 def get_quantity(found: DiscoveredCurve, drive_unit: str) -> str:
     """Return the quantity of a curve's values; ``drive_unit`` is V or A."""
-    quantity = PLACE_QUANTITIES.get(found.place, f"value at {format_name(found.place)}")
+    quantity = _name_quantity(found.place, found.variables)
     is_relative = found.place in ("drive", "field") and found.curve.unit != drive_unit
     return f"{quantity} over drive" if is_relative else quantity
 
@@ -136,8 +138,13 @@ def _describe_discovery(discovery: Discovery, before: float, named: list[str]) -
 
 
 def _write_formula(discovery: Discovery, formula: Formula) -> str:
-    quantity = PLACE_QUANTITIES.get(discovery.place, format_name(discovery.place))
-    return f"{quantity} = {formula.expression}"
+    return f"{_name_quantity(discovery.place, discovery.variables)} = {formula.expression}"
+
+
+def _name_quantity(place: str, variables: tuple[str, ...]) -> str:
+    if place == "mounting" and "force" in variables:
+        return _ELONGATION
+    return PLACE_QUANTITIES.get(place, f"value at {format_name(place)}")
 
 
 def _make_symbol_rows(formula: Formula) -> list[tuple[str, str, str]]:

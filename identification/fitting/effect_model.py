@@ -11,7 +11,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.damper import LIBRARY_SIZE, DamperSize, Quantity, compute_scale_factor, scale_quantity
-from identification.damper.definitions import ACTIONS
+from identification.damper.definitions import DEFINED_ACTIONS
 from identification.damper.effects import EFFECTS, Effect, Form
 from identification.simulate import ActiveEffect
 
@@ -62,7 +62,7 @@ class EffectModel:
     @property
     def _is_scaled(self) -> bool:
         """True for a form of the library; a defined effect has the bounds of one damper."""
-        return self.form.action not in ACTIONS.values()
+        return self.form.action not in DEFINED_ACTIONS
 
     @property
     def log_mask(self) -> BoolArray:

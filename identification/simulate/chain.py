@@ -16,7 +16,11 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.simulate import channel, compliant_mount, compliant_sensitivities, inputs
-from identification.simulate.curves import differentiate_by_parameters
+from identification.simulate.connections import (
+    differentiate_connections,
+    differentiate_tables,
+    gather_connections,
+)
 from identification.simulate.kernel import InputDerivatives, StepCounts, integrate, integrate_with_sensitivities
 from identification.simulate.motion import DamperMotion, compute_damper_motion
 from identification.simulate.scaling import ScaleFactors, compute_scale_factors
@@ -29,8 +33,6 @@ MAX_TRAVEL = 0.1
 Origin: the error of the force then stays below 4e-5 of its standard deviation.
 """
 
-_CONNECTION_COUNT = compliant_mount.FIXED_COUNT - STRUCTURAL_COUNT - 2
-"""Number of values that describe a connection."""
 _STRUCTURAL_COLUMNS = [0, 1, 2, 3, 4, 6, 7, 8, 9, 10]
 """Positions of the ten structural coordinates in ``SENSITIVITY_COLUMNS``; the next line has the others."""
 _ETA, _K1, _F0, _Y0, _FORCE_DELAY, _DRIVE_DELAY = 5, 11, 12, 13, 14, 15
@@ -58,8 +60,8 @@ def simulate(
     field = inputs.compute_damper_field(model, excitation, sensitivities)
     scales = compute_scale_factors(model, excitation, motion, sensitivities)
     chain = _SimulationChain(model, excitation, motion, field, scales)
-    carrying = sum_connections(model)
-    if carrying[0] > 0.0:
+    carrying = gather_connections(model)
+    if carrying[0] > 0.0 or len(carrying) > compliant_mount.CONNECTION_COUNT:
         found, J = chain.simulate_compliant(step_counts, carrying, max_travel, sensitivities)
     else:
         found, J = chain.simulate_rigid(step_counts, max_travel, sensitivities)
@@ -71,13 +73,6 @@ def simulate(
         return replace(found, force=force)
     names = [f"{e.effect.name}.{q.symbol}" for e in model.effects for q in e.form.parameters]
     return replace(found, force=force, sensitivities=J, columns=(*SENSITIVITY_COLUMNS, *names))
-
-
-def sum_connections(model: SimulationModel) -> Array:
-    """Return the values (5,) of all connections together, as listed at ``Action``; zeros for a rigid mount."""
-    # Without a connection there are no rows. Their sum is zero, which means rigid.
-    parts = [form.function(*values) for _, form, values in model.select_forms("connection")]
-    return np.asarray(np.sum(np.array(parts, float).reshape(-1, _CONNECTION_COUNT), axis=0))
 
 
 class _SimulationChain:
@@ -162,7 +157,7 @@ class _SimulationChain:
     def simulate_compliant(
         self, step_counts: StepCounts, carrying: Array, max_travel: float, sensitivities: bool
     ) -> tuple[Response, Array | None]:
-        """Return response and sensitivities (N, U) on a compliant mount with these connection values (5,)."""
+        """Return response and sensitivities (N, U) on a compliant mount, with its values (5,) or (5 + G,)."""
         c, h = self._model.coordinates, self._h
         g = compliant_mount.stack_inputs(self._motion, self._field, self._scales, self._parallel_force, h)
         fixed = np.array([*self._s, c.k1, c.f0, *carrying])
@@ -172,19 +167,19 @@ class _SimulationChain:
             return Response(force, y, zeta, self._field.u, step_counts), None
         over_motion, own = channel.differentiate_parallel_force(self._model, self._excitation, self._motion)
         rows = compliant_mount.stack_derivatives(self._motion, self._field, self._scales, over_motion, own, h)
+        tabulated, table_rows = differentiate_tables(self._model)
         y, zeta, force, partial = compliant_sensitivities.integrate_with_sensitivities(
-            fixed, *g, h, start, max_travel, step_counts, *rows
+            fixed, *g, h, start, max_travel, step_counts, *rows, table_rows
         )
         J = self._make_sensitivities()
         J[:, _STRUCTURAL_COLUMNS] = partial[:, :STRUCTURAL_COUNT]
-        J[:, [_K1, _F0]] = partial[:, STRUCTURAL_COUNT : STRUCTURAL_COUNT + 2]
-        for at, form, values in self._model.select_forms("connection"):
-            for k, row in enumerate(differentiate_by_parameters(form.function, values, form.parameters)):
-                J[:, len(SENSITIVITY_COLUMNS) + at + k] += (
-                    partial[:, STRUCTURAL_COUNT + 2 : compliant_mount.FIXED_COUNT] @ row
-                )
-        J[:, _Y0] = partial[:, compliant_mount.FIXED_COUNT]
-        columns = [*self._columns, *(len(SENSITIVITY_COLUMNS) + at for at, _ in own)]
+        J[:, [_K1, _F0, _Y0]] = partial[:, [compliant_mount.K1, compliant_mount.F0, compliant_mount.FIXED_COUNT]]
+        columns = [
+            *self._columns,
+            *(len(SENSITIVITY_COLUMNS) + column for column in (*(column for column, _ in own), *tabulated)),
+        ]
         J[:, columns] = partial[:, compliant_mount.FIXED_COUNT + 1 :]
+        for column, row in differentiate_connections(self._model, partial):
+            J[:, len(SENSITIVITY_COLUMNS) + column] += row
         self._add_delay_terms(J)
         return Response(force, y, zeta, self._field.u, step_counts), J

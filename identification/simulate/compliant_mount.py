@@ -6,11 +6,12 @@ actuator, d film damping of the connection, p parallel force), the law reads
     y' = R / c1      X' = slip + y'      slip = (R - F zeta - k0 (X - y)) / c0      zeta' = g(slip, zeta)
 
 For a linear spring, each implicit stage is linear in y and X. It reduces to one scalar equation in zeta, as on a
-rigid mount. A connection with gap or hardening is linearised repeatedly until its elongation no longer changes.
+rigid mount. Any other connection is linearised repeatedly until its elongation no longer changes.
 The force on the load cell is the force of the connection. Parallel forces are evaluated at the actuator's motion.
 
 ``p`` holds 17 fixed values: the ten structural coordinates, k1, f0, and compliance, gap, hardening, film damping
-and in-gap stiffness ratio of the connection. ``g`` holds the seven inputs at one instant: x, u, factors of alpha,
+and in-gap stiffness ratio of the connection. Where the elongation is a table, its G values follow, and only the
+film damping of the five counts. ``g`` holds the seven inputs at one instant: x, u, factors of alpha,
 c0 and c1, parallel force, x'.
 """
 
@@ -35,18 +36,22 @@ from identification.simulate.step import (
     solve_hysteresis,
 )
 
-FIXED_COUNT, INPUT_COUNT = 17, 7
+FIXED_COUNT, INPUT_COUNT, CONNECTION_COUNT = 17, 7, 5
 K1, F0, COMPLIANCE, GAP, HARDENING, FILM_DAMPING, IN_GAP_RATIO = 10, 11, 12, 13, 14, 15, 16
 _MAX_LINEARISATIONS = 12
 """Largest number of linearisations of a connection in one stage."""
+_MAX_TABLE_LINEARISATIONS = 60
+"""The same for a table, of which a bisection finds every cell."""
 _FORCE_TOLERANCE = 1e-8
 """Relative error of the connection's force below which the linearisation is accepted [1]."""
 _EDGE_OFFSET = 1e-12
 """Distance beyond an edge of the gap at which the other side is linearised [m]."""
 
-compute_transmitted_force = njit_cached(connection.compute_transmitted_force)
-compute_tangent_stiffness = njit_cached(connection.compute_tangent_stiffness)
-_compute_elongation = njit_cached(connection.compute_elongation)
+_compute_transmitted_force = njit_cached(connection.compute_transmitted_force)
+_compute_tangent_stiffness = njit_cached(connection.compute_tangent_stiffness)
+_compute_formula_elongation = njit_cached(connection.compute_elongation)
+_interpolate_force = njit_cached(connection.interpolate_force)
+_FORCES = connection.FORCES
 
 
 def stack_inputs(
@@ -124,14 +129,33 @@ def _compute_rates(p: Array, g: Array, y: float, zeta: float, X: float) -> tuple
 @njit_cached
 def compute_dashpot_force(p: Array, g: Array, X: float, held: float, c0: float, c1: float) -> float:
     """Compute the force R [N] on the dashpot c1; ``held`` is the part of hysteresis and k0."""
-    spring = (
-        compute_transmitted_force(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
-        - p[K1] * X
-        + p[F0]
-        - g[5]
-    )
+    spring = compute_spring_force(p, g[0] - X) - p[K1] * X + p[F0] - g[5]
     film = p[FILM_DAMPING]
     return float((spring + film * (g[6] + held / c0)) / (1.0 + film * (1.0 / c0 + 1.0 / c1)))
+
+
+@njit_cached
+def compute_spring_force(p: Array, elongation: float) -> float:
+    """Compute the force of the connection [N] at an elongation [m], without that of its film."""
+    if len(p) > FIXED_COUNT:
+        return float(_interpolate_force(elongation, p, FIXED_COUNT)[0])
+    return float(_compute_transmitted_force(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]))
+
+
+@njit_cached
+def compute_spring_stiffness(p: Array, elongation: float) -> float:
+    """Compute the derivative of this force over the elongation [N/m]."""
+    if len(p) > FIXED_COUNT:
+        return float(_interpolate_force(elongation, p, FIXED_COUNT)[1])
+    return float(_compute_tangent_stiffness(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]))
+
+
+@njit_cached
+def _compute_elongation(p: Array, force: float) -> float:
+    """Compute the elongation of the connection [m] under a force [N]."""
+    if len(p) > FIXED_COUNT:
+        return float(np.interp(force, _FORCES, p[FIXED_COUNT:]))
+    return float(_compute_formula_elongation(force, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]))
 
 
 @njit_cached
@@ -139,22 +163,25 @@ def solve_stage(
     p: Array, g: Array, yk: float, zk: float, Xk: float, w: float, zeta: float, X: float
 ) -> tuple[float, float, float]:
     """Solve state = known + w * rates(state) for y, zeta and X at the end of a stage, from ``zeta`` and ``X``."""
-    compliance, gap, hardening, in_gap_ratio = p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]
+    tabulated, half = len(p) > FIXED_COUNT, 0.5 * p[GAP]
     elongation, y = g[0] - X, yk
-    for _ in range(_MAX_LINEARISATIONS):
-        force = compute_transmitted_force(elongation, compliance, gap, hardening, in_gap_ratio)
-        steep = compute_tangent_stiffness(elongation, compliance, gap, hardening, in_gap_ratio)
+    low, high = -np.inf, np.inf
+    for _ in range(_MAX_TABLE_LINEARISATIONS if tabulated else _MAX_LINEARISATIONS):
+        force, steep = compute_spring_force(p, elongation), compute_spring_stiffness(p, elongation)
         y, zeta, X = _solve_linearised(p, g, yk, zk, Xk, w, zeta, force - steep * elongation, steep)
         # A linear spring needs one linearisation.
-        if gap == 0.0 and hardening == 0.0:
+        if not tabulated and half == 0.0 and p[HARDENING] == 0.0:
             break
         moved = g[0] - X
         straight = force + steep * (moved - elongation)
-        if abs(
-            compute_transmitted_force(moved, compliance, gap, hardening, in_gap_ratio) - straight
-        ) < _FORCE_TOLERANCE * (1.0 + abs(straight)):
+        if abs(compute_spring_force(p, moved) - straight) < _FORCE_TOLERANCE * (1.0 + abs(straight)):
             break
-        elongation = _choose_elongation(elongation, moved, 0.5 * gap)
+        if not tabulated:
+            elongation = _choose_elongation(elongation, moved, half)
+            continue
+        # The force grows with the elongation and the load of the damper decreases, so the step shows the side.
+        low, high = (elongation, high) if moved > elongation else (low, elongation)
+        elongation = moved if low < moved < high else 0.5 * (low + high)
     return y, zeta, X
 
 
@@ -198,7 +225,7 @@ def find_start_position(p: Array, g: Array, y0: float, zeta0: float, v0: float) 
     X = g[0]
     # k1 acts at X. Each iteration reduces the error by the factor k1 times compliance, which is small.
     for _ in range(_MAX_LINEARISATIONS):
-        X = g[0] - _compute_elongation(load + p[K1] * X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+        X = g[0] - _compute_elongation(p, load + p[K1] * X)
     return float(X)
 
 
@@ -209,7 +236,7 @@ def integrate(
     """Integrate the states and the force along an excitation.
 
     Args:
-        p: (17,) fixed values.
+        p: (17,) fixed values, or (17 + G,) with a table.
         at, middle: (7, N) and (7, N-1) inputs.
         h: time between samples [s].
         start: y [m], zeta [1] and velocity of the actuator [m/s] at the first sample.
@@ -269,7 +296,4 @@ def choose_sample_steps(
 @njit_cached
 def compute_cell_force(p: Array, g: Array, X: float, X_rate: float) -> float:
     """Compute the force of the connection on the load cell [N]."""
-    return float(
-        compute_transmitted_force(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
-        + p[FILM_DAMPING] * (g[6] - X_rate)
-    )
+    return float(compute_spring_force(p, g[0] - X) + p[FILM_DAMPING] * (g[6] - X_rate))

@@ -25,8 +25,8 @@ from identification.simulate.compliant_mount import (
     combine_stages,
     compute_cell_force,
     compute_dashpot_force,
-    compute_tangent_stiffness,
-    compute_transmitted_force,
+    compute_spring_force,
+    compute_spring_stiffness,
     evaluate_law,
     find_start_position,
     interpolate_inputs,
@@ -54,19 +54,21 @@ def integrate_with_sensitivities(
     step_counts: StepCounts,
     over: Array,
     over_middle: Array,
+    table_rows: Array,
 ) -> tuple[Array, Array, Array, Array]:
     """Integrate states and force along an excitation, and the sensitivities of the force.
 
     Args:
         p, at, middle, h, start, max_travel, step_counts: as in ``integrate``.
         over, over_middle: (E, 7, N) and (E, 7, N-1) derivatives of the inputs over further unknowns.
+        table_rows: (T, G) derivatives of a tabulated elongation over its parameters [m].
 
     Returns:
-        y [m], zeta [1], force [N], each (N,), and sensitivities (N, 17 + 1 + E) over fixed values, y0 and further
-        unknowns.
+        y [m], zeta [1], force [N], each (N,), and sensitivities (N, 17 + 1 + E + T) over fixed values, y0, further
+        unknowns and the parameters of the table.
     """
     count, extra = at.shape[1], len(over)
-    columns = FIXED_COUNT + 1 + extra
+    columns = FIXED_COUNT + 1 + extra + len(table_rows)
     ys, zetas, forces, sensitivities = (
         np.empty(count),
         np.empty(count),
@@ -79,12 +81,12 @@ def integrate_with_sensitivities(
     y, zeta = start[0], start[1]
     interpolate_inputs(g, at, middle, 0, 0.0)
     X = find_start_position(p, g, y, zeta, start[2])
-    _differentiate_start(p, g, zeta, start[2], X, over, S)
-    y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, over, over_middle, 0, 0.0, J, f)
+    _differentiate_start(p, g, zeta, start[2], X, over, table_rows, S)
+    y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, over, over_middle, table_rows, 0, 0.0, J, f)
     for i in range(count):
         ys[i], zetas[i] = y, zeta
         forces[i] = compute_cell_force(p, at[:, i], X, X_rate)
-        _record_row(sensitivities[i], S, J, f, over[:, :, i], at[0, i] - X, at[6, i] - X_rate, p)
+        _record_row(sensitivities[i], S, J, f, over[:, :, i], table_rows, at[0, i] - X, at[6, i] - X_rate, p)
         if i == count - 1:
             break
         if step_counts[i] == 0:
@@ -94,7 +96,7 @@ def integrate_with_sensitivities(
             t = (k + GAMMA) / step_counts[i]
             interpolate_inputs(g, at, middle, i, t)
             y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta, X)
-            _differentiate_rates(p, g, y1, z1, X1, over, over_middle, i, t, J1, f1)
+            _differentiate_rates(p, g, y1, z1, X1, over, over_middle, table_rows, i, t, J1, f1)
             _propagate_first_stage(w, J, S, f, f1, S1)
             _solve(w, J1, S1)
             t = (k + 1.0) / step_counts[i]
@@ -102,7 +104,9 @@ def integrate_with_sensitivities(
             y, zeta, X = solve_stage(
                 p, g, combine_stages(y1, y), combine_stages(z1, zeta), combine_stages(X1, X), w, z1, X1
             )
-            y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, over, over_middle, i, t, J, f)
+            y_rate, zeta_rate, X_rate = _differentiate_rates(
+                p, g, y, zeta, X, over, over_middle, table_rows, i, t, J, f
+            )
             _propagate_second_stage(w, f, S1, S)
             _solve(w, J, S)
     return ys, zetas, forces, sensitivities
@@ -110,12 +114,20 @@ def integrate_with_sensitivities(
 
 @njit_cached
 def _record_row(
-    row: Array, S: Array, J: Array, f: Array, over: Array, elongation: float, elongation_rate: float, p: Array
+    row: Array,
+    S: Array,
+    J: Array,
+    f: Array,
+    over: Array,
+    table_rows: Array,
+    elongation: float,
+    elongation_rate: float,
+    p: Array,
 ) -> None:
     """Write the sensitivities of the force at one sample into its row."""
     # The film's force depends on X', whose derivative over the unknowns follows from the state.
     steep, film = (
-        compute_tangent_stiffness(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]),
+        compute_spring_stiffness(p, elongation),
         p[FILM_DAMPING],
     )
     for j in range(len(row)):
@@ -123,6 +135,9 @@ def _record_row(
         row[j] = -S[2, j] * steep - film * X_rate
     for e in range(len(over)):
         row[FIXED_COUNT + 1 + e] += over[e, 0] * steep + film * over[e, 6]
+    first = FIXED_COUNT + 1 + len(over)
+    for k in range(len(table_rows)):
+        row[first + k] -= steep * _interpolate_row(p, table_rows[k], elongation)
     row[FILM_DAMPING] += elongation_rate
     over_compliance, over_gap, over_hardening, over_in_gap_ratio = _differentiate_connection(elongation, p)
     row[COMPLIANCE] += over_compliance
@@ -133,20 +148,29 @@ def _record_row(
 
 @njit_cached
 def _differentiate_connection(elongation: float, p: Array) -> tuple[float, float, float, float]:
-    """Differentiate the force of the connection over compliance, gap, hardening and in-gap stiffness ratio."""
-    compliance, gap, hardening, in_gap_ratio = p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]
-    half = 0.5 * gap
+    """Differentiate the force of the connection over compliance, gap, hardening and in-gap stiffness ratio.
+
+    Those of a table are zero: its parameters act as a displacement of the actuator.
+    """
+    if len(p) > FIXED_COUNT:
+        return 0.0, 0.0, 0.0, 0.0
+    compliance, half = p[COMPLIANCE], 0.5 * p[GAP]
     free = min(max(elongation, -half), half)
     engaged = elongation - free
-    over_compliance = -compute_transmitted_force(elongation, compliance, gap, hardening, in_gap_ratio) / compliance
+    over_compliance = -compute_spring_force(p, elongation) / compliance
     if engaged == 0.0:
         return over_compliance, 0.0, 0.0, free / compliance
     side = 0.5 if engaged > 0.0 else -0.5
     over_gap = side * (
-        (connection.MIN_STIFFNESS_RATIO + in_gap_ratio) / compliance
-        - compute_tangent_stiffness(elongation, compliance, gap, hardening, in_gap_ratio)
+        (connection.MIN_STIFFNESS_RATIO + p[IN_GAP_RATIO]) / compliance - compute_spring_stiffness(p, elongation)
     )
     return over_compliance, over_gap, engaged**3 / compliance, free / compliance
+
+
+@njit_cached
+def _interpolate_row(p: Array, row: Array, elongation: float) -> float:
+    """Return the derivative of the elongation over a parameter of the table [m], at an elongation [m]."""
+    return float(np.interp(elongation, p[FIXED_COUNT:], row))
 
 
 @njit_cached
@@ -167,10 +191,12 @@ def _propagate_second_stage(w: float, f: Array, S1: Array, S: Array) -> None:
 
 
 @njit_cached
-def _differentiate_start(p: Array, g: Array, zeta0: float, v0: float, X: float, over: Array, S: Array) -> None:
+def _differentiate_start(
+    p: Array, g: Array, zeta0: float, v0: float, X: float, over: Array, table_rows: Array, S: Array
+) -> None:
     """Write the derivatives of the initial X into S."""
     u = g[1]
-    compliance = 1.0 / compute_tangent_stiffness(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+    compliance = 1.0 / compute_spring_stiffness(p, g[0] - X)
     stiff = 1.0 + compliance * p[K1]
     S[2, 0], S[2, 1] = -compliance * g[2] * zeta0 / stiff, -compliance * u * g[2] * zeta0 / stiff
     S[2, 5], S[2, 6] = -compliance * g[3] * v0 / stiff, -compliance * u * g[3] * v0 / stiff
@@ -187,6 +213,9 @@ def _differentiate_start(p: Array, g: Array, zeta0: float, v0: float, X: float, 
             d[2] * evaluate_coefficient(p[0], p[1], u) * zeta0 + d[3] * evaluate_coefficient(p[5], p[6], u) * v0
         )
         S[2, FIXED_COUNT + 1 + e] = (d[0] - compliance * change) / stiff
+    first = FIXED_COUNT + 1 + len(over)
+    for k in range(len(table_rows)):
+        S[2, first + k] = -_interpolate_row(p, table_rows[k], g[0] - X) / stiff
 
 
 @njit_cached
@@ -198,6 +227,7 @@ def _differentiate_rates(
     X: float,
     over: Array,
     over_middle: Array,
+    table_rows: Array,
     i: int,
     t: float,
     J: Array,
@@ -209,7 +239,7 @@ def _differentiate_rates(
     """
     F, c0, c1 = evaluate_law(p, g)
     k0 = p[9]
-    steep = compute_tangent_stiffness(g[0] - X, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])
+    steep = compute_spring_stiffness(p, g[0] - X)
     held = F * zeta + k0 * (X - y)
     R = compute_dashpot_force(p, g, X, held, c0, c1)
     y_rate, slip = R / c1, (R - held) / c0
@@ -233,6 +263,10 @@ def _differentiate_rates(
                 over_y, over_s = _differentiate_by_input(p, g, k, steep, zeta, y_rate, slip, c0, c1)
                 f[0, FIXED_COUNT + 1 + e] += over_y * d
                 f[1, FIXED_COUNT + 1 + e] += over_s * d
+    first = FIXED_COUNT + 1 + len(over)
+    for e in range(len(table_rows)):
+        change = -steep * _interpolate_row(p, table_rows[e], g[0] - X)
+        f[0, first + e], f[1, first + e] = change / c1, change / c0
     _apply_film_damping(p[FILM_DAMPING], c0, c1, over_slip, f)
     _apply_film_damping(p[FILM_DAMPING], c0, c1, over_slip, J)
     J[1, 1] += over_zeta

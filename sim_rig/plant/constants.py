@@ -6,12 +6,16 @@ import numpy as np
 
 from sim_rig.plant import states
 from sim_rig.plant.defined_effects import DefinedFunctions, compute_steepest_slope
-from sim_rig.plant.effects import EffectFunctions
+from sim_rig.plant.effects import FORCES, EffectFunctions
 from sim_rig.plant.jit import Array, QuaternaryFunction
 from sim_rig.scenario import Scenario
 
 _MIN_LAG = 2e-5
 """Threshold on the second lag of the coil [s]: below it, the lag is omitted."""
+_LEAST_LAG = 5e-6
+"""Lag of the damper behind the stiffest part of a tabulated mounting [s]: a stiffer one would need finer steps."""
+_SMALLEST_DAMPING = 1e-3
+"""Smallest damping for which this lag is kept [N s/m]."""
 _MAX_LIP_SPEED = 0.5
 """[m/s] largest velocity for which the deflection of a lip is integrated stably."""
 
@@ -58,7 +62,11 @@ def compute_rig_rate(scenario: Scenario, law: Array, parallel_slope: float = 0.0
 def make_plant_constants(
     scenario: Scenario, law: Array, effects: EffectFunctions, defined: DefinedFunctions | None
 ) -> Array:
-    """Return all constants, (CONSTANT_COUNT,): those of the rig and those of its effects, defined or not."""
+    """Return all constants: those of the rig and those of its effects, defined or not.
+
+    They are (CONSTANT_COUNT,). Where the elongation of the mounting is a table, its (G,) values follow. Its least
+    slope then is the compliance of the fixture, because it bounds the steps.
+    """
     k = np.zeros(states.CONSTANT_COUNT)
     k[: states.Z_SATURATION + 1] = make_rig_constants(scenario, law)
     k[states.DEAD_TIME], lag, k[states.LAGGED_FRACTION], k[states.LAG_COUNT] = effects.get_coil_lag()
@@ -77,7 +85,11 @@ def make_plant_constants(
     k[states.MASS] = sum(form.function(1.0, *values) for form, values in effects.select("inertia"))
     k[states.COOLING_RATE] = effects.get_cooling_rate()
     k[states.FIELD_MEMORY] = bool(effects.select("field_memory"))
-    return k
+    table = effects.tabulate_elongation(_LEAST_LAG / max(abs(law[6]), _SMALLEST_DAMPING))
+    if len(table):
+        k[states.FIXTURE_COMPLIANCE] = float(np.min(np.diff(table) / np.diff(FORCES)))
+        k[[states.GAP, states.HARDENING, states.IN_GAP_STIFFNESS]] = 0.0
+    return np.concatenate([k, table])
 
 
 def _compute_max_slope(parallel: QuaternaryFunction) -> float:

@@ -36,6 +36,7 @@ from sim_rig.plant.rig_rates import compute_actuator_rates, compute_coil_rates, 
 from sim_rig.plant.states import (
     BACKLASH,
     BRISTLE_RATE,
+    CONSTANT_COUNT,
     DAMPER,
     ENERGY,
     FIELD,
@@ -61,7 +62,18 @@ _VELOCITY_TOLERANCE = 1e-9
 LOOKAHEAD = 1e-6
 """[s] time over which the mounting looks ahead to determine whether it moves the damper."""
 
-compute_transmitted_force = compile_function(connection.compute_transmitted_force)
+_compute_transmitted_force = compile_function(connection.compute_transmitted_force)
+_interpolate_force = compile_function(connection.interpolate_force)
+
+
+@compile_function
+def _compute_spring_force(elongation: float, k: Array) -> float:
+    """Return the force of the mounting [N] at an elongation [m], without that of its film."""
+    if len(k) > CONSTANT_COUNT:
+        return float(_interpolate_force(elongation, k, CONSTANT_COUNT)[0])
+    return float(
+        _compute_transmitted_force(elongation, k[FIXTURE_COMPLIANCE], k[GAP], k[HARDENING], k[IN_GAP_STIFFNESS])
+    )
 
 
 @compile_function
@@ -184,9 +196,7 @@ def _balance_mounting(
 
     ``driven_x`` [m] and ``driven_v`` [m/s] are the motion at the fixture's other end.
     """
-    load = compute_transmitted_force(
-        driven_x - s[DAMPER], k[FIXTURE_COMPLIANCE], k[GAP], k[HARDENING], k[IN_GAP_STIFFNESS]
-    )
+    load = _compute_spring_force(driven_x - s[DAMPER], k)
     load, film_damping = load + k[FILM_DAMPING] * driven_v, k[FILM_DAMPING]
     v = _solve_velocity(s, load, film_damping, driven_v, u, p, parallel_force, scale_factors, defined)
     y_rate = _compute_damper_force(s, s[DAMPER], v, u, p, parallel_force, scale_factors, defined)[1]
@@ -227,7 +237,7 @@ def compute_rates(
         command: [m] commanded displacement now.
         drive: [V or A] commanded drive.
         delayed_output: [V or A] amplifier output as it reaches the coil after the dead time.
-        k: (CONSTANT_COUNT,) constants of actuator, amplifier, coil, heat and mounting.
+        k: (CONSTANT_COUNT,) constants of actuator, amplifier, coil, heat and mounting, then a table of this.
         p: (14,) parameters of the law in the paper's order.
         backlash_map: displacement of the damper over (its last one, actuator) [m].
         parallel_force: [N] over displacement [m], velocity [m/s], deflection of a lip [1] and gas position [m].

@@ -1,7 +1,10 @@
 """Active effects of a scenario as compiled functions and constants of the plant, by the action of their forms."""
 
-from identification.damper.effects import Action, Form
+import numpy as np
+
+from identification.damper.effects import Action, Form, compute_elongation, connection
 from sim_rig.plant.jit import (
+    Array,
     BinaryFunction,
     QuaternaryFunction,
     ScaleFunction,
@@ -21,6 +24,8 @@ from sim_rig.plant.jit import (
 from sim_rig.scenario import Scenario
 
 ParameterValues = tuple[float, ...]
+FORCES = connection.FORCES
+"""(G,) forces at which a table gives the elongation of the mounting [N]."""
 
 
 class EffectFunctions:
@@ -48,6 +53,20 @@ class EffectFunctions:
             float(sum(part[k] for part in parts)) for k in range(5)
         )
         return compliance, gap, hardening, film, stiffness_ratio
+
+    def tabulate_elongation(self, least_compliance: float) -> Array:
+        """Return the elongation (G,) of the mounting [m] at ``FORCES``; empty unless a defined effect gives one.
+
+        Args:
+            least_compliance: least slope of the table [m/N].
+        """
+        defined = self.select("elongation_function")
+        if not defined:
+            return np.empty(0)
+        compliance, gap, hardening, _, stiffness_ratio = self.sum_connections()
+        spring = [compute_elongation(float(f), compliance, gap, hardening, stiffness_ratio) for f in FORCES]
+        added = [form.function({"force": FORCES}, *values) for form, values in defined]
+        return np.asarray(connection.tabulate_elongation(np.sum([spring, *added], axis=0), least_compliance))
 
     def get_coil_lag(self) -> tuple[float, float, float, float]:
         """Return dead time [s], second lag [s], part of the field behind it [1] and number of such lags [1]."""

@@ -23,7 +23,7 @@ from sim_rig.plant.defined_effects import (
     make_defined_functions,
     start_variables,
 )
-from sim_rig.plant.effects import EffectFunctions
+from sim_rig.plant.effects import FORCES, EffectFunctions
 from sim_rig.plant.jit import BINARY_TYPE, QUATERNARY_TYPE, SCALE_TYPE, Array, FixedAddress
 from sim_rig.scenario import Scenario
 
@@ -146,10 +146,7 @@ class Plant:
             position = displacement - self._constants[states.ACTUATOR_COMPLIANCE] * (load + mounting_force)
         if not math.isfinite(position):
             raise PlantError(f"the specimen has no finite force at rest at {displacement:.4g} m")
-        mounting = self._constants[
-            [states.FIXTURE_COMPLIANCE, states.GAP, states.HARDENING, states.IN_GAP_STIFFNESS]
-        ]
-        damper = position - compute_elongation(load, *mounting) if mounting[0] > 0.0 else position
+        damper = position - self._compute_elongation(load)
         state = np.zeros(states.STATE_COUNT)
         state[[states.COMMAND, states.POSITION, states.Y]] = displacement, position, damper
         state[[states.DAMPER, states.GAS_POSITION]] = damper
@@ -157,6 +154,14 @@ class Plant:
         state[[states.FIELD, states.LAGGED, states.LAGGED_TWICE, states.OUTPUT]] = field, field, field, drive
         state[states.TEMPERATURE] = self._constants[states.AMBIENT]
         return state, position
+
+    def _compute_elongation(self, load: float) -> float:
+        """Return the elongation of the mounting [m] at rest under a load [N]."""
+        k = self._constants
+        if len(k) > states.CONSTANT_COUNT:
+            return float(np.interp(load, FORCES, k[states.CONSTANT_COUNT :]))
+        spring = k[[states.FIXTURE_COMPLIANCE, states.GAP, states.HARDENING, states.IN_GAP_STIFFNESS]]
+        return float(compute_elongation(load, *spring)) if spring[0] > 0.0 else 0.0
 
     def _compute_resting_forces(self, position: float, drive: float) -> tuple[float, float]:
         """Return the forces of damper and defined effects in the mounting [N], at rest at a position [m]."""

@@ -3,8 +3,10 @@
 from identification.damper.definitions.defined_effect import (
     ACTIONS,
     CURVE,
+    DEFINED_ACTIONS,
     DEFINED_FORM,
     DefinedFunction,
+    find_action,
     find_effect_file,
     make_effect,
 )
@@ -28,6 +30,7 @@ from identification.damper.definitions.library import (
 __all__ = [
     "ACTIONS",
     "CURVE",
+    "DEFINED_ACTIONS",
     "DEFINED_FORM",
     "STAGE_OF",
     "VARIABLES_AT",
@@ -38,6 +41,7 @@ __all__ = [
     "Expression",
     "Instruction",
     "check_new_name",
+    "find_action",
     "find_effect_file",
     "find_effect_folder",
     "load_effects",

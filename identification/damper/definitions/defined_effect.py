@@ -5,12 +5,13 @@ The value of the function acts at the definition's place:
 - ``drive``, ``field``: adds to the drive before the coil's lag, or to the field behind it [drive].
 - ``damper_gain``: the factor on alpha, c0 and c1 is one plus the value [1].
 - ``parallel_force``: adds to the law's force [N].
-- ``mounting``: adds to the force between load cell and damper [N].
+- ``mounting``: adds to the force between load cell and damper [N]. A function of that force is the elongation of
+  their connection instead [m], which grows with the force: the damper moves less than the actuator.
 - ``force_channel``: adds to the recorded force [N].
 - ``displacement_channel``: adds to the recorded displacement [m].
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +19,7 @@ import numpy as np
 
 from identification.damper.definitions.effect_file import EffectFile, EffectParameter
 from identification.damper.definitions.expression import Expression
-from identification.damper.effects import Action, Effect, Form, Place
+from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.damper.parameters import Quantity
 
 CURVE = "curve"
@@ -34,7 +35,9 @@ ACTIONS: dict[Place, Action] = {
     "force_channel": "channel_function",
     "displacement_channel": "displacement_function",
 }
-"""Action of a defined effect at each place."""
+"""Action of a defined effect at each place, except for a function of the force in the mounting."""
+DEFINED_ACTIONS: frozenset[Action] = frozenset({*ACTIONS.values(), "elongation_function"})
+"""All actions of defined effects."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,11 @@ class DefinedFunction:
         return self.expression.evaluate(known) + 0.0 * known[self.variables[0]]
 
 
+def find_action(place: Place, variables: Sequence[Variable]) -> Action:
+    """Return the action of a defined effect at a place, over some variables."""
+    return "elongation_function" if place == "mounting" and "force" in variables else ACTIONS[place]
+
+
 def make_effect(file: EffectFile) -> Effect:
     """Return the effect that a file defines."""
     quantities = tuple(
@@ -82,7 +90,7 @@ def make_effect(file: EffectFile) -> Effect:
         file.model_dump_json(by_alias=True),
     )
     start = tuple(p.value for p in file.parameters.values())
-    form = Form(DEFINED_FORM, ACTIONS[file.place], quantities, (start,), function)
+    form = Form(DEFINED_FORM, find_action(file.place, file.variables), quantities, (start,), function)
     return Effect(file.name, file.stage, file.variables[0], file.describe(), (form,))
 
 

@@ -23,11 +23,11 @@ VARIABLES_AT: dict[Place, tuple[Variable, ...]] = {
     "field": _COIL,
     "damper_gain": _DAMPER,
     "parallel_force": _DAMPER,
-    "mounting": _DAMPER,
+    "mounting": (*_DAMPER, "force"),
     "force_channel": ("force", "drive", "time"),
     "displacement_channel": ("displacement", "velocity", "time"),
 }
-"""Variables that can act at each place."""
+"""Variables that can act at each place; in the mounting, the force acts without others."""
 STAGE_OF: dict[Place, Stage] = {
     "drive": "coil",
     "field": "coil",
@@ -108,6 +108,8 @@ class EffectFile(FrozenModel):
         for variable in self.variables:
             if variable not in VARIABLES_AT[self.place]:
                 raise ValueError(f"at {self.place} there are {_join(VARIABLES_AT[self.place])}, not {variable}")
+        if self.place == "mounting" and "force" in self.variables and len(self.variables) > 1:
+            raise ValueError("in the mounting, force acts without other variables: the value is an elongation")
         if self.expression is None and self.curve is None:
             raise ValueError("there is neither an expression nor a curve")
         if self.curve is not None and self.curve.variable not in self.variables:

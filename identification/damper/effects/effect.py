@@ -47,6 +47,7 @@ Action = Literal[
     "relaxation_force",
     "displacement_backlash",
     "connection",
+    "elongation_function",
     "inertia",
     "time_shift",
     "force_lag",
@@ -81,6 +82,7 @@ Action = Literal[
   of the damper [m].
 - ``connection``: () -> compliance [m/N], gap [m], hardening [1/m²] and film damping [N s/m] of the connection
   between load cell and damper, and its in-gap stiffness ratio [1]. Those of several effects add up.
+- ``elongation_function``: force of the connection by name -> elongation that it adds [m].
 - ``inertia``: acceleration of the actuator [m/s²] -> force between load cell and damper [N].
 - ``time_shift``: () -> delay of the force channel [s].
 - ``force_lag``: () -> time constant of a lag in the force channel [s].
@@ -103,6 +105,7 @@ PLACES: dict[Action, Place] = {
     "relaxation_force": "parallel_force",
     "displacement_backlash": "mounting",
     "connection": "mounting",
+    "elongation_function": "mounting",
     "inertia": "mounting",
     "time_shift": "force_channel",
     "force_lag": "force_channel",

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper import Quantity
-from identification.damper.definitions import ACTIONS, STAGE_OF
+from identification.damper.definitions import STAGE_OF, find_action
 from identification.damper.effects import Effect, Form, Place, Variable
 from identification.fitting import EffectModel, Piece, Problem, RecordingScales
 from identification.gap.discovery.curve_basis import (
@@ -72,6 +72,11 @@ class CurvePlace(NamedTuple):
         return "drive" in self.variables[1:] and not self.grows_with_drive
 
     @property
+    def is_elongation(self) -> bool:
+        """True for the elongation of the connection over its force."""
+        return self.place == "mounting" and self.variables == ("force",)
+
+    @property
     def label(self) -> str:
         """Description for a person."""
         kind = "viscous " if self.is_viscous else "periodic " if self.period else ""
@@ -103,6 +108,7 @@ CURVE_PLACES: tuple[CurvePlace, ...] = (
     *_PARALLEL,
     *(at._replace(variables=(*at.variables, "drive"), grows_with_drive=True) for at in _PARALLEL),
     CurvePlace("mounting", ("acceleration",)),
+    CurvePlace("mounting", ("force",)),
     CurvePlace("force_channel", ("force",)),
     CurvePlace("force_channel", ("time",)),
     CurvePlace("force_channel", ("drive",)),
@@ -138,6 +144,8 @@ class CurveEffect:
         """Unit of the curve's values."""
         if self.at.has_drive_factor:
             return "1"
+        if self.at.is_elongation:
+            return "m"
         return "N s/m" if self.at.is_viscous else _PLACE_UNITS[self.at.place]
 
 
@@ -205,6 +213,8 @@ def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> Curve
 
 def _find_size(at: CurvePlace, scales: RecordingScales) -> float:
     """Return the value of a curve of size one, in the unit of its place over that of its factors."""
+    if at.is_elongation:
+        return scales.length
     sizes: dict[Place, float] = {
         "drive": scales.drive if not at.has_drive_factor else 1.0,
         "field": scales.drive,
@@ -220,5 +230,7 @@ def _list_coefficients(count: int) -> tuple[Quantity, ...]:
 
 
 def _make_model(at: CurvePlace, quantities: tuple[Quantity, ...], function: Any) -> EffectModel:
-    form = Form(CURVE_EFFECT, ACTIONS[at.place], quantities, ((0.0,) * len(quantities),), function)
+    form = Form(
+        CURVE_EFFECT, find_action(at.place, at.variables), quantities, ((0.0,) * len(quantities),), function
+    )
     return EffectModel(Effect(CURVE_EFFECT, STAGE_OF[at.place], at.variables[0], at.label, (form,)), CURVE_EFFECT)

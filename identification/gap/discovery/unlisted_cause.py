@@ -40,12 +40,13 @@ _STATIC_ACTIONS: frozenset[Action] = frozenset(
         "field_function",
         "gain_function",
         "force_function",
+        "elongation_function",
         "mount_function",
         "channel_function",
         "displacement_function",
     }
 )
-"""Actions that a curve over one variable can represent; delays, lags and connections have a state of their own."""
+"""Actions that a curve over one variable can represent; delays and lags have a state of their own."""
 
 
 def is_unlisted(at: CurvePlace, library: Mapping[str, Effect]) -> bool:
@@ -60,6 +61,8 @@ def list_pairs(library: Mapping[str, Effect]) -> set[tuple[Place, Variable]]:
         for form in effect.forms:
             if form.action in _STATIC_ACTIONS:
                 pairs.add((form.place, effect.variable))
+            if form.action == "connection":
+                pairs.add((form.place, "force"))
             if form.action == "hysteretic_force":
                 pairs.add((form.place, "travel_since_reversal"))
     return pairs

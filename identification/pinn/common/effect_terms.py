@@ -36,6 +36,7 @@ from identification.simulate import (
 _UNSUPPORTED_ACTIONS: tuple[Action, ...] = (
     "displacement_backlash",
     "connection",
+    "elongation_function",
     "force_lag",
     "channel_function",
     "displacement_function",

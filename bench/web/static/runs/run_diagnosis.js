@@ -147,7 +147,8 @@ function effectCurve({ place, curve }, driveUnit) {
   const x = inUnit(VARIABLE_UNITS[curve.variable] ?? "", driveUnit);
   const y = inUnit(curve.unit, driveUnit);
   const isRelative = ["drive", "field"].includes(place) && curve.unit !== "{drive}" && curve.unit !== driveUnit;
-  const up = `${PLACE_QUANTITIES[place] ?? spaced(place)}${isRelative ? " over drive" : ""}${y.unit === "1" ? "" : ` [${y.unit}]`}`;
+  const quantity = place === "mounting" && curve.variable === "force" ? "elongation of the mounting" : PLACE_QUANTITIES[place] ?? spaced(place);
+  const up = `${quantity}${isRelative ? " over drive" : ""}${y.unit === "1" ? "" : ` [${y.unit}]`}`;
   const across = curve.x.map((value) => value * x.scale);
   const convert = (values) => values.map((value) => value * y.scale);
   const band = curve.lo && curve.hi && { name: "95 % band", colour: "--force", x: across, low: convert(curve.lo), high: convert(curve.hi) };

@@ -89,6 +89,8 @@ def test_a_displacement_error_is_drawn_in_millimetres():
         ("drive", ("time", "drive"), "1", "added drive over drive"),
         ("field", ("drive",), "A", "added field"),
         ("damper_gain", ("time",), "1", "relative change of alpha, c0 and c1"),
+        ("mounting", ("acceleration",), "N", "added force"),
+        ("mounting", ("force",), "m", "elongation of the mounting"),
         ("elsewhere", ("time",), "N", "value at elsewhere"),
     ],
 )

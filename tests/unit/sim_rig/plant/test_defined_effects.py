@@ -121,6 +121,22 @@ def test_a_force_of_the_acceleration_in_the_mounting_is_a_moving_mass(stiffness)
     assert_close(own.force - without.force, library.force - without.force, 1e-3)
 
 
+@pytest.mark.parametrize("form", ["linear", "in series"])
+def test_an_elongation_over_the_force_is_a_compliance_of_the_fixture(plain, form):
+    library = {"name": "fixture_compliance", "form": "linear", "parameters": {"compliance": 2e-6}}
+    part = {**library, "parameters": {"compliance": 0.5e-6}}
+    own = define("mounting", "c*force", ["force"], c=2e-6 if form == "linear" else 1.5e-6)
+    run, expected = play(own, *([part] if form == "in series" else [])), play(library)
+    assert_close(run.force - plain.force, expected.force - plain.force, 0.05)
+
+
+def test_a_soft_middle_of_the_mounting_is_crossed_before_the_damper_moves_on(plain):
+    run = play(define("mounting", "a*tanh(force/s)", ["force"], a=1e-4, s=5.0))
+    lag = run.truth.position[::SUBSTEPS] - run.truth.damper_displacement
+    pulled = run.truth.force[::SUBSTEPS] > 50.0
+    assert lag[pulled] == pytest.approx(1e-4, rel=0.05)
+
+
 def test_a_force_in_the_mounting_does_not_heat_the_damper(plain):
     run, change = play_with(plain, "mounting", "a*velocity", ["velocity"], a=500.0)
     assert_close(change, 500.0 * run.truth.velocity, 1e-3)

@@ -47,6 +47,12 @@ def test_an_effect_acts_at_its_place(place):
     assert effect.forms[0].place == place
 
 
+def test_a_function_of_the_force_in_the_mounting_is_an_elongation():
+    content = {"name": "mine", "stage": "mounting", "place": "mounting", "variables": ["force"]}
+    (form,) = make(content | {"expression": "1e-6*force"}).forms
+    assert (form.action, form.place) == ("elongation_function", "mounting")
+
+
 @pytest.mark.parametrize(
     ("value", "lo", "hi", "scale"),
     [

@@ -90,8 +90,16 @@ def test_a_place_outside_the_damper_has_few_variables(place, known):
 
 def test_at_the_damper_there_is_neither_a_recorded_force_nor_a_history_of_the_drive():
     every = set(get_args(Variable))
-    for place in ("damper_gain", "parallel_force", "mounting"):
+    for place in ("damper_gain", "parallel_force"):
         assert every - set(VARIABLES_AT[place]) == {"force", "drive_history", "temperature"}
+    assert every - set(VARIABLES_AT["mounting"]) == {"drive_history", "temperature"}
+
+
+def test_in_the_mounting_the_force_acts_alone():
+    content = {"name": "mine", "stage": "mounting", "place": "mounting", "expression": "force*velocity"}
+    assert refuse(content | {"variables": ["force", "velocity"]}) == (
+        "mine.json: in the mounting, force acts without other variables: the value is an elongation"
+    )
 
 
 @pytest.mark.parametrize(("place", "variable"), PLACES_AND_VARIABLES)

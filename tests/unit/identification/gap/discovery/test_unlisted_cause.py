@@ -26,6 +26,8 @@ from tests.support.effects import active
         ("parallel_force", ("travel_since_reversal", "velocity"), False),
         ("parallel_force", ("travel_since_rest", "velocity"), True),
         ("force_channel", ("force",), True),
+        ("mounting", ("force",), False),
+        ("mounting", ("displacement",), True),
         ("force_channel", ("time",), False),
     ],
 )

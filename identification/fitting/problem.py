@@ -238,8 +238,9 @@ class Problem:
         """Return the cost alone; an unstable point has infinite cost."""
         centre, weight = self._compute_priors()
         total = float(np.sum((weight * (unknowns - centre)) ** 2))
-        for force, p in zip(self.simulate(unknowns), self.pieces, strict=True):
-            total += float(np.sum((p.train / self.noise * (force - p.force)) ** 2))
+        with np.errstate(over="ignore", invalid="ignore"):  # of an unstable point
+            for force, p in zip(self.simulate(unknowns), self.pieces, strict=True):
+                total += float(np.sum((p.train / self.noise * (force - p.force)) ** 2))
         return total if np.isfinite(total) else np.inf
 
     def _compute_priors(self) -> tuple[Array, Array]:

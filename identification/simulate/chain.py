@@ -161,7 +161,7 @@ class _SimulationChain:
         c, h = self._model.coordinates, self._h
         g = compliant_mount.stack_inputs(self._motion, self._field, self._scales, self._parallel_force, h)
         fixed = np.array([*self._s, c.k1, c.f0, *carrying])
-        start = np.array([self._model.y0, self._zeta0, self._motion.v[0]])
+        start = np.array([self._model.y0, self._zeta0])
         if not sensitivities:
             y, zeta, force = compliant_mount.integrate(fixed, *g, h, start, max_travel, step_counts)
             return Response(force, y, zeta, self._field.u, step_counts), None

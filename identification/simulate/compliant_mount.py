@@ -32,6 +32,7 @@ from identification.simulate.step import (
     choose_steps,
     compute_hysteresis_rate,
     evaluate_coefficient,
+    interpolate_motion,
     interpolate_parabola,
     solve_hysteresis,
 )
@@ -98,10 +99,14 @@ def stack_derivatives(
 
 
 @njit_cached
-def interpolate_inputs(g: Array, at: Array, middle: Array, i: int, t: float) -> None:
-    """Write the inputs at the fraction t of sample i into g (7,)."""
+def interpolate_inputs(g: Array, at: Array, middle: Array, h: float, i: int, t: float) -> None:
+    """Write the inputs at the fraction t of sample i into g (7,); the motion is interpolated by a Hermite cubic."""
     for k in range(INPUT_COUNT):
-        g[k] = at[k, i] if t == 0.0 else interpolate_parabola(at[k, i], middle[k, i], at[k, i + 1], t)
+        g[k] = at[k, i]
+    if t > 0.0:
+        g[0], g[6] = interpolate_motion(at[0, i], at[0, i + 1], at[6, i], at[6, i + 1], h, t)
+        for k in range(1, INPUT_COUNT - 1):
+            g[k] = interpolate_parabola(at[k, i], middle[k, i], at[k, i + 1], t)
 
 
 @njit_cached
@@ -218,15 +223,23 @@ def _solve_linearised(
 
 
 @njit_cached
-def find_start_position(p: Array, g: Array, y0: float, zeta0: float, v0: float) -> float:
-    """Find the initial X [m], at which the connection carries the force of the saturated law."""
-    F, c0, _ = evaluate_law(p, g)
-    load = F * zeta0 + c0 * v0 + g[5] - p[F0]
+def find_start_position(p: Array, g: Array, y0: float, zeta0: float) -> float:
+    """Find the initial X [m], at which the damper has the velocity of the actuator."""
     X = g[0]
-    # k1 acts at X. Each iteration reduces the error by the factor k1 times compliance, which is small.
+    # k0 and k1 act at X. Each iteration reduces the error by the factor of both times compliance, which is small.
     for _ in range(_MAX_LINEARISATIONS):
-        X = g[0] - _compute_elongation(p, load + p[K1] * X)
+        _, y_rate, _ = compute_start_rates(p, g, y0, zeta0, X)
+        c1 = evaluate_law(p, g)[2]
+        X = g[0] - _compute_elongation(p, c1 * y_rate + p[K1] * X - p[F0] + g[5])
     return float(X)
+
+
+@njit_cached
+def compute_start_rates(p: Array, g: Array, y0: float, zeta0: float, X: float) -> tuple[float, float, float]:
+    """Return c1 over c0 + c1 [1], and y' and slip [m/s] of a damper that has the velocity of the actuator."""
+    F, c0, c1 = evaluate_law(p, g)
+    y_rate = (c0 * g[6] + F * zeta0 + p[9] * (X - y0)) / (c0 + c1)
+    return c1 / (c0 + c1), y_rate, g[6] - y_rate
 
 
 @njit_cached
@@ -239,7 +252,7 @@ def integrate(
         p: (17,) fixed values, or (17 + G,) with a table.
         at, middle: (7, N) and (7, N-1) inputs.
         h: time between samples [s].
-        start: y [m], zeta [1] and velocity of the actuator [m/s] at the first sample.
+        start: y [m] and zeta [1] at the first sample.
         max_travel, step_counts: as on a rigid mount.
 
     Returns:
@@ -248,8 +261,8 @@ def integrate(
     count = at.shape[1]
     ys, zetas, forces, g = np.empty(count), np.empty(count), np.empty(count), np.empty(INPUT_COUNT)
     y, zeta = start[0], start[1]
-    interpolate_inputs(g, at, middle, 0, 0.0)
-    X = find_start_position(p, g, y, zeta, start[2])
+    interpolate_inputs(g, at, middle, h, 0, 0.0)
+    X = find_start_position(p, g, y, zeta)
     y_rate, zeta_rate, X_rate = _compute_rates(p, g, y, zeta, X)
     for i in range(count):
         ys[i], zetas[i] = y, zeta
@@ -260,12 +273,14 @@ def integrate(
             step_counts[i] = choose_sample_steps(max_travel, p, at, h, i, X_rate, y_rate, zeta, zeta_rate)
         w = RATE_WEIGHT * h / step_counts[i]
         for k in range(step_counts[i]):
-            interpolate_inputs(g, at, middle, i, (k + GAMMA) / step_counts[i])
-            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta, X)
-            interpolate_inputs(g, at, middle, i, (k + 1.0) / step_counts[i])
-            y, zeta, X = solve_stage(
-                p, g, combine_stages(y1, y), combine_stages(z1, zeta), combine_stages(X1, X), w, z1, X1
-            )
+            x0, v0 = g[0], g[6]
+            interpolate_inputs(g, at, middle, h, i, (k + GAMMA) / step_counts[i])
+            x1, v1 = g[0], g[6]
+            known = X + w * X_rate + correct_first_stage(w, x0, x1, v0, v1)
+            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, known, w, zeta, X)
+            interpolate_inputs(g, at, middle, h, i, (k + 1.0) / step_counts[i])
+            known = combine_stages(X1, X) + correct_second_stage(w, x0, x1, g[0], g[6])
+            y, zeta, X = solve_stage(p, g, combine_stages(y1, y), combine_stages(z1, zeta), known, w, z1, X1)
             y_rate, zeta_rate, X_rate = _compute_rates(p, g, y, zeta, X)
     return ys, zetas, forces
 
@@ -274,6 +289,22 @@ def integrate(
 def combine_stages(stage: float, start: float) -> float:
     """Return the known part of the second stage, from the first stage and the start of the step."""
     return WEIGHT_STAGE * stage - WEIGHT_START * start
+
+
+@njit_cached
+def correct_first_stage(w: float, x0: float, x1: float, v0: float, v1: float) -> float:
+    """Return what the weights miss of the actuator's path up to the first stage [m].
+
+    With it, the elongation is the integrated state, and X follows from it. On a stiff connection the damper then
+    has the velocity of the actuator, also at coarse steps.
+    """
+    return x1 - x0 - w * (v0 + v1)
+
+
+@njit_cached
+def correct_second_stage(w: float, x0: float, x1: float, x2: float, v2: float) -> float:
+    """Return what the weights miss of the actuator's path up to the end of the step [m]."""
+    return x2 - combine_stages(x1, x0) - w * v2
 
 
 @njit_cached
@@ -288,9 +319,9 @@ def choose_sample_steps(
     zeta: float,
     zeta_rate: float,
 ) -> int:
-    """Choose the number of steps for one sample as if the damper's velocity changed to that of the actuator."""
-    speed = (at[0, i + 1] - at[0, i]) / h
-    return choose_steps(max_travel, p, h, X_rate, speed, at[1, i], at[1, i + 1], y_rate, zeta, zeta_rate)
+    """Choose the number of steps for one sample as if the damper reached the actuator's velocity at its end."""
+    v1 = at[6, i + 1]
+    return choose_steps(max_travel, p, h, X_rate, v1, at[1, i], at[1, i + 1], y_rate, zeta, zeta_rate)
 
 
 @njit_cached

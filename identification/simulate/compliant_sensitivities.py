@@ -27,6 +27,9 @@ from identification.simulate.compliant_mount import (
     compute_dashpot_force,
     compute_spring_force,
     compute_spring_stiffness,
+    compute_start_rates,
+    correct_first_stage,
+    correct_second_stage,
     evaluate_law,
     find_start_position,
     interpolate_inputs,
@@ -39,7 +42,6 @@ from identification.simulate.step import (
     compute_hysteresis_rate,
     differentiate_hysteresis_rate,
     evaluate_coefficient,
-    interpolate_parabola,
 )
 
 
@@ -77,39 +79,51 @@ def integrate_with_sensitivities(
     )
     S, S1, f, f1 = np.zeros((3, columns)), np.zeros((3, columns)), np.zeros((3, columns)), np.zeros((3, columns))
     J, J1, g = np.zeros((3, 3)), np.zeros((3, 3)), np.empty(INPUT_COUNT)
+    D, D1, D2 = np.empty((extra, INPUT_COUNT)), np.empty((extra, INPUT_COUNT)), np.empty((extra, INPUT_COUNT))
     S[0, FIXED_COUNT] = 1.0
     y, zeta = start[0], start[1]
-    interpolate_inputs(g, at, middle, 0, 0.0)
-    X = find_start_position(p, g, y, zeta, start[2])
-    _differentiate_start(p, g, zeta, start[2], X, over, table_rows, S)
-    y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, over, over_middle, table_rows, 0, 0.0, J, f)
+    interpolate_inputs(g, at, middle, h, 0, 0.0)
+    _interpolate_derivatives(D, over, over_middle, h, 0, 0.0)
+    X = find_start_position(p, g, y, zeta)
+    _differentiate_start(p, g, y, zeta, X, D, table_rows, S)
+    y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, D, table_rows, J, f)
     for i in range(count):
         ys[i], zetas[i] = y, zeta
-        forces[i] = compute_cell_force(p, at[:, i], X, X_rate)
-        _record_row(sensitivities[i], S, J, f, over[:, :, i], table_rows, at[0, i] - X, at[6, i] - X_rate, p)
+        forces[i] = compute_cell_force(p, g, X, X_rate)
+        _record_row(sensitivities[i], S, J, f, D, table_rows, g[0] - X, g[6] - X_rate, p)
         if i == count - 1:
             break
         if step_counts[i] == 0:
             step_counts[i] = choose_sample_steps(max_travel, p, at, h, i, X_rate, y_rate, zeta, zeta_rate)
         w = RATE_WEIGHT * h / step_counts[i]
         for k in range(step_counts[i]):
+            x0, v0 = g[0], g[6]
             t = (k + GAMMA) / step_counts[i]
-            interpolate_inputs(g, at, middle, i, t)
-            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, X + w * X_rate, w, zeta, X)
-            _differentiate_rates(p, g, y1, z1, X1, over, over_middle, table_rows, i, t, J1, f1)
-            _propagate_first_stage(w, J, S, f, f1, S1)
+            interpolate_inputs(g, at, middle, h, i, t)
+            _interpolate_derivatives(D1, over, over_middle, h, i, t)
+            x1, v1 = g[0], g[6]
+            known = X + w * X_rate + correct_first_stage(w, x0, x1, v0, v1)
+            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, known, w, zeta, X)
+            _differentiate_rates(p, g, y1, z1, X1, D1, table_rows, J1, f1)
+            _propagate_first_stage(w, J, S, f, f1, D, D1, S1)
             _solve(w, J1, S1)
             t = (k + 1.0) / step_counts[i]
-            interpolate_inputs(g, at, middle, i, t)
-            y, zeta, X = solve_stage(
-                p, g, combine_stages(y1, y), combine_stages(z1, zeta), combine_stages(X1, X), w, z1, X1
-            )
-            y_rate, zeta_rate, X_rate = _differentiate_rates(
-                p, g, y, zeta, X, over, over_middle, table_rows, i, t, J, f
-            )
-            _propagate_second_stage(w, f, S1, S)
+            interpolate_inputs(g, at, middle, h, i, t)
+            _interpolate_derivatives(D2, over, over_middle, h, i, t)
+            known = combine_stages(X1, X) + correct_second_stage(w, x0, x1, g[0], g[6])
+            y, zeta, X = solve_stage(p, g, combine_stages(y1, y), combine_stages(z1, zeta), known, w, z1, X1)
+            y_rate, zeta_rate, X_rate = _differentiate_rates(p, g, y, zeta, X, D2, table_rows, J, f)
+            _propagate_second_stage(w, f, S1, D, D1, D2, S)
             _solve(w, J, S)
+            D[:] = D2
     return ys, zetas, forces, sensitivities
+
+
+@njit_cached
+def _interpolate_derivatives(D: Array, over: Array, over_middle: Array, h: float, i: int, t: float) -> None:
+    """Write the derivatives of the inputs at the fraction t of sample i into D (E, 7)."""
+    for e in range(len(over)):
+        interpolate_inputs(D[e], over[e], over_middle[e], h, i, t)
 
 
 @njit_cached
@@ -118,7 +132,7 @@ def _record_row(
     S: Array,
     J: Array,
     f: Array,
-    over: Array,
+    D: Array,
     table_rows: Array,
     elongation: float,
     elongation_rate: float,
@@ -133,9 +147,9 @@ def _record_row(
     for j in range(len(row)):
         X_rate = J[2, 0] * S[0, j] + J[2, 1] * S[1, j] + J[2, 2] * S[2, j] + f[2, j]
         row[j] = -S[2, j] * steep - film * X_rate
-    for e in range(len(over)):
-        row[FIXED_COUNT + 1 + e] += over[e, 0] * steep + film * over[e, 6]
-    first = FIXED_COUNT + 1 + len(over)
+    for e in range(len(D)):
+        row[FIXED_COUNT + 1 + e] += D[e, 0] * steep + film * D[e, 6]
+    first = FIXED_COUNT + 1 + len(D)
     for k in range(len(table_rows)):
         row[first + k] -= steep * _interpolate_row(p, table_rows[k], elongation)
     row[FILM_DAMPING] += elongation_rate
@@ -174,46 +188,57 @@ def _interpolate_row(p: Array, row: Array, elongation: float) -> float:
 
 
 @njit_cached
-def _propagate_first_stage(w: float, J: Array, S: Array, f: Array, f1: Array, S1: Array) -> None:
+def _propagate_first_stage(
+    w: float, J: Array, S: Array, f: Array, f1: Array, D: Array, D1: Array, S1: Array
+) -> None:
     """Write the derivatives of the known part of the first stage and of its explicit part into S1."""
     for j in range(S.shape[1]):
         for a in range(3):
             moved = J[a, 0] * S[0, j] + J[a, 1] * S[1, j] + J[a, 2] * S[2, j]
             S1[a, j] = S[a, j] + w * (moved + f[a, j] + f1[a, j])
+    for e in range(len(D)):
+        S1[2, FIXED_COUNT + 1 + e] += correct_first_stage(w, D[e, 0], D1[e, 0], D[e, 6], D1[e, 6])
 
 
 @njit_cached
-def _propagate_second_stage(w: float, f: Array, S1: Array, S: Array) -> None:
+def _propagate_second_stage(w: float, f: Array, S1: Array, D: Array, D1: Array, D2: Array, S: Array) -> None:
     """Replace S by the derivatives of the known part of the second stage and of its explicit part."""
     for j in range(S.shape[1]):
         for a in range(3):
             S[a, j] = combine_stages(S1[a, j], S[a, j]) + w * f[a, j]
+    for e in range(len(D)):
+        S[2, FIXED_COUNT + 1 + e] += correct_second_stage(w, D[e, 0], D1[e, 0], D2[e, 0], D2[e, 6])
 
 
 @njit_cached
 def _differentiate_start(
-    p: Array, g: Array, zeta0: float, v0: float, X: float, over: Array, table_rows: Array, S: Array
+    p: Array, g: Array, y0: float, zeta0: float, X: float, D: Array, table_rows: Array, S: Array
 ) -> None:
     """Write the derivatives of the initial X into S."""
     u = g[1]
+    part, y_rate, slip = compute_start_rates(p, g, y0, zeta0, X)
     compliance = 1.0 / compute_spring_stiffness(p, g[0] - X)
-    stiff = 1.0 + compliance * p[K1]
-    S[2, 0], S[2, 1] = -compliance * g[2] * zeta0 / stiff, -compliance * u * g[2] * zeta0 / stiff
-    S[2, 5], S[2, 6] = -compliance * g[3] * v0 / stiff, -compliance * u * g[3] * v0 / stiff
-    S[2, K1], S[2, F0] = -compliance * X / stiff, compliance / stiff
+    stiff = 1.0 + compliance * (p[K1] + part * p[9])
+    # Each is the derivative of the load of the connection, times compliance.
+    scale = -compliance / stiff
+    over_yield, over_c0, over_c1 = part * zeta0, part * slip, (1.0 - part) * y_rate
+    S[2, 0], S[2, 1] = scale * g[2] * over_yield, scale * u * g[2] * over_yield
+    S[2, 5], S[2, 6] = scale * g[3] * over_c0, scale * u * g[3] * over_c0
+    S[2, 7], S[2, 8] = scale * g[4] * over_c1, scale * u * g[4] * over_c1
+    S[2, 9], S[2, FIXED_COUNT] = scale * part * (X - y0), -scale * part * p[9]
+    S[2, K1], S[2, F0] = scale * X, -scale
     over_compliance, over_gap, over_hardening, over_in_gap_ratio = _differentiate_connection(g[0] - X, p)
-    S[2, COMPLIANCE] = compliance * over_compliance / stiff
-    S[2, GAP] = compliance * over_gap / stiff
-    S[2, HARDENING] = compliance * over_hardening / stiff
-    S[2, IN_GAP_RATIO] = compliance * over_in_gap_ratio / stiff
-    for e in range(len(over)):
-        d = over[e, :, 0]
-        change = (g[2] * p[1] * zeta0 + g[3] * p[6] * v0) * d[1] + d[5]
-        change += (
-            d[2] * evaluate_coefficient(p[0], p[1], u) * zeta0 + d[3] * evaluate_coefficient(p[5], p[6], u) * v0
-        )
-        S[2, FIXED_COUNT + 1 + e] = (d[0] - compliance * change) / stiff
-    first = FIXED_COUNT + 1 + len(over)
+    S[2, COMPLIANCE], S[2, GAP] = -scale * over_compliance, -scale * over_gap
+    S[2, HARDENING], S[2, IN_GAP_RATIO] = -scale * over_hardening, -scale * over_in_gap_ratio
+    for e in range(len(D)):
+        d = D[e]
+        change = (g[2] * p[1] * over_yield + g[3] * p[6] * over_c0 + g[4] * p[8] * over_c1) * d[1] + d[5]
+        change += d[2] * evaluate_coefficient(p[0], p[1], u) * over_yield
+        change += d[3] * evaluate_coefficient(p[5], p[6], u) * over_c0
+        change += d[4] * evaluate_coefficient(p[7], p[8], u) * over_c1
+        change += part * g[3] * evaluate_coefficient(p[5], p[6], u) * d[6]
+        S[2, FIXED_COUNT + 1 + e] = d[0] / stiff + scale * change
+    first = FIXED_COUNT + 1 + len(D)
     for k in range(len(table_rows)):
         S[2, first + k] = -_interpolate_row(p, table_rows[k], g[0] - X) / stiff
 
@@ -225,11 +250,8 @@ def _differentiate_rates(
     y: float,
     zeta: float,
     X: float,
-    over: Array,
-    over_middle: Array,
+    D: Array,
     table_rows: Array,
-    i: int,
-    t: float,
     J: Array,
     f: Array,
 ) -> tuple[float, float, float]:
@@ -253,17 +275,14 @@ def _differentiate_rates(
     J[1, 0], J[1, 1], J[1, 2] = k0 / c0, -F / c0, -(stiffness + k0) / c0
     # Row 1 of J and f holds derivatives of the slip. At the end they are converted to those of zeta' and X'.
     _differentiate_by_fixed(p, g, X, y, zeta, y_rate, slip, c0, c1, f)
-    for e in range(len(over)):
+    for e in range(len(D)):
         f[0, FIXED_COUNT + 1 + e] = f[1, FIXED_COUNT + 1 + e] = 0.0
         for k in range(INPUT_COUNT):
-            d = over[e, k, i]
-            if t > 0.0:
-                d = interpolate_parabola(d, over_middle[e, k, i], over[e, k, i + 1], t)
-            if d != 0.0:
+            if D[e, k] != 0.0:
                 over_y, over_s = _differentiate_by_input(p, g, k, steep, zeta, y_rate, slip, c0, c1)
-                f[0, FIXED_COUNT + 1 + e] += over_y * d
-                f[1, FIXED_COUNT + 1 + e] += over_s * d
-    first = FIXED_COUNT + 1 + len(over)
+                f[0, FIXED_COUNT + 1 + e] += over_y * D[e, k]
+                f[1, FIXED_COUNT + 1 + e] += over_s * D[e, k]
+    first = FIXED_COUNT + 1 + len(D)
     for e in range(len(table_rows)):
         change = -steep * _interpolate_row(p, table_rows[e], g[0] - X)
         f[0, first + e], f[1, first + e] = change / c1, change / c0

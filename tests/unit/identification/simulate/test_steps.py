@@ -91,21 +91,32 @@ def inputs(x=0.0, u=0.1, factors=(1.0, 1.0, 1.0), parallel=0.0, v=0.0):
     return np.array([x, u, *factors, parallel, v])
 
 
+PART = 20000.0 / 20700.0
+"""Part of the force of yield and c0 that reaches the load cell: c1 over c0 + c1."""
+
+
 @pytest.mark.parametrize(
-    ("fixed", "at", "v0", "expected"),
+    ("fixed", "at", "expected"),
     [
         # The yield force is 200 N, c0 is 700 N s/m, and 1 N is 1 µm.
-        (mounting(), inputs(), 0.0, -200e-6),
-        (mounting(), inputs(x=1e-3), 0.1, 1e-3 - 270e-6),
-        (mounting(f0=50.0), inputs(parallel=20.0), 0.0, -170e-6),
-        (mounting(), inputs(factors=(0.5, 2.0, 1.0)), 0.1, -240e-6),
-        (mounting(gap=1e-4), inputs(), 0.0, -250e-6),
-        # X = -(200 + 1000 X) / 1e6
-        (mounting(k1=1e3), inputs(), 0.0, -0.2 / 1001.0),
+        (mounting(), inputs(), -200e-6 * PART),
+        (mounting(), inputs(x=1e-3, v=0.1), 1e-3 - 270e-6 * PART),
+        (mounting(f0=50.0), inputs(parallel=20.0), -200e-6 * PART + 30e-6),
+        (mounting(), inputs(factors=(0.5, 2.0, 1.0), v=0.1), -240e-6 * 20000.0 / 21400.0),
+        (mounting(gap=1e-4), inputs(), -200e-6 * PART - 50e-6),
+        # X = -(200 PART + 1000 X) / 1e6
+        (mounting(k1=1e3), inputs(), -0.2 * PART / 1001.0),
     ],
 )
-def test_a_compliant_mount_starts_where_the_connection_carries_the_saturated_law(fixed, at, v0, expected):
-    assert find_start_position(fixed, at, 0.0, 1.0, v0) == pytest.approx(expected, rel=1e-9)
+def test_a_compliant_mount_starts_where_the_damper_has_the_velocity_of_the_actuator(fixed, at, expected):
+    assert find_start_position(fixed, at, 0.0, 1.0) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_spring_of_the_law_pulls_at_the_start_by_its_elongation():
+    fixed = mounting()
+    fixed[9] = 1e4
+    # X = -(200 + 10 000 (X - y0)) PART / 1e6
+    assert find_start_position(fixed, inputs(), 1e-3, 1.0) == pytest.approx(-190e-6 * PART / (1.0 + 0.01 * PART))
 
 
 def test_the_cell_shows_the_spring_and_the_film_of_the_connection():
@@ -115,7 +126,7 @@ def test_the_cell_shows_the_spring_and_the_film_of_the_connection():
 
 @pytest.mark.parametrize(("X_rate", "steps"), [(0.06, 4), (0.16, 1)])
 def test_on_a_compliant_mount_the_damper_may_reach_the_speed_of_the_actuator_in_a_sample(X_rate, steps):
-    at = np.array([inputs(x=0.0), inputs(x=1e-4)]).T.copy()
+    at = np.array([inputs(v=0.1), inputs(x=1e-4, v=0.1)]).T.copy()
     assert choose_sample_steps(0.1, mounting(), at, H, 0, X_rate, 0.08, 0.0, 0.0) == steps
 
 

@@ -100,7 +100,7 @@ def stack_derivatives(
 
 @njit_cached
 def interpolate_inputs(g: Array, at: Array, middle: Array, h: float, i: int, t: float) -> None:
-    """Write the inputs at the fraction t of sample i into g (7,); the motion is interpolated by a Hermite cubic."""
+    """Write the inputs at the fraction t of sample i into g (7,); a Hermite cubic interpolates the motion."""
     for k in range(INPUT_COUNT):
         g[k] = at[k, i]
     if t > 0.0:

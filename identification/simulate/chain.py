@@ -15,12 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.simulate import channel, compliant_mount, compliant_sensitivities, inputs
-from identification.simulate.connections import (
-    differentiate_connections,
-    differentiate_tables,
-    gather_connections,
-)
+from identification.simulate import channel, compliant_mount, inputs
 from identification.simulate.kernel import InputDerivatives, StepCounts, integrate, integrate_with_sensitivities
 from identification.simulate.motion import DamperMotion, compute_damper_motion
 from identification.simulate.scaling import ScaleFactors, compute_scale_factors
@@ -60,7 +55,7 @@ def simulate(
     field = inputs.compute_damper_field(model, excitation, sensitivities)
     scales = compute_scale_factors(model, excitation, motion, sensitivities)
     chain = _SimulationChain(model, excitation, motion, field, scales)
-    carrying = gather_connections(model)
+    carrying = compliant_mount.gather_connections(model)
     if carrying[0] > 0.0 or len(carrying) > compliant_mount.CONNECTION_COUNT:
         found, J = chain.simulate_compliant(step_counts, carrying, max_travel, sensitivities)
     else:
@@ -167,19 +162,17 @@ class _SimulationChain:
             return Response(force, y, zeta, self._field.u, step_counts), None
         over_motion, own = channel.differentiate_parallel_force(self._model, self._excitation, self._motion)
         rows = compliant_mount.stack_derivatives(self._motion, self._field, self._scales, over_motion, own, h)
-        tabulated, table_rows = differentiate_tables(self._model)
-        y, zeta, force, partial = compliant_sensitivities.integrate_with_sensitivities(
+        tabulated, table_rows = compliant_mount.differentiate_tables(self._model)
+        y, zeta, force, partial = compliant_mount.integrate_with_sensitivities(
             fixed, *g, h, start, max_travel, step_counts, *rows, table_rows
         )
         J = self._make_sensitivities()
         J[:, _STRUCTURAL_COLUMNS] = partial[:, :STRUCTURAL_COUNT]
         J[:, [_K1, _F0, _Y0]] = partial[:, [compliant_mount.K1, compliant_mount.F0, compliant_mount.FIXED_COUNT]]
-        columns = [
-            *self._columns,
-            *(len(SENSITIVITY_COLUMNS) + column for column in (*(column for column, _ in own), *tabulated)),
-        ]
+        further = [*(column for column, _ in own), *tabulated]
+        columns = [*self._columns, *(len(SENSITIVITY_COLUMNS) + column for column in further)]
         J[:, columns] = partial[:, compliant_mount.FIXED_COUNT + 1 :]
-        for column, row in differentiate_connections(self._model, partial):
+        for column, row in compliant_mount.differentiate_connections(self._model, partial):
             J[:, len(SENSITIVITY_COLUMNS) + column] += row
         self._add_delay_terms(J)
         return Response(force, y, zeta, self._field.u, step_counts), J

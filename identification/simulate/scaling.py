@@ -14,7 +14,8 @@ from identification.simulate.curves import (
 )
 from identification.simulate.motion import DamperMotion
 from identification.simulate.simulation_model import Excitation, SimulationModel
-from identification.simulate.variables import DamperVariables, MovedVariables, compute_stored_energy
+from identification.simulate.stored_energy import compute_stored_energy
+from identification.simulate.variables import DamperVariables, MovedVariables
 
 _DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-7, 1e-6
 """Steps of differences [m], [m/s]."""

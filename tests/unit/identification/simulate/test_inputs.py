@@ -24,7 +24,8 @@ from identification.simulate.inputs import (
 )
 from identification.simulate.motion import compile_once, compute_damper_motion
 from identification.simulate.scaling import compute_scale_factors
-from identification.simulate.variables import apply_deadband, compute_stored_energy
+from identification.simulate.stored_energy import compute_stored_energy
+from identification.simulate.variables import apply_deadband
 from tests.support.effects import LABORATORY, active, sine
 
 H, ETA, LAG = 1e-3, 80.0, 0.004

@@ -6,12 +6,8 @@ import pytest
 from identification.damper import Coordinates
 from identification.damper.effects import EFFECTS
 from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
-from identification.simulate.compliant_mount import (
-    _choose_elongation,
-    choose_sample_steps,
-    compute_cell_force,
-    find_start_position,
-)
+from identification.simulate.compliant_mount.integration import choose_sample_steps, compute_cell_force
+from identification.simulate.compliant_mount.stages import _choose_elongation, find_start_position
 from identification.simulate.step import choose_steps
 
 H = 1e-3

@@ -19,7 +19,7 @@ from identification.damper.effects.connection import (
     differentiate_table,
     tabulate_elongation,
 )
-from identification.simulate.compliant_mount import CONNECTION_COUNT, FIXED_COUNT
+from identification.simulate.compliant_mount.springs import CONNECTION_COUNT, FIXED_COUNT
 from identification.simulate.curves import differentiate_by_parameters
 from identification.simulate.simulation_model import SimulationModel
 

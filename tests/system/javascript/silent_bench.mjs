@@ -29,6 +29,8 @@ const look = () =>
 
 await page.goto(`${url}/#token=${token}`);
 await page.waitForFunction(() => document.getElementById("state-word").innerText === "Idle");
+// On a busy machine the first status may come long before the first samples.
+await page.waitForFunction(() => document.getElementById("live-age").innerText.startsWith("newest sample"));
 await watch();
 await fetch(`${url}/api/v1/silence`, { method: "POST", headers: { Authorization: `Bearer ${token}` } });
 await page.waitForTimeout(9_000); // longer than a silence after which the websocket was opened again

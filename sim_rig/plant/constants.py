@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
+from identification.damper.effects import connection
 from sim_rig.plant import states
 from sim_rig.plant.defined_effects import DefinedFunctions, compute_steepest_slope
-from sim_rig.plant.effects import FORCES, EffectFunctions
+from sim_rig.plant.effects import EffectFunctions
 from sim_rig.plant.jit import Array, QuaternaryFunction
 from sim_rig.scenario import Scenario
 
@@ -87,7 +88,7 @@ def make_plant_constants(
     k[states.FIELD_MEMORY] = bool(effects.select("field_memory"))
     table = effects.tabulate_elongation(_LEAST_LAG / max(abs(law[6]), _SMALLEST_DAMPING))
     if len(table):
-        k[states.FIXTURE_COMPLIANCE] = float(np.min(np.diff(table) / np.diff(FORCES)))
+        k[states.FIXTURE_COMPLIANCE] = float(np.min(np.diff(table) / np.diff(connection.FORCES)))
         k[[states.GAP, states.HARDENING, states.IN_GAP_STIFFNESS]] = 0.0
     return np.concatenate([k, table])
 

@@ -24,8 +24,6 @@ from sim_rig.plant.jit import (
 from sim_rig.scenario import Scenario
 
 ParameterValues = tuple[float, ...]
-FORCES = connection.FORCES
-"""(G,) forces at which a table gives the elongation of the mounting [N]."""
 
 
 class EffectFunctions:
@@ -55,7 +53,7 @@ class EffectFunctions:
         return compliance, gap, hardening, film, stiffness_ratio
 
     def tabulate_elongation(self, least_compliance: float) -> Array:
-        """Return the elongation (G,) of the mounting [m] at ``FORCES``; empty unless a defined effect gives one.
+        """Return the elongation (G,) of the mounting [m] as a table; empty unless a defined effect gives one.
 
         Args:
             least_compliance: least slope of the table [m/N].
@@ -64,8 +62,10 @@ class EffectFunctions:
         if not defined:
             return np.empty(0)
         compliance, gap, hardening, _, stiffness_ratio = self.sum_connections()
-        spring = [compute_elongation(float(f), compliance, gap, hardening, stiffness_ratio) for f in FORCES]
-        added = [form.function({"force": FORCES}, *values) for form, values in defined]
+        spring = [
+            compute_elongation(float(f), compliance, gap, hardening, stiffness_ratio) for f in connection.FORCES
+        ]
+        added = [form.function({"force": connection.FORCES}, *values) for form, values in defined]
         return np.asarray(connection.tabulate_elongation(np.sum([spring, *added], axis=0), least_compliance))
 
     def get_coil_lag(self) -> tuple[float, float, float, float]:

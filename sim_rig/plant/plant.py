@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.damper.effects import compute_elongation
+from identification.damper.effects import compute_elongation, connection
 from sim_rig.errors import PlantError
 from sim_rig.plant import integrator, states
 from sim_rig.plant.constants import make_plant_constants
@@ -23,7 +23,7 @@ from sim_rig.plant.defined_effects import (
     make_defined_functions,
     start_variables,
 )
-from sim_rig.plant.effects import FORCES, EffectFunctions
+from sim_rig.plant.effects import EffectFunctions
 from sim_rig.plant.jit import BINARY_TYPE, QUATERNARY_TYPE, SCALE_TYPE, Array, FixedAddress
 from sim_rig.scenario import Scenario
 
@@ -159,7 +159,7 @@ class Plant:
         """Return the elongation of the mounting [m] at rest under a load [N]."""
         k = self._constants
         if len(k) > states.CONSTANT_COUNT:
-            return float(np.interp(load, FORCES, k[states.CONSTANT_COUNT :]))
+            return float(np.interp(load, connection.FORCES, k[states.CONSTANT_COUNT :]))
         spring = k[[states.FIXTURE_COMPLIANCE, states.GAP, states.HARDENING, states.IN_GAP_STIFFNESS]]
         return float(compute_elongation(load, *spring)) if spring[0] > 0.0 else 0.0
 

@@ -16,6 +16,7 @@ from identification.damper.definitions.effect_file import (
     Curve,
     EffectFile,
     EffectParameter,
+    is_elongation,
     parse_effect_file,
 )
 from identification.damper.definitions.expression import Expression, Instruction
@@ -44,6 +45,7 @@ __all__ = [
     "find_action",
     "find_effect_file",
     "find_effect_folder",
+    "is_elongation",
     "load_effects",
     "make_effect",
     "parse_effect_file",

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.damper.definitions.effect_file import EffectFile, EffectParameter
+from identification.damper.definitions.effect_file import EffectFile, EffectParameter, is_elongation
 from identification.damper.definitions.expression import Expression
 from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.damper.parameters import Quantity
@@ -69,7 +69,7 @@ class DefinedFunction:
 
 def find_action(place: Place, variables: Sequence[Variable]) -> Action:
     """Return the action of a defined effect at a place, over some variables."""
-    return "elongation_function" if place == "mounting" and "force" in variables else ACTIONS[place]
+    return "elongation_function" if is_elongation(place, variables) else ACTIONS[place]
 
 
 def make_effect(file: EffectFile) -> Effect:

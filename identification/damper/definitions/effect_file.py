@@ -1,6 +1,6 @@
 """Effect file, mrbench.effect/1: an effect of the user's own as data."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Annotated, Literal, Self, get_args
 
 from pydantic import ConfigDict, Field, StringConstraints, ValidationError, model_validator
@@ -38,6 +38,11 @@ STAGE_OF: dict[Place, Stage] = {
     "displacement_channel": "displacement_channel",
 }
 """Stage of the signal chain to which each place belongs."""
+
+
+def is_elongation(place: Place, variables: Sequence[Variable]) -> bool:
+    """Return True where the value at a place is the elongation of the mounting: a function of its force."""
+    return place == "mounting" and "force" in variables
 
 
 class EffectParameter(FrozenModel):
@@ -108,7 +113,7 @@ class EffectFile(FrozenModel):
         for variable in self.variables:
             if variable not in VARIABLES_AT[self.place]:
                 raise ValueError(f"at {self.place} there are {_join(VARIABLES_AT[self.place])}, not {variable}")
-        if self.place == "mounting" and "force" in self.variables and len(self.variables) > 1:
+        if is_elongation(self.place, self.variables) and len(self.variables) > 1:
             raise ValueError("in the mounting, force acts without other variables: the value is an elongation")
         if self.expression is None and self.curve is None:
             raise ValueError("there is neither an expression nor a curve")

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper import Quantity
-from identification.damper.definitions import STAGE_OF, find_action
+from identification.damper.definitions import STAGE_OF, find_action, is_elongation
 from identification.damper.effects import Effect, Form, Place, Variable
 from identification.fitting import EffectModel, Piece, Problem, RecordingScales
 from identification.gap.discovery.curve_basis import (
@@ -74,7 +74,7 @@ class CurvePlace(NamedTuple):
     @property
     def is_elongation(self) -> bool:
         """True for the elongation of the connection over its force."""
-        return self.place == "mounting" and self.variables == ("force",)
+        return is_elongation(self.place, self.variables)
 
     @property
     def label(self) -> str:

@@ -19,11 +19,11 @@ from identification.damper.effects.connection import (
     differentiate_table,
     tabulate_elongation,
 )
-from identification.simulate.compliant_mount.springs import CONNECTION_COUNT, FIXED_COUNT
+from identification.simulate.compliant_mount.springs import CONNECTION_COUNT, FILM_DAMPING, FIXED_COUNT
 from identification.simulate.curves import differentiate_by_parameters
 from identification.simulate.simulation_model import SimulationModel
 
-_FILM_DAMPING = 3
+_FILM_DAMPING = FILM_DAMPING - (FIXED_COUNT - CONNECTION_COUNT)
 """Position of the film damping among the values of a connection."""
 _LEAST_LAG = 1e-7
 """Lag of a damper behind the stiffest connection of a table [s]; it gives the least slope of a table."""

@@ -6,12 +6,10 @@ from identification.arrays import Array, njit_cached
 from identification.simulate.compliant_mount.springs import FILM_DAMPING, compute_spring_force
 from identification.simulate.compliant_mount.stacked_inputs import INPUT_COUNT, interpolate_inputs
 from identification.simulate.compliant_mount.stages import (
-    combine_stages,
     compute_rates,
-    correct_first_stage,
-    correct_second_stage,
     find_start_position,
-    solve_stage,
+    solve_first_stage,
+    solve_second_stage,
 )
 from identification.simulate.kernel import StepCounts
 from identification.simulate.step import GAMMA, RATE_WEIGHT, choose_steps
@@ -50,12 +48,10 @@ def integrate(
         for k in range(step_counts[i]):
             x0, v0 = g[0], g[6]
             interpolate_inputs(g, at, middle, h, i, (k + GAMMA) / step_counts[i])
-            x1, v1 = g[0], g[6]
-            known = X + w * X_rate + correct_first_stage(w, x0, x1, v0, v1)
-            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, known, w, zeta, X)
+            x1 = g[0]
+            y1, z1, X1 = solve_first_stage(p, g, y, zeta, X, y_rate, zeta_rate, X_rate, w, x0, v0)
             interpolate_inputs(g, at, middle, h, i, (k + 1.0) / step_counts[i])
-            known = combine_stages(X1, X) + correct_second_stage(w, x0, x1, g[0], g[6])
-            y, zeta, X = solve_stage(p, g, combine_stages(y1, y), combine_stages(z1, zeta), known, w, z1, X1)
+            y, zeta, X = solve_second_stage(p, g, y, zeta, X, y1, z1, X1, w, x0, x1)
             y_rate, zeta_rate, X_rate = compute_rates(p, g, y, zeta, X)
     return ys, zetas, forces
 

@@ -48,7 +48,7 @@ def differentiate_start(
     S[2, 0], S[2, 1] = scale * g[2] * over_yield, scale * u * g[2] * over_yield
     S[2, 5], S[2, 6] = scale * g[3] * over_c0, scale * u * g[3] * over_c0
     S[2, 7], S[2, 8] = scale * g[4] * over_c1, scale * u * g[4] * over_c1
-    S[2, 9], S[2, FIXED_COUNT] = scale * part * (X - y0), -scale * part * p[K0]
+    S[2, K0], S[2, FIXED_COUNT] = scale * part * (X - y0), -scale * part * p[K0]
     S[2, K1], S[2, F0] = scale * X, -scale
     over_compliance, over_gap, over_hardening, over_in_gap_ratio = differentiate_connection(g[0] - X, p)
     S[2, COMPLIANCE], S[2, GAP] = -scale * over_compliance, -scale * over_gap
@@ -173,7 +173,7 @@ def _differentiate_by_fixed(
     f[1, 0], f[1, 1] = -g[2] * zeta / c0, -u * g[2] * zeta / c0
     f[1, 5], f[1, 6] = -slip * g[3] / c0, -u * slip * g[3] / c0
     f[0, 7], f[0, 8] = -y_rate * g[4] / c1, -u * y_rate * g[4] / c1
-    f[1, 9] = -(X - y) / c0
+    f[1, K0] = -(X - y) / c0
     f[0, K1], f[1, K1] = -X / c1, -X / c0
     f[0, F0], f[1, F0] = 1.0 / c1, 1.0 / c0
     over_compliance, over_gap, over_hardening, over_in_gap_ratio = differentiate_connection(g[0] - X, p)

@@ -29,7 +29,8 @@ from identification.simulate.compliant_mount.stages import (
     correct_first_stage,
     correct_second_stage,
     find_start_position,
-    solve_stage,
+    solve_first_stage,
+    solve_second_stage,
 )
 from identification.simulate.kernel import StepCounts
 from identification.simulate.step import GAMMA, RATE_WEIGHT
@@ -91,17 +92,15 @@ def integrate_with_sensitivities(
             t = (k + GAMMA) / step_counts[i]
             interpolate_inputs(g, at, middle, h, i, t)
             _interpolate_derivatives(D1, over, over_middle, h, i, t)
-            x1, v1 = g[0], g[6]
-            known = X + w * X_rate + correct_first_stage(w, x0, x1, v0, v1)
-            y1, z1, X1 = solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, known, w, zeta, X)
+            x1 = g[0]
+            y1, z1, X1 = solve_first_stage(p, g, y, zeta, X, y_rate, zeta_rate, X_rate, w, x0, v0)
             differentiate_rates(p, g, y1, z1, X1, D1, table_rows, J1, f1)
             _propagate_first_stage(w, J, S, f, f1, D, D1, S1)
             _solve(w, J1, S1)
             t = (k + 1.0) / step_counts[i]
             interpolate_inputs(g, at, middle, h, i, t)
             _interpolate_derivatives(D2, over, over_middle, h, i, t)
-            known = combine_stages(X1, X) + correct_second_stage(w, x0, x1, g[0], g[6])
-            y, zeta, X = solve_stage(p, g, combine_stages(y1, y), combine_stages(z1, zeta), known, w, z1, X1)
+            y, zeta, X = solve_second_stage(p, g, y, zeta, X, y1, z1, X1, w, x0, x1)
             y_rate, zeta_rate, X_rate = differentiate_rates(p, g, y, zeta, X, D2, table_rows, J, f)
             _propagate_second_stage(w, f, S1, D, D1, D2, S)
             _solve(w, J, S)

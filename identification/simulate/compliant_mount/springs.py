@@ -21,19 +21,26 @@ _FORCES = connection.FORCES
 
 
 @njit_cached
+def evaluate_spring(p: Array, elongation: float) -> tuple[float, float]:
+    """Return the force of the connection [N] without its film, and its derivative [N/m], at an elongation [m]."""
+    if len(p) > FIXED_COUNT:
+        return _interpolate_force(elongation, p, FIXED_COUNT)
+    return (
+        float(_compute_transmitted_force(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])),
+        float(_compute_tangent_stiffness(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO])),
+    )
+
+
+@njit_cached
 def compute_spring_force(p: Array, elongation: float) -> float:
     """Compute the force of the connection [N] at an elongation [m], without that of its film."""
-    if len(p) > FIXED_COUNT:
-        return float(_interpolate_force(elongation, p, FIXED_COUNT)[0])
-    return float(_compute_transmitted_force(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]))
+    return evaluate_spring(p, elongation)[0]
 
 
 @njit_cached
 def compute_spring_stiffness(p: Array, elongation: float) -> float:
     """Compute the derivative of this force over the elongation [N/m]."""
-    if len(p) > FIXED_COUNT:
-        return float(_interpolate_force(elongation, p, FIXED_COUNT)[1])
-    return float(_compute_tangent_stiffness(elongation, p[COMPLIANCE], p[GAP], p[HARDENING], p[IN_GAP_RATIO]))
+    return evaluate_spring(p, elongation)[1]
 
 
 @njit_cached

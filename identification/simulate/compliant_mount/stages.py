@@ -24,7 +24,7 @@ from identification.simulate.compliant_mount.springs import (
     K1,
     compute_elongation,
     compute_spring_force,
-    compute_spring_stiffness,
+    evaluate_spring,
 )
 from identification.simulate.step import (
     WEIGHT_STAGE,
@@ -103,7 +103,7 @@ def solve_stage(
     elongation, y = g[0] - X, yk
     low, high = -np.inf, np.inf
     for _ in range(_MAX_TABLE_LINEARISATIONS if tabulated else _MAX_LINEARISATIONS):
-        force, steep = compute_spring_force(p, elongation), compute_spring_stiffness(p, elongation)
+        force, steep = evaluate_spring(p, elongation)
         y, zeta, X = _solve_linearised(p, g, yk, zk, Xk, w, zeta, force - steep * elongation, steep)
         # A linear spring needs one linearisation.
         if not tabulated and half == 0.0 and p[HARDENING] == 0.0:
@@ -157,6 +157,44 @@ def _solve_linearised(
 def combine_stages(stage: float, start: float) -> float:
     """Return the known part of the second stage, from the first stage and the start of the step."""
     return WEIGHT_STAGE * stage - WEIGHT_START * start
+
+
+@njit_cached
+def solve_first_stage(
+    p: Array,
+    g: Array,
+    y: float,
+    zeta: float,
+    X: float,
+    y_rate: float,
+    zeta_rate: float,
+    X_rate: float,
+    w: float,
+    x0: float,
+    v0: float,
+) -> tuple[float, float, float]:
+    """Return y, zeta and X at the first stage, from the start of the step and the actuator's motion there."""
+    known = X + w * X_rate + correct_first_stage(w, x0, g[0], v0, g[6])
+    return solve_stage(p, g, y + w * y_rate, zeta + w * zeta_rate, known, w, zeta, X)
+
+
+@njit_cached
+def solve_second_stage(
+    p: Array,
+    g: Array,
+    y: float,
+    zeta: float,
+    X: float,
+    y1: float,
+    z1: float,
+    X1: float,
+    w: float,
+    x0: float,
+    x1: float,
+) -> tuple[float, float, float]:
+    """Return y, zeta and X at the end of the step, from its start, its first stage and the actuator's path."""
+    known = combine_stages(X1, X) + correct_second_stage(w, x0, x1, g[0], g[6])
+    return solve_stage(p, g, combine_stages(y1, y), combine_stages(z1, zeta), known, w, z1, X1)
 
 
 @njit_cached

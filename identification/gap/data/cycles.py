@@ -21,9 +21,9 @@ Indices = npt.NDArray[np.intp]
 _CYCLE_TOLERANCE = 0.1
 """Part of a cycle that may be missing at the end of a segment for the last cycle to count as whole."""
 _HOLD_OUT_STRIDE = 4
-"""Every so many segments, or cycles, one is held out."""
-_FEWEST_SEGMENTS = 10
-"""Threshold on the number of segments: below it, cycles are held out instead of whole segments."""
+"""Every so many strokes, or cycles, one is held out."""
+_FEWEST_STROKES = 10
+"""Threshold on the number of strokes: below it, cycles are held out instead of whole strokes."""
 
 
 def split_by_piece(values: npt.NDArray[Number], pieces: Sequence[Piece]) -> list[npt.NDArray[Number]]:
@@ -42,6 +42,8 @@ class StrokeCondition:
     """Amplitude [m]."""
     frequency: float
     """Frequency [Hz]; 0 where the motion is not periodic."""
+    is_stroke: bool = True
+    """False for a rest and for a motion that does not return, such as the way to another position."""
 
 
 @dataclass(frozen=True)
@@ -131,42 +133,60 @@ def _number_cycles(segment: Segment, piece: Piece, rate: float, usual: float) ->
 
 
 def _find_condition(segment: Segment, piece: Piece) -> StrokeCondition:
-    part = slice(segment.start, segment.stop)
+    displacement = piece.excitation.displacement[segment.start : segment.stop]
     periodic = segment.motion in PERIODIC_MOTIONS and segment.frequency
-    amplitude = segment.amplitude or float(np.ptp(piece.excitation.displacement[part])) / 2.0
     drive = segment.drive_value
     return StrokeCondition(
-        float(np.mean(piece.excitation.drive[part])) if drive is None else drive,
-        amplitude,
+        float(np.mean(piece.excitation.drive[segment.start : segment.stop])) if drive is None else drive,
+        segment.amplitude or float(np.ptp(displacement)) / 2.0,
         float(segment.frequency or 0.0) if periodic else 0.0,
+        bool(periodic) or _is_stroke(segment.motion, displacement),
     )
 
 
-def _select_held_out_segments(conditions: Sequence[StrokeCondition]) -> BoolArray:
-    """Select every fourth segment of each drive, (segments,)."""
-    drives = [f"{c.drive:.3g}" for c in conditions]
-    offsets = {drive: k for k, drive in enumerate(sorted(set(drives), key=float))}
-    numbers = [drives[:i].count(drive) for i, drive in enumerate(drives)]
-    places = np.array([n + offsets[d] for n, d in zip(numbers, drives, strict=True)])
-    return np.asarray(places % _HOLD_OUT_STRIDE == _HOLD_OUT_STRIDE // 2)
+def _is_stroke(motion: str, displacement: Array) -> bool:
+    """Return whether a motion that does not repeat goes forth and back at least once."""
+    path, extent = np.sum(np.abs(np.diff(displacement))), np.ptp(displacement)
+    return motion != "hold" and bool(path >= (1.0 - _CYCLE_TOLERANCE) * 2.0 * extent > 0.0)
+
+
+def _select_held_out_strokes(cycles: Cycles, strokes: Sequence[int]) -> tuple[list[int], list[int]]:
+    """Select every fourth stroke of each drive to be held out whole.
+
+    Returns:
+        The selected segments, and those that are the only stroke of their drive.
+    """
+    by_drive: dict[str, list[int]] = {}
+    for stroke in strokes:
+        by_drive.setdefault(f"{cycles.conditions[stroke].drive:.3g}", []).append(stroke)
+    repeated = [by_drive[drive] for drive in sorted(by_drive, key=float) if len(by_drive[drive]) > 1]
+    whole = [
+        stroke
+        for offset, members in enumerate(repeated)
+        for stroke in members[(_HOLD_OUT_STRIDE // 2 - offset) % _HOLD_OUT_STRIDE :: _HOLD_OUT_STRIDE]
+    ]
+    return whole, [members[0] for members in by_drive.values() if len(members) == 1]
 
 
 def select_held_out_cycles(cycles: Cycles, usable: BoolArray | None = None) -> BoolArray:
-    """Select the held-out cycles, (cycles,): every fourth segment, or every fourth cycle where segments are few.
+    """Select the held-out cycles, (cycles,): every fourth stroke of each drive, or every fourth cycle of strokes.
 
     Only ``usable`` cycles (cycles,) are counted and held out; None for all.
 
-    A held-out segment is a stroke condition that no fit has used. The segments of each drive start at another
-    offset: a method that repeats its drives would otherwise hold out one drive and fit the others. In each of few
-    segments, the cycles start at another offset, so that some held-out cycle follows a step of the drive.
+    A held-out stroke is a condition that no fit has used. Cycles are held out instead where strokes are few, and
+    in the only stroke of a drive: no fit could know the damper at a drive that it has not met. Rests and motions
+    that do not return are always fitted; they count as strokes in a recording that has nothing else.
+
+    The strokes of each drive start at another offset: a method that repeats its drives would otherwise hold out
+    one drive and fit the others. The cycles of each stroke start at another offset too, so that some held-out
+    cycle follows a step of the drive.
     """
     usable = np.ones(cycles.count, bool) if usable is None else usable
-    segments = np.unique(cycles.segment[usable])
-    held_out = np.zeros(cycles.count, bool)
-    if len(segments) >= _FEWEST_SEGMENTS:
-        chosen = segments[_select_held_out_segments([cycles.conditions[s] for s in segments])]
-        return np.asarray(usable & np.isin(cycles.segment, chosen))
-    for offset, segment in enumerate(segments, _HOLD_OUT_STRIDE // 2):
+    segments = [int(s) for s in np.unique(cycles.segment[usable])]
+    strokes = [s for s in segments if cycles.conditions[s].is_stroke] or segments
+    whole, divided = ([], strokes) if len(strokes) < _FEWEST_STROKES else _select_held_out_strokes(cycles, strokes)
+    held_out = np.asarray(usable & np.isin(cycles.segment, whole))
+    for offset, segment in enumerate(divided, _HOLD_OUT_STRIDE // 2):
         members = np.flatnonzero(usable & (cycles.segment == segment))
         held_out[members[offset % _HOLD_OUT_STRIDE :: _HOLD_OUT_STRIDE]] = True
     if not held_out.any():

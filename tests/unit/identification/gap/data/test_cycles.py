@@ -140,8 +140,12 @@ def test_samples_outside_all_segments_belong_to_no_cycle():
     assert cycles.sum_by_cycle(np.ones(400), np.ones(400, bool)).tolist() == [100.0, 100.0]
 
 
-def make_cycles(segment, count):
-    conditions = tuple(StrokeCondition(0.0, 0.01, 1.0) for _ in range(count))
+def make_cycles(segment, count, drives=None, strokes=None):
+    """Cycles of segments, with the drive of each segment and whether it is a stroke."""
+    conditions = tuple(
+        StrokeCondition(d, 0.01, 1.0, s)
+        for d, s in zip(drives or [0.0] * count, strokes or [True] * count, strict=True)
+    )
     return Cycles(np.zeros(0, int), np.zeros(0), np.array(segment), conditions)
 
 
@@ -184,3 +188,40 @@ def test_a_drive_is_held_out_and_fitted_as_well_where_it_repeats(drives, strokes
     if strokes > 1:
         assert not any(part.all() for part in by_drive)
     assert sum(part.any() for part in by_drive) >= min(drives, 3)
+
+
+def test_cycles_of_the_only_stroke_of_a_drive_are_held_out_not_the_whole_stroke():
+    drives = [0.0] * 6 + [0.5] + [1.0] * 6
+    for cycles_each in (2, 3, 4, 8):
+        cycles = make_cycles(np.repeat(np.arange(13), cycles_each), 13, drives)
+        held_out = select_held_out_cycles(cycles)
+        counts = np.bincount(cycles.segment, held_out)
+        assert counts[6] <= np.ceil(cycles_each / 4)
+        assert set(np.delete(counts, 6)) == {0.0, float(cycles_each)}
+
+
+def test_rests_are_fitted_and_do_not_count_as_strokes():
+    strokes = [True, False] * 6
+    cycles = make_cycles(np.repeat(np.arange(12), 8), 12, strokes=strokes)
+    counts = np.bincount(cycles.segment, select_held_out_cycles(cycles))
+    assert counts.tolist() == [2.0, 0.0] * 6
+
+
+def test_a_recording_of_rests_alone_has_held_out_cycles():
+    held_out = select_held_out_cycles(make_cycles([0] * 8, 1, strokes=[False]))
+    assert np.flatnonzero(held_out).tolist() == [2, 6]
+
+
+@pytest.mark.parametrize(
+    ("motion", "x", "expected"),
+    [
+        ("hold", np.zeros(200), False),
+        ("hold", 1e-6 * np.sin(np.arange(200)), False),
+        ("ramp", np.linspace(-0.01, 0.01, 200), False),
+        ("other", 0.01 * np.sin(np.linspace(0.0, np.pi, 200)), True),
+        ("random", 0.01 * np.sin(np.linspace(0.0, 9.0, 200)), True),
+        ("table", np.zeros(200), False),
+    ],
+)
+def test_a_stroke_moves_and_returns(motion, x, expected):
+    assert cut_one(Segment(0, "s", 0, 200, motion, None, None, None), x).conditions[0].is_stroke is expected

@@ -85,11 +85,14 @@ def _draw_curve(axes: Axes, found: DiscoveredCurve, drive_unit: str) -> None:
     axes.plot(x, y_scale * np.array(curve.value), color=_GAP_COLOUR, linewidth=1.6)
     style_axes(
         axes,
-        f"{format_name(curve.variable)} [{x_unit}]",
+        f"{'time since a change' if found.is_step_response else format_name(curve.variable)} [{x_unit}]",
         f"{get_quantity(found, drive_unit)} [{y_unit}]",
         found.label.replace(" over ", "\nover ", 1),
     )
-    axes.locator_params(axis="x", nbins=6)
+    if found.is_step_response:
+        axes.set_xscale("log")
+    else:
+        axes.locator_params(axis="x", nbins=6)
 
 
 def _scale_length(unit: str) -> tuple[float, str]:

@@ -19,6 +19,9 @@ PLACE_QUANTITIES = {
 """Quantity that the value of an effect is, by place."""
 _ELONGATION = "elongation of the mounting"
 """The same for a function of the force in the mounting."""
+_STEP_RESPONSE = "step response"
+"""The same for a curve over the time since a change."""
+_RESPONSE_SENTENCE = "The curve is the part of a change that has arrived, over the time since the change."
 VARIABLE_UNITS = {
     "displacement": "m",
     "velocity": "m/s",
@@ -64,7 +67,13 @@ class DiscoveredCurve(DocumentPart):
     @property
     def label(self) -> str:
         """Place and variables as text."""
-        return f"{format_name(self.place)} over {join_words(self.variables)}"
+        kind = f"{_STEP_RESPONSE} of the " if self.is_step_response else ""
+        return f"{kind}{format_name(self.place)} over {join_words(self.variables)}"
+
+    @property
+    def is_step_response(self) -> bool:
+        """True where the curve is the part of a change that has arrived, over the time since it."""
+        return self.curve.variable not in self.variables
 
 
 class Discovery(DiscoveredCurve):
@@ -90,7 +99,7 @@ def join_words(names: tuple[str, ...] | list[str]) -> str:
 
 def get_quantity(found: DiscoveredCurve, drive_unit: str) -> str:
     """Return the quantity of a curve's values; ``drive_unit`` is V or A."""
-    quantity = _name_quantity(found.place, found.variables)
+    quantity = _name_quantity(found)
     is_relative = found.place in ("drive", "field") and found.curve.unit != drive_unit
     return f"{quantity} over drive" if is_relative else quantity
 
@@ -121,6 +130,7 @@ def _describe_discovery(discovery: Discovery, before: float, named: list[str]) -
     sentences = [
         f"An effect outside the library acts at the place “{format_name(discovery.place)}”.",
         f"It depends on {join_words(discovery.variables)}.",
+        *([_RESPONSE_SENTENCE] if discovery.is_step_response else []),
         f"{together} the force error on held-out strokes falls from {format_force(before)} to "
         f"{format_force(discovery.rmse_n)}.",
     ]
@@ -138,13 +148,15 @@ def _describe_discovery(discovery: Discovery, before: float, named: list[str]) -
 
 
 def _write_formula(discovery: Discovery, formula: Formula) -> str:
-    return f"{_name_quantity(discovery.place, discovery.variables)} = {formula.expression}"
+    return f"{_name_quantity(discovery)} = {formula.expression}"
 
 
-def _name_quantity(place: str, variables: tuple[str, ...]) -> str:
-    if place == "mounting" and "force" in variables:
+def _name_quantity(found: DiscoveredCurve) -> str:
+    if found.is_step_response:
+        return _STEP_RESPONSE
+    if found.place == "mounting" and "force" in found.variables:
         return _ELONGATION
-    return PLACE_QUANTITIES.get(place, f"value at {format_name(place)}")
+    return PLACE_QUANTITIES.get(found.place, f"value at {format_name(found.place)}")
 
 
 def _make_symbol_rows(formula: Formula) -> list[tuple[str, str, str]]:

@@ -173,11 +173,12 @@ class DiscoveredCurve(Document):
     stage: Stage = Field(description="stage of the signal chain")
     place: Place = Field(description="place in the signal chain")
     variables: list[Variable] = Field(description="variable of the curve, then those of its factors")
-    curve: Curve = Field(description="curve over the first variable with its 95 % band, without the factors")
-    rmse_n: float = Field(description="RMSE on held-out strokes with this effect and those before it, in N")
-    log_odds: float = Field(
-        description="logarithm of the odds (natural) of this effect on held-out strokes, over the set without it"
+    curve: Curve = Field(
+        description="curve over the first variable with its 95 % band, without the factors; over `time`, where "
+        "that is not among the variables, the step response: the part [1] of a change that has arrived by then"
     )
+    rmse_n: float = Field(description="RMSE on held-out strokes with this effect and those before it, in N")
+    log_odds: float = Field(description="logarithm of the odds (natural) of this effect over the set without it")
 
 
 class Discovery(DiscoveredCurve):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.damper.effects import Form
+from identification.damper.effects import Form, step_response
 from identification.simulate.curves import apply_lag, differentiate_by_argument, differentiate_by_parameters
 from identification.simulate.inputs import trace_path_memory
 from identification.simulate.motion import DamperMotion, compile_once
@@ -163,6 +163,8 @@ def apply_force_channel(
             )
     for at, form, values in model.select_forms("channel_function"):
         force = _apply_channel_function(excitation, force, J, form, values, first + at)
+    for at, form, values in model.select_forms("channel_response"):
+        force = _apply_channel_response(excitation, force, J, form, values, first + at)
     for at, _, values in model.select_forms("force_lag"):
         force = _apply_lag_to_both(force, values[0], 1.0 / excitation.rate, J, first + at)
     return force
@@ -191,6 +193,25 @@ def _apply_channel_function(
         J *= (1.0 + differentiate_by_argument(at_force, force, step))[:, None]
         _add_columns(J, at, partial(form.function, variables), form, values)
     return np.asarray(force + at_force(force))
+
+
+def _apply_channel_response(
+    excitation: Excitation, force: Array, J: Array | None, form: Form, values: tuple[float, ...], at: int
+) -> Array:
+    """Return the force after the step response of a defined effect; the sensitivities J follow in place."""
+    h = 1.0 / excitation.rate
+    weights = step_response.compute_weights(form.function, values, h)
+    found = step_response.apply_weights(weights, force)
+    if J is not None:
+        J[:] = step_response.apply_weights(weights, J)
+
+        def respond(*parameters: float) -> Array:
+            changed = step_response.compute_weights(form.function, parameters, h)
+            return step_response.apply_weights(changed, force)
+
+        for k, row in enumerate(differentiate_by_parameters(respond, values, form.parameters)):
+            J[:, at + k] += row
+    return found
 
 
 def _apply_lag_to_both(force: Array, lag: float, h: float, J: Array | None, at: int) -> Array:

@@ -11,13 +11,20 @@ import numpy as np
 
 from identification.arrays import Array, njit_cached, njit_uncached
 from identification.damper import Quantity
-from identification.damper.effects import Action
+from identification.damper.effects import Action, step_response
 from identification.simulate.curves import apply_lag, differentiate_by_parameters
 from identification.simulate.motion import compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.variables import make_coil_variables
 
-COIL_ACTIONS: tuple[Action, ...] = ("drive_delay", "field", "field_memory", "drive_function", "field_function")
+COIL_ACTIONS: tuple[Action, ...] = (
+    "drive_delay",
+    "field",
+    "field_memory",
+    "drive_function",
+    "drive_response",
+    "field_function",
+)
 """Actions that change the field."""
 _MIN_LAG = 1e-6
 """Second lag below which the drive passes without lag [s]."""
@@ -89,7 +96,7 @@ def _apply_coil(coil: Any, parameters: tuple[float, ...], excitation: Excitation
     """Apply all effects of the coil in the order of the chain; return the field at half samples (2N-1,)."""
     drive = excitation.drive
     eta, delay, lag, part, layers, at = parameters[0], parameters[1], 0.0, 1.0, 1, 2
-    maps = []
+    maps, responses = [], []
     for _, form, some in coil:
         own = parameters[at : at + len(some)]
         at += len(some)
@@ -98,8 +105,12 @@ def _apply_coil(coil: Any, parameters: tuple[float, ...], excitation: Excitation
             delay, lag = delay + further, lag + slower
         elif form.action == "drive_function":
             drive = drive + form.function(make_coil_variables(drive, excitation.start, h), *own)
+        elif form.action == "drive_response":
+            responses.append(step_response.compute_weights(form.function, own, h))
         else:
             maps.append((form, own))
+    for weights in responses:
+        drive = step_response.apply_weights(weights, drive)
     u = apply_two_lags(drive, eta, lag, delay, h)
     for _ in range(1, layers):
         u = apply_lag(u, lag, 0.5 * h)

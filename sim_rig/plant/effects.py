@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from identification.damper.effects import Action, Form, compute_elongation, connection
+from identification.damper.effects import Action, Form, compute_elongation, connection, step_response
 from sim_rig.plant.jit import (
     Array,
     BinaryFunction,
@@ -67,6 +67,11 @@ class EffectFunctions:
         ]
         added = [form.function({"force": connection.FORCES}, *values) for form, values in defined]
         return np.asarray(connection.tabulate_elongation(np.sum([spring, *added], axis=0), least_compliance))
+
+    def compute_response_weights(self, action: Action, dt: float) -> list[Array]:
+        """Return the weights of the last values, dt [s] apart, in each step response with an action."""
+        forms = self.select(action)
+        return [step_response.compute_weights(form.function, values, dt) for form, values in forms]
 
     def get_coil_lag(self) -> tuple[float, float, float, float]:
         """Return dead time [s], second lag [s], part of the field behind it [1] and number of such lags [1]."""

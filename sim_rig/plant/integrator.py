@@ -19,6 +19,7 @@ from sim_rig.plant.defined_effects import (
     DefinedFunctions,
     evaluate,
     hold_drive,
+    respond_to_drive,
     update_memory,
 )
 from sim_rig.plant.derivatives import compute_rates
@@ -244,7 +245,8 @@ def _integrate(
             output_history[substep % len(output_history)] = s[OUTPUT]
             if defined is not None:
                 # Before the new drive, which the output has not followed yet.
-                output_history[substep % len(output_history)] += evaluate(defined, DRIVE_PLACE)
+                output = s[OUTPUT] + evaluate(defined, DRIVE_PLACE)
+                output_history[substep % len(output_history)] = respond_to_drive(defined, output, substep)
                 hold_drive(defined, drive[i])
             delayed_output = _interpolate_output(output_history, substep, k[DEAD_TIME] / h)
             force, x, v, slip = compute_rates(

@@ -21,6 +21,7 @@ from sim_rig.plant.defined_effects import (
     MOUNTING_PLACE,
     evaluate,
     make_defined_functions,
+    set_drive_response,
     start_variables,
 )
 from sim_rig.plant.effects import EffectFunctions
@@ -70,7 +71,8 @@ class Plant:
         Raises:
             PlantError: the effects have no finite force there.
         """
-        effects = EffectFunctions(scenario)
+        effects = self._effects = EffectFunctions(scenario)
+        self._response_step = 0.0
         self._law = np.array(scenario.parameters)
         self._parallel_force = FixedAddress(effects.make_parallel_force(), QUATERNARY_TYPE)
         self._follower = FixedAddress(effects.make_backlash_map(), BINARY_TYPE)
@@ -108,6 +110,7 @@ class Plant:
             PlantError: the motion is not finite.
         """
         count, substeps = len(drive), count_substeps(dt)
+        self._start_drive_response(dt / substeps)
         (position, velocity, force), output = np.empty((3, count * substeps)), np.empty(count)
         damper, record = np.empty((count, 2)), np.empty((count, states.STATE_COUNT))
         self._damper_position, self._remanence, done = self._integrate(
@@ -136,6 +139,14 @@ class Plant:
             record[:, states.FIELD],
             record[:, states.TEMPERATURE],
         )
+
+    def _start_drive_response(self, h: float) -> None:
+        """Start the step response of the drive settled, unless it has started with substeps of h [s]."""
+        if self._defined is None or h == self._response_step:
+            return
+        weights = self._effects.compute_response_weights("drive_response", h)
+        drive = float(self._states[states.OUTPUT]) + evaluate(self._defined, DRIVE_PLACE)
+        self._defined, self._response_step = set_drive_response(self._defined, weights, drive), h
 
     def _find_equilibrium(self, displacement: float, drive: float) -> tuple[Array, float]:
         """Return the states at rest under the load of the resting damper, and its displacement [m]."""

@@ -58,10 +58,13 @@ def compute_coil_rates(
 ) -> None:
     """Write the rates from the amplifier's output through the second lag to the field."""
     rate[OUTPUT] = k[AMPLIFIER_RATE] * (drive - s[OUTPUT])
-    source = delayed_output if k[DEAD_TIME] > 0.0 else s[OUTPUT]
+    is_delayed = k[DEAD_TIME] > 0.0
+    if defined is not None:
+        is_delayed |= len(defined.weights) > 0
+    source = delayed_output if is_delayed else s[OUTPUT]
     if defined is not None:
         # A delayed output already contains what the effects add.
-        source += evaluate(defined, DRIVE_PLACE) if k[DEAD_TIME] == 0.0 else 0.0
+        source += 0.0 if is_delayed else evaluate(defined, DRIVE_PLACE)
     rate[LAGGED] = k[SECOND_LAG_RATE] * (source - s[LAGGED])
     rate[LAGGED_TWICE] = k[SECOND_LAG_RATE] * (s[LAGGED] - s[LAGGED_TWICE])
     fraction = k[LAGGED_FRACTION] if k[SECOND_LAG_RATE] > 0.0 else 0.0

@@ -142,9 +142,10 @@ def _make_models(scenario: Scenario, step: float) -> dict[str, SamplingModel]:
     effects = EffectFunctions(scenario)
     fine, held = SamplingModel(step / count_substeps(step)), SamplingModel(step, held=True)
     force_delay, force_lag = effects.sum_values("time_shift"), effects.sum_values("force_lag")
+    responses = tuple(effects.compute_response_weights("channel_response", fine.dt))
     return {
         "displacement": fine._replace(hidden_delay=effects.sum_values("displacement_shift")),
-        "force": fine._replace(hidden_delay=force_delay, hidden_lag=force_lag),
+        "force": fine._replace(hidden_delay=force_delay, hidden_lag=force_lag, responses=responses),
         "coil_drive": held,
         "actuator_position": fine,
         "coil_current": held,

@@ -36,6 +36,25 @@ class FilterStream:
         return apply_filter(self._b, self._a, values, self._state)
 
 
+class ResponseStream:
+    """Step response of a defined effect, settled at its first value."""
+
+    def __init__(self, weights: Array) -> None:
+        """Start with the weights (L,) of the last values [1], the newest first."""
+        self._weights = weights
+        self._last: Array | None = None
+
+    def feed(self, values: Array) -> Array:
+        """Return the response to further input ``values``."""
+        if not len(values):
+            return values
+        if self._last is None:
+            self._last = np.full(len(self._weights) - 1, values[0])
+        known = np.concatenate([self._last, values])
+        self._last = known[len(values) :]
+        return np.convolve(known, self._weights, "valid")
+
+
 def design_low_pass(order: int, cutoff: float, dt: float) -> tuple[Array, Array]:
     """Return numerator and denominator (n+1,) of a Butterworth filter, exact for inputs linear between samples.
 

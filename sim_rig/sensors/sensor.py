@@ -17,7 +17,7 @@ import numpy as np
 from sim_rig.plant import Array
 from sim_rig.scenario import ClockDeviation, Filter, Sensor
 from sim_rig.sensors.readings import ReadingConstants, convert_readings
-from sim_rig.sensors.sampling import FilterStream, apply_filter
+from sim_rig.sensors.sampling import FilterStream, ResponseStream, apply_filter
 
 _MIN_LAG = 8e-5
 """Threshold on a hidden lag [s]: below it, the lag is omitted, as it is faster than any filter of a device."""
@@ -58,6 +58,8 @@ class SamplingModel(NamedTuple):
     """[s] delay beyond the one that the channel reports."""
     hidden_lag: float = 0.0
     """[s] time constant of a lag that the channel does not report."""
+    responses: tuple[Array, ...] = ()
+    """Weights of the last true values [1], the newest first, in each step response that it does not report."""
 
 
 class ChannelStream:
@@ -84,7 +86,11 @@ class ChannelStream:
             [Filter(order=1, cutoff=1 / (2 * math.pi * model.hidden_lag))] if model.hidden_lag > _MIN_LAG else []
         )
         device = [sensor.filter] if sensor.filter else []
-        self._filters = [FilterStream(low_pass, model.dt) for low_pass in hidden + device]
+        responses = [ResponseStream(weights) for weights in model.responses]
+        self._filters: list[ResponseStream | FilterStream] = [
+            *responses,
+            *(FilterStream(low_pass, model.dt) for low_pass in hidden + device),
+        ]
         self._true_values = np.empty(0)
         self._first = 0
         self._next = 0
@@ -95,8 +101,8 @@ class ChannelStream:
 
     def feed(self, true_values: Array) -> None:
         """Add (K,) further true values in the channel's unit."""
-        for low_pass in self._filters:
-            true_values = low_pass.feed(true_values)
+        for filter_ in self._filters:
+            true_values = filter_.feed(true_values)
         self._true_values = np.concatenate([self._true_values, true_values])
 
     def count_ready(self) -> int:

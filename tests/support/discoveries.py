@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from identification.damper.definitions import STAGE_OF, EffectFile, EffectParameter, make_effect
+from identification.damper.definitions import STAGE_OF, EffectFile, EffectParameter, Kind, make_effect
 from identification.damper.effects import Place, Variable
 from identification.fitting import Piece, Problem
 from identification.fitting.search_space import SearchSpace
@@ -21,13 +21,16 @@ LENGTH = 0.012
 THREE_LEVELS = (0.0, 0.5, 0.25)
 
 
-def define(place: Place, expression: str, variables: tuple[Variable, ...], **values: float) -> ActiveEffect:
+def define(
+    place: Place, expression: str, variables: tuple[Variable, ...], kind: Kind = "value", **values: float
+) -> ActiveEffect:
     """Return an active effect of an expression and its parameters."""
     parameters = {name: EffectParameter(value=v, unit="1", lo=-1e9, hi=1e9) for name, v in values.items()}
     file = EffectFile(
         name=f"own_{place}",
         stage=STAGE_OF[place],
         place=place,
+        kind=kind,
         variables=list(variables),
         expression=expression,
         parameters=parameters,

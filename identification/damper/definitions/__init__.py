@@ -16,6 +16,7 @@ from identification.damper.definitions.effect_file import (
     Curve,
     EffectFile,
     EffectParameter,
+    Kind,
     is_elongation,
     parse_effect_file,
 )
@@ -41,6 +42,7 @@ __all__ = [
     "EffectParameter",
     "Expression",
     "Instruction",
+    "Kind",
     "check_new_name",
     "find_action",
     "find_effect_file",

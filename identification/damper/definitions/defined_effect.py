@@ -9,6 +9,9 @@ The value of the function acts at the definition's place:
   their connection instead [m], which grows with the force: the damper moves less than the actuator.
 - ``force_channel``: adds to the recorded force [N].
 - ``displacement_channel``: adds to the recorded displacement [m].
+
+A step response at ``drive`` or ``force_channel`` is no such value. It is the part [1] of a change of the drive or
+force that has arrived, over the time since the change.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.damper.definitions.effect_file import EffectFile, EffectParameter, is_elongation
+from identification.damper.definitions.effect_file import EffectFile, EffectParameter, Kind, is_elongation
 from identification.damper.definitions.expression import Expression
 from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.damper.parameters import Quantity
@@ -35,8 +38,10 @@ ACTIONS: dict[Place, Action] = {
     "force_channel": "channel_function",
     "displacement_channel": "displacement_function",
 }
-"""Action of a defined effect at each place, except for a function of the force in the mounting."""
-DEFINED_ACTIONS: frozenset[Action] = frozenset({*ACTIONS.values(), "elongation_function"})
+"""Action of a value at each place, except for a function of the force in the mounting."""
+DEFINED_ACTIONS: frozenset[Action] = frozenset(
+    {*ACTIONS.values(), "elongation_function", "drive_response", "channel_response"}
+)
 """All actions of defined effects."""
 
 
@@ -67,8 +72,10 @@ class DefinedFunction:
         return self.expression.evaluate(known) + 0.0 * known[self.variables[0]]
 
 
-def find_action(place: Place, variables: Sequence[Variable]) -> Action:
-    """Return the action of a defined effect at a place, over some variables."""
+def find_action(place: Place, variables: Sequence[Variable], kind: Kind = "value") -> Action:
+    """Return the action of a defined effect of a kind at a place, over some variables."""
+    if kind == "step_response":
+        return "drive_response" if place == "drive" else "channel_response"
     return "elongation_function" if is_elongation(place, variables) else ACTIONS[place]
 
 
@@ -81,7 +88,7 @@ def make_effect(file: EffectFile) -> Effect:
     expression = Expression.parse(file.expression or CURVE)
     curve = file.curve
     function = DefinedFunction(
-        tuple(file.variables),
+        tuple(file.arguments),
         expression,
         tuple(file.parameters),
         curve.variable if curve else "",
@@ -90,7 +97,7 @@ def make_effect(file: EffectFile) -> Effect:
         file.model_dump_json(by_alias=True),
     )
     start = tuple(p.value for p in file.parameters.values())
-    form = Form(DEFINED_FORM, find_action(file.place, file.variables), quantities, (start,), function)
+    form = Form(DEFINED_FORM, find_action(file.place, file.variables, file.kind), quantities, (start,), function)
     return Effect(file.name, file.stage, file.variables[0], file.describe(), (form,))
 
 

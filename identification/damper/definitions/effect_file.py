@@ -40,6 +40,12 @@ STAGE_OF: dict[Place, Stage] = {
 """Stage of the signal chain to which each place belongs."""
 
 
+RESPONSE_SIGNALS: dict[Place, tuple[Variable, ...]] = {"drive": ("drive_history",), "force_channel": ("force",)}
+"""Variable of a step response at each place that has one: the past of the drive, or the force."""
+Kind = Literal["value", "step_response"]
+"""Meaning of a function: the value at its place, or the part of a change there that has arrived after a time."""
+
+
 def is_elongation(place: Place, variables: Sequence[Variable]) -> bool:
     """Return True where the value at a place is the elongation of the mounting: a function of its force."""
     return place == "mounting" and "force" in variables
@@ -94,6 +100,11 @@ class EffectFile(FrozenModel):
     meaning: str = Field(default="", max_length=200, description="description for a person")
     stage: Stage = Field(description="stage of the signal chain, to which the place belongs")
     place: Place = Field(description="place in the signal chain")
+    kind: Kind = Field(
+        default="value",
+        description="value: the function is the value at the place; step_response: it is the part [1] of a change "
+        "of the signal that has arrived at a `time` [s] after the change",
+    )
     variables: list[Variable] = Field(min_length=1, max_length=3, description="variables, the main one first")
     expression: str | None = Field(
         default=None, description="expression over variables, parameters and `curve`; null for the curve alone"
@@ -115,12 +126,20 @@ class EffectFile(FrozenModel):
                 raise ValueError(f"at {self.place} there are {_join(VARIABLES_AT[self.place])}, not {variable}")
         if is_elongation(self.place, self.variables) and len(self.variables) > 1:
             raise ValueError("in the mounting, force acts without other variables: the value is an elongation")
+        if self.kind == "step_response" and RESPONSE_SIGNALS.get(self.place) != tuple(self.variables):
+            places = " or ".join(f"{place} over {signal[0]}" for place, signal in RESPONSE_SIGNALS.items())
+            raise ValueError(f"a step response acts at {places} alone")
         if self.expression is None and self.curve is None:
             raise ValueError("there is neither an expression nor a curve")
-        if self.curve is not None and self.curve.variable not in self.variables:
-            raise ValueError(f"the curve is over {self.curve.variable}, which is not among the variables")
+        if self.curve is not None and self.curve.variable not in self.arguments:
+            raise ValueError(f"the curve is over {self.curve.variable}, not over {_join(self.arguments)}")
         self._check_names()
         return self
+
+    @property
+    def arguments(self) -> list[Variable]:
+        """Variables of the function: those of the effect, or the time since a change for a step response."""
+        return ["time"] if self.kind == "step_response" else self.variables
 
     def _check_names(self) -> None:
         taken = sorted(set(self.parameters) & _RESERVED)
@@ -128,7 +147,7 @@ class EffectFile(FrozenModel):
             raise ValueError(f"{_join(taken)} cannot be the name of a parameter")
         own = {*self.parameters, *(["curve"] if self.curve else [])}
         used = Expression.parse(self.expression or "curve").names
-        unknown = used - own - set(self.variables)
+        unknown = used - own - set(self.arguments)
         if unknown:
             raise ValueError(f"the expression uses {_join(sorted(unknown))}, which is not declared")
         if own - used:

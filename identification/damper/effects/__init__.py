@@ -1,6 +1,6 @@
 """Library of effects, one module each, by their names in documents."""
 
-from identification.damper.effects import connection
+from identification.damper.effects import connection, step_response
 from identification.damper.effects.clevis_backlash import CLEVIS_BACKLASH
 from identification.damper.effects.coil_crosstalk import COIL_CROSSTALK
 from identification.damper.effects.coil_lag import COIL_LAG
@@ -71,4 +71,5 @@ __all__ = [
     "connection",
     "rename_form",
     "rename_parameters",
+    "step_response",
 ]

@@ -38,6 +38,7 @@ Variable = Literal[
 """Variable on which an effect depends."""
 Action = Literal[
     "drive_delay",
+    "drive_response",
     "field",
     "field_memory",
     "scaling",
@@ -60,6 +61,7 @@ Action = Literal[
     "force_function",
     "mount_function",
     "channel_function",
+    "channel_response",
     "displacement_function",
 ]
 """Quantity on which a form acts. It fixes the function's result and its arguments before the parameters:
@@ -92,10 +94,13 @@ Action = Literal[
 - ``drive_function``, ``field_function``, ``gain_function``, ``force_function``, ``mount_function``,
   ``channel_function``, ``displacement_function``: variables by name -> value at the place, as in
   `identification.damper.definitions`.
+- ``drive_response``, ``channel_response``: time since a change of the drive or force by name -> part of the change
+  that has arrived [1].
 """
 
 PLACES: dict[Action, Place] = {
     "drive_delay": "drive",
+    "drive_response": "drive",
     "field": "field",
     "field_memory": "field",
     "scaling": "damper_gain",
@@ -118,6 +123,7 @@ PLACES: dict[Action, Place] = {
     "force_function": "parallel_force",
     "mount_function": "mounting",
     "channel_function": "force_channel",
+    "channel_response": "force_channel",
     "displacement_function": "displacement_channel",
 }
 """Place of each action."""

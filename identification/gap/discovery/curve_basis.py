@@ -124,6 +124,8 @@ class CurveFunction:
     """True where the curve is proportional to the drive."""
     grows_with_drive: bool = False
     """True where the last parameter is the relative growth with the drive."""
+    is_response: bool = False
+    """True where the result is a step response: one less the curve, and one beyond its end."""
 
     def __call__(self, variables: Mapping[str, Array], *values: float) -> Array:
         """Return the value (N,) for variables (N,) each, coefficients and, where it grows, [1/drive]."""
@@ -132,7 +134,10 @@ class CurveFunction:
 
     def evaluate(self, variables: Mapping[str, Array], coefficients: Array) -> Array:
         """Return the value (N,) with some coefficients (K,), without growth."""
-        curve = self.scale * self.basis.evaluate(variables[self.variables[0]], coefficients)
+        variable = variables[self.variables[0]]
+        curve = self.scale * self.basis.evaluate(variable, coefficients)
+        if self.is_response:
+            return np.where(variable < self.basis.positions[-1], 1.0 - curve, 1.0)
         match self.direction:
             case "sign":
                 curve = curve * np.sign(variables["velocity"])

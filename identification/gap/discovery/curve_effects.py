@@ -12,9 +12,10 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper import Quantity
-from identification.damper.definitions import STAGE_OF, find_action, is_elongation
-from identification.damper.effects import Effect, Form, Place, Variable
+from identification.damper.definitions import STAGE_OF, Kind, find_action, is_elongation
+from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.fitting import EffectModel, Piece, Problem, RecordingScales
+from identification.gap.data import split_by_piece
 from identification.gap.discovery.curve_basis import (
     MAX_GROWTH,
     CurveFunction,
@@ -58,6 +59,18 @@ class CurvePlace(NamedTuple):
     """True where the curve is proportional to the velocity; else it has its sign."""
     period: float | None = None
     """Period of the curve, in the unit of its variable; None where it does not repeat."""
+    is_response: bool = False
+    """True where the curve is the part of a change that has not arrived yet, over the time since the change."""
+
+    @property
+    def argument(self) -> Variable:
+        """Variable of the curve."""
+        return "time" if self.is_response else self.variables[0]
+
+    @property
+    def warp(self) -> Warp:
+        """Scale on which the knots of the curve are even."""
+        return "logarithmic" if self.is_response else _WARPS.get(self.variables[0], "none")
 
     @property
     def direction(self) -> Direction:
@@ -77,9 +90,20 @@ class CurvePlace(NamedTuple):
         return is_elongation(self.place, self.variables)
 
     @property
+    def action(self) -> Action:
+        """Action of an effect with this curve."""
+        return find_action(self.place, self.variables, self.kind)
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the function in an effect file."""
+        return "step_response" if self.is_response else "value"
+
+    @property
     def label(self) -> str:
         """Description for a person."""
         kind = "viscous " if self.is_viscous else "periodic " if self.period else ""
+        kind = "step response of " if self.is_response else kind
         return f"{kind}{self.place} over {' and '.join(self.variables)}".replace("_", " ")
 
 
@@ -92,6 +116,7 @@ _PARALLEL = (
 )
 CURVE_PLACES: tuple[CurvePlace, ...] = (
     CurvePlace("drive", ("time", "drive")),
+    CurvePlace("drive", ("drive_history",), is_response=True),
     CurvePlace("field", ("drive",)),
     CurvePlace("field", ("drive_history",)),
     *(
@@ -110,6 +135,7 @@ CURVE_PLACES: tuple[CurvePlace, ...] = (
     CurvePlace("mounting", ("acceleration",)),
     CurvePlace("mounting", ("force",)),
     CurvePlace("force_channel", ("force",)),
+    CurvePlace("force_channel", ("force",), is_response=True),
     CurvePlace("force_channel", ("time",)),
     CurvePlace("force_channel", ("drive",)),
     CurvePlace("displacement_channel", ("displacement",)),
@@ -142,7 +168,7 @@ class CurveEffect:
     @property
     def unit(self) -> str:
         """Unit of the curve's values."""
-        if self.at.has_drive_factor:
+        if self.at.has_drive_factor or self.at.is_response:
             return "1"
         if self.at.is_elongation:
             return "m"
@@ -182,6 +208,9 @@ def collect_variables(pieces: Sequence[Piece], forces: Sequence[Array]) -> dict[
 
 def _is_visible(at: CurvePlace, values: dict[str, Array], problem: Problem) -> bool:
     """Return True if the recording varies the variables of a curve."""
+    if at.is_response:
+        signal = "drive" if at.place == "drive" else "force"
+        return any(np.ptp(part) > 0.0 for part in split_by_piece(values[signal], problem.pieces))
     highest = problem.space.scales.drive
     levels = len(np.unique(np.round(values["drive"] / (_LEVEL_STEP * highest))))
     if at.variables[0] in ("drive", "drive_history") and levels < _MIN_LEVELS:
@@ -193,13 +222,18 @@ def _is_visible(at: CurvePlace, values: dict[str, Array], problem: Problem) -> b
 
 def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> CurveEffect:
     scales = problem.space.scales
+    if at.is_response:
+        # Within one sample, a response cannot be resolved; after a cycle, it looks like a gain.
+        sample = 1.0 / min(p.excitation.rate for p in problem.pieces)
+        values = np.array([sample, max(scales.cycle_duration, 2.0 * sample)])
     function = CurveFunction(
-        make_periodic_basis(at.period) if at.period else make_basis(values, _WARPS.get(at.variables[0], "none")),
-        at.variables,
+        make_periodic_basis(at.period) if at.period else make_basis(values, at.warp),
+        (at.argument, *at.variables[1:]),
         _find_size(at, scales),
         at.direction,
         at.has_drive_factor,
         at.grows_with_drive,
+        at.is_response,
     )
     coefficients = _list_coefficients(function.basis.size)
     if not at.grows_with_drive:
@@ -215,6 +249,8 @@ def _find_size(at: CurvePlace, scales: RecordingScales) -> float:
     """Return the value of a curve of size one, in the unit of its place over that of its factors."""
     if at.is_elongation:
         return scales.length
+    if at.is_response:
+        return 1.0
     sizes: dict[Place, float] = {
         "drive": scales.drive if not at.has_drive_factor else 1.0,
         "field": scales.drive,
@@ -230,7 +266,5 @@ def _list_coefficients(count: int) -> tuple[Quantity, ...]:
 
 
 def _make_model(at: CurvePlace, quantities: tuple[Quantity, ...], function: Any) -> EffectModel:
-    form = Form(
-        CURVE_EFFECT, find_action(at.place, at.variables), quantities, ((0.0,) * len(quantities),), function
-    )
+    form = Form(CURVE_EFFECT, at.action, quantities, ((0.0,) * len(quantities),), function)
     return EffectModel(Effect(CURVE_EFFECT, STAGE_OF[at.place], at.variables[0], at.label, (form,)), CURVE_EFFECT)

@@ -57,7 +57,7 @@ class FittedCurve:
     parent: Candidate
     """The set without the curve."""
     log_odds: float
-    """Block evidence for the curve over the set without it, on held-out strokes."""
+    """Block evidence for the curve over the set without it, on all samples."""
 
     @property
     def loss(self) -> float:
@@ -179,7 +179,7 @@ def _replace_law(problem: Problem, unknowns: Array, law: Array) -> Array:
 def _evaluate_curve(pool: CandidatePool, parent: Candidate, curve: CurveEffect, fit: JointFit) -> FittedCurve:
     """Return a fitted curve with its block evidence over the set without it."""
     candidate = pool.evaluate(fit)
-    return FittedCurve(curve, candidate, parent, pool.comparison.compute_held_out_evidence(parent, candidate))
+    return FittedCurve(curve, candidate, parent, pool.comparison.compute_evidence(parent, candidate))
 
 
 def refit_curve(pool: CandidatePool, fitted: FittedCurve) -> Candidate:

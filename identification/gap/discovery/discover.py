@@ -20,7 +20,11 @@ from identification.gap.selection import CandidatePool
 _MIN_CLOSED_PART = 0.2
 """Smallest part of the gap on held-out strokes that a discovered effect closes [1]."""
 _MIN_LOG_ODDS = 3.0
-"""Smallest log odds on held-out strokes, for each variable of a curve."""
+"""Smallest log odds on all samples, for each variable of a curve.
+
+Rare events, such as steps of the drive, are on few held-out strokes. A curve has too few coefficients to fit the
+noise of many blocks.
+"""
 _PLACES = 2
 """Largest number of places that are found one after the other."""
 
@@ -90,7 +94,7 @@ def _add_formula(pool: CandidatePool, fitted: FittedCurve) -> _Finding:
     """Return a curve with its formula, or without one if none closes part of the gap."""
     formula = find_formula(pool, fitted)
     if formula is not None:
-        odds = pool.comparison.compute_held_out_evidence(fitted.parent, formula.candidate)
+        odds = pool.comparison.compute_evidence(fitted.parent, formula.candidate)
         judged = replace(fitted, candidate=formula.candidate, log_odds=odds)
         if _is_accepted(pool, judged):
             return _Finding(fitted, formula, judged)
@@ -114,7 +118,7 @@ def _find_further(pool: CandidatePool, first: FittedCurve) -> tuple[FittedCurve,
 
 
 def _is_accepted(pool: CandidatePool, fitted: FittedCurve) -> bool:
-    """Return True if a curve closes part of the gap on held-out strokes, beyond chance."""
+    """Return True if a curve improves the fit beyond chance and closes part of the gap on held-out strokes."""
     parent, candidate, floor = fitted.parent, fitted.candidate, pool.floor
     gap = parent.held_out_rmse**2 - floor**2
     if gap <= 0.0 or fitted.log_odds < _MIN_LOG_ODDS * len(fitted.curve.at.variables):

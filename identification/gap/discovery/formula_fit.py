@@ -61,12 +61,7 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
 
     None if no formula does.
     """
-    pieces = pool.problems.screening.pieces
-    simulated = pool.problems.screening.replace_effects(fitted.parent.fit.effects).simulate(
-        fitted.parent.fit.minimum.unknowns
-    )
-    variable = collect_variables(pieces, simulated)[fitted.curve.at.variables[0]]
-    variable = variable[:: max(1, len(variable) // _MAX_POINTS)]
+    variable = _collect_arguments(pool, fitted)
     count = fitted.curve.function.basis.size
     starts = rank_formulas(fitted.curve, np.array(fitted.values[:count]), variable)
     samples = len(fitted.candidate.residual.values) / compute_full_correlation_length(pool, fitted.candidate)
@@ -74,6 +69,16 @@ def find_formula(pool: CandidatePool, fitted: FittedCurve) -> FittedFormula | No
     # A curve that repeats is one of its formulas; over one period, it would describe that period only.
     kept = [f for f in formulas if fitted.curve.at.period or _keeps_gain(fitted, f.candidate)]
     return min(kept, key=lambda f: f.criterion, default=None)
+
+
+def _collect_arguments(pool: CandidatePool, fitted: FittedCurve) -> Array:
+    """Return values (N,) of the variable of a curve, at which a formula is compared with it."""
+    if fitted.curve.at.is_response:
+        return np.array(fitted.curve.function.basis.positions)
+    problem = pool.problems.screening.replace_effects(fitted.parent.fit.effects)
+    simulated = problem.simulate(fitted.parent.fit.minimum.unknowns)
+    variable = collect_variables(problem.pieces, simulated)[fitted.curve.at.argument]
+    return variable[:: max(1, len(variable) // _MAX_POINTS)]
 
 
 def _keeps_gain(fitted: FittedCurve, candidate: Candidate) -> bool:
@@ -118,7 +123,9 @@ def _make_file(fitted: FittedCurve, start: FormulaStart, variable: Array) -> Eff
     parameters = {
         name: _make_parameter(curve, start, name, value, variable) for name, value in sorted(start.values.items())
     }
-    expression = start.formula.write(at.variables[0])
+    expression = start.formula.write(at.argument)
+    # The curve is what is missing from the step response.
+    expression = f"1-({expression})" if at.is_response else expression
     return make_curve_file(fitted, expression, parameters)
 
 
@@ -136,6 +143,7 @@ def make_curve_file(
         name=DISCOVERED,
         stage=STAGE_OF[at.place],
         place=at.place,
+        kind=at.kind,
         variables=list(at.variables),
         expression=_write_factors(at, expression),
         parameters=parameters | growth,
@@ -160,7 +168,7 @@ def _make_parameter(
     curve: CurveEffect, start: FormulaStart, name: str, value: float, variable: Array
 ) -> EffectParameter:
     """Return a parameter with its unit and the range of its search."""
-    unit, size = VARIABLE_UNITS[curve.at.variables[0]], max(float(np.abs(variable).max()), 1e-300)
+    unit, size = VARIABLE_UNITS[curve.at.argument], max(float(np.abs(variable).max()), 1e-300)
     match start.formula.others.get(name):
         case "scale":
             return EffectParameter(value=value, unit=unit, lo=min(1e-4 * size, 0.5 * value), hi=1e2 * size)

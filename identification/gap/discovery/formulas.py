@@ -99,6 +99,15 @@ PERIODIC_FORMULAS: tuple[Formula, ...] = (
 )
 """Expressions for a curve that repeats: the fundamental, with the second harmonic, the third one, or both."""
 
+RESPONSE_FORMULAS: tuple[Formula, ...] = (
+    Formula("a*exp(-z/s)", {"a": 0}, {"s": "scale"}),
+    Formula("a*(1+z/s)*exp(-z/s)", {"a": 0}, {"s": "scale"}),
+    Formula("a*(1+z/s+0.5*(z/s)**2+0.16666667*(z/s)**3)*exp(-z/s)", {"a": 0}, {"s": "scale"}),
+    Formula("a*exp(-z/s)*sin(1.5707963+z/r)", {"a": 0}, {"s": "scale", "r": "scale"}),
+    Formula("a*exp(-z/s)+b*exp(-z/r)", {"a": 0, "b": 0}, {"s": "scale", "r": "scale"}),
+)
+"""Expressions for what is missing of a change: after one, two or four equal lags, ringing, or two lags."""
+
 
 @dataclass(frozen=True)
 class FormulaStart:
@@ -122,7 +131,7 @@ def rank_formulas(curve: CurveEffect, coefficients: Array, variable: Array) -> l
     target = curve.function.scale * curve.function.basis.evaluate(variable, coefficients)
     others = _list_absorbed(curve, variable)
     remaining = target - _project(others, target)
-    formulas = PERIODIC_FORMULAS if curve.at.period else FORMULAS
+    formulas = RESPONSE_FORMULAS if curve.at.is_response else PERIODIC_FORMULAS if curve.at.period else FORMULAS
     starts = [_fit_formula(f, variable, remaining, others, curve.at.period) for f in formulas]
     return sorted((s for s in starts if s.values), key=lambda s: s.error)
 
@@ -137,9 +146,9 @@ def _list_absorbed(curve: CurveEffect, z: Array) -> Array:
         "displacement_channel": ("displacement", "velocity"),
         "force_channel": ("force", "drive"),
     }
-    if curve.at.variables[0] in straight.get(curve.at.place, ()) and curve.at.direction == "none":
+    if curve.at.argument in straight.get(curve.at.place, ()) and curve.at.direction == "none":
         columns.append(z / size)
-        if curve.at.variables[0] == "velocity":
+        if curve.at.argument == "velocity":
             columns.append(np.tanh(z / (_STEP_WIDTH * size)))
     return np.stack(columns, axis=1)
 

@@ -46,26 +46,40 @@ _STATIC_ACTIONS: frozenset[Action] = frozenset(
         "displacement_function",
     }
 )
-"""Actions that a curve over one variable can represent; delays and lags have a state of their own."""
+"""Actions that a curve over one variable can represent."""
+
+
+_RESPONSE_ACTIONS: frozenset[Action] = frozenset(
+    {"drive_delay", "drive_response", "time_shift", "force_lag", "channel_response"}
+)
+"""Actions that a step response can represent."""
+_Cause = tuple[Place, Variable, bool]
+"""Place and variable of a curve, and whether it is a step response."""
 
 
 def is_unlisted(at: CurvePlace, library: Mapping[str, Effect]) -> bool:
     """Return True if no effect of a library acts at the place of a curve over its variable."""
-    return (at.place, at.variables[0]) not in list_pairs(library)
+    return _get_cause(at) not in list_causes(library)
 
 
-def list_pairs(library: Mapping[str, Effect]) -> set[tuple[Place, Variable]]:
-    """Return the places of a library's effects with the variable over which each is a curve."""
-    pairs: set[tuple[Place, Variable]] = set()
+def _get_cause(at: CurvePlace) -> _Cause:
+    return at.place, at.variables[0], at.is_response
+
+
+def list_causes(library: Mapping[str, Effect]) -> set[_Cause]:
+    """Return the places of a library's effects with the variable over which each is a curve, and its kind."""
+    causes: set[_Cause] = set()
     for effect in library.values():
         for form in effect.forms:
             if form.action in _STATIC_ACTIONS:
-                pairs.add((form.place, effect.variable))
+                causes.add((form.place, effect.variable, False))
+            if form.action in _RESPONSE_ACTIONS:
+                causes.add((form.place, effect.variable, True))
             if form.action == "connection":
-                pairs.add((form.place, "force"))
+                causes.add((form.place, "force", False))
             if form.action == "hysteretic_force":
-                pairs.add((form.place, "travel_since_reversal"))
-    return pairs
+                causes.add((form.place, "travel_since_reversal", False))
+    return causes
 
 
 def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
@@ -103,9 +117,9 @@ def _name_cause(pool: CandidatePool, best: FittedCurve) -> frozenset[str] | None
         return best.candidate.names
     if not pool.reaches_floor(best.candidate):
         return None
-    pair = (best.curve.at.place, best.curve.at.variables[0])
+    cause = _get_cause(best.curve.at)
     single = [names for names in pool.candidates if len(names) == 1]
-    alike = [names for names in single if pair in list_pairs({name: pool.library[name] for name in names})]
+    alike = [names for names in single if cause in list_causes({name: pool.library[name] for name in names})]
     return min(alike, key=lambda names: pool.compute_excess(pool.candidates[names]), default=None)
 
 
@@ -136,7 +150,7 @@ def locate_unlisted_cause(pool: CandidatePool, parent: Candidate) -> dict[Stage,
 def _compare_sets(pool: CandidatePool, parent: Candidate, samples: int) -> dict[Stage, float]:
     """Return the log odds of the best fitted extension of a set at each stage at which there is one.
 
-    A connection or a delay is no curve of one variable, so only the effects of the library stand for it.
+    Backlash is no curve of one variable, so only the effects of the library stand for it.
     """
     odds: dict[Stage, float] = {}
     before = pool.compute_excess(parent)

@@ -15,6 +15,8 @@ _CURVE_POINTS = 81
 """Points of a curve in a document."""
 _BAND = 1.96
 """Standard deviations of a 95 % band."""
+_END_STEP = 1e-6
+"""Relative step of the variable at the end of a curve, beyond which a step response is one."""
 
 
 def build_discovery(found: DiscoveredEffect, named: Candidate, shrinkage: Shrinkage, drive_unit: str) -> Discovery:
@@ -68,14 +70,24 @@ def _make_curve(fitted: FittedCurve, drive_unit: str) -> Curve:
     covariance = fitted.covariance[:count, :count]
     deviation = np.sqrt(np.maximum(np.einsum("kn,kl,ln->n", table, covariance, table), 0.0))
     unit = fitted.curve.unit
-    return Curve(
-        variable=fitted.curve.at.variables[0],
+    curve = Curve(
+        variable=fitted.curve.at.argument,
         unit=unit.format(drive=drive_unit) if drive_unit else unit,
         x=[basis.positions[i] for i in rows],
         value=values.tolist(),
         lo=(values - _BAND * deviation).tolist(),
         hi=(values + _BAND * deviation).tolist(),
     )
+    return _make_step_response(curve) if fitted.curve.at.is_response else curve
+
+
+def _make_step_response(missing: Curve) -> Curve:
+    """Return the step response to which a curve is missing; it is one beyond the end of the curve."""
+    x = [*missing.x, missing.x[-1] * (1.0 + _END_STEP)]
+    value, lo, hi = (
+        [*(1.0 - v for v in part), 1.0] for part in (missing.value, missing.hi or [], missing.lo or [])
+    )
+    return missing.model_copy(update={"x": x, "value": value, "lo": lo, "hi": hi})
 
 
 def _describe_formula(found: DiscoveredEffect, drive_unit: str) -> Formula | None:

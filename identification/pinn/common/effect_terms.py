@@ -39,6 +39,7 @@ _UNSUPPORTED_ACTIONS: tuple[Action, ...] = (
     "elongation_function",
     "force_lag",
     "channel_function",
+    "channel_response",
     "displacement_function",
 )
 """Backlash and compliance, and channels through which the network's force or motion would have to pass as well."""

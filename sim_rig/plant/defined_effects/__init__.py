@@ -1,6 +1,10 @@
 """Defined effects of a scenario in compiled code: their functions, their variables and the stack machine."""
 
-from sim_rig.plant.defined_effects.functions import compute_steepest_slope, make_defined_functions
+from sim_rig.plant.defined_effects.functions import (
+    compute_steepest_slope,
+    make_defined_functions,
+    set_drive_response,
+)
 from sim_rig.plant.defined_effects.stack_machine import (
     DEFINED_TYPE,
     DRIVE_PLACE,
@@ -14,6 +18,7 @@ from sim_rig.plant.defined_effects.stack_machine import (
 from sim_rig.plant.defined_effects.variables import (
     hold_drive,
     improve_acceleration,
+    respond_to_drive,
     set_variables,
     set_velocity,
     start_variables,
@@ -33,6 +38,8 @@ __all__ = [
     "hold_drive",
     "improve_acceleration",
     "make_defined_functions",
+    "respond_to_drive",
+    "set_drive_response",
     "set_variables",
     "set_velocity",
     "start_variables",

@@ -4,6 +4,7 @@ The effects of one place become one expression. Its value is the sum of their va
 gain, it is the product of their factors. All effects of a place depend on the same variables.
 """
 
+import functools
 from collections.abc import Sequence
 from itertools import product
 from typing import NamedTuple, cast
@@ -37,6 +38,7 @@ from sim_rig.plant.defined_effects.variables import (
     VELOCITY,
 )
 from sim_rig.plant.effects import EffectFunctions, ParameterValues
+from sim_rig.plant.jit import Array
 
 _ACTIONS: tuple[Action, ...] = (
     "drive_function",
@@ -65,6 +67,9 @@ _ACCELERATION_PASSES = 3
 _SLOPE_DRIVES = (0.0, 1.0)
 """[V or A] at which the slope of the forces over the velocity is determined."""
 
+_SETTLED = 1e-6
+"""Part of a change of the drive that may still be missing when its step response counts as settled [1]."""
+
 _Code = tuple[str, float]
 """Instruction and its operand as a number."""
 
@@ -79,7 +84,7 @@ class _Curve(NamedTuple):
 
 def make_defined_functions(effects: EffectFunctions) -> DefinedFunctions | None:
     """Return the functions of all defined effects in the plant, or None if there are none."""
-    if not effects.select(*_ACTIONS):
+    if not effects.select(*_ACTIONS, "drive_response"):
         return None
     curves: list[_Curve] = []
     places = [_translate_place(effects, place, curves) for place in range(len(_ACTIONS))]
@@ -99,7 +104,24 @@ def make_defined_functions(effects: EffectFunctions) -> DefinedFunctions | None:
         memory=np.zeros(MEMORY_COUNT),
         stack=np.zeros(len(codes) + 1),  # an instruction pushes one value at most
         passes=_count_passes(codes, curves),
+        weights=np.empty(0),
+        window=np.empty(0),
     )
+
+
+def set_drive_response(functions: DefinedFunctions, weights: Sequence[Array], drive: float) -> DefinedFunctions:
+    """Return the functions with step responses of the drive, in series, that have settled at a drive [V or A].
+
+    ``weights`` has those (L,) of each response. The smallest of the oldest drives join the last that counts.
+    """
+    if not weights:
+        return functions
+    whole = functools.reduce(np.convolve, weights)
+    remaining = np.abs(np.cumsum(whole) - whole.sum())
+    count = int(np.flatnonzero(remaining > _SETTLED * max(float(remaining.max()), 1.0))[-1:].sum()) + 2
+    kept = whole[:count].copy()
+    kept[-1] += whole[count:].sum()
+    return functions._replace(weights=kept, window=np.full(len(kept), drive))
 
 
 def compute_steepest_slope(functions: DefinedFunctions) -> float:

@@ -53,10 +53,23 @@ class DefinedFunctions(NamedTuple):
     """(D,) working space."""
     passes: int
     """Number of evaluations per rate: more than one if a function depends on the acceleration."""
+    weights: Array
+    """(L,) weights of the last drives in the step response of the drive, the newest first; empty without one."""
+    window: Array
+    """(L,) ring buffer of these drives [V or A]."""
 
 
 _INDEX_VECTOR, _VECTOR = numba.int64[::1], numba.float64[::1]
-_FIELD_TYPES = (_INDEX_VECTOR, _INDEX_VECTOR, _VECTOR, numba.int64[:, ::1], *[_VECTOR] * 5, numba.int64)
+_FIELD_TYPES = (
+    _INDEX_VECTOR,
+    _INDEX_VECTOR,
+    _VECTOR,
+    numba.int64[:, ::1],
+    *[_VECTOR] * 5,
+    numba.int64,
+    _VECTOR,
+    _VECTOR,
+)
 DEFINED_TYPE = numba.types.NamedTuple(_FIELD_TYPES, DefinedFunctions)  # type: ignore[no-untyped-call]
 """Type of ``DefinedFunctions`` in explicit signatures."""
 

@@ -105,6 +105,23 @@ def hold_drive(functions: Any, drive: float) -> None:
 
 
 @compile_function
+def respond_to_drive(functions: Any, drive: float, substep: int) -> float:
+    """Return the response to the drive [V or A] of a substep and to those before it."""
+    weights, window = functions.weights, functions.window
+    count = len(weights)
+    if count == 0:
+        return drive
+    newest = substep % count
+    window[newest] = drive
+    response = 0.0
+    for j in range(newest + 1):
+        response += weights[j] * window[newest - j]
+    for j in range(newest + 1, count):
+        response += weights[j] * window[newest - j + count]
+    return response
+
+
+@compile_function
 def set_variables(functions: Any, x: float, field: float, energy: float, time: float) -> None:
     """Set the variables of a stage, except the velocity and the acceleration.
 

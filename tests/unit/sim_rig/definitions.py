@@ -6,7 +6,12 @@ from identification.damper.definitions import STAGE_OF
 
 
 def define(
-    place: str, expression: str | None, variables: list[str], curve: dict[str, Any] | None = None, **values: float
+    place: str,
+    expression: str | None,
+    variables: list[str],
+    curve: dict[str, Any] | None = None,
+    kind: str = "value",
+    **values: float,
 ) -> dict[str, Any]:
     """Return the entry of a scenario for a defined effect with parameters of these values."""
     parameters = {name: {"value": v, "unit": "N kg/K", "lo": -1e6, "hi": 1e6} for name, v in values.items()}
@@ -15,6 +20,7 @@ def define(
         "name": "of_mine",
         "stage": STAGE_OF[place],
         "place": place,
+        "kind": kind,
         "variables": variables,
         "expression": expression,
         "parameters": parameters,

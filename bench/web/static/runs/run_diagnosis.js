@@ -137,23 +137,28 @@ function describeDiscovery(discovery) {
   const { place, variables, formula, shrinkage, shrinkage_ci95: range } = discovery;
   const symbols = Object.entries(formula?.symbols ?? {}).map(([name, value]) => `${name} = ${interval(value, [value.unit, 1])}`);
   return {
-    "Outside the library": [`${spaced(place)} over ${variables.map(spaced).join(" and ")}`, formula && element("small", { className: "path" }, formula.expression),
+    "Outside the library": [`${isStepResponse(discovery) ? "step response of the " : ""}${spaced(place)} over ${variables.map(spaced).join(" and ")}`, formula && element("small", { className: "path" }, formula.expression),
       ...symbols.map((text) => element("small", {}, text)), shrinkage === null ? null : element("small", {}, `Gap closed with it: ${percent(shrinkage)}${shareInterval(range)}.`)],
   };
 }
 
+/** Whether the curve of an effect is the part of a change that has arrived, over the time since it. */
+const isStepResponse = ({ variables, curve }) => !variables.includes(curve.variable);
+
 /** Curve of an effect outside the library with its 95 % band, in the chosen units of force and length. */
-function effectCurve({ place, curve }, driveUnit) {
+function effectCurve({ place, variables, curve }, driveUnit) {
   const x = inUnit(VARIABLE_UNITS[curve.variable] ?? "", driveUnit);
   const y = inUnit(curve.unit, driveUnit);
   const isRelative = ["drive", "field"].includes(place) && curve.unit !== "{drive}" && curve.unit !== driveUnit;
-  const quantity = place === "mounting" && curve.variable === "force" ? "elongation of the mounting" : PLACE_QUANTITIES[place] ?? spaced(place);
+  const isResponse = isStepResponse({ variables, curve });
+  const elongation = place === "mounting" && curve.variable === "force" ? "elongation of the mounting" : null;
+  const quantity = isResponse ? "step response" : elongation ?? PLACE_QUANTITIES[place] ?? spaced(place);
   const up = `${quantity}${isRelative ? " over drive" : ""}${y.unit === "1" ? "" : ` [${y.unit}]`}`;
   const across = curve.x.map((value) => value * x.scale);
   const convert = (values) => values.map((value) => value * y.scale);
   const band = curve.lo && curve.hi && { name: "95 % band", colour: "--force", x: across, low: convert(curve.lo), high: convert(curve.hi) };
   return new CurvePlot({
-    title: `Effect at the ${spaced(place)}.`, across: `${spaced(curve.variable)} [${x.unit}]`, up,
+    title: `Effect at the ${spaced(place)}.`, across: `${isResponse ? "time since a change" : spaced(curve.variable)} [${x.unit}]`, up,
     curves: [{ name: "found effect", colour: "--force", x: across, y: convert(curve.value) }], band,
   });
 }

@@ -76,6 +76,25 @@ def test_a_curve_is_drawn_with_its_band_in_the_units_of_the_other_plots():
     assert (second.get_xlabel(), len(second.collections)) == ("acceleration [m/s²]", 0)
 
 
+def test_a_step_response_is_named_explained_and_drawn_over_the_time_since_a_change():
+    curve = {"variable": "time", "unit": "1", "x": [0.001, 0.01, 0.1], "value": [0.2, 0.9, 1.0]}
+    formula = {"expression": "1-(a*exp(-time/s))", "symbols": {}}
+    response = {
+        "place": "force_channel",
+        "variables": ["force"],
+        "curve": curve,
+        "formula": formula,
+        "further": [],
+    }
+    context = make_context(**response)
+    assert "acts at the place “force channel”. It depends on force. The curve is the part of a" in context["text"]
+    assert context["formula"] == "step response = 1-(a*exp(-time/s))"
+    (axes,) = draw(**response).axes
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("time since a change [s]", "step response [1]")
+    assert axes.get_title(loc="left") == "step response of the force channel\nover force"
+    assert axes.get_xscale() == "log"
+
+
 def test_a_displacement_error_is_drawn_in_millimetres():
     curve = discovery_document()["curve"] | {"unit": "m", "value": [2e-5, 0.0, 2e-5], "lo": None, "hi": None}
     (axes,) = draw(place="displacement_channel", variables=["displacement"], curve=curve, further=[]).axes

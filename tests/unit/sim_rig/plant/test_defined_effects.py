@@ -11,7 +11,7 @@ import pytest
 
 from sim_rig.plant.plant import Plant, TrueSignals
 from sim_rig.scenario.scenario import Scenario, load_scenario, parse_scenario
-from sim_rig.sensors.channels import compute_true_values
+from sim_rig.sensors.channels import compute_true_values, make_readings
 from tests.unit.sim_rig.definitions import define
 
 STEP, SUBSTEPS = 1e-3, 8
@@ -273,6 +273,45 @@ def test_channel_functions_of_the_time_continue_from_chunk_to_chunk(plain):
     scenario = make_scenario(define("force_channel", "a*time", ["time"], a=3.0))
     values = compute_true_values(scenario, plain.truth, 5.0, STEP)
     assert np.allclose(values["force"] - plain.truth.force, 3.0 * (5.0 + FINE))
+
+
+@pytest.mark.parametrize("further", [(), (COIL_LAG,)], ids=["alone", "with a dead time"])
+def test_a_step_response_of_the_drive_is_the_lag_of_the_library(further):
+    late = define("drive", "1-exp(-time/s)", ["drive_history"], kind="step_response", s=0.02)
+    lag = {"name": "coil_lag", "form": "second_lag", "parameters": {"lag": 0.02}}
+    if further:
+        lag = {"name": "coil_lag", "form": "dead_time_and_lag", "parameters": {"delay": 4e-3, "lag": 0.02}}
+    expected = play(lag).force
+    assert np.abs(play(*further, late).force - expected).max() < 0.01 * np.abs(play().force - expected).max()
+
+
+def test_a_step_response_of_the_drive_acts_on_what_other_effects_add_to_it(plain):
+    late = define("drive", "1-exp(-time/s)", ["drive_history"], kind="step_response", s=0.02)
+    added = define("drive", "a*drive", ["drive"], a=0.2)
+    late["name"] = late["definition"]["name"] = "of_yours"
+    stronger = play({"name": "coil_lag", "form": "second_lag", "parameters": {"lag": 0.02}}, drive=1.2 * DRIVE)
+    assert np.abs(play(added, late).force - stronger.force).max() < 0.01 * np.ptp(plain.force)
+
+
+def test_a_step_response_of_the_drive_continues_from_sample_to_sample():
+    late = define("drive", "1-a*exp(-time/s)", ["drive_history"], kind="step_response", a=0.6, s=0.02)
+    whole = play(late).truth.force
+    plant = Plant(make_scenario(late), COMMAND[0], DRIVE[0])
+    parts = [plant.advance(STEP, COMMAND[i + 1], DRIVE[i]).force for i in range(700)]
+    assert np.array_equal(np.concatenate(parts), whole[: 700 * SUBSTEPS])
+
+
+def test_a_step_response_of_the_force_channel_is_the_filter_of_the_library():
+    late = define("force_channel", "1-exp(-time/s)", ["force"], kind="step_response", s=0.01)
+    filtered = {"name": "force_filter", "form": "first_order", "parameters": {"lag": 0.01}}
+
+    def record(*effects):
+        scenario, truth = make_scenario(*effects), play(*effects).truth
+        return make_readings(scenario, TIME, truth)[0]["force"]
+
+    expected = record(filtered)
+    assert np.abs(record(late) - expected).max() < 2e-3 * expected.std()
+    assert np.abs(record() - expected).max() > 0.1 * expected.std()
 
 
 @pytest.mark.parametrize("place", ["parallel_force", "mounting"])

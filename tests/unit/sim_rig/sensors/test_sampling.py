@@ -9,7 +9,13 @@ from scipy import signal
 from sim_rig.scenario import ChannelFault
 from sim_rig.sensors.channels import compute_true_values, read_channel
 from sim_rig.sensors.faults import apply_channel_faults
-from sim_rig.sensors.sampling import apply_filter, design_low_pass, interpolate_cubic, sample_held
+from sim_rig.sensors.sampling import (
+    ResponseStream,
+    apply_filter,
+    design_low_pass,
+    interpolate_cubic,
+    sample_held,
+)
 
 CUBE = np.arange(6.0) ** 3
 
@@ -91,3 +97,19 @@ def test_a_low_pass_has_the_coefficients_of_scipy(order, share):
     b, a = design_low_pass(order, share * 1e3, 1e-3)
     assert b == pytest.approx(np.ravel(numerator), abs=1e-12)
     assert a == pytest.approx(denominator, abs=1e-12)
+
+
+def test_a_step_response_does_not_depend_on_the_division_into_chunks():
+    weights, values = np.array([0.1, 0.2, 0.4, 0.3]), CUBE + 5.0
+    expected = [sum(w * values[max(i - k, 0)] for k, w in enumerate(weights)) for i in range(6)]
+    for edges in ((6,), (1, 2, 6), (1, 2, 3, 4, 5, 6), (3, 3, 6)):
+        stream, first = ResponseStream(weights), 0
+        found = []
+        for edge in edges:
+            found += stream.feed(values[first:edge]).tolist()
+            first = edge
+        assert found == pytest.approx(expected)
+
+
+def test_a_step_response_of_one_weight_is_a_gain():
+    assert ResponseStream(np.array([0.5])).feed(CUBE).tolist() == (0.5 * CUBE).tolist()

@@ -10,6 +10,7 @@ CONTENT = {
     "meaning": "friction that grows with the drive",
     "stage": "damper",
     "place": "parallel_force",
+    "kind": "value",
     "variables": ["velocity", "drive"],
     "expression": "(base + rise * drive) * tanh(velocity / width)",
     "parameters": {
@@ -36,6 +37,7 @@ def curve_content():
         "name": "measured_friction",
         "stage": "damper",
         "place": "parallel_force",
+        "kind": "value",
         "variables": ["velocity"],
         "curve": {
             "variable": "velocity",

@@ -249,7 +249,7 @@ def test_a_file_is_one_object():
         ({"x": [0.0], "value": [1.0]}, "curve.x: List should have at least 2 items"),
         ({"x": list(range(1001))}, "curve.x: List should have at most 1000 items"),
         ({"unit": ""}, "curve.unit: String should match pattern"),
-        ({"variable": "drive"}, "the curve is over drive, which is not among the variables"),
+        ({"variable": "drive"}, "the curve is over drive, not over velocity"),
         ({"variable": "speed"}, "curve.variable: Input should be 'displacement', "),
         ({"width": 1.0}, "curve.width: Extra inputs are not permitted"),
     ],
@@ -280,3 +280,41 @@ def test_a_definition_made_in_code_is_checked_likewise(content):
     file = parse(content)
     with pytest.raises(ValidationError, match="belongs to stage damper"):
         EffectFile(**(file.model_dump() | {"stage": "coil"}))
+
+
+@pytest.fixture
+def response(curve_content):
+    """Return the content of a valid file with a step response."""
+    curve_content["curve"] |= {"variable": "time", "unit": "1", "x": [0.0, 0.01, 0.02]}
+    channel = {"stage": "force_channel", "place": "force_channel", "variables": ["force"]}
+    return {**curve_content, **channel, "kind": "step_response"}
+
+
+def test_a_step_response_is_a_function_of_the_time_since_a_change(response):
+    assert parse(response).arguments == ["time"]
+    a = {"a": {"value": 0.01, "unit": "s", "lo": 0.0, "hi": 1.0}}
+    formula = {**response, "curve": None, "parameters": a}
+    assert parse(formula | {"expression": "1-exp(-time/a)"}).variables == ["force"]
+    message = "mine.json: the expression uses force, which is not declared"
+    assert refuse(formula | {"expression": "force+a"}) == message
+    response["curve"]["variable"] = "force"
+    assert refuse(response) == "mine.json: the curve is over force, not over time"
+
+
+def test_the_drive_has_a_step_response_over_its_history(response):
+    drive = {"stage": "coil", "place": "drive", "variables": ["drive_history"]}
+    assert parse(response | drive).arguments == ["time"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"variables": ["force", "time"]},
+        {"variables": ["time"]},
+        {"stage": "coil", "place": "drive", "variables": ["drive"]},
+        {"stage": "coil", "place": "field", "variables": ["drive_history"]},
+    ],
+)
+def test_a_step_response_acts_on_drive_or_force_alone(response, changes):
+    message = "a step response acts at drive over drive_history or force_channel over force alone"
+    assert refuse(response | changes) == f"mine.json: {message}"

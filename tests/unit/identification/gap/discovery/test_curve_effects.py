@@ -18,7 +18,8 @@ from tests.support.discoveries import all_curves, make_curves, make_problem, mak
 from tests.support.effects import LABORATORY
 from tests.support.fit_problems import SCALES
 
-OVER_DRIVE = {at for at in CURVE_PLACES if at.variables[0] in ("drive", "drive_history")}
+DRIVE_RESPONSE = CurvePlace("drive", ("drive_history",), is_response=True)
+OVER_DRIVE = {at for at in CURVE_PLACES if at.variables[0] in ("drive", "drive_history")} - {DRIVE_RESPONSE}
 WITH_DRIVE = {at for at in CURVE_PLACES if "drive" in at.variables[1:]}
 
 
@@ -32,7 +33,7 @@ def test_every_place_of_the_chain_is_tried_once_with_variables_that_exist_there(
 @pytest.mark.parametrize(
     ("levels", "hidden"),
     [
-        ((0.4,), OVER_DRIVE | WITH_DRIVE),
+        ((0.4,), OVER_DRIVE | WITH_DRIVE | {DRIVE_RESPONSE}),
         ((0.1, 0.5), OVER_DRIVE),
         ((0.1, 0.5, 0.105), OVER_DRIVE),  # two levels differ by a hundredth of the highest
         ((0.1, 0.5, 0.3), set()),
@@ -55,10 +56,9 @@ def test_a_spectral_line_adds_a_curve_that_repeats_with_its_period():
     np.testing.assert_allclose(curve[8:], curve[:-8], atol=1e-9 * np.abs(curve).max())
 
 
-def test_levels_may_be_in_different_pieces():
-    assert set(make_curves(*(make_stroke((level,), seconds=0.5) for level in (0.1, 0.3, 0.5)))) == set(
-        CURVE_PLACES
-    )
+def test_levels_may_be_in_different_pieces_but_a_response_needs_a_change_within_one():
+    curves = make_curves(*(make_stroke((level,), seconds=0.5) for level in (0.1, 0.3, 0.5)))
+    assert set(curves) == set(CURVE_PLACES) - {DRIVE_RESPONSE}
 
 
 def test_a_variable_that_does_not_vary_has_no_curve():
@@ -94,7 +94,8 @@ def test_factors_of_a_curve_follow_from_its_variables():
 )
 def test_a_curve_has_unit_and_stage_of_its_place(place, unit, stage):
     curves = [c for at, c in all_curves().items() if at.place == place]
-    plain = [c for c in curves if not (c.at.is_viscous or c.at.has_drive_factor or c.at.is_elongation)]
+    other = ("is_viscous", "has_drive_factor", "is_elongation", "is_response")
+    plain = [c for c in curves if not any(getattr(c.at, name) for name in other)]
     assert {c.unit for c in plain} <= {unit}
     assert {c.unit for c in curves if c.at.is_elongation} <= {"m"}
     assert {c.unit for c in curves if c.at.has_drive_factor} <= {"1"}
@@ -119,7 +120,7 @@ def test_a_curve_of_unit_size_is_as_large_as_the_damper(place, factor):
         SCALES, force=100.0 * SCALES.force, length=7.0 * SCALES.length, drive=3.0 * SCALES.drive, velocity=1.0
     )
     for at, curve in make_curves(make_stroke(), scales=large).items():
-        if at.place == place and not (at.is_viscous or at.is_elongation):
+        if at.place == place and not (at.is_viscous or at.is_elongation or at.is_response):
             assert curve.function.scale == pytest.approx(factor * all_curves()[at].function.scale), at
     sizes = {"field": 0.5, "damper_gain": 1.0, "displacement_channel": 0.01}
     assert all_curves()[next(at for at in all_curves() if at.place == place)].function.scale == sizes.get(

@@ -18,6 +18,8 @@ from identification.gap.discovery.discover import (
 from tests.support.candidate_pools import BASELINE_FIT, NOISE
 from tests.support.discoveries import GAIN, GROWING, MOUNTING, define, discovered_with, pool_with
 
+LATE = define("force_channel", "1-exp(-time/s)", ("force",), "step_response", s=0.01)
+"""Lag of the force channel."""
 OVER_DISPLACEMENT = CurvePlace("damper_gain", ("displacement",))
 GROWING_OVER_DISPLACEMENT = CurvePlace("parallel_force", ("displacement", "drive"), grows_with_drive=True)
 
@@ -59,6 +61,17 @@ def test_a_disturbance_that_is_independent_of_the_motion_is_found_with_its_frequ
     assert np.hypot(values["a"], values["b"]) == pytest.approx(30.0, rel=0.05)
     assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
     assert found.further == ()
+
+
+def test_a_lag_of_the_force_channel_is_found_as_its_step_response():
+    found = discovered_with(LATE)
+    assert found.fitted.curve.at == CurvePlace("force_channel", ("force",), is_response=True)
+    assert found.formula.file.kind == "step_response"
+    (effect,) = found.candidate.fit.active_effects
+    time = np.array([0.005, 0.01, 0.02, 0.05])
+    response = effect.form.function({"time": time}, *effect.values)
+    np.testing.assert_allclose(response, 1.0 - np.exp(-time / 0.01), atol=0.05)
+    assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
 
 
 def test_the_reported_set_is_fitted_on_all_samples():

@@ -156,7 +156,10 @@ def test_the_file_of_a_curve_has_the_values_of_its_function(at):
     random = np.random.default_rng(5)
     values = (*random.standard_normal(function.basis.size), *((0.7,) if at.grows_with_drive else ()))
     table = function.scale * np.array(values[: function.basis.size]) @ np.array(function.basis.table)
-    drawn = Curve(variable=at.variables[0], unit="1", x=list(function.basis.positions), value=table.tolist())
+    x, y = list(function.basis.positions), table.tolist()
+    if at.is_response:
+        x, y = [*x, x[-1] * (1.0 + 1e-9)], [*(1.0 - table), 1.0]
+    drawn = Curve(variable=at.argument, unit="1", x=x, value=y)
     file = make_curve_file(make_fitted(curve, *values), "curve", {}, drawn)
     assert (file.place, file.stage, file.variables) == (at.place, curve.model.effect.stage, list(at.variables))
     variables = collect_all_variables(stroke)

@@ -8,7 +8,7 @@ from identification.gap.discovery.curve_effects import CURVE_PLACES, CurvePlace
 from identification.gap.discovery.unlisted_cause import (
     find_best_curve,
     is_unlisted,
-    list_pairs,
+    list_causes,
     locate_unlisted_cause,
 )
 from identification.gap.selection import Posterior
@@ -37,8 +37,17 @@ def test_a_curve_is_unlisted_where_no_effect_of_the_library_acts(place, variable
 
 def test_a_smaller_library_has_fewer_places():
     without = {name: e for name, e in EFFECTS.items() if name != "field_saturation"}
-    assert list_pairs(EFFECTS) - list_pairs(without) == {("field", "drive")}
-    assert {(at.place, at.variables[0]) for at in CURVE_PLACES} > list_pairs(without)
+    assert list_causes(EFFECTS) - list_causes(without) == {("field", "drive", False)}
+    assert {(at.place, at.variables[0], at.is_response) for at in CURVE_PLACES} > list_causes(without)
+
+
+def test_delays_and_lags_of_the_force_channel_are_step_responses():
+    response = CurvePlace("force_channel", ("force",), is_response=True)
+    assert not is_unlisted(response, EFFECTS)
+    assert not is_unlisted(response, {"force_delay": EFFECTS["force_delay"]})
+    assert not is_unlisted(response, {"force_filter": EFFECTS["force_filter"]})
+    others = {name: e for name, e in EFFECTS.items() if name not in ("force_delay", "force_filter")}
+    assert is_unlisted(response, others)
 
 
 def compare(cause, *names):

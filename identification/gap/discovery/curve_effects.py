@@ -175,18 +175,24 @@ class CurveEffect:
         return "N s/m" if self.at.is_viscous else _PLACE_UNITS[self.at.place]
 
 
-def list_curve_effects(problem: Problem, forces: Sequence[Array], line: float | None = None) -> list[CurveEffect]:
+def list_curve_effects(
+    problem: Problem, forces: Sequence[Array], line: float | None = None, finest_rate: float = 0.0
+) -> list[CurveEffect]:
     """Return the curves that a recording can show.
 
     Args:
         problem: fitted pieces and their scales.
         forces: simulated force (N,) [N] of each piece.
         line: frequency [Hz] of a disturbance that is independent of the motion; None without one.
+        finest_rate: sampling rate [Hz] that step responses resolve; at least that of the pieces.
     """
     values = collect_variables(problem.pieces, forces)
     periodic = () if line is None else (CurvePlace("force_channel", ("time",), period=1.0 / line),)
+    rate = max(finest_rate, min(p.excitation.rate for p in problem.pieces))
+    # After a cycle, a response looks like a gain.
+    response_times = np.array([1.0 / rate, max(problem.space.scales.cycle_duration, 2.0 / rate)])
     return [
-        _make_curve_effect(problem, at, values[at.variables[0]])
+        _make_curve_effect(problem, at, response_times if at.is_response else values[at.variables[0]])
         for at in (*CURVE_PLACES, *periodic)
         if _is_visible(at, values, problem)
     ]
@@ -222,10 +228,6 @@ def _is_visible(at: CurvePlace, values: dict[str, Array], problem: Problem) -> b
 
 def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> CurveEffect:
     scales = problem.space.scales
-    if at.is_response:
-        # Within one sample, a response cannot be resolved; after a cycle, it looks like a gain.
-        sample = 1.0 / min(p.excitation.rate for p in problem.pieces)
-        values = np.array([sample, max(scales.cycle_duration, 2.0 * sample)])
     function = CurveFunction(
         make_periodic_basis(at.period) if at.period else make_basis(values, at.warp),
         (at.argument, *at.variables[1:]),

@@ -90,9 +90,20 @@ def screen_curves(pool: CandidatePool, parent: Candidate) -> list[ScreenedCurve]
     unknowns = parent.fit.minimum.unknowns
     simulated = problem.simulate(unknowns)
     line, _ = find_strongest_line(parent.residual)
-    curves = list_curve_effects(problem, simulated, line)
-    screened = [ScreenedCurve(c, _screen_curve(problem, unknowns, c)) for c in curves]
+    finest = min(p.excitation.rate for p in pool.problems.decimated.pieces)
+    screened = []
+    for curve in list_curve_effects(problem, simulated, line, finest):
+        own = choose_problem(pool, curve.at).replace_effects(parent.fit.effects)
+        evidence = _screen_curve(own, unknowns, curve)
+        # The odds of a curve do not grow with the rate at which it is screened.
+        comparable = evidence._replace(log_odds=evidence.log_odds * problem.samples / own.samples)
+        screened.append(ScreenedCurve(curve, comparable))
     return sorted(screened, key=lambda s: -s.evidence.log_odds)
+
+
+def choose_problem(pool: CandidatePool, at: CurvePlace) -> Problem:
+    """Return the law on the data on which a curve is fitted: a step response needs the finer ones."""
+    return pool.problems.decimated if at.is_response else pool.problems.screening
 
 
 def _screen_curve(problem: Problem, unknowns: Array, curve: CurveEffect) -> CurveEvidence:
@@ -144,7 +155,7 @@ def _continue_linear_model(pool: CandidatePool, parent: Candidate, screened: Scr
     """Fit a curve with the law and the effects of a set, from the end of its linear model."""
     curve, evidence = screened
     model = _set_prior(curve, evidence.deviation)
-    parent_problem = pool.problems.screening.replace_effects(parent.fit.effects)
+    parent_problem = choose_problem(pool, curve.at).replace_effects(parent.fit.effects)
     problem = parent_problem.replace_effects((*parent.fit.effects, model))
     start = insert_effect_unknowns(parent_problem, parent.fit.minimum.unknowns, np.zeros(len(model.quantities)))
     target = _find_linear_solution(parent_problem, parent.fit.minimum.unknowns, screened)

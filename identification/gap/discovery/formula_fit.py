@@ -10,7 +10,7 @@ from identification.damper.definitions import STAGE_OF, Curve, EffectFile, Effec
 from identification.damper.effects import Variable
 from identification.fitting import EffectModel, minimise
 from identification.gap.discovery.curve_effects import CurveEffect, CurvePlace, collect_variables
-from identification.gap.discovery.curve_fit import FittedCurve, compute_full_correlation_length
+from identification.gap.discovery.curve_fit import FittedCurve, choose_problem, compute_full_correlation_length
 from identification.gap.discovery.formulas import FormulaStart, rank_formulas
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
 from identification.gap.selection import CandidatePool
@@ -97,12 +97,11 @@ def _fit_formula(
     model = EffectModel(make_effect(file), "defined")
     parent = fitted.candidate.fit
     others = parent.effects[:-1]
-    problem = pool.problems.screening.replace_effects((*others, model))
+    law_alone = choose_problem(pool, fitted.curve.at)
+    problem = law_alone.replace_effects((*others, model))
     columns = parent.problem.layout.effect_slices[-1]
     law = np.delete(parent.minimum.unknowns, columns)
-    unknowns = insert_effect_unknowns(
-        pool.problems.screening.replace_effects(others), law, model.to_search(model.starts[0])
-    )
+    unknowns = insert_effect_unknowns(law_alone.replace_effects(others), law, model.to_search(model.starts[0]))
     with use_one_thread():
         fit = JointFit(problem, minimise(problem, unknowns, _ITERATIONS, ignore_progress))
     criterion = samples * math.log(fit.rmse**2) + len(file.parameters) * math.log(max(samples, 2.0))

@@ -280,7 +280,7 @@ class ReportBuilder:
             version=version("mrbench"),
             seed=self.seed,
             settings={
-                "held_out": "every fourth segment of each drive, or cycle where segments are few",
+                "held_out": "every fourth stroke of each drive, or cycle where strokes are few",
                 "hold_out": ",".join(self.dataset.hold_out.patterns) or None,
                 "hold_out_after": self.dataset.hold_out.after_fraction,
             },

@@ -100,8 +100,8 @@ def join_words(names: tuple[str, ...] | list[str]) -> str:
 def get_quantity(found: DiscoveredCurve, drive_unit: str) -> str:
     """Return the quantity of a curve's values; ``drive_unit`` is V or A."""
     quantity = _name_quantity(found)
-    is_relative = found.place in ("drive", "field") and found.curve.unit != drive_unit
-    return f"{quantity} over drive" if is_relative else quantity
+    is_added = found.place in ("drive", "field") and not found.is_step_response
+    return f"{quantity} over drive" if is_added and found.curve.unit != drive_unit else quantity
 
 
 def make_discovery_context(discovery: Discovery, before: float, named: list[str]) -> dict[str, Any]:

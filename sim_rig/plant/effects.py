@@ -25,6 +25,9 @@ from sim_rig.scenario import Scenario
 
 ParameterValues = tuple[float, ...]
 
+_SETTLED = 1e-6
+"""Part of a change that may still be missing when its step response counts as settled [1]."""
+
 
 class EffectFunctions:
     """Active effects of a scenario, sorted by action."""
@@ -70,8 +73,10 @@ class EffectFunctions:
 
     def compute_response_weights(self, action: Action, dt: float) -> list[Array]:
         """Return the weights of the last values, dt [s] apart, in each step response with an action."""
-        forms = self.select(action)
-        return [step_response.compute_weights(form.function, values, dt) for form, values in forms]
+        return [
+            step_response.compute_weights(form.function, values, dt, _SETTLED)
+            for form, values in self.select(action)
+        ]
 
     def get_coil_lag(self) -> tuple[float, float, float, float]:
         """Return dead time [s], second lag [s], part of the field behind it [1] and number of such lags [1]."""

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from identification.damper.definitions import STAGE_OF, EffectFile, EffectParameter, Kind, make_effect
+from identification.damper.definitions import STAGE_OF, EffectFile, EffectParameter, FunctionKind, make_effect
 from identification.damper.effects import Place, Variable
 from identification.fitting import Piece, Problem
 from identification.fitting.search_space import SearchSpace
@@ -22,7 +22,7 @@ THREE_LEVELS = (0.0, 0.5, 0.25)
 
 
 def define(
-    place: Place, expression: str, variables: tuple[Variable, ...], kind: Kind = "value", **values: float
+    place: Place, expression: str, variables: tuple[Variable, ...], kind: FunctionKind = "value", **values: float
 ) -> ActiveEffect:
     """Return an active effect of an expression and its parameters."""
     parameters = {name: EffectParameter(value=v, unit="1", lo=-1e9, hi=1e9) for name, v in values.items()}

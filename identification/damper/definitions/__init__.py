@@ -16,7 +16,7 @@ from identification.damper.definitions.effect_file import (
     Curve,
     EffectFile,
     EffectParameter,
-    Kind,
+    FunctionKind,
     is_elongation,
     parse_effect_file,
 )
@@ -41,8 +41,8 @@ __all__ = [
     "EffectFile",
     "EffectParameter",
     "Expression",
+    "FunctionKind",
     "Instruction",
-    "Kind",
     "check_new_name",
     "find_action",
     "find_effect_file",

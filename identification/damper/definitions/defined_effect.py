@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.damper.definitions.effect_file import EffectFile, EffectParameter, Kind, is_elongation
+from identification.damper.definitions.effect_file import EffectFile, EffectParameter, FunctionKind, is_elongation
 from identification.damper.definitions.expression import Expression
 from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.damper.parameters import Quantity
@@ -39,8 +39,10 @@ ACTIONS: dict[Place, Action] = {
     "displacement_channel": "displacement_function",
 }
 """Action of a value at each place, except for a function of the force in the mounting."""
+_RESPONSE_ACTIONS: dict[Place, Action] = {"drive": "drive_response", "force_channel": "channel_response"}
+"""Action of a step response at each place that has one."""
 DEFINED_ACTIONS: frozenset[Action] = frozenset(
-    {*ACTIONS.values(), "elongation_function", "drive_response", "channel_response"}
+    {*ACTIONS.values(), *_RESPONSE_ACTIONS.values(), "elongation_function"}
 )
 """All actions of defined effects."""
 
@@ -72,10 +74,10 @@ class DefinedFunction:
         return self.expression.evaluate(known) + 0.0 * known[self.variables[0]]
 
 
-def find_action(place: Place, variables: Sequence[Variable], kind: Kind = "value") -> Action:
+def find_action(place: Place, variables: Sequence[Variable], kind: FunctionKind = "value") -> Action:
     """Return the action of a defined effect of a kind at a place, over some variables."""
     if kind == "step_response":
-        return "drive_response" if place == "drive" else "channel_response"
+        return _RESPONSE_ACTIONS[place]
     return "elongation_function" if is_elongation(place, variables) else ACTIONS[place]
 
 

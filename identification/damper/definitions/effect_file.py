@@ -40,9 +40,9 @@ STAGE_OF: dict[Place, Stage] = {
 """Stage of the signal chain to which each place belongs."""
 
 
-RESPONSE_SIGNALS: dict[Place, tuple[Variable, ...]] = {"drive": ("drive_history",), "force_channel": ("force",)}
+_RESPONSE_VARIABLES: dict[Place, Variable] = {"drive": "drive_history", "force_channel": "force"}
 """Variable of a step response at each place that has one: the past of the drive, or the force."""
-Kind = Literal["value", "step_response"]
+FunctionKind = Literal["value", "step_response"]
 """Meaning of a function: the value at its place, or the part of a change there that has arrived after a time."""
 
 
@@ -100,7 +100,7 @@ class EffectFile(FrozenModel):
     meaning: str = Field(default="", max_length=200, description="description for a person")
     stage: Stage = Field(description="stage of the signal chain, to which the place belongs")
     place: Place = Field(description="place in the signal chain")
-    kind: Kind = Field(
+    kind: FunctionKind = Field(
         default="value",
         description="value: the function is the value at the place; step_response: it is the part [1] of a change "
         "of the signal that has arrived at a `time` [s] after the change",
@@ -126,8 +126,8 @@ class EffectFile(FrozenModel):
                 raise ValueError(f"at {self.place} there are {_join(VARIABLES_AT[self.place])}, not {variable}")
         if is_elongation(self.place, self.variables) and len(self.variables) > 1:
             raise ValueError("in the mounting, force acts without other variables: the value is an elongation")
-        if self.kind == "step_response" and RESPONSE_SIGNALS.get(self.place) != tuple(self.variables):
-            places = " or ".join(f"{place} over {signal[0]}" for place, signal in RESPONSE_SIGNALS.items())
+        if self.kind == "step_response" and [_RESPONSE_VARIABLES.get(self.place)] != self.variables:
+            places = " or ".join(f"{place} over {variable}" for place, variable in _RESPONSE_VARIABLES.items())
             raise ValueError(f"a step response acts at {places} alone")
         if self.expression is None and self.curve is None:
             raise ValueError("there is neither an expression nor a curve")

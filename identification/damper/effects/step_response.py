@@ -19,22 +19,25 @@ HORIZON = 10.0
 _POINTS = 4
 """Values of the step response whose mean stands for that over one sample."""
 _SETTLED = 1e-12
-"""Part of the whole change below which later weights are omitted [1]; larger parts would disturb derivatives."""
+"""Usual part of the whole change below which weights are omitted [1]; larger parts would disturb derivatives."""
 
 
-def compute_weights(function: Callable[..., Any], values: Sequence[float], h: float) -> Array:
+def compute_weights(
+    function: Callable[..., Any], values: Sequence[float], h: float, settled: float = _SETTLED
+) -> Array:
     """Return the weights (L,) of the last samples in the response of a channel, the newest sample first.
 
     Args:
         function: step response [1] over ``time`` by name: the time since the change [s], then its parameters.
         values: values of the parameters.
         h: time between two samples [s].
+        settled: part of the whole change below which later weights are omitted [1].
     """
     count = max(math.ceil(HORIZON / h), 2)
     time = h * (np.arange(count * _POINTS) + 0.5) / _POINTS
     response = np.asarray(function({"time": time}, *values)).reshape(count, _POINTS).mean(axis=1)
     remaining = np.abs(response - response[-1])
-    unsettled = np.flatnonzero(remaining > _SETTLED * max(float(remaining.max()), np.finfo(float).tiny))
+    unsettled = np.flatnonzero(remaining > settled * max(float(remaining.max()), np.finfo(float).tiny))
     length = int(unsettled[-1]) + 2 if len(unsettled) else 1
     return np.diff(response[:length], prepend=0.0)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.damper import Quantity
-from identification.damper.definitions import STAGE_OF, Kind, find_action, is_elongation
+from identification.damper.definitions import STAGE_OF, FunctionKind, find_action, is_elongation
 from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.fitting import EffectModel, Piece, Problem, RecordingScales
 from identification.gap.data import split_by_piece
@@ -95,8 +95,8 @@ class CurvePlace(NamedTuple):
         return find_action(self.place, self.variables, self.kind)
 
     @property
-    def kind(self) -> Kind:
-        """Kind of the function in an effect file."""
+    def kind(self) -> FunctionKind:
+        """FunctionKind of the function in an effect file."""
         return "step_response" if self.is_response else "value"
 
     @property

@@ -123,7 +123,7 @@ def _make_file(fitted: FittedCurve, start: FormulaStart, variable: Array) -> Eff
         name: _make_parameter(curve, start, name, value, variable) for name, value in sorted(start.values.items())
     }
     expression = start.formula.write(at.argument)
-    # The curve is what is missing from the step response.
+    # The curve is one less the step response.
     expression = f"1-({expression})" if at.is_response else expression
     return make_curve_file(fitted, expression, parameters)
 

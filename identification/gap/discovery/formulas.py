@@ -106,7 +106,7 @@ RESPONSE_FORMULAS: tuple[Formula, ...] = (
     Formula("a*exp(-z/s)*sin(1.5707963+z/r)", {"a": 0}, {"s": "scale", "r": "scale"}),
     Formula("a*exp(-z/s)+b*exp(-z/r)", {"a": 0, "b": 0}, {"s": "scale", "r": "scale"}),
 )
-"""Expressions for what is missing of a change: after one, two or four equal lags, ringing, or two lags."""
+"""Expressions for the part of a change that has not arrived: one, two or four equal lags, ringing, two lags."""
 
 
 @dataclass(frozen=True)

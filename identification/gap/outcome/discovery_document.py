@@ -82,7 +82,7 @@ def _make_curve(fitted: FittedCurve, drive_unit: str) -> Curve:
 
 
 def _make_step_response(missing: Curve) -> Curve:
-    """Return the step response to which a curve is missing; it is one beyond the end of the curve."""
+    """Return one less a curve, the part of a change that has not arrived; beyond its end nothing is missing."""
     x = [*missing.x, missing.x[-1] * (1.0 + _END_STEP)]
     value, lo, hi = (
         [*(1.0 - v for v in part), 1.0] for part in (missing.value, missing.hi or [], missing.lo or [])

@@ -67,9 +67,6 @@ _ACCELERATION_PASSES = 3
 _SLOPE_DRIVES = (0.0, 1.0)
 """[V or A] at which the slope of the forces over the velocity is determined."""
 
-_SETTLED = 1e-6
-"""Part of a change of the drive that may still be missing when its step response counts as settled [1]."""
-
 _Code = tuple[str, float]
 """Instruction and its operand as a number."""
 
@@ -112,16 +109,12 @@ def make_defined_functions(effects: EffectFunctions) -> DefinedFunctions | None:
 def set_drive_response(functions: DefinedFunctions, weights: Sequence[Array], drive: float) -> DefinedFunctions:
     """Return the functions with step responses of the drive, in series, that have settled at a drive [V or A].
 
-    ``weights`` has those (L,) of each response. The smallest of the oldest drives join the last that counts.
+    ``weights`` has those (L,) of each response.
     """
     if not weights:
         return functions
     whole = functools.reduce(np.convolve, weights)
-    remaining = np.abs(np.cumsum(whole) - whole.sum())
-    count = int(np.flatnonzero(remaining > _SETTLED * max(float(remaining.max()), 1.0))[-1:].sum()) + 2
-    kept = whole[:count].copy()
-    kept[-1] += whole[count:].sum()
-    return functions._replace(weights=kept, window=np.full(len(kept), drive))
+    return functions._replace(weights=whole, window=np.full(len(whole), drive))
 
 
 def compute_steepest_slope(functions: DefinedFunctions) -> float:

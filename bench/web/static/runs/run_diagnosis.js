@@ -149,8 +149,9 @@ const isStepResponse = ({ variables, curve }) => !variables.includes(curve.varia
 function effectCurve({ place, variables, curve }, driveUnit) {
   const x = inUnit(VARIABLE_UNITS[curve.variable] ?? "", driveUnit);
   const y = inUnit(curve.unit, driveUnit);
-  const isRelative = ["drive", "field"].includes(place) && curve.unit !== "{drive}" && curve.unit !== driveUnit;
   const isResponse = isStepResponse({ variables, curve });
+  const isAdded = ["drive", "field"].includes(place) && !isResponse;
+  const isRelative = isAdded && curve.unit !== "{drive}" && curve.unit !== driveUnit;
   const elongation = place === "mounting" && curve.variable === "force" ? "elongation of the mounting" : null;
   const quantity = isResponse ? "step response" : elongation ?? PLACE_QUANTITIES[place] ?? spaced(place);
   const up = `${quantity}${isRelative ? " over drive" : ""}${y.unit === "1" ? "" : ` [${y.unit}]`}`;

@@ -119,6 +119,12 @@ def test_the_quantity_of_a_curve_follows_from_its_place(place, variables, unit, 
     assert get_quantity(found, "A") == quantity
 
 
+def test_a_step_response_of_the_drive_is_not_relative_to_the_drive():
+    curve = discovery_document()["curve"] | {"unit": "1", "variable": "time"}
+    found = DiscoveredCurve(place="drive", variables=("drive_history",), curve=curve, rmse_n=1.0)
+    assert get_quantity(found, "A") == "step response"
+
+
 def test_names_are_joined_as_in_a_sentence():
     assert join_words(["a_b", "c", "d"]) == "a b, c and d"
     assert (join_words(("a",)), join_words([])) == ("a", "")

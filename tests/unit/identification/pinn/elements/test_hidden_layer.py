@@ -5,6 +5,7 @@ import pytest
 
 from identification.pinn.common.activations import ACTIVATIONS
 from identification.pinn.elements.hidden_layer import HiddenLayer
+from identification.pinn.elements.quadrature import compute_gauss_points
 
 
 def test_the_hidden_layer_has_two_nodal_functions_and_all_others_vanish_at_both_ends():
@@ -25,3 +26,14 @@ def test_derivatives_of_the_basis_functions_are_those_of_finite_differences(acti
     assert differences == pytest.approx(slopes, rel=1e-5, abs=1e-5)
     differences = (layer.differentiate(place + 1e-5) - layer.differentiate(place - 1e-5)) / 2e-5
     assert differences == pytest.approx(curvatures, rel=1e-5, abs=1e-4)
+
+
+@pytest.mark.parametrize(("units", "rank"), [(160, 40), (200, 48), (300, 64)])
+def test_slopes_and_curvatures_of_the_layers_in_use_integrate_to_values_and_slopes(units, rank):
+    layer = HiddenLayer(units, rank, 1)
+    places, weights = compute_gauss_points(300)
+    slopes, curvatures = layer.differentiate_twice(places)
+    values, ends = (f(np.array([0.0, 1.0])) for f in (layer.evaluate, layer.differentiate))
+    # The mixing of nearly collinear units leaves values a rounding of some 1e-6.
+    assert weights @ slopes == pytest.approx(values[1] - values[0], abs=2e-5)
+    assert weights @ curvatures == pytest.approx(ends[1] - ends[0], abs=1e-6 * np.abs(slopes).max())

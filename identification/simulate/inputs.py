@@ -128,18 +128,26 @@ def _apply_maps(maps: list[tuple[Any, tuple[float, ...]]], u: Array, start: floa
         elif form.action == "field_function":
             u = u + form.function(make_coil_variables(u, start, h), *own)
         else:
-            u = form.function(u, trace_memory(compile_once(form.memory), u, *own), *own)
+            u = form.function(u, trace_memory(compile_once(form.memory), form.memories, u, *own), *own)
     return np.asarray(u)
 
 
 @njit_uncached
-def trace_memory(memory: Any, u: Array, *values: float) -> Array:
-    """Return the memory of a form along a field or displacement (N,); it starts at zero."""
-    found = np.zeros(len(u))
-    for i in range(1, len(u)):
-        change = u[i] - u[i - 1]
+def trace_memory(memory: Any, count: int, u: Array, *values: float) -> Array:
+    """Return the mean of a form's memories (N,) along a field (N,).
+
+    Before its first value the field has risen from zero, because nothing is known of an earlier magnetisation.
+    """
+    found, memories = np.zeros(len(u)), np.zeros(count)
+    last = mean = 0.0
+    for i in range(len(u)):
+        change, last = u[i] - last, u[i]
         # Most of a drive is constant, and a constant drive does not change the memory.
-        found[i] = found[i - 1] if change == 0.0 else memory(found[i - 1], change, *values)
+        if change != 0.0:
+            for m in range(count):
+                memories[m] = memory(memories[m], change, (m + 0.5) / count, *values)
+            mean = memories.mean()
+        found[i] = mean
     return found
 
 

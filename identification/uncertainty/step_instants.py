@@ -85,6 +85,10 @@ def _project(piece: Piece, steps: StepShifts, residual: Array, sensitivity: Arra
     valid = piece.train > 0
     residual = np.where(valid, residual, 0.0)
     noise = _design_filter(residual, valid)
+    if not noise.deviation > 0.0:
+        # A recording of which no sample is fitted says nothing about its steps.
+        nothing = np.zeros(len(steps.places))
+        return _Projections(nothing, nothing)
     sensitivity, filtered = np.where(valid, sensitivity, 0.0), noise.apply(residual) / noise.deviation
     edges = [*steps.places, len(residual)]
     parts = [slice(start - 1, stop - 1) for start, stop in itertools.pairwise(edges)]

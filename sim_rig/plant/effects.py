@@ -8,12 +8,14 @@ from sim_rig.plant.jit import (
     BinaryFunction,
     QuaternaryFunction,
     ScaleFunction,
+    TernaryFunction,
     add_functions,
     bind_all_but_third,
     bind_energy,
     bind_first,
     bind_first_three,
     bind_first_two,
+    bind_memory,
     bind_motion,
     bind_values,
     compose_functions,
@@ -131,12 +133,16 @@ class EffectFunctions:
         ]
         return compose_functions(maps)
 
-    def make_field_memory(self) -> BinaryFunction:
-        """Return the new remanence over the previous one and the change of the field."""
+    def make_field_memory(self) -> TernaryFunction:
+        """Return the new memory of the iron over the previous one, the change of the field and its position."""
         for form, values in self.select("field_memory"):
             if form.memory is not None:
-                return bind_values(form.memory, values)
+                return bind_memory(form.memory, values)
         return no_memory
+
+    def count_field_memories(self) -> int:
+        """Return the number of memories of the iron, at least one."""
+        return max((form.memories for form, _ in self.select("field_memory")), default=1)
 
     def get_cooling_rate(self) -> float:
         """Return the rate [1/s] at which the energy leaves the damper."""

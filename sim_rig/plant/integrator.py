@@ -27,10 +27,12 @@ from sim_rig.plant.jit import (
     BINARY_TYPE,
     QUATERNARY_TYPE,
     SCALE_TYPE,
+    TERNARY_TYPE,
     Array,
     BinaryFunction,
     QuaternaryFunction,
     ScaleFunction,
+    TernaryFunction,
     compile_function,
 )
 from sim_rig.plant.states import (
@@ -59,7 +61,7 @@ _OUTPUT_TOLERANCE = 1e-7
 def _integrate_step(
     s: Array,
     last_damper: float,
-    remanence: float,
+    iron: Array,
     start: float,
     end: float,
     drive: float,
@@ -70,18 +72,21 @@ def _integrate_step(
     backlash_map: BinaryFunction,
     parallel_force: QuaternaryFunction,
     field_map: BinaryFunction,
-    field_memory: BinaryFunction,
+    field_memory: TernaryFunction,
     scale_factors: ScaleFunction,
     defined: DefinedFunctions | None,
     time: float,
     work: Array,
-) -> tuple[float, float]:
+) -> float:
     """Take one classical Runge-Kutta step of h [s] at a time [s]; the command is linear from start to end [m].
 
+    States and memories of the iron are changed in place.
+
     Returns:
-        Displacement of the damper [m] and remanence of the iron [V or A].
+        Displacement of the damper [m].
     """
     a, b, c, d, mid = work[0], work[1], work[2], work[3], work[4]
+    remanence = iron.mean()
     half, field, energy = 0.5 * (start + end), s[FIELD], s[ENERGY]
     compute_rates(
         s,
@@ -161,13 +166,14 @@ def _integrate_step(
         s[j] += h / 6.0 * (a[j] + 2.0 * (b[j] + c[j]) + d[j])
     # Once per step, from its end: stages are trial points that must not enter the memory of clevis and iron.
     if k[FIELD_MEMORY] != 0.0 and s[FIELD] != field:
-        remanence = field_memory(remanence, s[FIELD] - field)
+        for m in range(len(iron)):
+            iron[m] = field_memory(iron[m], s[FIELD] - field, (m + 0.5) / len(iron))
     last_damper = float(backlash_map(last_damper, s[POSITION]))
     if defined is not None:
         x = s[DAMPER] if k[FIXTURE_COMPLIANCE] > 0.0 else last_damper
         lost_energy = k[COOLING_RATE] * h * 0.5 * (energy + s[ENERGY])
-        update_memory(defined, x, field_map(s[FIELD], remanence), lost_energy, time + h)
-    return last_damper, remanence
+        update_memory(defined, x, field_map(s[FIELD], iron.mean()), lost_energy, time + h)
+    return last_damper
 
 
 @compile_function
@@ -186,7 +192,7 @@ def _interpolate_output(output_history: Array, substep: int, delay: float) -> fl
 def _integrate(
     s: Array,
     last_damper: float,
-    remanence: float,
+    iron: Array,
     output_history: Array,
     first_substep: int,
     command: Array,
@@ -198,7 +204,7 @@ def _integrate(
     backlash_map: BinaryFunction,
     parallel_force: QuaternaryFunction,
     field_map: BinaryFunction,
-    field_memory: BinaryFunction,
+    field_memory: TernaryFunction,
     scale_factors: ScaleFunction,
     defined: DefinedFunctions | None,
     positions: Array,
@@ -207,13 +213,13 @@ def _integrate(
     outputs: Array,
     damper: Array,
     states: Array,
-) -> tuple[float, float, int]:
+) -> tuple[float, int]:
     """Integrate the states through M command samples, in place.
 
     Args:
         s: (STATE_COUNT,) states at the first instant.
         last_damper: [m] displacement of the damper.
-        remanence: [V or A] of the iron.
+        iron: (C,) memories of the iron, changed in place.
         output_history: ring buffer of the amplifier's output at the start of each substep, at least as long as
             the dead time.
         first_substep: substeps integrated so far.
@@ -221,7 +227,7 @@ def _integrate(
         drive: (M,) commanded drive [V or A], held through each sample.
         h: [s] one substep; ``substeps`` of them make a sample.
         k, p, backlash_map, parallel_force, field_map, scale_factors: as in ``compute_rates``.
-        field_memory: remanence over (last remanence, change of the field).
+        field_memory: memory over (last memory, change of the field, position among all memories in 0..1).
         defined: functions of defined effects, with their memory; None without such effects.
         positions, velocities, forces: (M substeps,) filled with position [m] and velocity [m/s] of the actuator
             and force on the load cell [N], at the start of each substep.
@@ -230,7 +236,7 @@ def _integrate(
         states: (M, STATE_COUNT) filled with the states at each sample.
 
     Returns:
-        Displacement of the damper [m], remanence [V or A], and the sample in which the motion diverged, or M.
+        Displacement of the damper [m], and the sample in which the motion diverged, or M.
     """
     work, rate = np.empty((5, STATE_COUNT)), np.empty(STATE_COUNT)
     for i in range(len(drive)):
@@ -252,7 +258,7 @@ def _integrate(
             force, x, v, slip = compute_rates(
                 s,
                 last_damper,
-                remanence,
+                iron.mean(),
                 start,
                 drive[i],
                 delayed_output,
@@ -274,33 +280,33 @@ def _integrate(
                 outputs[i] = s[OUTPUT]
             steps = count_steps(s, rate, x, slip, drive[i], h, k, p, backlash_map)
             if not (steps <= MAX_STEPS and math.isfinite(force) and math.isfinite(s[Z])):
-                return last_damper, remanence, i
+                return last_damper, i
             for step in range(int(steps)):
                 step_start = start + (end - start) * step / steps
                 step_end = start + (end - start) * (step + 1) / steps
-                last_damper, remanence = _integrate_step(
-                    s, last_damper, remanence, step_start, step_end, drive[i], delayed_output, h / steps, k, p,
+                last_damper = _integrate_step(
+                    s, last_damper, iron, step_start, step_end, drive[i], delayed_output, h / steps, k, p,
                     backlash_map, parallel_force, field_map, field_memory, scale_factors,
                     defined, time + h * step / steps, work,
                 )  # fmt: skip
-    return last_damper, remanence, len(drive)
+    return last_damper, len(drive)
 
 
 _VECTOR, _MATRIX, _SCALAR = numba.float64[::1], numba.float64[:, ::1], numba.float64
 _INPUTS = (
-    *(_VECTOR, _SCALAR, _SCALAR, _VECTOR, numba.int64, _VECTOR, _VECTOR, _SCALAR, numba.int64, _VECTOR, _VECTOR),
-    *(BINARY_TYPE, QUATERNARY_TYPE, BINARY_TYPE, BINARY_TYPE, SCALE_TYPE),
+    *(_VECTOR, _SCALAR, _VECTOR, _VECTOR, numba.int64, _VECTOR, _VECTOR, _SCALAR, numba.int64, _VECTOR, _VECTOR),
+    *(BINARY_TYPE, QUATERNARY_TYPE, BINARY_TYPE, TERNARY_TYPE, SCALE_TYPE),
 )
 _RESULTS = (_VECTOR, _VECTOR, _VECTOR, _VECTOR, _MATRIX, _MATRIX)
 integrate = compile_function(_integrate, (*_INPUTS, numba.types.none, *_RESULTS))
 """`_integrate`, compiled at the first import, once for all kinds of effects of the library."""
 
 
-def choose_integrator(defined: DefinedFunctions | None) -> Callable[..., tuple[float, float, int]]:
+def choose_integrator(defined: DefinedFunctions | None) -> Callable[..., tuple[float, int]]:
     """Return the compiled `_integrate`: without defined effects, it contains none of their code."""
     return integrate if defined is None else _compile_with_defined_effects()
 
 
 @functools.cache
-def _compile_with_defined_effects() -> Callable[..., tuple[float, float, int]]:
+def _compile_with_defined_effects() -> Callable[..., tuple[float, int]]:
     return compile_function(_integrate, (*_INPUTS, DEFINED_TYPE, *_RESULTS))

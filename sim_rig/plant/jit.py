@@ -36,6 +36,9 @@ Array: TypeAlias = npt.NDArray[np.float64]
 BinaryFunction: TypeAlias = Callable[[float, float], float]
 """A compiled function of two numbers, passed to the plant as an argument."""
 
+TernaryFunction: TypeAlias = Callable[[float, float, float], float]
+"""A compiled function of three numbers, passed to the plant as an argument."""
+
 QuaternaryFunction: TypeAlias = Callable[[float, float, float, float], float]
 """A compiled function of four numbers, passed to the plant as an argument."""
 
@@ -47,6 +50,9 @@ Function = TypeVar("Function", bound=Callable[..., object])
 _BINARY_SIGNATURE = numba.float64(numba.float64, numba.float64)
 BINARY_TYPE = numba.types.FunctionType(_BINARY_SIGNATURE)
 """Type of ``BinaryFunction`` in explicit signatures: one compiled plant then takes any of them."""
+_TERNARY_SIGNATURE = numba.float64(numba.float64, numba.float64, numba.float64)
+TERNARY_TYPE = numba.types.FunctionType(_TERNARY_SIGNATURE)
+"""Type of ``TernaryFunction``."""
 _QUATERNARY_SIGNATURE = numba.float64(numba.float64, numba.float64, numba.float64, numba.float64)
 QUATERNARY_TYPE = numba.types.FunctionType(_QUATERNARY_SIGNATURE)
 """Type of ``QuaternaryFunction``."""
@@ -121,6 +127,16 @@ def bind_values(function: Callable[..., Any], values: Sequence[float]) -> Binary
         return float(form(first, second, *fixed))
 
     return _compile_uncached(bound, _BINARY_SIGNATURE)
+
+
+def bind_memory(function: Callable[..., Any], values: Sequence[float]) -> TernaryFunction:
+    """Fix the parameters of the memory of a field: over the last memory, the change of the field, its position."""
+    form, fixed = _compile_uncached(function), tuple(values)
+
+    def bound(memory: float, change: float, position: float) -> float:
+        return float(form(memory, change, position, *fixed))
+
+    return _compile_uncached(bound, _TERNARY_SIGNATURE)
 
 
 def bind_first(function: Callable[..., Any], values: Sequence[float]) -> BinaryFunction:
@@ -223,7 +239,7 @@ def _add_pair(one: QuaternaryFunction, other: QuaternaryFunction) -> QuaternaryF
     return _compile_uncached(total, _QUATERNARY_SIGNATURE)
 
 
-def _return_zero_memory(first: float, second: float) -> float:
+def _return_zero_memory(first: float, second: float, third: float) -> float:
     return 0.0
 
 
@@ -243,7 +259,7 @@ def _return_second(first: float, second: float) -> float:
     return second
 
 
-no_memory: BinaryFunction = compile_function(_return_zero_memory, _BINARY_SIGNATURE)
+no_memory: TernaryFunction = compile_function(_return_zero_memory, _TERNARY_SIGNATURE)
 """Iron without remanence."""
 no_force: QuaternaryFunction = compile_function(_return_zero_force, _QUATERNARY_SIGNATURE)
 """No parallel force."""

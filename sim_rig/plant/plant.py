@@ -25,7 +25,7 @@ from sim_rig.plant.defined_effects import (
     start_variables,
 )
 from sim_rig.plant.effects import EffectFunctions
-from sim_rig.plant.jit import BINARY_TYPE, QUATERNARY_TYPE, SCALE_TYPE, Array, FixedAddress
+from sim_rig.plant.jit import BINARY_TYPE, QUATERNARY_TYPE, SCALE_TYPE, TERNARY_TYPE, Array, FixedAddress
 from sim_rig.scenario import Scenario
 
 _MAX_SUBSTEP = 1.25e-4
@@ -78,14 +78,14 @@ class Plant:
         self._follower = FixedAddress(effects.make_backlash_map(), BINARY_TYPE)
         self._scale_factors = FixedAddress(effects.make_scale_factors(), SCALE_TYPE)
         self._field_map = FixedAddress(effects.make_field_map(), BINARY_TYPE)
-        self._field_memory = FixedAddress(effects.make_field_memory(), BINARY_TYPE)
+        self._field_memory = FixedAddress(effects.make_field_memory(), TERNARY_TYPE)
         self._defined = make_defined_functions(effects)
         # Here and not at the first sample, because the first compilation takes seconds.
         self._integrate = integrator.choose_integrator(self._defined)
         self._constants = make_plant_constants(scenario, self._law, effects, self._defined)
         self._command = displacement
         self._states, self._damper_position = self._find_equilibrium(displacement, drive)
-        self._remanence, self._substeps, self._samples = 0.0, 0, 0
+        self._substeps = self._samples = 0
         # The substep is not known yet, so the memory is long enough for the finest.
         dead_substeps = self._constants[states.DEAD_TIME] / _MIN_SUBSTEP
         self._output_history = np.full(math.ceil(dead_substeps) + 3, self._states[states.FIELD])
@@ -113,8 +113,8 @@ class Plant:
         self._start_drive_response(dt / substeps)
         (position, velocity, force), output = np.empty((3, count * substeps)), np.empty(count)
         damper, record = np.empty((count, 2)), np.empty((count, states.STATE_COUNT))
-        self._damper_position, self._remanence, done = self._integrate(
-            self._states, self._damper_position, self._remanence, self._output_history, self._substeps,
+        self._damper_position, done = self._integrate(
+            self._states, self._damper_position, self._iron, self._output_history, self._substeps,
             np.ascontiguousarray(command, float), np.ascontiguousarray(drive, float),
             dt / substeps, substeps, self._constants, self._law,
             self._follower, self._parallel_force, self._field_map, self._field_memory, self._scale_factors,
@@ -161,7 +161,7 @@ class Plant:
         state = np.zeros(states.STATE_COUNT)
         state[[states.COMMAND, states.POSITION, states.Y]] = displacement, position, damper
         state[[states.DAMPER, states.GAS_POSITION]] = damper
-        field = self._start_defined_effects(damper, drive)
+        field = self._start_coil(damper, drive)
         state[[states.FIELD, states.LAGGED, states.LAGGED_TWICE, states.OUTPUT]] = field, field, field, drive
         state[states.TEMPERATURE] = self._constants[states.AMBIENT]
         return state, position
@@ -182,14 +182,21 @@ class Plant:
         start_variables(self._defined, position, drive, drive)
         return force + evaluate(self._defined, FORCE_PLACE), evaluate(self._defined, MOUNTING_PLACE)
 
-    def _start_defined_effects(self, damper: float, drive: float) -> float:
-        """Start the memory of defined effects at rest; return the coil's settled field [V or A]."""
+    def _start_coil(self, damper: float, drive: float) -> float:
+        """Start the memories of iron and defined effects at rest; return the settled field [V or A]."""
         if self._defined is None:
+            self._magnetise(drive)
             return drive
         start_variables(self._defined, damper, drive, drive)
         field = drive + evaluate(self._defined, DRIVE_PLACE)
-        start_variables(self._defined, damper, drive, self._field_map(field, 0.0))
+        self._magnetise(field)
+        start_variables(self._defined, damper, drive, self._field_map(field, self._iron.mean()))
         return field
+
+    def _magnetise(self, field: float) -> None:
+        """Set the memories of the iron to those after a rise of the field from zero [V or A]."""
+        count = self._effects.count_field_memories()
+        self._iron = np.array([self._field_memory(0.0, field, (m + 0.5) / count) for m in range(count)])
 
 
 def count_substeps(dt: float) -> int:

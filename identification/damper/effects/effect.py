@@ -69,8 +69,9 @@ Action = Literal[
 - ``drive_delay``: () -> dead time [s], time constant of a second lag [s], fraction of the field behind that lag
   [1], and number of such lags in series [1], one or two.
 - ``field``: field [drive] -> field that the damper sees [drive].
-- ``field_memory``: field, memory [drive] -> field that the damper sees; ``memory``: (memory, change of the field)
-  -> memory, the same however a monotonic change is divided.
+- ``field_memory``: field, mean of the form's memories -> field that the damper sees [drive]; ``memory``: (memory,
+  change of the field, position of this memory among all in 0..1) -> memory, the same however a monotonic change is
+  divided.
 - ``scaling``: displacement [m], velocity [m/s] -> factors on alpha, c0, c1.
 - ``softening``: energy [J] -> factors on alpha, c0, c1. The energy is what the damper has dissipated and not yet
   lost: it leaves with the time constant ``recovery_time`` [s] among the parameters.
@@ -144,6 +145,8 @@ class Form(NamedTuple):
     """The form as a plain function; its arguments follow from ``action``."""
     memory: Callable[..., Any] | None = None
     """Function that updates the memory after a change; None for forms without memory."""
+    memories: int = 1
+    """Number of memories that a field keeps."""
 
     @property
     def place(self) -> Place:

@@ -3,6 +3,9 @@
 The memory is the difference between the field that the damper sees and the coil's own. After a long rise the field
 is below the coil's own by the residue, after a long fall above it. In between it follows exponentially over a
 width of drive, or as a play operator does.
+
+The Prandtl-Ishlinskii operator is a mean of play operators of different widths (Brokate and Sprekels 1996, ch. 2).
+Small reversals then make small loops, and a larger change wipes out the smaller ones before it.
 """
 
 from typing import Any
@@ -13,6 +16,8 @@ from identification.damper.effects.effect import Effect, Form
 from identification.damper.parameters import Quantity
 
 _MIN_WIDTH = 1e-6
+_PLAYS = 8
+"""Number of play operators that represent a distribution of widths."""
 
 
 def add_remanence(field: Any, remembered: Any, residue: Any, width: Any) -> Any:
@@ -20,7 +25,7 @@ def add_remanence(field: Any, remembered: Any, residue: Any, width: Any) -> Any:
     return field + residue * remembered
 
 
-def update_remanence(remembered: Any, change: Any, residue: Any, width: Any) -> Any:
+def update_remanence(remembered: Any, change: Any, position: Any, residue: Any, width: Any) -> Any:
     """Return the share [1] of the residue after a monotonic change of the field [V or A]."""
     target = -1.0 if change > 0.0 else 1.0
     return target + (remembered - target) * np.exp(-abs(change) / max(width, _MIN_WIDTH))
@@ -31,7 +36,9 @@ def add_closing_remanence(field: Any, remembered: Any, residue: Any, width: Any,
     return field + residue * remembered / (1.0 + (field / tip) ** 2)
 
 
-def update_closing_remanence(remembered: Any, change: Any, residue: Any, width: Any, tip: Any) -> Any:
+def update_closing_remanence(
+    remembered: Any, change: Any, position: Any, residue: Any, width: Any, tip: Any
+) -> Any:
     """Return the share [1] of the residue after a monotonic change of the field [V or A]."""
     target = -1.0 if change > 0.0 else 1.0
     return target + (remembered - target) * np.exp(-abs(change) / max(width, _MIN_WIDTH))
@@ -42,9 +49,20 @@ def add_play_remanence(field: Any, remembered: Any, residue: Any) -> Any:
     return field + remembered
 
 
-def update_play_remanence(remembered: Any, change: Any, residue: Any) -> Any:
+def update_play_remanence(remembered: Any, change: Any, position: Any, residue: Any) -> Any:
     """Return the difference [V or A] after a change of the field."""
     return min(max(remembered - change, -residue), residue)
+
+
+def add_plays(field: Any, remembered: Any, share: Any, reach: Any, exponent: Any) -> Any:
+    """Return the field of which a share [1] follows plays up to a half width ``reach`` [V or A]."""
+    return field + share * remembered
+
+
+def update_play(remembered: Any, change: Any, position: Any, share: Any, reach: Any, exponent: Any) -> Any:
+    """Return the difference [V or A] of one play from the field after a change of it."""
+    width = reach * position**exponent
+    return min(max(remembered - change, -width), width)
 
 
 _RESIDUE = Quantity("residue", "{drive}", 0.0, 1.0, 0.02, "difference that remains after a long change")
@@ -83,6 +101,19 @@ MAGNETIC_REMANENCE = Effect(
             ((0.01,), (0.04,)),
             add_play_remanence,
             update_play_remanence,
+        ),
+        Form(
+            "prandtl_ishlinskii",
+            "field_memory",
+            (
+                Quantity("share", "1", 0.0, 0.95, 0.3, "part of the field that follows plays"),
+                Quantity("reach", "{drive}", 5e-3, 5.0, 0.3, "half width of the widest play"),
+                Quantity("exponent", "1", 0.2, 5.0, 1.0, "power of a width over its order; 1 for equal density"),
+            ),
+            ((0.3, 0.2, 1.0), (0.3, 0.5, 1.0)),
+            add_plays,
+            update_play,
+            memories=_PLAYS,
         ),
     ),
 )

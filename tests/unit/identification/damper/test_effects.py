@@ -141,19 +141,22 @@ def test_iron_that_begins_slowly_begins_slowly_and_is_full_at_last():
 @pytest.mark.parametrize(("form", "values"), [("exponential", (0.02, 0.05)), ("play_operator", (0.02,))])
 def test_iron_is_below_on_the_way_up_and_above_on_the_way_down(form, values):
     shape = EFFECTS["magnetic_remanence"].find_form(form)
-    up = shape.memory(0.0, 0.5, *values)
-    down = shape.memory(up, -0.5, *values)
+    up = shape.memory(0.0, 0.5, 1.0, *values)
+    down = shape.memory(up, -0.5, 1.0, *values)
     assert shape.function(0.5, up, *values) == pytest.approx(0.48, abs=1e-4)
     assert shape.function(0.0, down, *values) == pytest.approx(0.02, abs=1e-4)
 
 
-@pytest.mark.parametrize(("form", "values"), [("exponential", (0.02, 0.05)), ("play_operator", (0.02,))])
+@pytest.mark.parametrize(
+    ("form", "values"),
+    [("exponential", (0.02, 0.05)), ("play_operator", (0.02,)), ("prandtl_ishlinskii", (0.5, 0.03, 1.0))],
+)
 def test_what_iron_remembers_does_not_depend_on_how_a_change_is_cut(form, values):
     memory = EFFECTS["magnetic_remanence"].find_form(form).memory
     cut = 0.01
     for _ in range(30):
-        cut = memory(cut, 0.001, *values)
-    assert cut == pytest.approx(memory(0.01, 0.03, *values))
+        cut = memory(cut, 0.001, 1.0, *values)
+    assert cut == pytest.approx(memory(0.01, 0.03, 1.0, *values))
 
 
 def test_a_bent_channel_has_no_gain_of_its_own_and_stays_bounded():

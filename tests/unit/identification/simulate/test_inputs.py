@@ -110,8 +110,21 @@ def test_a_slow_fraction_of_the_field_passes_its_own_lags(form, lags):
 
 def test_a_memory_changes_with_the_field_only():
     play = EFFECTS["magnetic_remanence"].find_form("play_operator")
-    found = trace_memory(compile_once(play.memory), np.array([0.5, 1.5, 1.5, 1.49, 1.0]), 0.02)
-    np.testing.assert_allclose(found, [0.0, -0.02, -0.02, -0.01, 0.02], atol=1e-15)
+    found = trace_memory(compile_once(play.memory), 1, np.array([0.01, 1.5, 1.5, 1.49, 1.0]), 0.02)
+    np.testing.assert_allclose(found, [-0.01, -0.02, -0.02, -0.01, 0.02], atol=1e-15)
+
+
+def test_memories_of_a_prandtl_ishlinskii_operator_are_the_mean_of_their_plays():
+    form = EFFECTS["magnetic_remanence"].find_form("prandtl_ishlinskii")
+    u = np.array([1.0, 0.2, 0.6, 0.5, -0.4, 1.0])
+    expected = np.zeros(len(u))
+    for order in (np.arange(form.memories) + 0.5) / form.memories:
+        width, level = 0.5 * order**2.0, 0.0
+        for i, value in enumerate(u):
+            level = min(max(level, value - width), value + width)
+            expected[i] += (level - value) / form.memories
+    found = trace_memory(compile_once(form.memory), form.memories, u, 0.3, 0.5, 2.0)
+    np.testing.assert_allclose(found, expected, atol=1e-15)
 
 
 def test_a_deadband_follows_only_what_leaves_it():

@@ -84,6 +84,16 @@ def test_held_out_samples_are_not_read(advances):
     assert first[places > COUNT // 2 + 1] == pytest.approx(0.5)
 
 
+def test_a_recording_that_is_held_out_whole_leaves_the_steps_of_the_others(advances):
+    problem, unknowns, _ = make_problem(advances)
+    piece = problem.pieces[0]
+    both = replace(problem, pieces=(piece, replace(piece, train=np.zeros(COUNT))))
+    start = both.make_start(LABORATORY)
+    alone, found = estimate_step_shifts(problem, unknowns), estimate_step_shifts(both, start)
+    assert found[0].advances == pytest.approx(alone[0].advances, abs=0.02)
+    assert found[1].advances == pytest.approx(0.5)
+
+
 def test_a_step_needs_constant_levels_on_both_sides():
     drive = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0, 2.0, 2.0, 0.5, 0.5])
     assert list(find_level_changes(drive)) == [3, 11]

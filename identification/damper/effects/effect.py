@@ -146,7 +146,7 @@ class Form(NamedTuple):
     memory: Callable[..., Any] | None = None
     """Function that updates the memory after a change; None for forms without memory."""
     memories: int = 1
-    """Number of memories that a field keeps."""
+    """Number of memories of a form with the action ``field_memory``; other forms have at most one."""
 
     @property
     def place(self) -> Place:

@@ -108,7 +108,7 @@ MAGNETIC_REMANENCE = Effect(
             (
                 Quantity("share", "1", 0.0, 0.95, 0.3, "part of the field that follows plays"),
                 Quantity("reach", "{drive}", 5e-3, 5.0, 0.3, "half width of the widest play"),
-                Quantity("exponent", "1", 0.2, 5.0, 1.0, "power of a width over its order; 1 for equal density"),
+                Quantity("exponent", "1", 0.2, 5.0, 1.0, "power of position with which widths grow; 1: uniform"),
             ),
             ((0.3, 0.2, 1.0), (0.3, 0.5, 1.0)),
             add_plays,

@@ -96,7 +96,7 @@ class CurvePlace(NamedTuple):
 
     @property
     def kind(self) -> FunctionKind:
-        """FunctionKind of the function in an effect file."""
+        """Kind of the function in an effect file."""
         return "step_response" if self.is_response else "value"
 
     @property

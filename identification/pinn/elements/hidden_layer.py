@@ -49,10 +49,6 @@ class HiddenLayer:
         """Return the derivatives (..., rank) of the basis functions over the input."""
         return np.asarray(self._slopes(place))
 
-    def evaluate_and_differentiate(self, place: Array) -> tuple[Array, Array]:
-        """Return the basis functions (..., rank) at inputs (...), and their derivatives."""
-        return self.evaluate(place), self.differentiate(place)
-
     def differentiate_twice(self, place: Array) -> tuple[Array, Array]:
         """Return the first and second derivatives (..., rank) of the basis functions over the input."""
         return self.differentiate(place), np.asarray(self._curvatures(place))

@@ -211,7 +211,7 @@ class ElementNetwork:
         """Return the states of a piece at times (N,) [s]; beyond its ends, those at the ends."""
         numbers, place, rate = self._locate(piece, time)
         z, y = self._select_weights(numbers)
-        values, slopes = self.layer.evaluate_and_differentiate(place)
+        values, slopes = self.layer.evaluate(place), self.layer.differentiate(place)
         return States((values * z).sum(1), (values * y).sum(1) * Y_UNIT, (slopes * y).sum(1) * rate * Y_UNIT)
 
     def evaluate_inner_velocity(self, piece: int, time: Array) -> Array:

@@ -1,23 +1,21 @@
 """Path from the law's force to the recorded force: parallel forces, inertia and the force channel."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.damper.effects import Form, step_response
 from identification.simulate.curves import apply_lag, differentiate_by_argument, differentiate_by_parameters
+from identification.simulate.dual import differentiate
 from identification.simulate.inputs import trace_path_memory
 from identification.simulate.motion import DamperMotion, compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.variables import DamperVariables, apply_deadband
 
-_DISPLACEMENT_STEP, _VELOCITY_STEP = 1e-8, 1e-7
-"""Steps of differences of parallel forces [m], [m/s]."""
-_ACCELERATION_STEP = 1e-3
-"""Step of differences of inertia [m/s^2]."""
+_DISPLACEMENT_STEP = 1e-8
+"""Step of differences of parallel forces with memory [m]."""
 _FORCE_STEP = 1e-6
 """Step of differences of a force channel, relative to the largest force [1]."""
 _LAG_STEP = 1e-7
@@ -58,10 +56,9 @@ def differentiate_parallel_force(
     """Differentiate the parallel forces over the unknowns of the motion (M, N), and over parameters by column."""
     moving, own, h = np.zeros_like(motion.dx), [], 1.0 / excitation.rate
     for at, form, values in model.select_forms("parallel_force"):
-        over_x, over_v = _differentiate_by_motion(form, values, motion)
+        _, (over_x, over_v, *rows) = differentiate(form.function, (motion.x, motion.v, *values))
         moving += over_x * motion.dx + over_v * motion.dv
-        rows = differentiate_by_parameters(partial(form.function, motion.x, motion.v), values, form.parameters)
-        own += [(at + k, np.broadcast_to(row, len(motion.x))) for k, row in enumerate(rows)]
+        own += [(at + k, row) for k, row in enumerate(rows)]
     for at, form, values in model.select_forms("hysteretic_force", "relaxation_force"):
         pairs = zip(motion.dx, motion.dv, strict=True)
         at_motion = partial(_evaluate_memory_force, form, h, values)
@@ -73,7 +70,7 @@ def differentiate_parallel_force(
         moving += _differentiate_defined_force(
             form, excitation, values, motion, _differentiate_acceleration(model, motion)
         )
-        rows = differentiate_by_parameters(partial(form.function, variables), values, form.parameters)
+        _, rows = differentiate(partial(form.function, variables), values)
         own += [(at + k, row) for k, row in enumerate(rows)]
     return moving, own
 
@@ -118,12 +115,6 @@ def _differentiate_by_unknown(
     return np.asarray((ahead - back) / (2.0 * step))
 
 
-def _differentiate_by_motion(form: Form, values: tuple[float, ...], motion: DamperMotion) -> tuple[Array, Array]:
-    over_x = differentiate_by_argument(lambda x: form.function(x, motion.v, *values), motion.x, _DISPLACEMENT_STEP)
-    over_v = differentiate_by_argument(lambda v: form.function(motion.x, v, *values), motion.v, _VELOCITY_STEP)
-    return over_x, over_v
-
-
 def apply_force_channel(
     model: SimulationModel,
     excitation: Excitation,
@@ -147,20 +138,19 @@ def apply_force_channel(
     """
     # In the order of the chain: the channel's lag comes last and acts on all forces added before it.
     for at, form, values in model.select_forms("inertia"):
-        force = force + form.function(motion.a, *values)
+        inertia, (over_a, *rows) = differentiate(form.function, (motion.a, *values))
+        force = force + inertia
         if J is not None:
-            _add_columns(J, first + at, partial(form.function, motion.a), form, values)
-            derivative = _differentiate_inertia(form, values, motion)
-            J[:, delays] += (derivative * motion.da)[:, None]
+            _add_columns(J, first + at, rows)
+            J[:, delays] += (over_a * motion.da)[:, None]
             for early, _, _ in model.select_forms("displacement_shift"):
                 # A delay of the displacement acts as a negative delay of the force.
-                J[:, first + early] -= derivative * motion.da
+                J[:, first + early] -= over_a * motion.da
     for at, form, values in model.select_forms("additive_force"):
-        force = force + form.function(excitation.time, excitation.sampled_drive, *values)
+        added = partial(form.function, excitation.time, excitation.sampled_drive)
+        force = force + added(*values)
         if J is not None:
-            _add_columns(
-                J, first + at, partial(form.function, excitation.time, excitation.sampled_drive), form, values
-            )
+            _add_columns(J, first + at, differentiate(added, values)[1])
     for at, form, values in model.select_forms("channel_function"):
         force = _apply_channel_function(excitation, force, J, form, values, first + at)
     for at, form, values in model.select_forms("channel_response"):
@@ -170,12 +160,8 @@ def apply_force_channel(
     return force
 
 
-def _differentiate_inertia(form: Form, values: tuple[float, ...], motion: DamperMotion) -> Array:
-    return np.asarray(differentiate_by_argument(lambda a: form.function(a, *values), motion.a, _ACCELERATION_STEP))
-
-
-def _add_columns(J: Array, at: int, function: Any, form: Form, values: tuple[float, ...]) -> None:
-    for k, row in enumerate(differentiate_by_parameters(function, values, form.parameters)):
+def _add_columns(J: Array, at: int, rows: Iterable[Array]) -> None:
+    for k, row in enumerate(rows):
         J[:, at + k] += row
 
 
@@ -191,7 +177,7 @@ def _apply_channel_function(
     if J is not None:
         step = _FORCE_STEP * max(float(np.abs(force).max()), 1.0)
         J *= (1.0 + differentiate_by_argument(at_force, force, step))[:, None]
-        _add_columns(J, at, partial(form.function, variables), form, values)
+        _add_columns(J, at, differentiate(partial(form.function, variables), values)[1])
     return np.asarray(force + at_force(force))
 
 
@@ -209,8 +195,7 @@ def _apply_channel_response(
             changed = step_response.compute_weights(form.function, parameters, h)
             return step_response.apply_weights(changed, force)
 
-        for k, row in enumerate(differentiate_by_parameters(respond, values, form.parameters)):
-            J[:, at + k] += row
+        _add_columns(J, at, differentiate_by_parameters(respond, values, form.parameters))
     return found
 
 

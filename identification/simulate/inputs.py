@@ -1,18 +1,21 @@
 """Field in the damper at the samples and half way between them, with its derivatives.
 
-Without an effect of the coil, the field and its derivatives have closed forms. With one, the derivatives are
-differences of the whole transform, which takes little time compared with the integration.
+Without an effect of the coil, the field and its derivatives have closed forms. The derivatives of lags and
+memories are differences of the whole transform. A function of the field without memory is applied to the samples
+that the integration needs, and its derivatives are exact.
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from identification.arrays import Array, njit_cached, njit_uncached
 from identification.damper import Quantity
-from identification.damper.effects import Action, step_response
+from identification.damper.effects import Action, Form, step_response
 from identification.simulate.curves import apply_lag, differentiate_by_parameters
+from identification.simulate.dual import differentiate
 from identification.simulate.motion import compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.variables import make_coil_variables
@@ -26,6 +29,8 @@ COIL_ACTIONS: tuple[Action, ...] = (
     "field_function",
 )
 """Actions that change the field."""
+_MAP_ACTIONS: tuple[Action, ...] = ("field", "field_memory", "field_function")
+"""Those that act on the field; the others act on the command."""
 _MIN_LAG = 1e-6
 """Second lag below which the drive passes without lag [s]."""
 _REST_SHARE = 0.05
@@ -54,16 +59,42 @@ def compute_damper_field(
 ) -> DamperField:
     """Compute the field along an excitation; derivatives over effects of the coil only with ``sensitivities``."""
     late = sum(values[0] for _, _, values in model.select_forms("time_shift"))
-    finer = excitation.drive_oversampling
-    delay, h = model.force_delay + model.drive_delay + late, 1.0 / (excitation.rate * finer)
+    delay = model.force_delay + model.drive_delay + late
+    effects, maps = _split_coil(model)
+    field = _compute_lagged_field(effects, model.coordinates.eta, delay, excitation, sensitivities)
+    for at, form, values in maps:
+        field = _apply_map(field, form, values, at, sensitivities)
+    return field
+
+
+_CoilEffect = tuple[int, Form, tuple[float, ...]]
+"""Column of the first parameter among those of all effects, form, and values."""
+
+
+def _split_coil(model: SimulationModel) -> tuple[list[_CoilEffect], list[_CoilEffect]]:
+    """Return the effects of the coil up to the last one with a past, and the functions of the field behind it.
+
+    Lags act on the command and maps on the field, so all lags come first, whatever the order of the effects.
+    """
     coil = model.select_forms(*COIL_ACTIONS)
+    coil = sorted(coil, key=lambda effect: effect[1].action in _MAP_ACTIONS)
+    count = max((k + 1 for k, (_, form, _) in enumerate(coil) if form.action != "field"), default=0)
+    return coil[:count], coil[count:]
+
+
+def _compute_lagged_field(
+    coil: Sequence[_CoilEffect], eta: float, delay: float, excitation: Excitation, sensitivities: bool
+) -> DamperField:
+    """Compute the field behind the lag of eta, the delay and some effects of the coil."""
+    finer = excitation.drive_oversampling
+    h = 1.0 / (excitation.rate * finer)
     if not coil:
-        u, middle, du, dmiddle = compute_field(excitation.drive, model.coordinates.eta, delay, h)
+        u, middle, du, dmiddle = compute_field(excitation.drive, eta, delay, h)
         u, middle = _decimate_field(u, middle, finer)
         du, dmiddle = _decimate_field(du, dmiddle, finer)
         # A delay of the force acts on the field as a delay of the drive does, so the last row repeats that row.
         return DamperField(u, middle, np.vstack([du, du[1:]]), np.vstack([dmiddle, dmiddle[1:]]), ())
-    values = (model.coordinates.eta, delay, *(v for _, _, some in coil for v in some))
+    values = (eta, delay, *(v for _, _, some in coil for v in some))
     quantities = (_ETA, _DELAY, *(q for _, form, _ in coil for q in form.parameters))
 
     def whole(*parameters: float) -> Array:
@@ -79,6 +110,26 @@ def compute_damper_field(
     )
 
 
+def _apply_map(
+    field: DamperField, form: Form, values: tuple[float, ...], at: int, sensitivities: bool
+) -> DamperField:
+    """Return the field behind a function of the field without memory, with the columns of its parameters."""
+    columns = (*field.columns, *range(at, at + len(values)))
+    if not sensitivities:
+        u, middle = (np.asarray(form.function(u, *values)) for u in (field.u, field.middle))
+        return DamperField(u, middle, field.du, field.dmiddle, columns)
+    u, du = _differentiate_map(form, values, field.u, field.du)
+    middle, dmiddle = _differentiate_map(form, values, field.middle, field.dmiddle)
+    return DamperField(u, middle, du, dmiddle, columns)
+
+
+def _differentiate_map(form: Form, values: tuple[float, ...], u: Array, rows: Array) -> tuple[Array, Array]:
+    """Return a function of the field (N,) and its derivatives (A + P, N), before the last row, of the delay."""
+    found, (over_u, *own) = differentiate(form.function, (u, *values))
+    moved = over_u * rows
+    return found, np.vstack([moved[:-1], *own, moved[-1:]])
+
+
 def _split_half_samples(both: Array, finer: int) -> tuple[Array, Array]:
     """Return the values at the samples of the motion, and half way between, from half samples of the drive."""
     return np.ascontiguousarray(both[..., :: 2 * finer]), np.ascontiguousarray(both[..., finer :: 2 * finer])
@@ -92,7 +143,9 @@ def _decimate_field(at: Array, middle: Array, finer: int) -> tuple[Array, Array]
     return np.ascontiguousarray(at[..., ::finer]), np.ascontiguousarray(halves)
 
 
-def _apply_coil(coil: Any, parameters: tuple[float, ...], excitation: Excitation, h: float) -> Array:
+def _apply_coil(
+    coil: Sequence[_CoilEffect], parameters: tuple[float, ...], excitation: Excitation, h: float
+) -> Array:
     """Apply all effects of the coil in the order of the chain; return the field at half samples (2N-1,)."""
     drive = excitation.drive
     eta, delay, lag, part, layers, at = parameters[0], parameters[1], 0.0, 1.0, 1, 2

@@ -9,6 +9,7 @@ import numpy as np
 from identification.arrays import Array, njit_cached, njit_uncached
 from identification.damper.effects import Form
 from identification.simulate.curves import differentiate_by_parameters
+from identification.simulate.dual import differentiate
 from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.step import interpolate_motion
 
@@ -112,10 +113,12 @@ def _invert_channel(
     bend = _compute_bend(form.function, x, values)
     over_v = -motion.v * bend / gain**3
     moved = moved._replace(dx=motion.dx / gain, dv=motion.dv / gain + motion.dx * over_v)
-    shifts = differentiate_by_parameters(lambda *p: form.function(x, *p), values, form.parameters)
-    gains = differentiate_by_parameters(lambda *p: _compute_gain(form.function, x, p), values, form.parameters)
-    dx = -np.stack(shifts) / gain
-    dv = -motion.v / gain**2 * (np.stack(gains) + bend * dx)
+    behind, here, ahead = (
+        np.stack(differentiate(partial(form.function, x + step), values)[1])
+        for step in (-_FIRST_STEP, 0.0, _FIRST_STEP)
+    )
+    dx = -here / gain
+    dv = -motion.v / gain**2 * ((ahead - behind) / (2.0 * _FIRST_STEP) + bend * dx)
     return _append_rows(moved, dx, dv, tuple(range(at, at + len(values))))
 
 

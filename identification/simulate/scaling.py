@@ -7,11 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from identification.simulate.curves import (
-    differentiate_by_argument,
-    differentiate_by_parameters,
-    interpolate_midpoints,
-)
+from identification.damper.effects import Form
+from identification.simulate.curves import differentiate_by_argument, interpolate_midpoints
+from identification.simulate.dual import differentiate, evaluate_by_differences
 from identification.simulate.motion import DamperMotion
 from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.stored_energy import compute_stored_energy
@@ -61,60 +59,61 @@ def _multiply_factors(
     parts: Sequence["_FormFactor"], motion: DamperMotion, *, sensitivities: bool
 ) -> tuple[Array, Array]:
     """Return the product of all factors (3, N) and its derivatives (S, 3, N)."""
-    total = np.prod([part.function(motion.x, motion.v, *part.values) for part in parts], axis=0)
     if not sensitivities:
-        return total, np.ones((0, 3, 0))
+        return np.prod([part.evaluate(motion.x, motion.v) for part in parts], axis=0), np.ones((0, 3, 0))
+    total: Any = 1.0
     relative = np.zeros((len(motion.dx), 3, len(motion.x)))
     own = []
     for part in parts:
-        alone = part.function(motion.x, motion.v, *part.values)
+        alone, rows = differentiate(partial(part.function, motion.x, motion.v), part.values)
+        total = total * alone
         relative += part.differentiate_by_motion(motion) / alone
-        rows = differentiate_by_parameters(
-            partial(part.function, motion.x, motion.v), part.values, part.quantities
-        )
         own += [row / alone for row in rows]
     return total, np.concatenate([relative, np.stack(own)]) * total
 
 
 class _FormFactor(NamedTuple):
-    """Factors of one form as a function of displacement and velocity."""
+    """Factors of one form along a motion."""
 
-    function: Callable[..., Array]
+    function: Callable[..., tuple[Any, Any, Any]]
+    """Displacement and velocity (N,), then the form's parameters -> three factors (N,)."""
     values: tuple[float, ...]
-    quantities: Any
+
+    def evaluate(self, x: Array, v: Array) -> Array:
+        """Return the factors (3, N)."""
+        return np.stack([np.broadcast_to(f, x.shape) for f in self.function(x, v, *self.values)])
 
     def differentiate_by_motion(self, motion: DamperMotion) -> Array:
-        """Differentiate the factors over the unknowns of the motion, (M, 3, N)."""
-
-        def at_displacement(x: Array) -> Array:
-            return self.function(x, motion.v, *self.values)
-
-        def at_velocity(v: Array) -> Array:
-            return self.function(motion.x, v, *self.values)
-
-        over_x = differentiate_by_argument(at_displacement, motion.x, _DISPLACEMENT_STEP)
-        over_v = differentiate_by_argument(at_velocity, motion.v, _VELOCITY_STEP)
+        """Return the derivatives (M, 3, N) of the factors over the unknowns of the motion."""
+        over_x = differentiate_by_argument(lambda x: self.evaluate(x, motion.v), motion.x, _DISPLACEMENT_STEP)
+        over_v = differentiate_by_argument(lambda v: self.evaluate(motion.x, v), motion.v, _VELOCITY_STEP)
         return np.asarray(over_x * motion.dx[:, None, :] + over_v * motion.dv[:, None, :])
 
 
 def _bind_form(
-    form: Any, values: tuple[float, ...], variables: DamperVariables, excitation: Excitation, *, half: bool
+    form: Form, values: tuple[float, ...], variables: DamperVariables, excitation: Excitation, *, half: bool
 ) -> _FormFactor:
     """Return the factors of a form over the motion, at the samples or half way between."""
     if form.action == "gain_function":
-        return _FormFactor(partial(_evaluate_gain, form, variables), values, form.parameters)
+        return _FormFactor(partial(_evaluate_gain, form, variables), values)
     if form.action == "scaling":
-        return _FormFactor(lambda x, v, *own: np.stack(form.function(x, v, *own)), values, form.parameters)
-    recovery = [q.symbol for q in form.parameters].index("recovery_time")
-
-    def warmed(x: Array, v: Array, *own: float) -> Array:
-        energy = compute_stored_energy(excitation, own[recovery])
-        energy = 0.5 * (energy[1:] + energy[:-1]) if half else energy
-        return np.stack(form.function(energy, *own))
-
-    return _FormFactor(warmed, values, form.parameters)
+        return _FormFactor(form.function, values)
+    return _FormFactor(partial(_soften, form, excitation, half), values)
 
 
-def _evaluate_gain(form: Any, samples: DamperVariables, x: Array, v: Array, *own: float) -> Array:
-    """Return the factors (3, N) of a defined effect at a motion near that of the samples."""
-    return np.stack([1.0 + form.function(MovedVariables(samples, x, v), *own)] * 3)
+def _soften(form: Form, excitation: Excitation, half: bool, x: Array, v: Array, *own: Any) -> tuple[Any, Any, Any]:
+    """Return the factors of a fluid that dissipated energy heats, at the samples or half way between."""
+
+    def store(recovery: float) -> Array:
+        energy = compute_stored_energy(excitation, recovery)
+        return 0.5 * (energy[1:] + energy[:-1]) if half else energy
+
+    recovery = own[[q.symbol for q in form.parameters].index("recovery_time")]
+    factors: tuple[Any, Any, Any] = form.function(evaluate_by_differences(store, recovery), *own)
+    return factors
+
+
+def _evaluate_gain(form: Form, samples: DamperVariables, x: Array, v: Array, *own: Any) -> tuple[Any, Any, Any]:
+    """Return the factors of a defined effect at a motion near that of the samples."""
+    gain = 1.0 + form.function(MovedVariables(samples, x, v), *own)
+    return gain, gain, gain

@@ -152,10 +152,9 @@ def _apply_operator(operator: str, left: Any, right: Any) -> Any:
         case "/":
             return left / _keep_from_zero(right)
         case _:
-            exponent = np.asarray(right, float)
-            whole_base = np.where(exponent < 0.0, _keep_from_zero(left), left)
-            whole = exponent == np.round(exponent)
-            return np.where(whole, whole_base, np.maximum(left, _SMALLEST)) ** exponent
+            whole_base = np.where(right < 0.0, _keep_from_zero(left), left)
+            base = np.where(right == np.rint(right), whole_base, np.maximum(left, _SMALLEST))
+            return base ** (1.0 * right)
 
 
 def _keep_from_zero(value: Any) -> Any:

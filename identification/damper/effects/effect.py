@@ -5,8 +5,8 @@ displacement at the actuator -> [displacement_channel] -> recorded displacement.
 scenario or a fit names the effects that are active, and the values of their parameters.
 
 An effect has one or more functional forms, each with its own parameters. The function of a form without memory
-uses numpy's elementary functions only, so it takes floats, arrays and compiled numbers. One with memory takes
-floats.
+uses numpy's elementary functions only, so it takes floats, arrays, compiled numbers and dual numbers. One with
+memory takes floats.
 """
 
 from collections.abc import Callable, Sequence

@@ -18,7 +18,7 @@ def saturate_tanh(field: Any, sharpness: Any) -> Any:
 
 def saturate_knee(field: Any, sharpness: Any, power: Any) -> Any:
     """Return the field behind a knee between Froelich's gentle one (power 1) and a hard limit (power 8)."""
-    return field / (1.0 + (np.abs(sharpness * field) + _MIN_SHARPNESS) ** power) ** (1.0 / power)
+    return field / (1.0 + (sharpness * np.abs(field) + _MIN_SHARPNESS) ** power) ** (1.0 / power)
 
 
 def saturate_magnetisation(field: Any, sharpness: Any, initial_loss: Any, initial_drive: Any) -> Any:

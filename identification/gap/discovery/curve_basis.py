@@ -6,9 +6,10 @@ penalty becomes their sum of squares. The penalty is that of Eilers and Marx (19
 number of knots. A curve that repeats is a Fourier series instead, with higher harmonics less probable.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -54,10 +55,18 @@ class CurveBasis:
         """Number of coefficients K."""
         return len(self.table)
 
-    def evaluate(self, variable: Array, coefficients: Array) -> Array:
+    def evaluate(self, variable: Array, coefficients: Iterable[Any]) -> Any:
         """Return the curve (N,) with some coefficients (K,) at values (N,) of the variable."""
-        values = coefficients @ np.array(self.table)
-        return np.asarray(np.interp(variable, self.positions, values, period=self.period))
+        values = sum(c * row for c, row in zip(coefficients, self._rows, strict=True))
+        return np.interp(variable, self._grid, values, period=self.period)
+
+    @cached_property
+    def _grid(self) -> Array:
+        return np.array(self.positions)
+
+    @cached_property
+    def _rows(self) -> Array:
+        return np.array(self.table)
 
 
 def make_basis(values: Array, warp: Warp) -> CurveBasis:
@@ -127,12 +136,12 @@ class CurveFunction:
     is_response: bool = False
     """True where the result is a step response: one less the curve, and one beyond its end."""
 
-    def __call__(self, variables: Mapping[str, Array], *values: float) -> Array:
+    def __call__(self, variables: Mapping[str, Array], *values: Any) -> Any:
         """Return the value (N,) for variables (N,) each, coefficients and, where it grows, [1/drive]."""
-        curve = self.evaluate(variables, np.array(values[: self.basis.size]))
+        curve = self.evaluate(variables, values[: self.basis.size])
         return curve * (1.0 + values[-1] * variables["drive"]) if self.grows_with_drive else curve
 
-    def evaluate(self, variables: Mapping[str, Array], coefficients: Array) -> Array:
+    def evaluate(self, variables: Mapping[str, Array], coefficients: Iterable[Any]) -> Any:
         """Return the value (N,) with some coefficients (K,), without growth."""
         variable = variables[self.variables[0]]
         curve = self.scale * self.basis.evaluate(variable, coefficients)
@@ -154,9 +163,9 @@ class LinearGrowth:
     highest_drive: float
     """Drive at which the second curve has its own size [drive]."""
 
-    def __call__(self, variables: Mapping[str, Array], *values: float) -> Array:
+    def __call__(self, variables: Mapping[str, Array], *values: Any) -> Any:
         """Return the value (N,) for the coefficients (2K,) of both curves."""
-        first, second = np.split(np.array(values), 2)
+        first, second = values[: self.function.basis.size], values[self.function.basis.size :]
         drive = variables["drive"] / self.highest_drive
         return self.function.evaluate(variables, first) + drive * self.function.evaluate(variables, second)
 

@@ -21,6 +21,7 @@ from identification.damper.effects.connection import (
 )
 from identification.simulate.compliant_mount.springs import CONNECTION_COUNT, FILM_DAMPING, FIXED_COUNT
 from identification.simulate.curves import differentiate_by_parameters
+from identification.simulate.dual import differentiate
 from identification.simulate.simulation_model import SimulationModel
 
 _FILM_DAMPING = FILM_DAMPING - (FIXED_COUNT - CONNECTION_COUNT)
@@ -59,7 +60,7 @@ def differentiate_connections(model: SimulationModel, partial_force: Array) -> l
     return [
         (at + k, over_values @ row)
         for at, form, values in model.select_forms("connection")
-        for k, row in enumerate(differentiate_by_parameters(form.function, values, form.parameters))
+        for k, row in enumerate(differentiate(form.function, values)[1])
     ]
 
 

@@ -229,12 +229,12 @@ def _draw_remanence(random: Random, size: DamperSize, duration: float) -> DrawnF
     width, taper = _draw_log(random, 0.05, 1.0) * size.drive, random.uniform(0.0, 1.0) / size.drive
 
     def retain(s: float) -> Function:
-        def add(field: Any, remembered: Any, residue: float, width: float) -> Any:
+        def add(field: Any, remembered: Any, residue: float, width: float, initial_rise: float) -> Any:
             return field + s * residue * remembered * np.exp(-taper * np.abs(field))
 
         return add
 
-    values = (0.1 * size.drive, width)
+    values = (0.1 * size.drive, width, random.choice([0.0, 1.0]))
     return DrawnForm("magnetic_remanence", "field_memory", retain, known.parameters, values, known.memory)
 
 

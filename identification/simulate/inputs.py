@@ -181,18 +181,23 @@ def _apply_maps(maps: list[tuple[Any, tuple[float, ...]]], u: Array, start: floa
         elif form.action == "field_function":
             u = u + form.function(make_coil_variables(u, start, h), *own)
         else:
-            u = form.function(u, trace_memory(compile_once(form.memory), form.memories, u, *own), *own)
+            rise = form.name_values(own).get("initial_rise", 1.0)
+            u = form.function(u, trace_memory(compile_once(form.memory), form.memories, rise, u, *own), *own)
     return np.asarray(u)
 
 
 @njit_uncached
-def trace_memory(memory: Any, count: int, u: Array, *values: float) -> Array:
+def trace_memory(memory: Any, count: int, rise: float, u: Array, *values: float) -> Array:
     """Return the mean of a form's memories (N,) along a field (N,).
 
-    Before its first value the field has risen from zero, because nothing is known of an earlier magnetisation.
+    Args:
+        memory, count: function and number of the memories.
+        rise: change to the first field, over that field, since the memories were zero [1].
+        u: field [V or A].
+        values: parameters of the form.
     """
     found, memories = np.zeros(len(u)), np.zeros(count)
-    last = mean = 0.0
+    last, mean = (1.0 - rise) * u[0], 0.0
     for i in range(len(u)):
         change, last = u[i] - last, u[i]
         # Most of a drive is constant, and a constant drive does not change the memory.

@@ -144,6 +144,12 @@ class EffectFunctions:
         """Return the number of memories of the iron, at least one."""
         return max((form.memories for form, _ in self.select("field_memory")), default=1)
 
+    def get_initial_rise(self) -> float:
+        """Return the change to the first field, over that field, since the iron had no memory [1]."""
+        for form, values in self.select("field_memory"):
+            return form.name_values(values).get("initial_rise", 1.0)
+        return 1.0
+
     def get_cooling_rate(self) -> float:
         """Return the rate [1/s] at which the energy leaves the damper."""
         return self._get_rate("softening", "recovery_time")

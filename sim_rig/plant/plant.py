@@ -194,9 +194,9 @@ class Plant:
         return field
 
     def _magnetise(self, field: float) -> None:
-        """Set the memories of the iron to those after a rise of the field from zero [V or A]."""
-        count = self._effects.count_field_memories()
-        self._iron = np.array([self._field_memory(0.0, field, (m + 0.5) / count) for m in range(count)])
+        """Set the memories of the iron to those after the change to the first field [V or A]."""
+        count, change = self._effects.count_field_memories(), self._effects.get_initial_rise() * field
+        self._iron = np.array([self._field_memory(0.0, change, (m + 0.5) / count) for m in range(count)])
 
 
 def count_substeps(dt: float) -> int:

@@ -48,11 +48,14 @@ def compare_sensitivities(
 def compute_worst_error(model: SimulationModel, excitation: Excitation, relative: float = 3e-6) -> float:
     """Compute the largest RMS error of a sensitivity, relative to its RMS [1].
 
-    A corner of backlash or of a loop can lie between the two differences, so the worst hundredth of the samples is
-    left out.
+    Where an unknown has no influence, sensitivity and difference have to be zero. A corner of backlash or of a
+    loop can lie between the two differences, so the worst hundredth of the samples is left out.
     """
     worst = 0.0
     for _, sensitivity, difference in compare_sensitivities(model, excitation, relative):
+        if not difference.any():
+            assert not sensitivity.any()
+            continue
         error = np.sort(np.abs(sensitivity - difference))[: -len(sensitivity) // 100]
         worst = max(worst, float(np.sqrt(np.mean(error**2)) / np.sqrt(np.mean(sensitivity**2))))
     return worst

@@ -71,7 +71,8 @@ Action = Literal[
 - ``field``: field [drive] -> field that the damper sees [drive].
 - ``field_memory``: field, mean of the form's memories -> field that the damper sees [drive]; ``memory``: (memory,
   change of the field, position of this memory among all in 0..1) -> memory, the same however a monotonic change is
-  divided.
+  divided. Memories begin at zero and take the change to the first field, which is ``initial_rise`` [1] among the
+  parameters times that field.
 - ``scaling``: displacement [m], velocity [m/s] -> factors on alpha, c0, c1.
 - ``softening``: energy [J] -> factors on alpha, c0, c1. The energy is what the damper has dissipated and not yet
   lost: it leaves with the time constant ``recovery_time`` [s] among the parameters.

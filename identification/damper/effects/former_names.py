@@ -40,6 +40,9 @@ FORMER_PARAMETERS: dict[str, dict[str, str]] = {
 }
 """Present name of a parameter by effect and former name."""
 
+ADDED_PARAMETERS: dict[str, dict[str, float]] = {"magnetic_remanence": {"initial_rise": 1.0}}
+"""Parameters that older documents lack, by effect, with the value that they assumed."""
+
 
 def rename_form(effect: str, name: str) -> str:
     """Return the present name of a form; a name that is not a former one is returned as it is."""
@@ -47,7 +50,7 @@ def rename_form(effect: str, name: str) -> str:
 
 
 def rename_parameters(effect: str, values: Mapping[str, float]) -> dict[str, float]:
-    """Return parameter values under their present names.
+    """Return parameter values under their present names, with those that older documents lack.
 
     Raises:
         ValueError: a parameter is given under its former and its present name.
@@ -57,4 +60,4 @@ def rename_parameters(effect: str, values: Mapping[str, float]) -> dict[str, flo
     if len(renamed) < len(values):
         twice = ", ".join(f"{old} and {new}" for old, new in former.items() if old in values and new in values)
         raise ValueError(f"{effect} has a parameter under its former and its present name: {twice}; keep one")
-    return renamed
+    return {**ADDED_PARAMETERS.get(effect, {}), **renamed}

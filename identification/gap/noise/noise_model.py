@@ -19,7 +19,7 @@ from identification.gap.data import (
     measure_residual_scales,
     split_by_piece,
 )
-from identification.gap.fits import NO_GAP_RATIO, Candidate
+from identification.gap.fits import EXPLAINED_RATIO, NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
 from identification.noise import NORMAL_95, NoiseFloorEstimate, estimate_slow_variance
@@ -62,6 +62,11 @@ class NoiseModel:
     def highest_floor(self) -> float:
         """Upper end of the floor's 95 % interval [N]; the floor itself where no cycles repeat."""
         return math.hypot(self.estimate.get_interval(self.noise)[1], self.input_noise or 0.0)
+
+    @property
+    def is_certain(self) -> bool:
+        """True where the floor is known, and its interval too narrow to change a verdict."""
+        return self.estimate.is_known and self.highest_floor < EXPLAINED_RATIO * self.floor
 
     def compute_highest_rmse(self, samples: int) -> float:
         """Return the RMSE [N] that noise alone hardly exceeds on some samples.
@@ -117,7 +122,7 @@ class NoiseModel:
             self.estimate = replace(self.estimate, noise=rest, deviation=0.5 * error.deviation / rest)
 
     def describe_residual(self, candidate: Candidate) -> NoiseFloorEstimate:
-        """Return the estimate of the noise if the residual of a candidate is noise; no cycles repeat then."""
+        """Return the estimate of the noise if the residual of a candidate is noise; at most few cycles repeat."""
         residual = candidate.residual
         values = residual.values[residual.valid]
         total = float(np.mean(values**2))
@@ -131,7 +136,7 @@ class NoiseModel:
         ratio = estimate.noise / self.estimate.high_frequency
         basis = (
             f"residual of the model, {ratio:.2f} times the noise at high frequencies: no function of stroke, "
-            "drive and time predicts it, and no cycles repeat"
+            f"drive and time predicts it, and {'few' if self.estimate.is_known else 'no'} cycles repeat"
         )
         return replace(estimate, deviation=deviation, basis=basis)
 

@@ -1,10 +1,10 @@
-"""Noise floor where no cycles repeat: the residual that no function of stroke, drive and time predicts.
+"""Noise floor where few or no cycles repeat: the residual that no function of stroke, drive and time predicts.
 
-Without repeated cycles, only the noise at high frequencies is known, which slow noise exceeds. The error of a
-fitted model is an upper bound. A residual is noise if a flexible regression predicts nothing of it on strokes that
-it has not seen, and if its size changes from block to block as much as that of noise of its spectrum does. The
-regression cannot learn an error that follows a rare event, such as a step of the drive. Such an error is strong in
-few blocks.
+Without repeated cycles, only the noise at high frequencies is known, which slow noise exceeds. Few cycles leave a
+wide interval. The error of a fitted model is an upper bound. A residual is noise if a flexible regression predicts
+nothing of it on strokes that it has not seen, and if its size changes from block to block as much as that of noise
+of its spectrum does. The regression cannot learn an error that follows a rare event, such as a step of the drive.
+Such an error is strong in few blocks.
 """
 
 import math
@@ -26,7 +26,7 @@ _NOISE_DRAWS = 16
 """Number of draws of noise of the residual's spectrum."""
 
 
-def settle_unknown_floor(
+def settle_uncertain_floor(
     noise_model: NoiseModel,
     candidates: Collection[Candidate],
     regression: ResidualRegression,
@@ -36,7 +36,8 @@ def settle_unknown_floor(
 ) -> bool:
     """Take the floor from the smallest set of effects whose residual is noise; return False if there is none.
 
-    White noise needs no such estimate: a set that reaches the noise at high frequencies shows it.
+    White noise needs no such estimate: a set that reaches the noise at high frequencies shows it. Nor does a floor
+    whose interval is too narrow to change a verdict. In a wide interval, the noise of the residual has to lie.
 
     Args:
         noise_model: its floor is replaced.
@@ -46,15 +47,18 @@ def settle_unknown_floor(
         evaluate: computes the residual of a fit; a drift that slow noise explains is then a part of it.
         propagate: computes the squared change of a candidate's force by the noise of its inputs, (runs, N) [N²].
     """
-    if noise_model.estimate.is_known:
+    if noise_model.is_certain:
         return False
     lowest = regression.find_explainable_rmse(_select_best(candidates), noise_model.floor, certain=True)
     if lowest < EXPLAINED_RATIO * noise_model.floor:
         return False
-    adequate = [c for c in candidates if c.held_out_rmse < EXPLAINED_RATIO * lowest]
+    fitted, highest = min(c.train_rmse for c in candidates), noise_model.estimate.get_interval(math.inf)[1]
+    adequate = [c for c in candidates if max(c.held_out_rmse / lowest, c.train_rmse / fitted) < EXPLAINED_RATIO]
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         estimate = noise_model.describe_residual(candidate)
-        if is_stationary(candidate.residual, estimate.noise**2, propagate(candidate), block_length):
+        if estimate.noise < highest and is_stationary(
+            candidate.residual, estimate.noise**2, propagate(candidate), block_length
+        ):
             noise_model.estimate = estimate
             noise_model.estimate = noise_model.describe_residual(evaluate(candidate.fit))
             return True

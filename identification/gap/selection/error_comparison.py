@@ -46,6 +46,16 @@ class ErrorComparison:
         first, second = (self.select_held_out(c.residual.whiten(chosen)) for c in (before, after))
         return compute_evidence(first, second, self.block_length)
 
+    def expect_held_out_evidence(self, before: Candidate, after: Candidate) -> float:
+        """Compute the block evidence on the held-out samples that a right second candidate would have.
+
+        Held-out samples on which the two candidates hardly differ cannot judge between them.
+        """
+        chosen = self.choose_filter(before)
+        first, second = (self.select_held_out(c.residual.whiten(chosen)) for c in (before, after))
+        wrong = replace(second, values=np.hypot(second.values, second.values - first.values))
+        return compute_evidence(wrong, second, self.block_length)
+
     def bound_evidence(self, candidate: Candidate) -> float:
         """Compute the block evidence for a candidate at the noise floor over a known one."""
         chosen = self.choose_filter(candidate)

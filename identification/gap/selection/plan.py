@@ -15,7 +15,7 @@ from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import (
     ResidualRegression,
     describe_drift_explanation,
-    settle_unknown_floor,
+    settle_uncertain_floor,
     subtract_clock_drift,
 )
 from identification.gap.selection.candidate_pool import CandidatePool
@@ -158,8 +158,8 @@ def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
 
 
 def settle_floor(pool: CandidatePool, candidates: Collection[Candidate]) -> bool:
-    """Take an unknown noise floor from candidates whose residual is noise; return False if the floor stays."""
-    return settle_unknown_floor(
+    """Take an uncertain noise floor from candidates whose residual is noise; return False if the floor stays."""
+    return settle_uncertain_floor(
         pool.noise_model,
         candidates,
         ResidualRegression(pool.evaluation, pool.floor),
@@ -202,12 +202,16 @@ def _check_effects(pool: CandidatePool) -> None:
 def _compare_with_subset(pool: CandidatePool, subset: Candidate, candidate: Candidate) -> BlockEvidence:
     """Return the evidence on held-out samples for a set over one with an effect less.
 
-    An effect that closes too little of what the others leave only repairs their form. Its set is then less
-    probable than the one without it, by the penalty for one more effect.
+    Where the effect hardly acts on them, they cannot judge it, and the evidence on all samples counts: transients
+    after rare steps of the drive may all be fitted. An effect that closes too little of what the others leave only
+    repairs their form. Its set is then less probable than the one without it, by the penalty for one more effect.
     """
-    evidence = pool.comparison.compute_held_out_evidence(subset, candidate)
-    if pool.comparison.compute_closed_share(subset, candidate) < pool.settings.min_closed_share:
-        evidence = min(evidence, -compute_complexity_penalty(subset.names))
+    comparison, penalty = pool.comparison, compute_complexity_penalty(subset.names)
+    evidence = comparison.compute_held_out_evidence(subset, candidate)
+    if comparison.expect_held_out_evidence(subset, candidate) < penalty:
+        evidence = comparison.compute_evidence(subset, candidate)
+    if comparison.compute_closed_share(subset, candidate) < pool.settings.min_closed_share:
+        evidence = min(evidence, -penalty)
     return BlockEvidence(subset.names, evidence)
 
 

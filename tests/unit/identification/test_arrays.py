@@ -18,7 +18,7 @@ memory = compile_once(form.memory)
 if form.action == "hysteretic_force":
     print(trace_path_memory(memory, path, np.zeros(3), *values)[-1])
 else:
-    print(trace_memory(memory, form.memories, path, *values)[-1])
+    print(trace_memory(memory, form.memories, 1.0, path, *values)[-1])
 """
 FORMS = [
     ("magnetic_remanence", "exponential"),

@@ -138,7 +138,7 @@ def test_iron_that_begins_slowly_begins_slowly_and_is_full_at_last():
     assert field(-0.3, *values) == -field(0.3, *values)
 
 
-@pytest.mark.parametrize(("form", "values"), [("exponential", (0.02, 0.05)), ("play_operator", (0.02,))])
+@pytest.mark.parametrize(("form", "values"), [("exponential", (0.02, 0.05, 1.0)), ("play_operator", (0.02, 1.0))])
 def test_iron_is_below_on_the_way_up_and_above_on_the_way_down(form, values):
     shape = EFFECTS["magnetic_remanence"].find_form(form)
     up = shape.memory(0.0, 0.5, 1.0, *values)
@@ -149,7 +149,11 @@ def test_iron_is_below_on_the_way_up_and_above_on_the_way_down(form, values):
 
 @pytest.mark.parametrize(
     ("form", "values"),
-    [("exponential", (0.02, 0.05)), ("play_operator", (0.02,)), ("prandtl_ishlinskii", (0.5, 0.03, 1.0))],
+    [
+        ("exponential", (0.02, 0.05, 1.0)),
+        ("play_operator", (0.02, 1.0)),
+        ("prandtl_ishlinskii", (0.5, 0.03, 1.0, 1.0)),
+    ],
 )
 def test_what_iron_remembers_does_not_depend_on_how_a_change_is_cut(form, values):
     memory = EFFECTS["magnetic_remanence"].find_form(form).memory

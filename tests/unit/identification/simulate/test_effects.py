@@ -25,6 +25,12 @@ def test_sensitivities_agree_with_central_differences(name, form):
     assert compute_worst_error(replace(MODEL, effects=(active(name, form),)), sine()) < 5e-6
 
 
+@pytest.mark.parametrize("form", ["exponential", "closing", "prandtl_ishlinskii"])
+def test_sensitivities_over_the_history_of_the_iron_agree_with_central_differences(form):
+    stroke = replace(sine(), drive=0.5 - sine().drive)
+    assert compute_worst_error(replace(MODEL, effects=(active("magnetic_remanence", form),)), stroke) < 5e-6
+
+
 @pytest.mark.parametrize("names", TOGETHER, ids=["mounting", "compliant mount", "coil"])
 def test_sensitivities_of_several_effects_together_agree_with_central_differences(names):
     assert compute_worst_error(replace(MODEL, effects=tuple(map(active, names))), sine()) < 5e-6

@@ -110,8 +110,22 @@ def test_a_slow_fraction_of_the_field_passes_its_own_lags(form, lags):
 
 def test_a_memory_changes_with_the_field_only():
     play = EFFECTS["magnetic_remanence"].find_form("play_operator")
-    found = trace_memory(compile_once(play.memory), 1, np.array([0.01, 1.5, 1.5, 1.49, 1.0]), 0.02)
+    found = trace_memory(compile_once(play.memory), 1, 1.0, np.array([0.01, 1.5, 1.5, 1.49, 1.0]), 0.02, 1.0)
     np.testing.assert_allclose(found, [-0.01, -0.02, -0.02, -0.01, 0.02], atol=1e-15)
+
+
+@pytest.mark.parametrize(("rise", "expected"), [(1.0, -0.02), (0.01, -0.01), (0.0, 0.0), (-1.0, 0.02)])
+def test_a_memory_begins_with_the_change_to_the_first_field(rise, expected):
+    play = EFFECTS["magnetic_remanence"].find_form("play_operator")
+    effect = ActiveEffect(EFFECTS["magnetic_remanence"], (0.02, rise), "play_operator")
+    assert trace_memory(compile_once(play.memory), 1, rise, np.ones(3), 0.02, rise) == pytest.approx(
+        [expected] * 3
+    )
+    stroke = Excitation(1.0 / H, *np.zeros((3, 5)), np.ones(5))
+    field = compute_damper_field(SimulationModel(LABORATORY, effects=(effect,)), stroke)
+    np.testing.assert_allclose(field.u, 1.0 + expected)
+    over_rise = field.du[field.columns.index(1) + 2]
+    np.testing.assert_allclose(over_rise, -1.0 if abs(expected) < 0.02 else 0.0, atol=1e-6)
 
 
 def test_memories_of_a_prandtl_ishlinskii_operator_are_the_mean_of_their_plays():
@@ -123,7 +137,7 @@ def test_memories_of_a_prandtl_ishlinskii_operator_are_the_mean_of_their_plays()
         for i, value in enumerate(u):
             level = min(max(level, value - width), value + width)
             expected[i] += (level - value) / form.memories
-    found = trace_memory(compile_once(form.memory), form.memories, u, 0.3, 0.5, 2.0)
+    found = trace_memory(compile_once(form.memory), form.memories, 1.0, u, 0.3, 0.5, 2.0, 1.0)
     np.testing.assert_allclose(found, expected, atol=1e-15)
 
 

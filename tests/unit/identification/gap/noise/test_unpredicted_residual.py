@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.gap.fits import Candidate
-from identification.gap.noise import ResidualRegression, settle_unknown_floor
+from identification.gap.noise import ResidualRegression, settle_uncertain_floor
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.unpredicted_residual import is_stationary
 from tests.support.candidate_pools import NOISE, RATE, fit_baseline
@@ -51,7 +51,7 @@ def settle(pool, *candidates, input_squares=0.0, **changes):
     model = NoiseModel(estimate, pool.noise_model.stretches)
     model.input_noise = float(np.sqrt(np.mean(propagated)))
     regression = ResidualRegression(pool.evaluation, model.floor)
-    settle_unknown_floor(
+    settle_uncertain_floor(
         model,
         candidates,
         regression,
@@ -84,7 +84,7 @@ def test_a_residual_that_nothing_predicts_is_the_floor_with_an_interval(pool):
     assert model.estimate.is_known
     low, high = model.estimate.get_interval(model.noise)
     assert BOUND < low < NOISE < high
-    assert "no cycles repeat" in model.estimate.basis
+    assert "few cycles repeat" in model.estimate.basis
     assert model.estimate.coloured_share == pytest.approx(1.0 - (BOUND / model.noise) ** 2)
 
 
@@ -104,11 +104,31 @@ def test_the_smallest_set_without_structure_gives_the_floor(pool):
     assert model.noise == pytest.approx(np.sqrt(np.mean(one.residual.values[one.residual.valid] ** 2)))
 
 
-def test_a_set_at_the_noise_of_high_frequencies_and_a_known_floor_change_nothing(pool):
+def test_a_set_with_a_larger_error_on_the_fitted_strokes_is_not_the_floor(pool):
+    fitted = np.where(pool.evaluation.fitted_samples, 1.1, 1.0)
+    law = make_candidate(pool, fitted * draw_noise(pool))
+    one = make_candidate(pool, draw_noise(pool), "gas_spring")
+
+    assert settle(pool, law, one).noise == pytest.approx(NOISE, rel=0.02)
+
+
+def test_a_set_at_the_noise_of_high_frequencies_changes_nothing(pool):
     white = make_candidate(pool, 0.7 * draw_noise(pool))
     assert settle(pool, white).noise == BOUND
-    known = settle(pool, make_candidate(pool, draw_noise(pool)), cycle_to_cycle=BOUND, deviation=0.1 * BOUND)
-    assert known.noise == BOUND
+
+
+@pytest.mark.parametrize(
+    ("noise", "deviation", "settled"),
+    [
+        pytest.param(NOISE / 1.25, 0.15 * NOISE, True, id="in a wide interval"),
+        pytest.param(NOISE / 1.25, 0.08 * NOISE, False, id="above a wide interval"),
+        pytest.param(NOISE / 1.06, 0.02 * NOISE, False, id="narrow interval"),
+    ],
+)
+def test_a_floor_of_few_cycles_is_replaced_within_its_interval(pool, noise, deviation, settled):
+    estimate = {"noise": noise, "cycle_to_cycle": noise, "deviation": deviation}
+    model = settle(pool, make_candidate(pool, draw_noise(pool)), **estimate)
+    assert model.noise == pytest.approx(NOISE if settled else noise, rel=0.03)
 
 
 def test_an_error_that_is_strong_in_few_blocks_is_not_the_floor(pool):

@@ -80,6 +80,17 @@ def test_held_out_evidence_ignores_the_other_samples(slow_noise):
     assert comparison.compute_held_out_evidence(before, make_candidate(slow_noise)) == pytest.approx(0.0, abs=1.0)
 
 
+def test_the_expected_evidence_is_that_of_a_right_candidate_and_small_where_nothing_acts(slow_noise):
+    held_out, error = TIME > 30.0, 3.0 * np.sin(2.0 * np.pi * TIME)
+    comparison = make_comparison(slow_noise, np.sqrt(0.1), held_out)
+    right = make_candidate(slow_noise)
+    elsewhere, everywhere = (make_candidate(slow_noise + part * error) for part in (~held_out, 1.0))
+    expected = comparison.expect_held_out_evidence(everywhere, right)
+    assert expected > 10.0
+    assert expected == pytest.approx(comparison.compute_held_out_evidence(everywhere, right), rel=0.2)
+    assert comparison.expect_held_out_evidence(elsewhere, right) == pytest.approx(0.0, abs=1e-9)
+
+
 def test_propagated_noise_of_the_displacement_is_part_of_the_floor(slow_noise):
     before = make_candidate(slow_noise + 3.0 * np.sin(2.0 * np.pi * TIME))
     bounds = [make_comparison(slow_noise, np.sqrt(0.1), input_noise=n).bound_evidence(before) for n in (0.0, 2.0)]

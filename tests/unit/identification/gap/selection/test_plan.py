@@ -80,14 +80,29 @@ def test_each_effect_of_the_most_probable_set_has_evidence_on_held_out_samples(s
     assert min(evidence.values()) > 1.0
 
 
+def make_comparing_pool(held_out, expected, on_all, closed):
+    """A pool whose comparison of any two sets has a stated result."""
+    comparison = SimpleNamespace(
+        compute_held_out_evidence=lambda before, after: held_out,
+        expect_held_out_evidence=lambda before, after: expected,
+        compute_evidence=lambda before, after: on_all,
+        compute_closed_share=lambda before, after: closed,
+    )
+    return SimpleNamespace(comparison=comparison, settings=SearchSettings())
+
+
+@pytest.mark.parametrize(("expected", "found"), [(0.5, 12.0), (20.0, -0.5)])
+def test_held_out_samples_do_not_judge_an_effect_that_hardly_acts_on_them(expected, found):
+    subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
+    assert (
+        _compare_with_subset(make_comparing_pool(-0.5, expected, 12.0, 0.9), subset, candidate).log_odds == found
+    )
+
+
 @pytest.mark.parametrize(("closed", "kept"), [(0.39, False), (0.41, True)])
 def test_an_effect_that_closes_little_of_what_the_others_leave_repairs_their_form(closed, kept):
     subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
-    comparison = SimpleNamespace(
-        compute_held_out_evidence=lambda before, after: 9.0, compute_closed_share=lambda before, after: closed
-    )
-    pool = SimpleNamespace(comparison=comparison, settings=SearchSettings())
-    parent, log_odds = _compare_with_subset(pool, subset, candidate)
+    parent, log_odds = _compare_with_subset(make_comparing_pool(9.0, 9.0, 9.0, closed), subset, candidate)
     assert parent == subset.names
     assert log_odds == (9.0 if kept else -compute_complexity_penalty(subset.names))
     assert log_odds > 0.0 or not kept

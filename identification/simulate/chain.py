@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.simulate import channel, compliant_mount, inputs
+from identification.simulate import channel, compliant_mount, inputs, memories
 from identification.simulate.kernel import InputDerivatives, StepCounts, integrate, integrate_with_sensitivities
 from identification.simulate.motion import DamperMotion, compute_damper_motion
 from identification.simulate.scaling import ScaleFactors, compute_scale_factors
@@ -84,7 +84,7 @@ class _SimulationChain:
         self._model, self._excitation = model, excitation
         self._motion, self._field, self._scales = motion, field, scales
         self._s = np.array([model.coordinates[i] for i in _STRUCTURAL_COLUMNS])
-        self._zeta0 = inputs.estimate_settled_hysteresis(motion.v)
+        self._zeta0 = memories.estimate_settled_hysteresis(motion.v)
         self._h = 1.0 / excitation.rate
         self._parallel_force = channel.compute_parallel_force(model, excitation, motion)
         extra = (*field.columns, -1, *motion.columns, *scales.columns)

@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.damper.effects import Form, step_response
 from identification.simulate.curves import apply_lag, differentiate_by_argument, differentiate_by_parameters
 from identification.simulate.dual import differentiate
-from identification.simulate.inputs import trace_path_memory
+from identification.simulate.memories import trace_path_memory
 from identification.simulate.motion import DamperMotion, compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.variables import DamperVariables, apply_deadband

@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.arrays import Array, njit_cached, njit_uncached
+from identification.arrays import Array, njit_cached
 from identification.damper import Quantity
 from identification.damper.effects import Action, Form, step_response
 from identification.simulate.curves import apply_lag, differentiate_by_parameters
 from identification.simulate.dual import differentiate
+from identification.simulate.memories import trace_memory
 from identification.simulate.motion import compile_once
 from identification.simulate.simulation_model import Excitation, SimulationModel
 from identification.simulate.variables import make_coil_variables
@@ -33,8 +34,6 @@ _MAP_ACTIONS: tuple[Action, ...] = ("field", "field_memory", "field_function")
 """Those that act on the field; the others act on the command."""
 _MIN_LAG = 1e-6
 """Second lag below which the drive passes without lag [s]."""
-_REST_SHARE = 0.05
-"""Initial speed over the highest speed [1] below which the damper counts as resting, not as sliding."""
 _ETA = Quantity("eta", "1/s", 0.0, math.inf, 100.0, "")
 _DELAY = Quantity("delay", "s", -math.inf, math.inf, 0.1, "")
 
@@ -186,41 +185,6 @@ def _apply_maps(maps: list[tuple[Any, tuple[float, ...]]], u: Array, start: floa
     return np.asarray(u)
 
 
-@njit_uncached
-def trace_memory(memory: Any, count: int, rise: float, u: Array, *values: float) -> Array:
-    """Return the mean of a form's memories (N,) along a field (N,).
-
-    Args:
-        memory, count: function and number of the memories.
-        rise: change to the first field, over that field, since the memories were zero [1].
-        u: field [V or A].
-        values: parameters of the form.
-    """
-    found, memories = np.zeros(len(u)), np.zeros(count)
-    last, mean = (1.0 - rise) * u[0], 0.0
-    for i in range(len(u)):
-        change, last = u[i] - last, u[i]
-        # Most of a drive is constant, and a constant drive does not change the memory.
-        if change != 0.0:
-            for m in range(count):
-                memories[m] = memory(memories[m], change, (m + 0.5) / count, *values)
-            mean = memories.mean()
-        found[i] = mean
-    return found
-
-
-@njit_uncached
-def trace_path_memory(memory: Any, x: Array, v: Array, *values: float) -> Array:
-    """Return the memory of a form along a displacement (N,) [m] at velocities (N,) [m/s]; it starts at zero."""
-    found = np.zeros(len(x))
-    for i in range(1, len(x)):
-        change = x[i] - x[i - 1]
-        found[i] = found[i - 1]
-        if change != 0.0:
-            found[i] = memory(found[i - 1], change, 0.5 * (v[i - 1] + v[i]), *values)
-    return found
-
-
 @njit_cached
 def apply_two_lags(drive: Array, eta: float, lag: float, delay: float, h: float) -> Array:
     """Return the field at half samples (2N-1,) after two lags and a dead time; exact for a held drive."""
@@ -319,13 +283,3 @@ def _advance_field(
     value = old + (value - old) * fade
     fade = math.exp(-eta * second)
     return new + (value - new) * fade, (slope - second * (value - new)) * fade
-
-
-def estimate_settled_hysteresis(velocity: Array) -> float:
-    """Estimate the initial hysteretic variable [1] from a velocity (N,) [m/s]: saturated in motion, zero at rest.
-
-    The first velocity contains noise. Near rest the variable follows its square, so that noise hardly moves it.
-    """
-    rest = _REST_SHARE * float(np.abs(velocity).max())
-    ratio = float(velocity[0]) / max(rest, np.finfo(float).tiny)
-    return ratio * abs(ratio) / (1.0 + ratio**2)

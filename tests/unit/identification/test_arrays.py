@@ -8,7 +8,7 @@ SCRIPT = """
 import sys
 import numpy as np
 from identification.damper.effects import EFFECTS
-from identification.simulate.inputs import trace_memory, trace_path_memory
+from identification.simulate.memories import trace_memory, trace_path_memory
 from identification.simulate.motion import compile_once
 
 form = EFFECTS[sys.argv[1]].find_form(sys.argv[2])

@@ -15,13 +15,8 @@ from identification.simulate.curves import (
     interpolate_hermite,
     interpolate_midpoints,
 )
-from identification.simulate.inputs import (
-    apply_two_lags,
-    compute_damper_field,
-    compute_field,
-    estimate_settled_hysteresis,
-    trace_memory,
-)
+from identification.simulate.inputs import apply_two_lags, compute_damper_field, compute_field
+from identification.simulate.memories import estimate_settled_hysteresis, trace_memory
 from identification.simulate.motion import compile_once, compute_damper_motion
 from identification.simulate.scaling import compute_scale_factors
 from identification.simulate.stored_energy import compute_stored_energy

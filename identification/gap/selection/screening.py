@@ -82,11 +82,11 @@ def screen(
         linearisation = _Linearisation.make(quick, start.unknowns, mains_frequency)
         listed = models or list_effect_models(size=problem.space.scales.damper_size)
         predicted = sorted(
-            (linearisation.find_best_start(model) for model in listed),
-            key=lambda g: -g.predicted_gain,
+            (linearisation.predict_gains(model) for model in listed), key=lambda starts: -starts[0].predicted_gain
         )
-        stepped = [linearisation.take_step(gain) for gain in predicted[:_STEPPED_FORMS]]
-    return sorted([*stepped, *predicted[_STEPPED_FORMS:]], key=lambda g: -compute_expected_gain(g))
+        stepped = [linearisation.take_step(starts) for starts in predicted[:_STEPPED_FORMS]]
+        others = [starts[0] for starts in predicted[_STEPPED_FORMS:]]
+    return sorted([*stepped, *others], key=lambda g: -compute_expected_gain(g))
 
 
 def select_shortlist(gains: Sequence[ScreeningResult], count: int) -> list[ScreeningResult]:
@@ -139,15 +139,25 @@ class _Linearisation:
         """Cost of the baseline beyond the noise [1]."""
         return max(self.evaluation.cost - self.problem.samples, 1.0)
 
-    def find_best_start(self, model: EffectModel) -> ScreeningResult:
-        """Return the start of a form with the largest predicted gain."""
-        return max(
-            (self._predict_gain(model, values) for values in self._list_starts(model)),
-            key=lambda g: g.predicted_gain,
-        )
+    def predict_gains(self, model: EffectModel) -> list[ScreeningResult]:
+        """Return the predicted gain from each start of a form, the largest first."""
+        gains = (self._predict_gain(model, values) for values in self._list_starts(model))
+        return sorted(gains, key=lambda g: -g.predicted_gain)
 
-    def take_step(self, predicted: ScreeningResult) -> ScreeningResult:
-        """Take the step from a start, with exact sensitivities and a line search."""
+    def take_step(self, starts: Sequence[ScreeningResult]) -> ScreeningResult:
+        """Take the step from the starts of a form in turn, until one reduces the error; return the best.
+
+        From a start that is far from the recording, the linear step may predict much and reduce nothing.
+        """
+        results = []
+        for start in starts:
+            results.append(self._take_step(start))
+            if results[-1].achieved_gain > 0.0:
+                break
+        return max(results, key=compute_expected_gain)
+
+    def _take_step(self, predicted: ScreeningResult) -> ScreeningResult:
+        """Take the step from one start, with exact sensitivities and a line search."""
         joint = self.problem.replace_effects((*self.problem.effects, predicted.effect_model))
         point, _, cost = take_joint_step(joint, predicted.unknowns)
         gain = min((self.evaluation.cost - cost) / self.excess, 1.0)

@@ -1,5 +1,6 @@
 """Shortlists of screened effects, and gains of joint problems, with hand-made numbers."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,6 +48,28 @@ def make_linearisation(cost, samples):
 @pytest.mark.parametrize(("cost", "excess"), [(150.0, 50.0), (100.5, 1.0), (90.0, 1.0)])
 def test_the_excess_is_the_cost_beyond_the_noise(cost, excess):
     assert make_linearisation(cost, 100).excess == excess
+
+
+class ScriptedLinearisation(_Linearisation):
+    """A linearisation whose steps achieve stated gains."""
+
+    def _take_step(self, predicted):
+        return replace(predicted, achieved_gain=float(predicted.unknowns[0]))
+
+
+@pytest.mark.parametrize(
+    ("achieved", "chosen"),
+    [
+        pytest.param((0.3, 0.9), 0, id="the first step reduces the error"),
+        pytest.param((-2.0, 0.4, 0.9), 1, id="the second one does"),
+        pytest.param((-2.0, -1.0), 0, id="none does, and the first predicts most"),
+    ],
+)
+def test_a_step_is_taken_from_the_next_start_where_one_only_increases_the_error(achieved, chosen):
+    linearisation = ScriptedLinearisation(SimpleNamespace(samples=1), np.zeros(0), None, (), (), 50.0)
+    model = list_effect_models(["force_delay"])[0]
+    starts = [ScreeningResult(model, 0.2 - 0.01 * k, 0.0, np.array([a])) for k, a in enumerate(achieved)]
+    assert linearisation.take_step(starts).unknowns == starts[chosen].unknowns
 
 
 def test_mains_interference_starts_at_the_measured_frequency():

@@ -12,6 +12,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.fitting import Piece, Problem
 from identification.gap.data import (
+    ErrorSquare,
     EvaluationData,
     Residual,
     estimate_repeated_residual,
@@ -19,7 +20,7 @@ from identification.gap.data import (
     measure_residual_scales,
     split_by_piece,
 )
-from identification.gap.fits import EXPLAINED_RATIO, NO_GAP_RATIO, Candidate
+from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise.input_noise import propagate_input_noise, resample_motion
 from identification.logs import Stretch
 from identification.noise import NORMAL_95, NoiseFloorEstimate, estimate_slow_variance
@@ -63,11 +64,6 @@ class NoiseModel:
         """Upper end of the floor's 95 % interval [N]; the floor itself where no cycles repeat."""
         return math.hypot(self.estimate.get_interval(self.noise)[1], self.input_noise or 0.0)
 
-    @property
-    def is_certain(self) -> bool:
-        """True where the floor is known, and its interval too narrow to change a verdict."""
-        return self.estimate.is_known and self.highest_floor < EXPLAINED_RATIO * self.floor
-
     def compute_highest_rmse(self, samples: int) -> float:
         """Return the RMSE [N] that noise alone hardly exceeds on some samples.
 
@@ -98,28 +94,42 @@ class NoiseModel:
     def narrow_floor(self, candidate: Candidate, evaluation: EvaluationData) -> None:
         """Take the floor from the residual of the law where a part of it is certainly an error of the law.
 
-        That part repeats with the cycles, or exceeds the noise at its time scale. The rest is noise. Within the
-        interval of the floor all of it would count as noise, because slow noise leaves a wide interval.
+        The rest is noise. Within the interval of the floor all of it would count as noise, because slow noise
+        leaves a wide interval.
 
         Args:
             candidate: the law without effects.
             evaluation: the recordings, cut into cycles.
         """
-        input_square = (self.input_noise or 0.0) ** 2
-        found = (
-            estimate_repeated_residual(candidate.residual, evaluation.cycles),
-            estimate_scale_excess(candidate.residual, self.estimate.scales, input_square),
-        )
-        errors = [e for e in found if e is not None and e.lowest > (NO_GAP_RATIO**2 - 1.0) * self.noise**2]
-        if not errors:
+        error = self._find_certain_error(candidate, evaluation)
+        if error is None:
             return
         self.has_certain_error = True
-        error = max(errors, key=lambda e: e.square)
         values = candidate.residual.values[candidate.residual.valid]
+        input_square = (self.input_noise or 0.0) ** 2
         rest = math.sqrt(max(float(np.mean(values**2)) - error.square - input_square, 0.0))
         low, high = self.estimate.get_interval(self.noise)
         if low <= rest <= high:
             self.estimate = replace(self.estimate, noise=rest, deviation=0.5 * error.deviation / rest)
+
+    def _find_certain_error(self, candidate: Candidate, evaluation: EvaluationData) -> ErrorSquare | None:
+        """Return the part of a residual that repeats with the cycles or exceeds the noise at its time scale."""
+        found = (
+            estimate_repeated_residual(candidate.residual, evaluation.cycles),
+            estimate_scale_excess(candidate.residual, self.estimate.scales, (self.input_noise or 0.0) ** 2),
+        )
+        errors = [e for e in found if e is not None and e.lowest > (NO_GAP_RATIO**2 - 1.0) * self.noise**2]
+        return max(errors, key=lambda e: e.square, default=None)
+
+    def may_be_noise(self, candidate: Candidate, evaluation: EvaluationData) -> bool:
+        """Return True if the estimate of the noise does not exclude that a whole residual is noise.
+
+        Few cycles do not show noise that is slower than they are. So the residual is compared with the noise by
+        time scale, where that is known, and else with the interval of the floor.
+        """
+        if self.estimate.scales:
+            return self._find_certain_error(candidate, evaluation) is None
+        return self.describe_residual(candidate).noise < self.estimate.get_interval(math.inf)[1]
 
     def describe_residual(self, candidate: Candidate) -> NoiseFloorEstimate:
         """Return the estimate of the noise if the residual of a candidate is noise; at most few cycles repeat."""

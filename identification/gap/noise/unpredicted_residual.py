@@ -36,8 +36,7 @@ def settle_uncertain_floor(
 ) -> bool:
     """Take the floor from the smallest set of effects whose residual is noise; return False if there is none.
 
-    White noise needs no such estimate: a set that reaches the noise at high frequencies shows it. Nor does a floor
-    whose interval is too narrow to change a verdict. In a wide interval, the noise of the residual has to lie.
+    White noise needs no such estimate: a set that reaches the noise at high frequencies shows it.
 
     Args:
         noise_model: its floor is replaced.
@@ -47,16 +46,14 @@ def settle_uncertain_floor(
         evaluate: computes the residual of a fit; a drift that slow noise explains is then a part of it.
         propagate: computes the squared change of a candidate's force by the noise of its inputs, (runs, N) [N²].
     """
-    if noise_model.is_certain:
-        return False
     lowest = regression.find_explainable_rmse(_select_best(candidates), noise_model.floor, certain=True)
     if lowest < EXPLAINED_RATIO * noise_model.floor:
         return False
-    fitted, highest = min(c.train_rmse for c in candidates), noise_model.estimate.get_interval(math.inf)[1]
+    fitted = min(c.train_rmse for c in candidates)
     adequate = [c for c in candidates if max(c.held_out_rmse / lowest, c.train_rmse / fitted) < EXPLAINED_RATIO]
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         estimate = noise_model.describe_residual(candidate)
-        if estimate.noise < highest and is_stationary(
+        if noise_model.may_be_noise(candidate, regression.evaluation) and is_stationary(
             candidate.residual, estimate.noise**2, propagate(candidate), block_length
         ):
             noise_model.estimate = estimate

@@ -9,6 +9,7 @@ from identification.gap.fits import Candidate
 from identification.gap.noise import ResidualRegression, settle_uncertain_floor
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.unpredicted_residual import is_stationary
+from identification.noise import ScaleVariance, measure_scale_variance
 from tests.support.candidate_pools import NOISE, RATE, fit_baseline
 from tests.support.noise import make_pink_noise, make_residual
 
@@ -129,6 +130,19 @@ def test_a_floor_of_few_cycles_is_replaced_within_its_interval(pool, noise, devi
     estimate = {"noise": noise, "cycle_to_cycle": noise, "deviation": deviation}
     model = settle(pool, make_candidate(pool, draw_noise(pool)), **estimate)
     assert model.noise == pytest.approx(NOISE if settled else noise, rel=0.03)
+
+
+@pytest.mark.parametrize(("size", "settled"), [(1.0, True), (1.2, False)])
+def test_a_residual_as_the_noise_at_every_known_scale_is_the_floor_beyond_its_interval(pool, size, settled):
+    """Cycles show fast noise only, and an interval that contains no slower noise."""
+    noise = draw_noise(pool, seed=3)
+    known = []
+    for samples in (1, 2, 4, 8):
+        variance, count = measure_scale_variance(noise, np.ones(len(noise), bool), samples)
+        known.append(ScaleVariance.from_signal(samples, variance, count))
+    estimate = {"noise": NOISE / 1.3, "cycle_to_cycle": NOISE / 1.3, "deviation": 0.01 * NOISE}
+    model = settle(pool, make_candidate(pool, size * draw_noise(pool)), scales=tuple(known), **estimate)
+    assert model.noise == pytest.approx(NOISE if settled else NOISE / 1.3, rel=0.03)
 
 
 def test_an_error_that_is_strong_in_few_blocks_is_not_the_floor(pool):

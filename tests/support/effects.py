@@ -13,10 +13,10 @@ RATE = 1000.0
 _CHOSEN: dict[str, dict[str, tuple[float, ...]]] = {
     "field_saturation": {"tanh": (1.5,), "knee": (1.8, 3.0), "magnetisation": (1.2, 0.4, 0.2)},
     "magnetic_remanence": {
-        "exponential": (0.03, 0.1, 0.6),
-        "closing": (0.03, 0.1, 0.3, 0.6),
-        "play_operator": (0.03, 0.6),
-        "prandtl_ishlinskii": (0.4, 0.15, 1.0, 0.6),
+        "exponential": (0.03, 0.1, 1.0),
+        "closing": (0.03, 0.1, 0.3, 1.0),
+        "play_operator": (0.03, 1.0),
+        "prandtl_ishlinskii": (0.4, 0.15, 1.0, 1.0),
     },
     "coil_lag": {
         "second_lag": (0.008,),

@@ -8,8 +8,8 @@ from identification.gap.noise.spectral_line import MAINS_FREQUENCY, find_mains_f
 from identification.gap.noise.unpredicted_residual import (
     CHANCE_DEVIATIONS,
     compute_scatter,
-    settle_uncertain_floor,
     simulate_scatter,
+    take_floor_from_residual,
 )
 
 __all__ = [
@@ -24,7 +24,7 @@ __all__ = [
     "describe_drift_explanation",
     "find_mains_frequency",
     "has_drift",
-    "settle_uncertain_floor",
     "simulate_scatter",
     "subtract_clock_drift",
+    "take_floor_from_residual",
 ]

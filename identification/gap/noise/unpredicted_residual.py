@@ -26,7 +26,7 @@ _NOISE_DRAWS = 16
 """Number of draws of noise of the residual's spectrum."""
 
 
-def settle_uncertain_floor(
+def take_floor_from_residual(
     noise_model: NoiseModel,
     candidates: Collection[Candidate],
     regression: ResidualRegression,

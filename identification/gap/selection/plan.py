@@ -15,8 +15,8 @@ from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import (
     ResidualRegression,
     describe_drift_explanation,
-    settle_uncertain_floor,
     subtract_clock_drift,
+    take_floor_from_residual,
 )
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
@@ -158,8 +158,8 @@ def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
 
 
 def settle_floor(pool: CandidatePool, candidates: Collection[Candidate]) -> bool:
-    """Take an uncertain noise floor from candidates whose residual is noise; return False if the floor stays."""
-    return settle_uncertain_floor(
+    """Take the noise floor from candidates whose residual is noise; return False if the floor stays."""
+    return take_floor_from_residual(
         pool.noise_model,
         candidates,
         ResidualRegression(pool.evaluation, pool.floor),

@@ -28,7 +28,9 @@ def test_sensitivities_agree_with_central_differences(name, form):
 @pytest.mark.parametrize("form", ["exponential", "closing", "prandtl_ishlinskii"])
 def test_sensitivities_over_the_history_of_the_iron_agree_with_central_differences(form):
     stroke = replace(sine(), drive=0.5 - sine().drive)
-    assert compute_worst_error(replace(MODEL, effects=(active("magnetic_remanence", form),)), stroke) < 5e-6
+    usual = active("magnetic_remanence", form)
+    effect = usual._replace(values=(*usual.values[:-1], 0.4))
+    assert compute_worst_error(replace(MODEL, effects=(effect,)), stroke) < 5e-6
 
 
 @pytest.mark.parametrize("names", TOGETHER, ids=["mounting", "compliant mount", "coil"])

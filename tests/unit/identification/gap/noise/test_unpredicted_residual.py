@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.gap.fits import Candidate
-from identification.gap.noise import ResidualRegression, settle_uncertain_floor
+from identification.gap.noise import ResidualRegression, take_floor_from_residual
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.unpredicted_residual import is_stationary
 from identification.noise import ScaleVariance, measure_scale_variance
@@ -52,7 +52,7 @@ def settle(pool, *candidates, input_squares=0.0, **changes):
     model = NoiseModel(estimate, pool.noise_model.stretches)
     model.input_noise = float(np.sqrt(np.mean(propagated)))
     regression = ResidualRegression(pool.evaluation, model.floor)
-    settle_uncertain_floor(
+    take_floor_from_residual(
         model,
         candidates,
         regression,

@@ -66,6 +66,7 @@ def assert_jacobian_is_that_of_finite_differences(problem, unknowns):
     network, loss = make_network(problem)
     weights = LossWeights(7.0, problem.noise)
     residuals = loss.compute_weighted_residuals(unknowns, network.output_weights, weights, jacobian=True)
+    without_influence = 0
     for k in range(len(unknowns)):
         step = np.zeros(len(unknowns))
         step[k] = STEP
@@ -75,10 +76,12 @@ def assert_jacobian_is_that_of_finite_differences(problem, unknowns):
         )
         columns = [(above.vector - below.vector) / (2 * STEP) for above, below in zip(high, low, strict=True)]
         largest = max(float(np.abs(column).max()) for column in columns)
-        assert largest > 0.0
+        without_influence += largest == 0.0
         for batch_residuals, expected in zip(residuals, columns, strict=True):
             column = batch_residuals.jacobian[..., k - len(unknowns)]
             assert column == pytest.approx(expected, rel=1e-4, abs=1e-5 * largest + 1e-7)
+    # A play that is saturated at the first field does not show how the field came there.
+    assert without_influence <= 1
 
 
 @pytest.mark.parametrize("effects", [(SPRING,), (SPRING, DELAY)], ids=["one", "two"])

@@ -138,9 +138,9 @@ def apply_force_channel(
     """
     # In the order of the chain: the channel's lag comes last and acts on all forces added before it.
     for at, form, values in model.select_forms("inertia"):
-        inertia, (over_a, *rows) = differentiate(form.function, (motion.a, *values))
-        force = force + inertia
+        force = force + form.function(motion.a, *values)
         if J is not None:
+            _, (over_a, *rows) = differentiate(form.function, (motion.a, *values))
             _add_columns(J, first + at, rows)
             J[:, delays] += (over_a * motion.da)[:, None]
             for early, _, _ in model.select_forms("displacement_shift"):

@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.damper import Quantity
 from identification.simulate.digital_filter import filter_series
 
-_RELATIVE_STEP = 1e-6
+RELATIVE_STEP = 1e-6
 """Step of a difference relative to the parameter [1]; errors of rounding and curvature both stay below 1e-9."""
 _MIN_LAG = 1e-6
 """Lag below which a first-order expansion replaces the filter [s]."""
@@ -44,7 +44,7 @@ def _differentiate_by_parameter(
     function: Callable[..., Any], values: tuple[float, ...], k: int, quantity: Quantity
 ) -> Any:
     # The size of a parameter that is zero is that of its scale.
-    step = _RELATIVE_STEP * max(abs(values[k]), 0.1 * quantity.scale)
+    step = RELATIVE_STEP * max(abs(values[k]), 0.1 * quantity.scale)
 
     def at(times: float) -> Any:
         moved = list(values)
@@ -57,7 +57,7 @@ def _differentiate_by_parameter(
     return (at(1.0) - at(-1.0)) / (2.0 * step)
 
 
-def differentiate_by_argument(function: Callable[[Array], Any], values: Array, step: float) -> Any:
+def differentiate_by_argument(function: Callable[[Any], Any], values: Any, step: float) -> Any:
     """Differentiate a form over one of its arguments at every sample, by central differences."""
     return (np.asarray(function(values + step)) - np.asarray(function(values - step))) / (2.0 * step)
 

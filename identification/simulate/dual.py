@@ -12,9 +12,8 @@ import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from identification.arrays import Array
+from identification.simulate.curves import RELATIVE_STEP, differentiate_by_argument
 
-_RELATIVE_STEP = 1e-6
-"""Step of a difference relative to the argument [1]."""
 Partials = dict[int, Any]
 """Derivatives by the number of the argument; (N,) or a number each."""
 
@@ -87,8 +86,7 @@ def evaluate_by_differences(function: Callable[[float], Array], argument: Any) -
     if not isinstance(argument, DualNumber):
         return function(argument)
     value = argument.value
-    step = _RELATIVE_STEP * abs(value)
-    slope = (function(value + step) - function(value - step)) / (2.0 * step)
+    slope = differentiate_by_argument(function, value, RELATIVE_STEP * abs(value))
     return DualNumber(function(value), {k: slope * part for k, part in argument.partials.items()})
 
 
@@ -104,7 +102,7 @@ def _choose(condition: Any, first: Any, second: Any) -> DualNumber:
     """Return the first value where a condition holds, else the second."""
     over = [_get_partials(o) for o in (first, second)]
     rows = {k: np.where(condition, *(o.get(k, 0.0) for o in over)) for k in dict.fromkeys([*over[0], *over[1]])}
-    return DualNumber(np.where(_get_value(condition), _get_value(first), _get_value(second)), rows)
+    return DualNumber(np.where(condition, _get_value(first), _get_value(second)), rows)
 
 
 def _differentiate_base(found: Any, base: Any, exponent: Any) -> Any:

@@ -180,7 +180,7 @@ def _apply_maps(maps: list[tuple[Any, tuple[float, ...]]], u: Array, start: floa
         elif form.action == "field_function":
             u = u + form.function(make_coil_variables(u, start, h), *own)
         else:
-            rise = form.name_values(own).get("initial_rise", 1.0)
+            rise = form.name_values(own)["initial_rise"]
             u = form.function(u, trace_memory(compile_once(form.memory), form.memories, rise, u, *own), *own)
     return np.asarray(u)
 

@@ -108,7 +108,7 @@ def _soften(form: Form, excitation: Excitation, half: bool, x: Array, v: Array, 
         energy = compute_stored_energy(excitation, recovery)
         return 0.5 * (energy[1:] + energy[:-1]) if half else energy
 
-    recovery = own[[q.symbol for q in form.parameters].index("recovery_time")]
+    recovery = form.name_values(own)["recovery_time"]
     factors: tuple[Any, Any, Any] = form.function(evaluate_by_differences(store, recovery), *own)
     return factors
 

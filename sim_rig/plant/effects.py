@@ -147,8 +147,8 @@ class EffectFunctions:
     def get_initial_rise(self) -> float:
         """Return the change to the first field, over that field, since the iron had no memory [1]."""
         for form, values in self.select("field_memory"):
-            return form.name_values(values).get("initial_rise", 1.0)
-        return 1.0
+            return form.name_values(values)["initial_rise"]
+        return 0.0
 
     def get_cooling_rate(self) -> float:
         """Return the rate [1/s] at which the energy leaves the damper."""

@@ -7,9 +7,9 @@ width of drive, or as a play operator does.
 The Prandtl-Ishlinskii operator is a mean of play operators of different widths (Brokate and Sprekels 1996, ch. 2).
 Small reversals then make small loops, and a larger change wipes out the smaller ones before it.
 
-The history of the iron before a recording is not known, so its end is a parameter: the rise to the first field.
-With one it rose from zero, with zero it has no memory at the first field, and with minus one it fell from twice
-that field.
+The history of the iron before a recording is not known. Its last part is a parameter: the change to the first
+field, over that field. One is a rise from zero, zero is no memory at the first field, and minus one is a fall from
+twice that field.
 """
 
 from typing import Any

@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from bench.csv_import.sampling_clock import restore_sampling_clock
 from bench.csv_import.units import Conversion
 from bench.errors import RecordingError
 
@@ -34,6 +35,8 @@ DRIVE_KINDS: dict[str, Literal["V", "A"]] = {"driver_command_v": "V", "coil_v": 
 
 MIN_SAMPLES = 200
 """Smallest number of samples of a recording."""
+OTHER_DELIMITERS = ("\t", ";")
+"""Delimiters besides the comma. With them a comma in a number is its decimal sign."""
 MAX_SIZE = 2_000_000_000
 """Largest size of a decompressed file [bytes]."""
 
@@ -57,6 +60,8 @@ class CsvRecording:
     """[m/s]; None if the file has no such column."""
     temperature: Array | None = None
     """[degC]; None if the file has no such column."""
+    note: str = ""
+    """Reason for other instants than those in the file, for a person; empty if they were kept."""
 
     @property
     def rate(self) -> float:
@@ -73,19 +78,22 @@ def read_csv(
     """Read and check one file.
 
     Args:
-        path: CSV file, plain or compressed by gzip; the first line contains the headers.
+        path: CSV file, plain or compressed by gzip; the first line contains the headers. Cells are separated by
+            commas, semicolons or tabs; with the last two, numbers may have decimal commas.
         headers: header in the file by column name, where they differ.
         drive_kind: one of `DRIVE_KINDS`; selects the drive if the file has both.
         conversions: of columns whose unit or sense differs, by column name.
 
     Raises:
         RecordingError: the file cannot be read, a column is missing, a cell is not a finite number, time does not
-            increase, or there are fewer than 200 samples. The message names file, line and column.
+            increase although it is not rounded, or there are fewer than 200 samples. The message names file, line
+            and column.
     """
     lines = _read_lines(path)
     columns = _find_columns(path, lines[0], headers or {}, drive_kind)
     table = _convert(path, _parse_table(path, lines, columns), conversions or {})
-    time_ns = np.round((table["time_s"] - table["time_s"][0]) * 1e9).astype(np.int64)
+    clock = restore_sampling_clock(table["time_s"], table["displacement_m"])
+    time_ns = np.round((clock.time - clock.time[0]) * 1e9).astype(np.int64)
     if (np.diff(time_ns) <= 0).any():
         row = int(np.argmax(np.diff(time_ns) <= 0)) + 1
         cell = f"{path.name}, row {_find_line_numbers(lines)[row]}, column {_get_header('time_s', headers or {})}"
@@ -101,6 +109,7 @@ def read_csv(
         drive_unit=DRIVE_COLUMNS[drive],
         velocity=table.get("velocity_mps"),
         temperature=table.get("temperature_c"),
+        note=clock.note,
     )
 
 
@@ -120,7 +129,15 @@ def _read_lines(path: Path) -> list[str]:
     lines = text.splitlines()
     if not lines or not lines[0].strip():
         raise RecordingError(f"{path.name}, row 1: no header; write the column names into the first row")
-    return lines
+    delimiter = next((one for one in OTHER_DELIMITERS if one in lines[0]), "")
+    return _separate_by_commas(lines, delimiter) if delimiter else lines
+
+
+def _separate_by_commas(lines: Sequence[str], delimiter: str) -> list[str]:
+    """Return the lines of another delimiter with commas, and with points as decimal signs."""
+    header = StringIO()
+    csv.writer(header, lineterminator="").writerow(next(csv.reader([lines[0]], delimiter=delimiter)))
+    return [header.getvalue(), *(line.replace(",", ".").replace(delimiter, ",") for line in lines[1:])]
 
 
 def _decompress(path: Path, data: bytes) -> bytes:

@@ -69,11 +69,13 @@ def import_recordings(
 
 
 def _collect_notes(recordings: Sequence[CsvRecording], use_velocity: bool) -> list[str]:
-    """Return notes on velocity and uneven sampling."""
+    """Return notes on velocity, time stamps and travel."""
     notes = []
     if not use_velocity and any(recording.velocity is not None for recording in recordings):
         notes.append("velocity computed from displacement, as not every file has velocity_mps")
     for recording in recordings:
+        if recording.note:
+            notes.append(f"{recording.name}: {recording.note}")
         steps = np.diff(recording.time_ns) / NS_PER_SECOND
         if np.max(steps) > 1.5 * np.median(steps):
             notes.append(f"{recording.name}: time steps from {np.min(steps):.3g} to {np.max(steps):.3g} s")

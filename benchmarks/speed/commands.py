@@ -37,6 +37,14 @@ _LOGS = {
 }
 """Method, factor on its cycles, and effect of each log."""
 _BASELINE = ("-c", "import numba, scipy.signal")
+_LAUNCHER = """
+import resource, subprocess, sys
+code = subprocess.call(sys.argv[1:], stdout=subprocess.DEVNULL)
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(used.ru_utime + used.ru_stime, used.ru_maxrss)
+sys.exit(code)
+"""
+"""Small process that starts a command: the peak memory of a new process includes that of its parent."""
 _PAGE = """# Speed of the commands
 
 Processor time (user and system) and peak memory of whole processes, imports included, with warm caches. The logs
@@ -104,13 +112,15 @@ def measure_process(words: Sequence[str], folder: Path, checkout: Path) -> Usage
         RuntimeError: the process failed.
     """
     environment = {**os.environ, "PYTHONPATH": str(checkout)}
-    process = subprocess.Popen([sys.executable, *words], cwd=folder, env=environment, stderr=subprocess.DEVNULL)
-    # The children of a reaped process count as well: a report predicts in a process of its own.
-    _, status, used = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode != 0:
-        raise RuntimeError(f"python {' '.join(words)}: exit status {process.returncode}")
-    return Usage(used.ru_utime + used.ru_stime, used.ru_maxrss * 1024 / 1e6)
+    command = [sys.executable, "-I", "-S", "-c", _LAUNCHER, sys.executable, *words]
+    result = subprocess.run(
+        command, cwd=folder, env=environment, check=False, text=True, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    if result.returncode != 0:
+        raise RuntimeError(f"python {' '.join(words)}: exit status {result.returncode}")
+    seconds, kibibytes = result.stdout.splitlines()[-1].split()
+    return Usage(float(seconds), float(kibibytes) * 1024 / 1e6)
 
 
 def measure_command(name: str, folder: Path, checkout: Path) -> Usage:

@@ -330,3 +330,31 @@ def test_real_recordings_are_imported_completely(tmp_path):
 
     assert len({segment.stretch for segment in log.segments}) == len(files) == 5
     np.testing.assert_array_equal(log.samples["force"][: len(read_csv(files[0]).force)], read_csv(files[0]).force)
+
+
+def test_stamps_with_too_few_digits_are_replaced_and_named(tmp_path):
+    columns = csv_columns()
+    rounded = {**columns, "time_s": np.round(columns["time_s"], 2)}
+    assert (np.diff(rounded["time_s"]) == 0).any()
+
+    text = import_recordings([write_csv(tmp_path / "a.csv", rounded)], tmp_path / "run.mcap")
+
+    steps = np.diff(read_log(tmp_path / "run.mcap").samples["time"])
+    np.testing.assert_allclose(steps, np.mean(np.diff(columns["time_s"])), rtol=1e-3)
+    assert "a: the time stamps are rounded to 0.01 s; the samples are taken as uniform" in text
+
+
+@pytest.mark.parametrize("delimiter", [";", "\t"])
+def test_other_delimiters_and_decimal_commas_give_the_same_values(tmp_path, delimiter):
+    plain = write_csv(tmp_path / "a.csv", rename(csv_columns(), force_n="Force, axial"))
+    text = plain.read_text().replace('"Force, axial"', "Force, axial")
+    header, body = text.split("\n", 1)
+    header = header.replace(",", delimiter).replace(f"Force{delimiter} axial", "Force, axial")
+    body = body.replace(",", delimiter).replace(".", ",")
+    other = tmp_path / "b.csv"
+    other.write_text(f"{header}\n{body}")
+
+    read = read_csv(other, {"force_n": "Force, axial"})
+
+    np.testing.assert_array_equal(read.force, csv_columns()["force_n"])
+    np.testing.assert_allclose(read.displacement, csv_columns()["displacement_m"], rtol=1e-9)

@@ -3,6 +3,7 @@
 from identification.gap.noise.clock_drift import describe_drift_explanation, subtract_clock_drift
 from identification.gap.noise.explainable_share import FEATURE_VARIABLES, Explained, ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
+from identification.gap.noise.simulated_noise import compute_noise_evidence
 from identification.gap.noise.slow_drift import compute_noise_drift, has_drift
 from identification.gap.noise.spectral_line import MAINS_FREQUENCY, find_mains_frequency
 from identification.gap.noise.unpredicted_residual import (
@@ -20,6 +21,7 @@ __all__ = [
     "NoiseModel",
     "ResidualRegression",
     "compute_noise_drift",
+    "compute_noise_evidence",
     "compute_scatter",
     "describe_drift_explanation",
     "find_mains_frequency",

@@ -18,7 +18,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.gap.data import Cycles, Residual, bound_evidence, compute_evidence
 from identification.gap.fits import Candidate
-from identification.gap.noise import NoiseModel
+from identification.gap.noise import NoiseModel, compute_noise_evidence
 from identification.noise import WhiteningFilter
 
 
@@ -55,6 +55,13 @@ class ErrorComparison:
         first, second = (self.select_held_out(c.residual.whiten(chosen)) for c in (before, after))
         wrong = replace(second, values=np.hypot(second.values, second.values - first.values))
         return compute_evidence(wrong, second, self.block_length)
+
+    def compute_noise_evidence(self, before: Candidate, after: Candidate) -> float:
+        """Compute the log likelihood ratio for one candidate over another if the second residual is noise.
+
+        Slow noise makes neighbouring blocks alike, so block evidence counts the same chance several times.
+        """
+        return compute_noise_evidence(after.residual, before.residual.values - after.residual.values)
 
     def bound_evidence(self, candidate: Candidate) -> float:
         """Compute the block evidence for a candidate at the noise floor over a known one."""

@@ -30,6 +30,7 @@ from identification.gap.selection.posterior import (
     BlockEvidence,
     Posterior,
     compute_complexity_penalty,
+    compute_log_prior,
 )
 from identification.gap.selection.screening import (
     MOUNTING_EFFECTS,
@@ -205,6 +206,7 @@ def _compare_with_subset(pool: CandidatePool, subset: Candidate, candidate: Cand
     Where the effect hardly acts on them, they cannot judge it, and the evidence on all samples counts: transients
     after rare steps of the drive may all be fitted. An effect that closes too little of what the others leave only
     repairs their form. Its set is then less probable than the one without it, by the penalty for one more effect.
+    The likelihood ratio in noise of the residual's spectrum has to pay for the effect, too.
     """
     comparison, penalty = pool.comparison, compute_complexity_penalty(subset.names)
     evidence = comparison.compute_held_out_evidence(subset, candidate)
@@ -212,6 +214,8 @@ def _compare_with_subset(pool: CandidatePool, subset: Candidate, candidate: Cand
         evidence = comparison.compute_evidence(subset, candidate)
     if comparison.compute_closed_share(subset, candidate) < pool.settings.min_closed_share:
         evidence = min(evidence, -penalty)
+    required = compute_log_prior(subset.names) - compute_log_prior(candidate.names)
+    evidence = min(evidence, comparison.compute_noise_evidence(subset, candidate) - required)
     return BlockEvidence(subset.names, evidence)
 
 

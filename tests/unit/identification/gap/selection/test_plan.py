@@ -80,13 +80,14 @@ def test_each_effect_of_the_most_probable_set_has_evidence_on_held_out_samples(s
     assert min(evidence.values()) > 1.0
 
 
-def make_comparing_pool(held_out, expected, on_all, closed):
+def make_comparing_pool(held_out, expected, on_all, closed, in_noise=100.0):
     """A pool whose comparison of any two sets has a stated result."""
     comparison = SimpleNamespace(
         compute_held_out_evidence=lambda before, after: held_out,
         expect_held_out_evidence=lambda before, after: expected,
         compute_evidence=lambda before, after: on_all,
         compute_closed_share=lambda before, after: closed,
+        compute_noise_evidence=lambda before, after: in_noise,
     )
     return SimpleNamespace(comparison=comparison, settings=SearchSettings())
 
@@ -106,6 +107,14 @@ def test_an_effect_that_closes_little_of_what_the_others_leave_repairs_their_for
     assert parent == subset.names
     assert log_odds == (9.0 if kept else -compute_complexity_penalty(subset.names))
     assert log_odds > 0.0 or not kept
+
+
+@pytest.mark.parametrize("excess", [-1.0, 1.0])
+def test_an_effect_has_to_pay_its_prior_in_noise_of_the_spectrum_of_the_residual(excess):
+    subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
+    in_noise = compute_complexity_penalty(subset.names) + excess
+    pool = make_comparing_pool(9.0, 9.0, 9.0, 0.9, in_noise)
+    assert _compare_with_subset(pool, subset, candidate).log_odds == pytest.approx(excess)
 
 
 def test_a_law_in_a_wrong_minimum_is_fitted_again_from_the_law_of_the_best_set():

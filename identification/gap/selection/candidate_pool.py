@@ -162,7 +162,10 @@ class CandidatePool:
         """Compute the posterior of all fitted sets."""
         coloured_share = self.noise_model.estimate.coloured_share
         curve = self._collect_curve_evidence()
-        return compute_posterior(self.collect_evidence(), self.problems.full.samples, coloured_share, curve)
+        # The same limit as that of the verdict ``no_gap``.
+        noise_excess = (self.no_gap_limits[0] / self.floor) ** 2 - 1.0
+        samples = self.problems.full.samples
+        return compute_posterior(self.collect_evidence(), samples, coloured_share, curve, noise_excess)
 
     def _collect_curve_evidence(self) -> SetEvidence | None:
         """Return the evidence of the curve that is an alternative to the sets; None without one."""

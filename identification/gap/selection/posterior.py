@@ -107,7 +107,11 @@ class Posterior:
 
 
 def compute_posterior(
-    sets: Sequence[SetEvidence], samples: int, coloured_share: float = 0.0, curve: SetEvidence | None = None
+    sets: Sequence[SetEvidence],
+    samples: int,
+    coloured_share: float = 0.0,
+    curve: SetEvidence | None = None,
+    noise_excess: float = 0.0,
 ) -> Posterior:
     """Compute the probabilities of sets of effects and of an unknown cause.
 
@@ -117,6 +121,7 @@ def compute_posterior(
         coloured_share: part of the variance of the noise [1] that is not white; slow noise varies more by chance.
         curve: evidence of a fitted curve, where it is an alternative to the sets. With the name of an effect it is
             that effect in another form, with another name a cause outside the library.
+        noise_excess: largest excess that the uncertainty of the noise floor explains [1].
     """
     gap = max(next(s.excess for s in sets if not s.names), 0.0)
     resolution = (
@@ -132,7 +137,8 @@ def compute_posterior(
         scores[curve.names] = curve_score
         sets = [curve if s.names == curve.names else s for s in sets]
     best = max(sets, key=lambda s: scores[s.names])
-    unknown = _score_unknown(best, gap, resolution, samples)
+    chance = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
+    unknown = _score_unknown(best, gap, resolution, max(chance, noise_excess))
     if not is_other_form:
         unknown = float(np.logaddexp(unknown, curve_score))
     shares = normalise_scores(np.array([*scores.values(), unknown]))
@@ -178,12 +184,11 @@ def _score_curve(
     return max(score, scores[parent] + log_odds + prior - compute_log_prior(parent))
 
 
-def _score_unknown(best: SetEvidence, gap: float, resolution: float, samples: int) -> float:
+def _score_unknown(best: SetEvidence, gap: float, resolution: float, insignificant: float) -> float:
     """Return the log odds of an unknown cause, next to the most probable set.
 
     It is an alternative only where known effects leave an excess that the noise floor cannot explain.
     """
-    insignificant = _INPUT_NOISE_EXCESS + _FLOOR_DEVIATIONS * math.sqrt(2.0 / max(samples, 1))
     score = compute_log_prior(best.names) + math.log(_UNKNOWN_ODDS)
     score -= _LIKELIHOOD_EXPONENT * math.log(_UNKNOWN_FORM_ERROR * gap + resolution + insignificant)
     score -= _penalise_incomplete(best, gap)

@@ -80,6 +80,14 @@ def test_a_gap_that_no_effect_closes_has_an_unknown_cause():
     assert posterior.unknown > 0.8
 
 
+@pytest.mark.parametrize(("noise_excess", "is_unknown"), [(0.0, True), (0.05, True), (0.4, False)])
+def test_an_excess_within_the_uncertainty_of_the_noise_floor_has_no_unknown_cause(noise_excess, is_unknown):
+    sets = [SetEvidence(frozenset(), 0.15), SetEvidence(frozenset({"gas_spring"}), 0.14)]
+    posterior = compute_posterior(sets, SAMPLES, noise_excess=noise_excess)
+    assert (posterior.unknown > 0.5) is is_unknown
+    assert (posterior.sets[frozenset()] > 0.5) is not is_unknown
+
+
 def test_the_most_probable_stage_is_that_of_the_effect():
     posterior = compute_posterior(make_sets(none=8.0, gas_spring=0.05, force_delay=2.0), SAMPLES)
     stages = compute_stage_probabilities(

@@ -110,7 +110,8 @@ class Readings(BaseModel):
         "running number of the first sample; a gap after the previous message means lost samples", "1"
     )
     quality: Literal["good", "uncertain", "bad"] = Field(
-        description="good: checked and in range; uncertain: without checksum or device clock; bad: not used"
+        description="good: checked and in range; uncertain: without checksum or device clock, or shifted by a "
+        "shunt; bad: not used"
     )
     received: list[int] = _make_list_field("bench clock of the receipt, after the timestamp", "ns")
     bench: list[int] = _make_list_field(

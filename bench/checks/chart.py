@@ -44,9 +44,9 @@ class ChartPoint(FrozenModel):
 
 
 class CheckSeries(FrozenModel):
-    """Checks that are compared with each other: those of one channel with the same specimen mounted."""
+    """Checks that are compared with each other: of one kind and channel, with the same specimen mounted."""
 
-    check: CheckKind = Field(description="zero: mean at rest")
+    check: CheckKind = Field(description="zero: mean at rest; shunt: change of the force by the shunt")
     channel: ChannelName
     specimen: str = Field(description="mounted damper; empty for checks that name none")
 

@@ -80,6 +80,9 @@ class Segment(BaseModel):
     frequency: float | None = _make_quantity_field("frequency of the motion; null if it has none", "Hz")
     drive: str = Field(description="kind of drive programme: constant, staircase, steps, ...")
     drive_value: float | None = _make_quantity_field("constant drive; null if the drive varies", "V or A")
+    shunt: bool = Field(
+        default=False, description="whether the shunt of the load cell adds to the force; omitted if it does not"
+    )
 
 
 class Event(BaseModel):

@@ -5,6 +5,12 @@ import { QUANTITIES } from "../common/quantities.js";
 
 const DAY_S = 86_400;
 
+/** Name of a series in addresses: that of its channel, with the kind of check unless it is a zero check. */
+export const keyOf = ({ channel, check }) => (check === "zero" ? channel : `${channel}.${check}`);
+
+/** Name of a series in words. */
+export const nameOf = ({ channel, check }) => (check === "zero" ? spaced(channel) : `${spaced(channel)} with the ${check}`);
+
 /** Displayed quantity of a channel, with its unit. */
 export const quantityOf = (channel) => Object.values(QUANTITIES).find(({ field }) => field === channel);
 

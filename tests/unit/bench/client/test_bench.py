@@ -11,6 +11,7 @@ import pytest
 from bench.catalogue import compute_sha256
 from bench.client import Bench, ClientError, RunState
 from tests.support.certificates import make_certificate
+from tests.support.checks import write_shunt_log
 from tests.support.logs import csv_columns, write_csv
 from tests.support.service_logs import write_complete_log, write_truncated_log
 
@@ -203,3 +204,21 @@ def test_certificates_are_added_corrected_and_withdrawn(bench):
     assert bench.withdraw_certificate(added["id"], "cell & cable replaced")["state"] == "withdrawn"
     assert [one["withdrawal"]["reason"] for one in bench.list_certificates("force")] == ["cell & cable replaced"]
     assert bench.list_certificates("coil_current") == []
+
+
+def test_a_shunt_check_is_started_and_charted_by_its_name(service, bench):
+    write_shunt_log(service.data / "shunt-1.mcap", "shunt-1")
+    await_run(bench, "shunt-1")
+    bench.start_shunt_check("none")
+    assert service.agent.commands[-1].method["name"] == "shunt_check"
+    assert service.agent.commands[-1].specimen == "none"
+    bench.start_zero_check("none")
+    assert service.agent.commands[-1].method["name"] == "zero_check"
+    deadline = time.monotonic() + TIMEOUT
+    while not (records := bench.list_checks("force", check="shunt")):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    assert [one["run"] for one in records] == ["shunt-1"]
+    assert bench.list_checks("force") == []
+    assert bench.get_check_chart("force", check="shunt")["count"] == 1
+    assert bench.begin_check_baseline("force", "repair", check="shunt")["count"] == 0

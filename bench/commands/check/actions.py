@@ -111,7 +111,7 @@ def _check_channel(name: str) -> ChannelName:
 def _describe_record(record: CheckRecord) -> str:
     name = _format_name(record.channel, record.check)
     return (
-        f"{record.measured:%Y-%m-%d %H:%M} UTC {name}: {record.value:.5g} {record.unit} with standard "
+        f"{record.measured:%Y-%m-%d %H:%M} UTC {name}: {record.value:.6g} {record.unit} with standard "
         f"uncertainty {record.standard_uncertainty:.2g} {record.unit}, "
         f"specimen {record.specimen or 'none named'}, run {record.run}"
     )
@@ -125,9 +125,9 @@ def _describe_chart(chart: ControlChart) -> Iterator[str]:
     yield chart.text
     if chart.limits is not None:
         limits, unit = chart.limits, chart.unit
-        yield f"centre {limits.centre:.5g} {unit}, standard deviation between checks {limits.sigma:.3g} {unit}"
-        yield f"limits {limits.lower:.5g} {unit} and {limits.upper:.5g} {unit}"
+        yield f"centre {limits.centre:.6g} {unit}, standard deviation between checks {limits.sigma:.3g} {unit}"
+        yield f"limits {limits.lower:.6g} {unit} and {limits.upper:.6g} {unit}"
     for point in chart.points:
         rules = f", {', '.join(point.rules).replace('_', ' ')}" if point.rules else ""
         part = ", baseline" if point.is_baseline else ""
-        yield f"{point.measured:%Y-%m-%d %H:%M} UTC {point.value:.5g} {chart.unit}{part}{rules}"
+        yield f"{point.measured:%Y-%m-%d %H:%M} UTC {point.value:.6g} {chart.unit}{part}{rules}"

@@ -7,7 +7,7 @@ import { need } from "../common/rights.js";
 import { runAddress } from "../common/router.js";
 import { table } from "../common/tables.js";
 import { CheckPlot } from "./check_plot.js";
-import { describeState, listRules, nameOf, quantityOf, withUnit } from "./check_words.js";
+import { describeState, listRules, nameOf, quantityOf, valueOf, withUnit } from "./check_words.js";
 
 /** Name of the value by kind of check, in the title of the figure and in the head of the table. */
 const VALUES = { zero: ["Zero", "Mean"], shunt: ["Change by the shunt", "Change"] };
@@ -79,20 +79,21 @@ export class CheckChart {
   }
 }
 
-function describeLimits({ series: { channel }, limits, count, needed }) {
+function describeLimits({ series, limits, count, needed }) {
   const since = `Centre and limits follow from the first ${needed} checks (ISO 7870-2)`;
   if (!limits) return `${since}; there are ${count}.`;
   const { centre, sigma, lower, upper } = limits;
-  return `${since}: centre ${withUnit(centre, channel)}, limits ${withUnit(lower, channel)} and ${withUnit(upper, channel)}, `
-    + `standard deviation between checks ${withUnit(sigma, channel)}.`;
+  return `${since}: centre ${valueOf(centre, series)}, limits ${valueOf(lower, series)} and ${valueOf(upper, series)}, `
+    + `standard deviation between checks ${withUnit(sigma, series.channel)}.`;
 }
 
 function makeTable({ series: { channel, check }, points }) {
   const { unit } = quantityOf(channel);
+  const digits = check === "zero" ? 4 : 6;
   const rows = points.map((point, index) => [
     String(index + 1), element("a", { className: "link", href: runAddress(point.run) }, localTime(point.measured)),
-    withUnit(point.value, channel, 4), withUnit(point.standard_uncertainty, channel, 2),
-    point.ewma === null ? "–" : withUnit(point.ewma, channel, 4), point.is_baseline ? "baseline" : "", listRules(point),
+    withUnit(point.value, channel, digits), withUnit(point.standard_uncertainty, channel, 2),
+    point.ewma === null ? "–" : withUnit(point.ewma, channel, digits), point.is_baseline ? "baseline" : "", listRules(point),
   ]).reverse();
   const heads = ["Number", `Measured (${zone()})`, `${VALUES[check][1]} [${unit}]`, `Standard uncertainty [${unit}]`, `Weighted mean [${unit}]`, "Part", "Out of control by"];
   return element("details", {}, element("summary", {}, `${points.length} checks as a table`), table(`${VALUES[check][0]} of the ${spaced(channel)} in each check`, heads, rows));

@@ -4,7 +4,7 @@ import { get, start } from "../common/api.js";
 import { benchQuery, withBench } from "../common/bench.js";
 import { byId, element, instant, write } from "../common/format.js";
 import { CheckChart } from "./check_chart.js";
-import { age, describeState, keyOf, nameOf, withUnit } from "./check_words.js";
+import { age, describeState, keyOf, nameOf, valueOf, withUnit } from "./check_words.js";
 
 const ADDRESS = "#/calibration?check=";
 const KINDS = ["zero", "shunt"];
@@ -81,8 +81,8 @@ function makeRow(chart) {
     element("td", {}, element("span", { className: `mark ${kind}` }, word), element("small", {}, reason)),
     element("td", {}, ...(latest ? [age(latest.measured), element("small", {}, instant(latest.measured))] : ["–"])),
     element("td", { className: "number" }, ...(latest
-      ? [withUnit(latest.value, channel), element("small", {}, `standard uncertainty ${withUnit(latest.standard_uncertainty, channel, 2)}`)] : ["–"])),
-    element("td", { className: "number" }, limits ? `${withUnit(limits.lower, channel)} … ${withUnit(limits.upper, channel)}` : "–"),
+      ? [valueOf(latest.value, series), element("small", {}, `standard uncertainty ${withUnit(latest.standard_uncertainty, channel, 2)}`)] : ["–"])),
+    element("td", { className: "number" }, limits ? `${valueOf(limits.lower, series)} … ${valueOf(limits.upper, series)}` : "–"),
     element("td", {}, specimen || "not named"),
     element("td", {}, element("a", { className: "button", href: `${ADDRESS}${keyOf(series)}`, "aria-label": `Chart of the ${nameOf(series)}` }, "Chart")));
 }

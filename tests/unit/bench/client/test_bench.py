@@ -206,14 +206,17 @@ def test_certificates_are_added_corrected_and_withdrawn(bench):
     assert bench.list_certificates("coil_current") == []
 
 
-def test_a_shunt_check_is_started_and_charted_by_its_name(service, bench):
+@pytest.mark.parametrize("kind", ["zero", "shunt"])
+def test_a_check_is_started_by_its_kind(service, bench, kind):
+    start = {"zero": bench.start_zero_check, "shunt": bench.start_shunt_check}[kind]
+    start("none", "M. Curie")
+    command = service.agent.commands[-1]
+    assert (command.method["name"], command.specimen, command.operator) == (f"{kind}_check", "none", "M. Curie")
+
+
+def test_shunt_checks_are_listed_and_charted_by_their_name(service, bench):
     write_shunt_log(service.data / "shunt-1.mcap", "shunt-1")
     await_run(bench, "shunt-1")
-    bench.start_shunt_check("none")
-    assert service.agent.commands[-1].method["name"] == "shunt_check"
-    assert service.agent.commands[-1].specimen == "none"
-    bench.start_zero_check("none")
-    assert service.agent.commands[-1].method["name"] == "zero_check"
     deadline = time.monotonic() + TIMEOUT
     while not (records := bench.list_checks("force", check="shunt")):
         assert time.monotonic() < deadline

@@ -145,6 +145,8 @@ def _measure_shunt(log: Log) -> Iterator[_Measurement]:
     parts = [_select_inner(log, "force", segment) for segment in segments if segment is not None]
     if len(parts) < len(segments) or any(len(part.values) < _SHORTEST for part in parts):
         return
+    if not parts[0].time[-1] < parts[1].time[0] <= parts[1].time[-1] < parts[2].time[0]:
+        return  # an uploaded log may have its segments in any order
     result = compute_difference(*parts)
     yield _Measurement(
         "shunt", "force", result.value, result.standard_uncertainty, result.statistics, parts[1].time

@@ -107,6 +107,7 @@ def test_a_linear_drift_changes_neither_value_nor_uncertainty(tmp_path, rests):
         {"marked": ("shunt", "rest_after")},
         {"names": ("rest", "shunt", "later")},
         {"names": ("before", "shunt", "rest_after")},
+        {"names": ("rest_after", "shunt", "rest")},
         {"rests": (4, 1)},
     ],
 )

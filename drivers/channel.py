@@ -10,7 +10,8 @@ from drivers.errors import OutOfRangeError
 
 Access = Literal["read", "write", "read_write"]
 Quality = Literal["good", "uncertain", "bad"]
-"""good: checked on the wire and in range; uncertain: without checksum or clock, or doubted; bad: unusable."""
+"""good: checked on the wire and in range; uncertain: without checksum or clock, doubted, or shifted by a shunt;
+bad: unusable."""
 
 Array = npt.NDArray[np.float64]
 TimeArray = npt.NDArray[np.int64]

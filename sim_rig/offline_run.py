@@ -32,6 +32,8 @@ class CommandSeries(NamedTuple):
     """(N,) [m]"""
     drive: Array
     """(N,) [V or A], held through each sample."""
+    shunt: Array = np.zeros(0)
+    """(N,) 1 while the shunt of the load cell is on, else 0 [1]; empty for never."""
 
 
 class RunResult(NamedTuple):
@@ -76,7 +78,8 @@ def run_offline(
     elapsed = commands.time - commands.time[0]
     if start_temperature is not None:
         truth = _add_start_temperature(truth, scenario, elapsed, start_temperature)
-    values, channel_errors = make_readings(scenario, elapsed, truth)
+    shunt = scenario.sensors.force.shunt * commands.shunt
+    values, channel_errors = make_readings(scenario, elapsed, truth, shunt)
     return RunResult(commands.time, apply_faults(scenario, elapsed, values), truth, channel_errors)
 
 
@@ -88,14 +91,15 @@ def _add_start_temperature(truth: TrueSignals, scenario: Scenario, elapsed: Arra
 
 
 def read_commands(path: Path) -> CommandSeries:
-    """Return the commands in a file of arrays ``time``, ``displacement``, ``drive``.
+    """Return the commands in a file of arrays ``time``, ``displacement``, ``drive`` and, if used, ``shunt``.
 
     Raises:
         CommandsError: the file cannot be read, or the record is not finite, uniform and of one length.
     """
     try:
         with np.load(path) as file:
-            commands = CommandSeries(*(np.asarray(file[name], float) for name in CommandSeries._fields))
+            names = [name for name in CommandSeries._fields if name != "shunt" or name in file.files]
+            commands = CommandSeries(**{name: np.asarray(file[name], float) for name in names})
     except KeyError as error:
         raise CommandsError(f"{path}: {error.args[0]}") from error
     except (OSError, ValueError, EOFError, TypeError, zipfile.BadZipFile) as error:
@@ -105,12 +109,13 @@ def read_commands(path: Path) -> CommandSeries:
 
 
 def _check_commands(commands: CommandSeries, path: Path) -> None:
-    shapes = {name: array.shape for name, array in commands._asdict().items()}
+    arrays = {name: array for name, array in commands._asdict().items() if name != "shunt" or array.size}
+    shapes = {name: array.shape for name, array in arrays.items()}
     if len(set(shapes.values())) > 1 or commands.time.ndim != 1:
-        raise CommandsError(f"{path}: time, displacement and drive differ in shape: {shapes}")
+        raise CommandsError(f"{path}: the commands differ in shape: {shapes}")
     if len(commands.time) < 10:
         raise CommandsError(f"{path}: {len(commands.time)} samples; at least 10 are needed")
-    for name, array in commands._asdict().items():
+    for name, array in arrays.items():
         if not np.isfinite(array).all():
             raise CommandsError(f"{path}: {name} is not finite at sample {int(np.argmin(np.isfinite(array)))}")
     steps = np.diff(commands.time)

@@ -13,7 +13,7 @@ from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import OPERATION_TIMING, AgentTiming
 from bench.agent_protocol import RunCommand
 from bench.calibration import choose_current, list_failed, list_overdue, make_check_record, read_failed
-from bench.checks import CHECK_METHODS, CHECKED_CHANNELS
+from bench.checks import CHECKED_CHANNELS, find_check_kind
 from bench.config import BenchConfig
 from bench.disk import check_space, estimate_log_size, find_free_space
 from bench.errors import RunError
@@ -28,8 +28,8 @@ from bench.recorder import (
     make_run_header,
 )
 from bench.rig import PRIORITY_STEP, Acquisition, Rig, pause_collection, raise_priority
-from bench.safety import Interlocks
-from bench.sequencer import CommandHistory, Sequencer
+from bench.safety import Interlocks, make_specimen_matrix, merge_limits
+from bench.sequencer import CommandHistory, Sequencer, check_shunt
 from drivers import Clock
 
 _CLOCK_RATE_TIME = 20.0
@@ -87,8 +87,9 @@ class RunExecutor:
         """Prepare the run of a command; nothing moves.
 
         Raises:
-            MethodError, RunError: it cannot be executed, the disk has no room for its log, or a calibration is
-                overdue or a check has failed, and the configuration refuses that.
+            MethodError, RunError: it cannot be executed, the load cell cannot switch a shunt that it needs, the
+                disk has no room for its log, or a calibration is overdue or a check has failed, and the
+                configuration refuses that.
         """
         request = validate_request(command, self._rig, self._config.rig.specimen, self._find_log_folder())
         metadata = self._describe(request, command)
@@ -100,6 +101,8 @@ class RunExecutor:
         self._check_calibration(request)
         check_space(find_free_space(request.path.parent), _estimate_log_size(request, metadata.header))
         method, history = request.method, CommandHistory()
+        limits = merge_limits(self._interlocks.limits, make_specimen_matrix(method))
+        check_shunt(request.programme, self._rig.load_cell, limits)
         supervision = RunSupervision(
             method, history, self._interlocks, self._supervisor, self._acquisition, self._clock, self._report_event
         )
@@ -111,6 +114,7 @@ class RunExecutor:
             self._clock,
             supervision,
             self._estimate_amplifier_rate,
+            load_cell=self._rig.load_cell,
         )
         run = Run(
             request, history, sequencer, self._recording_thread, self._clock, self._report_event, self._timing
@@ -141,7 +145,7 @@ class RunExecutor:
 
     def _describe_checks(self, request: RunRequest, command: RunCommand) -> dict[str, str]:
         """Return the latest check of each channel; none for a run that is a check itself."""
-        if request.method.name in CHECK_METHODS.values():
+        if find_check_kind(request.method.name) is not None:
             return {}
         interval = self._config.calibration.check_interval_days
         failed = list_failed(command.checks, CHECKED_CHANNELS, request.identity.started, interval)

@@ -11,7 +11,7 @@ from bench.catalogue.integrity import check_integrity, find_missing
 from bench.catalogue.log_summary import LogSummary, compute_sha256, read_log_summary
 from bench.catalogue.models import RunRow
 from bench.catalogue.records import read_log_events
-from bench.checks import CHECK_METHODS, CheckRecord, compute_records
+from bench.checks import CheckRecord, compute_records, find_check_kind
 from bench.errors import LogError
 from bench.log import read_log
 
@@ -105,7 +105,7 @@ def _read_content(catalogue: Catalogue, row: RunRow) -> RunRow:
     except LogError:
         lost, events = {}, []
     catalogue.event_journal.replace(row.id, events)
-    if row.method in CHECK_METHODS.values():
+    if find_check_kind(row.method) is not None:
         catalogue.checks.replace(row.id, _compute_checks(path))
     return catalogue.update_run(row.id, lost=lost)
 

@@ -19,17 +19,27 @@ from bench.checks.control_chart import (
     find_rules,
 )
 from bench.checks.record import (
+    CHECK_KINDS,
     CHECK_METHODS,
     CHECKED_CHANNELS,
     CheckKind,
     CheckRecord,
     compute_records,
+    find_check_kind,
 )
-from bench.checks.statistics import RestStatistics, compute_statistics, estimate_correlation
+from bench.checks.statistics import (
+    Difference,
+    RestStatistics,
+    TimedSamples,
+    compute_difference,
+    compute_statistics,
+    estimate_correlation,
+)
 
 __all__ = [
     "BASELINE_POINTS",
     "CHECKED_CHANNELS",
+    "CHECK_KINDS",
     "CHECK_METHODS",
     "ChartLimits",
     "ChartPoint",
@@ -39,15 +49,19 @@ __all__ = [
     "CheckSeries",
     "CheckValue",
     "ControlChart",
+    "Difference",
     "RestStatistics",
     "Rule",
+    "TimedSamples",
     "compute_chart",
+    "compute_difference",
     "compute_ewma",
     "compute_limits",
     "compute_records",
     "compute_statistics",
     "describe_latest",
     "estimate_correlation",
+    "find_check_kind",
     "find_rules",
     "make_chart",
 ]

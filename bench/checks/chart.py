@@ -1,7 +1,8 @@
 """Control chart of one channel as a document, with its state in words."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import datetime
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,9 @@ from bench.checks.control_chart import (
 from bench.checks.record import CheckKind
 from bench.config import CHANNEL_UNITS, ChannelName
 from bench.validation import FrozenModel
+
+_DIGITS: dict[CheckKind, int] = {"zero": 4, "shunt": 6}
+"""Significant digits in words: the limits of a shunt check differ from its centre by a thousandth."""
 
 
 class CheckValue(NamedTuple):
@@ -44,9 +48,9 @@ class ChartPoint(FrozenModel):
 
 
 class CheckSeries(FrozenModel):
-    """Checks that are compared with each other: those of one channel with the same specimen mounted."""
+    """Checks that are compared with each other: of one kind and channel, with the same specimen mounted."""
 
-    check: CheckKind = Field(description="zero: mean at rest")
+    check: CheckKind = Field(description="zero: mean at rest; shunt: change of the force by the shunt")
     channel: ChannelName
     specimen: str = Field(description="mounted damper; empty for checks that name none")
 
@@ -131,32 +135,38 @@ def _describe(series: CheckSeries, checks: Sequence[CheckValue], values: ChartVa
         return f"{name}: not enough checks, {len(checks)} of {BASELINE_POINTS}"
     if limits is None:
         return f"{name}: no limits, because all checks of the baseline have the same value"
-    latest, unit = checks[-1], CHANNEL_UNITS[series.channel]
+    latest, show = checks[-1], partial(_format_value, series)
     of = f"{name} of {latest.measured:%Y-%m-%d %H:%M} UTC is"
     if values.rules[-1]:
         mean = float(values.ewma[-1]) if values.ewma.size else latest.value
-        reasons = (_describe_rule(rule, latest.value, mean, limits, unit) for rule in values.rules[-1])
+        reasons = (_describe_rule(rule, latest.value, mean, limits, show) for rule in values.rules[-1])
         return f"{of} out of control: {' and '.join(reasons)}"
     return (
-        f"{of} in control: {latest.value:.4g} {unit}, limits {limits.lower:.4g} {unit} to "
-        f"{limits.upper:.4g} {unit}{_describe_baseline(values)}"
+        f"{of} in control: {show(latest.value)}, limits {show(limits.lower)} to "
+        f"{show(limits.upper)}{_describe_baseline(values)}"
     )
 
 
-def _describe_rule(rule: Rule, value: float, mean: float, limits: ChartLimits, unit: str) -> str:
+def _format_value(series: CheckSeries, value: float) -> str:
+    return f"{value:.{_DIGITS[series.check]}g} {CHANNEL_UNITS[series.channel]}"
+
+
+def _describe_rule(
+    rule: Rule, value: float, mean: float, limits: ChartLimits, show: Callable[[float], str]
+) -> str:
     match rule:
         case "run_of_eight":
             side = "above" if value > limits.centre else "below"
-            return f"{RUN_LENGTH} checks in a row are {side} the centre {limits.centre:.4g} {unit}"
+            return f"{RUN_LENGTH} checks in a row are {side} the centre {show(limits.centre)}"
         case "drift":
-            return f"the weighted mean {_describe_beyond(mean, limits.ewma_lower, limits.ewma_upper, unit)}"
+            return f"the weighted mean {_describe_beyond(mean, limits.ewma_lower, limits.ewma_upper, show)}"
         case "beyond_limits":
-            return _describe_beyond(value, limits.lower, limits.upper, unit)
+            return _describe_beyond(value, limits.lower, limits.upper, show)
 
 
-def _describe_beyond(value: float, lower: float, upper: float, unit: str) -> str:
+def _describe_beyond(value: float, lower: float, upper: float, show: Callable[[float], str]) -> str:
     side, limit = ("above", upper) if value > upper else ("below", lower)
-    return f"{value:.4g} {unit} is {side} the limit {limit:.4g} {unit}"
+    return f"{show(value)} is {side} the limit {show(limit)}"
 
 
 def _describe_baseline(values: ChartValues) -> str:

@@ -1,4 +1,4 @@
-"""Mean of a recorded quantity at rest, with an uncertainty that allows for correlated samples."""
+"""Means of a recorded quantity at rest, with uncertainties that allow for correlated samples."""
 
 import math
 from typing import NamedTuple
@@ -7,6 +7,17 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
+
+
+class TimedSamples(NamedTuple):
+    """Samples of one channel in its unit, and their times [s]; both of shape (samples,)."""
+
+    time: Array
+    values: Array
+
+    def remove_drift(self, slope: float, time: float) -> Array:
+        """Return the values without a drift [unit/s] that is zero at a time [s]."""
+        return self.values - slope * (self.time - time)
 
 
 class RestStatistics(NamedTuple):
@@ -30,6 +41,40 @@ def compute_statistics(values: Array) -> RestStatistics:
     deviation = float(np.std(values, ddof=1))
     independent = samples / estimate_correlation(values)
     return RestStatistics(float(np.mean(values)), deviation, samples, independent)
+
+
+class Difference(NamedTuple):
+    """Difference of a mean from the means before and after it, in the unit of the samples."""
+
+    value: float
+    standard_uncertainty: float
+    """Standard uncertainty of the three means, combined (JCGM 100:2008, 5.1)."""
+    statistics: RestStatistics
+    """Statistics of the samples between the others."""
+
+
+def compute_difference(before: TimedSamples, between: TimedSamples, after: TimedSamples) -> Difference:
+    """Compute how far the mean of samples differs from the line through the means before and after them.
+
+    A linear drift therefore has no influence, neither on the value nor on its uncertainty.
+
+    Args:
+        before: at least two samples.
+        between: at least two samples, later than these.
+        after: at least two samples, later than these.
+    """
+    first, middle, last = (float(np.mean(one.time)) for one in (before, between, after))
+    slope = float(np.mean(after.values) - np.mean(before.values)) / (last - first)
+    share = (middle - first) / (last - first)
+    earlier, inner, later = (
+        compute_statistics(one.remove_drift(slope, middle)) for one in (before, between, after)
+    )
+    variance = (
+        inner.standard_uncertainty**2
+        + ((1 - share) * earlier.standard_uncertainty) ** 2
+        + (share * later.standard_uncertainty) ** 2
+    )
+    return Difference(inner.mean - earlier.mean, math.sqrt(variance), inner)
 
 
 def estimate_correlation(values: Array) -> float:

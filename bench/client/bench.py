@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from bench.client.campaign import Campaign
 from bench.client.errors import ClientError
@@ -19,6 +19,8 @@ _PAGE_SIZE = 50
 """Number of runs requested at a time."""
 _MOST_METHODS = 500
 """Largest number of listed methods."""
+CheckName: TypeAlias = Literal["zero", "shunt"]
+"""Kind of a check."""
 
 
 class Bench:
@@ -229,43 +231,54 @@ class Bench:
         """
         return dict(self._session.delete(f"/certificates/{quote_name(certificate_id)}", reason=reason))
 
-    def list_checks(self, channel: str | None = None, limit: int = _PAGE_SIZE) -> list[dict[str, Any]]:
+    def list_checks(
+        self, channel: str | None = None, limit: int = _PAGE_SIZE, check: CheckName = "zero"
+    ) -> list[dict[str, Any]]:
         """Return the newest records of checks, one for each run and channel.
 
         Args:
             channel: only those of this channel; None for all.
             limit: largest number of records.
+            check: `zero` for the mean at rest, `shunt` for the change of the force by the shunt.
 
         Raises:
-            ClientError: there is no such channel, or the service cannot be reached.
+            ClientError: there is no such channel or check, or the service cannot be reached.
         """
-        return list(self._session.get("/checks", channel=channel, limit=limit, bench=self._name)["items"])
+        page = self._session.get("/checks", channel=channel, limit=limit, bench=self._name, check=check)
+        return list(page["items"])
 
-    def get_check_chart(self, channel: str, specimen: str | None = None) -> dict[str, Any]:
+    def get_check_chart(
+        self, channel: str, specimen: str | None = None, check: CheckName = "zero"
+    ) -> dict[str, Any]:
         """Return the control chart of a channel: centre, limits, points, state in words.
 
         Args:
             channel: such as `force`.
             specimen: mounted damper during the checks; None for that of the latest check.
+            check: kind of the checks, `zero` or `shunt`.
 
         Raises:
-            ClientError: there is no such channel, or the service cannot be reached.
+            ClientError: there is no such channel or check, or the service cannot be reached.
         """
-        return dict(self._session.get(f"/checks/{quote_name(channel)}/chart", specimen=specimen, bench=self._name))
+        path = f"/checks/{quote_name(channel)}/chart"
+        return dict(self._session.get(path, specimen=specimen, bench=self._name, check=check))
 
-    def begin_check_baseline(self, channel: str, reason: str, specimen: str | None = None) -> dict[str, Any]:
+    def begin_check_baseline(
+        self, channel: str, reason: str, specimen: str | None = None, check: CheckName = "zero"
+    ) -> dict[str, Any]:
         """Let only checks from now on count in the chart of a channel, and return that chart.
 
         Args:
             channel: such as `force`.
             reason: reason, such as a repair, for people.
             specimen: mounted damper during the checks; None for that of the latest check.
+            check: kind of the checks, `zero` or `shunt`.
 
         Raises:
             ClientError: it is refused, or the service cannot be reached.
         """
         path = self._add_choice(f"/checks/{quote_name(channel)}/baseline")
-        request = {"reason": reason, "specimen": specimen}
+        request = {"reason": reason, "specimen": specimen, "check": check}
         return dict(self._session.post(path, request, key=uuid.uuid4().hex))
 
     def start_zero_check(self, specimen: str, operator: str = "") -> Run:
@@ -278,7 +291,23 @@ class Bench:
         Raises:
             ClientError: the start is refused, or the service or its agent cannot be reached.
         """
-        method = self._session.get("/checks/charts", bench=self._name)["method"]
+        return self._start_check("zero", specimen, operator)
+
+    def start_shunt_check(self, specimen: str, operator: str = "") -> Run:
+        """Start the shunt check of this bench: 35 s at rest without drive, for 10 s of them with the shunt.
+
+        Args:
+            specimen: mounted damper, or a word such as `none`; only checks with the same one are compared.
+            operator: name of the person.
+
+        Raises:
+            ClientError: the start is refused, such as for a load cell without a shunt, or the service or its agent
+                cannot be reached.
+        """
+        return self._start_check("shunt", specimen, operator)
+
+    def _start_check(self, check: CheckName, specimen: str, operator: str) -> Run:
+        method = self._session.get("/checks/charts", bench=self._name, check=check)["method"]
         if method is None:
             raise ClientError("the rig agent does not answer; start it, then repeat the check")
         return self.start(str(method), specimen, operator)

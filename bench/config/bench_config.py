@@ -85,11 +85,11 @@ class CalibrationSection(FrozenModel):
     )
     failed_check: Literal["mark", "refuse"] = Field(
         default="mark",
-        description="mark: the log of a run names the channels whose latest check has failed; refuse: it does not "
-        "start, except for a check",
+        description="mark: the log of a run names the channels of which a latest check has failed; refuse: it "
+        "does not start, except for a check",
     )
     check_interval_days: PositiveFloat | None = Field(
-        default=None, description="[days] largest age of a channel's latest check; by default any"
+        default=None, description="[days] largest age of a channel's latest zero check; by default any"
     )
 
 

@@ -80,6 +80,9 @@ class Segment(BaseModel):
     frequency: float | None = _make_quantity_field("frequency of the motion; null if it has none", "Hz")
     drive: str = Field(description="kind of drive programme: constant, staircase, steps, ...")
     drive_value: float | None = _make_quantity_field("constant drive; null if the drive varies", "V or A")
+    shunt: bool = Field(
+        default=False, description="whether the shunt of the load cell adds to the force; omitted if it does not"
+    )
 
 
 class Event(BaseModel):
@@ -110,7 +113,8 @@ class Readings(BaseModel):
         "running number of the first sample; a gap after the previous message means lost samples", "1"
     )
     quality: Literal["good", "uncertain", "bad"] = Field(
-        description="good: checked and in range; uncertain: without checksum or device clock; bad: not used"
+        description="good: checked and in range; uncertain: without checksum or device clock, or shifted by a "
+        "shunt; bad: not used"
     )
     received: list[int] = _make_list_field("bench clock of the receipt, after the timestamp", "ns")
     bench: list[int] = _make_list_field(

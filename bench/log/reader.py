@@ -45,6 +45,8 @@ class LoggedSegment:
     """First sample."""
     stop: int
     """One after the last sample."""
+    shunt: bool = False
+    """True if the shunt of the load cell adds to the force."""
 
 
 @dataclass(frozen=True)

@@ -78,6 +78,8 @@ class SegmentMark(TypedDict):
     """[Hz]; None if the motion has none."""
     drive_value: NotRequired[float | None]
     """[V or A]; None if the drive varies."""
+    shunt: NotRequired[bool]
+    """True if the shunt of the load cell is on."""
 
 
 class LogWriter(LogContext):
@@ -154,8 +156,9 @@ class LogWriter(LogContext):
     def write_segment(self, time_ns: int, **mark: Unpack[SegmentMark]) -> None:
         """Write a segment mark; ``time_ns`` is the bench clock [ns] of the segment's first or last sample."""
         segment = Segment(timestamp=Timestamp(**make_timestamp(time_ns)), **{**_UNSET_VALUES, **mark})
+        omitted = None if segment.shunt else {"shunt"}
         with convert_file_errors(self.path):
-            self._file.write_message(SEGMENT, time_ns, segment.model_dump_json().encode())
+            self._file.write_message(SEGMENT, time_ns, segment.model_dump_json(exclude=omitted).encode())
 
     def write_event(self, time_ns: int, kind: str, text: str, **more: Any) -> None:
         """Write an event.

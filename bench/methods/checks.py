@@ -1,9 +1,10 @@
-"""Checks of a segment before it is sampled: duration, cycles, sampling rate, corners and drive steps."""
+"""Checks of a segment before it is sampled: duration, cycles, sampling rate, corners, drive steps and shunt."""
 
 from bench.errors import MethodError
 from bench.methods.document import MethodSegment
-from bench.methods.drive import Staircase, Steps
+from bench.methods.drive import Constant, Staircase, Steps
 from bench.methods.motion import (
+    Hold,
     MotionTable,
     Multisine,
     Ramp,
@@ -31,7 +32,7 @@ def check_segment(segment: MethodSegment, rate: float) -> float:
         rate: sampling rate [Hz].
 
     Raises:
-        MethodError: duration, cycles, rate, corners or drive steps are inconsistent.
+        MethodError: duration, cycles, rate, corners or drive steps are inconsistent, or the shunt is not allowed.
     """
     duration = _find_duration(segment)
     _check_rate(segment, duration, rate)
@@ -40,6 +41,7 @@ def check_segment(segment: MethodSegment, rate: float) -> float:
     if isinstance(segment.motion, Random):
         _check_band(segment.name, segment.motion, duration)
     _check_drive(segment, duration)
+    _check_shunt(segment)
     return duration
 
 
@@ -120,6 +122,17 @@ def _check_drive(segment: MethodSegment, duration: float) -> None:
                 f"segment {segment.name}: {duration / period:g} cycles cannot be divided into {levels} levels of "
                 f"whole cycles; give a multiple of {levels}"
             )
+
+
+def _check_shunt(segment: MethodSegment) -> None:
+    """Check that the force is constant while the shunt is on, because it shifts the reading."""
+    drive = segment.drive
+    is_at_rest = isinstance(segment.motion, Hold) and isinstance(drive, Constant) and drive.value == 0
+    if segment.shunt and not is_at_rest:
+        raise MethodError(
+            f"segment {segment.name}: the shunt needs a rod at rest without drive, not {segment.motion.kind} with "
+            f'{drive.kind} drive; use motion "hold" and a constant drive of 0, or leave out shunt'
+        )
 
 
 def _find_period(segment: MethodSegment) -> float | None:

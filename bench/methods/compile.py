@@ -44,6 +44,8 @@ class ProgrammeSegment:
     """[V or A]; None if the drive varies."""
     checkpoint: bool = False
     """True if an interrupted run can be resumed after this segment."""
+    shunt: bool = False
+    """True if the shunt of the load cell is on."""
 
 
 @dataclass(frozen=True)
@@ -166,6 +168,7 @@ def _make_segment(index: int, begin: float, segment: PlannedSegment, rate: float
         segment.frequency,
         segment.drive_value,
         segment.checkpoint,
+        segment.shunt,
     )
 
 

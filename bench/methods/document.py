@@ -71,6 +71,10 @@ class MethodSegment(FrozenModel):
     checkpoint: bool = Field(
         default=False, description="Whether an interrupted run can be resumed after this segment."
     )
+    shunt: bool = Field(
+        default=False,
+        description="Whether the shunt of the load cell is on; only at rest: motion hold, constant drive 0.",
+    )
 
     @model_validator(mode="after")
     def _check_length(self) -> Self:

@@ -41,6 +41,7 @@ class PlannedSegment:
     drive_value: float | None
     """[V or A]; None if the drive varies."""
     checkpoint: bool
+    shunt: bool
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,7 @@ def _plan_segments(
             frequency,
             level,
             segment.checkpoint and end == sections[-1][2],
+            segment.shunt,
         )
         for name, begin, end, kind, level in sections
     )

@@ -133,4 +133,5 @@ class RunRecorder:
             amplitude=segment.amplitude,
             frequency=segment.frequency,
             drive_value=segment.drive_value,
+            shunt=segment.shunt,
         )

@@ -68,7 +68,7 @@ def run_from_plant(
     if not out.parent.is_dir():
         raise RunError(f"{out} cannot be written: the folder {out.parent} does not exist; create it first")
     programme = compile_method(method)
-    commands = {"time": programme.time, "displacement": programme.displacement, "drive": programme.drive}
+    commands = _make_commands(programme)
     options = () if seed is None else ("--seed", str(seed))
     rig_channels = play_scenario(scenario, commands, progress, (*rig, *options))
     if rig_channels.info["drive_unit"] != method.drive_unit:
@@ -83,6 +83,13 @@ def run_from_plant(
     with LogWriter(out, header.model_copy(update=parts)) as log:
         _write_log(log, programme, rig_channels, values, Path(scenario).stem)
     return programme
+
+
+def _make_commands(programme: Programme) -> dict[str, Array]:
+    """Return the commands of the rig; the shunt only if it is used, because other rigs may not have one."""
+    commands = {"time": programme.time, "displacement": programme.displacement, "drive": programme.drive}
+    shunted = [segment.index for segment in programme.segments if segment.shunt]
+    return {**commands, "shunt": np.isin(programme.segment, shunted).astype(float)} if shunted else commands
 
 
 def _make_header(method: Method, rig_channels: RigChannels, identity: Identity, seed: int | None) -> RunHeader:

@@ -50,7 +50,8 @@ def play_scenario(
 
     Args:
         scenario: name or file of the scenario.
-        commands: ``time`` [s], ``displacement`` [m] and ``drive`` [V or A], each of shape (samples,).
+        commands: ``time`` [s], ``displacement`` [m], ``drive`` [V or A] and, if used, ``shunt`` (1 while it is on,
+            else 0), each of shape (samples,).
         progress: receives the completed share, 0 to 1.
         rig: command that starts the rig.
         silence_timeout: time without output after which the rig is stopped [s].

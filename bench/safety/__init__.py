@@ -1,7 +1,15 @@
 """Limits, interlocks and the stop of the bench."""
 
 from bench.safety.interlocks import Interlocks, Trip, compute_following_error
-from bench.safety.limits import Action, LimitMatrix, LimitViolation, Quantity, make_specimen_matrix
+from bench.safety.limits import (
+    Action,
+    LimitMatrix,
+    LimitViolation,
+    Quantity,
+    evaluate_limits,
+    make_specimen_matrix,
+    merge_limits,
+)
 from bench.safety.trip import STOP_DEADLINE, bring_to_rest
 
 __all__ = [
@@ -14,5 +22,7 @@ __all__ = [
     "Trip",
     "bring_to_rest",
     "compute_following_error",
+    "evaluate_limits",
     "make_specimen_matrix",
+    "merge_limits",
 ]

@@ -2,7 +2,7 @@
 
 The amplifier plays the drive steps exactly, but by its own clock, and its table is limited. A programme with more
 steps, or a long one, is therefore split where the rod rests anyway. The rod waits there until the next section is
-uploaded.
+uploaded, and the shunt of the load cell is switched there.
 """
 
 from dataclasses import dataclass
@@ -40,6 +40,17 @@ class PlaybackSection:
             programme.rate, programme.displacement[part], programme.velocity[part], programme.acceleration[part]
         )
 
+    @property
+    def shunt(self) -> bool:
+        """True if the shunt of the load cell is on, from the first to the last sample."""
+        index = int(self.programme.segment[self.start])
+        return index != NO_SEGMENT and self.programme.segments[index].shunt
+
+    @property
+    def duration(self) -> float:
+        """Planned duration [s]."""
+        return (self.stop - self.start) / self.programme.rate
+
     def list_drive_steps(self) -> tuple[Array, Array]:
         """Return times from the begin [s] and levels [V or A] of the drive steps, the first at the begin."""
         drive = self.programme.drive[self.start : self.stop + 1]
@@ -54,7 +65,7 @@ class PlaybackSection:
 
 
 def split_into_sections(programme: Programme, capacity: int) -> tuple[PlaybackSection, ...]:
-    """Split a programme at its checkpoints, and further into as few sections as its drive steps allow.
+    """Split a programme at checkpoints and shunt edges, and further into as few sections as drive steps allow.
 
     Args:
         programme: compiled method.
@@ -66,11 +77,11 @@ def split_into_sections(programme: Programme, capacity: int) -> tuple[PlaybackSe
     step_counts = np.concatenate([[0], np.cumsum(np.diff(programme.drive) != 0)])
     rests = [int(sample) for sample in find_rest_samples(programme)]
     last = len(programme.time) - 1
-    checkpoints = sorted(find_checkpoint_samples(programme))
+    # Between two sections only, a run can be paused and the shunt switched.
+    edges = sorted({*find_checkpoint_samples(programme), *_find_shunt_edges(programme)})
     sections, start = [], 0
     while start < last:
-        # A run can be paused only between two sections, so none extends beyond a checkpoint.
-        end = next((sample for sample in checkpoints if sample > start), last)
+        end = next((sample for sample in edges if sample > start), last)
         later = [rest for rest in rests if start < rest <= end]
         # The level at the begin takes one entry of the table, so the number of changes must be below its capacity.
         fitting = [rest for rest in later if step_counts[rest] - step_counts[start] < capacity]
@@ -92,6 +103,11 @@ def find_rest_samples(programme: Programme) -> Times:
     may_wait = at_rest & (between | edge)
     may_wait[-1] = True
     return np.flatnonzero(may_wait)
+
+
+def _find_shunt_edges(programme: Programme) -> set[int]:
+    """Return the first sample with the shunt and the first one without it, of each segment with the shunt."""
+    return {sample for one in programme.segments if one.shunt for sample in (one.start, one.stop)}
 
 
 def find_checkpoint_samples(programme: Programme) -> dict[int, str]:

@@ -17,6 +17,7 @@ from bench.sequencer.command_history import CommandHistory
 from bench.sequencer.playback import PlaybackSection, find_checkpoint_samples, split_into_sections
 from bench.sequencer.run_observer import RunObserver
 from bench.sequencer.setpoint_thread import PAUSE_SHARE, SetpointGenerator, SetpointThread
+from bench.sequencer.shunt import ShuntedCell, use_shunt
 from bench.sequencer.trajectory import STOP_TIMES, plan_approach
 from drivers import Clock, DriverError
 from drivers.actuator import Actuator
@@ -68,6 +69,7 @@ class Sequencer:
         observer: receives the events of the run.
         get_amplifier_rate: returns the relative rate deviation of the amplifier's clock (50e-6 for 50 ppm fast).
         timeouts: deadlines for the amplifier.
+        load_cell: switches its shunt for the segments that need it; None without such a load cell.
     """
 
     def __init__(
@@ -80,11 +82,12 @@ class Sequencer:
         observer: RunObserver,
         get_amplifier_rate: Callable[[], float],
         timeouts: AmplifierTimeouts = OPERATION_TIMEOUTS,
+        load_cell: ShuntedCell | None = None,
     ) -> None:
         settings = actuator.settings
         self._actuator, self._amplifier, self._guard, self._history = actuator, amplifier, guard, history
         self._clock, self._observer, self._get_amplifier_rate = clock, observer, get_amplifier_rate
-        self._timeouts = timeouts
+        self._timeouts, self._load_cell = timeouts, load_cell
         self._generator = SetpointGenerator(
             actuator, self._permit, history, settings.cycle, settings.setpoint_timeout
         )
@@ -181,8 +184,9 @@ class Sequencer:
             self._upload_drive(section)
             # A stop may have been requested during the upload, which takes several exchanges.
             if not self._stop_requested.is_set():
-                self._start_section(section)
-                self._await_rest(section.trajectory.duration, "the end of the section")
+                with use_shunt(self._load_cell, section):
+                    self._start_section(section)
+                    self._await_rest(section.duration, "the end of the section")
 
     def _check_programme(self, programme: Programme) -> None:
         """Check before anything moves that every command of the programme is permitted."""

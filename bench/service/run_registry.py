@@ -20,7 +20,7 @@ from bench.catalogue import (
     is_complete,
     scan_logs,
 )
-from bench.checks import CHECK_METHODS
+from bench.checks import find_check_kind
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
 
@@ -32,8 +32,6 @@ DAMAGED: tuple[LogIntegrity, ...] = ("changed", "missing")
 """Results of an integrity check after which a log is not identified."""
 IDENTIFIED_OUTCOMES: tuple[RunOutcome, ...] = ("clean", "lossy")
 """Outcomes after which a run is identified automatically."""
-_WITHOUT_FIT = (WARM_UP_METHOD, *CHECK_METHODS.values())
-"""Methods whose runs are not identified automatically."""
 _LOG = logging.getLogger(__name__)
 
 
@@ -179,7 +177,8 @@ class RunRegistry:
             (is_wanted or row.source == "run")
             and row.outcome in IDENTIFIED_OUTCOMES
             and row.log_sha256
-            and row.method not in _WITHOUT_FIT
+            and row.method != WARM_UP_METHOD
+            and find_check_kind(row.method) is None
         )
         if (
             is_complete_run

@@ -6,10 +6,10 @@ bench when the line ended.
 """
 
 import time
-from typing import ClassVar
+from typing import ClassVar, NoReturn
 
 from drivers.channel import Channel, Reading, SampleBlock
-from drivers.errors import NoReplyError
+from drivers.errors import NoReplyError, RefusedError
 from drivers.instrument import Clock
 from drivers.load_cell.ascii_decoder import CONTRACT, FULL_SCALE, AsciiLoadCellDecoder
 from drivers.load_cell.serial_load_cell import SerialLoadCell
@@ -94,6 +94,26 @@ class AsciiLoadCell(SerialLoadCell[AsciiLoadCellDecoder]):
                 "indicator sends, and shows gross if the untared force is requested"
             )
         return Reading(float(block.values[-1]), block.received_ns, None, float(block.raw[-1]), block.quality)
+
+    @property
+    def longest_shunt(self) -> float:
+        """Longest time for which the shunt can be switched on [s]: none."""
+        return 0.0
+
+    def switch_shunt_on(self, duration: float) -> NoReturn:
+        """Refuse: an indicator has no commands.
+
+        Raises:
+            RefusedError: always.
+        """
+        self.switch_shunt_off()
+
+    def switch_shunt_off(self) -> NoReturn:
+        """Refuse, as `switch_shunt_on` does."""
+        raise RefusedError(
+            f"{self.name}: a weighing indicator has no shunt that a command can switch; nothing was sent; "
+            "use a load cell with driver load_cell"
+        )
 
     def _wait_for_block(self, channel: str) -> SampleBlock | None:
         """Return the first new reading of a channel; None if it does not arrive in time."""

@@ -16,6 +16,7 @@ _CODES = {code: name.replace("_", " ") for name, code in CONTRACT["codes"].items
 _HINTS = {
     "tare": "; the reading must be steady and in range: hold the actuator still",
     "set_rate": "; stop the stream first",
+    "shunt": "; a command can switch the shunt only in a load cell that has one, see its manual",
 }
 WAIT_SLICE = 0.01
 """Time that a thread waits before it checks whether the other thread has read its reply [s]."""

@@ -16,6 +16,8 @@ from drivers.load_cell.stream_decoder import StreamStatistics
 
 _STATUS = CONTRACT["status"]
 _UNUSABLE = _STATUS["overload"] | _STATUS["sensor_fault"]
+_SHIFTED = _STATUS["shunt"]
+"""Status of samples that contain more than the force on the cell."""
 _COUNTS_PER_NEWTON = float(CONTRACT["instrument"]["counts_per_newton"])
 _FULL_SCALE = CONTRACT["instrument"]["full_scale_n"] * _COUNTS_PER_NEWTON
 """[counts]"""
@@ -158,7 +160,9 @@ class LoadCellDecoder:
 
 
 def _assess_quality(sample: Sample) -> Quality:
-    return "bad" if sample.status & _UNUSABLE or abs(sample.counts) > _FULL_SCALE else "good"
+    if sample.status & _UNUSABLE or abs(sample.counts) > _FULL_SCALE:
+        return "bad"
+    return "uncertain" if sample.status & _SHIFTED else "good"
 
 
 def _make_blocks(samples: list[_NumberedSample], received_ns: int) -> Iterator[SampleBlock]:

@@ -179,6 +179,40 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
         """Make ``force`` equal to ``force_raw`` again."""
         self._commands.execute("clear_tare")
 
+    @property
+    def longest_shunt(self) -> float:
+        """Longest time for which the shunt can be switched on [s]."""
+        return float(_INSTRUMENT["longest_shunt_s"])
+
+    def switch_shunt_on(self, duration: float) -> float | None:
+        """Switch the shunt on; it switches itself off after a time. A repetition restarts the time.
+
+        Args:
+            duration: time for which it is on [s].
+
+        Returns:
+            Force [N] that it adds to both channels by the instrument's calibration; None if not known.
+
+        Raises:
+            OutOfRangeError: the instrument does not allow this time; nothing was sent.
+            RefusedError: the load cell has no shunt that a command can switch.
+        """
+        milliseconds = round(duration * 1e3)
+        if not 1 <= milliseconds <= self.longest_shunt * 1e3:
+            raise OutOfRangeError(
+                f"{self.name}: the shunt cannot be on for {duration:g} s, only for 0.001 s to "
+                f"{self.longest_shunt:g} s; nothing was sent"
+            )
+        return self._switch_shunt(milliseconds)
+
+    def switch_shunt_off(self) -> float | None:
+        """Switch the shunt off, on or not; result and errors are those of `switch_shunt_on`."""
+        return self._switch_shunt(0)
+
+    def _switch_shunt(self, milliseconds: int) -> float | None:
+        counts = self._commands.execute("shunt", milliseconds)
+        return counts / float(_INSTRUMENT["counts_per_newton"]) if counts else None
+
     def set_rate(self, rate: int) -> None:
         """Change the sample rate [Hz]; a running stream is stopped and restarted.
 
@@ -199,6 +233,8 @@ class LoadCell(SerialLoadCell[LoadCellDecoder]):
             return ["stopped"]
         status = 0 if decoder.latest is None else decoder.latest.status
         problems = [name.replace("_", " ") for name in ("overload", "sensor_fault") if status & _STATUS[name]]
+        if status & _STATUS["shunt"]:
+            problems.append("the shunt is on, so the force contains the one that it simulates")
         problems += self._find_silence(max(_DEADLINES["silence_s"], 5 / decoder.rate))
         if decoder.repeat_count >= _DEADLINES["stuck_samples"]:
             problems.append(f"stuck: the same reading {decoder.repeat_count + 1} times")

@@ -36,6 +36,8 @@ _MIN_PAUSE = 0.5
 """Shortest pause [s] between two imported recordings."""
 _MIN_SAMPLES = 50
 """Smallest number of samples of a stretch; with fewer, it is dropped."""
+_SHUNT_MARGIN = 0.5
+"""Time [s] around a segment with the shunt of the load cell in which the force may contain its part."""
 PERIODIC_MOTIONS = ("sine", "triangle")
 """Kinds of motion that repeat."""
 
@@ -202,8 +204,22 @@ def _make_stretch(raw: RawLog, info: ChannelInfo, name: str, rows: npt.NDArray[n
         displacement_delay=info.delays["displacement"],
         drive_delay=info.delays["coil_drive"],
         measured=measured,
+        force_valid=_find_valid_force(raw, time),
         interpolated=info.interpolated,
     )
+
+
+def _find_valid_force(raw: RawLog, time: Array) -> BoolArray | None:
+    """Return (N,) False where the shunt of the load cell adds to the force; None if it never does."""
+    shunted = [mark for mark in raw.segments if mark["phase"] == "start" and mark.get("shunt")]
+    if not shunted:
+        return None
+    ends = {mark["index"]: mark["time"] for mark in raw.segments if mark["phase"] == "end"}
+    valid = np.ones(len(time), bool)
+    for mark in shunted:
+        end = ends.get(mark["index"], time[-1])
+        valid &= (time < mark["time"] - _SHUNT_MARGIN) | (time > end + _SHUNT_MARGIN)
+    return valid
 
 
 def _make_time_base(time: Array) -> tuple[Array, npt.NDArray[np.int64]]:

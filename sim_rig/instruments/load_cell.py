@@ -1,7 +1,7 @@
 """Simulated load cell amplifier on a serial line, after ``drivers/wire/load_cell.toml``.
 
 It converts samples of the rig's force to counts and stamps them with its own clock. It tares on command and
-refuses to tare while the reading moves.
+refuses to tare while the reading moves. Its shunt adds a force to that of the rig, before filter and gain.
 """
 
 import math
@@ -102,13 +102,16 @@ class _RecentCounts:
 class LoadCellDevice:
     """Behaviour of the instrument, without its line; faults may be injected from any thread."""
 
-    def __init__(self, signals: RigInterface, clock: DeviceClock = TRUE_CLOCK, serial: int = 1) -> None:
-        """Switch the instrument on: not streaming, untared, at its highest rate.
+    def __init__(
+        self, signals: RigInterface, clock: DeviceClock = TRUE_CLOCK, serial: int = 1, shunt: float = 0.0
+    ) -> None:
+        """Switch the instrument on: not streaming, untared, at its highest rate, with its shunt off.
 
         Args:
             signals: the rig's force.
             clock: the instrument's clock.
             serial: its serial number.
+            shunt: force [N] that its shunt simulates; 0 if it has none.
         """
         self.stuck = False
         """While true, the converter repeats its last counts."""
@@ -122,6 +125,7 @@ class LoadCellDevice:
         self._running = False
         self._sequence = 0
         self._tare: int | None = None
+        self._shunt, self._shunt_end_ns = shunt, 0
         self._counts = 0
         self._last_sample_ns = signals.now_ns()
         self._tick = 0
@@ -150,6 +154,8 @@ class LoadCellDevice:
 
     def poll(self, now_ns: int) -> list[tuple[int, bytes]]:
         """Return frames of the new samples up to ``now_ns`` [ns], each with its time on the rig's clock [ns]."""
+        if self._shunt_end_ns and now_ns >= self._shunt_end_ns:
+            self._set_shunt(0, now_ns)
         # Twice the expected number: repeated samples are skipped below, but missed ones would be lost.
         window = int((now_ns - self._last_sample_ns) * 1e-9 * 2 * max(_INSTRUMENT["rates_hz"])) + 2
         times, values = self._signals.read_latest("force", window, now_ns)
@@ -169,6 +175,7 @@ class LoadCellDevice:
         if not (self._running and due):
             return []
         status |= _STATUS["tared"] * (self._tare is not None) | _STATUS["stable"] * self._is_stable()
+        status |= _STATUS["shunt"] * (self._shunt_end_ns > 0)
         micros = self._clock.read_ns(at_ns) // 1000 % (1 << 32)
         frame = encode_frame("sample", self._sequence, micros, self._counts, self._tare or 0, status)
         self._sequence = (self._sequence + 1) % 65536
@@ -192,10 +199,10 @@ class LoadCellDevice:
             return encode_frame(
                 "identity", token, command, _INSTRUMENT["protocol"], self._serial, _COUNTS_PER_NEWTON
             )
-        code, value = self._execute(name, argument) if name != "read_clock" else ("done", self._read_clock(now_ns))
+        code, value = self._execute(name, argument, now_ns)
         return encode_frame("acknowledgement", token, command, _CODES[code], value)
 
-    def _execute(self, name: str | None, argument: int) -> tuple[str, int]:
+    def _execute(self, name: str | None, argument: int, now_ns: int) -> tuple[str, int]:
         """Execute a command; return code and value of the reply."""
         if name == "start":
             self._running, self._sequence = True, 0
@@ -207,6 +214,10 @@ class LoadCellDevice:
             return self._set_rate(argument)
         if name in ("tare", "clear_tare"):
             return self._set_tare(name == "tare")
+        if name == "read_clock":
+            return "done", self._read_clock(now_ns)
+        if name == "shunt" and self._shunt:
+            return self._set_shunt(argument, now_ns)
         return "unknown_command", 0
 
     def _read_clock(self, now_ns: int) -> int:
@@ -229,9 +240,20 @@ class LoadCellDevice:
         self._tare = round(self._recent_counts.compute_mean()) if tared else None
         return "done", self._tare or 0
 
+    def _set_shunt(self, milliseconds: int, now_ns: int) -> tuple[str, int]:
+        if milliseconds > _INSTRUMENT["longest_shunt_s"] * 1000:
+            return "bad_argument", 0
+        self._shunt_end_ns = now_ns + milliseconds * 1_000_000 if milliseconds else 0
+        self._signals.command("shunt", self._shunt if milliseconds else 0.0)
+        return "done", round(self._shunt * _COUNTS_PER_NEWTON)
+
 
 def make_load_cell(
-    signals: RigInterface, address: str = "pty", clock: DeviceClock = TRUE_CLOCK, batch: float = 0.004
+    signals: RigInterface,
+    address: str = "pty",
+    clock: DeviceClock = TRUE_CLOCK,
+    batch: float = 0.004,
+    shunt: float = 0.0,
 ) -> tuple[SerialAdapter, LoadCellDevice]:
     """Return the instrument on its line, not serving yet, and the device for the injection of faults.
 
@@ -240,8 +262,9 @@ def make_load_cell(
         address: ``pty``, or ``host:port`` with port 0 for any free one.
         clock: the instrument's clock.
         batch: [s] for which its USB adapter collects bytes.
+        shunt: force [N] that its shunt simulates; 0 if it has none.
     """
-    device = LoadCellDevice(signals, clock)
+    device = LoadCellDevice(signals, clock, shunt=shunt)
     port = SerialPort(address, CONTRACT["line"]["baud"], _INSTRUMENT["transmit_buffer_bytes"], batch)
     # Between two batches nothing reaches the host, so the device is polled once for each.
     return SerialAdapter(port, device, signals.now_ns, max(batch, _MIN_POLL)), device

@@ -1,4 +1,4 @@
-"""Interface of the rig to its simulated instruments: reported samples, and commands of actuator and amplifier."""
+"""Interface of the rig to its simulated instruments: reported samples, and commands from them."""
 
 from typing import Protocol, TypeAlias
 
@@ -40,10 +40,10 @@ class RigInterface(Protocol):
         """
 
     def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
-        """Command ``displacement`` [m] of the actuator or ``drive`` [V or A] of the amplifier.
+        """Command ``displacement`` [m] of the actuator, ``drive`` [V or A] or ``shunt`` [N] of the load cell.
 
         Args:
-            channel: ``displacement`` or ``drive``.
+            channel: ``displacement``, ``drive``, or ``shunt``: force that the load cell reads in addition.
             value: in its unit.
             at_ns: [ns] on the rig's clock, from which it holds, not before the last command; None for now.
         """

@@ -20,7 +20,14 @@ from sim_rig.live.interface import TimeArray
 from sim_rig.live.sample_buffer import RingBuffer
 from sim_rig.plant import Array, TrueSignals, make_plant
 from sim_rig.scenario import Scenario
-from sim_rig.sensors import ChannelStream, apply_channel_faults, compute_true_values, make_streams, select_faults
+from sim_rig.sensors import (
+    ChannelStream,
+    add_shunt,
+    apply_channel_faults,
+    compute_true_values,
+    make_streams,
+    select_faults,
+)
 
 SAMPLE_PERIOD_NS = 1_000_000
 """[ns] sample period of the rig."""
@@ -83,7 +90,7 @@ class LiveRig:
             for name, stream in make_streams(scenario, SAMPLE_PERIOD_NS * 1e-9, mapped=False)[0].items()
         }
         self._displacement = LinearInterpolator(displacement, TRANSITION_NS)
-        self._drive = ZeroOrderHold(drive)
+        self._drive, self._shunt = ZeroOrderHold(drive), ZeroOrderHold(0.0)
         self._truth: deque[TruthRecord] = deque()
         self._lock = threading.Lock()
         self._stopping = threading.Event()
@@ -105,19 +112,23 @@ class LiveRig:
             self._displacement.add(at_ns, position, since_ns)
 
     def command(self, channel: str, value: float, at_ns: int | None = None) -> None:
-        """Command ``displacement`` [m] or ``drive`` [V or A] from an instant [ns] on; None for now.
+        """Command ``displacement`` [m], ``drive`` [V or A] or ``shunt`` [N] from an instant [ns] on; None for now.
 
         Raises:
             CommandsError: there is no such command, or the value is not finite.
         """
-        if channel not in ("displacement", "drive"):
-            raise CommandsError(f"the rig takes no command {channel!r}; it takes displacement and drive")
+        signals: dict[str, LinearInterpolator | ZeroOrderHold] = {
+            "displacement": self._displacement,
+            "drive": self._drive,
+            "shunt": self._shunt,
+        }
+        if channel not in signals:
+            raise CommandsError(f"the rig takes no command {channel!r}; it takes {', '.join(signals)}")
         if not math.isfinite(value):
             raise CommandsError(f"the commanded {channel} is {value}; it must be finite")
-        command_signal = self._displacement if channel == "displacement" else self._drive
         self._last_command_ns = self._clock.now_ns()
         with self._lock:
-            command_signal.add(self._clock.now_ns() if at_ns is None else at_ns, value)
+            signals[channel].add(self._clock.now_ns() if at_ns is None else at_ns, value)
 
     def read_truth(self) -> TruthRecord:
         """Return the true signals of the last ten seconds or so, for tests and measurements only."""
@@ -183,10 +194,12 @@ class LiveRig:
         edges = self._simulated_ns + SAMPLE_PERIOD_NS * np.arange(count + 1)
         with self._lock:
             command, drive = self._displacement.evaluate(edges), self._drive.evaluate(edges[:-1])
+            shunt = self._shunt.evaluate(edges[:-1])
         # Without the lock, so that instruments can read samples meanwhile.
         truth = self._plant.simulate(SAMPLE_PERIOD_NS * 1e-9, command, drive)
         start = (self._simulated_ns - self._origin) * 1e-9
         true_values = compute_true_values(self._scenario, truth, start, SAMPLE_PERIOD_NS * 1e-9)
+        true_values = add_shunt(true_values, shunt)
         for name, channel in self._channels.items():
             times, values = channel.convert(true_values[name])
             with self._lock:

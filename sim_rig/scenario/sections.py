@@ -112,6 +112,18 @@ class Sensor(FrozenModel):
     )
 
 
+class ForceSensor(Sensor):
+    """Errors and settings of the load cell, and its shunt."""
+
+    shunt: float = Field(
+        default=1000.0,
+        ge=-1e4,
+        le=1e4,
+        description="[N] force that its shunt simulates when a check switches it on, 0 without a shunt; "
+        "the reading contains it with the gain error",
+    )
+
+
 class Sensors(FrozenModel):
     """One sensor per channel. The zero shift of the load cell adds to the preload f0 of the damper."""
 
@@ -121,8 +133,8 @@ class Sensors(FrozenModel):
         ),
         description="LVDT at the actuator",
     )
-    force: Sensor = Field(
-        default=Sensor(
+    force: ForceSensor = Field(
+        default=ForceSensor(
             noise=2.5, resolution=0.05, limit=1e4, zero_spread=2.0, filter=Filter(), delay=2e-4, jitter=1e-6
         ),
         description="load cell between actuator and damper",

@@ -20,6 +20,8 @@ CHANNELS: dict[str, tuple[str, str]] = {
     "temperature": ("degC", "thermometer"),
 }
 """Unit and device of each channel; the unit ``drive`` is V or A."""
+NO_SHUNT: Array = np.zeros(0)
+"""Simulated force of a shunt that is never on."""
 
 
 def make_streams(
@@ -46,7 +48,7 @@ def make_streams(
 
 
 def make_readings(
-    scenario: Scenario, time: Array, truth: TrueSignals
+    scenario: Scenario, time: Array, truth: TrueSignals, shunt: Array = NO_SHUNT
 ) -> tuple[dict[str, Array], dict[str, ChannelErrors]]:
     """Return all channels of a run, and the errors drawn for each.
 
@@ -54,10 +56,11 @@ def make_readings(
         scenario: sensors, clocks, effects on channels, seed.
         time: (N,) on the bench clock, from 0 [s], N at least 2.
         truth: true signals of N samples.
+        shunt: (N,) force that the shunt of the load cell simulates [N]; empty for none.
     """
     step = float(time[-1] - time[0]) / (len(time) - 1)
     streams, channel_errors = make_streams(scenario, step)
-    true_values = compute_true_values(scenario, truth, 0.0, step)
+    true_values = add_shunt(compute_true_values(scenario, truth, 0.0, step), shunt)
     values = {name: read_channel(stream, true_values[name], time) for name, stream in streams.items()}
     return values, channel_errors
 
@@ -99,6 +102,19 @@ def compute_true_values(scenario: Scenario, truth: TrueSignals, start: float, st
         "coil_voltage": drive * resistance if current_driven else drive,
         "temperature": truth.temperature,
     }
+
+
+def add_shunt(true_values: dict[str, Array], shunt: Array) -> dict[str, Array]:
+    """Return the true values with the force that the shunt simulates in front of the load cell's amplifier.
+
+    Args:
+        true_values: of each channel, with several values of the force in each sample.
+        shunt: (N,) simulated force of each sample [N]; empty for none.
+    """
+    if not shunt.any():
+        return true_values
+    force = true_values["force"]
+    return {**true_values, "force": force + np.repeat(shunt, len(force) // len(shunt))}
 
 
 def _apply_displacement_effects(

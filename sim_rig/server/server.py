@@ -166,7 +166,7 @@ class RigServer:
             adapter, _ = make_ascii_load_cell(self.rig, address)
             driver, baud = "ascii_load_cell", load_wire_file("ascii_load_cell")["line"]["baud"]
         else:
-            adapter, _ = make_load_cell(self.rig, address, clock)
+            adapter, _ = make_load_cell(self.rig, address, clock, shunt=self._scenario.sensors.force.shunt)
             driver, baud = "load_cell", load_wire_file("load_cell")["line"]["baud"]
         self._resources.enter_context(adapter)
         url = self._insert_fault_proxy("load_cell", adapter.address)

@@ -1,4 +1,4 @@
-"""Zero checks for tests: logs as a bench records them, records and series of them."""
+"""Zero and shunt checks for tests: logs as a bench records them, records and series of them."""
 
 import json
 from datetime import UTC, datetime, timedelta
@@ -71,6 +71,44 @@ def write_check_log(path, run="check-1", zero_n=0.0, day=0, seed=1, **changes):
         changes: `method`, `motion`, `outcome`, `tare_n` in place of those of a zero check.
     """
     given = {"method": "zero_check", "motion": "hold", "outcome": "clean", "tare_n": 50.0} | changes
+    columns = _make_columns((SETTLE + REST) * RATE, zero_n, given["tare_n"], seed)
+    return _write_log(path, run, day, given, columns, [("settle", SETTLE), ("rest", REST)])
+
+
+def write_shunt_log(path, run="shunt-1", shunt_n=1000.0, day=0, seed=1, **changes):
+    """Write the log of a shunt check.
+
+    Args:
+        path: file of the log.
+        run: id of the run.
+        shunt_n: [N] change of the force by the shunt.
+        day: days from `START` to the check.
+        seed: seed of the noise.
+        changes: `method`, `motion`, `outcome`, `tare_n` in place of those of a shunt check; `drift` [N/s] of the
+            force; `noise_n`; `late_s`: time by which the force follows the shunt too late [s]; `rests`: seconds
+            before and after; `marked`: segments that are marked as those with the shunt; `names` of the segments.
+    """
+    given = {
+        "method": "shunt_check", "motion": "hold", "outcome": "clean", "tare_n": 50.0, "drift": 0.0,
+        "noise_n": 2.5, "late_s": 0.0, "rests": (REST, REST), "marked": ("shunt",),
+        "names": ("rest", "shunt", "rest_after"),
+    } | changes  # fmt: skip
+    before, after = given["rests"]
+    durations = [SETTLE, before, REST, after]
+    samples = sum(durations) * RATE
+    columns = _make_columns(samples, 0.0, given["tare_n"], seed, given["noise_n"])
+    time = np.arange(samples) / RATE
+    begin = SETTLE + before + given["late_s"]
+    change = np.where((time >= begin) & (time < begin + REST), shunt_n, 0.0) + given["drift"] * time
+    for field in ("force", "force_raw"):
+        columns[field] += change
+    return _write_log(
+        path, run, day, given, columns, list(zip(("settle", *given["names"]), durations, strict=True))
+    )
+
+
+def _write_log(path, run, day, given, columns, segments):
+    """Write a log of segments, given by name and duration [s]."""
     header = RunHeader(
         id=run,
         specimen=MOUNTED,
@@ -80,15 +118,13 @@ def write_check_log(path, run="check-1", zero_n=0.0, day=0, seed=1, **changes):
         source="run",
         utc_offset=(START + timedelta(days=day)).isoformat(),
     )
-    samples = (SETTLE + REST) * RATE
-    time_ns = np.arange(samples, dtype=np.int64) * (1_000_000_000 // RATE)
-    columns = _make_columns(samples, zero_n, given["tare_n"], seed)
-    edges = (0, SETTLE * RATE, samples)
+    edges = np.cumsum([0, *(duration * RATE for _, duration in segments)])
+    time_ns = np.arange(edges[-1], dtype=np.int64) * (1_000_000_000 // RATE)
     with LogWriter(path, header) as log:
         log.attach("bench.toml", "application/toml", b'[rig]\nname = "bench 3"\n')
         cell = {"driver": "load_cell", "serial": "4242", "channels": [{"name": "force"}, {"name": "force_raw"}]}
         log.attach("instruments.json", "application/json", json.dumps({"cell": cell}).encode())
-        for index, name in enumerate(("settle", "rest")):
+        for index, (name, _) in enumerate(segments):
             part = slice(edges[index], edges[index + 1])
             mark = {
                 "index": index,
@@ -99,6 +135,7 @@ def write_check_log(path, run="check-1", zero_n=0.0, day=0, seed=1, **changes):
                 "amplitude": None,
                 "frequency": None,
                 "drive_value": 0.0,
+                "shunt": name in given.get("marked", ()),
             }
             log.write_segment(int(time_ns[part][0]), phase="start", **mark)
             log.write_samples(time_ns[part], {field: column[part] for field, column in columns.items()})
@@ -107,9 +144,9 @@ def write_check_log(path, run="check-1", zero_n=0.0, day=0, seed=1, **changes):
     return path
 
 
-def _make_columns(samples, zero_n, tare_n, seed):
+def _make_columns(samples, zero_n, tare_n, seed, noise_n=2.5):
     generator = np.random.default_rng(seed)
-    force = zero_n + generator.normal(0, 2.5, samples)
+    force = zero_n + noise_n * generator.normal(0, 1, samples)
     # Before the rest, the rod still moves.
     force[: SETTLE * RATE] += 500
     return {

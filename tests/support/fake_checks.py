@@ -1,4 +1,4 @@
-"""Zero checks of the fake service: a shifted load cell, a displacement in control, and a new coil voltage."""
+"""Checks of the fake service: a shifted load cell, displacement and shunt in control, and a new coil voltage."""
 
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
@@ -26,10 +26,14 @@ def fill_checks(engine: Engine) -> CheckStore:
         *make_records(generator.normal(2e-5, 3e-6, _CHECKS).tolist(), 4e-7, "displacement", "m", start),
         *make_records(generator.normal(0, 2e-4, 7).tolist(), 2e-5, "coil_voltage", "V", start),
     )
+    shunt = make_records(generator.normal(1000.0, 0.2, _CHECKS).tolist(), 0.05, start=start, check="shunt")
+    shunt = [one.model_copy(update={"run": f"shunt-{one.run}"}) for one in shunt]
+    channels += tuple(shunt)
     store = CheckStore(engine)
     with Session(engine) as session, session.begin():
         for index in range(_CHECKS):
             session.add(_make_run(f"run-{index}", start + timedelta(days=index)))
+            session.add(_make_run(f"shunt-run-{index}", start + timedelta(days=index), "shunt_check"))
     for run in {one.run for one in channels}:
         store.replace(run, [one for one in channels if one.run == run])
     return store
@@ -40,5 +44,5 @@ def describe_bench() -> SimpleNamespace:
     return SimpleNamespace(drive_kind="coil_v", specimen=MOUNTED)
 
 
-def _make_run(name: str, started: datetime) -> RunRow:
-    return RunRow(id=name, method="zero_check", started=started, state="ended", log=f"{name}.mcap")
+def _make_run(name: str, started: datetime, method: str = "zero_check") -> RunRow:
+    return RunRow(id=name, method=method, started=started, state="ended", log=f"{name}.mcap")

@@ -102,6 +102,32 @@ class FakeAmplifier:
         self.calls.append("coil reset")
 
 
+class FakeLoadCell:
+    """Load cell with a shunt; `refusal` is raised by every command, `late_refusal` by all but the first."""
+
+    name, longest_shunt = "cell", 60.0
+
+    def __init__(self, calls=None, force=1000.0, refusal=None, late_refusal=None):
+        self.calls = [] if calls is None else calls
+        self.force, self.refusals = force, [refusal, late_refusal or refusal]
+        self.is_on, self.durations = False, []
+
+    def switch_shunt_on(self, duration):
+        self.durations.append(duration)
+        return self._switch(True)
+
+    def switch_shunt_off(self):
+        return self._switch(False)
+
+    def _switch(self, is_on):
+        self.calls.append(f"shunt {'on' if is_on else 'off'}")
+        refusal = self.refusals.pop(0) if len(self.refusals) > 1 else self.refusals[0]
+        if refusal is not None:
+            raise refusal
+        self.is_on = is_on
+        return self.force
+
+
 class FakeGuard:
     """Guard that permits everything until a trip."""
 

@@ -15,6 +15,11 @@ def sine(name, amplitude, frequency, drive, **more):
     return {"name": name, "motion": motion, "cycles": 3, "drive": drive, "checkpoint": True, **more}
 
 
+def hold(name, duration, **more):
+    """Return a segment at rest without drive for a duration [s]."""
+    return {"name": name, "motion": {"kind": "hold"}, "duration_s": duration, "drive": constant(0.0), **more}
+
+
 def method_document(*segments, **limits):
     return {
         "schema": "mrbench.method/1",

@@ -22,6 +22,7 @@ class KnownForce:
         self.force = force
         self._start_ns = time.monotonic_ns()
         self.stepped_ns = step_ns
+        self._shunt = 0.0
 
     def now_ns(self) -> int:
         return time.monotonic_ns() - self._start_ns if self.stepped_ns is None else self.stepped_ns
@@ -30,7 +31,11 @@ class KnownForce:
         assert channel == "force"
         last = before_ns // 1_000_000
         ticks = np.arange(max(last - count + 1, 0), last + 1)
-        return ticks * 1_000_000, self.force(ticks)
+        return ticks * 1_000_000, self.force(ticks) + self._shunt
+
+    def command(self, channel: str, value: float) -> None:
+        assert channel == "shunt"
+        self._shunt = value
 
 
 def saw(ticks: np.ndarray) -> np.ndarray:

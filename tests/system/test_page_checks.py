@@ -1,4 +1,4 @@
-"""Zero checks in the web page, in a real browser: list, control chart, units, new baseline, start."""
+"""Checks in the web page, in a real browser: list, control charts, units, new baseline, start."""
 
 import json
 
@@ -29,7 +29,7 @@ def find_row(rows, channel):
 @browser_test
 def test_each_channel_has_state_latest_check_and_age(seen):
     assert seen["errors"] == []
-    assert len(seen["list"]) == 3
+    assert len(seen["list"]) == 4
     force = find_row(seen["list"], "force")
     assert "out of control" in force
     assert "is above the limit" in force
@@ -76,4 +76,14 @@ def test_a_check_is_started_and_the_next_key_can_stop_it(seen, bench):
     assert seen["specimen"] == MOUNTED
     assert seen["afterStart"] == "stop"
     started = [json.loads(body) for path, body in bench.posted if path == "runs"]
-    assert started == [{"method": "zero_check", "specimen": MOUNTED}]
+    assert started == [{"method": f"{kind}_check", "specimen": MOUNTED} for kind in ("zero", "shunt")]
+
+
+@browser_test
+def test_the_shunt_has_a_row_and_a_chart_of_its_own(seen):
+    row = find_row(seen["list"], "force with the shunt")
+    assert "in control" in row
+    assert "1000" in row
+    assert seen["shuntAddress"] == "#/calibration?check=force.shunt"
+    assert f"Chart of the force with the shunt, specimen {MOUNTED}" in seen["shuntChart"]
+    assert "Change by the shunt of the force in N, over the number of the check" in seen["shuntChart"]

@@ -38,6 +38,7 @@ CASES = [
     ({"segments.2.cycles": None, "segments.2.duration_s": 1.3}, "segments.2.duration_s"),
     ({LAST: RAMP} | UNCOUNTED, "segments.2.motion.corner_acceleration_mps2"),
     ({LAST: RAMP}, "segments.2.cycles"),
+    ({"segments.1.shunt": True}, "segments.1.shunt"),
     ({LAST: TABLE}, "segments.2.motion.displacement_m"),
     ({LAST: NOISE} | UNCOUNTED, "segments.2.duration_s"),
     ({LAST: WIDE_NOISE, "segments.2.drive": PHASES} | UNCOUNTED, "segments.2.drive.phase_cycles"),

@@ -2,13 +2,22 @@
 
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from typing import cast
 
 from sqlalchemy import ColumnElement, Engine, ForeignKey, Select, Text, delete, func, select
 from sqlalchemy.orm import Mapped, mapped_column, sessionmaker
 
 from bench.calibration import LatestCheck
 from bench.catalogue.models import Base, RunRow, UtcTime
-from bench.checks import CheckRecord, CheckSeries, CheckValue, ControlChart, describe_latest, make_chart
+from bench.checks import (
+    CheckKind,
+    CheckRecord,
+    CheckSeries,
+    CheckValue,
+    ControlChart,
+    describe_latest,
+    make_chart,
+)
 from bench.config import DEFAULT_BENCH, ChannelName
 
 
@@ -68,42 +77,51 @@ class CheckStore:
             session.execute(delete(CheckRow).where(CheckRow.run == run_id))
             session.add_all(CheckRow(**record.model_dump()) for record in records)
 
-    def list_newest(self, limit: int, channel: str | None = None, bench: str | None = None) -> list[CheckRecord]:
+    def list_newest(
+        self, limit: int, channel: str | None = None, bench: str | None = None, check: CheckKind | None = None
+    ) -> list[CheckRecord]:
         """Return the newest records, without those of runs in the trash.
 
         Args:
             limit: largest number of records.
             channel: only those of this channel; None for all.
             bench: only those of this bench of the service; None for all.
+            check: only those of this kind; None for all.
         """
         query = _select_present(bench).order_by(CheckRow.measured.desc(), CheckRow.run.desc(), CheckRow.channel)
         if channel is not None:
             query = query.where(CheckRow.channel == channel)
+        if check is not None:
+            query = query.where(CheckRow.check == check)
         with self._sessions() as session:
             return [row.to_record() for row in session.scalars(query.limit(limit))]
 
-    def find_latest(self, channel: str, bench: str = DEFAULT_BENCH) -> CheckRecord | None:
-        """Return the latest record of a channel of a bench, or None."""
-        return next(iter(self.list_newest(1, channel, bench)), None)
+    def find_latest(
+        self, channel: str, bench: str = DEFAULT_BENCH, check: CheckKind = "zero"
+    ) -> CheckRecord | None:
+        """Return the latest record of one kind of a channel of a bench, or None."""
+        return next(iter(self.list_newest(1, channel, bench, check)), None)
 
-    def find_series(self, channel: ChannelName, specimen: str | None, bench: str = DEFAULT_BENCH) -> CheckSeries:
-        """Return the series of a channel with a specimen; with None that of the channel's latest check."""
+    def find_series(
+        self, channel: ChannelName, specimen: str | None, bench: str = DEFAULT_BENCH, check: CheckKind = "zero"
+    ) -> CheckSeries:
+        """Return the series of a channel with a specimen; with None that of its latest check of this kind."""
         if specimen is None:
-            latest = self.find_latest(channel, bench)
+            latest = self.find_latest(channel, bench, check)
             specimen = "" if latest is None else latest.specimen
-        return CheckSeries(check="zero", channel=channel, specimen=specimen)
+        return CheckSeries(check=check, channel=channel, specimen=specimen)
 
     def make_chart(self, series: CheckSeries, bench: str = DEFAULT_BENCH) -> ControlChart:
         """Return the control chart of a series on a bench."""
         since, checks = self._list_counting(series, bench)
         return make_chart(series, checks, since)
 
-    def make_latest_charts(self, bench: str = DEFAULT_BENCH) -> list[ControlChart]:
-        """Return for each channel of a bench the chart that its latest check belongs to."""
-        return [self.make_chart(series, bench) for series in self._list_series(bench)]
+    def make_latest_charts(self, bench: str = DEFAULT_BENCH, check: CheckKind = "zero") -> list[ControlChart]:
+        """Return for each channel of a bench the chart that its latest check of this kind belongs to."""
+        return [self.make_chart(series, bench) for series in self._list_series(bench) if series.check == check]
 
     def list_latest(self, bench: str = DEFAULT_BENCH) -> tuple[LatestCheck, ...]:
-        """Return the latest check of each channel of a bench that counts, with its state in its chart."""
+        """Return the latest check of each channel and kind of a bench that counts, with its state in its chart."""
         found = ((series, self._list_counting(series, bench)[1]) for series in self._list_series(bench))
         return tuple(_describe_latest(series, checks) for series, checks in found if checks)
 
@@ -122,10 +140,11 @@ class CheckStore:
             return session.scalar(query)
 
     def _list_series(self, bench: str) -> list[CheckSeries]:
-        """Return the series that the latest check of each channel of a bench belongs to."""
+        """Return the series that the latest check of each channel and kind of a bench belongs to."""
+        known = select(CheckRow.channel, CheckRow.check).distinct().order_by(CheckRow.channel, CheckRow.check)
         with self._sessions() as session:
-            channels = session.scalars(select(CheckRow.channel).distinct().order_by(CheckRow.channel)).all()
-        latest = (self.find_latest(channel, bench) for channel in channels)
+            pairs = session.execute(known).all()
+        latest = (self.find_latest(channel, bench, cast("CheckKind", check)) for channel, check in pairs)
         return [_find_series(record) for record in latest if record is not None]
 
     def _list_counting(self, series: CheckSeries, bench: str) -> tuple[datetime | None, list[CheckValue]]:

@@ -16,6 +16,13 @@ class Action(StrEnum):
     BASELINE = "baseline"
 
 
+class Kind(StrEnum):
+    """Kinds of checks."""
+
+    ZERO = "zero"
+    SHUNT = "shunt"
+
+
 def check(
     action: Annotated[
         Action,
@@ -35,6 +42,14 @@ def check(
         str | None,
         typer.Option(metavar="SERIAL", help="Mounted damper; by default that of the channel's latest check."),
     ] = None,
+    kind: Annotated[
+        Kind,
+        typer.Option(
+            "--check",
+            help="With list, chart and baseline. zero: mean at rest. shunt: change of the force by the shunt of "
+            "the load cell.",
+        ),
+    ] = Kind.ZERO,
     reason: Annotated[str, typer.Option(metavar="TEXT", help="With baseline: reason, for people.")] = "",
     data: Annotated[Path, typer.Option(metavar="DIR", help="Data folder of the service.")] = Path("runs"),
     operator: Annotated[str, typer.Option(metavar="NAME", help="Person, for the record.")] = "",
@@ -42,10 +57,10 @@ def check(
         str, typer.Option(metavar="NAME", help="With chart and baseline: bench, if the service has several.")
     ] = "",
 ) -> None:
-    """Show zero checks and their control charts.
+    """Show checks of the channels and their control charts.
 
-    A check is a run of the method zero_check, or zero_check_current for a damper driven by current. The service
-    records the checks in its data folder.
+    A zero check is a run of the method zero_check, a shunt check one of shunt_check. For a damper driven by
+    current they are zero_check_current and shunt_check_current. The service records the checks in its data folder.
     """
     if (action is Action.BASELINE) != bool(reason.strip()):
         raise typer.BadParameter("baseline needs --reason TEXT, and no other action takes it")
@@ -56,12 +71,14 @@ def check(
     from bench.config import choose_bench
 
     if action is Action.LIST:
-        typer.echo("\n".join(list_checks(data, target)))
+        typer.echo("\n".join(list_checks(data, target, kind.value)))
     elif action is Action.CHART:
-        typer.echo("\n".join(describe_charts(data, target, specimen, choose_bench(data, bench))))
+        lines = describe_charts(data, target, specimen, choose_bench(data, bench), kind.value)
+        typer.echo("\n".join(lines))
     elif action is Action.SHOW:
         typer.echo("\n".join(describe_log(Path(target))))
     else:
         author = f"command:{operator}" if operator else "command"
-        typer.echo(begin_baseline(data, target, specimen, author, reason.strip(), choose_bench(data, bench)))
-        record(data, "check baseline", target, {}, {"operator": operator, "reason": reason.strip()})
+        chosen, why = choose_bench(data, bench), reason.strip()
+        typer.echo(begin_baseline(data, target, specimen, author, why, chosen, kind.value))
+        record(data, "check baseline", target, {}, {"operator": operator, "reason": why, "check": kind.value})

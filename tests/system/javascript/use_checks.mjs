@@ -1,4 +1,4 @@
-// Looks at the zero checks and starts one like a person with a keyboard, and prints the observations as JSON:
+// Looks at the checks and starts one like a person with a keyboard, and prints the observations as JSON:
 //   node use_checks.mjs URL TOKEN CHROMIUM
 
 import { makeWaits, openPage } from "./browser.mjs";
@@ -24,7 +24,7 @@ async function look() {
 }
 
 async function openChart() {
-  await page.getByRole("link", { name: "Chart of the force" }).focus();
+  await page.getByRole("link", { name: "Chart of the force", exact: true }).focus();
   await page.keyboard.press("Enter");
   await hasText("#check-chart", "Chart of the force");
   seen.address = new URL(page.url()).hash;
@@ -36,6 +36,18 @@ async function openChart() {
   seen.findings.chart = await inspect();
   await page.reload();
   await hasText("#check-chart", "Chart of the force");
+}
+
+async function openShuntChart() {
+  await page.getByRole("link", { name: "Chart of the force with the shunt" }).focus();
+  await page.keyboard.press("Enter");
+  await hasText("#check-chart", "Chart of the force with the shunt");
+  seen.shuntAddress = new URL(page.url()).hash;
+  seen.shuntChart = await chart();
+  seen.findings.shuntChart = await inspect([1400]);
+  await page.getByRole("link", { name: "Chart of the force", exact: true }).focus();
+  await page.keyboard.press("Enter");
+  await hasText("#check-chart", `Chart of the force, specimen`);
 }
 
 async function chooseUnits() {
@@ -59,14 +71,17 @@ async function beginBaseline() {
 }
 
 async function startCheck() {
-  await page.locator("#check-start button").focus();
+  await page.getByRole("button", { name: "Start zero check" }).focus();
   await page.keyboard.press("Enter");
   await hasText("#checks-answer", "has started");
   seen.afterStart = await page.evaluate(() => document.activeElement.id);
+  await page.getByRole("button", { name: "Start shunt check" }).focus();
+  await page.keyboard.press("Enter");
+  await hasText("#checks-answer", "The shunt check has started");
 }
 
 try {
-  for (const step of [look, openChart, chooseUnits, beginBaseline, startCheck]) await step();
+  for (const step of [look, openChart, openShuntChart, chooseUnits, beginBaseline, startCheck]) await step();
   console.log(JSON.stringify(seen));
 } finally {
   await close();

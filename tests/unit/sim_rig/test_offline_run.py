@@ -104,6 +104,10 @@ BAD = {
     "a missing array": ({"time": TIME, "drive": TIME}, "displacement"),
     "two lengths": ({"time": TIME, "displacement": TIME[:50], "drive": TIME}, "differ in shape"),
     "too few": ({"time": TIME[:5], "displacement": TIME[:5], "drive": TIME[:5]}, "5 samples; at least 10"),
+    "a shunt of another length": (
+        {"time": TIME, "displacement": TIME, "drive": TIME, "shunt": TIME[:50]},
+        "differ in shape",
+    ),
     "NaN": (
         {"time": TIME, "displacement": TIME, "drive": np.where(TIME > 0.05, np.nan, 0)},
         "drive is not finite at",

@@ -5,6 +5,12 @@ import { QUANTITIES } from "../common/quantities.js";
 
 const DAY_S = 86_400;
 
+/** Name of a series in addresses: that of its channel, with the kind of check unless it is a zero check. */
+export const keyOf = ({ channel, check }) => (check === "zero" ? channel : `${channel}.${check}`);
+
+/** Name of a series in words. */
+export const nameOf = ({ channel, check }) => (check === "zero" ? spaced(channel) : `${spaced(channel)} with the ${check}`);
+
 /** Displayed quantity of a channel, with its unit. */
 export const quantityOf = (channel) => Object.values(QUANTITIES).find(({ field }) => field === channel);
 
@@ -14,6 +20,9 @@ export function withUnit(value, channel, digits = 3) {
   return `${significant(value * scale, digits)}\u00a0${unit}`;
 }
 
+/** Value of a series with its unit; the limits of a shunt check differ from its centre by a thousandth. */
+export const valueOf = (value, { channel, check }) => withUnit(value, channel, check === "zero" ? 3 : 6);
+
 /** Age of an instant: `42 s ago`, `3 days ago`. */
 export function age(text) {
   const seconds = (Date.now() - new Date(text)) / 1e3;
@@ -21,13 +30,13 @@ export function age(text) {
 }
 
 /** State of the latest check of a chart: mark, and the reason in words. */
-export function describeState({ state, series: { channel }, points, limits, count, needed }) {
+export function describeState({ state, series, points, limits, count, needed }) {
   const latest = points.at(-1);
   switch (state) {
     case "in_control":
       return { kind: "good", word: "in control", reason: `all rules kept${describeBaseline(points)}` };
     case "out_of_control":
-      return { kind: "bad", word: "out of control", reason: latest.rules.map((rule) => RULES[rule](latest, limits, channel)).join("; ") };
+      return { kind: "bad", word: "out of control", reason: latest.rules.map((rule) => RULES[rule](latest, limits, series)).join("; ") };
     case "no_limits":
       return { kind: "plain", word: "no limits", reason: "all checks of the baseline have the same value" };
     default:
@@ -36,15 +45,15 @@ export function describeState({ state, series: { channel }, points, limits, coun
 }
 
 const RULES = {
-  beyond_limits: ({ value }, { lower, upper }, channel) => describeBeyond("", value, lower, upper, channel),
-  drift: ({ ewma }, limits, channel) => describeBeyond("the weighted mean ", ewma, limits.ewma_lower, limits.ewma_upper, channel),
-  run_of_eight: ({ value }, { centre }, channel) =>
-    `8 checks in a row are ${value > centre ? "above" : "below"} the centre ${withUnit(centre, channel)}`,
+  beyond_limits: ({ value }, { lower, upper }, series) => describeBeyond("", value, lower, upper, series),
+  drift: ({ ewma }, limits, series) => describeBeyond("the weighted mean ", ewma, limits.ewma_lower, limits.ewma_upper, series),
+  run_of_eight: ({ value }, { centre }, series) =>
+    `8 checks in a row are ${value > centre ? "above" : "below"} the centre ${valueOf(centre, series)}`,
 };
 
-function describeBeyond(what, value, lower, upper, channel) {
+function describeBeyond(what, value, lower, upper, series) {
   const [word, limit] = value > upper ? ["above", upper] : ["below", lower];
-  return `${what}${withUnit(value, channel)} is ${word} the limit ${withUnit(limit, channel)}`;
+  return `${what}${valueOf(value, series)} is ${word} the limit ${valueOf(limit, series)}`;
 }
 
 function describeBaseline(points) {

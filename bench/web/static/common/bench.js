@@ -17,4 +17,4 @@ export const benchPath = (part = "") => (shown ? `benches/${encodeURIComponent(s
 export const withBench = (body) => (shown ? { ...body, bench: shown } : body);
 
 /** Adds the bench to the query of a path that has none. */
-export const benchQuery = (path) => (shown ? `${path}?${new URLSearchParams({ bench: shown })}` : path);
+export const benchQuery = (path) => (shown ? `${path}${path.includes("?") ? "&" : "?"}${new URLSearchParams({ bench: shown })}` : path);

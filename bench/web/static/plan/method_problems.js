@@ -4,6 +4,7 @@
 const CLUES = [
   [/corner_acceleration_mps2/, ["motion.corner_acceleration_mps2"]],
   [/rate_hz|samples per cycle/, ["/rate_hz"]],
+  [/the shunt needs/, ["shunt"]],
   [/at its first position/, ["motion.displacement_m"]],
   [/steps at phases/, ["drive.phase_cycles"]],
   [/give duration_s|fewer than 2 samples|make it longer/, ["duration_s", "cycles"]],

@@ -5,6 +5,7 @@ import gc
 import shutil
 import time
 import tomllib
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
 
@@ -18,8 +19,9 @@ from bench.disk import RESERVE
 from bench.errors import LogError, RunError
 from bench.methods import load_method
 from bench.recorder import make_attachments
+from drivers.load_cell import AsciiLoadCell
 from tests.support.certificates import issue_certificate
-from tests.support.fake_rig import BENCH_TOML
+from tests.support.fake_rig import BENCH_TOML, FakeLoadCell
 from tests.support.run_bench import METHOD, RunBench
 
 SECOND = 1_000_000_000
@@ -377,3 +379,42 @@ def test_a_run_whose_log_does_not_fit_is_refused_before_anything_moves(tmp_path,
         bench.prepare(lambda supervision: None, tmp_path / "a.mcap")
     assert not (tmp_path / "a.mcap").exists()
     assert bench.doubles.calls == []
+
+
+class TestShunt:
+    """Methods that need the shunt of the load cell, before anything moves."""
+
+    METHOD = load_method("shunt_check").model_dump(mode="json", by_alias=True)
+
+    def make_bench(self, folder, cell, toml=BENCH_TOML):
+        bench = RunBench(folder, time.monotonic_ns, toml)
+        bench.executor._rig = replace(bench.rig, load_cell=cell)
+        return bench
+
+    def test_a_load_cell_with_a_shunt_can_play_it(self, tmp_path):
+        cell = FakeLoadCell()
+        prepared = self.make_bench(tmp_path, cell).executor.prepare(RunCommand(method=self.METHOD))
+        assert [one.name for one in prepared.run.request.programme.segments if one.shunt] == ["shunt"]
+        assert cell.calls == ["shunt off"]
+
+    def test_a_load_cell_without_a_shunt_is_refused(self, tmp_path):
+        bench = self.make_bench(tmp_path, AsciiLoadCell("indicator", "/dev/null", time.monotonic_ns))
+        with pytest.raises(RunError, match=r"method shunt_check, segment shunt: .* indicator: .* has no shunt"):
+            bench.executor.prepare(RunCommand(method=self.METHOD))
+        assert bench.executor.prepare(RunCommand(method=METHOD))
+
+    def test_a_load_cell_that_does_not_reply_is_refused(self, bench):
+        with pytest.raises(RunError, match="the shunt of the load cell cannot be switched: cell"):
+            bench.executor.prepare(RunCommand(method=self.METHOD))
+
+    @pytest.mark.parametrize(("force", "limit"), [(1501.0, 1500), (1300.0, 1200)])
+    def test_more_force_than_a_limit_of_method_or_bench_is_refused(self, tmp_path, force, limit):
+        toml = f"{BENCH_TOML}[limits.force]\ncontrolled_stop = {limit}\ntrip = 5000\n"
+        bench = self.make_bench(tmp_path, FakeLoadCell(force=force), toml if limit < 1500 else BENCH_TOML)
+        with pytest.raises(RunError, match=f"force {force:.4g} N exceeds the limit of {limit} N"):
+            bench.executor.prepare(RunCommand(method=self.METHOD))
+
+    def test_a_shunt_check_is_not_refused_for_a_failed_check(self, tmp_path):
+        toml = f'{BENCH_TOML}[calibration]\nfailed_check = "refuse"\n'
+        command = RunCommand(method=self.METHOD, checks=(TestChecks.FAILED,))
+        assert self.make_bench(tmp_path, FakeLoadCell(), toml).executor.prepare(command)

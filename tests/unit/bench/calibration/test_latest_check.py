@@ -46,3 +46,35 @@ def test_the_record_of_the_log_names_check_and_failure():
     assert (entry["run"], entry["state"], entry["failed"]) == ("run-1", "out_of_control", TEXT)
     assert read_entry(record["displacement"])["failed"] == ""
     assert read_failed({}) == []
+
+
+SHUNT_TEXT = "force: shunt check of 2026-02-28 10:00 UTC is out of control: 1010 N is above the limit 1001 N"
+
+
+def make_shunt_check(state, age_days=1.0):
+    return make_check(state, age_days=age_days).model_copy(update={"check": "shunt", "text": SHUNT_TEXT})
+
+
+def test_a_channel_fails_by_either_kind_of_check():
+    zero, shunt = make_check(), make_shunt_check("out_of_control")
+    assert list_failed([zero, shunt], ["force"], NOW, None) == [SHUNT_TEXT]
+    both = [make_check("out_of_control"), shunt]
+    assert list_failed(both, ["force"], NOW, None) == [TEXT, SHUNT_TEXT]
+    assert list_failed([zero, make_shunt_check("in_control")], ["force"], NOW, None) == []
+
+
+def test_the_interval_counts_zero_checks_only():
+    old = make_shunt_check("in_control", age_days=30.0)
+    assert list_failed([make_check(), old], ["force"], NOW, 7.0) == []
+    new = make_shunt_check("in_control")
+    assert list_failed([new], ["force"], NOW, 7.0) == ["force: no zero check yet; one is due every 7 days"]
+
+
+def test_the_record_of_the_log_has_an_entry_for_each_kind():
+    checks = [make_check(age_days=9.0), make_shunt_check("out_of_control")]
+    failed = list_failed(checks, ["force"], NOW, 7.0)
+    record = make_check_record(checks, failed)
+    assert read_failed(record) == failed
+    assert len(failed) == 2
+    assert read_entry(record["force"])["failed"].startswith("force: the latest zero check is 9.0 days old")
+    assert read_entry(record["force.shunt"])["failed"] == SHUNT_TEXT

@@ -11,6 +11,7 @@ import pytest
 from bench.catalogue import compute_sha256
 from bench.client import Bench, ClientError, RunState
 from tests.support.certificates import make_certificate
+from tests.support.checks import write_shunt_log
 from tests.support.logs import csv_columns, write_csv
 from tests.support.service_logs import write_complete_log, write_truncated_log
 
@@ -203,3 +204,24 @@ def test_certificates_are_added_corrected_and_withdrawn(bench):
     assert bench.withdraw_certificate(added["id"], "cell & cable replaced")["state"] == "withdrawn"
     assert [one["withdrawal"]["reason"] for one in bench.list_certificates("force")] == ["cell & cable replaced"]
     assert bench.list_certificates("coil_current") == []
+
+
+@pytest.mark.parametrize("kind", ["zero", "shunt"])
+def test_a_check_is_started_by_its_kind(service, bench, kind):
+    start = {"zero": bench.start_zero_check, "shunt": bench.start_shunt_check}[kind]
+    start("none", "M. Curie")
+    command = service.agent.commands[-1]
+    assert (command.method["name"], command.specimen, command.operator) == (f"{kind}_check", "none", "M. Curie")
+
+
+def test_shunt_checks_are_listed_and_charted_by_their_name(service, bench):
+    write_shunt_log(service.data / "shunt-1.mcap", "shunt-1")
+    await_run(bench, "shunt-1")
+    deadline = time.monotonic() + TIMEOUT
+    while not (records := bench.list_checks("force", check="shunt")):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    assert [one["run"] for one in records] == ["shunt-1"]
+    assert bench.list_checks("force") == []
+    assert bench.get_check_chart("force", check="shunt")["count"] == 1
+    assert bench.begin_check_baseline("force", "repair", check="shunt")["count"] == 0

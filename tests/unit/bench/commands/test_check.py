@@ -7,8 +7,8 @@ from bench.catalogue import open_catalogue, scan_logs
 from bench.catalogue.errors import CatalogueError
 from bench.commands.check import check
 from bench.commands.check.actions import CheckError
-from bench.commands.check.dispatch import Action
-from tests.support.checks import MOUNTED, write_check_log
+from bench.commands.check.dispatch import Action, Kind
+from tests.support.checks import MOUNTED, write_check_log, write_shunt_log
 
 
 @pytest.fixture
@@ -76,3 +76,34 @@ def test_misuse_is_refused(words, tmp_path):
 def test_only_a_baseline_takes_a_reason(tmp_path):
     with pytest.raises(BadParameter):
         check(Action.LIST, reason="x", data=tmp_path)
+
+
+@pytest.fixture
+def shunted(data):
+    """Return a data folder with a zero check and a later shunt check."""
+    with open_catalogue(data) as catalogue:
+        write_shunt_log(data / "shunt-0.mcap", "shunt-0", day=1)
+        scan_logs(catalogue, lambda path: False)
+    return data
+
+
+def test_shunt_checks_are_shown_by_their_name(shunted, capsys):
+    check(Action.LIST, data=shunted, kind=Kind.SHUNT)
+    listed = capsys.readouterr().out
+    assert listed.startswith("2026-01-06 08:00 UTC force, shunt check: ")
+    assert listed.count("\n") == 1
+    check(Action.SHOW, str(shunted / "shunt-0.mcap"))
+    assert capsys.readouterr().out == listed
+    check(Action.LIST, data=shunted)
+    assert "shunt" not in capsys.readouterr().out
+    check(Action.CHART, data=shunted, kind=Kind.SHUNT)
+    assert capsys.readouterr().out == "force: shunt check: not enough checks, 1 of 20\n"
+
+
+def test_a_new_baseline_of_shunt_checks_leaves_zero_checks(shunted, capsys):
+    check(Action.BASELINE, "force", kind=Kind.SHUNT, reason="amplifier was replaced", data=shunted)
+    assert capsys.readouterr().out.startswith("force, shunt check: only checks from now on count")
+    check(Action.CHART, "force", kind=Kind.SHUNT, data=shunted, specimen=MOUNTED)
+    assert capsys.readouterr().out.strip() == "force: no shunt check yet"
+    check(Action.CHART, "force", data=shunted)
+    assert capsys.readouterr().out.startswith("force: zero check: not enough checks, 1 of 20")

@@ -246,3 +246,16 @@ def test_attachment_has_the_time_of_the_last_sample_and_zero_before_the_first(tm
     with (tmp_path / "run.mcap").open("rb") as file:
         times_by_name = {one.name: one.log_time for one in make_reader(file).iter_attachments()}
     assert (times_by_name["before"], times_by_name["after"]) == (0, 7)
+
+
+def test_segment_mark_has_the_shunt_only_if_it_is_on(tmp_path):
+    mark = {"stretch": "t", "motion": "hold", "drive": "constant"}
+    with LogWriter(tmp_path / "run.mcap", header()) as log:
+        for index, shunt in enumerate((False, True)):
+            log.write_segment(index, phase="start", index=index, name=f"s{index}", shunt=shunt, **mark)
+            log.write_sample(index, ONE)
+
+    with (tmp_path / "run.mcap").open("rb") as file:
+        marks = [json.loads(message.data) for _, _, message in make_reader(file).iter_messages("/bench/segment")]
+    assert [one.get("shunt") for one in marks] == [None, True]
+    assert [one.shunt for one in read_log(tmp_path / "run.mcap").segments] == [False, True]

@@ -383,6 +383,23 @@ def test_message_on_a_limit_exceeded_between_segments_names_the_position():
             "drive steps at phases need whole cycles, but this hold",
         ),
         (
+            {"motion": SINE, "cycles": 2, "drive": {"kind": "constant", "value": 0}, "shunt": True},
+            'the shunt needs a rod at rest without drive, not sine with constant drive; use motion "hold"',
+        ),
+        (
+            {"motion": {"kind": "hold"}, "duration_s": 2, "drive": DRIVES["staircase"], "shunt": True},
+            "the shunt needs a rod at rest without drive, not hold with staircase drive",
+        ),
+        (
+            {
+                "motion": {"kind": "hold"},
+                "duration_s": 2,
+                "drive": {"kind": "constant", "value": 0.1},
+                "shunt": True,
+            },
+            "the shunt needs a rod at rest without drive",
+        ),
+        (
             {"motion": SINE, "cycles": 3, "drive": DRIVES["staircase"]},
             "3 cycles cannot be divided into 2 levels of whole cycles",
         ),
@@ -396,3 +413,10 @@ def test_an_inconsistent_segment_is_refused(segment, message):
 def test_a_method_with_too_many_samples_is_refused():
     with pytest.raises(MethodError, match="samples, more than 1000; divide it into several runs"):
         compile_method(method(MOTIONS["sine"]), max_samples=1000)
+
+
+def test_a_segment_with_the_shunt_is_marked_in_the_programme():
+    segments = compile_method(load_method("shunt_check")).segments
+    assert [(one.name, one.shunt) for one in segments] == [
+        ("settle", False), ("rest", False), ("shunt", True), ("rest_after", False)
+    ]  # fmt: skip

@@ -139,3 +139,15 @@ def test_the_method_in_the_readme_is_a_method(tmp_path):
     path = tmp_path / "example.json"
     path.write_text(text.split("```json\n")[1].split("```")[0])
     assert load_method(path).name == "my_method"
+
+
+@pytest.mark.parametrize(
+    ("name", "sha256"),
+    [
+        ("quick", "eab7d363022786736e56db52d7e05e09268711e4308c3532016bf7a7fb12b4c6"),
+        ("zero_check", "e3d5580ace0579b9070551a0e3bc7db6a7e8bc5903760ec6a571b078d2655882"),
+    ],
+)
+def test_a_later_optional_field_does_not_change_the_hash_of_a_method(name, sha256):
+    """Logs and approvals refer to these hashes."""
+    assert load_method(name).compute_sha256() == sha256

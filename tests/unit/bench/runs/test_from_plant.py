@@ -159,3 +159,22 @@ def test_method_beyond_its_limits_is_refused_before_the_run(method, tmp_path):
     tight = method.model_copy(update={"limits": method.limits.model_copy(update={"stroke_m": 0.001})})
     with pytest.raises(MethodError, match=r"exceeds the limit of 0\.001 m"):
         run_from_plant(tight, "any", tmp_path / "run.mcap", UNNAMED)
+
+
+def test_shunt_of_the_load_cell_is_commanded_and_marked(tmp_path, monkeypatch):
+    given = {}
+
+    def play(scenario, commands, progress, rig):
+        given.update(commands)
+        return make_rig()(scenario, commands, progress, rig)
+
+    monkeypatch.setattr(module, "play_scenario", play)
+    programme = run_from_plant(load_method("shunt_check"), "any", tmp_path / "run.mcap", IDENTITY)
+    shunt = next(one for one in programme.segments if one.shunt)
+    assert np.flatnonzero(given["shunt"]).tolist() == list(range(shunt.start, shunt.stop))
+    assert {one.name: one.shunt for one in read_log(tmp_path / "run.mcap").segments} == {
+        "settle": False, "rest": False, "shunt": True, "rest_after": False
+    }  # fmt: skip
+    given.clear()
+    run_from_plant(load_method("zero_check"), "any", tmp_path / "run.mcap", IDENTITY)
+    assert "shunt" not in given

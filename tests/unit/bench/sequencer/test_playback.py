@@ -14,7 +14,7 @@ from bench.sequencer.playback import (
     find_rest_samples,
     split_into_sections,
 )
-from tests.support.methods import constant, programme, sine
+from tests.support.methods import constant, hold, programme, sine
 
 TWO_SEGMENTS = programme(sine("a", 0.01, 2.0, constant(0.2)), sine("b", 0.005, 4.0, constant(0.4)))
 
@@ -120,3 +120,17 @@ def test_run_waits_between_segments_or_at_their_edges():
         8,
         12,
     ]
+
+
+def test_programme_is_split_where_the_shunt_is_switched():
+    rests = programme(hold("a", 0.2), hold("b", 0.3, shunt=True), hold("c", 0.2, shunt=True), hold("d", 0.2))
+    sections = split_into_sections(rests, 1024)
+    assert [(one.start, one.stop, one.shunt) for one in sections] == [
+        (0, 200, False), (200, 500, True), (500, 700, True), (700, 900, False)
+    ]  # fmt: skip
+    assert [one.duration for one in sections] == pytest.approx([0.2, 0.3, 0.2, 0.2])
+
+
+def test_programme_may_begin_and_end_with_the_shunt():
+    (section,) = split_into_sections(programme(hold("a", 0.5, shunt=True)), 1024)
+    assert (section.start, section.stop, section.shunt) == (0, 500, True)

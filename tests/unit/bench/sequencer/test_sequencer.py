@@ -12,8 +12,8 @@ from bench.sequencer.sequencer import OPERATION_TIMEOUTS, AmplifierTimeouts, Seq
 from drivers.channel import Channel
 from drivers.errors import OutOfRangeError, RefusedError
 from drivers.modbus.step_table import TableState
-from tests.support.fake_rig import FakeActuator, FakeAmplifier, FakeGuard, FakeObserver
-from tests.support.methods import constant, programme, sine
+from tests.support.fake_rig import FakeActuator, FakeAmplifier, FakeGuard, FakeLoadCell, FakeObserver
+from tests.support.methods import constant, hold, programme, sine
 
 TIMEOUT = 10.0
 LIMITS = {"stroke_m": 0.01, "velocity_mps": 0.5, "acceleration_mps2": 30.0}
@@ -30,10 +30,11 @@ SHORT, LONG = stroke(), stroke(cycles=300)
 class Bench:
     """A sequencer with doubles of everything around it."""
 
-    def __init__(self, actuator=None, amplifier=None, amplifier_rate=0.0, timeouts=OPERATION_TIMEOUTS):
+    def __init__(self, actuator=None, amplifier=None, amplifier_rate=0.0, timeouts=OPERATION_TIMEOUTS, cell=None):
         self.calls = []
         self.actuator = FakeActuator(self.calls, **(actuator or {}))
         self.amplifier = FakeAmplifier(self.calls, **(amplifier or {}))
+        self.cell = FakeLoadCell(self.calls, **(cell or {}))
         self.guard, self.observer = FakeGuard(), FakeObserver(self.calls)
         self.sequencer = Sequencer(
             self.actuator,
@@ -44,6 +45,7 @@ class Bench:
             self.observer,
             lambda: amplifier_rate,
             timeouts,
+            self.cell,
         )
 
     def while_moving(self, action):
@@ -202,3 +204,78 @@ def test_forbidden_programme_is_refused_before_anything_moves():
     with pytest.raises(RunError, match=r"moves at 0.1\d+ m/s, but the actuator's limit is 0.1 m/s; lower"):
         bench.sequencer.run(SHORT)
     assert bench.calls == []
+
+
+SHUNTED = programme(hold("a", 0.1), hold("b", 0.1, shunt=True), hold("c", 0.1), **LIMITS)
+LONG_SHUNT = programme(hold("a", 0.1), hold("b", 30.0, shunt=True), hold("c", 0.1), **LIMITS)
+
+
+def test_shunt_is_on_for_its_segment_only():
+    bench = Bench()
+    bench.sequencer.run(SHUNTED)
+    played = [call for call in bench.calls if call.startswith(("shunt", "table armed"))]
+    assert played == ["table armed", "shunt on", "table armed", "shunt off", "table armed"]
+    assert bench.calls[-2:] == ["coil safe", "actuator disabled"]
+
+
+def wait_for_shunt(bench):
+    deadline = time.monotonic() + TIMEOUT
+    while not bench.cell.is_on:
+        assert time.monotonic() < deadline
+        time.sleep(0.001)
+
+
+@pytest.mark.parametrize("end", ["stop", "trip"])
+def test_shunt_is_off_after_a_run_that_ends_early(end):
+    bench = Bench()
+
+    def end_run():
+        wait_for_shunt(bench)
+        if end == "stop":
+            bench.sequencer.stop("enough")
+        else:
+            bench.guard.trip_reason = "force 1600 N"
+
+    ending = threading.Thread(target=end_run)
+    ending.start()
+    bench.sequencer.run(LONG_SHUNT)
+    ending.join()
+    assert ("enough" if end == "stop" else "force 1600 N") in bench.sequencer.stop_reason
+    assert bench.calls.count("shunt on") == bench.calls.count("shunt off") == 1
+    assert not bench.cell.is_on
+    assert bench.calls.count("table armed") == 2
+
+
+def test_hold_after_a_stop_is_without_the_shunt():
+    bench = Bench()
+
+    def hold_and_release():
+        wait_for_shunt(bench)
+        bench.sequencer.stop("held", hold=True)
+        deadline = time.monotonic() + TIMEOUT
+        while "the rod is held at its position; stop ends the hold" not in bench.observer.states:
+            assert time.monotonic() < deadline
+            time.sleep(0.001)
+        states.append(bench.cell.is_on)
+        bench.sequencer.stop("released")
+
+    states = []
+    holding = threading.Thread(target=hold_and_release)
+    holding.start()
+    bench.sequencer.run(LONG_SHUNT)
+    holding.join()
+    assert states == [False]
+
+
+def test_shunt_is_off_after_an_instrument_has_failed():
+    bench = Bench(amplifier={"state": TableState.ARMED}, timeouts=AmplifierTimeouts(table_start=0.02))
+    with pytest.raises(RunError, match="its table to start"):
+        bench.sequencer.run(programme(hold("b", 0.1, shunt=True), **LIMITS))
+    assert bench.calls[-4:] == ["shunt off", "coil safe", "coil safe", "actuator disabled"]
+
+
+def test_load_cell_that_refuses_its_shunt_ends_the_run_at_rest():
+    bench = Bench(cell={"refusal": RefusedError("cell: shunt refused")})
+    with pytest.raises(RefusedError, match="shunt refused"):
+        bench.sequencer.run(SHUNTED)
+    assert bench.calls[-2:] == ["coil safe", "actuator disabled"]

@@ -24,7 +24,7 @@ FILLER = bytes(32)
 STARTED = encode_frame(Acknowledgement(1, CONTRACT["commands"]["start"], 0, 1000))
 
 counts = st.integers(-8_000_000, 8_000_000)
-samples = st.builds(Sample, st.integers(0, 65535), st.integers(0, 2**32 - 1), counts, counts, st.integers(0, 15))
+samples = st.builds(Sample, st.integers(0, 65535), st.integers(0, 2**32 - 1), counts, counts, st.integers(0, 31))
 frames = st.one_of(samples, st.builds(Acknowledgement, *[st.integers(0, 255)] * 3, counts))
 
 

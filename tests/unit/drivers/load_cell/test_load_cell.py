@@ -5,6 +5,7 @@ import pytest
 from drivers.channel import Frame
 from drivers.errors import InvalidReplyError, NoReplyError, OutOfRangeError, RefusedError
 from drivers.instrument import Health
+from drivers.load_cell.ascii_load_cell import AsciiLoadCell
 from drivers.load_cell.frames import CONTRACT, Acknowledgement, FrameDecoder, Identity, Sample, encode_frame
 from drivers.load_cell.load_cell import LoadCell
 
@@ -83,6 +84,47 @@ def test_a_refused_tare_names_its_reason(cell):
         cell.tare()
 
 
+def test_the_shunt_is_switched_for_a_time_and_its_force_returned(cell):
+    cell._line.requests.clear()
+    cell._line.replies["shunt"] = 0, 800_000
+    assert (cell.switch_shunt_on(15.5), cell.switch_shunt_off()) == (1000.0, 1000.0)
+    assert cell._line.requests == [("shunt", 15_500), ("shunt", 0)]
+    cell._line.replies["shunt"] = 0, 0
+    assert cell.switch_shunt_off() is None
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, 60.001])
+def test_a_time_that_the_shunt_does_not_allow_is_not_sent(cell, duration):
+    cell._line.requests.clear()
+    with pytest.raises(OutOfRangeError, match=r"cell: the shunt cannot be on for \S+ s, only for 0.001 s to 60 s"):
+        cell.switch_shunt_on(duration)
+    assert cell._line.requests == []
+
+
+def test_a_load_cell_without_a_shunt_refuses_the_command(cell):
+    cell._line.replies["shunt"] = CONTRACT["codes"]["unknown_command"], 0
+    with pytest.raises(RefusedError, match=r"cell: shunt 1000 refused: unknown command; .* has one"):
+        cell.switch_shunt_on(1.0)
+    with pytest.raises(RefusedError):
+        cell.switch_shunt_off()
+
+
+def test_an_indicator_has_no_shunt():
+    indicator = AsciiLoadCell("indicator", "/dev/null", lambda: 0)
+    assert indicator.longest_shunt == 0.0
+    with pytest.raises(RefusedError, match=r"indicator: .* no shunt .*; use a load cell with driver load_cell"):
+        indicator.switch_shunt_on(1.0)
+
+
+def test_samples_with_the_shunt_are_uncertain_from_a_block_of_their_own(cell):
+    cell._line.send(800, 800)
+    cell._line.send(800_800, 800_800, status=0x10, first=2)
+    cell._line.send(900_800, status=0x18, first=4)
+    blocks = [block for block in cell.acquire(0.0) if block.channel == "force_raw"]
+    assert [(block.first, block.quality) for block in blocks] == [(0, "good"), (2, "uncertain"), (4, "bad")]
+    assert blocks[1].values.tolist() == [1001.0, 1001.0]
+
+
 def test_a_request_without_a_reply_is_repeated_twice(cell, monkeypatch):
     monkeypatch.setitem(CONTRACT["deadlines"], "reply_s", 0.0)
     cell._line.replies["tare"] = None, 0
@@ -127,7 +169,14 @@ def test_another_calibration_is_refused_and_the_line_closed(monkeypatch):
 
 @pytest.mark.parametrize(
     ("status", "message"),
-    [(0, ""), (0x06, ""), (0x01, "overload"), (0x08, "sensor fault"), (0x09, "overload; sensor fault")],
+    [
+        (0, ""),
+        (0x06, ""),
+        (0x01, "overload"),
+        (0x08, "sensor fault"),
+        (0x09, "overload; sensor fault"),
+        (0x10, "the shunt is on, so the force contains the one that it simulates"),
+    ],
 )
 def test_the_status_of_the_latest_sample_is_reported(cell, status, message):
     cell._line.send(800, status=status)

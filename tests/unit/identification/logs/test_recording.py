@@ -58,6 +58,18 @@ def test_a_segment_without_end_reaches_to_the_end(tmp_path):
     assert (segment.start, segment.stop) == (50, 100)
 
 
+def test_the_force_is_not_valid_near_a_segment_with_the_shunt(tmp_path):
+    """The shunt is switched within half a second of its segment."""
+    with writing(tmp_path / "a.mcap") as written:
+        written.segment("start", 1.0, 0, shunt=True, motion="hold")
+        written.samples(times(3000))
+        written.segment("end", 1.5, 0, shunt=True, motion="hold")
+    (stretch,) = load(tmp_path / "a.mcap").stretches
+    assert np.flatnonzero(~stretch.valid_mask).tolist() == list(range(500, 2001))
+    assert np.all(stretch.measured)
+    assert load(tmp_path / "a.mcap").stretches[0].force_valid.sum() == 3000 - 1501  # from the cache
+
+
 def test_imported_files_keep_their_names_and_rates(tmp_path):
     with writing(tmp_path / "a.mcap") as written:
         written.segment("start", 0.02, 0, "slow")

@@ -10,9 +10,9 @@ from sim_rig.instruments.load_cell import LoadCellDevice, compute_checksum, enco
 from sim_rig.live import DeviceClock
 
 MILLISECOND = 1_000_000
-START, STOP, TARE, CLEAR_TARE, SET_RATE, IDENTIFY, READ_CLOCK = range(1, 8)
+START, STOP, TARE, CLEAR_TARE, SET_RATE, IDENTIFY, READ_CLOCK, SHUNT = range(1, 9)
 DONE, UNKNOWN_COMMAND, BAD_ARGUMENT, NOT_NOW = range(4)
-OVERLOAD, TARED, STABLE, SENSOR_FAULT = 1, 2, 4, 8
+OVERLOAD, TARED, STABLE, SENSOR_FAULT, SHUNT_ON = 1, 2, 4, 8, 16
 
 
 @pytest.fixture
@@ -120,6 +120,36 @@ def test_tare_is_refused_at_overload_and_with_an_open_bridge(signals, device):
     record(signals, device, [10.0] * 101, start=102)
     device.bridge_open = True
     assert ask(device, TARE)[0] == NOT_NOW
+
+
+@pytest.fixture
+def shunted(signals):
+    """Return a device that streams and whose shunt simulates 1000 N."""
+    device = LoadCellDevice(signals, DeviceClock(5_000, 0.0), shunt=1000.0)
+    ask(device, START)
+    return device
+
+
+def test_shunt_is_commanded_with_its_force_and_in_the_status_until_it_is_off(signals, shunted):
+    assert ask(shunted, SHUNT, 60_000) == (DONE, 800_000)
+    assert record(signals, shunted, [1001.0])[0][3:] == (800_800, 0, SHUNT_ON)
+    assert ask(shunted, SHUNT, 0) == (DONE, 800_000)
+    assert record(signals, shunted, [1.0], start=2)[0][3:] == (800, 0, 0)
+    assert signals.commands == [("shunt", 1000.0), ("shunt", 0.0)]
+
+
+def test_shunt_switches_itself_off_and_a_repetition_restarts_its_time(signals, shunted):
+    ask(shunted, SHUNT, 10)
+    ask(shunted, SHUNT, 10, now_ns=5 * MILLISECOND)
+    assert record(signals, shunted, [0.0], start=14)[0][5] == SHUNT_ON
+    assert record(signals, shunted, [0.0], start=15)[0][5] == 0
+    assert signals.commands == [("shunt", 1000.0), ("shunt", 1000.0), ("shunt", 0.0)]
+
+
+def test_shunt_is_refused_beyond_its_longest_time_and_without_one(signals, device, shunted):
+    assert ask(shunted, SHUNT, 60_001) == (BAD_ARGUMENT, 0)
+    assert ask(device, SHUNT, 1) == (UNKNOWN_COMMAND, 0)
+    assert signals.commands == []
 
 
 @pytest.mark.parametrize(

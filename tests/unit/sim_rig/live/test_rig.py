@@ -99,7 +99,7 @@ def test_a_step_of_the_drive_takes_effect_at_the_next_update_of_the_amplifier(va
 
 def test_an_invalid_command_is_refused(varied):
     rig = LiveRig(varied(), SteppedClock())
-    with pytest.raises(CommandsError, match="takes displacement and drive"):
+    with pytest.raises(CommandsError, match="takes displacement, drive, shunt"):
         rig.command("force", 1.0)
     with pytest.raises(CommandsError, match="commanded drive is nan; it must be finite"):
         rig.command("drive", float("nan"))
@@ -151,3 +151,26 @@ def test_a_full_buffer_keeps_the_newest_samples_in_order():
     times, values = buffer.read_latest(10, 1000)
     assert times.tolist() == list(range(95, 105))
     assert np.array_equal(times, values)
+
+
+def test_the_shunt_adds_its_force_to_the_reading_only(varied):
+    """It passes filter, gain and converter of the load cell, as in an offline run."""
+    scenario = varied(
+        "default", actuator=SERVO, clocks=CLOCKS, sensors={"force": {"noise": 1.0, "gain_error": 0.02}}
+    )
+    rest = CommandSeries(np.arange(600) * 1e-3, np.zeros(600), np.zeros(600), np.repeat([0.0, 1.0, 0.0], 200))
+    clock = SteppedClock()
+    rig = LiveRig(scenario, clock)
+    for shunt in (0.0, scenario.sensors.force.shunt, 0.0):
+        rig.command("shunt", shunt)
+        clock.advance(200 * SAMPLE_PERIOD_NS)
+        rig.catch_up()
+    played = run_offline(scenario, rest)
+    _, force = rig.read_latest("force", ALL, EVER)
+    np.testing.assert_array_equal(force[:590], played.channels["force"][:590])
+    without = run_offline(scenario, rest._replace(shunt=np.zeros(0)))
+    difference = played.channels["force"] - without.channels["force"]
+    assert np.max(np.abs(difference[250:390] - 1020.0)) < 1e-6
+    assert np.max(np.abs(difference[:199])) == 0.0
+    assert np.max(np.abs(difference[450:])) < 1e-6
+    assert np.array_equal(played.truth.force, without.truth.force)

@@ -3,7 +3,15 @@
 import pytest
 from pydantic import ValidationError
 
-from sim_rig.scenario.sections import Actuator, Amplifier, ClockDeviation, ClockDeviations, Sensor, Sensors
+from sim_rig.scenario.sections import (
+    Actuator,
+    Amplifier,
+    ClockDeviation,
+    ClockDeviations,
+    ForceSensor,
+    Sensor,
+    Sensors,
+)
 
 LOW_PASS = {"kind": "butterworth", "order": 2, "cutoff": 300.0}
 
@@ -28,7 +36,12 @@ LOW_PASS = {"kind": "butterworth", "order": 2, "cutoff": 300.0}
 )
 def test_default_sensor_has_the_errors_of_a_decent_laboratory(channel, errors):
     low_pass = LOW_PASS if channel in ("displacement", "force") else None
-    assert getattr(Sensors(), channel) == Sensor(**errors, filter=low_pass)
+    kind = ForceSensor if channel == "force" else Sensor
+    assert getattr(Sensors(), channel) == kind(**errors, filter=low_pass)
+
+
+def test_a_load_cell_that_names_no_shunt_has_one():
+    assert Sensors(force={"noise": 1.0}).force == ForceSensor(noise=1.0, shunt=1000.0)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from bench.catalogue import Catalogue, open_database, scan_logs
 from bench.catalogue.trash import move_to_trash, restore_from_trash
 from bench.checks import CheckSeries
-from tests.support.checks import IN_CONTROL, MOUNTED, START, write_check_log
+from tests.support.checks import IN_CONTROL, MOUNTED, START, write_check_log, write_shunt_log
 
 FORCE = CheckSeries(check="zero", channel="force", specimen=MOUNTED)
 
@@ -81,3 +81,47 @@ def test_a_run_of_another_method_has_no_record(catalogue):
     scan_logs(catalogue, lambda path: False)
     assert path.is_file()
     assert catalogue.checks.list_newest(10) == []
+
+
+def test_shunt_checks_have_a_series_of_their_own(catalogue):
+    scan(catalogue, [1.0, 2.0])
+    for index in range(2):
+        write_shunt_log(
+            catalogue.folder / f"shunt-{index}.mcap", f"shunt-{index}", 1000.0 + index, 5 + index, index
+        )
+    scan_logs(catalogue, lambda path: False)
+    shunt = FORCE.model_copy(update={"check": "shunt"})
+    assert [one.run for one in catalogue.checks.make_chart(FORCE).points] == ["check-0", "check-1"]
+    assert [one.run for one in catalogue.checks.make_chart(shunt).points] == ["shunt-0", "shunt-1"]
+    assert [one.value for one in catalogue.checks.list_newest(9, check="shunt")] == pytest.approx(
+        [1001.0, 1000.0], abs=0.5
+    )
+    assert catalogue.checks.find_latest("force").run == "check-1"
+    assert catalogue.checks.find_series("force", None, check="shunt") == shunt
+    assert [one.series for one in catalogue.checks.make_latest_charts(check="shunt")] == [shunt]
+    assert {one.series.check for one in catalogue.checks.make_latest_charts()} == {"zero"}
+    latest = {(one.channel, one.check): one.run for one in catalogue.checks.list_latest()}
+    assert (latest["force", "zero"], latest["force", "shunt"]) == ("check-1", "shunt-1")
+    assert len(latest) == 4
+
+
+def test_a_new_baseline_of_the_shunt_leaves_the_zero(catalogue):
+    scan(catalogue, [1.0])
+    write_shunt_log(catalogue.folder / "shunt-0.mcap", "shunt-0")
+    scan_logs(catalogue, lambda path: False)
+    shunt = FORCE.model_copy(update={"check": "shunt"})
+    catalogue.checks.begin_baseline(shunt, "user:mcurie", "amplifier was replaced")
+    assert catalogue.checks.make_chart(shunt).count == 0
+    assert catalogue.checks.make_chart(FORCE).count == 1
+    assert catalogue.checks.find_baseline(FORCE) is None
+
+
+def test_a_gain_shift_is_out_of_control(catalogue):
+    """A gain error of 1 % changes the shunt of 1000 N by 10 N."""
+    for index in range(21):
+        shunt_n = 1010.0 if index == 20 else 1000.0 + (-1) ** index
+        write_shunt_log(catalogue.folder / f"shunt-{index}.mcap", f"shunt-{index}", shunt_n, index, index)
+    scan_logs(catalogue, lambda path: False)
+    (latest,) = catalogue.checks.list_latest()
+    assert (latest.check, latest.state, latest.run) == ("shunt", "out_of_control", "shunt-20")
+    assert latest.text.startswith("force: shunt check of 2026-01-25")

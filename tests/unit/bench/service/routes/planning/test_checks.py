@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.support.checks import IN_CONTROL, MOUNTED, store_checks, write_check_log
+from tests.support.checks import IN_CONTROL, MOUNTED, store_checks, write_check_log, write_shunt_log
 
 API = "/api/v1/checks"
 
@@ -87,3 +87,48 @@ def test_a_new_baseline_needs_a_reason_and_clears_the_state(shifted):
     assert chart["since"] is not None
     assert shifted.get("/health")["calibration"] == "ok"
     assert len(shifted.get("/checks?channel=force")["items"]) == 22
+
+
+@pytest.fixture
+def both(shifted):
+    """Return a service with zero checks, and one shunt check of 1000 N."""
+    write_shunt_log(shifted.data / "shunt-1.mcap", "shunt-1")
+    shifted.scan()
+    return shifted
+
+
+def test_shunt_checks_are_listed_and_charted_only_by_their_name(both):
+    (record,) = both.get("/checks?check=shunt")["items"]
+    assert (record["run"], record["check"], record["value"]) == (
+        "shunt-1",
+        "shunt",
+        pytest.approx(1000.0, abs=0.5),
+    )
+    assert {one["check"] for one in both.get("/checks?limit=1000")["items"]} == {"zero"}
+    chart = both.get("/checks/force/chart?check=shunt")
+    assert (chart["series"]["check"], chart["count"]) == ("shunt", 1)
+    assert chart["text"] == "force: shunt check: not enough checks, 1 of 20"
+    assert both.get("/checks/force/chart")["count"] == 22
+    assert both.client.get(f"{API}/force/chart?check=gain").status_code == 422
+    assert both.get("/runs/shunt-1")["jobs"] == []
+
+
+def test_the_charts_of_a_kind_have_its_method(both):
+    charts = both.get("/checks/charts?check=shunt")
+    assert charts["method"] == "shunt_check"
+    assert [one["series"]["channel"] for one in charts["items"]] == ["force"]
+    both.agent.description = both.agent.description.model_copy(update={"drive_kind": "coil_a"})
+    assert both.get("/checks/charts?check=shunt")["method"] == "shunt_check_current"
+
+
+def test_a_new_baseline_is_that_of_its_kind(both):
+    request = {"reason": "amplifier was replaced", "check": "shunt"}
+    assert both.post("/checks/force/baseline", request, status=201)["series"]["check"] == "shunt"
+    assert both.get("/checks/force/chart?check=shunt")["count"] == 0
+    assert both.get("/checks/force/chart")["count"] == 22
+
+
+def test_a_run_gets_the_latest_check_of_each_kind(both):
+    both.post("/runs", {"method": "quick", "specimen": "A"}, status=201)
+    checks = {(one.channel, one.check): one.run for one in both.agent.commands[-1].checks}
+    assert (checks["force", "zero"], checks["force", "shunt"]) == ("run-21", "shunt-1")

@@ -84,8 +84,10 @@ def compute_noise(values: Array, time: Array) -> float:
     divided difference.
     """
     instants = np.lib.stride_tricks.sliding_window_view(time, _WINDOW)
-    distances = instants[:, :, None] - instants[:, None, :] + np.eye(_WINDOW)
-    weights = 1.0 / np.prod(distances, axis=2)
+    # One column at a time: all differences at once would need 25 numbers for each sample.
+    weights = np.stack(
+        [1.0 / np.prod(instants[:, [k]] - np.delete(instants, k, axis=1), axis=1) for k in range(_WINDOW)], axis=1
+    )
     weights /= np.linalg.norm(weights, axis=1, keepdims=True)
     remainders = np.sum(weights * np.lib.stride_tricks.sliding_window_view(values, _WINDOW), axis=1)
     return float(np.sqrt(np.mean(remainders**2)))

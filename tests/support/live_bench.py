@@ -14,6 +14,7 @@ import numpy as np
 from bench.agent_protocol.endpoint import find_agent
 from bench.agent_protocol.link import AgentClient
 from bench.agent_protocol.messages import ShutDownCommand, StatusCommand
+from bench.log.reader import read_log
 from bench.rig.priority import raise_priority
 from sim_rig.live.clock import RunningClock
 from sim_rig.scenario.scenario import load_scenario
@@ -130,6 +131,25 @@ def live_bench(folder, choices=TCP, faults=None, limits="", scenario=None):
         text = bench.toml.read_text().replace("setpoint_timeout = 0.2", _TOLERANT_DRIVE)
         bench.toml.write_text(f"{text}{limits}\n")
         yield bench
+
+
+def make_force_scenario(**changes):
+    """Return the default scenario with other settings of the load cell."""
+    scenario = load_scenario("default")
+    force = scenario.sensors.force.model_copy(update=changes)
+    return scenario.model_copy(update={"sensors": scenario.sensors.model_copy(update={"force": force})})
+
+
+def record_check(folder, scenario, name, segments):
+    """Record a check with nothing clamped, by `mrbench run` on a rig of its own; return the log."""
+    folder.mkdir()
+    with (
+        live_bench(folder, scenario=scenario) as bench,
+        ended(bench.run("--specimen", "none", name=name, segments=segments)) as process,
+    ):
+        _, output = process.communicate(timeout=DEADLINE)
+        assert process.returncode == 0, output
+        return read_log(bench.log)
 
 
 @contextlib.contextmanager

@@ -6,14 +6,13 @@ import pytest
 from bench.agent_protocol.messages import RunCommand, StopCommand
 from bench.checks import compute_records
 from bench.log.reader import read_log
-from sim_rig.scenario.scenario import load_scenario
 from tests.support.live_bench import (
-    DEADLINE,
     constant,
-    ended,
     fetch_status,
     live_bench,
+    make_force_scenario,
     method,
+    record_check,
     served_agent,
     until,
     until_ended,
@@ -31,29 +30,13 @@ SEGMENTS = [
 LONG_SHUNT = [SEGMENTS[0], {**SEGMENTS[1], "duration_s": 40.0}, SEGMENTS[2]]
 
 
-def make_scenario(gain_error):
-    """Return the default scenario with a gain error of the load cell."""
-    scenario = load_scenario("default")
-    force = scenario.sensors.force.model_copy(update={"gain_error": gain_error})
-    return scenario.model_copy(update={"sensors": scenario.sensors.model_copy(update={"force": force})})
-
-
-def record(folder, gain_error):
-    """Record a shunt check on a rig of its own; return the log."""
-    folder.mkdir()
-    with (
-        live_bench(folder, scenario=make_scenario(gain_error)) as bench,
-        ended(bench.run("--specimen", "none", name="shunt_check", segments=SEGMENTS)) as process,
-    ):
-        _, output = process.communicate(timeout=DEADLINE)
-        assert process.returncode == 0, output
-        return read_log(bench.log)
-
-
 @pytest.fixture(scope="module")
 def logs(tmp_path_factory):
     folder = tmp_path_factory.mktemp("checks")
-    return [record(folder / str(error), error) for error in (0.0, 0.01)]
+    return [
+        record_check(folder / str(error), make_force_scenario(gain_error=error), "shunt_check", SEGMENTS)
+        for error in (0.0, 0.01)
+    ]
 
 
 def test_a_gain_error_of_the_load_cell_is_the_same_part_of_the_shunt(logs):

@@ -3,9 +3,7 @@
 import pytest
 
 from bench.checks import compute_records
-from bench.log.reader import read_log
-from sim_rig.scenario.scenario import load_scenario
-from tests.support.live_bench import DEADLINE, constant, ended, live_bench
+from tests.support.live_bench import constant, make_force_scenario, record_check
 
 pytestmark = [pytest.mark.wire, pytest.mark.timeout(240)]
 SHIFT = 12.0
@@ -17,23 +15,10 @@ SEGMENTS = [
 """Segments of the shipped method, in a shorter time."""
 
 
-def make_scenario(zero_n):
-    """Return the default scenario with a known zero of the load cell [N]."""
-    scenario = load_scenario("default")
-    force = scenario.sensors.force.model_copy(update={"zero": zero_n, "zero_spread": 0.0})
-    return scenario.model_copy(update={"sensors": scenario.sensors.model_copy(update={"force": force})})
-
-
 def record(folder, zero_n):
-    """Record a zero check on a rig of its own; return log and records by channel."""
-    folder.mkdir()
-    with (
-        live_bench(folder, scenario=make_scenario(zero_n)) as bench,
-        ended(bench.run("--specimen", "none", name="zero_check", segments=SEGMENTS)) as process,
-    ):
-        _, output = process.communicate(timeout=DEADLINE)
-        assert process.returncode == 0, output
-        log = read_log(bench.log)
+    """Record a zero check with a known zero of the load cell [N]; return log and records by channel."""
+    scenario = make_force_scenario(zero=zero_n, zero_spread=0.0)
+    log = record_check(folder, scenario, "zero_check", SEGMENTS)
     return log, {one.channel: one for one in compute_records(log)}
 
 

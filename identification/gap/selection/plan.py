@@ -206,7 +206,7 @@ def _compare_with_subset(pool: CandidatePool, subset: Candidate, candidate: Cand
     Where the effect hardly acts on them, they cannot judge it, and the evidence on all samples counts: transients
     after rare steps of the drive may all be fitted. An effect that closes too little of what the others leave only
     repairs their form. Its set is then less probable than the one without it, by the penalty for one more effect.
-    The likelihood ratio in noise of the residual's spectrum has to pay for the effect, too.
+    The evidence is at most the likelihood ratio in noise of the residual's spectrum, less the prior odds.
     """
     comparison, penalty = pool.comparison, compute_complexity_penalty(subset.names)
     evidence = comparison.compute_held_out_evidence(subset, candidate)

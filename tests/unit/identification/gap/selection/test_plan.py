@@ -110,7 +110,7 @@ def test_an_effect_that_closes_little_of_what_the_others_leave_repairs_their_for
 
 
 @pytest.mark.parametrize("excess", [-1.0, 1.0])
-def test_an_effect_has_to_pay_its_prior_in_noise_of_the_spectrum_of_the_residual(excess):
+def test_noise_of_the_residuals_spectrum_bounds_the_evidence_of_an_effect(excess):
     subset, candidate = (SimpleNamespace(names=frozenset(names)) for names in (["gas_spring"], BOTH))
     in_noise = compute_complexity_penalty(subset.names) + excess
     pool = make_comparing_pool(9.0, 9.0, 9.0, 0.9, in_noise)

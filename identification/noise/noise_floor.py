@@ -100,6 +100,11 @@ class NoiseFloorEstimate:
         squares += slower**2 * min(8.0 * longest / samples, 2.0)
         return math.sqrt(squares) / self.noise**2
 
+    def discard_cycles(self, reason: str) -> "NoiseFloorEstimate":
+        """Return the estimate without repeated cycles, a lower bound, with the reason as text for a person."""
+        fast = self.high_frequency
+        return NoiseFloorEstimate(fast, self.cycle_to_cycle, fast, f"high frequency: {reason}")
+
     def get_interval(self, error: float) -> tuple[float, float]:
         """Return the 95 % interval of the floor [N].
 

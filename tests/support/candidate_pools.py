@@ -114,7 +114,12 @@ class WatchedPool(CandidatePool):
 
 def make_pool(*effects: str | ActiveEffect, **settings: float) -> WatchedPool:
     """Return an empty pool of a short recording."""
-    prepared = prepare_recordings([record(*effects)])
+    return make_pool_of(record(*effects), **settings)
+
+
+def make_pool_of(recording: Recording, **settings: float) -> WatchedPool:
+    """Return an empty pool of a recording."""
+    prepared = prepare_recordings([recording])
     pool = make_candidate_pool(prepared, settings=SearchSettings(**settings))
     return WatchedPool(pool.problems, pool.evaluation, pool.noise_model, pool.clock_deviation)
 

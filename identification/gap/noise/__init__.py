@@ -9,6 +9,7 @@ from identification.gap.noise.spectral_line import MAINS_FREQUENCY, find_mains_f
 from identification.gap.noise.unpredicted_residual import (
     CHANCE_DEVIATIONS,
     compute_scatter,
+    discard_unsteady_cycles,
     simulate_scatter,
     take_floor_from_residual,
 )
@@ -24,6 +25,7 @@ __all__ = [
     "compute_noise_evidence",
     "compute_scatter",
     "describe_drift_explanation",
+    "discard_unsteady_cycles",
     "find_mains_frequency",
     "has_drift",
     "simulate_scatter",

@@ -15,7 +15,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.gap.data import Residual, compute_block_squares
-from identification.gap.fits import EXPLAINED_RATIO, Candidate, JointFit
+from identification.gap.fits import EXPLAINED_RATIO, NO_GAP_RATIO, Candidate, JointFit
 from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.simulated_noise import simulate_noise
@@ -52,19 +52,55 @@ def take_floor_from_residual(
     fitted = min(c.train_rmse for c in candidates)
     adequate = [c for c in candidates if max(c.held_out_rmse / lowest, c.train_rmse / fitted) < EXPLAINED_RATIO]
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
-        estimate = noise_model.describe_residual(candidate)
-        if noise_model.may_be_noise(candidate, regression.evaluation) and is_stationary(
-            candidate.residual, estimate.noise**2, propagate(candidate), block_length
-        ):
-            noise_model.estimate = estimate
+        if not noise_model.may_be_noise(candidate, regression.evaluation):
+            continue
+        deviation = measure_scatter_deviation(noise_model, candidate, propagate(candidate), block_length)
+        if deviation is not None and deviation < CHANCE_DEVIATIONS:
+            noise_model.estimate = noise_model.describe_residual(candidate)
             noise_model.estimate = noise_model.describe_residual(evaluate(candidate.fit))
             return True
     return False
 
 
-def is_stationary(residual: Residual, square: float, input_squares: Array, block_length: float) -> bool:
-    """Return True if the mean square of blocks [s] scatters as that of noise of the same spectrum.
+def discard_unsteady_cycles(
+    noise_model: NoiseModel, law: Candidate, propagate: Callable[[Candidate], Array], block_length: float
+) -> bool:
+    """Discard the noise floor of repeated cycles if the residual of the law is not noise; return True if so.
 
+    Cycles count all that does not repeat with them as noise. A cause that follows time, or a path that is no
+    multiple of the stroke, is a part of it. The size of its blocks scatters otherwise than that of noise.
+
+    Args:
+        noise_model: its floor is replaced by the noise at high frequencies.
+        law: the law without effects, within the limits of that floor.
+        propagate: computes the squared change of a candidate's force by the noise of its inputs, (runs, N) [N²].
+        block_length: length of a block [s], part of a stroke.
+    """
+    estimate = noise_model.estimate
+    white = NO_GAP_RATIO * math.hypot(estimate.high_frequency, noise_model.input_noise or 0.0)
+    if not estimate.is_known or max(law.train_rmse, law.held_out_rmse) < white:
+        return False
+    deviation = measure_scatter_deviation(noise_model, law, propagate(law), block_length)
+    if deviation is None or deviation < CHANCE_DEVIATIONS:
+        return False
+    noise_model.estimate = estimate.discard_cycles(
+        "what does not repeat with the cycles is not noise, because it is stronger in some parts of the recording"
+    )
+    return True
+
+
+def measure_scatter_deviation(
+    noise_model: NoiseModel, candidate: Candidate, input_squares: Array, block_length: float
+) -> float | None:
+    """Return the deviation of `compare_scatter` for the residual of a candidate, if all of it is noise."""
+    square = noise_model.describe_residual(candidate).noise ** 2
+    return compare_scatter(candidate.residual, square, input_squares, block_length)
+
+
+def compare_scatter(residual: Residual, square: float, input_squares: Array, block_length: float) -> float | None:
+    """Return by how much the mean square of blocks scatters otherwise than that of noise of the same spectrum.
+
+    The unit is the standard deviation of that scatter. The result is None where blocks cannot be compared.
     An error of a model is strong in some blocks and weak in others. A spectral line has the same size in all. The
     noise of the displacement (runs, N) [N²] is strong where the force is steep, in short bursts whose size differs
     from run to run. Its estimate may be too large, so blocks may also scatter as noise of the force alone.
@@ -77,12 +113,12 @@ def is_stationary(residual: Residual, square: float, input_squares: Array, block
     """
     squares = compute_block_squares(residual, block_length)
     if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1:
-        return False
+        return None
     runs = _collect_block_squares(residual, np.sqrt(input_squares), block_length)
     chance, deviation = simulate_scatter(residual, block_length)
     scaled = squares / (square + runs.mean(axis=0))
     pairs = (compute_scatter(squares), chance), (compute_scatter(scaled), _expect_scatter(square, runs, chance))
-    return any(abs(math.log(found / expected)) < CHANCE_DEVIATIONS * deviation for found, expected in pairs)
+    return min(abs(math.log(found / expected)) for found, expected in pairs) / deviation
 
 
 def simulate_scatter(residual: Residual, block_length: float) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import (
     ResidualRegression,
     describe_drift_explanation,
+    discard_unsteady_cycles,
     subtract_clock_drift,
     take_floor_from_residual,
 )
@@ -50,7 +51,7 @@ def search_forward(pool: CandidatePool) -> None:
         baseline = pool.fit((), [baseline.fit.minimum.unknowns])
     pool.noise_model.update(baseline, pool.problems.full, pool.evaluation)
     pool.noise_model.narrow_floor(baseline, pool.evaluation)
-    if pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline) or _is_explained_by_clocks(pool):
+    if _is_noise(pool, baseline) or _is_explained_by_clocks(pool):
         return
     beam = [baseline]
     for size, count in enumerate(pool.settings.shortlist_sizes, 1):
@@ -113,8 +114,23 @@ def _select_beam(pool: CandidatePool, size: int, sets: list[Candidate], parent: 
     return [c for c in sets if pool.compute_excess(c) < limit][: settings.beam_widths[size - 1]]
 
 
+def _is_noise(pool: CandidatePool, baseline: Candidate) -> bool:
+    """Return True if the baseline is so close to the noise floor that no effect is searched for.
+
+    Where what does not repeat with the cycles is not noise, the floor becomes that of high frequencies.
+    """
+    noise_model = pool.noise_model
+    if not (pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline)):
+        return False
+    block_length = pool.problems.block_length
+    if not discard_unsteady_cycles(noise_model, baseline, pool.propagate_input_noise, block_length):
+        return True
+    noise_model.update(baseline, pool.problems.full, pool.evaluation)
+    return pool.is_at_floor(baseline)
+
+
 def _is_gap_negligible(pool: CandidatePool, baseline: Candidate) -> bool:
-    """Return True if the baseline is so close to the noise floor that no effect is searched for."""
+    """Return True if the error of the baseline is within the limits of the verdict ``no_gap``."""
     fitted, held_out = pool.no_gap_limits
     return baseline.train_rmse < fitted and baseline.held_out_rmse < held_out
 

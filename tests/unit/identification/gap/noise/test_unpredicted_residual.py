@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from identification.gap.fits import Candidate
-from identification.gap.noise import ResidualRegression, take_floor_from_residual
+from identification.gap.noise import ResidualRegression, discard_unsteady_cycles, take_floor_from_residual
 from identification.gap.noise.noise_model import NoiseModel
-from identification.gap.noise.unpredicted_residual import is_stationary
+from identification.gap.noise.unpredicted_residual import CHANCE_DEVIATIONS, compare_scatter
 from identification.noise import ScaleVariance, measure_scale_variance
 from tests.support.candidate_pools import NOISE, RATE, fit_baseline
 from tests.support.noise import make_pink_noise, make_residual
@@ -183,6 +183,53 @@ def test_a_line_of_one_size_is_not_the_floor(pool):
 def test_blocks_of_slow_noise_scatter_as_those_of_simulated_noise(seed):
     """Each has few independent samples. One such residual in six was refused with the error of white noise."""
     noise, nothing = make_pink_noise(25_000, np.random.default_rng(seed)), np.zeros((8, 25_000))
-    assert is_stationary(make_residual(noise, 500.0), float(np.mean(noise**2)), nothing, 0.15)
+    found = compare_scatter(make_residual(noise, 500.0), float(np.mean(noise**2)), nothing, 0.15)
+    assert found < CHANCE_DEVIATIONS
     bursts = noise * (1.0 + 4.0 * (np.arange(len(noise)) // 500 % 16 == 0))
-    assert not is_stationary(make_residual(bursts, 500.0), float(np.mean(bursts**2)), nothing, 0.15)
+    found = compare_scatter(make_residual(bursts, 500.0), float(np.mean(bursts**2)), nothing, 0.15)
+    assert found > CHANCE_DEVIATIONS
+
+
+def test_recordings_of_different_rates_cannot_be_compared():
+    noise = make_pink_noise(2_000, np.random.default_rng(1))
+    residual = replace(make_residual(noise, 500.0), rates=((1_000, 500.0), (1_000, 250.0)))
+    assert compare_scatter(residual, 1.0, np.zeros((8, 2_000)), 0.15) is None
+
+
+def judge_cycles(pool, values, **changes):
+    """Return whether cycles are discarded with this residual of the law, and the noise model."""
+    estimate = {"noise": 1.2 * NOISE, "high_frequency": NOISE, "deviation": 0.05 * NOISE, **changes}
+    model = NoiseModel(replace(pool.noise_model.estimate, **estimate), pool.noise_model.stretches)
+    nothing = np.zeros((RUNS, len(values)))
+    law = make_candidate(pool, values)
+    return discard_unsteady_cycles(model, law, lambda candidate: nothing, pool.problems.block_length), model
+
+
+def draw_rare_bursts(pool):
+    """Noise, and bursts that do not repeat with the cycles."""
+    return draw_noise(pool) * np.where(np.arange(len(pool.evaluation.force)) % 997 < 60, 3.0, 1.0)
+
+
+def test_cycles_are_no_floor_where_what_does_not_repeat_comes_in_bursts(pool):
+    discarded, model = judge_cycles(pool, draw_rare_bursts(pool))
+
+    assert discarded
+    assert (model.noise, model.estimate.is_known) == (NOISE, False)
+    assert "stronger in some parts of the recording" in model.estimate.basis
+
+
+@pytest.mark.parametrize(
+    ("size", "changes"),
+    [
+        pytest.param(1.2, {}, id="stationary noise"),
+        pytest.param(1.2, {"deviation": None}, id="no cycles repeat"),
+    ],
+)
+def test_cycles_remain_the_floor_of_stationary_noise(pool, size, changes):
+    discarded, model = judge_cycles(pool, size * draw_noise(pool), **changes)
+    assert (discarded, model.noise) == (False, 1.2 * NOISE)
+
+
+def test_a_law_at_the_noise_of_high_frequencies_needs_no_comparison(pool):
+    discarded, _ = judge_cycles(pool, draw_rare_bursts(pool), high_frequency=2.0 * NOISE)
+    assert not discarded

@@ -12,6 +12,7 @@ from identification.gap.noise import NoiseModel
 from identification.gap.selection.neighbours import fit_extension
 from identification.gap.selection.plan import (
     _compare_with_subset,
+    _is_gap_negligible,
     _refit_law,
     _search_best_sets,
     compute_final_posterior,
@@ -19,7 +20,7 @@ from identification.gap.selection.plan import (
 )
 from identification.gap.selection.posterior import compute_complexity_penalty
 from identification.gap.selection.search_settings import QUICK_FIT, SearchSettings
-from tests.support.candidate_pools import make_pool
+from tests.support.candidate_pools import NOISE, make_pool, make_pool_of, record
 
 BOTH = frozenset({"gas_spring", "moving_mass"})
 
@@ -71,6 +72,25 @@ def test_a_recording_below_the_gap_ratio_is_not_searched():
     assert len(pool.fitted) == 1
     assert pool.noise_model.updates == [frozenset()]
     assert compute_final_posterior(pool).rank_sets()[0][0] == frozenset()
+
+
+def test_bursts_that_the_cycles_count_as_noise_are_searched_for():
+    """Their floor contains the bursts, so that the law is within the limits of a recording without a gap."""
+    recording = record()
+    place = np.arange(len(recording.stretches[0].force))
+    bursts = np.where(place % 997 < 60, 4.0 * NOISE, 0.0) * np.sin(place)
+    disturbed = replace(recording.stretches[0], force=recording.stretches[0].force + bursts)
+    pool = make_pool_of(replace(recording, stretches=(disturbed,)))
+    size = float(np.hypot(NOISE, bursts.std()))
+    pool.noise_model.estimate = replace(
+        pool.noise_model.estimate, noise=size, high_frequency=NOISE, deviation=0.1 * size, scales=()
+    )
+    assert _is_gap_negligible(pool, pool.fit_law())
+
+    search_forward(pool)
+
+    assert pool.noise_model.noise == NOISE
+    assert len(pool.fitted) > 2
 
 
 def test_each_effect_of_the_most_probable_set_has_evidence_on_held_out_samples(searched):

@@ -14,6 +14,7 @@ MODULES = {
     "rest_load": "speed.rest_load",
     "rig_load": "speed.rig_load",
     "benches": "speed.benches",
+    "workers": "speed.workers",
     "live_page": "live.page",
     "dead_bench": "live.dead_bench",
     "campaign": "live.campaign",

@@ -47,6 +47,8 @@ class NoiseModel:
     """Propagated noise of the displacement [N]; None before the first update."""
     has_certain_error: bool = False
     """True where a part of the law's residual is certainly an error of the law."""
+    has_unsteady_cycles: bool = False
+    """True where what does not repeat with the cycles is not noise."""
     _motion_draws: list[tuple[Piece, ...]] = field(default_factory=list)
 
     @property

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.gap.data import Residual, compute_block_squares
+from identification.gap.data import EvaluationData, Residual, compute_block_squares
 from identification.gap.fits import EXPLAINED_RATIO, NO_GAP_RATIO, Candidate, JointFit
 from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
@@ -54,8 +54,10 @@ def take_floor_from_residual(
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         if not noise_model.may_be_noise(candidate, regression.evaluation):
             continue
-        deviation = measure_scatter_deviation(noise_model, candidate, propagate(candidate), block_length)
-        if deviation is not None and deviation < CHANCE_DEVIATIONS:
+        # The form error of an effect may grow with the drive, so this is only tested where noise already does.
+        drive = _collect_drive(regression.evaluation) if noise_model.has_unsteady_cycles else None
+        found = _measure_deviations(noise_model, candidate, drive, propagate(candidate), block_length)
+        if found and max(found.values()) < CHANCE_DEVIATIONS:
             noise_model.estimate = noise_model.describe_residual(candidate)
             noise_model.estimate = noise_model.describe_residual(evaluate(candidate.fit))
             return True
@@ -63,16 +65,21 @@ def take_floor_from_residual(
 
 
 def discard_unsteady_cycles(
-    noise_model: NoiseModel, law: Candidate, propagate: Callable[[Candidate], Array], block_length: float
+    noise_model: NoiseModel,
+    law: Candidate,
+    evaluation: EvaluationData,
+    propagate: Callable[[Candidate], Array],
+    block_length: float,
 ) -> bool:
     """Discard the noise floor of repeated cycles if the residual of the law is not noise; return True if so.
 
     Cycles count all that does not repeat with them as noise. A cause that follows time, or a path that is no
-    multiple of the stroke, is a part of it. The size of its blocks scatters otherwise than that of noise.
+    multiple of the stroke, is a part of it. Its blocks scatter otherwise than those of noise, or follow the drive.
 
     Args:
         noise_model: its floor is replaced by the noise at high frequencies.
         law: the law without effects, within the limits of that floor.
+        evaluation: the recordings, cut into cycles.
         propagate: computes the squared change of a candidate's force by the noise of its inputs, (runs, N) [N²].
         block_length: length of a block [s], part of a stroke.
     """
@@ -80,21 +87,39 @@ def discard_unsteady_cycles(
     white = NO_GAP_RATIO * math.hypot(estimate.high_frequency, noise_model.input_noise or 0.0)
     if not estimate.is_known or max(law.train_rmse, law.held_out_rmse) < white:
         return False
-    deviation = measure_scatter_deviation(noise_model, law, propagate(law), block_length)
-    if deviation is None or deviation < CHANCE_DEVIATIONS:
+    found = _measure_deviations(noise_model, law, _collect_drive(evaluation), propagate(law), block_length)
+    reason = max(found, key=lambda name: found[name], default="")
+    if found.get(reason, 0.0) < CHANCE_DEVIATIONS:
         return False
+    noise_model.has_unsteady_cycles = True
     noise_model.estimate = estimate.discard_cycles(
-        "what does not repeat with the cycles is not noise, because it is stronger in some parts of the recording"
+        f"what does not repeat with the cycles is not noise, because it {reason}"
     )
     return True
 
 
-def measure_scatter_deviation(
-    noise_model: NoiseModel, candidate: Candidate, input_squares: Array, block_length: float
-) -> float | None:
-    """Return the deviation of `compare_scatter` for the residual of a candidate, if all of it is noise."""
-    square = noise_model.describe_residual(candidate).noise ** 2
-    return compare_scatter(candidate.residual, square, input_squares, block_length)
+def _collect_drive(evaluation: EvaluationData) -> Array:
+    """Return the drive of each sample (N,) [V or A]."""
+    return np.concatenate([p.excitation.sampled_drive for p in evaluation.pieces])
+
+
+def _measure_deviations(
+    noise_model: NoiseModel, candidate: Candidate, drive: Array | None, input_squares: Array, block_length: float
+) -> dict[str, float]:
+    """Return by how many standard deviations a residual differs from noise, by the difference in words.
+
+    It is empty where blocks cannot be compared.
+    """
+    residual, square = candidate.residual, noise_model.describe_residual(candidate).noise ** 2
+    found = {
+        "is stronger in some parts of the recording": compare_scatter(
+            residual, square, input_squares, block_length
+        )
+    }
+    if drive is not None:
+        by_drive = compare_with_drive(residual, drive, square, input_squares, block_length)
+        found["grows or falls with the drive"] = by_drive
+    return {name: value for name, value in found.items() if value is not None}
 
 
 def compare_scatter(residual: Residual, square: float, input_squares: Array, block_length: float) -> float | None:
@@ -119,6 +144,34 @@ def compare_scatter(residual: Residual, square: float, input_squares: Array, blo
     scaled = squares / (square + runs.mean(axis=0))
     pairs = (compute_scatter(squares), chance), (compute_scatter(scaled), _expect_scatter(square, runs, chance))
     return min(abs(math.log(found / expected)) for found, expected in pairs) / deviation
+
+
+def compare_with_drive(
+    residual: Residual, drive: Array, square: float, input_squares: Array, block_length: float
+) -> float | None:
+    """Return by how much the mean square of blocks follows the drive, more than that of noise does.
+
+    The unit is the standard deviation of that in noise of the same spectrum. The noise of the displacement follows
+    the drive, because it makes the force steep, so blocks may also follow it less than expected of that noise. The
+    result is None where blocks or drives cannot be compared.
+
+    Args:
+        residual: residual of a model.
+        drive: drive of each sample (N,) [V or A].
+        square: mean square of the noise of the force, if the residual is noise [N²].
+        input_squares: squared change of the force by the noise of the inputs, (runs, N) [N²].
+        block_length: length of a block [s].
+    """
+    squares = compute_block_squares(residual, block_length)
+    levels = np.sqrt(compute_block_squares(replace(residual, values=drive), block_length))
+    if len(squares) < 2 or len({rate for _, rate in residual.rates}) != 1 or not np.ptp(levels) > 0.0:
+        return None
+    centred = levels - levels.mean()
+    noise = _collect_block_squares(residual, simulate_noise(residual, _NOISE_DRAWS).T, block_length)
+    by_chance = noise @ centred / noise.mean(axis=1)
+    expected = square + _collect_block_squares(residual, np.sqrt(input_squares), block_length).mean(axis=0)
+    found = [float(values @ centred / values.mean()) for values in (squares, squares / expected)]
+    return min(map(abs, found)) / math.sqrt(float(np.mean(by_chance**2)))
 
 
 def simulate_scatter(residual: Residual, block_length: float) -> tuple[float, float]:

@@ -122,8 +122,9 @@ def _is_noise(pool: CandidatePool, baseline: Candidate) -> bool:
     noise_model = pool.noise_model
     if not (pool.is_at_floor(baseline) or _is_gap_negligible(pool, baseline)):
         return False
-    block_length = pool.problems.block_length
-    if not discard_unsteady_cycles(noise_model, baseline, pool.propagate_input_noise, block_length):
+    if not discard_unsteady_cycles(
+        noise_model, baseline, pool.evaluation, pool.propagate_input_noise, pool.problems.block_length
+    ):
         return True
     noise_model.update(baseline, pool.problems.full, pool.evaluation)
     return pool.is_at_floor(baseline)

@@ -8,7 +8,7 @@ import pytest
 from identification.gap.fits import Candidate
 from identification.gap.noise import ResidualRegression, discard_unsteady_cycles, take_floor_from_residual
 from identification.gap.noise.noise_model import NoiseModel
-from identification.gap.noise.unpredicted_residual import CHANCE_DEVIATIONS, compare_scatter
+from identification.gap.noise.unpredicted_residual import CHANCE_DEVIATIONS, compare_scatter, compare_with_drive
 from identification.noise import ScaleVariance, measure_scale_variance
 from tests.support.candidate_pools import NOISE, RATE, fit_baseline
 from tests.support.noise import make_pink_noise, make_residual
@@ -42,14 +42,14 @@ def make_candidate(pool, values, *names):
     return candidate
 
 
-def settle(pool, *candidates, input_squares=0.0, **changes):
+def settle(pool, *candidates, input_squares=0.0, unsteady=False, **changes):
     """Return the noise model after candidates with unknown floor, or with a changed estimate."""
     propagated = np.broadcast_to(input_squares, (RUNS, len(pool.evaluation.force)))
     estimate = replace(pool.noise_model.estimate, **{
         "noise": BOUND, "high_frequency": BOUND, "cycle_to_cycle": None, "deviation": None, "scales": (),
         **changes,
     })  # fmt: skip
-    model = NoiseModel(estimate, pool.noise_model.stretches)
+    model = NoiseModel(estimate, pool.noise_model.stretches, has_unsteady_cycles=unsteady)
     model.input_noise = float(np.sqrt(np.mean(propagated)))
     regression = ResidualRegression(pool.evaluation, model.floor)
     take_floor_from_residual(
@@ -201,8 +201,12 @@ def judge_cycles(pool, values, **changes):
     estimate = {"noise": 1.2 * NOISE, "high_frequency": NOISE, "deviation": 0.05 * NOISE, **changes}
     model = NoiseModel(replace(pool.noise_model.estimate, **estimate), pool.noise_model.stretches)
     nothing = np.zeros((RUNS, len(values)))
-    law = make_candidate(pool, values)
-    return discard_unsteady_cycles(model, law, lambda candidate: nothing, pool.problems.block_length), model
+    law, length = make_candidate(pool, values), pool.problems.block_length
+    return discard_unsteady_cycles(model, law, pool.evaluation, lambda candidate: nothing, length), model
+
+
+def find_drive(pool):
+    return np.concatenate([p.excitation.sampled_drive for p in pool.evaluation.pieces])
 
 
 def draw_rare_bursts(pool):
@@ -216,6 +220,42 @@ def test_cycles_are_no_floor_where_what_does_not_repeat_comes_in_bursts(pool):
     assert discarded
     assert (model.noise, model.estimate.is_known) == (NOISE, False)
     assert "stronger in some parts of the recording" in model.estimate.basis
+
+
+def draw_line(pool):
+    """A line in proportion to the drive, at no multiple of the stroke's frequency."""
+    time = np.arange(len(pool.evaluation.force)) / RATE
+    return 4.0 * NOISE * find_drive(pool) * np.sin(2.0 * np.pi * 13.7 * time)
+
+
+def test_cycles_are_no_floor_where_a_line_that_does_not_repeat_grows_with_the_drive(pool):
+    """Its blocks hardly scatter more than those of noise with such a line."""
+    discarded, model = judge_cycles(pool, draw_noise(pool) + draw_line(pool))
+    assert discarded
+    assert "grows or falls with the drive" in model.estimate.basis
+
+
+@pytest.mark.parametrize("unsteady", [True, False])
+def test_a_line_that_grows_with_the_drive_is_not_the_floor_after_cycles_were_discarded(pool, unsteady):
+    """Else it may be a form error of an effect, which also grows with the drive."""
+    candidate = make_candidate(pool, draw_noise(pool) + draw_line(pool))
+    assert settle(pool, candidate, unsteady=unsteady).estimate.is_known is not unsteady
+
+
+def test_noise_of_the_displacement_may_grow_with_the_drive(pool):
+    """A force that the drive makes steep shows more of it."""
+    drive, random = find_drive(pool), np.random.default_rng(6)
+    runs = 8.0 * NOISE * drive * random.standard_normal((RUNS, len(drive)))
+    residual = make_candidate(
+        pool, draw_noise(pool) + 8.0 * NOISE * drive * random.standard_normal(len(drive))
+    ).residual
+    nothing = np.zeros_like(runs)
+
+    def compare(squares):
+        return compare_with_drive(residual, drive, NOISE**2, squares, pool.problems.block_length)
+
+    assert compare(nothing) > CHANCE_DEVIATIONS > compare(runs**2)
+    assert compare_with_drive(residual, np.ones_like(drive), NOISE**2, nothing, pool.problems.block_length) is None
 
 
 @pytest.mark.parametrize(

@@ -81,9 +81,11 @@ class Gap(Document):
     noise_floor_n: float = Field(description="noise of the recorded force, in N, the same for both")
     noise_floor_ci95: tuple[float, float] | None = Field(
         default=None,
-        description="95 % interval of that noise, in N; where no cycles repeat, its lower bound and `after_n`",
+        description="95 % interval of that noise, in N; where no cycles show it, its lower bound and `after_n`",
     )
-    floor_known: bool = Field(default=True, description="false where no cycles repeat, so that it is only bounded")
+    floor_known: bool = Field(
+        default=True, description="false where no cycles show it, so that it is only bounded"
+    )
     shrinkage: float | None = Field(
         description="1 - (after² - floor²)/(before² - floor²); null where before is within 2 % of the floor"
     )

@@ -228,7 +228,9 @@ class ReportBuilder:
     ) -> Gap:
         no_gap = verdict == "no_gap"
         noise = self.pool.noise_model.estimate_noise(named)
-        low, high = self.dataset.floor.get_interval(shrinkage.after)
+        discarded = self.pool.noise_model.has_unsteady_cycles
+        floor = self.pool.noise_model.estimate if discarded else self.dataset.floor
+        low, high = floor.get_interval(shrinkage.after)
         return Gap(
             before_n=shrinkage.before,
             after_n=shrinkage.after,
@@ -236,7 +238,7 @@ class ReportBuilder:
             explainable_n=self._find_explainable_rmse(named, noise),
             noise_floor_n=noise,
             noise_floor_ci95=(min(low, noise), max(high, noise)),
-            floor_known=self.dataset.floor.is_known,
+            floor_known=floor.is_known and not discarded,
             shrinkage=None if no_gap else shrinkage.value,
             shrinkage_ci95=None if no_gap else shrinkage.ci95,
             nominal_n=self._compute_nominal_rmse(),

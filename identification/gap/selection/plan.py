@@ -126,6 +126,7 @@ def _is_noise(pool: CandidatePool, baseline: Candidate) -> bool:
         noise_model, baseline, pool.evaluation, pool.propagate_input_noise, pool.problems.block_length
     ):
         return True
+    pool.notes.append(f"the noise floor is that at {noise_model.estimate.basis}")
     noise_model.update(baseline, pool.problems.full, pool.evaluation)
     return pool.is_at_floor(baseline)
 

@@ -116,7 +116,7 @@ function describeGap({ gap, effects, probability, alternatives, unknown_probabil
   const floor = gap.noise_floor_ci95 ? ` (95 % interval ${inForceUnit(gap.noise_floor_ci95[0])} to ${forceText(gap.noise_floor_ci95[1])})` : "";
   return {
     ...(effects.length && { "Gap closed on unseen strokes": [shrinkage] }),
-    "Noise floor": [forceText(gap.noise_floor_n) + floor, gap.floor_known === false ? element("small", {}, "Only bounded, because no cycles repeat.") : null],
+    "Noise floor": [forceText(gap.noise_floor_n) + floor, gap.floor_known === false ? element("small", {}, "Only bounded, because no cycles show it.") : null],
     "Probability of each set of effects": sets.map((text) => element("span", { className: "line" }, text)),
   };
 }

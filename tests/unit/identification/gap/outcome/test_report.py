@@ -48,7 +48,9 @@ def make_builder(
         SPRING: make_candidate(SPRING, named, named, named * FLOOR),
     }
     noise_model = SimpleNamespace(
-        estimate_noise=lambda candidate: 1.9, sample_other_runs=lambda candidate, problem: np.ones((3, 8))
+        estimate_noise=lambda candidate: 1.9,
+        sample_other_runs=lambda candidate, problem: np.ones((3, 8)),
+        has_unsteady_cycles=False,
     )
     pool = SimpleNamespace(
         baseline=candidates[NONE],
@@ -145,6 +147,15 @@ def test_the_gap_of_noise_has_no_shrinkage():
     assert (gap.noise_floor_ci95, gap.floor_known) == (pytest.approx((1.9, 2.098)), True)
     gap = builder._build_gap("no_gap", named, shrinkage, None)
     assert (gap.shrinkage, gap.shrinkage_ci95) == (None, None)
+
+
+def test_the_floor_is_only_bounded_where_what_does_not_repeat_with_the_cycles_is_not_noise():
+    builder = make_builder()
+    model = builder.pool.noise_model
+    model.has_unsteady_cycles, model.estimate = True, NoiseFloorEstimate(1.5, 1.9, 1.5, "high frequency")
+    object.__setattr__(builder, "regression", SimpleNamespace(find_explainable_rmse=lambda sets, noise: 1.9))
+    gap = builder._build_gap("unexplained", builder.pool.baseline, Shrinkage(6.0, 6.0, 0.0, (0.0, 0.0)), None)
+    assert (gap.noise_floor_ci95, gap.floor_known) == ((1.5, 6.0), False)
 
 
 def test_a_given_simulation_is_compared_on_the_held_out_cycles():

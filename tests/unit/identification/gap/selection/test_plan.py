@@ -90,6 +90,7 @@ def test_bursts_that_the_cycles_count_as_noise_are_searched_for():
     search_forward(pool)
 
     assert pool.noise_model.noise == NOISE
+    assert "what does not repeat with the cycles is not noise" in pool.notes[0]
     assert len(pool.fitted) > 2
 
 

@@ -33,13 +33,13 @@ from benchmarks.common import print_line
 from benchmarks.speed.overlay import get, serve, wait_for
 
 REAL_WORKERS, REAL_LOGS = (1, 2), 4
-"""Numbers of workers, and logs of about a minute, of real jobs."""
+"""Numbers of workers, and logs of the method, of real jobs."""
 WAITING_WORKERS, WAITING_LOGS = (2, 4, 8, 16), 8
 """Numbers of workers, and short logs for each worker, of jobs that only wait."""
 WAIT = 2.0
 """Duration of a waiting job [s]; a real one takes longer."""
 REQUIRED = 0.85
-METHOD = "paper_sines"
+METHOD = "quick"
 _SUMMARY: ResultSummary = {
     "verdict": "no_gap", "effects": [], "probability": 1.0, "before_n": 1.0, "after_n": 1.0, "noise_floor_n": 1.0,
     "shrinkage": None, "shrinkage_ci95": None, "explanation": "",
@@ -155,7 +155,7 @@ def _parse(moment: str) -> float:
 
 
 def _record_log(log: Path, number: int) -> None:
-    """Record a run of a minute on the simulated rig; each has its own noise."""
+    """Record a run on the simulated rig; each has its own noise."""
     identity = Identity("", "", _STARTED + timedelta(minutes=number))
     run_from_plant(load_method(METHOD), "default", log, identity, seed=number + 1)
 

@@ -57,7 +57,7 @@ def run() -> None:
         durations = {n: _measure_duration(jobs, n) for n, jobs in real.items()}
         print(f"workers: {2 * REAL_LOGS} real jobs, identification and diagnosis of {METHOD}")
         for count, duration in durations.items():
-            print(f"  {count} workers: {duration:.1f} s")
+            print(f"  with {count}: {duration:.1f} s")
         print_line("  share of linear, 2 workers", durations[1] / (2.0 * durations[2]), "", f">= {REQUIRED}")
         print(f"workers: jobs that wait {WAIT:g} s")
         for count in WAITING_WORKERS:

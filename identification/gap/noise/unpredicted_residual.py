@@ -54,7 +54,7 @@ def take_floor_from_residual(
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         if not noise_model.may_be_noise(candidate, regression.evaluation):
             continue
-        # The form error of an effect may grow with the drive, so this is only tested where noise already does.
+        # The form error of an effect may grow with the drive, too, so cycles that show the noise suffice.
         drive = _collect_drive(regression.evaluation) if noise_model.has_unsteady_cycles else None
         found = _measure_deviations(noise_model, candidate, drive, propagate(candidate), block_length)
         if found and max(found.values()) < CHANCE_DEVIATIONS:
@@ -112,9 +112,7 @@ def _measure_deviations(
     """
     residual, square = candidate.residual, noise_model.describe_residual(candidate).noise ** 2
     found = {
-        "is stronger in some parts of the recording": compare_scatter(
-            residual, square, input_squares, block_length
-        )
+        "changes in size otherwise than noise": compare_scatter(residual, square, input_squares, block_length)
     }
     if drive is not None:
         by_drive = compare_with_drive(residual, drive, square, input_squares, block_length)

@@ -219,7 +219,7 @@ def test_cycles_are_no_floor_where_what_does_not_repeat_comes_in_bursts(pool):
 
     assert discarded
     assert (model.noise, model.estimate.is_known) == (NOISE, False)
-    assert "stronger in some parts of the recording" in model.estimate.basis
+    assert "changes in size otherwise than noise" in model.estimate.basis
 
 
 def draw_line(pool):

@@ -78,6 +78,11 @@ class EvaluationData:
         """(N,) recorded force [N]."""
         return np.concatenate([p.force for p in self.pieces])
 
+    @cached_property
+    def drive(self) -> Array:
+        """(N,) drive [V or A]."""
+        return np.concatenate([p.excitation.sampled_drive for p in self.pieces])
+
     def make_fit_masks(self) -> list[Array]:
         """Return a mask (N,) for each piece: 1.0 where a sample is fitted."""
         return [part.astype(float) for part in split_by_piece(self.fitted_samples, self.pieces)]

@@ -55,7 +55,7 @@ def take_floor_from_residual(
         if not noise_model.may_be_noise(candidate, regression.evaluation):
             continue
         # The form error of an effect may grow with the drive, too, so cycles that show the noise suffice.
-        drive = _collect_drive(regression.evaluation) if noise_model.has_unsteady_cycles else None
+        drive = regression.evaluation.drive if noise_model.has_unsteady_cycles else None
         found = _measure_deviations(noise_model, candidate, drive, propagate(candidate), block_length)
         if found and max(found.values()) < CHANCE_DEVIATIONS:
             noise_model.estimate = noise_model.describe_residual(candidate)
@@ -87,7 +87,7 @@ def discard_unsteady_cycles(
     white = NO_GAP_RATIO * math.hypot(estimate.high_frequency, noise_model.input_noise or 0.0)
     if not estimate.is_known or max(law.train_rmse, law.held_out_rmse) < white:
         return False
-    found = _measure_deviations(noise_model, law, _collect_drive(evaluation), propagate(law), block_length)
+    found = _measure_deviations(noise_model, law, evaluation.drive, propagate(law), block_length)
     reason = max(found, key=lambda name: found[name], default="")
     if found.get(reason, 0.0) < CHANCE_DEVIATIONS:
         return False
@@ -96,11 +96,6 @@ def discard_unsteady_cycles(
         f"what does not repeat with the cycles is not noise, because it {reason}"
     )
     return True
-
-
-def _collect_drive(evaluation: EvaluationData) -> Array:
-    """Return the drive of each sample (N,) [V or A]."""
-    return np.concatenate([p.excitation.sampled_drive for p in evaluation.pieces])
 
 
 def _measure_deviations(

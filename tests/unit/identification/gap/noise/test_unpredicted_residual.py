@@ -205,10 +205,6 @@ def judge_cycles(pool, values, **changes):
     return discard_unsteady_cycles(model, law, pool.evaluation, lambda candidate: nothing, length), model
 
 
-def find_drive(pool):
-    return np.concatenate([p.excitation.sampled_drive for p in pool.evaluation.pieces])
-
-
 def draw_rare_bursts(pool):
     """Noise, and bursts that do not repeat with the cycles."""
     return draw_noise(pool) * np.where(np.arange(len(pool.evaluation.force)) % 997 < 60, 3.0, 1.0)
@@ -225,7 +221,7 @@ def test_cycles_are_no_floor_where_what_does_not_repeat_comes_in_bursts(pool):
 def draw_line(pool):
     """A line in proportion to the drive, at no multiple of the stroke's frequency."""
     time = np.arange(len(pool.evaluation.force)) / RATE
-    return 4.0 * NOISE * find_drive(pool) * np.sin(2.0 * np.pi * 13.7 * time)
+    return 4.0 * NOISE * pool.evaluation.drive * np.sin(2.0 * np.pi * 13.7 * time)
 
 
 def test_cycles_are_no_floor_where_a_line_that_does_not_repeat_grows_with_the_drive(pool):
@@ -244,7 +240,7 @@ def test_a_line_that_grows_with_the_drive_is_not_the_floor_after_cycles_were_dis
 
 def test_noise_of_the_displacement_may_grow_with_the_drive(pool):
     """A force that the drive makes steep shows more of it."""
-    drive, random = find_drive(pool), np.random.default_rng(6)
+    drive, random = pool.evaluation.drive, np.random.default_rng(6)
     runs = 8.0 * NOISE * drive * random.standard_normal((RUNS, len(drive)))
     residual = make_candidate(
         pool, draw_noise(pool) + 8.0 * NOISE * drive * random.standard_normal(len(drive))

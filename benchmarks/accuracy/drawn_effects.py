@@ -170,12 +170,14 @@ def _add_effects(
 
 def measure_size(force: Array, stroke: Excitation) -> DamperSize:
     """Return the size of a damper from its force (N,) [N] and motion."""
+    duration = len(force) / stroke.rate
     return DamperSize(
         float(np.std(force)),
         0.5 * float(np.ptp(stroke.displacement)),
         float(np.abs(stroke.velocity).max()),
         float(np.abs(stroke.drive).max()),
-        len(force) / stroke.rate,
+        duration,
+        duration,
     )
 
 

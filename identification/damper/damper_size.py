@@ -27,28 +27,33 @@ class DamperSize(NamedTuple):
     """Highest drive [V or A]."""
     observation_time: float
     """Time over which slow changes are observed [s]."""
+    recording_time: float
+    """Time of the last recorded sample since the start of its run [s]."""
 
 
-LIBRARY_SIZE = DamperSize(500.0, 0.015, 0.15, 1.0, 100.0)
+LIBRARY_SIZE = DamperSize(500.0, 0.015, 0.15, 1.0, 100.0, 100.0)
 """Size for which the library of effects states its values."""
-SMALLEST_SIZE = DamperSize(5.0, 5e-4, 1e-3, 1e-2, 1.0)
+SMALLEST_SIZE = DamperSize(5.0, 5e-4, 1e-3, 1e-2, 1.0, 0.1)
 """Smallest admitted size."""
-LARGEST_SIZE = DamperSize(5e5, 1.0, 10.0, 100.0, 1e5)
+LARGEST_SIZE = DamperSize(5e5, 1.0, 10.0, 100.0, 1e5, 1e5)
 """Largest admitted size."""
 _DIMENSIONS = {
-    # Exponents of newton, metre, second, drive and observation.
-    "1": (0, 0, 0, 0, 0),
-    "N": (1, 0, 0, 0, 0),
-    "m": (0, 1, 0, 0, 0),
-    "s": (0, 0, 1, 0, 0),
-    "{drive}": (0, 0, 0, 1, 0),
-    "{observation}": (0, 0, 0, 0, 1),
-    "Hz": (0, 0, -1, 0, 0),
-    "J": (1, 1, 0, 0, 0),
-    "kg": (1, -1, 2, 0, 0),
+    # Exponents of newton, metre, second, drive, observation and recording.
+    "1": (0, 0, 0, 0, 0, 0),
+    "N": (1, 0, 0, 0, 0, 0),
+    "m": (0, 1, 0, 0, 0, 0),
+    "s": (0, 0, 1, 0, 0, 0),
+    "{drive}": (0, 0, 0, 1, 0, 0),
+    "{observation}": (0, 0, 0, 0, 1, 0),
+    "{recording}": (0, 0, 0, 0, 0, 1),
+    "Hz": (0, 0, -1, 0, 0, 0),
+    "J": (1, 1, 0, 0, 0, 0),
+    "kg": (1, -1, 2, 0, 0, 0),
 }
 SLOW_TIME = "{observation}"
 """Scaling of a quantity in seconds that belongs to a slow change."""
+RECORDING_TIME = "{recording}"
+"""Scaling of a quantity in seconds that is known from the recording."""
 
 
 def compute_scale_factor(unit: str, size: DamperSize) -> float:
@@ -57,12 +62,13 @@ def compute_scale_factor(unit: str, size: DamperSize) -> float:
     Raises:
         KeyError: the unit contains a symbol without a dimension.
     """
-    force, length, time, drive, observation = _parse_dimension(unit)
+    force, length, time, drive, observation, recording = _parse_dimension(unit)
     # Only with a length or a force does a time follow the motion.
     time = time if force or length else 0
     ratio = DamperSize(*(a / b for a, b in zip(size, LIBRARY_SIZE, strict=True)))
     motion = ratio.force**force * ratio.length ** (length + time) * ratio.velocity**-time
-    return float(motion * ratio.drive**drive * ratio.observation_time**observation)
+    slow = ratio.observation_time**observation * ratio.recording_time**recording
+    return float(motion * ratio.drive**drive * slow)
 
 
 def scale_quantity(quantity: Quantity, size: DamperSize) -> Quantity:

@@ -16,7 +16,7 @@ class Quantity(NamedTuple):
     low: float
     """Smallest value that any damper may have, in ``unit``; a fit searches a narrower range."""
     high: float
-    """Largest value that any damper may have, in ``unit``."""
+    """Largest value that any damper may have, in ``unit``; a value with equal limits is known and not fitted."""
     scale: float
     """Usual magnitude in a laboratory damper, in ``unit``: the size of a change of order one."""
     meaning: str

@@ -37,13 +37,13 @@ class RecordingScales:
     sampling_rate: float
     """Highest sampling rate [Hz]."""
     duration: float
-    """Length of the longest stretch [s]."""
+    """Time of the end of the last fitted sample since the start of its run [s]."""
 
     @property
     def damper_size(self) -> DamperSize:
         """Size of the damper, by which the ranges of effects are scaled."""
         observation_time = max(self.duration, _SLOW_ANGLE / self.rate)
-        return DamperSize(self.force, self.length, self.velocity, self.drive, observation_time)
+        return DamperSize(self.force, self.length, self.velocity, self.drive, observation_time, self.duration)
 
     @property
     def rate(self) -> float:
@@ -78,5 +78,5 @@ def measure_scales(pieces: Sequence[Piece]) -> RecordingScales:
         velocity=max(float(np.quantile(speed, _PEAK_QUANTILE)), _SMALLEST),
         drive=float(max(np.abs(p.excitation.drive[used]).max() for p, used in fitted)) or 1.0,
         sampling_rate=max(p.excitation.rate for p in pieces),
-        duration=max(len(p.force) / p.excitation.rate for p, _ in fitted),
+        duration=max(float(p.excitation.time[used][-1]) + 1.0 / p.excitation.rate for p, used in fitted),
     )

@@ -51,8 +51,8 @@ _CHOSEN: dict[str, dict[str, tuple[float, ...]]] = {
     "force_delay": {"pure_delay": (0.0021,)},
     "force_drift": {
         "settling": (12.0, 20.0),
-        "sinusoidal": (8.0, -4.0, 60.0),
-        "harmonic": (8.0, -4.0, 3.0, 2.0, -2.0, 1.0, 1.0, -1.0, 0.5, 1.0, -0.5, 0.5, 70.0),
+        "sinusoidal": (8.0, -4.0, 60.0, 100.0),
+        "harmonic": (8.0, -4.0, 3.0, 2.0, -2.0, 1.0, 1.0, -1.0, 0.5, 1.0, -0.5, 0.5, 70.0, 100.0),
     },
     "mains_hum": {"fundamental": (4.0, 3.0, 50.02), "third_harmonic": (4.0, 3.0, 1.0, -2.0, 50.02)},
     "displacement_nonlinearity": {

@@ -40,8 +40,11 @@ FORMER_PARAMETERS: dict[str, dict[str, str]] = {
 }
 """Present name of a parameter by effect and former name."""
 
-ADDED_PARAMETERS: dict[str, dict[str, float]] = {"magnetic_remanence": {"initial_rise": 1.0}}
-"""Parameters that older documents lack, by effect, with the value that they assumed."""
+ADDED_PARAMETERS: dict[str, dict[str, tuple[frozenset[str], float]]] = {
+    "force_drift": {"end": (frozenset({"period"}), 1e5)},
+    "magnetic_remanence": {"initial_rise": (frozenset({"residue", "share"}), 1.0)},
+}
+"""Parameters that older documents lack, by effect: one parameter of each of their forms, and the assumed value."""
 
 
 def rename_form(effect: str, name: str) -> str:
@@ -60,4 +63,5 @@ def rename_parameters(effect: str, values: Mapping[str, float]) -> dict[str, flo
     if len(renamed) < len(values):
         twice = ", ".join(f"{old} and {new}" for old, new in former.items() if old in values and new in values)
         raise ValueError(f"{effect} has a parameter under its former and its present name: {twice}; keep one")
-    return {**ADDED_PARAMETERS.get(effect, {}), **renamed}
+    added = ADDED_PARAMETERS.get(effect, {}).items()
+    return {**{name: value for name, (beside, value) in added if beside & renamed.keys()}, **renamed}

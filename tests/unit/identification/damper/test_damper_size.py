@@ -5,6 +5,7 @@ import pytest
 from identification.damper.damper_size import (
     LARGEST_SIZE,
     LIBRARY_SIZE,
+    RECORDING_TIME,
     SLOW_TIME,
     SMALLEST_SIZE,
     DamperSize,
@@ -15,8 +16,8 @@ from identification.damper.damper_size import (
 from identification.damper.effects import EFFECTS
 from identification.damper.parameters import Quantity
 
-FORCE, LENGTH, VELOCITY, DRIVE, OBSERVATION = 100.0, 4.0, 2.0, 5.0, 3.0
-FACTORS = FORCE, LENGTH, VELOCITY, DRIVE, OBSERVATION
+FORCE, LENGTH, VELOCITY, DRIVE, OBSERVATION, RECORDING = 100.0, 4.0, 2.0, 5.0, 3.0, 7.0
+FACTORS = FORCE, LENGTH, VELOCITY, DRIVE, OBSERVATION, RECORDING
 LARGER = DamperSize(*(v * f for v, f in zip(LIBRARY_SIZE, FACTORS, strict=True)))
 QUANTITIES = [
     pytest.param(q, id=f"{effect.name}-{form.name}-{q.symbol}")
@@ -32,6 +33,7 @@ QUANTITIES = [
         ("1", 1.0),
         ("s", 1.0),  # electronics do not grow with the damper
         (SLOW_TIME, OBSERVATION),
+        (RECORDING_TIME, RECORDING),
         ("Hz", 1.0),
         ("N", FORCE),
         ("m", LENGTH),

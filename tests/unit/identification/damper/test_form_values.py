@@ -51,9 +51,11 @@ CASES = [
     ("fixture_compliance", "stiffening", (1e-6, 1e7), (1e-6, 0.0, 1e7, 0.0, 0.0)),
     ("fixture_compliance", "closing_joint", (1e-6, 100.0, 2.0), (5e-7, 2e-4, 0.0, 0.0, 0.5)),
     ("force_drift", "settling", (20.0, 0.3, 5.0, 10.0), 5.0 * (1.0 - E2)),
-    ("force_drift", "sinusoidal", (5.0, 0.3, 8.0, -4.0, 60.0), 8.0 * COS30 - 2.0),
+    ("force_drift", "sinusoidal", (5.0, 0.3, 8.0, -4.0, 60.0, 5.0), 8.0 * COS30 - 2.0),
+    ("force_drift", "sinusoidal", (7.0, 0.3, 8.0, -4.0, 60.0, 5.0), 8.0 * COS30 - 2.0),
     # A twelfth of the period: the angles are multiples of 30 degrees.
-    ("force_drift", "harmonic", (10.0, 0.3, *range(1, 13), 120.0), 4.0 * COS30 - 1.0),
+    ("force_drift", "harmonic", (10.0, 0.3, *range(1, 13), 120.0, 10.0), 4.0 * COS30 - 1.0),
+    ("force_drift", "harmonic", (11.0, 0.3, *range(1, 13), 120.0, 10.0), 4.0 * COS30 - 1.0),
     ("gas_spring", "polytropic", (-0.025, 0.0, 90.0, 0.05), -131.605994),
     ("gas_spring", "polytropic", (-0.05, 0.0, 90.0, 0.05), -90.0 * (161.6817516 - 1.0)),
     ("gas_spring", "polytropic_reversed", (0.025, 0.0, 90.0, 0.05), 131.605994),

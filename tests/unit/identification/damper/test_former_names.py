@@ -61,6 +61,11 @@ def test_present_names_stay(effect):
         assert rename_parameters(effect, values) == values
 
 
+def test_waves_of_older_documents_continue_after_their_recording():
+    assert rename_parameters("force_drift", {"cosine": 1.0, "period": 50.0})["end"] == 1e5
+    assert "end" not in rename_parameters("force_drift", {"change": 1.0, "duration": 50.0})
+
+
 def test_an_old_twin_is_read_and_written_with_the_present_names(tmp_path):
     twin = tmp_path / "twin.json"
     twin.write_text(old_document())

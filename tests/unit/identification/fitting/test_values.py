@@ -210,6 +210,16 @@ def test_scales_are_those_of_the_fitted_samples():
     )
 
 
+def test_a_drift_is_held_after_the_last_fitted_sample_of_the_run():
+    late = replace(SLIDING_STROKES[0], start=20.0)
+    used = (np.arange(6000) < 3000).astype(float)
+    scales = measure_scales([SLIDING[1], replace(piece_of(late), train=used)])
+    model = EffectModel(EFFECTS["force_drift"], "harmonic", scales.damper_size)
+    low, high = model.get_bounds()
+    assert scales.duration == pytest.approx(23.0)
+    assert (np.exp(low[-1]), np.exp(high[-1])) == pytest.approx((23.0, 23.0))
+
+
 def test_the_scales_of_a_recording_at_rest_can_be_divided_by():
     rest = replace(SHORT, displacement=0.0 * SHORT.displacement, velocity=0.0 * SHORT.velocity)
     scales = measure_scales([piece_of(rest)])

@@ -19,7 +19,7 @@ def make_problem(pieces=1):
     return SimpleNamespace(pieces=(piece,) * pieces)
 
 
-def make_fit(name="force_drift", form="sinusoidal", values=(3.0, 0.0, 30.0)):
+def make_fit(name="force_drift", form="sinusoidal", values=(3.0, 0.0, 30.0, 1e5)):
     return SimpleNamespace(active_effects=(ActiveEffect(EFFECTS[name], values, form),))
 
 
@@ -35,7 +35,7 @@ def test_a_drift_that_exceeds_slow_noise_is_an_effect():
 
 def test_a_drift_with_faster_waves_may_contain_more_noise():
     """Both have a variance of 4.5, of which noise explains 10 for each factor e of the frequency."""
-    slow, fast = make_fit(values=(3.0, 0.0, 60.0)), make_fit(values=(3.0, 0.0, 5.0))
+    slow, fast = make_fit(values=(3.0, 0.0, 60.0, 1e5)), make_fit(values=(3.0, 0.0, 5.0, 1e5))
     assert not compute_noise_drift(slow, make_problem(), 0.3).any()
     assert compute_noise_drift(fast, make_problem(), 0.3).any()
 

@@ -58,5 +58,5 @@ def test_one_of_several_sizes_at_its_bound_is_enough():
 @pytest.mark.parametrize(("period", "weight"), [(33.0, 1.0), (31.0, 0.03)])
 def test_a_quarter_of_the_period_of_a_slow_drift_lasts_eight_seconds(period, weight):
     effect = EFFECTS["force_drift"]
-    values = (1.0, 1.0, period)
+    values = (1.0, 1.0, period, 100.0)
     assert compute_size_weight(ActiveEffect(effect, values, "sinusoidal"), DISPLACEMENT) == weight

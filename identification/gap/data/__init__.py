@@ -20,7 +20,7 @@ from identification.gap.data.residual_map import (
     map_gap,
 )
 from identification.gap.data.scale_excess import estimate_scale_excess, measure_residual_scales
-from identification.gap.data.shrinkage import NEAR_FLOOR_RATIO, Shrinkage
+from identification.gap.data.shrinkage import NEAR_FLOOR_RATIO, Shrinkage, extend_to_other_strokes
 
 __all__ = [
     "NEAR_FLOOR_RATIO",
@@ -43,6 +43,7 @@ __all__ = [
     "estimate_drift",
     "estimate_repeated_residual",
     "estimate_scale_excess",
+    "extend_to_other_strokes",
     "find_strongest_line",
     "map_gap",
     "measure_residual_scales",

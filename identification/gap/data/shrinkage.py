@@ -1,7 +1,7 @@
 """Shrinkage of the gap by named effects, as it is expected on another run of the same damper."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,17 @@ _MIN_GAP_SHARE = 1e-2
 """Smallest gap by which others are divided, relative to the variance of the noise."""
 
 
+class RemainingGap(NamedTuple):
+    """Parts of the gap that remain on other runs, as they were drawn; each array is (draws,)."""
+
+    form_error: Array
+    """Part of the gap that the effects do not describe [1]."""
+    input_noise: Array
+    """Part that the noise of the motion adds [1]."""
+    noise: float
+    """Standard deviation of the noise in the recorded force [N]."""
+
+
 @dataclass(frozen=True)
 class Shrinkage:
     """Shrinkage of the gap on the held-out cycles."""
@@ -37,6 +48,8 @@ class Shrinkage:
     """95 % interval of the shrinkage for other runs."""
     expected_benefit: float | None = None
     """Part of a whole run's gap that the effects are expected to close if the run is repeated [1]."""
+    remaining: RemainingGap | None = field(default=None, compare=False, repr=False)
+    """Drawn parts of the gap that remain; None where nothing shrinks."""
 
 
 class CycleErrors(NamedTuple):
@@ -112,11 +125,27 @@ def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates
     if errors.before is errors.after or np.array_equal(errors.before, errors.after):
         return Shrinkage(math.sqrt(before), math.sqrt(after), 0.0, (0.0, 0.0))
     remaining = _sample_remaining_gap(errors, noise, replicates, strokes)
-    value = 1.0 - float(remaining.mean())
-    low, high = np.quantile(1.0 - remaining, [0.025, 0.975])
-    expected = math.sqrt(noise**2 + (1.0 - value) * (before - noise**2))
-    interval = (min(float(low), value), max(float(high), value))
-    return Shrinkage(math.sqrt(before), expected, value, interval, _estimate_benefit(after, noise, replicates))
+    benefit = _estimate_benefit(after, noise, replicates)
+    return _summarise(Shrinkage(math.sqrt(before), math.sqrt(after), None, None, benefit, remaining))
+
+
+def extend_to_other_strokes(shrinkage: Shrinkage, growth: Array, strokes: int) -> Shrinkage:
+    """Return the shrinkage on strokes some of which are outside the recorded ranges (decision 0055).
+
+    Args:
+        shrinkage: shrinkage on strokes like the recorded ones.
+        growth: growth of the remaining form error outside the recorded ranges, over the gap there, (draws,) [1].
+        strokes: number of recorded strokes of different amplitude or frequency.
+    """
+    remaining = shrinkage.remaining
+    if remaining is None:
+        return shrinkage
+    random = np.random.default_rng(0)
+    # Of n + 1 strokes drawn alike, the last is outside the range of the others with the probability 2 / (n + 1).
+    is_outside = random.random(_DRAWS) < 2.0 / (max(strokes, 1) + 1)
+    factor = np.where(is_outside, random.choice(growth, _DRAWS), 1.0)
+    grown = remaining._replace(form_error=_scale_odds(remaining.form_error, factor))
+    return _summarise(replace(shrinkage, remaining=grown))
 
 
 def estimate_shares(
@@ -156,8 +185,25 @@ def _estimate_benefit(after: float, noise: float, replicates: Replicates) -> flo
     return 1.0 - remaining / max(replicates.before - noise**2, _MIN_GAP_SHARE * noise**2)
 
 
-def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replicates, strokes: int) -> Array:
-    """Draw the parts of the gap [1] that remain on other runs, (draws,)."""
+def _summarise(shrinkage: Shrinkage) -> Shrinkage:
+    """Return the shrinkage with value, interval and expected error from what remains of the gap."""
+    remaining = shrinkage.remaining
+    if remaining is None:
+        return shrinkage
+    closed = 1.0 - remaining.form_error - remaining.input_noise
+    value = float(closed.mean())
+    low, high = np.quantile(closed, [0.025, 0.975])
+    gap = shrinkage.before**2 - remaining.noise**2
+    return replace(
+        shrinkage,
+        after=math.sqrt(remaining.noise**2 + (1.0 - value) * gap),
+        value=value,
+        ci95=(min(float(low), value), max(float(high), value)),
+    )
+
+
+def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replicates, strokes: int) -> RemainingGap:
+    """Draw the parts of the gap that remain on other runs."""
     random = np.random.default_rng(0)
     before, after = _resample_cycles(np.stack(errors[:2]), errors.counts, errors.segment, random)
     gap = np.maximum(before - noise**2, _MIN_GAP_SHARE * noise**2)
@@ -166,7 +212,7 @@ def _sample_remaining_gap(errors: CycleErrors, noise: float, replicates: Replica
     form_error = _vary_part(form_error, deviation * random.standard_normal(_DRAWS))
     size = (replicates.before - noise**2) * np.exp(_GAP_DEVIATION * random.standard_normal(_DRAWS))
     input_noise = random.choice(replicates.runs, _DRAWS) / np.maximum(size, _MIN_GAP_SHARE * noise**2)
-    return np.asarray(form_error + input_noise)
+    return RemainingGap(form_error, input_noise, noise)
 
 
 def _vary_part(part: Array, deviation: Array) -> Array:
@@ -177,7 +223,11 @@ def _vary_part(part: Array, deviation: Array) -> Array:
     are a representative sample. For few strokes a small part is larger on average (decision 0014).
     """
     shift = 0.5 * _FORM_DEVIATION**2 * (1.0 - 2.0 * part)
-    factor = np.exp(deviation - shift)
+    return _scale_odds(part, np.exp(deviation - shift))
+
+
+def _scale_odds(part: Array, factor: Array) -> Array:
+    """Multiply the odds of parts of the gap [1]; a part of one or more stays as it is."""
     return np.asarray(np.where(part < 1.0, part * factor / (1.0 + part * (factor - 1.0)), part))
 
 

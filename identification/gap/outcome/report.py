@@ -25,6 +25,7 @@ from identification.gap.data import (
     compute_harmonics,
     describe_unobservable_effects,
     estimate_drift,
+    extend_to_other_strokes,
     map_gap,
 )
 from identification.gap.discovery import DiscoveredEffect, discover_effect, locate_unlisted_cause
@@ -41,6 +42,7 @@ from identification.gap.outcome.explanation import (
 )
 from identification.gap.outcome.held_out_strokes import measure_held_out_strokes
 from identification.gap.outcome.next_stroke import propose_next_stroke
+from identification.gap.outcome.other_strokes import estimate_error_growth
 from identification.gap.outcome.remainder import describe_remainder
 from identification.gap.outcome.twin import make_baseline_fit, make_twin
 from identification.gap.outcome.twin_residual import learn_twin_residual
@@ -181,7 +183,8 @@ class ReportBuilder:
         if found is None:
             return None
         shrinkage = estimate_expected_shrinkage(self.pool, self.evaluation, found.candidate)
-        return build_discovery(found, named, shrinkage, self.dataset.drive_unit)
+        extended = self._extend_shrinkage(shrinkage, found.candidate)
+        return build_discovery(found, named, extended, self.dataset.drive_unit)
 
     def _describe_search(self, verdict: Verdict, discovery: Discovery | None) -> list[str]:
         """Return the note on the search for a cause outside the library: its result, or an offer."""
@@ -195,7 +198,15 @@ class ReportBuilder:
         return ["no curve at any place closes part of the gap on held-out strokes, so none is reported"]
 
     def _choose_named_set(self) -> NamedSet:
-        return choose_named_set(self.pool, self.evaluation, self.posterior, self.partial)
+        chosen = choose_named_set(self.pool, self.evaluation, self.posterior, self.partial)
+        return chosen._replace(shrinkage=self._extend_shrinkage(chosen.shrinkage, chosen.candidate))
+
+    def _extend_shrinkage(self, shrinkage: Shrinkage, named: Candidate) -> Shrinkage:
+        """Return the shrinkage on other strokes; the sets are chosen by the recorded ones."""
+        if shrinkage.remaining is None:
+            return shrinkage
+        growth = estimate_error_growth(named, self.pool.baseline)
+        return extend_to_other_strokes(shrinkage, growth, self.evaluation.cycles.stroke_count)
 
     def _describe_nearest(self, verdict: Verdict) -> list[str]:
         """Return the note on the most similar known effects where none is named."""

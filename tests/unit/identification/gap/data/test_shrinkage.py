@@ -10,6 +10,7 @@ from identification.gap.data.shrinkage import (
     Replicates,
     estimate_shares,
     estimate_shrinkage,
+    extend_to_other_strokes,
 )
 
 NOISE = 2.0
@@ -99,6 +100,37 @@ def test_errors_below_the_floor_by_chance_close_no_more_than_the_gap():
     shrinkage = estimate_shrinkage(lucky, NOISE, replicate(0.1, gap=1.0), strokes=5)
     assert shrinkage.value == pytest.approx(0.9, abs=0.03)
     assert shrinkage.after > NOISE
+
+
+@pytest.mark.parametrize("strokes", [1, 5])
+def test_an_error_that_grows_on_other_strokes_lowers_the_shrinkage(strokes):
+    recorded = estimate_shrinkage(close_gap(9.0, 0.05), NOISE, replicate(0.2), strokes)
+    same, grown = (extend_to_other_strokes(recorded, np.full(3, g), strokes) for g in (1.0, 4.0))
+    assert same == recorded
+    assert grown.value < recorded.value - 0.02
+    assert grown.ci95[0] < recorded.ci95[0]
+    assert grown.before == recorded.before
+    closed = 1.0 - (grown.after**2 - NOISE**2) / (grown.before**2 - NOISE**2)
+    assert grown.value == pytest.approx(closed, abs=1e-9)
+
+
+def test_other_strokes_are_more_often_like_many_recorded_ones():
+    recorded = estimate_shrinkage(close_gap(9.0, 0.05), NOISE, replicate(), strokes=5)
+    few, many = (extend_to_other_strokes(recorded, np.full(3, 4.0), strokes).value for strokes in (1, 9))
+    assert recorded.value > many > few
+    # One of five other strokes is outside the ranges of nine.
+    assert recorded.value - many == pytest.approx(0.2 * (recorded.value - few), abs=0.01)
+
+
+def test_a_part_that_no_stroke_could_leave_does_not_exceed_the_gap():
+    recorded = estimate_shrinkage(close_gap(9.0, 0.05), NOISE, replicate(), strokes=1)
+    assert extend_to_other_strokes(recorded, np.full(3, 1e6), 1).value == pytest.approx(0.0, abs=0.01)
+
+
+def test_without_effects_nothing_shrinks_on_other_strokes_either():
+    errors = close_gap(9.0, 0.1)
+    nothing = estimate_shrinkage(errors._replace(after=errors.before), NOISE, replicate(), strokes=1)
+    assert extend_to_other_strokes(nothing, np.full(3, 4.0), 1) is nothing
 
 
 def test_without_effects_nothing_shrinks():

@@ -6,6 +6,8 @@ from typing import Any
 
 from alembic import command
 from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from alembic.util import CommandError
 from sqlalchemy import URL, Connection, Engine, create_engine, event
 from sqlalchemy.engine import ExceptionContext
@@ -130,5 +132,14 @@ def migrate(connection: Connection) -> None:
     config.set_main_option("script_location", "bench.catalogue:migrations")
     if connection.dialect.name != SQLITE:
         postgres.wait_for_other_migrations(connection)
+    elif MigrationContext.configure(connection).get_current_heads() != _get_heads(config):
+        # Two processes may open a new folder at once. The second waits here, and then finds the tables. The driver
+        # begins a transaction only at the first change of a row; the tables belong to it as well.
+        connection.exec_driver_sql("BEGIN IMMEDIATE")
     config.attributes["connection"] = connection
     command.upgrade(config, "head")
+
+
+def _get_heads(config: Config) -> tuple[str, ...]:
+    """Return the revisions of this version."""
+    return tuple(ScriptDirectory.from_config(config).get_heads())

@@ -65,7 +65,7 @@ def open_file(folder: Path) -> Iterator[Connection]:
         )
     _remove_file(partial)
     try:
-        with open_transaction(parse_address(make_sqlite_url(partial)), _prepare_file) as connection:
+        with open_transaction(parse_address(make_sqlite_url(partial)), migrate) as connection:
             yield connection
             connection.commit()
         partial.replace(own)
@@ -108,12 +108,6 @@ def _finish_server(connection: Connection) -> None:
             connection.execute(text(f"SELECT setval({sequence}, (SELECT max({key}) FROM {table.name}))"))
     names = ", ".join(table.name for table in list_tables())
     connection.execute(text(f"ANALYZE {names}, newest_values"))
-
-
-def _prepare_file(connection: Connection) -> None:
-    # The driver begins a transaction only at the first change of a row; the tables belong to it as well.
-    connection.exec_driver_sql("BEGIN IMMEDIATE")
-    migrate(connection)
 
 
 def _list_companions(path: Path) -> list[Path]:

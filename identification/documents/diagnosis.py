@@ -90,7 +90,8 @@ class Gap(Document):
         description="1 - (after² - floor²)/(before² - floor²); null where before is within 2 % of the floor"
     )
     shrinkage_ci95: tuple[float, float] | None = Field(
-        description="95 % interval for other runs: resampled conditions and cycles, input noise, form error and its growth on other strokes"
+        description="95 % interval for other runs: resampled conditions and cycles, input noise, form error and "
+        "its growth on other strokes"
     )
     nominal_n: float | None = Field(default=None, description="RMSE of the given simulation, in N; null if none")
     held_out: HeldOutError | None = Field(

@@ -1,21 +1,31 @@
-"""A campaign whose process is killed at random moments, and what must be true afterwards.
+"""A campaign that is edited and killed at random moments, and what must be true afterwards.
 
 ``python -m tests.support.killed_campaign FOLDER KILLS SEED`` repeats it as often as wanted, for the evidence.
+Options: ``--clock`` lets the clock of the campaign step at each start, ``--copy`` continues from a copy of the
+folder at a random moment instead of a kill, as after a loss of power.
 """
 
+import argparse
 import random
+import shutil
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
+
+import psutil
 
 from bench.campaigns import CampaignRunner, CampaignStore, PlantBench, collect_methods, parse_campaign
 from bench.catalogue import Catalogue, locate_catalogue, open_database
 from bench.log import read_log
+from tests.support.campaign_author import CampaignAuthor, check_audit
 
 RIG = (sys.executable, str(Path(__file__).with_name("fast_rig.py")))
 LONGEST_WAIT = 3.0
 """[s] Latest moment of a kill after the start of the process."""
+LARGEST_STEP = 7200.0
+"""[s] Largest step of the clock between two processes."""
 METHOD = {
     "schema": "mrbench.method/1", "name": "short", "title": "Two short strokes", "description": "For kills.",
     "rate_hz": 500, "drive_kind": "coil_v",
@@ -34,34 +44,96 @@ def open_store(folder):
     return CampaignStore(Catalogue(open_database(locate_catalogue(folder)), folder))
 
 
-def execute(folder):
-    """Start the campaign of a folder, or continue it."""
+def execute(folder, step=0.0):
+    """Start the campaign of a folder, or continue it, with a step of its clock [s]."""
     store = open_store(folder)
     document = parse_campaign({"name": "kills", "steps": STEPS}, "the test")
     methods = collect_methods(document)
-    found = store.find_unfinished(document, methods, "double") or store.create(document, methods, "double", 1e9)
-    CampaignRunner(store, found.id, PlantBench(store.catalogue, "double", found.state.updated, rig=RIG)).run()
+    found = store.find_unfinished(document, methods, "double") or store.create(
+        document, methods, "double", time.time()
+    )
+    bench = PlantBench(store.catalogue, "double", found.state.updated + step, rig=RIG)
+    CampaignRunner(store, found.id, bench).run()
     store.catalogue.close()
 
 
-def kill_at_random(folder, kills, seed):
-    """Run a campaign to its end, with some kills; return the number of kills."""
-    moments, done = random.Random(seed), 0
-    while True:
-        process = subprocess.Popen([sys.executable, "-m", "tests.support.killed_campaign", str(folder)])
-        try:
-            process.wait(moments.uniform(0.6, LONGEST_WAIT) if done < kills else 240)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
+class KilledCampaign:
+    """A campaign in a folder, with a person who edits it and moments at which its processes are killed."""
+
+    def __init__(self, folder, seed, *, clock=False, copy=False):
+        self.folder, self.random = folder, random.Random(seed)
+        self.author = CampaignAuthor(folder, METHOD, self.random)
+        self.clock, self.copy = clock, copy
+        self.counts = Counter()
+
+    def run(self, kills):
+        """Run the campaign to its end, with some kills; return the number of kills."""
+        done = 0
+        while True:
+            process = self._start()
+            if self._wait(process, self.random.uniform(0.6, LONGEST_WAIT) if done < kills else 240.0):
+                assert process.returncode == 0
+                return done
+            self._interrupt(process)
             done += 1
-            continue
-        assert process.returncode == 0
-        return done
+
+    def _start(self):
+        step = self.random.uniform(-LARGEST_STEP, LARGEST_STEP) if self.clock else 0.0
+        command = [
+            sys.executable,
+            "-m",
+            "tests.support.killed_campaign",
+            str(self.folder),
+            "--step",
+            f"{step:.1f}",
+        ]
+        return subprocess.Popen(command, start_new_session=True)
+
+    def _wait(self, process, seconds):
+        """Edit until the process ends or the time is over; return whether it has ended."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if process.poll() is not None:
+                return True
+            self.author.act()
+            time.sleep(0.1)
+        return process.poll() is not None
+
+    def _interrupt(self, process):
+        """Kill the campaign's process, its rig, or both; or continue from a copy of the folder."""
+        kind = "copy" if self.copy else self.random.choice(("process", "rig", "all"))
+        rigs = psutil.Process(process.pid).children(recursive=True)
+        if kind == "copy":
+            self._copy_folder(process, rigs)
+        for victim in rigs if kind in ("rig", "all", "copy") else ():
+            victim.kill()
+        if kind == "rig" and rigs:
+            # The campaign has to notice it, before its own process is killed.
+            self._wait(process, self.random.uniform(0.2, 1.0))
+        process.kill()
+        process.wait()
+        self.counts[kind] += 1
+
+    def _copy_folder(self, process, rigs):
+        """Copy the folder at one moment, and put the copy in its place."""
+        members = [psutil.Process(process.pid), *rigs]
+        for member in members:
+            member.suspend()
+        copy = self.folder.with_name(f"{self.folder.name}-copy")
+        shutil.copytree(self.folder, copy)
+        for member in members:
+            member.kill()
+        process.wait()
+        shutil.rmtree(self.folder)
+        copy.rename(self.folder)
 
 
-def check(folder):
-    """Check that every step ended once, by a complete log of its own; return the number of steps held back."""
+def check(campaign):
+    """Check that every step ended once, by a complete log of its own; return the number of steps held back.
+
+    By the clock of the campaign, the steps end in the order of the queue; a released one takes place later.
+    """
+    folder = campaign.folder
     store = open_store(folder)
     state = store.list_campaigns(1)[0].state
     assert state.status == "done"
@@ -69,9 +141,11 @@ def check(folder):
     assert len(runs) == len(set(runs))
     assert {fact.run for fact in state.facts} == set(runs)
     for item in state.items:
-        assert item.state in ("done", "held_back")
+        assert item.state in ("done", "held_back", "skipped")
         is_run = hasattr(item.step, "run")
         assert len(item.runs) == (1 if is_run and item.state == "done" else 0)
+    ordered = [item for item in state.items if item.state == "done" and item.id not in campaign.author.released]
+    assert campaign.clock or ordered == sorted(ordered, key=lambda item: item.ended)
     for run in runs:
         row = store.catalogue.get_run(run)
         assert row.outcome == "clean"
@@ -82,20 +156,37 @@ def check(folder):
     return sum(item.state == "held_back" for item in state.items)
 
 
-def main():
-    folder = Path(sys.argv[1])
-    if len(sys.argv) == 2:
-        return execute(folder)
-    kills, seed = int(sys.argv[2]), int(sys.argv[3])
-    began, total, campaigns, held = time.monotonic(), 0, 0, 0
-    while total < kills:
-        place = folder / f"campaign-{campaigns}"
+def repeat(options):
+    """Kill as often as wanted, at most 20 times in one campaign, and print what happened."""
+    began, total, campaigns, held, counts = time.monotonic(), 0, 0, 0, Counter()
+    while total < options.kills:
+        place = options.folder / f"campaign-{campaigns}"
         place.mkdir(parents=True)
-        total += kill_at_random(place, min(kills - total, 20), seed + campaigns)
-        held += check(place)
+        killed = KilledCampaign(place, options.seed + campaigns, clock=options.clock, copy=options.copy)
+        total += killed.run(min(options.kills - total, 20))
+        held += check(killed)
+        counts += killed.counts + killed.author.counts
+        counts["audit entries"] += check_audit(place, killed.author)
         campaigns += 1
-    print(f"{total} kills, {campaigns} campaigns, {held} steps held back, {time.monotonic() - began:.0f} s")
-    return None
+        print(
+            f"{total} kills, {campaigns} campaigns, {held} held back, {time.monotonic() - began:.0f} s, {counts}",
+            flush=True,
+        )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("kills", type=int, nargs="?")
+    parser.add_argument("seed", type=int, nargs="?", default=0)
+    parser.add_argument("--step", type=float, default=0.0, help="step of the clock [s]")
+    parser.add_argument("--clock", action="store_true")
+    parser.add_argument("--copy", action="store_true")
+    options = parser.parse_args()
+    if options.kills is None:
+        execute(options.folder, options.step)
+    else:
+        repeat(options)
 
 
 if __name__ == "__main__":

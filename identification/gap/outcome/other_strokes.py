@@ -6,20 +6,23 @@ computed for the recorded strokes with changed amplitude and speed. The remainin
 of motion, drive and time, because its true form is not known (Kennedy and O'Hagan 2001).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray
+from identification.arrays import Array
 from identification.fitting import Piece, Problem
+from identification.gap.data import Indices
 from identification.gap.fits import Candidate
 
 _CHANGE = 0.25
 """Usual change of amplitude and of speed from one method to another, as a logarithm [1]."""
+_CYCLE_SAMPLES = 100
+"""Smallest number of simulated samples of a usual cycle; fewer would not show the loop."""
 _SAMPLES = 5000
-"""Approximate number of samples that are simulated for each change."""
+"""Largest number of samples that are compared."""
 _DRAWS = 60
 """Number of random functions."""
 _WAVES = 60
@@ -42,12 +45,12 @@ class _Strokes:
     """Mean square of the change of the force by the effects and the refit [N²]."""
 
     @staticmethod
-    def make(problem: Problem, unknowns: Array, law_force: Array, fitted: BoolArray, ranges: Array) -> "_Strokes":
-        """Simulate the pieces of a problem; ``fitted`` (N,) selects the samples that count."""
+    def make(problem: Problem, unknowns: Array, law_force: Array, chosen: Indices, ranges: Array) -> "_Strokes":
+        """Simulate the pieces of a problem; ``chosen`` (N,) are the samples that count."""
         force, sensitivities = _simulate(problem, unknowns)
         variables = np.vstack([_stack_variables(p) for p in problem.pieces])
-        gap = float(np.var((force - law_force)[fitted]))
-        return _Strokes((variables / ranges)[fitted], sensitivities[fitted], gap)
+        gap = float(np.var((force - law_force)[chosen]))
+        return _Strokes((variables / ranges)[chosen], sensitivities[chosen], gap)
 
 
 def estimate_error_growth(named: Candidate, baseline: Candidate) -> Array:
@@ -57,26 +60,36 @@ def estimate_error_growth(named: Candidate, baseline: Candidate) -> Array:
         named: a set of effects, fitted to all samples.
         baseline: the law without effects.
     """
-    factor = max(1, named.fit.problem.samples // _SAMPLES)
+    scales = named.fit.problem.space.scales
+    factor = max(1, int(scales.sampling_rate * scales.cycle_duration / _CYCLE_SAMPLES))
     problem, law = named.fit.problem.decimate(factor), baseline.fit.problem.decimate(factor)
-    fitted = np.concatenate([p.train for p in problem.pieces]) > 0
-    variables = np.vstack([_stack_variables(p) for p in problem.pieces])[fitted]
+    chosen = _choose_samples(problem.pieces)
+    variables = np.vstack([_stack_variables(p) for p in problem.pieces])[chosen]
     ranges = np.maximum(np.abs(variables).max(axis=0), np.finfo(float).tiny)
 
     def simulate(amplitude: float, speed: float) -> _Strokes:
         changed = [replace(p, pieces=_change_strokes(p.pieces, amplitude, speed)) for p in (problem, law)]
         law_force = np.concatenate(changed[1].simulate(baseline.fit.minimum.unknowns))
-        return _Strokes.make(changed[0], named.fit.minimum.unknowns, law_force, fitted, ranges)
+        return _Strokes.make(changed[0], named.fit.minimum.unknowns, law_force, chosen, ranges)
 
     changes = np.exp([-_CHANGE, _CHANGE])
     others = [simulate(a, s) for a, s in product(changes, repeat=2)]
     return _draw_growths(simulate(1.0, 1.0), others, problem)
 
 
+def _choose_samples(pieces: Sequence[Piece]) -> Indices:
+    """Draw fitted samples of all pieces, in their order, (N,)."""
+    fitted = np.flatnonzero(np.concatenate([p.train for p in pieces]))
+    if len(fitted) <= _SAMPLES:
+        return fitted
+    return np.sort(np.random.default_rng(0).choice(fitted, _SAMPLES, replace=False))
+
+
 def _draw_growths(recorded: _Strokes, others: list[_Strokes], problem: Problem) -> Array:
     """Draw the growth for random functions and the other strokes, (draws,) [1].
 
-    The fit absorbs what it can of the error on the recorded strokes. Its unknowns then have a wrong value there.
+    The fit absorbs what it can of the error on the recorded strokes. Its unknowns then have a wrong value. A model
+    that is unstable on the other strokes says nothing about them.
     """
     random = np.random.default_rng(0)
     free = problem.free_mask
@@ -84,17 +97,20 @@ def _draw_growths(recorded: _Strokes, others: list[_Strokes], problem: Problem) 
     # Other strokes begin with their own y(0).
     shared[problem.layout.y0] = False
     J = recorded.sensitivities[:, free]
-    normal = J.T @ J + _PRIOR_WEIGHT * np.eye(J.shape[1])
+    # The drawn samples stand for all fitted ones.
+    normal = J.T @ J * (problem.samples / len(J)) + _PRIOR_WEIGHT * np.eye(J.shape[1])
     growths = []
     for _ in range(_DRAWS):
         error_function = _draw_function(random)
         error, step = error_function(recorded.variables), np.zeros(len(free))
-        step[free] = -np.linalg.solve(normal, J.T @ error)
+        step[free] = -np.linalg.solve(normal, J.T @ error * (problem.samples / len(J)))
         remaining = float(np.mean((error + recorded.sensitivities @ step) ** 2)) / recorded.gap
         for other in others:
-            returned = error_function(other.variables) + other.sensitivities[:, shared] @ step[shared]
-            growths.append(float(np.var(returned)) / other.gap / remaining)
-    return np.array(growths)
+            with np.errstate(all="ignore"):  # of an unstable model
+                returned = error_function(other.variables) + other.sensitivities[:, shared] @ step[shared]
+                growths.append(np.var(returned) / np.float64(other.gap) / remaining)
+    known = np.array([growth for growth in growths if np.isfinite(growth)])
+    return known if known.size else np.ones(1)
 
 
 def _draw_function(random: np.random.Generator) -> Callable[[Array], Array]:

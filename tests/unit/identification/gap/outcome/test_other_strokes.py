@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from identification.fitting import EffectModel
-from identification.gap.outcome.other_strokes import _change_stroke, _draw_function, estimate_error_growth
+from identification.gap.outcome.other_strokes import (
+    _change_stroke,
+    _draw_function,
+    _draw_growths,
+    _Strokes,
+    estimate_error_growth,
+)
 from tests.support.fit_problems import LABORATORY, STROKES, piece_of, problem_of, sine
 
 SINGLE = [sine(0.010, 1.5)]
@@ -41,6 +47,16 @@ def test_it_is_a_smaller_part_of_a_gap_that_grows_with_the_speed():
 
 def test_the_same_candidates_give_the_same_growth():
     assert np.array_equal(grow(SINGLE, "gas_spring"), grow(SINGLE, "gas_spring"))
+
+
+def test_a_model_that_is_unstable_on_other_strokes_says_nothing_about_them():
+    problem = problem_of(LABORATORY, SINGLE)
+    random = np.random.default_rng(2)
+    variables, J = random.uniform(-1.0, 1.0, (50, 5)), random.standard_normal((50, problem.layout.size))
+    stable, unstable = _Strokes(variables, J, 2.0), _Strokes(variables, np.inf * J, np.inf)
+    assert np.isfinite(_draw_growths(stable, [stable, unstable], problem)).all()
+    assert len(_draw_growths(stable, [stable, unstable], problem)) == len(_draw_growths(stable, [stable], problem))
+    assert _draw_growths(stable, [unstable], problem) == pytest.approx([1.0])
 
 
 def test_a_change_of_speed_keeps_the_path():

@@ -186,12 +186,17 @@ def test_every_coefficient_changes_the_force_as_its_sensitivity_says(at):
         return simulate(SimulationModel(LABORATORY, effects=(effect,)), stroke, **more)
 
     J = run(values, sensitivities=True).sensitivities[:, -len(values) :]
-    for k in (0, len(values) // 2, len(values) - 1):
+    # Where an elongation does not increase, some coefficients change nothing.
+    active = np.flatnonzero(np.abs(J).max(axis=0))
+    assert len(active) >= len(values) // 2
+    for k in (active[0], active[len(active) // 2], active[-1]):
         move = np.zeros(len(values))
         # Where an elongation stops to increase, its force has a corner, which a larger step would cross.
         step = move[k] = 1e-7 if at.is_elongation else 1e-5
         change = (run(values + move).force - run(values - move).force) / (2.0 * step)
-        assert np.sqrt(np.mean((change - J[:, k]) ** 2)) < 0.02 * np.sqrt(np.mean(change**2))
+        # The force at a mounting is solved to about 1e-8 N.
+        solved = 1e-8 / step if at.is_elongation else 0.0
+        assert np.sqrt(np.mean((change - J[:, k]) ** 2)) < 0.02 * np.sqrt(np.mean(change**2)) + solved
 
 
 def test_variables_are_those_of_every_piece_one_after_the_other():

@@ -23,7 +23,6 @@ class CampaignAuthor:
     def __init__(self, folder, method, random):
         self.folder, self.method, self.random = folder, method, random
         self.counts = Counter()
-        self.released = set()
         self.added = 0
         self.commands = 0
 
@@ -69,7 +68,6 @@ class CampaignAuthor:
         """Return the fields of an edit; None where the queue has nothing for it."""
         held = [item.id for item in state.items if item.state == "held_back"]
         if kind == "release" and held:
-            self.released.add(held[0])
             return {"item": held[0]}
         if kind in ("add", "pause", "do_now"):
             if self.added >= MOST_ADDED:

@@ -131,7 +131,7 @@ class KilledCampaign:
 def check(campaign):
     """Check that every step ended once, by a complete log of its own; return the number of steps held back.
 
-    By the clock of the campaign, the steps end in the order of the queue; a released one takes place later.
+    By the clock of the campaign, the steps end in the order of the queue, unless one was released late.
     """
     folder = campaign.folder
     store = open_store(folder)
@@ -144,8 +144,8 @@ def check(campaign):
         assert item.state in ("done", "held_back", "skipped")
         is_run = hasattr(item.step, "run")
         assert len(item.runs) == (1 if is_run and item.state == "done" else 0)
-    ordered = [item for item in state.items if item.state == "done" and item.id not in campaign.author.released]
-    assert campaign.clock or ordered == sorted(ordered, key=lambda item: item.ended)
+    ended = [item.ended for item in state.items if item.state == "done"]
+    assert campaign.clock or campaign.author.counts["release"] or ended == sorted(ended)
     for run in runs:
         row = store.catalogue.get_run(run)
         assert row.outcome == "clean"

@@ -1,6 +1,7 @@
 """Checks of a recording before its diagnosis, and effects that its strokes cannot show."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,6 +55,8 @@ def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> 
     amplitudes = {float(f"{c.amplitude:.2g}") for c in cycles.conditions}
     if len(drives) == 1:
         notes.append("only one drive: effects of the coil cannot be observed")
+    if _has_each_drive_once(cycles):
+        notes.append("each drive in one stretch of time: effects of the coil and a change over time look alike")
     if len(frequencies) == 1:
         notes.append("only one frequency: force delay, moving mass and fixture compliance look alike")
     if len(amplitudes) == 1:
@@ -69,3 +72,10 @@ def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> 
         )
     notes.append("a gain error of the force or displacement channel can only be found by calibration")
     return notes
+
+
+def _has_each_drive_once(cycles: Cycles) -> bool:
+    """Return True if there are several drives and none was returned to."""
+    drives = [float(f"{c.drive:.2g}") for c in cycles.conditions if c.is_stroke]
+    changes = sum(before != after for before, after in pairwise(drives))
+    return 0 < changes < len(set(drives))

@@ -55,9 +55,25 @@ def test_poor_strokes_are_noted():
 
 
 def test_rich_strokes_only_lack_a_calibration():
-    rich = make_cycles(6, StrokeCondition(0.0, 0.01, 1.0), StrokeCondition(0.2, 0.005, 3.0))
+    strokes = StrokeCondition(0.0, 0.01, 1.0), StrokeCondition(0.2, 0.005, 3.0), StrokeCondition(0.0, 0.005, 3.0)
+    rich = make_cycles(6, *strokes)
     (note,) = describe_unobservable_effects(rich, FLOOR)
     assert "calibration" in note
+
+
+@pytest.mark.parametrize(
+    ("drives", "noted"),
+    [((0.0, 0.2, 0.4), True), ((0.0, 0.0, 0.4), True), ((0.0, 0.2, 0.0), False), ((0.2, 0.2), False)],
+)
+def test_drives_that_were_never_returned_to_are_noted(drives, noted):
+    cycles = make_cycles(6, *(StrokeCondition(drive, 0.01, 1.0) for drive in drives))
+    assert ("one stretch of time" in " ".join(describe_unobservable_effects(cycles, FLOOR))) == noted
+
+
+def test_a_rest_does_not_return_to_its_drive():
+    rest = StrokeCondition(0.0, 0.0, 0.0, is_stroke=False)
+    cycles = make_cycles(6, StrokeCondition(0.0, 0.01, 1.0), StrokeCondition(0.2, 0.01, 1.0), rest)
+    assert "one stretch of time" in " ".join(describe_unobservable_effects(cycles, FLOOR))
 
 
 def test_a_floor_without_repeating_cycles_is_noted():
@@ -95,5 +111,6 @@ def test_strokes_that_agree_in_two_digits_count_as_one():
     alike = make_cycles(6, StrokeCondition(0.201, 0.01, 1.001), StrokeCondition(0.202, 0.01001, 1.002))
     assert len(describe_unobservable_effects(alike, FLOOR)) == 4
     two = make_cycles(6, StrokeCondition(0.2, 0.01, 1.0), StrokeCondition(0.21, 0.011, 0.0))
-    (frequency, _) = describe_unobservable_effects(two, FLOOR)
+    (drive, frequency, _) = describe_unobservable_effects(two, FLOOR)
+    assert "one stretch of time" in drive
     assert "one frequency" in frequency

@@ -4,7 +4,7 @@ The library states its bounds, scales and starts for a laboratory damper. For a 
 the dimension of the unit: a force grows with the damper's force, a time derivative with its velocity over its
 length. A time of electronics or flow does not belong to the size, and keeps its value. Only its upper bound grows
 where the motion is slower, because slow motion hides longer delays. A time of a slow change, such as a drift,
-follows the time over which the recording shows it.
+follows the time over which the recording shows it. The end of the recording is known.
 """
 
 import re
@@ -67,8 +67,8 @@ def compute_scale_factor(unit: str, size: DamperSize) -> float:
     time = time if force or length else 0
     ratio = DamperSize(*(a / b for a, b in zip(size, LIBRARY_SIZE, strict=True)))
     motion = ratio.force**force * ratio.length ** (length + time) * ratio.velocity**-time
-    slow = ratio.observation_time**observation * ratio.recording_time**recording
-    return float(motion * ratio.drive**drive * slow)
+    times = ratio.observation_time**observation * ratio.recording_time**recording
+    return float(motion * ratio.drive**drive * times)
 
 
 def scale_quantity(quantity: Quantity, size: DamperSize) -> Quantity:

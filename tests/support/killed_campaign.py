@@ -6,6 +6,7 @@ folder at a random moment instead of a kill, as after a loss of power.
 """
 
 import argparse
+import contextlib
 import random
 import shutil
 import subprocess
@@ -16,8 +17,8 @@ from pathlib import Path
 
 import psutil
 
-from bench.campaigns import CampaignRunner, CampaignStore, PlantBench, collect_methods, parse_campaign
-from bench.catalogue import Catalogue, locate_catalogue, open_database
+from bench.campaigns import CampaignRunner, PlantBench, collect_methods, parse_campaign
+from bench.commands.campaign.catalogue import open_store
 from bench.log import read_log
 from tests.support.campaign_author import CampaignAuthor, check_audit
 
@@ -40,21 +41,16 @@ STEPS = {"matrix": {"specimens": ["A", "B", "C"], "methods": [METHOD], "repeats"
                     "before_run": [{"rest": {"seconds": 60}}]}}  # fmt: skip
 
 
-def open_store(folder):
-    return CampaignStore(Catalogue(open_database(locate_catalogue(folder)), folder))
-
-
 def execute(folder, step=0.0):
     """Start the campaign of a folder, or continue it, with a step of its clock [s]."""
-    store = open_store(folder)
     document = parse_campaign({"name": "kills", "steps": STEPS}, "the test")
     methods = collect_methods(document)
-    found = store.find_unfinished(document, methods, "double") or store.create(
-        document, methods, "double", time.time()
-    )
-    bench = PlantBench(store.catalogue, "double", found.state.updated + step, rig=RIG)
-    CampaignRunner(store, found.id, bench).run()
-    store.catalogue.close()
+    with open_store(folder, is_created=True) as store:
+        found = store.find_unfinished(document, methods, "double") or store.create(
+            document, methods, "double", time.time()
+        )
+        bench = PlantBench(store.catalogue, "double", found.state.updated + step, rig=RIG)
+        CampaignRunner(store, found.id, bench).run()
 
 
 class KilledCampaign:
@@ -105,8 +101,8 @@ class KilledCampaign:
         rigs = psutil.Process(process.pid).children(recursive=True)
         if kind == "copy":
             self._copy_folder(process, rigs)
-        for victim in rigs if kind in ("rig", "all", "copy") else ():
-            victim.kill()
+        elif kind != "process":
+            signal_all(rigs, psutil.Process.kill)
         if kind == "rig" and rigs:
             # The campaign has to notice it, before its own process is killed.
             self._wait(process, self.random.uniform(0.2, 1.0))
@@ -117,15 +113,20 @@ class KilledCampaign:
     def _copy_folder(self, process, rigs):
         """Copy the folder at one moment, and put the copy in its place."""
         members = [psutil.Process(process.pid), *rigs]
-        for member in members:
-            member.suspend()
+        signal_all(members, psutil.Process.suspend)
         copy = self.folder.with_name(f"{self.folder.name}-copy")
         shutil.copytree(self.folder, copy)
-        for member in members:
-            member.kill()
+        signal_all(members, psutil.Process.kill)
         process.wait()
         shutil.rmtree(self.folder)
         copy.rename(self.folder)
+
+
+def signal_all(processes, send):
+    """Send a signal to processes, some of which may just have ended by themselves."""
+    for process in processes:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            send(process)
 
 
 def check(campaign):
@@ -133,8 +134,12 @@ def check(campaign):
 
     By the clock of the campaign, the steps end in the order of the queue, unless one was released late.
     """
-    folder = campaign.folder
-    store = open_store(folder)
+    with open_store(campaign.folder) as store:
+        return check_steps(store, campaign)
+
+
+def check_steps(store, campaign):
+    """Check the steps of a campaign in its catalogue; return the number of those held back."""
     state = store.list_campaigns(1)[0].state
     assert state.status == "done"
     runs = [run for item in state.items for run in item.runs]
@@ -149,10 +154,9 @@ def check(campaign):
     for run in runs:
         row = store.catalogue.get_run(run)
         assert row.outcome == "clean"
-        assert read_log(folder / row.log).outcome == "clean"
+        assert read_log(campaign.folder / row.log).outcome == "clean"
     for item in state.items:
         assert all(store.catalogue.get_run(part).outcome == "incomplete" for part in item.parts)
-    store.catalogue.close()
     return sum(item.state == "held_back" for item in state.items)
 
 

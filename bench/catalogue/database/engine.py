@@ -132,7 +132,9 @@ def migrate(connection: Connection) -> None:
     config.set_main_option("script_location", "bench.catalogue:migrations")
     if connection.dialect.name != SQLITE:
         postgres.wait_for_other_migrations(connection)
-    elif MigrationContext.configure(connection).get_current_heads() != _get_heads(config):
+    elif MigrationContext.configure(connection).get_current_heads() == _get_heads(config):
+        return
+    else:
         # Two processes may open a new folder at once. The second waits here, and then finds the tables. The driver
         # begins a transaction only at the first change of a row; the tables belong to it as well.
         connection.exec_driver_sql("BEGIN IMMEDIATE")

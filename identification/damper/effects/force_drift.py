@@ -1,8 +1,9 @@
 """Drift of the force channel's zero: electronics that warm up, a load cell that creeps.
 
 The zero settles towards another value, oscillates slowly, or follows a wave with five overtones. A wave describes
-the drift of the recorded time only. Its amplitudes may be many times the drift where its period is longer than the
-recording, and a continuation would add up to as much. So the zero is held at its last value after the recording.
+the drift of the recorded time only. Where its period is longer than the recording, its amplitudes may be many
+times the drift, and its continuation as large as they are. So the zero is held at its last value after the
+recording.
 """
 
 from typing import Any

@@ -50,9 +50,9 @@ def check_cycle_count(cycles: Cycles) -> None:
 def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> list[str]:
     """Return notes about effects that these strokes cannot show or separate."""
     notes = []
-    drives = {float(f"{c.drive:.2g}") for c in cycles.conditions}
-    frequencies = {float(f"{c.frequency:.2g}") for c in cycles.conditions if c.frequency}
-    amplitudes = {float(f"{c.amplitude:.2g}") for c in cycles.conditions}
+    drives = {_round(c.drive) for c in cycles.conditions}
+    frequencies = {_round(c.frequency) for c in cycles.conditions if c.frequency}
+    amplitudes = {_round(c.amplitude) for c in cycles.conditions}
     if len(drives) == 1:
         notes.append("only one drive: effects of the coil cannot be observed")
     if _has_each_drive_once(cycles):
@@ -76,6 +76,11 @@ def describe_unobservable_effects(cycles: Cycles, floor: NoiseFloorEstimate) -> 
 
 def _has_each_drive_once(cycles: Cycles) -> bool:
     """Return True if there are several drives and none was returned to."""
-    drives = [float(f"{c.drive:.2g}") for c in cycles.conditions if c.is_stroke]
+    drives = [_round(c.drive) for c in cycles.conditions if c.is_stroke]
     changes = sum(before != after for before, after in pairwise(drives))
     return 0 < changes < len(set(drives))
+
+
+def _round(value: float) -> float:
+    """Round to two significant digits, within which conditions count as equal."""
+    return float(f"{value:.2g}")

@@ -88,8 +88,8 @@ def _choose_samples(pieces: Sequence[Piece]) -> Indices:
 def _draw_growths(recorded: _Strokes, others: list[_Strokes], problem: Problem) -> Array:
     """Draw the growth for random functions and the other strokes, (draws,) [1].
 
-    The fit absorbs what it can of the error on the recorded strokes. Its unknowns then have a wrong value. A model
-    that is unstable on the other strokes says nothing about them.
+    The fit absorbs what it can of the error on the recorded strokes. Its unknowns then have a wrong value. Other
+    strokes on which the model is unstable are left out.
     """
     random = np.random.default_rng(0)
     free = problem.free_mask
@@ -98,12 +98,13 @@ def _draw_growths(recorded: _Strokes, others: list[_Strokes], problem: Problem) 
     shared[problem.layout.y0] = False
     J = recorded.sensitivities[:, free]
     # The drawn samples stand for all fitted ones.
-    normal = J.T @ J * (problem.samples / len(J)) + _PRIOR_WEIGHT * np.eye(J.shape[1])
+    weight = problem.samples / len(J)
+    normal = J.T @ J * weight + _PRIOR_WEIGHT * np.eye(J.shape[1])
     growths = []
     for _ in range(_DRAWS):
         error_function = _draw_function(random)
         error, step = error_function(recorded.variables), np.zeros(len(free))
-        step[free] = -np.linalg.solve(normal, J.T @ error * (problem.samples / len(J)))
+        step[free] = -np.linalg.solve(normal, J.T @ error * weight)
         remaining = float(np.mean((error + recorded.sensitivities @ step) ** 2)) / recorded.gap
         for other in others:
             with np.errstate(all="ignore"):  # of an unstable model

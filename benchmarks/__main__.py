@@ -16,6 +16,7 @@ MODULES = {
     "benches": "speed.benches",
     "workers": "speed.workers",
     "live_page": "live.page",
+    "scripted_page": "live.scripted_page",
     "dead_bench": "live.dead_bench",
     "campaign": "live.campaign",
     "overlay": "speed.overlay",

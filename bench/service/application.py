@@ -53,9 +53,12 @@ PUBLIC_OPERATIONS = (
     f"GET {API}/session/oidc/callback",
 )
 """Operations that need no sign-in."""
-_LISTS = ("benches", "events", "jobs", "methods", "runs")
+CATALOGUE_PATHS = frozenset(f"{API}/{path}" for path in ("events", "jobs", "methods"))
+"""Paths whose answers depend only on the catalogue and the query."""
 _BENCH_PARTS = ("", "/channels", "/instruments", "/limits")
-KEPT_PATHS = frozenset(f"{API}/{path}" for path in (*_LISTS, *(f"bench{part}" for part in _BENCH_PARTS)))
+STATUS_PATHS = frozenset(
+    f"{API}/{path}" for path in ("benches", "runs", *(f"bench{part}" for part in _BENCH_PARTS))
+)
 """Paths whose answers depend only on the catalogue, the agents' statuses and the query."""
 COMPUTATIONS = frozenset((f"{API}/methods/dry-run", f"{API}/campaigns/plan"))
 """Paths whose POST only computes an answer; nothing of it is recorded."""
@@ -102,7 +105,7 @@ def create_app(settings: AppSettings | None = None) -> FastAPI:
     app.openapi = lambda: _make_openapi(app)  # type: ignore[method-assign]
     problems.install_handlers(app)
     # The middleware that is added last sees a request first.
-    app.add_middleware(KeptAnswerMiddleware, paths=_list_kept_paths(settings))
+    app.add_middleware(KeptAnswerMiddleware, catalogue=CATALOGUE_PATHS, status=_list_status_paths(settings))
     app.add_middleware(HeadMiddleware, below="/api/")
     app.add_middleware(BodyLimitMiddleware, paths={f"{API}/logs": MAX_UPLOAD_SIZE})
     app.add_middleware(AccessCheckMiddleware, below=API, public=PUBLIC_OPERATIONS)
@@ -132,10 +135,10 @@ _BEARER = HTTPBearer(auto_error=False, description="token of the bench or of a p
 """Description of the token for OpenAPI; `AccessCheckMiddleware` checks it, or the cookie of a session."""
 
 
-def _list_kept_paths(settings: AppSettings | None) -> frozenset[str]:
-    """Return the paths in `KEPT_PATHS`, and the same parts of the named benches."""
+def _list_status_paths(settings: AppSettings | None) -> frozenset[str]:
+    """Return the paths in `STATUS_PATHS`, and the same parts of the named benches."""
     benches = () if settings is None else settings.benches
-    return KEPT_PATHS.union(f"{API}/benches/{bench.name}{part}" for bench in benches for part in _BENCH_PARTS)
+    return STATUS_PATHS.union(f"{API}/benches/{bench.name}{part}" for bench in benches for part in _BENCH_PARTS)
 
 
 @asynccontextmanager

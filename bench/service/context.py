@@ -2,7 +2,9 @@
 
 import asyncio
 from collections import defaultdict
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Annotated
 from weakref import WeakValueDictionary
@@ -33,11 +35,11 @@ MAX_JOBS = 50
 
 @dataclass(frozen=True)
 class Shown:
-    """State that lists show: one state of the catalogue, and one status of each agent."""
+    """State that lists show: one state of the catalogue, and one status of each agent, if it matters."""
 
     changes: int
     """Number of the catalogue's state, from `ChangeCounter`."""
-    statuses: tuple[AgentStatus | None, ...]
+    statuses: tuple[AgentStatus | None, ...] = ()
 
     def is_same(self, other: "Shown") -> bool:
         """Return whether both are the same state and the same messages of the agents."""
@@ -70,16 +72,40 @@ class ServiceContext:
     """Provider by which persons sign in; None without one."""
     log_copier: LogCopier | None = None
     """Copies the logs to a store; None without one."""
+    _descriptions: dict[Callable[["ServiceContext"], str], tuple[int, date, str]] = field(default_factory=dict)
+    """Descriptions of the catalogue, each with the state of the catalogue and the day that it describes."""
 
     @property
     def data(self) -> Path:
         """Data folder."""
         return self.catalogue.folder
 
-    def find_shown(self) -> Shown | None:
-        """Return what lists show at present; None if the database cannot tell a change."""
+    def find_shown_catalogue(self) -> Shown | None:
+        """Return the state of the catalogue that lists show; None if the database cannot tell a change."""
         changes = self.catalogue.change_counter.read()
-        return None if changes is None else Shown(changes, self.benches.list_statuses())
+        return None if changes is None else Shown(changes)
+
+    def find_shown(self) -> Shown | None:
+        """Return what lists show that also depend on the benches; None if the database cannot tell a change."""
+        shown = self.find_shown_catalogue()
+        return shown and replace(shown, statuses=self.benches.list_statuses())
+
+    def describe_catalogue(self, describe: Callable[["ServiceContext"], str]) -> str:
+        """Return a description of the catalogue; it is made again after a change, and on the next day.
+
+        Args:
+            describe: makes the description, of nothing but catalogue, names of the benches and day.
+
+        Raises:
+            CatalogueUnavailableError: the catalogue cannot be used at present.
+        """
+        # Read before the description is made: a change meanwhile then only makes the next call describe again.
+        changes, day = self.catalogue.change_counter.read(), datetime.now(UTC).date()
+        if changes is None:
+            return describe(self)
+        if self._descriptions.get(describe, ())[:2] != (changes, day):
+            self._descriptions[describe] = changes, day, describe(self)
+        return self._descriptions[describe][2]
 
     def get_bench_of_run(self, run_id: str) -> ServedBench:
         """Return the bench of a run; one in progress need not be in the catalogue.

@@ -1,11 +1,11 @@
 // Measures the Bench view for some seconds and prints the figures as JSON:
-//   node measure_page.mjs ADDRESS CHROMIUM SECONDS
-// It prints `ready` once the page shows the bench at rest, and measures after the start of a run.
+//   node measure_page.mjs ADDRESS CHROMIUM SECONDS [STATE]
+// It prints `ready` once the page shows the bench at rest, and measures once it shows STATE, by default a run.
 // A frame counts as drawn if it clears a canvas. The age of the newest sample in view is the one that the page states.
 
 import { openPage } from "../../tests/system/javascript/browser.mjs";
 
-const [address, chromium, seconds] = process.argv.slice(2);
+const [address, chromium, seconds, state = "Running"] = process.argv.slice(2);
 const { page, close } = await openPage(chromium, { height: 1100 });
 
 /** Counts the frames of the browser and those that drew, and collects the stated ages [ms]. */
@@ -42,7 +42,7 @@ try {
   await page.goto(address);
   await shows("Idle");
   console.log("ready");
-  await shows("Running");
+  await shows(state);
   console.log(JSON.stringify(await page.evaluate(measure, 1000 * Number(seconds))));
 } finally {
   await close();

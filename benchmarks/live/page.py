@@ -13,6 +13,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
@@ -33,7 +34,7 @@ def run() -> None:
     with TemporaryDirectory() as path, start_processes(DemoFolder(Path(path), METHOD, None, 1)) as address:
         for title, readers in (("page alone", 0), ("twenty listeners, one stalled", READERS)):
             print(f"  {title}")
-            with _listen(address, readers) as counts:
+            with listen(address, readers) as counts:
                 _measure_run(address, Path(path) / f"{readers}.mcap")
             if counts:
                 print(f"  batches of each reader: {min(counts)} to {max(counts)}")
@@ -45,20 +46,24 @@ def _measure_run(address: str, log_path: Path) -> None:
     assert script.stdout.readline() == "ready\n"
     recorded = Bench(address).start(METHOD, specimen="live")
     output, _ = script.communicate(timeout=300)
-    seen = json.loads(output)
-    print_line("  frames of the browser", seen["frames"] / seen["seconds"], "1/s", "")
-    print_line("  drawn frames", seen["drawn"] / seen["seconds"], "1/s", "at least 50")
-    ages = [age for age in seen["ages"] if age is not None]
-    print_line("  age of the newest sample in view, median", statistics.median(ages), "ms", "at most 150")
-    print_line("  the same, largest", max(ages), "ms", "")
+    print_view(json.loads(output))
     recorded.wait()
     log = read_log(recorded.download_log(log_path))
     lost = json.loads(log.metadata["outcome"]["lost"])
     print(f"    recording: {len(log.samples['time'])} samples, outcome {log.outcome}, lost: {lost or 'nothing'}")
 
 
+def print_view(seen: dict[str, Any]) -> None:
+    """Print frames and ages of the view that `measure_page.mjs` has measured."""
+    print_line("  frames of the browser", seen["frames"] / seen["seconds"], "1/s", "")
+    print_line("  drawn frames", seen["drawn"] / seen["seconds"], "1/s", "at least 50")
+    ages = [age for age in seen["ages"] if age is not None]
+    print_line("  age of the newest sample in view, median", statistics.median(ages), "ms", "at most 150")
+    print_line("  the same, largest", max(ages), "ms", "")
+
+
 @contextlib.contextmanager
-def _listen(address: str, readers: int) -> Iterator[list[int]]:
+def listen(address: str, readers: int) -> Iterator[list[int]]:
     """Run clients that read, and one that does not; yield the number of batches that each reader has received."""
     counts = [0] * readers
     stopping = threading.Event()

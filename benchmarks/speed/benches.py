@@ -14,8 +14,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -29,9 +27,10 @@ from benchmarks.common import print_line
 from benchmarks.speed.catalogue import fill_catalogue
 from benchmarks.speed.overlay import get, serve, wait_for
 from benchmarks.speed.rest_load import measure_load
-from benchmarks.speed.scripted_agents import RATE
+from benchmarks.speed.scripted_agents import play_agents
 
-COUNTS = (1, 10)
+COUNTS, RATE = (1, 10), 100
+"""Numbers of benches, samples of each bench [1/s]."""
 SECONDS, REQUESTS, CLIENTS = 30.0, 50.0, 10
 """Duration [s], requests of all clients [1/s], number of clients."""
 ROUTES = (
@@ -62,7 +61,7 @@ def run() -> None:
 def _measure(count: int) -> dict[str, float]:
     """Print and return the figures of a service with a number of benches."""
     names = [f"b{number}" for number in range(count)]
-    with TemporaryDirectory() as path, _play_agents(Path(path), count):
+    with TemporaryDirectory() as path, play_agents(Path(path), count, RATE):
         data = _make_catalogue(Path(path) / "runs")
         options = [f"--bench={name}=ipc://{path}/{name}" for name in names]
         with serve(data, *options) as client:
@@ -104,18 +103,6 @@ def _make_catalogue(data: Path) -> Path:
     return data
 
 
-@contextmanager
-def _play_agents(folder: Path, count: int) -> Iterator[None]:
-    command = [sys.executable, "-m", "benchmarks.speed.scripted_agents", str(folder), str(count)]
-    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-    try:
-        assert process.stdout is not None
-        process.stdout.readline()
-        yield
-    finally:
-        process.communicate()
-
-
 def _start_listeners(url: str, names: list[str]) -> "subprocess.Popen[bytes]":
     seconds = str(SECONDS + _END)
     command = [sys.executable, "-m", "benchmarks.speed.benches", "listen", url, seconds, *names]
@@ -134,11 +121,11 @@ def listen(url: str, seconds: float, names: list[str]) -> dict[str, Any]:
     def follow(place: int) -> None:
         end, expected = time.monotonic() + seconds, None
         for batch in Bench(url, name=names[place]).live():
-            force = batch["force"]
-            steps = np.diff(force, prepend=force[0] - 1 if expected is None else expected - 1)
+            number = batch["number"]
+            steps = np.diff(number, prepend=number[0] - 1 if expected is None else expected - 1)
             lost[place] += int(np.sum(steps - 1))
-            received[place] += len(force)
-            expected = force[-1] + 1
+            received[place] += len(number)
+            expected = number[-1] + 1
             if time.monotonic() > end:
                 return
 

@@ -1,16 +1,18 @@
 """Scripted rig agents: they speak the protocol of an agent over its real sockets, without instruments.
 
-python -m benchmarks.speed.scripted_agents FOLDER COUNT
+python -m benchmarks.speed.scripted_agents FOLDER COUNT RATE
 
-Agent N listens at FOLDER/bN and publishes at FOLDER/bN.samples: 100 samples a second in 25 batches, and four
-statuses a second. The value of the channel `force` is the running number of the sample, so that a listener sees
-every loss.
+Agent N listens at FOLDER/bN and publishes at FOLDER/bN.samples: RATE samples a second in 25 batches, and four
+statuses a second. The channels are those that the page draws, as sines, and `number`, the running number of the
+sample, so that a listener sees every loss.
 """
 
+import subprocess
 import sys
 import threading
 import time
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -28,14 +30,21 @@ from bench.agent_protocol import (
 )
 from bench.live import Channel, LiveBatch
 
-RATE, BATCH = 100.0, 4
-"""Samples of each agent [1/s], and samples of a batch [1]."""
+BATCH_RATE = 25
+"""Batches of each agent [1/s]."""
 STATUS_EVERY = 6
 """Number of batches between two statuses."""
-CHANNELS = tuple(
-    Channel(name, unit)
-    for name, unit in (("force", "N"), ("displacement", "m"), ("velocity", "m/s"), ("coil_drive", "V"))
-)
+FREQUENCY = 2.0
+"""Frequency of the sines [Hz]."""
+_AMPLITUDES = {
+    Channel("force", "N"): 800.0,
+    Channel("displacement", "m"): 10e-3,
+    Channel("velocity", "m/s"): 126e-3,
+    Channel("coil_drive", "V"): 1.0,
+    Channel("coil_current", "A"): 0.5,
+    Channel("temperature", "degC"): 3.0,
+}
+CHANNELS = (*_AMPLITUDES, Channel("number", "1"))
 _DESCRIPTION = BenchDescription(
     name="b", specimen="s", drive_kind="coil_v", drive_unit="V", limits={}, channels={}
 )
@@ -46,11 +55,13 @@ def make_status() -> AgentStatus:
     return AgentStatus(state="idle", utc_s=time.time(), drive_kind="coil_v", drive_unit="V")
 
 
-def make_batch(number: int, utc_s: float) -> LiveBatch:
+def make_batch(number: int, utc_s: float, rate: int) -> LiveBatch:
     """Return the batch with a running number; its samples are numbered, too."""
-    index = np.arange(number * BATCH, (number + 1) * BATCH, dtype=np.float32)
-    values = np.stack([index, *(np.zeros_like(index) for _ in CHANNELS[1:])])
-    return LiveBatch(number, utc_s, 1 / RATE, CHANNELS, values)
+    count = rate // BATCH_RATE
+    index = np.arange(number * count, (number + 1) * count, dtype=np.float32)
+    sine = np.sin(2 * np.pi * FREQUENCY * index / rate)
+    values = np.stack([*(amplitude * sine for amplitude in _AMPLITUDES.values()), index])
+    return LiveBatch(number, utc_s, 1 / rate, CHANNELS, values.astype(np.float32))
 
 
 def answer(command: Command) -> Reply:
@@ -62,12 +73,12 @@ def answer(command: Command) -> Reply:
     return Reply(ok=True, status=make_status())
 
 
-def publish(publishers: list[Publisher], stopping: threading.Event) -> None:
+def publish(publishers: list[Publisher], rate: int, stopping: threading.Event) -> None:
     """Publish at fixed times until the event is set."""
-    begin, period = time.time(), BATCH / RATE
+    begin, period = time.time(), 1 / BATCH_RATE
     number = 0
     while not stopping.wait(max(0.0, begin + number * period - time.time())):
-        batch = make_batch(number, begin + (number - 1) * period)
+        batch = make_batch(number, begin + (number - 1) * period, rate)
         for publisher in publishers:
             publisher.publish(batch)
             if number % STATUS_EVERY == 0:
@@ -75,14 +86,14 @@ def publish(publishers: list[Publisher], stopping: threading.Event) -> None:
         number += 1
 
 
-def main(folder: Path, count: int) -> None:
+def main(folder: Path, count: int, rate: int) -> None:
     """Play the agents until standard input ends."""
     stopping = threading.Event()
     with ExitStack() as stack:
         servers = [stack.enter_context(CommandServer(f"ipc://{folder}/b{n}")) for n in range(count)]
         publishers = [stack.enter_context(Publisher(f"ipc://{folder}/b{n}.samples")) for n in range(count)]
         threads = [threading.Thread(target=server.serve, args=(answer, stopping)) for server in servers]
-        threads.append(threading.Thread(target=publish, args=(publishers, stopping)))
+        threads.append(threading.Thread(target=publish, args=(publishers, rate, stopping)))
         for thread in threads:
             thread.start()
         print("ready", flush=True)
@@ -92,5 +103,18 @@ def main(folder: Path, count: int) -> None:
             thread.join()
 
 
+@contextmanager
+def play_agents(folder: Path, count: int, rate: int) -> Iterator[None]:
+    """Play agents in a process of their own."""
+    command = [sys.executable, "-m", "benchmarks.speed.scripted_agents", str(folder), str(count), str(rate)]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        assert process.stdout is not None
+        process.stdout.readline()
+        yield
+    finally:
+        process.communicate()
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]))
+    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))

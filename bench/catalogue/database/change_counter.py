@@ -1,28 +1,38 @@
 """Detection of changes of a catalogue, by any process."""
 
+import sqlite3
 from threading import Lock
 
-from sqlalchemy import Connection, Engine
+from sqlalchemy import Engine, PoolProxiedConnection
 
 
 class ChangeCounter:
     """Counter of the commits to a database; safe from any thread.
 
-    It holds a connection of its own, because SQLite counts only the commits of other connections for each.
+    It holds a connection of its own, because SQLite counts only the commits of other connections for each. Each
+    request reads the number, so it is read without the statements of SQLAlchemy, which take longer than the query.
     """
 
     def __init__(self, engine: Engine) -> None:
         self._engine, self._lock = engine, Lock()
-        self._connection: Connection | None = None
+        self._connection: PoolProxiedConnection | None = None
 
     def read(self) -> int | None:
-        """Return a number that another commit makes different; None for a database that has none."""
+        """Return a number that another commit makes different; None where the database tells none."""
         if self._engine.dialect.name != "sqlite":
             return None
         with self._lock:
             if self._connection is None:
-                self._connection = self._engine.connect()
-            return int(self._connection.exec_driver_sql("PRAGMA data_version").scalar_one())
+                self._connection = self._engine.raw_connection()
+            cursor = self._connection.cursor()
+            try:
+                cursor.execute("PRAGMA data_version")
+                (number,) = cursor.fetchone() or (None,)
+            except sqlite3.Error:  # the answer is then read from the catalogue, whose error says more
+                return None
+            finally:
+                cursor.close()
+            return number
 
     def close(self) -> None:
         """Close the connection."""

@@ -31,28 +31,28 @@ class _Answer:
 
 
 class KeptAnswerMiddleware:
-    """ASGI middleware that repeats the answer to a GET until the catalogue or the agent's status changes.
+    """ASGI middleware that repeats the answer to a GET until what it shows changes.
 
     Programs ask for the same lists many times a second. What a list shows is read from the catalogue only once
     after each change, so that these requests leave the processor to the run in progress.
     """
 
-    def __init__(self, app: ASGIApp, *, paths: Container[str]) -> None:
+    def __init__(self, app: ASGIApp, *, catalogue: Container[str], status: Container[str]) -> None:
         """Serve an application.
 
         Args:
             app: application that makes the answers.
-            paths: paths whose answers depend on nothing but catalogue, status and query.
+            catalogue: paths whose answers depend on nothing but catalogue and query.
+            status: paths whose answers depend on nothing but catalogue, the agents' statuses and query.
         """
-        self._app, self._paths = app, paths
+        self._app, self._catalogue, self._status = app, catalogue, status
         self._answers: OrderedDict[tuple[str, bytes], _Answer] = OrderedDict()
         self._locks: WeakValueDictionary[tuple[str, bytes], asyncio.Lock] = WeakValueDictionary()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Repeat the kept answer, or have it made and keep it."""
-        is_kept = scope["type"] == "http" and scope["method"] == "GET" and scope["path"] in self._paths
         # Read before the answer is made: a change meanwhile then only makes the next request read again.
-        shown = _find_shown(scope) if is_kept else None
+        shown = self._find_shown(scope) if scope["type"] == "http" and scope["method"] == "GET" else None
         if shown is None:
             await self._app(scope, receive, send)
             return
@@ -66,6 +66,14 @@ class KeptAnswerMiddleware:
         scope["endpoint"] = kept.endpoint  # for the metrics
         for message in kept.messages:
             await send(_copy(message))
+
+    def _find_shown(self, scope: Scope) -> Shown | None:
+        """Return what the answer at the path of a request shows; None if it may show anything else."""
+        path = scope["path"]
+        context: ServiceContext = scope["app"].state.context
+        if path in self._status:
+            return context.find_shown()
+        return context.find_shown_catalogue() if path in self._catalogue else None
 
     async def _make(
         self, key: tuple[str, bytes], shown: Shown, scope: Scope, receive: Receive, send: Send
@@ -88,8 +96,3 @@ class KeptAnswerMiddleware:
 def _copy(message: Message) -> Message:
     """Return a message with headers of its own, because outer middleware adds to those that it is sent."""
     return {**message, "headers": list(message["headers"])} if "headers" in message else message
-
-
-def _find_shown(scope: Scope) -> Shown | None:
-    context: ServiceContext = scope["app"].state.context
-    return context.find_shown()

@@ -58,13 +58,15 @@ def _describe_parts(context: ServiceContext) -> dict[str, Any]:
 def _describe_from_catalogue(describe: Callable[[ServiceContext], str], context: ServiceContext) -> str:
     """Return a description, or that there is none; the cause names the server, and health is public."""
     try:
-        return describe(context)
+        return context.describe_catalogue(describe)
     except CatalogueUnavailableError:
         return "not known: the catalogue cannot be used at present; see the log of the service"
 
 
 def _describe_agents(benches: ServedBenches) -> dict[str, str]:
-    """Return the state of each agent in words; all are asked at once, so that silent ones cost one time limit."""
+    """Return the state of each agent in words; silent ones are asked at once, so that they cost one time limit."""
+    if None not in benches.list_statuses():
+        return {bench.name: _describe_agent(bench) for bench in benches}
     with ThreadPoolExecutor(len(benches.names), "health") as threads:
         return dict(zip(benches.names, threads.map(_describe_agent, benches), strict=True))
 

@@ -4,7 +4,8 @@ import sqlite3
 
 import pytest
 
-from bench.service.application import KEPT_PATHS
+from bench.catalogue.job_queue import JobQueue
+from bench.service.application import CATALOGUE_PATHS, STATUS_PATHS
 from bench.service.context import ServiceContext
 from tests.support.service_logs import write_complete_log
 
@@ -64,6 +65,19 @@ def test_a_change_of_the_status_is_shown_at_once(service, counted):
     assert service.get("/bench")["state"] == "tripped"
 
 
+def test_a_new_status_keeps_the_answers_that_do_not_show_it(service, counted, monkeypatch):
+    made, original = [], JobQueue.list_jobs
+    monkeypatch.setattr(JobQueue, "list_jobs", lambda *given: made.append(1) or original(*given))
+    service.get("/jobs")
+    service.get("/runs")
+    before = len(made), len(counted)
+    service.post("/bench/abort")
+    service.wait_for("/bench", lambda status: status["state"] == "tripped")
+    service.get("/jobs")
+    service.get("/runs")
+    assert (len(made), len(counted)) == (before[0], before[1] + 1)
+
+
 def test_an_old_status_is_not_repeated(service, counted, monkeypatch):
     assert service.get("/bench")["state"] == "idle"
     service.agent.reachable = False
@@ -106,4 +120,4 @@ def test_the_metrics_count_kept_answers_by_their_operation(service, counted):
 
 def test_the_paths_are_routes_of_the_service(service):
     paths = service.client.app.openapi()["paths"]
-    assert all("get" in paths[path] for path in KEPT_PATHS)
+    assert all("get" in paths[path] for path in CATALOGUE_PATHS | STATUS_PATHS)

@@ -4,6 +4,7 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from bench.agent_protocol import AgentStatus, InstrumentStatus
+from bench.catalogue.job_queue import JobQueue
 from bench.service.routes.health import describe_clocks
 from tests.support.service_logs import write_complete_log
 
@@ -43,6 +44,17 @@ def test_waiting_jobs_are_counted(service):
     write_complete_log(service.data / "one.mcap")
     service.scan()
     service.wait_for("/health", lambda health: health["queue"] == "0 running, 1 waiting")
+
+
+def test_the_catalogue_is_read_again_only_after_a_change(service, monkeypatch):
+    made, original = [], JobQueue.count_states
+    monkeypatch.setattr(JobQueue, "count_states", lambda queue: made.append(1) or original(queue))
+    assert [service.get("/health")["queue"] for _ in range(3)] == ["empty"] * 3
+    assert len(made) == 1
+    write_complete_log(service.data / "one.mcap")
+    service.scan()
+    service.wait_for("/health", lambda health: health["queue"] == "0 running, 1 waiting")
+    assert len(made) > 1
 
 
 def test_the_log_store_has_words_and_numbers(service, tmp_path):

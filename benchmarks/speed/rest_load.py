@@ -22,6 +22,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from urllib.parse import SplitResult, urlsplit
 
+import httpx2
 import numpy as np
 
 from bench.catalogue import CATALOGUE_FILE, make_sqlite_url, open_database
@@ -57,6 +58,8 @@ def run() -> None:
         with start_processes(DemoFolder(Path(path), METHOD, None, 1)) as address:
             base, token = address.split("#token=")
             headers = {"Authorization": f"Bearer {token}"}
+            with httpx2.Client(base_url=f"{base}api/v1/", headers=headers) as client:
+                _wait_until_ready(client, ROUTES)
             with _record_run(Bench(address), Path(path)):
                 _print_load("empty route of FastAPI, beside a run at 1 kHz", empty, ("/empty",), {})
             with _record_run(Bench(address), Path(path)):
@@ -72,13 +75,18 @@ def _measure_without_rig(data: Path) -> None:
     fill_catalogue(engine, RUNS)
     engine.dispose()
     with serve(data) as client:
-        wait_for(lambda: get(client, "health")["worker"] == "ok")  # its start needs a whole core for some seconds
         headers = {"Authorization": client.headers["Authorization"]}
         routes = tuple(route for route in ROUTES if not route.startswith("/bench"))
-        for route in routes:  # the first answer of each reads what later ones keep
-            get(client, route.lstrip("/"))
+        _wait_until_ready(client, routes)
         name = f"mrbench, {RUNS} runs, idle machine, {_name(routes)}"
         _print_load(name, str(client.base_url).rstrip("/"), routes, headers, "at most 50")
+
+
+def _wait_until_ready(client: httpx2.Client, routes: tuple[str, ...]) -> None:
+    """Wait for the worker, whose start needs a whole core for some seconds, and for an answer of each route."""
+    wait_for(lambda: get(client, "health")["worker"] == "ok")
+    for route in routes:
+        get(client, route.lstrip("/"))
 
 
 @contextmanager

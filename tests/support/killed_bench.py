@@ -131,7 +131,7 @@ def await_ready(bench):
         if status is None or status["utc_s"] < handled:
             return False
         if status["state"] == "tripped":
-            _handle_trip(bench, status)
+            handle_trip(bench, status)
             handled = time.time()
         is_connected = all(one["connected"] for one in status["instruments"])
         return status["state"] == "idle" and not status["notice"] and is_connected
@@ -139,7 +139,8 @@ def await_ready(bench):
     wait_for(is_ready, lambda: f"not ready: {bench.get('/bench')} {bench.get('/health')}")
 
 
-def _handle_trip(bench, status):
+def handle_trip(bench, status):
+    """Reset a trip, or end the agent if its rig is another one now."""
     if status["notice"]:
         command = [*MRBENCH, "rig", "--end", "--force", "--config", bench.toml.name]
         subprocess.run(command, cwd=bench.folder, env=ENVIRONMENT, capture_output=True, timeout=60, check=False)

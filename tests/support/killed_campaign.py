@@ -20,7 +20,7 @@ import psutil
 from bench.campaigns import CampaignRunner, PlantBench, collect_methods, parse_campaign
 from bench.commands.campaign.catalogue import open_store
 from bench.log import read_log
-from tests.support.campaign_author import CampaignAuthor, check_audit
+from tests.support.campaign_author import CommandAuthor, check_audit
 
 RIG = (sys.executable, str(Path(__file__).with_name("fast_rig.py")))
 LONGEST_WAIT = 3.0
@@ -58,7 +58,7 @@ class KilledCampaign:
 
     def __init__(self, folder, seed, *, clock=False, copy=False):
         self.folder, self.random = folder, random.Random(seed)
-        self.author = CampaignAuthor(folder, METHOD, self.random)
+        self.author = CommandAuthor(folder, METHOD, self.random)
         self.clock, self.copy = clock, copy
         self.counts = Counter()
 

@@ -36,6 +36,20 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
             terminalreporter.line(f"{report.nodeid}: {report.longrepr[2] if report.longrepr else ''}")
 
 
+@pytest.fixture(autouse=True)
+def kept_priority():
+    """Reset the priority after each test: one that runs an agent's thread leaves it at a real-time priority.
+
+    All tests after it, and the processes that they start, would otherwise displace those of the other worker.
+    """
+    if not hasattr(os, "sched_setscheduler"):
+        yield
+        return
+    before = os.sched_getscheduler(0), os.sched_getparam(0)
+    yield
+    os.sched_setscheduler(0, *before)
+
+
 @pytest.fixture(scope="session")
 def postgres_server():
     """Provide a private PostgreSQL server."""

@@ -64,5 +64,8 @@ def postgres_server():
 def catalogue_url(request, tmp_path):
     """Provide the address of an empty catalogue, once in each kind of database."""
     if request.param == "sqlite":
-        return f"sqlite:///{tmp_path / 'catalogue.db'}"
+        # Inside the fixture: tests of other packages must not wait for the import of the catalogue.
+        from tests.support.empty_catalogues import write_empty_catalogue
+
+        return write_empty_catalogue(tmp_path)
     return request.getfixturevalue("postgres_server").make_catalogue()

@@ -9,7 +9,7 @@ TEST_OPTIONS ?=
 # The tests start hundreds of processes. Where no compiled modules may be written, each would compile them again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test unit wire check coverage faults bench clean
+.PHONY: help install demo test unit wire check types contracts style coverage faults bench clean
 
 help:
 	@echo "make demo      hides an effect in the simulated damper, finds it from a recording, discloses the truth"
@@ -35,12 +35,20 @@ install: $(READY)
 demo: $(READY)
 	$(BIN)/mrbench demo
 
+# The three parts share two cores; the types take longest and begin first.
 check: $(READY)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+	@$(MAKE) --no-print-directory --jobs 2 types contracts style
+
+types: $(READY)
 	$(BIN)/mypy
+
+contracts: $(READY)
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/pytest -q tests/contracts/test_packages.py
+
+style: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
 
 # Tests of processes run in real time: what a busy machine has made late is repeated alone, and named at the end.
 # The tests of a file on wires stay together, because they share a bench. Files of whole benches take longest and

@@ -1,8 +1,12 @@
 """Options for all tests."""
 
+import functools
 import os
+from pathlib import Path
 
 import pytest
+
+LEFT_OUT = pytest.StashKey[list[str]]()
 
 # Two test processes share two cores. A matrix library that starts a thread for each core makes both of them wait.
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
@@ -15,6 +19,28 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="fail if a test was skipped",
     )
+
+
+@pytest.hookimpl(tryfirst=True)  # before the conditions of `-m` apply
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep the marked tests that ``make`` would leave out, because it finds their files by a word."""
+    config.stash[LEFT_OUT] = [
+        item.nodeid
+        for word in ("wire", "slow")
+        for item in items
+        if item.get_closest_marker(word) and f"mark.{word}" not in _read(item.path)
+    ]
+
+
+@functools.cache
+def _read(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def left_out(request):
+    """Return the marked tests that ``make`` would leave out."""
+    return request.config.stash[LEFT_OUT]
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

@@ -6,8 +6,10 @@ READY := $(VENV)/.ready
 RESULTS := build/results
 # CI sets this to --fail-on-skip: there, what the tests need is installed.
 TEST_OPTIONS ?=
+# The tests start hundreds of processes. Where no compiled modules may be written, each would compile them again.
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test unit wire check coverage faults bench clean
+.PHONY: help install demo test unit wire check types contracts style all-tests coverage faults bench clean
 
 help:
 	@echo "make demo      hides an effect in the simulated damper, finds it from a recording, discloses the truth"
@@ -33,15 +35,26 @@ install: $(READY)
 demo: $(READY)
 	$(BIN)/mrbench demo
 
+# The three parts share two cores; the types take longest and begin first.
 check: $(READY)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+	@$(MAKE) --no-print-directory --jobs 2 types contracts style
+
+types: $(READY)
 	$(BIN)/mypy
+
+contracts: $(READY)
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/pytest -q tests/contracts/test_packages.py
 
+style: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
 # Tests of processes run in real time: what a busy machine has made late is repeated alone, and named at the end.
-# The tests of a file on wires stay together, because they share a bench.
+# The tests of a file on wires stay together, because they share a bench. Files of whole benches take longest and
+# come first. Only files with a mark are collected, because to import all of them takes half a minute.
+find_marked = $(sort $(shell grep -rl --include='test_*.py' 'mark\.$(1)' tests))
+WIRE = $(call find_marked,wire) tests/wire -m 'wire and not slow'
 AGAIN := --last-failed --last-failed-no-failures none
 unit: $(READY)
 	@rm -rf $(RESULTS) && mkdir -p $(RESULTS)
@@ -50,12 +63,14 @@ unit: $(READY)
 
 wire: $(READY)
 	@mkdir -p $(RESULTS) && rm -f $(RESULTS)/wire*.xml
-	$(BIN)/pytest -n 2 --dist loadfile -m 'wire and not slow' --junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
-		$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_2.xml $(AGAIN) $(TEST_OPTIONS) || \
-		$(BIN)/pytest -m 'wire and not slow' --junitxml=$(RESULTS)/wire_3.xml $(AGAIN) $(TEST_OPTIONS)
+	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder $(WIRE) --junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
+		$(BIN)/pytest $(WIRE) --junitxml=$(RESULTS)/wire_2.xml $(AGAIN) $(TEST_OPTIONS) || \
+		$(BIN)/pytest $(WIRE) --junitxml=$(RESULTS)/wire_3.xml $(AGAIN) $(TEST_OPTIONS)
 
-test: check unit wire
-	@$(BIN)/pytest -m slow --collect-only > $(RESULTS)/slow.txt || true
+test: check all-tests
+
+all-tests: unit wire
+	@$(BIN)/pytest $(call find_marked,slow) -m slow --collect-only > $(RESULTS)/slow.txt || true
 	@$(BIN)/python -m tests.summary $(RESULTS)/unit_*.xml $(RESULTS)/wire_*.xml --deselected $(RESULTS)/slow.txt
 
 coverage: $(READY)

@@ -20,12 +20,18 @@ def environment():
 
 
 @pytest.fixture(scope="session")
-def recordings(tmp_path_factory, environment):
+def log(tmp_path_factory, environment):
+    """Record the log that most pages begin with."""
+    folder = tmp_path_factory.mktemp("recorded")
+    blocks.run("mrbench run quick --scenario default --out quick.mcap", folder, environment)
+    return folder / "quick.mcap"
+
+
+@pytest.fixture(scope="session")
+def recordings(log, environment):
     """Make files of two strokes, and one of the first stroke with the headers of a vendor."""
-    folder = tmp_path_factory.mktemp("elsewhere")
-    blocks.run("mrbench run quick --scenario default --out a.mcap", folder, environment)
-    blocks.run("mrbench export a.mcap --format csv --out a.csv", folder, environment)
-    header, *rows = (folder / "a.csv").read_text().splitlines()
+    blocks.run(f"mrbench export {log.name} --format csv --out quick.csv", log.parent, environment)
+    header, *rows = log.with_name("quick.csv").read_text().splitlines()
     kept = [header.split(",").index(name) for name in ("time_s", "displacement_m", "force_n", "voltage_v")]
 
     def lines(start, stop):

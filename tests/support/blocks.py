@@ -11,6 +11,8 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted(ROOT.glob("docs/tutorial/*.md")), *sorted(ROOT.glob("docs/how-to/*.md"))]
 
 _BLOCK = re.compile(r"(?:<!-- (not run|file): (.+?) -->\n)?```(\w+)\n(.*?)```", re.DOTALL)
+_RECORDING = re.compile(r"^mrbench run quick --scenario default --out (\S+)$", re.MULTILINE)
+"""Command by which ten blocks begin."""
 _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 _TOLERANCE = 0.05
 """Largest relative difference [1] between a number in the page and the printed number."""
@@ -30,14 +32,17 @@ def blocks(page: Path) -> list[Block]:
     return [Block(match[3], match[4], match[1] or "", match[2] or "") for match in found]
 
 
-def carry_out(block: Block, folder: Path, environment: dict[str, str]) -> None:
-    """Execute a block as a reader would; fail if a command fails or prints another output."""
+def carry_out(block: Block, folder: Path, environment: dict[str, str], log: Path) -> None:
+    """Execute a block as a reader would; fail if a command fails or prints another output.
+
+    A block without output gets a copy of the log that `_RECORDING` has made before.
+    """
     if block.mark == "file":
         (folder / block.argument).write_text(block.text, encoding="utf-8")
     elif block.mark == "not run":
         return
     elif block.language == "sh":
-        run(block.text, folder, environment)
+        run(_RECORDING.sub(rf"cp '{log}' \1", block.text), folder, environment)
     elif block.language == "console":
         for command in re.split(r"^\$ ", block.text, flags=re.MULTILINE)[1:]:
             words, _, expected = command.partition("\n")

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 COMMAND = (sys.executable, "-m", "tests.support.quick_jobs")
-DURATION = 0.8
+DURATION = 1.2
 """Duration of one command [s]."""
 
 
@@ -49,7 +49,7 @@ def _report_progress(name):
 
 
 def _write_documents(name, arguments):
-    from tests.support.reports import diagnosis_document, fit_document
+    from tests.support.result_documents import diagnosis_document, fit_document
 
     out = Path(arguments[arguments.index("--out") + 1])
     documents = {"identify": fit_document, "diagnose": diagnosis_document}

@@ -12,6 +12,7 @@ from bench.service import run_registry
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from bench.service.benches import BenchSettings
+from tests.support.empty_catalogues import write_empty_catalogue
 from tests.support.fake_service import FakeAgent, FakeEngine
 
 TIMEOUT = 20.0
@@ -51,6 +52,7 @@ class RunningService:
 def service(tmp_path, monkeypatch):
     # Tests put logs into the data folder and wait until they are listed.
     monkeypatch.setattr(run_registry, "SCAN_PERIOD", 0.1)
+    write_empty_catalogue(tmp_path)
     with RunningService(tmp_path) as running:
         yield running
 

@@ -1,6 +1,7 @@
 from bench.demo.summary import _make_error_table, describe_late_setpoints
 from bench.report import Fit
-from tests.support.reports import fit_document, prediction
+from tests.support.reports import prediction
+from tests.support.result_documents import fit_document
 
 
 def event(kind, quantity, value):

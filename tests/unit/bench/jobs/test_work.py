@@ -23,7 +23,8 @@ from bench.jobs.job_spec import (
 from bench.jobs.settings import DiagnoseSettings, IdentifySettings, PredictSettings
 from bench.jobs.work import WATCHDOG_COMMAND, JobCallbacks, execute_job
 from tests.support.logs import write_log
-from tests.support.reports import diagnosis_document, fit_document, prediction
+from tests.support.reports import prediction
+from tests.support.result_documents import diagnosis_document, fit_document
 from tests.support.waiting import wait_until
 
 COMMAND = """

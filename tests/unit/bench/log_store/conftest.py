@@ -3,7 +3,8 @@
 import fsspec
 import pytest
 
-from bench.catalogue import CATALOGUE_FILE, Catalogue, make_sqlite_url, open_database, scan_logs
+from bench.catalogue import Catalogue, open_database, scan_logs
+from tests.support.empty_catalogues import write_empty_catalogue
 from tests.support.service_logs import write_complete_log
 
 
@@ -11,7 +12,7 @@ from tests.support.service_logs import write_complete_log
 def catalogue(tmp_path):
     folder = tmp_path / "runs"
     folder.mkdir()
-    catalogue = Catalogue(open_database(make_sqlite_url(folder / CATALOGUE_FILE)), folder)
+    catalogue = Catalogue(open_database(write_empty_catalogue(folder)), folder)
     for name in ("a", "b"):
         write_complete_log(folder / f"{name}.mcap", name)
     scan_logs(catalogue, lambda path: False)

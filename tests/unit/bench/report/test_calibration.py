@@ -12,7 +12,8 @@ from bench.report.calibration import make_calibration_findings, make_calibration
 from bench.report.documents import Fit
 from bench.report.formats.pdf import write_pdf
 from tests.support.certificates import issue_certificate
-from tests.support.reports import estimate, fit_document, prediction, series, write_fit, write_log
+from tests.support.reports import prediction, series, write_log
+from tests.support.result_documents import estimate, fit_document, write_fit
 
 DAY = date(2026, 5, 4)
 OVERDUE = "force: calibration overdue since 2026-05-01 (certificate 4711 of PTB Braunschweig)."

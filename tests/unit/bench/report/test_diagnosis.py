@@ -7,7 +7,8 @@ import pytest
 from bench.errors import ReportError
 from bench.report import diagnosis_plots, page
 from bench.report.diagnosis import make_context, read_diagnosis
-from tests.support.reports import STAGES, diagnosis_document, discovery_document, write_log
+from tests.support.reports import write_log
+from tests.support.result_documents import STAGES, diagnosis_document, discovery_document
 
 
 @pytest.fixture

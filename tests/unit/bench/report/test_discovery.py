@@ -4,7 +4,7 @@ import pytest
 from bench.report import diagnosis_plots
 from bench.report.diagnosis import Diagnosis
 from bench.report.discovery import DiscoveredCurve, Discovery, get_quantity, join_words, make_discovery_context
-from tests.support.reports import discovery_document
+from tests.support.result_documents import discovery_document
 
 
 def make_context(named=(), **changes):

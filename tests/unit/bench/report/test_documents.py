@@ -6,7 +6,8 @@ import pytest
 from bench.errors import ReportError
 from bench.report.documents import read_fit, read_prediction
 from bench.report.series import predict, read_series
-from tests.support.reports import fit_document, series, write_fit, write_log
+from tests.support.reports import series, write_log
+from tests.support.result_documents import fit_document, write_fit
 
 
 def test_a_fit_is_read_and_keys_that_no_report_shows_are_ignored(tmp_path):

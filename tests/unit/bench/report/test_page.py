@@ -15,7 +15,8 @@ from bench.report import page
 from bench.report.content import make_correlation_rows, make_drive_rows, make_header_rows
 from bench.report.documents import DriveError, Fit
 from bench.report.summary import make_findings
-from tests.support.reports import fit_document, prediction, series, write_fit, write_log
+from tests.support.reports import prediction, series, write_log
+from tests.support.result_documents import fit_document, write_fit
 
 VOID = {"meta", "img", "br", "link", "hr", "input"}
 MADE = datetime(2026, 5, 4, 3, 2, tzinfo=UTC)

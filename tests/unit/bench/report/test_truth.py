@@ -11,7 +11,8 @@ from bench.errors import ReportError
 from bench.report import page
 from bench.report.diagnosis import Diagnosis
 from bench.report.truth import Truth, judge, make_answer_rows, make_truth_rows, read_truth
-from tests.support.reports import diagnosis_document, prediction, write_log
+from tests.support.reports import prediction, write_log
+from tests.support.result_documents import diagnosis_document
 
 LATE = diagnosis_document()["effects"][0]
 

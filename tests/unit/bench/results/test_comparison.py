@@ -1,7 +1,7 @@
 """Changes between two results of one run."""
 
 from bench.results import compare_results
-from tests.support.reports import diagnosis_document, estimate, fit_document
+from tests.support.result_documents import diagnosis_document, estimate, fit_document
 
 
 def compare(older, newer):

@@ -14,6 +14,7 @@ from bench.people import passwords
 from bench.service.access import open_access
 from bench.service.application import AppSettings, create_app
 from bench.service.benches import BenchSettings
+from tests.support.empty_catalogues import write_empty_catalogue
 from tests.support.fake_service import FakeAgent, FakeEngine
 from tests.support.waiting import wait_until
 
@@ -118,7 +119,9 @@ def database(request):
 
 @pytest.fixture
 def service(tmp_path, database):
-    if database is not None:
+    if database is None:
+        write_empty_catalogue(tmp_path)
+    else:
         keep_address(tmp_path, database)
     made = Service(tmp_path)
     made.start()

@@ -9,7 +9,8 @@ import pytest
 from bench.calibration import make_log_text
 from tests.support.certificates import issue_certificate
 from tests.support.cyclic_logs import write_cyclic_log
-from tests.support.reports import fit_document, prediction
+from tests.support.reports import prediction
+from tests.support.result_documents import fit_document
 from tests.support.service_logs import STARTED, write_complete_log, write_truncated_log
 
 API = "/api/v1"

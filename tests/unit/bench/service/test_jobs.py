@@ -9,7 +9,7 @@ import pytest
 
 from bench.jobs.job_spec import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE, TWIN_FILE
 from bench.jobs.progress import JobProgress
-from tests.support.reports import estimate, fit_document
+from tests.support.result_documents import estimate, fit_document
 from tests.support.service_logs import write_complete_log
 
 FIT = {"result": "converged", "rmse_n": 5.4, "held_out_rmse_n": None, "noise_floor_n": 2.4}

@@ -58,13 +58,12 @@ def make_settings(drawn, **more):
     )
 
 
-def read_operations():
+@pytest.fixture(scope="module")
+def operations():
+    """Return the operations; in a fixture, so that only the process that needs them reads the description."""
     document = read_description()
     found = [result.ok() for result in schemathesis.openapi.from_dict(document).get_all_operations()]
     return [operation for operation in found if operation.label != UPLOAD]
-
-
-OPERATIONS = read_operations()
 
 
 @pytest.fixture
@@ -93,9 +92,9 @@ def check(service, operation, mode):
 
 
 @pytest.mark.parametrize(("mode", "least"), [(GenerationMode.POSITIVE, 60), (GenerationMode.NEGATIVE, 25)])
-def test_drawn_requests_get_described_answers(service, mode, least):
+def test_drawn_requests_get_described_answers(service, operations, mode, least):
     # Without query and body, an operation takes any text in its path: no request is invalid.
-    chosen = [one for one in OPERATIONS if mode is GenerationMode.POSITIVE or one.query or one.body]
+    chosen = [one for one in operations if mode is GenerationMode.POSITIVE or one.query or one.body]
     assert len(chosen) >= least
     for operation in chosen:
         check(service, operation, mode)

@@ -13,7 +13,8 @@ from collections import Counter
 import schemathesis
 from schemathesis import Response
 
-from tests.support.reports import fit_document
+from tests.support.empty_catalogues import write_empty_catalogue
+from tests.support.result_documents import fit_document
 from tests.support.service_logs import write_complete_log
 from tests.unit.bench.service.conftest import Service
 from tests.unit.bench.service.test_schema import CHECKS, make_settings, read_description, send
@@ -50,6 +51,7 @@ def test_answers_to_sequences_of_requests_are_as_described(tmp_path):
         def setup(self):
             folder = tmp_path / str(next(numbers))
             folder.mkdir()
+            write_empty_catalogue(folder)
             self.service = Service(folder)
             prepare(self.service)
 

@@ -7,6 +7,7 @@ import pytest
 from bench.agent_protocol import AgentStatus
 from bench.people import ROLES
 from bench.service.access import OPERATION_RIGHTS
+from bench.service.application import create_app
 from tests.unit.bench.service.people.conftest import PASSWORD
 
 LOWEST = {
@@ -47,11 +48,13 @@ PUBLIC = {"GET /health", "GET /openapi.json"}
 STATES = ("idle", "preparing", "running", "stopping", "tripped")
 
 
-def list_operations(client):
-    described = client.get("/api/v1/openapi.json").json()["paths"]
-    for path, operations in described.items():
-        for method in operations:
-            yield f"{method.upper()} {path.removeprefix('/api/v1')}"
+@pytest.fixture(scope="module")
+def operations():
+    """Return all operations. Their description takes seconds, and is the same for every service."""
+    paths = create_app().openapi()["paths"]
+    return [
+        f"{method.upper()} {path.removeprefix('/api/v1')}" for path, found in paths.items() for method in found
+    ]
 
 
 def find_lowest(operation, state):
@@ -64,18 +67,20 @@ def find_lowest(operation, state):
     return "viewer"
 
 
-def test_every_operation_that_changes_something_has_its_right(client):
+def test_every_operation_that_changes_something_has_its_right(operations):
     described = {re.sub(r":\w+\}", "}", one) for one in OPERATION_RIGHTS}
-    changing = {one for one in list_operations(client) if not one.startswith("GET ")}
+    changing = {one for one in operations if not one.startswith("GET ")}
     assert changing - described == {"POST /session"}
     assert {one for one in described if not one.startswith("GET ")} <= changing
 
 
 @pytest.mark.parametrize("state", STATES)
-def test_each_role_can_do_what_it_may_and_nothing_else(service, people, open_browser, monkeypatch, state):
+def test_each_role_can_do_what_it_may_and_nothing_else(
+    service, people, open_browser, monkeypatch, operations, state
+):
     monitor = service.client.app.state.context.benches.get(None).monitor
     monkeypatch.setattr(type(monitor), "latest_status", property(lambda self: AgentStatus(state=state)))
-    operations = [one for one in list_operations(service.client) if one not in BY_CONTENT | PUBLIC]
+    operations = [one for one in operations if one not in BY_CONTENT | PUBLIC]
     assert len(operations) > 70
     for role in ROLES:
         browser, refused = open_browser(role), set()

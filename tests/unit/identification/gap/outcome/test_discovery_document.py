@@ -19,7 +19,7 @@ from identification.gap.outcome.twin import make_twin
 from tests.support.candidate_pools import NOISE, record
 from tests.support.discoveries import GAIN, GROWING, LENGTH, all_curves, discovered_with, fitted_with, pool_with
 from tests.support.discovery_documents import make_discovery, make_result
-from tests.support.reports import fit_document
+from tests.support.result_documents import fit_document
 
 SHRINKAGE = Shrinkage(36.0, 2.0, 0.97, (0.95, 0.99))
 PROVENANCE = Provenance(logs={"short.mcap": "0" * 64}, version="0", seed=1, settings={})

@@ -9,7 +9,7 @@ TEST_OPTIONS ?=
 # The tests start hundreds of processes. Where no compiled modules may be written, each would compile them again.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help install demo test unit wire check types contracts style all-tests coverage faults bench clean
+.PHONY: help install demo test unit wire check types contracts style coverage faults bench clean
 
 help:
 	@echo "make demo      hides an effect in the simulated damper, finds it from a recording, discloses the truth"
@@ -67,9 +67,7 @@ wire: $(READY)
 		$(BIN)/pytest $(WIRE) --junitxml=$(RESULTS)/wire_2.xml $(AGAIN) $(TEST_OPTIONS) || \
 		$(BIN)/pytest $(WIRE) --junitxml=$(RESULTS)/wire_3.xml $(AGAIN) $(TEST_OPTIONS)
 
-test: check all-tests
-
-all-tests: unit wire
+test: check unit wire
 	@$(BIN)/pytest $(call find_marked,slow) -m slow --collect-only > $(RESULTS)/slow.txt || true
 	@$(BIN)/python -m tests.summary $(RESULTS)/unit_*.xml $(RESULTS)/wire_*.xml --deselected $(RESULTS)/slow.txt
 

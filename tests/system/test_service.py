@@ -74,7 +74,8 @@ class ServiceProcess:
             time.sleep(0.02)
 
     def find_worker(self):
-        """Return the process id of the worker that was started last."""
+        """Return the process id of the worker that was started last; wait for the first one."""
+        wait_until_false(lambda: "worker_started pid=" not in self.log.read_text(), "no worker was started")
         return int(re.findall(r"worker_started pid=(\d+)", self.log.read_text())[-1])
 
     def end(self):

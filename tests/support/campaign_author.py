@@ -20,13 +20,13 @@ MOST_ADDED = 6
 
 @dataclass(frozen=True)
 class Look:
-    """What a person sees of a campaign."""
+    """View of a campaign, as a person sees it."""
 
     status: str
     has_ended: bool
     needs_person: bool
     is_question: bool
-    """Whether a failure has to be decided on; otherwise a prompt is to be answered."""
+    """True if a failure has to be decided on, false if a prompt is to be answered."""
     pending: list
     held: list
     """Ids of the steps that are held back."""

@@ -51,8 +51,8 @@ style: $(READY)
 	$(BIN)/ruff format --check .
 
 # Tests of processes run in real time: what a busy machine has made late is repeated alone, and named at the end.
-# The tests of a file on wires stay together, because they share a bench. Files of whole benches take longest and
-# come first. Only files with a mark are collected, because to import all of them takes half a minute.
+# The tests of a file on wires stay together, because they share a bench. Only files with a mark are collected,
+# because to import all of them takes half a minute.
 find_marked = $(sort $(shell grep -rl --include='test_*.py' 'mark\.$(1)' tests))
 WIRE = $(call find_marked,wire) tests/wire -m 'wire and not slow'
 AGAIN := --last-failed --last-failed-no-failures none
@@ -63,7 +63,7 @@ unit: $(READY)
 
 wire: $(READY)
 	@mkdir -p $(RESULTS) && rm -f $(RESULTS)/wire*.xml
-	$(BIN)/pytest -n 2 --dist loadfile --no-loadscope-reorder $(WIRE) --junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
+	$(BIN)/pytest -n 2 --dist loadfile $(WIRE) --junitxml=$(RESULTS)/wire_1.xml $(TEST_OPTIONS) || \
 		$(BIN)/pytest $(WIRE) --junitxml=$(RESULTS)/wire_2.xml $(AGAIN) $(TEST_OPTIONS) || \
 		$(BIN)/pytest $(WIRE) --junitxml=$(RESULTS)/wire_3.xml $(AGAIN) $(TEST_OPTIONS)
 

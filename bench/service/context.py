@@ -72,7 +72,9 @@ class ServiceContext:
     """Provider by which persons sign in; None without one."""
     log_copier: LogCopier | None = None
     """Copies the logs to a store; None without one."""
-    _descriptions: dict[Callable[["ServiceContext"], str], tuple[int, date, str]] = field(default_factory=dict)
+    _descriptions: dict[Callable[["ServiceContext"], str], tuple[int, date, str]] = field(
+        default_factory=dict, init=False
+    )
     """Descriptions of the catalogue, each with the state of the catalogue and the day that it describes."""
 
     @property

@@ -13,8 +13,8 @@ from tempfile import TemporaryDirectory
 
 from benchmarks.live.browser import MEASURE_PAGE, start_script
 from benchmarks.live.page import READERS, SECONDS, listen, print_view
-from benchmarks.speed.overlay import get, serve, wait_for
-from benchmarks.speed.scripted_agents import play_agents
+from benchmarks.speed.benches import serve_benches
+from benchmarks.speed.rest_load import wait_until_ready
 
 CASES = (
     ("one bench at 1 kHz, page alone", 1, 1000, 0),
@@ -34,13 +34,11 @@ def run() -> None:
 
 
 def _measure(count: int, rate: int, readers: int) -> None:
-    with TemporaryDirectory() as path, play_agents(Path(path), count, rate):
+    with TemporaryDirectory() as path:
         data = Path(path) / "runs"
         data.mkdir()
-        options = [f"--bench=b{number}=ipc://{path}/b{number}" for number in range(count)]
-        with serve(data, *options) as client:
-            wait_for(lambda: all(one["state"] == "idle" for one in get(client, "benches")["items"]))
-            wait_for(lambda: get(client, "health")["worker"] == "ok")  # its start needs a whole core
+        with serve_benches(Path(path), data, count, rate) as client:
+            wait_until_ready(client, ())
             token = client.headers["Authorization"].removeprefix("Bearer ")
             address = f"{str(client.base_url).split('api/v1')[0]}#token={token}"
             with listen(address, readers):

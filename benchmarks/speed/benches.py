@@ -14,10 +14,13 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import httpx2
 import numpy as np
 import psutil
 
@@ -26,7 +29,7 @@ from bench.client import Bench
 from benchmarks.common import print_line
 from benchmarks.speed.catalogue import fill_catalogue
 from benchmarks.speed.overlay import get, serve, wait_for
-from benchmarks.speed.rest_load import measure_load
+from benchmarks.speed.rest_load import measure_load, wait_until_ready
 from benchmarks.speed.scripted_agents import play_agents
 
 COUNTS, RATE = (1, 10), 100
@@ -61,17 +64,22 @@ def run() -> None:
 def _measure(count: int) -> dict[str, float]:
     """Print and return the figures of a service with a number of benches."""
     names = [f"b{number}" for number in range(count)]
-    with TemporaryDirectory() as path, play_agents(Path(path), count, RATE):
+    with TemporaryDirectory() as path:
         data = _make_catalogue(Path(path) / "runs")
-        options = [f"--bench={name}=ipc://{path}/{name}" for name in names]
-        with serve(data, *options) as client:
-            wait_for(lambda: all(one["state"] == "idle" for one in get(client, "benches")["items"]))
-            wait_for(lambda: get(client, "health")["worker"] == "ok")
-            for route in ROUTES:  # the first answer of each reads what later ones keep
-                get(client, route.lstrip("/"))
+        with serve_benches(Path(path), data, count, RATE) as client:
+            wait_until_ready(client, ROUTES)
             token = client.headers["Authorization"].removeprefix("Bearer ")
             address = str(client.base_url).rstrip("/")
             return _load(address, token, names)
+
+
+@contextmanager
+def serve_benches(folder: Path, data: Path, count: int, rate: int) -> Iterator[httpx2.Client]:
+    """Play agents b0, b1, ... in a folder, serve their benches, and yield a client once all are idle."""
+    options = [f"--bench=b{number}=ipc://{folder}/b{number}" for number in range(count)]
+    with play_agents(folder, count, rate), serve(data, *options) as client:
+        wait_for(lambda: all(one["state"] == "idle" for one in get(client, "benches")["items"]))
+        yield client
 
 
 def _load(address: str, token: str, names: list[str]) -> dict[str, float]:

@@ -59,7 +59,7 @@ def run() -> None:
             base, token = address.split("#token=")
             headers = {"Authorization": f"Bearer {token}"}
             with httpx2.Client(base_url=f"{base}api/v1/", headers=headers) as client:
-                _wait_until_ready(client, ROUTES)
+                wait_until_ready(client, ROUTES)
             with _record_run(Bench(address), Path(path)):
                 _print_load("empty route of FastAPI, beside a run at 1 kHz", empty, ("/empty",), {})
             with _record_run(Bench(address), Path(path)):
@@ -77,12 +77,12 @@ def _measure_without_rig(data: Path) -> None:
     with serve(data) as client:
         headers = {"Authorization": client.headers["Authorization"]}
         routes = tuple(route for route in ROUTES if not route.startswith("/bench"))
-        _wait_until_ready(client, routes)
+        wait_until_ready(client, routes)
         name = f"mrbench, {RUNS} runs, idle machine, {_name(routes)}"
         _print_load(name, str(client.base_url).rstrip("/"), routes, headers, "at most 50")
 
 
-def _wait_until_ready(client: httpx2.Client, routes: tuple[str, ...]) -> None:
+def wait_until_ready(client: httpx2.Client, routes: tuple[str, ...]) -> None:
     """Wait for the worker, whose start needs a whole core for some seconds, and for an answer of each route."""
     wait_for(lambda: get(client, "health")["worker"] == "ok")
     for route in routes:

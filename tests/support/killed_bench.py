@@ -9,18 +9,17 @@ and worker again. Jobs are the quick ones of `tests.support.quick_jobs`, so that
 import random
 import re
 import subprocess
-import sys
 import threading
 import time
 from collections import Counter
-from dataclasses import dataclass, field, fields
-from pathlib import Path
+from dataclasses import dataclass, field
 
 from bench.client import ClientError
 from tests.support.bench_processes import ENVIRONMENT, MRBENCH, PARTS, BenchProcesses, wait_for
 from tests.support.killed_bench_checks import Records, check_records
 from tests.support.live_bench import method
 from tests.support.statements import StatementWatch
+from tests.support.tally import Tally, repeat
 
 VICTIMS = (*PARTS, "all")
 LATEST_KILL = 10.0
@@ -52,7 +51,7 @@ class StartedRun:
 
 
 @dataclass
-class Result:
+class Result(Tally):
     """Kills of one or several benches, what they met, and what was wrong afterwards."""
 
     kills: Counter = field(default_factory=Counter)
@@ -66,13 +65,6 @@ class Result:
     """Number of answers by path."""
     untrue: list = field(default_factory=list)
     records: Records = field(default_factory=Records)
-
-    def add(self, other):
-        """Add the result of another bench."""
-        for one in fields(Result):
-            if one.name != "records":
-                setattr(self, one.name, getattr(self, one.name) + getattr(other, one.name))
-        self.records.add(other.records)
 
     def note(self, started, killed):
         """Note the answer to a start during which parts were killed."""
@@ -170,18 +162,5 @@ def kill_at_random(folder, kills, seed):
         bench.end()
 
 
-def main():
-    folder, kills, seed = Path(sys.argv[1]).absolute(), int(sys.argv[2]), int(sys.argv[3])
-    began, total, benches = time.monotonic(), Result(), 0
-    while (done := total.kills.total()) < kills:
-        place = folder / f"bench-{benches}"
-        place.mkdir(parents=True)
-        total.add(kill_at_random(place, min(kills - done, KILLS_OF_ONE_BENCH), seed + benches))
-        benches += 1
-        print(f"\n{benches} benches, {time.monotonic() - began:.0f} s")
-        for name, value in total.list_rows().items():
-            print(f"{name}: {value}", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    repeat(kill_at_random, Result(), KILLS_OF_ONE_BENCH)

@@ -1,7 +1,7 @@
 """Records of a bench after kills: every run once, with a readable log, and one result of each job."""
 
 from collections import Counter
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from bench.errors import LogError
 from bench.jobs.scheduler import MAX_ATTEMPTS
 from bench.log import NS_PER_SECOND, read_log, salvage_log
 from tests.support.bench_processes import wait_for
+from tests.support.tally import Tally
 
 RATE = 1000.0
 """Sampling rate of the runs [Hz]."""
@@ -23,7 +24,7 @@ LOG_STATES = ("complete", "salvaged", "without a sample", "no log")
 
 
 @dataclass
-class Records:
+class Records(Tally):
     """Content of the catalogue and the data folder after kills."""
 
     outcomes: Counter = field(default_factory=Counter)
@@ -34,11 +35,6 @@ class Records:
     attempts: Counter = field(default_factory=Counter)
     """Number of done jobs by their attempts."""
     problems: list = field(default_factory=list)
-
-    def add(self, other):
-        """Add the records of another bench."""
-        for one in fields(Records):
-            setattr(self, one.name, getattr(self, one.name) + getattr(other, one.name))
 
 
 def check_records(bench, accepted):

@@ -1,6 +1,7 @@
 """Detection of changes of a catalogue, by any process."""
 
 import sqlite3
+from contextlib import closing
 from threading import Lock
 
 from sqlalchemy import Engine, PoolProxiedConnection
@@ -21,18 +22,18 @@ class ChangeCounter:
         """Return a number that another commit makes different; None where the database tells none."""
         if self._engine.dialect.name != "sqlite":
             return None
-        with self._lock:
-            if self._connection is None:
-                self._connection = self._engine.raw_connection()
-            cursor = self._connection.cursor()
-            try:
+        try:
+            with self._lock, closing(self._open().cursor()) as cursor:
                 cursor.execute("PRAGMA data_version")
-                (number,) = cursor.fetchone() or (None,)
-            except sqlite3.Error:  # the answer is then read from the catalogue, whose error says more
-                return None
-            finally:
-                cursor.close()
-            return number
+                ((number,),) = cursor.fetchall()
+                return int(number)
+        except sqlite3.Error:  # the answer is then read from the catalogue, whose error says more
+            return None
+
+    def _open(self) -> PoolProxiedConnection:
+        if self._connection is None:
+            self._connection = self._engine.raw_connection()
+        return self._connection
 
     def close(self) -> None:
         """Close the connection."""

@@ -35,6 +35,8 @@ from identification.simulate import ActiveEffect, Excitation, SimulationModel, s
 
 KINDS = ("none", "one", "one", "one", "two", "unknown")
 """Kinds of cases, in turn."""
+EFFECT_COUNTS = {"one": 1, "two": 2, "three": 3}
+"""Number of effects in each kind of cases with known effects."""
 COLUMNS = ("case", "error of the law over the floor", "verdict", "named", "stage", "with them", "right")
 SMALLEST_CHANGE, LARGEST_CHANGE = 2.0, 30.0
 """Change of the force by an effect, over the noise [1]; a refit of the law removes a part of it."""
@@ -131,7 +133,7 @@ def draw_case(seed: int, kind: str) -> Case:
     x, drive, segments = make_strokes(length, rate, drive_factor)
     velocity = np.gradient(x) * rate
     stroke = Excitation(rate, x, velocity, np.gradient(velocity) * rate, drive)
-    names = draw_names(random, {"one": 1, "two": 2}.get(kind, 0))
+    names = draw_names(random, EFFECT_COUNTS.get(kind, 0))
     cause = tuple(UNKNOWN_CAUSES)[random.integers(0, len(UNKNOWN_CAUSES))] if kind == "unknown" else ""
     clean = (
         _add_unknown(damper, stroke, cause, random) if cause else _add_effects(damper, stroke, names, size, random)
@@ -241,6 +243,7 @@ def format_summary(outcomes: Sequence[Outcome]) -> list[str]:
         "no effect": [o for o in outcomes if o.kind == "none"],
         "one effect": [o for o in outcomes if o.kind == "one"],
         "two effects": [o for o in outcomes if o.kind == "two"],
+        "three effects": [o for o in outcomes if o.kind == "three"],
         "unknown cause": [o for o in outcomes if o.kind == "unknown"],
     }
     lines = [

@@ -4,8 +4,8 @@
         [--methods sweep] [--out PAGE.md]
 
 Each recording has a random damper of 4 N to 90 kN, a random method (rich, poor, of a campaign, random strokes;
-sweeps only where they are asked for) and noise of a random spectrum. It has no effect, one, two, or a cause
-outside the library. It is written as CSV, imported by `mrbench import`, and diagnosed from the log alone. An
+sweeps only where they are asked for) and noise of a random spectrum. It has no effect, one to three, or a
+cause outside the library. It is written as CSV, imported by `mrbench import`, and diagnosed from the log alone. An
 effect that a refit of the law absorbs cannot be named; it counts as wrong all the same.
 """
 
@@ -21,6 +21,7 @@ import numpy as np
 
 from benchmarks.accuracy.drawn_effects import (
     COLUMNS,
+    EFFECT_COUNTS,
     Case,
     Outcome,
     diagnose_case,
@@ -137,8 +138,7 @@ def _draw_causes(random: np.random.Generator, kind: str) -> dict[str, Cause]:
     if kind == "unknown":
         name = str(random.choice(list(UNKNOWN)))
         return {name: UNKNOWN[name][0]}
-    count = {"one": 1, "two": 2}.get(kind, 0)
-    names = set(random.choice(list(KNOWN), count, replace=False))
+    names = set(random.choice(list(KNOWN), EFFECT_COUNTS.get(kind, 0), replace=False))
     return {name: cause for name, cause in KNOWN.items() if name in names}
 
 

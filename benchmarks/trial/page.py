@@ -151,6 +151,7 @@ def _list_requirements(
         "27 of 30",
         _format_proportion(scores.unknown_correct),
     )
+    yield "unknown effects blamed on known ones", "at most 5 %", _format_proportion(scores.unknown_blamed)
     yield from _list_claims(cases, notes)
     if notes.same_kind and notes.same_kind.total:
         yield (

@@ -35,7 +35,7 @@ def make_diagnosis(verdict: str, *names: str, probability: float = 0.8, **more: 
     """Return a diagnosis that names these effects."""
     return {
         "verdict": verdict,
-        "effects": [{"name": name, "probability": 0.9} for name in names],
+        "effects": [{"name": name, "probability": 0.9, "share": 0.6} for name in names],
         "alternatives": [],
         "probability": probability,
         "unknown_probability": 0.1,

@@ -24,6 +24,12 @@ _SIZE_EDGES = (1.0, *(math.sqrt(a * b) for a, b in pairwise(GRID_RATIOS)), math.
 """[1] edges of the bins of a detection curve: geometric means of the grid's ratios."""
 _Z_95 = 1.959964
 """[1] standard normal quantile of a two-sided 95 % interval."""
+_CONFIDENT_PROBABILITY = 0.9
+"""[1] probability above which an effect is named with confidence, if its share is large as well."""
+_LARGE_SHARE = 0.5
+"""[1] share of the gap above which an effect is said to cause most of it."""
+_CLOSE_CLAIM = 0.05
+"""[1] largest difference between claimed and observed shrinkage that is close without an interval."""
 UNKNOWN_LABEL = "(unknown)"
 NOTHING_LABEL = "(nothing)"
 
@@ -45,6 +51,7 @@ def compute_scores(cases: Sequence[CaseResult]) -> Scores:
         false_alarms=compute_proportion(bool(_get_names(c)) for c in nothing),
         no_gap_correct=compute_proportion(c.verdict == "no_gap" for c in nothing),
         unknown_correct=compute_proportion(not _get_names(c) for c in unknown),
+        unknown_blamed=compute_proportion(is_unknown_blamed(c) for c in unknown),
         stage_correct=compute_proportion(c.stage == _find_stage(c) for c in single),
         failures=len(accelerated) - len(diagnosed),
         log_score=fmean(math.log(c.truth_probability) for c in diagnosed) if diagnosed else None,
@@ -58,6 +65,17 @@ def compute_scores(cases: Sequence[CaseResult]) -> Scores:
         seconds_median=median(durations) if durations else None,
         seconds_max=max(durations, default=None),
     )
+
+
+def is_unknown_blamed(case: CaseResult) -> bool:
+    """Return True if a diagnosis attributes an unknown effect to effects of the library with confidence.
+
+    A partial answer with doubtful names is no such claim: it states what helps, and that more is unknown.
+    """
+    named = _get_names(case)
+    confident = (case.effect_probabilities.get(n, 0.0) > _CONFIDENT_PROBABILITY for n in named)
+    large = (case.effect_shares.get(n, 0.0) > _LARGE_SHARE for n in named)
+    return case.verdict == "explained" or any(c and s for c, s in zip(confident, large, strict=True))
 
 
 def group_cases(cases: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:
@@ -128,13 +146,18 @@ def _find_stage(case: CaseResult) -> str:
 def _score_shrinkage(cases: Sequence[CaseResult]) -> ShrinkageScore:
     candidates = [(c, c.claimed_shrinkage, c.true_shrinkage) for c in cases if _get_names(c)]
     pairs = [(c, claimed, true) for c, claimed, true in candidates if claimed is not None and true is not None]
-    within = [c.claimed_ci95[0] <= true <= c.claimed_ci95[1] for c, _, true in pairs if c.claimed_ci95]
+    claims = [
+        (abs(claimed - true), c.claimed_ci95[0] <= true <= c.claimed_ci95[1])
+        for c, claimed, true in pairs
+        if c.claimed_ci95
+    ]
     return ShrinkageScore(
         cases=len(pairs),
         claimed=fmean(claimed for _, claimed, _ in pairs) if pairs else None,
         observed=fmean(true for _, _, true in pairs) if pairs else None,
         median_difference=median(abs(claimed - true) for _, claimed, true in pairs) if pairs else None,
-        within_ci95=compute_proportion(within),
+        within_ci95=compute_proportion(within for _, within in claims),
+        close_or_within=compute_proportion(within or error <= _CLOSE_CLAIM for error, within in claims),
     )
 
 

@@ -47,6 +47,7 @@ def _list_figures(trial: TrialReport) -> list[tuple[str, str]]:
         ("effects named without any effect", _format_proportion(s.false_alarms)),
         ("no_gap without any effect", _format_proportion(s.no_gap_correct)),
         ("unknown effects left unknown", _format_proportion(s.unknown_correct)),
+        ("unknown effects blamed on known ones", _format_proportion(s.unknown_blamed)),
         ("most probable stage correct", _format_proportion(s.stage_correct)),
         ("without a diagnosis", str(s.failures)),
         ("mean ln probability of the truth", _format_number(s.log_score)),
@@ -58,6 +59,7 @@ def _list_figures(trial: TrialReport) -> list[tuple[str, str]]:
         ),
         ("  median difference", f"{_format_number(shrinkage.median_difference)} in {shrinkage.cases} cases"),
         ("  observed within the interval", _format_proportion(shrinkage.within_ci95)),
+        ("  within 5 points or the interval", _format_proportion(shrinkage.close_or_within)),
         (
             "duration of a diagnosis [s], median / longest",
             f"{_format_number(s.seconds_median)} / {_format_number(s.seconds_max)}",

@@ -25,6 +25,10 @@ class Proportion(FrozenModel):
     ci95: tuple[float, float] | None = Field(description="[1] 95 % interval (Wilson); null if the total is 0")
 
 
+NOT_COUNTED = Proportion(count=0, total=0, fraction=None, ci95=None)
+"""Default of scores that earlier versions did not have."""
+
+
 class NamedSet(FrozenModel):
     """A set of effects with its probability."""
 
@@ -54,6 +58,9 @@ class CaseResult(FrozenModel):
     unknown_probability: float = Field(default=0.0, description="[1] that an unknown effect is active")
     effect_probabilities: dict[str, float] = _renamed(
         "effect_probabilities", "odds", "[1] of each named effect, that it is active", default={}
+    )
+    effect_shares: dict[str, float] = Field(
+        default={}, description="[1] part of the gap that each named effect closes"
     )
     stage: str | None = Field(default=None, description="most probable stage")
     error_ratio_before: float | None = _renamed(
@@ -103,6 +110,9 @@ class ShrinkageScore(FrozenModel):
     within_ci95: Proportion = _renamed(
         "within_ci95", "inside_interval", "observed value within the claimed 95 % interval"
     )
+    close_or_within: Proportion = Field(
+        default=NOT_COUNTED, description="observed value within 5 points of the claim, or within its interval"
+    )
 
 
 class DetectionBin(FrozenModel):
@@ -141,6 +151,10 @@ class Scores(FrozenModel):
         "unknown_correct",
         "unknown_left_unknown",
         "cases of an unknown effect in which no library effect was named",
+    )
+    unknown_blamed: Proportion = Field(
+        default=NOT_COUNTED,
+        description="cases of an unknown effect with the verdict `explained` or a confident name",
     )
     stage_correct: Proportion = _renamed(
         "stage_correct", "stage_right", "cases of one effect, in the library or not, with the correct stage"

@@ -72,6 +72,7 @@ def _extract_claims(diagnosis: dict[str, Any]) -> dict[str, Any]:
         ),
         "unknown_probability": diagnosis["unknown_probability"],
         "effect_probabilities": {effect["name"]: effect["probability"] for effect in effects},
+        "effect_shares": {effect["name"]: effect["share"] for effect in effects},
         "stage": diagnosis["where"]["stage"],
         "error_ratio_before": gap["before_n"] / noise,
         "error_ratio_after": gap["after_n"] / noise,

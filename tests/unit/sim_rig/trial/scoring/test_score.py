@@ -104,6 +104,40 @@ def test_groups_false_alarms_and_unknown_effects():
     assert result.effects["end_stop"].false_alarms == 3
 
 
+@pytest.mark.parametrize(
+    ("verdict", "probability", "share", "blamed"),
+    [
+        ("explained", 0.6, 0.3, True),
+        ("partly_explained", 0.95, 0.6, True),
+        ("partly_explained", 0.95, 0.5, False),
+        ("partly_explained", 0.9, 0.6, False),
+        ("unexplained", 0.1, 0.1, False),
+    ],
+)
+def test_an_unknown_effect_is_blamed_on_a_known_one_by_a_confident_answer(verdict, probability, share, blamed):
+    effects = [{"name": "end_stop", "probability": probability, "share": share}]
+    case = evaluate(make_truth("hanging_valve", kind="unknown"), make_diagnosis(verdict, effects=effects))
+    score = compute_scores([case, evaluate(make_truth("gas_spring"), make_diagnosis("explained", "end_stop"))])
+    assert (score.unknown_blamed.count, score.unknown_blamed.total) == (int(blamed), 1)
+
+
+@pytest.mark.parametrize(
+    ("rmse", "interval", "holds"),
+    [
+        (2.70, [0.99, 1.0], False),
+        (2.58, [0.99, 1.0], True),
+        (2.70, [0.90, 0.99], True),
+    ],
+    ids=["far and outside", "close", "inside"],
+)
+def test_a_claimed_shrinkage_holds_within_five_points_or_its_interval(rmse, interval, holds):
+    gap = make_diagnosis("explained")["gap"] | {"shrinkage": 1.0, "shrinkage_ci95": interval}
+    prediction = {"noise_floor_n": 2.5, "before_n": 5.0, "rmse_n": rmse}
+    case = evaluate(make_truth("gas_spring"), make_diagnosis("explained", "gas_spring", gap=gap), prediction)
+    result = compute_scores([case]).shrinkage.close_or_within
+    assert (result.count, result.total) == (int(holds), 1)
+
+
 def test_the_log_score_is_the_mean_over_all_diagnoses():
     cases = [
         evaluate(make_truth("gas_spring"), make_diagnosis("explained", "gas_spring", probability=0.5)),
@@ -187,3 +221,4 @@ def test_the_table_contains_the_scores():
     assert "gas_spring" in text
     assert text.startswith("2 cases and 1 of them again over wires, seed 4,")
     assert "over wires   1/1 = 100 %" in text
+    assert "unknown effects blamed on known ones" in text

@@ -15,20 +15,30 @@ NO_LOG_REASON = f"{CRASH_REASON} before it wrote a log"
 def recover_execution(catalogue: Catalogue, log: str) -> ExecutionReport:
     """Return what became of a run whose process has ended, by its log.
 
-    A truncated log is repaired and stays in the catalogue as incomplete. One that cannot be repaired is renamed.
+    A truncated log is repaired and stays in the catalogue as incomplete. One that cannot be repaired is renamed,
+    and its run in the catalogue says so.
     """
     path = catalogue.folder / log
     if not path.is_file():
-        return ExecutionReport(kind="crashed", reason=NO_LOG_REASON)
+        return _report_loss(catalogue.find_run_by_log(path), NO_LOG_REASON)
     try:
         if is_complete(path):
             return make_end_report(catalogue, catalogue_log(catalogue, path), path)
         salvage_log(path)
         row = catalogue_log(catalogue, path)
     except LogError as error:
-        path.rename(path.with_name(f"{path.name}.{os.getpid()}.broken"))
-        return ExecutionReport(kind="crashed", reason=f"{CRASH_REASON}; its log cannot be repaired: {error}")
+        kept = path.rename(path.with_name(f"{path.name}.{os.getpid()}.broken"))
+        reason = f"{CRASH_REASON}; its log cannot be repaired and is kept as {kept.name}: {error}"
+        known = catalogue.find_run_by_log(path)
+        if known is not None:
+            catalogue.update_run(known.id, state="ended", outcome="incomplete", reason=reason)
+        return _report_loss(known, reason)
     return _report_crash(catalogue, row, path)
+
+
+def _report_loss(row: RunRow | None, reason: str) -> ExecutionReport:
+    """Return the report on a run of which no sample is left."""
+    return ExecutionReport(kind="crashed", run=row.id if row else "", reason=reason, has_samples=False)
 
 
 def _report_crash(catalogue: Catalogue, row: RunRow | None, path: Path) -> ExecutionReport:

@@ -128,14 +128,18 @@ def _take_crash(state: CampaignState, report: ExecutionReport, now: float) -> Ca
 
 
 def _keep_part(state: CampaignState, report: ExecutionReport) -> CampaignState:
-    """Keep an incomplete run, and the place at which the next one continues."""
+    """Keep an incomplete run, and the place at which the next one continues.
+
+    A run without samples belongs to the step, but the next one continues the run before it.
+    """
     active = state.active
     if active is None or not report.run:
         return state
     item = state.get_item(active.item)
     parts = (*item.parts, report.run)
     after = report.checkpoint or item.resume_after
-    return change_item(state, item.id, parts=parts, resume_after=after, continues=report.run)
+    continues = report.run if report.has_samples else item.continues
+    return change_item(state, item.id, parts=parts, resume_after=after, continues=continues)
 
 
 def _put_back(state: CampaignState) -> CampaignState:

@@ -26,6 +26,8 @@ class ExecutionReport(FrozenModel):
     """Recorded time [s]."""
     checkpoint: str = ""
     """Last checkpoint that an incomplete run has passed; empty without one."""
+    has_samples: bool = True
+    """False if its log is missing or contains no sample, so that no other run can continue it."""
 
 
 class Observation(FrozenModel):

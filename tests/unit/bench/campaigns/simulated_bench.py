@@ -55,7 +55,7 @@ class SimulatedBench:
         )
         self.report = self.logs[log]
 
-    def die(self, checkpoint="", has_log=False):
+    def die(self, checkpoint="", has_log=False, has_samples=True):
         """Lose everything but the stored state and the logs; then continue."""
         self.report = None
         self.now += 60.0
@@ -66,7 +66,11 @@ class SimulatedBench:
             if report is None:
                 run = f"part-{len(self.logs)}" if has_log else ""
                 report = ExecutionReport(
-                    kind="crashed", run=run, checkpoint=checkpoint if has_log else "", reason="killed"
+                    kind="crashed",
+                    run=run,
+                    checkpoint=checkpoint if has_log else "",
+                    reason="killed",
+                    has_samples=has_samples,
                 )
                 if has_log:
                     self.logs[active.execution.log] = report

@@ -230,6 +230,16 @@ def test_a_step_that_crashes_the_bench_twice_is_held_back_and_released():
     assert states(bench) == ["done", "done"]
 
 
+def test_a_run_without_samples_belongs_to_its_step_and_is_not_continued():
+    bench = SimulatedBench(start([RUN, OTHER]))
+    for sampled, checkpoint in ((True, "10mm_1Hz_0.2V"), (False, "")):
+        bench.store(advance(bench.state, Observation(), bench.now, ID))
+        bench.die(checkpoint, has_log=True, has_samples=sampled)
+    item = bench.state.items[0]
+    assert len(item.parts) == 2
+    assert (item.continues, item.resume_after) == (item.parts[0], "10mm_1Hz_0.2V")
+
+
 def test_a_person_is_told_once_that_the_bench_is_not_ready():
     bench = SimulatedBench(start([RUN]))
     bench.obstacle = "the rig agent is tripped: force"

@@ -103,6 +103,8 @@ class Result(Tally):
     commands: Counter = field(default_factory=Counter)
     steps: Counter = field(default_factory=Counter)
     runs: Counter = field(default_factory=Counter)
+    unattributed: int = 0
+    """Number of runs that belong to no step."""
     entries: int = 0
     """Number of entries of accepted commands in the audit trails."""
 
@@ -142,7 +144,10 @@ def check_campaign(data, result):
     with open_store(data) as store:
         state = check_runs(store, data)
         result.steps.update(item.state for item in state.items)
-        result.runs.update(row.outcome or row.state for row in store.catalogue.list_runs(1000))
+        rows = store.catalogue.list_runs(1000)
+        result.runs.update(row.outcome or row.state for row in rows)
+        attributed = {run for item in state.items for run in (*item.runs, *item.parts)}
+        result.unattributed = sum(row.id not in attributed for row in rows)
     assert not verify_chain(data / AUDIT_FILE).fault
     paths = ("POST /campaigns/{campaign_id}/", "PATCH /campaigns/{campaign_id}")
     entries = [one for one in list_newest(data / AUDIT_FILE, 100_000) if one.action.startswith(paths)]

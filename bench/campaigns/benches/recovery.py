@@ -20,7 +20,7 @@ def recover_execution(catalogue: Catalogue, log: str) -> ExecutionReport:
     """
     path = catalogue.folder / log
     if not path.is_file():
-        return _report_loss(catalogue.find_run_by_log(path), NO_LOG_REASON)
+        return _report_loss(catalogue, path, NO_LOG_REASON)
     try:
         if is_complete(path):
             return make_end_report(catalogue, catalogue_log(catalogue, path), path)
@@ -29,15 +29,15 @@ def recover_execution(catalogue: Catalogue, log: str) -> ExecutionReport:
     except LogError as error:
         kept = path.rename(path.with_name(f"{path.name}.{os.getpid()}.broken"))
         reason = f"{CRASH_REASON}; its log cannot be repaired and is kept as {kept.name}: {error}"
-        known = catalogue.find_run_by_log(path)
-        if known is not None:
-            catalogue.update_run(known.id, state="ended", outcome="incomplete", reason=reason)
-        return _report_loss(known, reason)
+        return _report_loss(catalogue, path, reason)
     return _report_crash(catalogue, row, path)
 
 
-def _report_loss(row: RunRow | None, reason: str) -> ExecutionReport:
-    """Return the report on a run of which no sample is left."""
+def _report_loss(catalogue: Catalogue, path: Path, reason: str) -> ExecutionReport:
+    """End a run of which no sample is left, if the catalogue has it, and return the report on it."""
+    row = catalogue.find_run_by_log(path)
+    if row is not None and row.state != "ended":
+        catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=reason)
     return ExecutionReport(kind="crashed", run=row.id if row else "", reason=reason, has_samples=False)
 
 

@@ -24,7 +24,16 @@ def test_a_run_without_a_log_belongs_to_its_step(catalogue):
     add_run(catalogue)
     report = recover_execution(catalogue, LOG)
     assert (report.kind, report.run, report.has_samples) == ("crashed", "run-1", False)
-    assert report.reason == NO_LOG_REASON
+    row = catalogue.get_run("run-1")
+    assert report.reason == row.reason == NO_LOG_REASON
+    assert (row.state, row.outcome) == ("ended", "incomplete")
+
+
+def test_a_run_that_the_catalogue_has_ended_keeps_its_reason(catalogue):
+    add_run(catalogue, "ended")
+    catalogue.update_run("run-1", outcome="incomplete", reason="stopped by A")
+    assert recover_execution(catalogue, LOG).run == "run-1"
+    assert catalogue.get_run("run-1").reason == "stopped by A"
 
 
 def test_a_run_that_never_began_has_no_id(catalogue):

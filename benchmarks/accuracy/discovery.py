@@ -23,6 +23,7 @@ _UNKNOWN: dict[str, tuple[Place, Variable]] = {
     "gain over displacement": ("damper_gain", "displacement"),
     "drive over time": ("drive", "time"),
     "load cell over force": ("force_channel", "force"),
+    "delay over time": ("displacement_channel", "time"),
 }
 _SAME_PLACE = {"field": "drive"}
 """Before and behind the lag of the coil, which only its transients tell apart."""

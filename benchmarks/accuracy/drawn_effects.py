@@ -44,6 +44,7 @@ UNKNOWN_CAUSES: dict[str, Stage] = {
     "gain over displacement": "damper",
     "drive over time": "coil",
     "load cell over force": "force_channel",
+    "delay over time": "displacement_channel",
 }
 """Causes outside the library, with their stages."""
 _HEATING_ITERATIONS = 4
@@ -219,6 +220,15 @@ def _add_unknown(damper: Coordinates, stroke: Excitation, cause: str, random: np
     if cause == "drive over time":
         time = np.linspace(-1.0, 1.0, len(plain))
         return _simulate(damper, replace(stroke, drive=stroke.drive * (1.0 + strength * shape(time))), ())
+    if cause == "delay over time":
+        time = np.arange(len(plain)) / stroke.rate
+        largest = 0.3 * strength * size.length / size.velocity
+        moved = np.interp(time + largest * shape(np.linspace(-1.0, 1.0, len(time))), time, stroke.displacement)
+        velocity = np.gradient(moved) * stroke.rate
+        ahead = replace(
+            stroke, displacement=moved, velocity=velocity, acceleration=np.gradient(velocity) * stroke.rate
+        )
+        return _simulate(damper, ahead, ())
     gain = 1.0 + strength * shape(stroke.displacement / size.length)
     # Neither the accumulator's spring nor the preload passes through the gap with the fluid.
     static = damper.k1 * stroke.displacement - damper.f0

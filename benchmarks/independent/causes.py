@@ -240,6 +240,19 @@ def slow_decay(rig: Rig, strength: float, random: np.random.Generator, s: Scales
     return replace(rig, fall=rig.rise / (1.0 + 8.0 * strength))
 
 
+def switch_delay(rig: Rig, strength: float, random: np.random.Generator, s: Scales) -> Rig:
+    """Let the displacement be late at times: a buffer that is read a cycle later again and again."""
+    delay, period = 0.3 * strength * s.length / s.speed, s.duration * random.uniform(0.1, 0.5)
+    part, begin = random.uniform(0.3, 0.7), random.uniform(0.0, 1.0)
+
+    def hold(x: Array) -> Array:
+        time = np.linspace(0.0, s.duration, len(x))
+        is_late = (time / period + begin) % 1.0 < part
+        return np.interp(time - delay * is_late, time, x)
+
+    return replace(rig, displacement_maps=(*rig.displacement_maps, hold))
+
+
 def _change_force(rig: Rig, change: Callable[[Array, Strokes], Array]) -> Rig:
     return replace(rig, force_maps=(*rig.force_maps, change))
 
@@ -268,5 +281,6 @@ UNKNOWN: dict[str, tuple[Cause, Stage]] = {
     "load cell over force": (bend_load_cell, "force_channel"),
     "loss of force in steps": (lose_fluid, "damper"),
     "field that falls slowly": (slow_decay, "coil"),
+    "delay in steps": (switch_delay, "displacement_channel"),
 }
 """Causes outside the library, with their stages."""

@@ -23,8 +23,10 @@ Warp = Literal["none", "symmetric", "logarithmic"]
 
 ``symmetric`` resolves small values of both signs, ``logarithmic`` small positive ones.
 """
-_KNOT_COUNT = 12
-"""Number of cubic splines."""
+KNOT_COUNT = 12
+"""Number of cubic splines of a curve over a variable of the motion or the drive."""
+TIME_KNOT_COUNT = 40
+"""Number of cubic splines over time, in which a change may return many times. Origin: a delay that alternates."""
 _GRID_POINTS = 401
 """Points at which the basis is tabulated."""
 _LEVEL_PENALTY = 0.02
@@ -69,17 +71,19 @@ class CurveBasis:
         return np.array(self.table)
 
 
-def make_basis(values: Array, warp: Warp) -> CurveBasis:
-    """Return a basis over the range of some values of the variable (N,)."""
+def make_basis(values: Array, warp: Warp, count: int = KNOT_COUNT) -> CurveBasis:
+    """Return a basis of some number of splines over the range of some values of the variable (N,)."""
     low, high = (float(q) for q in np.quantile(values, _QUANTILES))
     size = max(abs(low), abs(high), 1e-300)
     even = np.linspace(_warp(low / size, warp), _warp(high / size, warp), _GRID_POINTS)
     positions = size * _unwarp(even, warp)
-    inner = np.linspace(0.0, 1.0, _KNOT_COUNT - 2)
+    inner = np.linspace(0.0, 1.0, count - 2)
     step = inner[1]
     knots = np.concatenate([-step * np.arange(3, 0, -1), inner, 1.0 + step * np.arange(1, 4)])
     splines = BSpline.design_matrix(np.linspace(0.0, 1.0, _GRID_POINTS), knots, 3).toarray()
-    return CurveBasis(tuple(positions.tolist()), tuple(map(tuple, (splines @ _compute_rotation()).T.tolist())))
+    return CurveBasis(
+        tuple(positions.tolist()), tuple(map(tuple, (splines @ _compute_rotation(count)).T.tolist()))
+    )
 
 
 def make_periodic_basis(period: float) -> CurveBasis:
@@ -91,10 +95,10 @@ def make_periodic_basis(period: float) -> CurveBasis:
     return CurveBasis(tuple(positions.tolist()), tuple(tuple(w.tolist()) for w in waves), period)
 
 
-def _compute_rotation() -> Array:
-    """Return the matrix (K, K) from independent coefficients to those of the splines."""
-    differences = np.diff(np.eye(_KNOT_COUNT), 2, axis=0)
-    penalty = differences.T @ differences + _LEVEL_PENALTY * np.eye(_KNOT_COUNT)
+def _compute_rotation(count: int) -> Array:
+    """Return the matrix (K, K) from independent coefficients to those of some number of splines."""
+    differences = np.diff(np.eye(count), 2, axis=0)
+    penalty = differences.T @ differences + _LEVEL_PENALTY * np.eye(count)
     values, vectors = np.linalg.eigh(penalty)
     return np.asarray(vectors / np.sqrt(values))
 

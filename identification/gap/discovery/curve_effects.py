@@ -17,7 +17,10 @@ from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.fitting import EffectModel, Piece, Problem, RecordingScales
 from identification.gap.data import split_by_piece
 from identification.gap.discovery.curve_basis import (
+    KNOT_COUNT,
     MAX_GROWTH,
+    TIME_KNOT_COUNT,
+    CurveBasis,
     CurveFunction,
     Direction,
     LinearGrowth,
@@ -56,7 +59,7 @@ class CurvePlace(NamedTuple):
     """The variable of the curve, then those of its factors."""
     grows_with_drive: bool = False
     is_viscous: bool = False
-    """True where the curve is proportional to the velocity; else it has its sign."""
+    """True where a parallel force is proportional to the velocity; else it has its sign."""
     period: float | None = None
     """Period of the curve, in the unit of its variable; None where it does not repeat."""
     is_response: bool = False
@@ -68,6 +71,11 @@ class CurvePlace(NamedTuple):
         return "time" if self.is_response else self.variables[0]
 
     @property
+    def is_over_time(self) -> bool:
+        """True for a curve over the time of the recording."""
+        return self.argument == "time" and not self.is_response
+
+    @property
     def warp(self) -> Warp:
         """Scale on which the knots of the curve are even."""
         return "logarithmic" if self.is_response else _WARPS.get(self.variables[0], "none")
@@ -77,7 +85,12 @@ class CurvePlace(NamedTuple):
         """Factor of the curve that depends on the velocity."""
         if "velocity" not in self.variables[1:]:
             return "none"
-        return "velocity" if self.is_viscous else "sign"
+        return "velocity" if self.is_viscous or self.is_delay else "sign"
+
+    @property
+    def is_delay(self) -> bool:
+        """True for an error of the displacement that is proportional to the velocity: a delay that varies."""
+        return self.place == "displacement_channel" and "velocity" in self.variables[1:]
 
     @property
     def has_drive_factor(self) -> bool:
@@ -141,6 +154,7 @@ CURVE_PLACES: tuple[CurvePlace, ...] = (
     CurvePlace("displacement_channel", ("displacement",)),
     CurvePlace("displacement_channel", ("velocity",)),
     CurvePlace("displacement_channel", ("time",)),
+    CurvePlace("displacement_channel", ("time", "velocity")),
 )
 """All places and variables that are tried."""
 _PLACE_UNITS: dict[Place, str] = {
@@ -172,6 +186,8 @@ class CurveEffect:
             return "1"
         if self.at.is_elongation:
             return "m"
+        if self.at.is_delay:
+            return "s"
         return "N s/m" if self.at.is_viscous else _PLACE_UNITS[self.at.place]
 
 
@@ -229,7 +245,7 @@ def _is_visible(at: CurvePlace, values: dict[str, Array], problem: Problem) -> b
 def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> CurveEffect:
     scales = problem.space.scales
     function = CurveFunction(
-        make_periodic_basis(at.period) if at.period else make_basis(values, at.warp),
+        _make_basis(at, values),
         (at.argument, *at.variables[1:]),
         _find_size(at, scales),
         at.direction,
@@ -247,12 +263,20 @@ def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> Curve
     return CurveEffect(at, function, _make_model(at, (*coefficients, growth), function), linear)
 
 
+def _make_basis(at: CurvePlace, values: Array) -> CurveBasis:
+    if at.period:
+        return make_periodic_basis(at.period)
+    return make_basis(values, at.warp, TIME_KNOT_COUNT if at.is_over_time else KNOT_COUNT)
+
+
 def _find_size(at: CurvePlace, scales: RecordingScales) -> float:
     """Return the value of a curve of size one, in the unit of its place over that of its factors."""
     if at.is_elongation:
         return scales.length
     if at.is_response:
         return 1.0
+    if at.is_delay:
+        return 1.0 / scales.rate
     sizes: dict[Place, float] = {
         "drive": scales.drive if not at.has_drive_factor else 1.0,
         "field": scales.drive,

@@ -81,7 +81,18 @@ def _choose_finding(pool: CandidatePool, found: Sequence[FittedCurve]) -> _Findi
     """
     accepted = [_Finding(f, None, f) for f in found if _is_accepted(pool, f)]
     findings = [_add_formula(pool, x.fitted) for x in _select_equal(accepted)]
+    findings += _find_time_formulas(pool, [f for f in found if not _is_accepted(pool, f)])
     return min(_select_equal(findings), key=lambda x: (x.length, x.judged.loss), default=None)
+
+
+def _find_time_formulas(pool: CandidatePool, found: Sequence[FittedCurve]) -> list[_Finding]:
+    """Return the formulas over time that close part of the gap although their curves do not.
+
+    A curve over time that changes faster than the strokes is unknown in those that were left out. A formula that
+    repeats is not.
+    """
+    over_time = [f for f in found if f.curve.at.is_over_time and _is_certain(f)]
+    return [x for f in over_time if (x := _add_formula(pool, f)).formula is not None]
 
 
 def _select_equal(findings: Sequence[_Finding]) -> list[_Finding]:
@@ -121,10 +132,15 @@ def _is_accepted(pool: CandidatePool, fitted: FittedCurve) -> bool:
     """Return True if a curve improves the fit beyond chance and closes part of the gap on held-out strokes."""
     parent, candidate, floor = fitted.parent, fitted.candidate, pool.floor
     gap = parent.held_out_rmse**2 - floor**2
-    if gap <= 0.0 or fitted.log_odds < _MIN_LOG_ODDS * len(fitted.curve.at.variables):
+    if gap <= 0.0 or not _is_certain(fitted):
         return False
     closed = (parent.held_out_rmse**2 - candidate.held_out_rmse**2) / gap
     interval = pool.evaluation.estimate_shares(
         parent.residual, candidate.residual, {"curve": parent.residual}, candidate.held_out_rmse, floor
     )["curve"][1]
     return closed > _MIN_CLOSED_PART and interval[0] > 0.0
+
+
+def _is_certain(fitted: FittedCurve) -> bool:
+    """Return True if a curve improves the fit beyond chance."""
+    return fitted.log_odds >= _MIN_LOG_ODDS * len(fitted.curve.at.variables)

@@ -169,7 +169,7 @@ def _make_parameter(
     """Return a parameter with its unit and the range of its search."""
     unit, size = VARIABLE_UNITS[curve.at.argument], max(float(np.abs(variable).max()), 1e-300)
     match start.formula.others.get(name):
-        case "scale":
+        case "scale" | "wave":
             return EffectParameter(value=value, unit=unit, lo=min(1e-4 * size, 0.5 * value), hi=1e2 * size)
         case "size":
             return EffectParameter(value=value, unit=unit, lo=value, hi=value)

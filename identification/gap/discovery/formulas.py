@@ -14,13 +14,16 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.definitions import Expression
 from identification.damper.effects import Place, Variable
-from identification.gap.discovery.curve_effects import CurveEffect
+from identification.gap.discovery.curve_basis import TIME_KNOT_COUNT
+from identification.gap.discovery.curve_effects import CurveEffect, CurvePlace
 
-Role = Literal["scale", "size", "power", "position"]
-"""A scale is fitted; a size only makes a power dimensionless, and has one value."""
+Role = Literal["scale", "wave", "size", "power", "position"]
+"""A scale is fitted, that of a wave from even frequencies. A size, of one value, makes a power dimensionless."""
 
 _SCALES = np.geomspace(0.003, 3.0, 13)
 """Scales of the variable that are tried, over its largest size [1]."""
+_HALF_WAVES = 0.5 * np.arange(1, 2 * TIME_KNOT_COUNT)
+"""Numbers of half waves in the range of the variable that are tried; a curve shows no more."""
 _POWERS = (0.4, 0.7, 1.5, 2.0, 3.0)
 _POSITIONS = np.linspace(-0.8, 0.8, 9)
 """Positions that are tried, over the range of the variable about its middle [1]."""
@@ -77,27 +80,30 @@ FORMULAS: tuple[Formula, ...] = (
     Formula("a*(abs(z-m)+z-m)+b*(abs(l-z)+l-z)", {"a": 1, "b": 1}, {"m": "position", "l": "position"}),
     Formula("a*tanh((z-m)/s)", {"a": 0}, {"m": "position", "s": "scale"}),
     Formula("a*exp(-((z-m)/s)**2)", {"a": 0}, {"m": "position", "s": "scale"}),
-    Formula(_FIRST_HARMONIC, {"a": 0, "b": 0}, {"s": "scale"}),
+    Formula(_FIRST_HARMONIC, {"a": 0, "b": 0}, {"s": "wave"}),
 )
 """Expressions that are tried, the shortest first."""
 
 PERIODIC_FORMULAS: tuple[Formula, ...] = (
-    Formula(_FIRST_HARMONIC, {"a": 0, "b": 0}, {"s": "scale"}),
+    Formula(_FIRST_HARMONIC, {"a": 0, "b": 0}, {"s": "wave"}),
     *(
         Formula(
             f"{_FIRST_HARMONIC}+c*sin({k}*z/s)+d*sin(1.5707963+{k}*z/s)",
             {"a": 0, "b": 0, "c": 0, "d": 0},
-            {"s": "scale"},
+            {"s": "wave"},
         )
         for k in (2, 3)
     ),
     Formula(
         f"{_FIRST_HARMONIC}+c*sin(2*z/s)+d*sin(1.5707963+2*z/s)+f*sin(3*z/s)+g*sin(1.5707963+3*z/s)",
         {"a": 0, "b": 0, "c": 0, "d": 0, "f": 0, "g": 0},
-        {"s": "scale"},
+        {"s": "wave"},
     ),
 )
-"""Expressions for a curve that repeats: the fundamental, with the second harmonic, the third one, or both."""
+"""Expressions for a curve that repeats: the fundamental, with the second harmonic, the third one, or both.
+
+A curve over time may repeat as well, with a period that is found.
+"""
 
 RESPONSE_FORMULAS: tuple[Formula, ...] = (
     Formula("a*exp(-z/s)", {"a": 0}, {"s": "scale"}),
@@ -131,9 +137,17 @@ def rank_formulas(curve: CurveEffect, coefficients: Array, variable: Array) -> l
     target = curve.function.scale * curve.function.basis.evaluate(variable, coefficients)
     others = _list_absorbed(curve, variable)
     remaining = target - _project(others, target)
-    formulas = RESPONSE_FORMULAS if curve.at.is_response else PERIODIC_FORMULAS if curve.at.period else FORMULAS
-    starts = [_fit_formula(f, variable, remaining, others, curve.at.period) for f in formulas]
+    starts = [_fit_formula(f, variable, remaining, others, curve.at.period) for f in _list_formulas(curve.at)]
     return sorted((s for s in starts if s.values), key=lambda s: s.error)
+
+
+def _list_formulas(at: CurvePlace) -> tuple[Formula, ...]:
+    """Return the expressions that are tried for a curve."""
+    if at.is_response:
+        return RESPONSE_FORMULAS
+    if at.period:
+        return PERIODIC_FORMULAS
+    return FORMULAS + PERIODIC_FORMULAS[1:] if at.is_over_time else FORMULAS
 
 
 def _list_absorbed(curve: CurveEffect, z: Array) -> Array:
@@ -187,7 +201,8 @@ def _has_large_terms(formula: Formula, columns: Array, amplitudes: Array, z: Arr
 def _iterate_grid(formula: Formula, z: Array, period: float | None) -> Iterator[dict[str, float]]:
     size, low, high = max(float(np.abs(z).max()), 1e-300), float(z.min()), float(z.max())
     grids: dict[Role, list[float]] = {
-        "scale": [period / (2.0 * np.pi)] if period else [float(size * s) for s in _SCALES],
+        "scale": [float(size * s) for s in _SCALES],
+        "wave": [period / (2.0 * np.pi)] if period else [float((high - low) / (np.pi * k)) for k in _HALF_WAVES],
         "size": [size],
         "power": list(_POWERS),
         "position": [float(0.5 * (low + high) + 0.5 * (high - low) * m) for m in _POSITIONS],

@@ -12,7 +12,9 @@ from identification.gap.fits import Candidate
 from identification.gap.outcome.interval import compute_interval
 
 _CURVE_POINTS = 81
-"""Points of a curve in a document."""
+"""Smallest number of points of a curve in a document."""
+_POINTS_PER_COEFFICIENT = 4
+"""Number of points for each coefficient of a curve with many, between which it is nearly straight."""
 _BAND = 1.96
 """Standard deviations of a 95 % band."""
 _END_STEP = 1e-6
@@ -64,7 +66,8 @@ def _make_curve(fitted: FittedCurve, drive_unit: str) -> Curve:
     """Return the curve at some points, with its 95 % band."""
     function, basis = fitted.curve.function, fitted.curve.function.basis
     count = basis.size
-    rows = np.linspace(0, len(basis.positions) - 1, _CURVE_POINTS).round().astype(int)
+    points = max(_CURVE_POINTS, _POINTS_PER_COEFFICIENT * count + 1)
+    rows = np.linspace(0, len(basis.positions) - 1, points).round().astype(int)
     table = function.scale * np.array(basis.table)[:, rows]
     values = np.array(fitted.values[:count]) @ table
     covariance = fitted.covariance[:count, :count]

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from identification.gap.discovery import curve_basis
 from identification.gap.discovery.curve_basis import (
     MAX_GROWTH,
     CurveFunction,
@@ -47,9 +46,8 @@ def test_a_curve_has_no_more_freedom_than_its_coefficients():
 
 
 @pytest.mark.parametrize("knots", [8, 12, 24, 48])
-def test_coefficients_of_unit_size_give_curves_of_unit_size_for_any_number_of_knots(monkeypatch, knots):
-    monkeypatch.setattr(curve_basis, "_KNOT_COUNT", knots)
-    table = np.array(make_basis(EVEN, "none").table)
+def test_coefficients_of_unit_size_give_curves_of_unit_size_for_any_number_of_knots(knots):
+    table = np.array(make_basis(EVEN, "none", knots).table)
     assert len(table) == knots
     deviation = np.sqrt(np.sum(table**2, axis=0))  # of a curve with independent coefficients of deviation one
     assert deviation.min() == pytest.approx(2.6, rel=0.1)

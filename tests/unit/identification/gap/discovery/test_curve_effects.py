@@ -19,6 +19,7 @@ from tests.support.effects import LABORATORY
 from tests.support.fit_problems import SCALES
 
 DRIVE_RESPONSE = CurvePlace("drive", ("drive_history",), is_response=True)
+DELAY = CurvePlace("displacement_channel", ("time", "velocity"))
 OVER_DRIVE = {at for at in CURVE_PLACES if at.variables[0] in ("drive", "drive_history")} - {DRIVE_RESPONSE}
 WITH_DRIVE = {at for at in CURVE_PLACES if "drive" in at.variables[1:]}
 
@@ -75,6 +76,7 @@ def test_factors_of_a_curve_follow_from_its_variables():
     assert friction.label == "parallel force over displacement and velocity and drive"
     assert CurvePlace("drive", ("time", "drive")).has_drive_factor
     assert CurvePlace("parallel_force", ("velocity",)).direction == "none"
+    assert DELAY.direction == "velocity"
     for at, curve in all_curves().items():
         flags = (curve.function.direction, curve.function.drive_factor, curve.function.grows_with_drive)
         assert flags == (at.direction, at.has_drive_factor, at.grows_with_drive)
@@ -94,12 +96,13 @@ def test_factors_of_a_curve_follow_from_its_variables():
 )
 def test_a_curve_has_unit_and_stage_of_its_place(place, unit, stage):
     curves = [c for at, c in all_curves().items() if at.place == place]
-    other = ("is_viscous", "has_drive_factor", "is_elongation", "is_response")
+    other = ("is_viscous", "has_drive_factor", "is_elongation", "is_response", "is_delay")
     plain = [c for c in curves if not any(getattr(c.at, name) for name in other)]
     assert {c.unit for c in plain} <= {unit}
     assert {c.unit for c in curves if c.at.is_elongation} <= {"m"}
     assert {c.unit for c in curves if c.at.has_drive_factor} <= {"1"}
     assert {c.unit for c in curves if c.at.is_viscous} <= {"N s/m"}
+    assert {c.unit for c in curves if c.at.is_delay} <= {"s"}
     assert {m.effect.stage for c in curves for m in (c.model, c.linear_model)} == {stage}
     assert {c.model.effect.variable for c in curves} == {c.at.variables[0] for c in curves}
 
@@ -120,7 +123,7 @@ def test_a_curve_of_unit_size_is_as_large_as_the_damper(place, factor):
         SCALES, force=100.0 * SCALES.force, length=7.0 * SCALES.length, drive=3.0 * SCALES.drive, velocity=1.0
     )
     for at, curve in make_curves(make_stroke(), scales=large).items():
-        if at.place == place and not (at.is_viscous or at.is_elongation or at.is_response):
+        if at.place == place and not (at.is_viscous or at.is_elongation or at.is_response or at.is_delay):
             assert curve.function.scale == pytest.approx(factor * all_curves()[at].function.scale), at
     sizes = {"field": 0.5, "damper_gain": 1.0, "displacement_channel": 0.01}
     assert all_curves()[next(at for at in all_curves() if at.place == place)].function.scale == sizes.get(
@@ -138,6 +141,12 @@ def test_a_viscous_curve_of_unit_size_is_as_large_as_the_damping():
     viscous = {at: c for at, c in all_curves().items() if at.is_viscous}
     assert viscous
     assert {c.function.scale for c in viscous.values()} == {SCALES.damping}
+
+
+def test_a_delay_that_varies_has_the_size_of_a_part_of_a_cycle():
+    fast = replace(SCALES, velocity=4.0 * SCALES.velocity)
+    sizes = [make_curves(make_stroke(), scales=scales)[DELAY].function.scale for scales in (SCALES, fast)]
+    assert sizes == pytest.approx([SCALES.length / SCALES.velocity, SCALES.length / fast.velocity])
 
 
 def test_a_curve_that_is_proportional_to_the_drive_is_relative_to_it():

@@ -18,6 +18,10 @@ from identification.gap.discovery.discover import (
 from tests.support.candidate_pools import BASELINE_FIT, NOISE
 from tests.support.discoveries import GAIN, GROWING, MOUNTING, define, discovered_with, pool_with
 
+ALTERNATING = define(
+    "displacement_channel", "velocity*a*tanh(5*sin(time/s))", ("time", "velocity"), a=0.004, s=0.13
+)
+"""Delay of the displacement that changes its sign every 0.4 s."""
 LATE = define("force_channel", "1-exp(-time/s)", ("force",), "step_response", s=0.01)
 """Lag of the force channel."""
 OVER_DISPLACEMENT = CurvePlace("damper_gain", ("displacement",))
@@ -72,6 +76,15 @@ def test_a_lag_of_the_force_channel_is_found_as_its_step_response():
     response = effect.form.function({"time": time}, *effect.values)
     np.testing.assert_allclose(response, 1.0 - np.exp(-time / 0.01), atol=0.05)
     assert found.candidate.held_out_rmse == pytest.approx(NOISE, rel=0.05)
+
+
+def test_a_delay_that_alternates_is_found_by_its_formula():
+    found, pool = discovered_with(ALTERNATING), pool_with(ALTERNATING)
+    assert found.fitted.curve.at == CurvePlace("displacement_channel", ("time", "velocity"))
+    assert found.formula.file.expression.startswith("velocity*(a*sin(time/s)")
+    assert found.formula.file.parameters["s"].value == pytest.approx(0.13, rel=0.01)
+    before, after = pool.baseline.held_out_rmse, found.candidate.held_out_rmse
+    assert after**2 - NOISE**2 < 0.2 * (before**2 - NOISE**2)
 
 
 def test_the_reported_set_is_fitted_on_all_samples():

@@ -129,19 +129,28 @@ def test_named_effects_that_are_not_needed_are_replaced(with_formula):
     assert build_discovery(with_formula, both, SHRINKAGE, "V").replaces == ["gas_spring"]
 
 
+def fit_flat(curve):
+    """Return a fitted curve with coefficients of the same size."""
+    count = curve.function.basis.size
+    return SimpleNamespace(curve=curve, values=(0.1,) * count, covariance=np.eye(count))
+
+
 @pytest.mark.parametrize("unit", ["A", "V"])
 def test_a_document_is_about_one_drive_and_a_definition_about_any(unit):
-    at = CurvePlace("field", ("drive",))
-    curve = all_curves()[at]
-    count = curve.function.basis.size
-    fitted = SimpleNamespace(curve=curve, values=(0.1,) * count, covariance=np.eye(count))
-    assert _make_curve(fitted, unit).unit == unit
-    assert _make_curve(fitted, "").unit == "{drive}"
-    relative = all_curves()[CurvePlace("drive", ("time", "drive"))]
-    assert (
-        _make_curve(SimpleNamespace(curve=relative, values=(0.1,) * count, covariance=np.eye(count)), unit).unit
-        == "1"
+    shift, relative = (
+        fit_flat(all_curves()[CurvePlace(place, variables)])
+        for place, variables in (("field", ("drive",)), ("drive", ("time", "drive")))
     )
+    assert _make_curve(shift, unit).unit == unit
+    assert _make_curve(shift, "").unit == "{drive}"
+    assert _make_curve(relative, unit).unit == "1"
+
+
+def test_a_curve_with_many_splines_has_more_points():
+    over_time = fit_flat(all_curves()[CurvePlace("displacement_channel", ("time", "velocity"))])
+    drawn = _make_curve(over_time, "V")
+    assert len(drawn.x) == len(drawn.value) == 4 * len(over_time.values) + 1
+    assert np.all(np.diff(drawn.x) > 0.0)
 
 
 def test_the_band_has_the_deviation_of_the_curve():

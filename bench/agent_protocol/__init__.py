@@ -1,7 +1,8 @@
 """Messages between the rig agent and its clients, and the sockets that carry them."""
 
+from bench.agent_protocol.agent_client import AgentClient
+from bench.agent_protocol.command_server import CommandAudit, CommandServer
 from bench.agent_protocol.endpoint import AgentEndpoint, derive_samples_address, find_agent, make_endpoint
-from bench.agent_protocol.link import AgentClient, CommandAudit, CommandServer, Publisher
 from bench.agent_protocol.messages import (
     AbortCommand,
     AgentEvent,
@@ -31,6 +32,7 @@ from bench.agent_protocol.messages import (
     StatusCommand,
     StopCommand,
 )
+from bench.agent_protocol.publications import Publisher
 from bench.agent_protocol.sender import get_sender, send_as
 from bench.agent_protocol.setup_client import request_setup_step
 from bench.agent_protocol.stop_client import request_end, request_stop

@@ -3,8 +3,8 @@
 import time
 from pathlib import Path
 
+from bench.agent_protocol.agent_client import AgentClient
 from bench.agent_protocol.endpoint import find_agent
-from bench.agent_protocol.link import AgentClient
 from bench.agent_protocol.messages import AgentStatus, PrepareCommand, StatusCommand, StopCommand
 from bench.errors import RunError
 from bench.setup_steps import SetupStep

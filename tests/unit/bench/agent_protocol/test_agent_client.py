@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import zmq
 
-from bench.agent_protocol.link import AgentClient, CommandServer, Publisher
+from bench.agent_protocol.agent_client import AgentClient
+from bench.agent_protocol.command_server import CommandServer
 from bench.agent_protocol.messages import (
     AbortCommand,
     AgentEvent,
@@ -22,6 +23,7 @@ from bench.agent_protocol.messages import (
     StatusCommand,
     StopCommand,
 )
+from bench.agent_protocol.publications import Publisher
 from bench.errors import AgentUnreachableError, RunError
 
 ANY_PORT = "tcp://127.0.0.1:*"

@@ -24,9 +24,9 @@ Warp = Literal["none", "symmetric", "logarithmic"]
 ``symmetric`` resolves small values of both signs, ``logarithmic`` small positive ones.
 """
 KNOT_COUNT = 12
-"""Number of cubic splines of a curve over a variable of the motion or the drive."""
-TIME_KNOT_COUNT = 40
-"""Number of cubic splines over time, in which a change may return many times. Origin: a delay that alternates."""
+"""Number of cubic splines of a curve."""
+FINE_KNOT_COUNT = 40
+"""Number of cubic splines of a fine curve over time, in which a change may return up to 20 times."""
 _GRID_POINTS = 401
 """Points at which the basis is tabulated."""
 _LEVEL_PENALTY = 0.02

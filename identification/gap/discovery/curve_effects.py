@@ -17,9 +17,9 @@ from identification.damper.effects import Action, Effect, Form, Place, Variable
 from identification.fitting import EffectModel, Piece, Problem, RecordingScales
 from identification.gap.data import split_by_piece
 from identification.gap.discovery.curve_basis import (
+    FINE_KNOT_COUNT,
     KNOT_COUNT,
     MAX_GROWTH,
-    TIME_KNOT_COUNT,
     CurveBasis,
     CurveFunction,
     Direction,
@@ -64,6 +64,8 @@ class CurvePlace(NamedTuple):
     """Period of the curve, in the unit of its variable; None where it does not repeat."""
     is_response: bool = False
     """True where the curve is the part of a change that has not arrived yet, over the time since the change."""
+    is_fine: bool = False
+    """True where the curve resolves changes over time that return in few strokes."""
 
     @property
     def argument(self) -> Variable:
@@ -214,6 +216,12 @@ def list_curve_effects(
     ]
 
 
+def make_fine_curve(problem: Problem, at: CurvePlace) -> CurveEffect:
+    """Return a fine curve at a place over the time of some pieces."""
+    time = np.concatenate([p.excitation.time for p in problem.pieces])
+    return _make_curve_effect(problem, at._replace(is_fine=True), time)
+
+
 def collect_variables(pieces: Sequence[Piece], forces: Sequence[Array]) -> dict[str, Array]:
     """Return all values (N,) of each variable."""
     names = {name for at in CURVE_PLACES for name in at.variables}
@@ -266,7 +274,7 @@ def _make_curve_effect(problem: Problem, at: CurvePlace, values: Array) -> Curve
 def _make_basis(at: CurvePlace, values: Array) -> CurveBasis:
     if at.period:
         return make_periodic_basis(at.period)
-    return make_basis(values, at.warp, TIME_KNOT_COUNT if at.is_over_time else KNOT_COUNT)
+    return make_basis(values, at.warp, FINE_KNOT_COUNT if at.is_fine else KNOT_COUNT)
 
 
 def _find_size(at: CurvePlace, scales: RecordingScales) -> float:

@@ -16,6 +16,7 @@ from identification.gap.discovery.curve_effects import (
     CurveEffect,
     CurvePlace,
     list_curve_effects,
+    make_fine_curve,
 )
 from identification.gap.discovery.curve_evidence import CurveEvidence, compute_curve_evidence
 from identification.gap.fits import Candidate, JointFit, insert_effect_unknowns
@@ -130,6 +131,21 @@ def fit_best_curves(
     if simpler is not None:
         fitted.append(_finish_fit(pool, _continue_linear_model(pool, parent, simpler)))
     return sorted(fitted, key=lambda f: f.loss)
+
+
+def fit_fine_curves(
+    pool: CandidatePool, parent: Candidate, screened: Sequence[ScreenedCurve]
+) -> list[FittedCurve]:
+    """Fit the fine curves over time that have more linear evidence than any other curve.
+
+    ``screened`` are the other curves with the same set, the largest evidence first.
+    """
+    problem, unknowns = pool.problems.screening.replace_effects(parent.fit.effects), parent.fit.minimum.unknowns
+    places = [s.curve.at for s in screened if s.curve.at.is_over_time and not s.curve.at.period]
+    fine = [make_fine_curve(problem, at) for at in places]
+    found = [ScreenedCurve(c, _screen_curve(problem, unknowns, c)) for c in fine]
+    likely = [s for s in found if s.evidence.log_odds > screened[0].evidence.log_odds]
+    return [_finish_fit(pool, _continue_linear_model(pool, parent, s)) for s in likely]
 
 
 def _find_simpler(screened: Sequence[ScreenedCurve], fitted: Sequence[FittedCurve]) -> ScreenedCurve | None:

@@ -12,7 +12,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, refit_curve, screen_curves
+from identification.gap.discovery.curve_fit import (
+    FittedCurve,
+    fit_best_curves,
+    fit_fine_curves,
+    refit_curve,
+    screen_curves,
+)
 from identification.gap.discovery.formula_fit import FittedFormula, find_formula
 from identification.gap.fits import Candidate
 from identification.gap.selection import CandidatePool
@@ -49,13 +55,18 @@ def discover_effect(pool: CandidatePool, named: Candidate) -> DiscoveredEffect |
         named: the named set; the law alone if none is named.
     """
     parents = [pool.baseline] if not named.names else [pool.baseline, named]
-    best = _choose_finding(pool, [f for parent in parents for f in _find_curves(pool, parent)])
+    screened = [(parent, screen_curves(pool, parent)) for parent in parents]
+    found = [f for parent, curves in screened for f in fit_best_curves(pool, parent, curves)]
+    fine = [f for parent, curves in screened for f in fit_fine_curves(pool, parent, curves)]
+    best = _choose_finding(pool, found, fine)
     if best is None:
         return None
     chosen = pool.refit_all_samples(best.judged.candidate) if best.formula else refit_curve(pool, best.fitted)
     # The curve that is reported belongs to the law that is reported.
     reported = best.fitted if best.formula else replace(best.fitted, candidate=chosen)
-    return DiscoveredEffect(reported, best.formula, chosen, _find_further(pool, best.fitted))
+    # What a fine curve leaves in the strokes that were left out says nothing about a further cause.
+    first = best.judged if best.fitted.curve.at.is_fine else best.fitted
+    return DiscoveredEffect(reported, best.formula, chosen, _find_further(pool, first))
 
 
 class _Finding(NamedTuple):
@@ -74,25 +85,19 @@ class _Finding(NamedTuple):
         return sum(p.lo < p.hi for p in self.formula.file.parameters.values())
 
 
-def _choose_finding(pool: CandidatePool, found: Sequence[FittedCurve]) -> _Finding | None:
+def _choose_finding(
+    pool: CandidatePool, found: Sequence[FittedCurve], fine: Sequence[FittedCurve] = ()
+) -> _Finding | None:
     """Return the curve that is reported; None if no curve closes part of the gap.
 
-    Of several whose errors differ by no more than chance, it is the one with the shortest formula.
+    Of several whose errors differ by no more than chance, it is the one with the shortest formula. A change over
+    time that is quicker than the strokes is unknown in those that were left out. So a fine curve is judged by its
+    formula alone.
     """
     accepted = [_Finding(f, None, f) for f in found if _is_accepted(pool, f)]
     findings = [_add_formula(pool, x.fitted) for x in _select_equal(accepted)]
-    findings += _find_time_formulas(pool, [f for f in found if not _is_accepted(pool, f)])
+    findings += [x for f in fine if _is_certain(f) and (x := _add_formula(pool, f)).formula is not None]
     return min(_select_equal(findings), key=lambda x: (x.length, x.judged.loss), default=None)
-
-
-def _find_time_formulas(pool: CandidatePool, found: Sequence[FittedCurve]) -> list[_Finding]:
-    """Return the formulas over time that close part of the gap although their curves do not.
-
-    A curve over time that changes faster than the strokes is unknown in those that were left out. A formula that
-    repeats is not.
-    """
-    over_time = [f for f in found if f.curve.at.is_over_time and _is_certain(f)]
-    return [x for f in over_time if (x := _add_formula(pool, f)).formula is not None]
 
 
 def _select_equal(findings: Sequence[_Finding]) -> list[_Finding]:

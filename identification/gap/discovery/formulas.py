@@ -14,7 +14,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.damper.definitions import Expression
 from identification.damper.effects import Place, Variable
-from identification.gap.discovery.curve_basis import TIME_KNOT_COUNT
+from identification.gap.discovery.curve_basis import FINE_KNOT_COUNT
 from identification.gap.discovery.curve_effects import CurveEffect, CurvePlace
 
 Role = Literal["scale", "wave", "size", "power", "position"]
@@ -22,7 +22,7 @@ Role = Literal["scale", "wave", "size", "power", "position"]
 
 _SCALES = np.geomspace(0.003, 3.0, 13)
 """Scales of the variable that are tried, over its largest size [1]."""
-_HALF_WAVES = 0.5 * np.arange(1, 2 * TIME_KNOT_COUNT)
+_HALF_WAVES = 0.5 * np.arange(1, 2 * FINE_KNOT_COUNT)
 """Numbers of half waves in the range of the variable that are tried; a curve shows no more."""
 _POWERS = (0.4, 0.7, 1.5, 2.0, 3.0)
 _POSITIONS = np.linspace(-0.8, 0.8, 9)

@@ -12,6 +12,7 @@ from identification.gap.discovery.curve_effects import (
     CurvePlace,
     collect_variables,
     list_curve_effects,
+    make_fine_curve,
 )
 from identification.simulate import ActiveEffect, DamperVariables, SimulationModel, make_coil_variables, simulate
 from tests.support.discoveries import all_curves, make_curves, make_problem, make_stroke
@@ -141,6 +142,20 @@ def test_a_viscous_curve_of_unit_size_is_as_large_as_the_damping():
     viscous = {at: c for at, c in all_curves().items() if at.is_viscous}
     assert viscous
     assert {c.function.scale for c in viscous.values()} == {SCALES.damping}
+
+
+def test_a_fine_curve_follows_changes_that_a_curve_does_not():
+    problem, at = make_problem(make_stroke(seconds=30.0)), CurvePlace("drive", ("time", "drive"))
+    time = problem.pieces[0].excitation.time
+    wave = np.sin(2.0 * np.pi * time / 4.0)
+    coarse, fine = make_curves(make_stroke(seconds=30.0))[at], make_fine_curve(problem, at)
+    left = []
+    for basis in (coarse.function.basis, fine.function.basis):
+        columns = np.stack([np.interp(time, basis.positions, row) for row in basis.table], axis=1)
+        left.append(np.std(wave - columns @ np.linalg.lstsq(columns, wave, rcond=None)[0]) / np.std(wave))
+    assert left[0] > 0.5
+    assert left[1] < 0.1
+    assert (fine.unit, fine.function.scale, fine.at.label) == (coarse.unit, coarse.function.scale, at.label)
 
 
 def test_a_delay_that_varies_has_the_size_of_a_part_of_a_cycle():

@@ -12,12 +12,22 @@ from identification.fitting import EffectModel, read_damper_model
 from identification.gap.data import Shrinkage
 from identification.gap.diagnosis import prepare_recordings
 from identification.gap.discovery import discover
-from identification.gap.discovery.curve_effects import CurvePlace
+from identification.gap.discovery.curve_effects import CurvePlace, make_fine_curve
 from identification.gap.discovery.discover import discover_effect
 from identification.gap.outcome.discovery_document import _make_curve, build_discovery, define_discovered_effect
 from identification.gap.outcome.twin import make_twin
 from tests.support.candidate_pools import NOISE, record
-from tests.support.discoveries import GAIN, GROWING, LENGTH, all_curves, discovered_with, fitted_with, pool_with
+from tests.support.discoveries import (
+    GAIN,
+    GROWING,
+    LENGTH,
+    all_curves,
+    discovered_with,
+    fitted_with,
+    make_problem,
+    make_stroke,
+    pool_with,
+)
 from tests.support.discovery_documents import make_discovery, make_result
 from tests.support.result_documents import fit_document
 
@@ -147,9 +157,10 @@ def test_a_document_is_about_one_drive_and_a_definition_about_any(unit):
 
 
 def test_a_curve_with_many_splines_has_more_points():
-    over_time = fit_flat(all_curves()[CurvePlace("displacement_channel", ("time", "velocity"))])
-    drawn = _make_curve(over_time, "V")
-    assert len(drawn.x) == len(drawn.value) == 4 * len(over_time.values) + 1
+    at = CurvePlace("displacement_channel", ("time", "velocity"))
+    fine = fit_flat(make_fine_curve(make_problem(make_stroke()), at))
+    drawn = _make_curve(fine, "V")
+    assert len(drawn.x) == len(drawn.value) == 4 * len(fine.values) + 1
     assert np.all(np.diff(drawn.x) > 0.0)
 
 

@@ -53,6 +53,10 @@ class LogError(BenchError):
     """A log cannot be read, written or repaired."""
 
 
+class EmptyLogError(LogError):
+    """A log without its end contains no sample, so nothing of it can be kept."""
+
+
 class RecordingError(BenchError):
     """A recording cannot be imported."""
 

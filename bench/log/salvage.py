@@ -13,7 +13,7 @@ from mcap.records import Attachment, Channel, Chunk, Header, McapRecord, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import Writer
 
-from bench.errors import LogError
+from bench.errors import EmptyLogError, LogError
 from bench.log.atomic_file import write_atomically
 from bench.log.header import serialise_values
 from bench.log.mcap_file import DAMAGE_ERRORS, MAGIC, convert_file_errors, finish, flush, start_writer
@@ -81,7 +81,8 @@ def salvage_log(path: Path | str, out: Path | str | None = None) -> SalvageResul
             name.
 
     Raises:
-        LogError: the file is not an mrbench log, contains no intact sample, or the repaired log cannot be written.
+        EmptyLogError: the file contains no intact sample.
+        LogError: the file is not an mrbench log, or the repaired log cannot be written.
     """
     path = Path(path)
     target = path if out is None else Path(out)
@@ -134,7 +135,9 @@ def _copy_intact(path: Path, out: Path) -> tuple[_SalvageState, int]:
         for record in _read_intact_records(path, file, state):
             _copy_record(record, writer, schemas, channels, state)
         if not state.counts[SAMPLE]:
-            raise LogError(f"{path}: the recorder was killed before it wrote a sample; there is nothing to keep")
+            raise EmptyLogError(
+                f"{path}: the recorder was killed before it wrote a sample; there is nothing to keep"
+            )
         size = file.seek(0, 2)
         _read_cut_chunk(file, state)
         writer.add_metadata("outcome", _make_outcome(state, size))

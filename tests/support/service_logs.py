@@ -59,3 +59,9 @@ def write_truncated_log(path, run="run-1"):
     path.write_bytes(complete[: len(complete) * 2 // 3])
     assert not path.read_bytes().endswith(MAGIC)
     return path
+
+
+def write_empty_log(path, run="run-1"):
+    """Write the beginning of the same log, as after a kill of the recorder before its first sample."""
+    path.write_bytes(write_complete_log(path, run).read_bytes()[:2000])
+    return path

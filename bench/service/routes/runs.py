@@ -12,7 +12,7 @@ from fastapi import APIRouter, Query, Request, Response
 
 from bench.agent_protocol import AbortCommand, AgentStatus, RunCommand, RunStatus, StatusCommand, StopCommand
 from bench.catalogue import CatalogueUnavailableError, RunRow, catalogue_log
-from bench.errors import RunError
+from bench.errors import EmptyLogError, RunError
 from bench.log import salvage_log
 from bench.methods import Method, compile_method, parse_method
 from bench.service.benches import ServedBench
@@ -265,5 +265,11 @@ async def salvage_run(run_id: str, context: Context) -> Run:
 
 def _repair_log(context: ServiceContext, row: RunRow) -> None:
     path = context.catalogue.resolve_path(row.log)
-    salvage_log(path)
+    try:
+        salvage_log(path)
+    except EmptyLogError as error:
+        # A repair that cannot succeed is not offered again; what the agent has reported is kept.
+        reason = row.reason if row.ending else str(error)
+        context.catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=reason)
+        raise
     catalogue_log(context.catalogue, path)

@@ -12,7 +12,7 @@ from bench.catalogue.scan import catalogue_log
 from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
 from bench.service.routes import runs
 from tests.support.certificates import issue_certificate, make_certificate, shift
-from tests.support.service_logs import STARTED, write_complete_log, write_truncated_log
+from tests.support.service_logs import STARTED, write_complete_log, write_empty_log, write_truncated_log
 from tests.support.waiting import wait_until
 
 PAGE = "<!doctype html><title>report</title>"
@@ -428,6 +428,27 @@ def test_a_log_from_elsewhere_is_found(service):
     imported = service.get("/runs/bought")
     assert (imported["source"], imported["jobs"]) == ("import", [])
     assert service.post("/runs/bought/identify", status=201)["state"] == "queued"
+
+
+@pytest.mark.parametrize("reported", [False, True], ids=["killed", "reported by the agent"])
+def test_a_log_without_a_sample_is_not_offered_for_repair_again(service, reported):
+    run = start(service)
+    write_empty_log(service.data / run["log"], run["id"])
+    if reported:
+        service.agent.finish("incomplete", "no space left on device", "tripped")
+    else:
+        service.end()
+        service.agent.forget()
+        service.start()
+        service.agent.publish()
+    service.wait_for(f"/runs/{run['id']}", lambda found: found["state"] == "truncated")
+    refused = service.client.post(f"/api/v1/runs/{run['id']}/salvage")
+    assert refused.status_code == 409
+    assert "before it wrote a sample" in refused.json()["detail"]
+    found = service.get(f"/runs/{run['id']}")
+    assert (found["state"], found["outcome"]) == ("ended", "incomplete")
+    assert ("no space left" if reported else "before it wrote a sample") in found["reason"]
+    assert service.client.post(f"/api/v1/runs/{run['id']}/salvage").status_code == 409
 
 
 def test_a_truncated_log_is_flagged_and_can_be_repaired(service):

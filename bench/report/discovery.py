@@ -19,6 +19,8 @@ PLACE_QUANTITIES = {
 """Quantity that the value of an effect is, by place."""
 _ELONGATION = "elongation of the mounting"
 """The same for a function of the force in the mounting."""
+_LEAD = "lead of the displacement"
+"""The same for a curve of the displacement channel that is multiplied by the velocity."""
 _STEP_RESPONSE = "step response"
 """The same for a curve over the time since a change."""
 _RESPONSE_SENTENCE = "The curve is the part of a change that has arrived, over the time since the change."
@@ -99,6 +101,8 @@ def join_words(names: tuple[str, ...] | list[str]) -> str:
 
 def get_quantity(found: DiscoveredCurve, drive_unit: str) -> str:
     """Return the quantity of a curve's values; ``drive_unit`` is V or A."""
+    if found.place == "displacement_channel" and "velocity" in found.variables[1:]:
+        return _LEAD
     quantity = _name_quantity(found)
     is_added = found.place in ("drive", "field") and not found.is_step_response
     return f"{quantity} over drive" if is_added and found.curve.unit != drive_unit else quantity

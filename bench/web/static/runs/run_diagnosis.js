@@ -153,7 +153,8 @@ function effectCurve({ place, variables, curve }, driveUnit) {
   const isAdded = ["drive", "field"].includes(place) && !isResponse;
   const isRelative = isAdded && curve.unit !== "{drive}" && curve.unit !== driveUnit;
   const elongation = place === "mounting" && curve.variable === "force" ? "elongation of the mounting" : null;
-  const quantity = isResponse ? "step response" : elongation ?? PLACE_QUANTITIES[place] ?? spaced(place);
+  const lead = place === "displacement_channel" && variables.slice(1).includes("velocity") ? "lead of the displacement" : null;
+  const quantity = isResponse ? "step response" : elongation ?? lead ?? PLACE_QUANTITIES[place] ?? spaced(place);
   const up = `${quantity}${isRelative ? " over drive" : ""}${y.unit === "1" ? "" : ` [${y.unit}]`}`;
   const across = curve.x.map((value) => value * x.scale);
   const convert = (values) => values.map((value) => value * y.scale);

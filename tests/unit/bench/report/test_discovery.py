@@ -110,6 +110,8 @@ def test_a_displacement_error_is_drawn_in_millimetres():
         ("damper_gain", ("time",), "1", "relative change of alpha, c0 and c1"),
         ("mounting", ("acceleration",), "N", "added force"),
         ("mounting", ("force",), "m", "elongation of the mounting"),
+        ("displacement_channel", ("velocity",), "m", "added displacement"),
+        ("displacement_channel", ("time", "velocity"), "s", "lead of the displacement"),
         ("elsewhere", ("time",), "N", "value at elsewhere"),
     ],
 )

@@ -181,6 +181,10 @@ class Catalogue:
                 setattr(row, name, value)
             return row
 
+    def end_incomplete(self, run_id: str, reason: str) -> RunRow:
+        """End a run as incomplete and return it."""
+        return self.update_run(run_id, state="ended", outcome="incomplete", reason=reason)
+
     def get_job(self, job_id: str) -> JobRow | None:
         """Return the job with an id, or None."""
         with self._sessions() as session:

@@ -176,4 +176,4 @@ def _end_runs_without_log(catalogue: Catalogue, is_being_written: WriteCheck) ->
         exists = path.exists()
         if (not exists or catalogue.is_skipped(path)) and not is_being_written(path):
             reason = EMPTY_LOG_MESSAGE if exists else NO_LOG_MESSAGE
-            yield catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=reason)
+            yield catalogue.end_incomplete(row.id, reason)

@@ -32,6 +32,7 @@ from identification.errors import IdentificationError
 from identification.gap import diagnose
 from identification.logs import Recording
 from identification.simulate import ActiveEffect, Excitation, SimulationModel, simulate
+from sim_rig.trial.scoring import is_confident
 
 KINDS = ("none", "one", "one", "one", "two", "unknown")
 """Kinds of cases, in turn."""
@@ -112,7 +113,7 @@ def diagnose_case(case: Case) -> Outcome:
 def judge(case: Case, diagnosis: Diagnosis) -> Outcome:
     """Compare a diagnosis with the truth."""
     named = frozenset(e.name for e in diagnosis.effects)
-    confident = {e.name for e in diagnosis.effects if e.probability > 0.9 and e.share > 0.5}
+    confident = {e.name for e in diagnosis.effects if is_confident(e.probability, e.share)}
     explained_unknown = case.kind == "unknown" and diagnosis.verdict == "explained"
     sets = [named, *(frozenset(a.effects) for a in diagnosis.alternatives)]
     return Outcome(
@@ -221,9 +222,9 @@ def _add_unknown(damper: Coordinates, stroke: Excitation, cause: str, random: np
         time = np.linspace(-1.0, 1.0, len(plain))
         return _simulate(damper, replace(stroke, drive=stroke.drive * (1.0 + strength * shape(time))), ())
     if cause == "delay over time":
-        time = np.arange(len(plain)) / stroke.rate
         largest = 0.3 * strength * size.length / size.velocity
-        moved = np.interp(time + largest * shape(np.linspace(-1.0, 1.0, len(time))), time, stroke.displacement)
+        lead = largest * shape(np.linspace(-1.0, 1.0, len(plain)))
+        moved = np.interp(stroke.time + lead, stroke.time, stroke.displacement)
         velocity = np.gradient(moved) * stroke.rate
         ahead = replace(
             stroke, displacement=moved, velocity=velocity, acceleration=np.gradient(velocity) * stroke.rate

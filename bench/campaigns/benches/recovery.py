@@ -16,7 +16,7 @@ def recover_execution(catalogue: Catalogue, log: str) -> ExecutionReport:
     """Return what became of a run whose process has ended, by its log.
 
     A truncated log is repaired and stays in the catalogue as incomplete. One that cannot be repaired is renamed,
-    and its run in the catalogue says so.
+    and the reason in the catalogue names the new file.
     """
     path = catalogue.folder / log
     if not path.is_file():
@@ -37,7 +37,7 @@ def _report_loss(catalogue: Catalogue, path: Path, reason: str) -> ExecutionRepo
     """End a run of which no sample is left, if the catalogue has it, and return the report on it."""
     row = catalogue.find_run_by_log(path)
     if row is not None and row.state != "ended":
-        catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=reason)
+        catalogue.end_incomplete(row.id, reason)
     return ExecutionReport(kind="crashed", run=row.id if row else "", reason=reason, has_samples=False)
 
 
@@ -45,7 +45,7 @@ def _report_crash(catalogue: Catalogue, row: RunRow | None, path: Path) -> Execu
     if row is None:
         return ExecutionReport(kind="crashed", reason=CRASH_REASON)
     reason = f"{CRASH_REASON} after {row.duration_s or 0:.1f} s"
-    catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=reason)
+    catalogue.end_incomplete(row.id, reason)
     checkpoint = find_checkpoint(path)
     return ExecutionReport(
         kind="crashed", run=row.id, reason=reason, checkpoint=checkpoint, duration_s=row.duration_s or 0.0

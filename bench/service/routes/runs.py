@@ -269,7 +269,6 @@ def _repair_log(context: ServiceContext, row: RunRow) -> None:
         salvage_log(path)
     except EmptyLogError as error:
         # A repair that cannot succeed is not offered again; what the agent has reported is kept.
-        reason = row.reason if row.ending else str(error)
-        context.catalogue.update_run(row.id, state="ended", outcome="incomplete", reason=reason)
+        context.catalogue.end_incomplete(row.id, row.reason if row.ending else str(error))
         raise
     catalogue_log(context.catalogue, path)

@@ -1,6 +1,6 @@
 """Scores of the blind trial."""
 
-from sim_rig.trial.scoring.score import compute_proportion, compute_scores
+from sim_rig.trial.scoring.score import compute_proportion, compute_scores, is_confident
 from sim_rig.trial.scoring.summary import score_trial
 from sim_rig.trial.scoring.table import render_table
 from sim_rig.trial.scoring.trial_report import CaseResult, Proportion, Scores, TrialReport
@@ -15,6 +15,7 @@ __all__ = [
     "compute_proportion",
     "compute_scores",
     "compute_true_shrinkage",
+    "is_confident",
     "render_table",
     "score_trial",
     "unseal_case",

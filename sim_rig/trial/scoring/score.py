@@ -51,7 +51,7 @@ def compute_scores(cases: Sequence[CaseResult]) -> Scores:
         false_alarms=compute_proportion(bool(_get_names(c)) for c in nothing),
         no_gap_correct=compute_proportion(c.verdict == "no_gap" for c in nothing),
         unknown_correct=compute_proportion(not _get_names(c) for c in unknown),
-        unknown_blamed=compute_proportion(is_unknown_blamed(c) for c in unknown),
+        unknown_blamed=compute_proportion(_is_blamed(c) for c in unknown),
         stage_correct=compute_proportion(c.stage == _find_stage(c) for c in single),
         failures=len(accelerated) - len(diagnosed),
         log_score=fmean(math.log(c.truth_probability) for c in diagnosed) if diagnosed else None,
@@ -67,15 +67,20 @@ def compute_scores(cases: Sequence[CaseResult]) -> Scores:
     )
 
 
-def is_unknown_blamed(case: CaseResult) -> bool:
+def is_confident(probability: float, share: float) -> bool:
+    """Return True if an effect with a probability [1] and a share of the gap [1] is named with confidence."""
+    return probability > _CONFIDENT_PROBABILITY and share > _LARGE_SHARE
+
+
+def _is_blamed(case: CaseResult) -> bool:
     """Return True if a diagnosis attributes an unknown effect to effects of the library with confidence.
 
     A partial answer with doubtful names is no such claim: it states what helps, and that more is unknown.
     """
-    named = _get_names(case)
-    confident = (case.effect_probabilities.get(n, 0.0) > _CONFIDENT_PROBABILITY for n in named)
-    large = (case.effect_shares.get(n, 0.0) > _LARGE_SHARE for n in named)
-    return case.verdict == "explained" or any(c and s for c, s in zip(confident, large, strict=True))
+    shares = case.effect_shares
+    return case.verdict == "explained" or any(
+        is_confident(p, shares.get(name, 0.0)) for name, p in case.effect_probabilities.items()
+    )
 
 
 def group_cases(cases: Sequence[CaseResult]) -> dict[str, list[CaseResult]]:

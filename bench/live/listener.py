@@ -2,6 +2,8 @@
 
 The operating system keeps much for a listener that reads nothing. A listener that acknowledges batches therefore
 gets no further ones while many are unacknowledged. When it resumes, it gets the newest, and is told what was lost.
+
+A listener that waits for batches is not slow, however many come at once. They do after the event loop was held up.
 """
 
 import asyncio
@@ -22,10 +24,12 @@ MAX_QUEUED_EVENTS = 64
 """Largest number of events that wait for a slow listener."""
 MAX_QUEUED_BATCHES = 8
 """Largest number of batches that wait for a slow listener; older ones are lost."""
+MAX_BURST = 250
+"""Largest number of batches that wait for a listener that is ready, after the service itself was held up."""
 MAX_UNACKNOWLEDGED = 16
 """Number of unacknowledged batches above which a listener counts as stalled."""
 _SLOW_AFTER = 3
-"""Number of waiting batches above which a listener is slow and gets decimated ones."""
+"""Number of batches that came while a listener was not ready, above which it is slow and gets decimated ones."""
 _SLOW_FACTOR = 4
 """Decimation for a slow listener."""
 
@@ -53,7 +57,9 @@ class Listener:
         # Of a status, run or job only the latest state matters. Each event counts, up to a limit.
         self._latest: dict[tuple[str, str], str] = {}
         self._events: deque[str] = deque(maxlen=MAX_QUEUED_EVENTS)
-        self._batches: deque[LiveBatch] = deque(maxlen=MAX_QUEUED_BATCHES)
+        self._batches: deque[LiveBatch] = deque()
+        self._late_batches = 0
+        self._is_waiting = False
         self._unacknowledged: deque[int] = deque()
         self._channels: tuple[Channel, ...] | None = None
         self._last_sequence: int | None = None
@@ -69,7 +75,11 @@ class Listener:
 
     def put_batch(self, batch: LiveBatch) -> None:
         """Add a batch; the oldest one is lost if too many wait."""
+        is_ready = self._is_waiting and not self._is_stalled
+        self._late_batches += not is_ready
         self._batches.append(batch)
+        if len(self._batches) > (MAX_BURST if is_ready else MAX_QUEUED_BATCHES):
+            self._batches.popleft()
         self._changed.set()
 
     def acknowledge(self, sequence: int) -> None:
@@ -83,15 +93,22 @@ class Listener:
         """Wait for messages that may be sent, and remove and return all of them."""
         while not (due := [*self._latest.values(), *self._events, *self._take_batches()]):
             self._changed.clear()
+            self._is_waiting = True
             await self._changed.wait()
+            self._is_waiting = False
         self._latest.clear()
         self._events.clear()
         return due
 
+    @property
+    def _is_stalled(self) -> bool:
+        return len(self._unacknowledged) > MAX_UNACKNOWLEDGED
+
     def _take_batches(self) -> Iterator[str | bytes]:
-        if len(self._unacknowledged) > MAX_UNACKNOWLEDGED:
+        if self._is_stalled:
             return
-        least = _SLOW_FACTOR if len(self._batches) > _SLOW_AFTER else 1
+        least = _SLOW_FACTOR if self._late_batches > _SLOW_AFTER else 1
+        self._late_batches = 0
         while self._batches:
             batch = self._batches.popleft()
             yield from self._announce(batch)

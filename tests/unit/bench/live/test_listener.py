@@ -7,7 +7,7 @@ import orjson
 import pytest
 
 from bench.live import MAX_SEQUENCE, Channel, Listener, ListenerSettings, LiveBatch, LiveBroadcaster
-from bench.live.listener import MAX_QUEUED_BATCHES, MAX_QUEUED_EVENTS, MAX_UNACKNOWLEDGED
+from bench.live.listener import MAX_BURST, MAX_QUEUED_BATCHES, MAX_QUEUED_EVENTS, MAX_UNACKNOWLEDGED
 
 CHANNELS = (Channel("force", "N"),)
 
@@ -61,6 +61,44 @@ def test_a_slow_listener_gets_decimated_batches():
         listener.put_batch(make_batch(k, count=40))
     due = asyncio.run(listener.take())
     assert {int.from_bytes(one[16:20], "little") for one in due if isinstance(one, bytes)} == {10}
+
+
+async def put_at_once(listener, numbers):
+    """Return what a waiting listener gets after batches came in one turn of the event loop."""
+    waiting = asyncio.ensure_future(listener.take())
+    await asyncio.sleep(0)
+    for k in numbers:
+        listener.put_batch(make_batch(k, count=40))
+    return [one for one in await waiting if isinstance(one, bytes)]
+
+
+def test_a_listener_that_waits_gets_all_samples_of_batches_that_come_at_once():
+    numbers = range(3 * MAX_QUEUED_BATCHES)
+    due = asyncio.run(put_at_once(make_listener(), numbers))
+    assert [int.from_bytes(one[4:8], "little") for one in due] == list(numbers)
+    assert {int.from_bytes(one[16:20], "little") for one in due} == {40}
+
+
+def test_batches_that_wait_after_the_service_was_held_up_are_limited():
+    due = asyncio.run(put_at_once(make_listener(), range(2 * MAX_BURST)))
+    assert len(due) == MAX_BURST
+
+
+def test_a_stalled_listener_is_not_ready_while_it_waits():
+    listener = make_listener(acknowledges=True)
+    for k in range(MAX_UNACKNOWLEDGED + 1):
+        listener.put_batch(make_batch(k))
+        take(listener)
+
+    async def resume():
+        waiting = asyncio.ensure_future(listener.take())
+        await asyncio.sleep(0)
+        for k in range(100, 200):
+            listener.put_batch(make_batch(k))
+        listener.acknowledge(MAX_UNACKNOWLEDGED)
+        return [one for one in await waiting if isinstance(one, bytes)]
+
+    assert len(asyncio.run(resume())) == MAX_QUEUED_BATCHES
 
 
 def test_a_stalled_listener_gets_nothing_more_and_after_it_resumes_the_newest():

@@ -23,6 +23,8 @@ class Quantity(NamedTuple):
     """Description for a person, one line."""
     scaling: str = ""
     """Unit by which it follows the damper's size, if not ``unit``: for a value that holds at a fixed reference."""
+    has_natural_limits: bool = False
+    """True if nothing can have a value beyond the limits, so that a value at one of them is plausible."""
 
     @property
     def scaling_unit(self) -> str:

@@ -76,7 +76,13 @@ def update_play(
 
 
 _INITIAL_RISE = Quantity(
-    "initial_rise", "1", -1.0, 1.0, 1.0, "change to the first field, over that field, since the iron had no memory"
+    "initial_rise",
+    "1",
+    -1.0,
+    1.0,
+    1.0,
+    "change to the first field, over that field, since the iron had no memory",
+    has_natural_limits=True,
 )
 _RESIDUE = Quantity("residue", "{drive}", 0.0, 1.0, 0.02, "difference that remains after a long change")
 _WIDTH = Quantity("width", "{drive}", 5e-3, 5.0, 0.1, "change of drive over which the difference reverses")

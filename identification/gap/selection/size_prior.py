@@ -50,12 +50,12 @@ def _has_plausible_size(effect: ActiveEffect, displacement: Array, size: DamperS
 
 
 def _is_at_bound(effect: ActiveEffect, size: DamperSize) -> bool:
-    """Return True if a size is at a bound of its search range."""
+    """Return True if a size is at a bound of its search range, and not at a limit of nature."""
     quantities = [scale_quantity(q, size) for q in effect.form.parameters]
     bounds = [
         (value, bound)
         for q, value in zip(quantities, effect.values, strict=True)
-        if q.low <= 0.0
+        if q.low <= 0.0 and not q.has_natural_limits
         for bound in (q.low, q.high)
         if bound != 0.0
     ]

@@ -39,6 +39,8 @@ def test_an_implausible_size_counts_for_little(name, plausible, implausible):
         ("moving_mass", (HIGHEST_MASS * 0.998,), 1.0),  # a bound has a width of a thousandth
         ("moving_mass", (HIGHEST_MASS * 0.9995,), 0.03),
         ("moving_mass", (0.0,), 1.0),  # a bound of zero is not one
+        ("magnetic_remanence", (0.1, 0.1, 1.0), 1.0),  # the first rise from zero is the usual history of iron
+        ("magnetic_remanence", (EFFECTS["magnetic_remanence"].forms[0].parameters[0].high, 0.1, 1.0), 0.03),
     ],
 )
 def test_the_weight_falls_at_the_limit_of_plausibility(name, values, weight):

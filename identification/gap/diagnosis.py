@@ -27,7 +27,7 @@ from identification.gap.selection import (
 from identification.logs import Recording
 from identification.pipeline import make_problem
 from identification.progress import Progress, enter_stage, ignore_progress
-from identification.signals import check_recordings, check_single_specimen, mask_clipping
+from identification.signals import check_recordings, check_single_specimen, mask_invalid_samples
 from identification.threads import use_one_thread
 
 _CLOCK_DEVIATION = 5e-5
@@ -102,7 +102,7 @@ def prepare_recordings(recordings: Sequence[Recording], hold_out: HoldOut | None
     with use_one_thread():
         check_single_specimen(recordings, "diagnose")
         check_recordings(recordings)
-        cleaned, notes = mask_clipping(recordings)
+        cleaned, notes = mask_invalid_samples(recordings)
         dataset = assemble(cleaned, hold_out or HoldOut())
         evaluation = EvaluationData.make(dataset)
     check_cycle_count(evaluation.cycles)

@@ -5,7 +5,7 @@ from identification.signals.data_quality import (
     check_single_specimen,
     clean_recordings,
     describe_outlier_logs,
-    mask_clipping,
+    mask_invalid_samples,
 )
 from identification.signals.drive import (
     StepShifts,
@@ -35,6 +35,6 @@ __all__ = [
     "estimate_white_noise",
     "find_level_changes",
     "find_steady_cycles",
-    "mask_clipping",
+    "mask_invalid_samples",
     "smooth_below",
 ]

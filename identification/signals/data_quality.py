@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.errors import UnusableDataError
 from identification.logs import Recording, Segment, Stretch
 from identification.signals.invalid_samples import (
@@ -82,18 +82,26 @@ def check_single_specimen(recordings: Sequence[Recording], action: str) -> None:
         raise UnusableDataError(f"the logs are of different specimens ({listed}); {action} each damper separately")
 
 
-def mask_clipping(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
-    """Return the recordings with clipped samples of the force marked as invalid, and notes about them.
+def mask_invalid_samples(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
+    """Return the recordings of a diagnosis with invalid samples excluded, and notes about them.
+
+    Spikes, jumps and stuck values are those of `clean_recordings`. Samples at an extreme of the force count as
+    clipped after fewer repeats, because a gap at the extremes could be taken for an effect.
 
     Raises:
-        UnusableDataError: too much of the force is clipped.
+        UnusableDataError: too many samples are invalid.
     """
     notes: list[str] = []
     cleaned = [
-        replace(r, stretches=tuple(_mask_clipped_force(s, r.path.name, notes) for s in r.stretches))
+        replace(r, stretches=tuple(_mask_invalid_stretch(s, r.path.name, notes) for s in r.stretches))
         for r in recordings
     ]
     return cleaned, notes
+
+
+def _mask_invalid_stretch(stretch: Stretch, log: str, notes: list[str]) -> Stretch:
+    clipped = np.zeros(len(stretch.force), bool)
+    return _mask_clipped_force(_exclude_samples(stretch, clipped, log, notes), log, notes)
 
 
 def _mask_clipped_force(stretch: Stretch, log: str, notes: list[str]) -> Stretch:
@@ -128,13 +136,20 @@ def _check_finite(recordings: Sequence[Recording]) -> None:
 
 
 def _clean_stretch(stretch: Stretch, log: str, notes: list[str]) -> Stretch:
-    """Return the stretch with invalid samples bridged and marked, and add notes about them."""
+    return _exclude_samples(stretch, find_clipped_runs(stretch.force), log, notes)
+
+
+def _exclude_samples(stretch: Stretch, clipped: BoolArray, log: str, notes: list[str]) -> Stretch:
+    """Return the stretch with invalid samples bridged and marked, and add notes about them.
+
+    ``clipped`` is a mask (N,) of clipped samples of the force.
+    """
     force = stretch.force
+    invalid_x, invalid_f = find_jumps(stretch.displacement), find_spikes(force) | find_stuck_force(stretch)
     faults = {
-        "displacement samples are spikes": find_jumps(stretch.displacement),
-        "force samples are spikes, or constant while the damper moves": find_spikes(force)
-        | find_stuck_force(stretch),
-        f"force samples are clipped at {np.abs(force).max():.4g} N": find_clipped_runs(force),
+        "displacement samples are spikes": invalid_x,
+        "force samples are spikes, or constant while the damper moves": invalid_f,
+        f"force samples are clipped at {np.abs(force).max():.4g} N": clipped,
     }
     for fault, mask in faults.items():
         if mask.mean() > _MAX_EXCLUDED:
@@ -144,7 +159,6 @@ def _clean_stretch(stretch: Stretch, log: str, notes: list[str]) -> Stretch:
             )
         if mask.any():
             notes.append(f"{stretch.name}: {mask.mean():.2%} of the {fault}; these samples were excluded")
-    invalid_x, invalid_f, clipped = faults.values()
     if not (invalid_x | invalid_f | clipped).any():
         return stretch
     valid = ~(invalid_f | clipped)

@@ -29,9 +29,24 @@ _EXTREME_TOLERANCE = 1e-9
 
 
 def find_spikes(values: Array) -> BoolArray:
-    """Return a mask (N,) of samples far off all others around them; corners of the signal are not marked."""
+    """Return a mask (N,) of samples far off all others around them; steps and corners are not marked."""
+    noise = estimate_white_noise(values, 4)
     deviation = np.abs(values - median_filter(values, _MEDIAN_WINDOW, mode="nearest"))
-    return _find_outliers(deviation, _SPIKE_RATIO * estimate_white_noise(values, 4), values)
+    changes = np.diff(values, prepend=values[:1])
+    return _find_outliers(deviation, _SPIKE_RATIO * noise, values) | _find_outliers(
+        _compute_heights(values), _SPIKE_RATIO * noise, changes
+    )
+
+
+def _compute_heights(values: Array) -> Array:
+    """Return the height (N,) of each sample above or below both of its neighbours; 0 between them.
+
+    The values around a single spike may change by more than it, but not from sample to sample.
+    """
+    changes, heights = np.diff(values), np.zeros(len(values))
+    rise, fall = changes[:-1], -changes[1:]
+    heights[1:-1] = np.where(rise * fall > 0.0, np.minimum(np.abs(rise), np.abs(fall)), 0.0)
+    return heights
 
 
 def find_jumps(values: Array) -> BoolArray:

@@ -9,7 +9,7 @@ import pytest
 from identification.errors import UnreadableLogError, UnusableDataError
 from identification.logs.recording import Recording, load
 from identification.pipeline import identify
-from identification.signals.data_quality import check_single_specimen, clean_recordings, mask_clipping
+from identification.signals.data_quality import check_single_specimen, clean_recordings, mask_invalid_samples
 from identification.simulate import Excitation, SimulationModel, simulate
 from tests.support.laboratory import FAST, LABORATORY, NOISE, SLOW, recording, stretch
 from tests.support.mcap_logs import times, writing
@@ -114,22 +114,34 @@ def test_two_specimens_are_named():
 
 
 def test_a_force_without_clipping_is_not_masked():
-    cleaned, notes = mask_clipping([sine_force()])
+    cleaned, notes = mask_invalid_samples([sine_force()])
     assert notes == []
     assert cleaned[0].stretches[0].valid_mask.all()
 
 
 def test_clipped_samples_are_masked_with_a_note_and_their_displacement_is_kept():
-    cleaned, notes = mask_clipping([sine_force(295.0)])
+    cleaned, notes = mask_invalid_samples([sine_force(295.0)])
     masked = cleaned[0].stretches[0]
     assert 0.02 < np.mean(~masked.valid_mask) < 0.2
     assert masked.measured.all()
     assert "clipped at 295 N" in notes[0]
 
 
+def test_spikes_of_force_and_displacement_are_masked_for_a_diagnosis():
+    given = changed(
+        force=with_values(SLOW.force, SPIKED, SLOW.force[SPIKED] + 2e4),
+        displacement=with_values(SLOW.displacement, SPIKED[:3], SLOW.displacement[SPIKED[:3]] + 5e-3),
+    )
+    cleaned, notes = mask_invalid_samples([recording(given, FAST)])
+    masked = cleaned[0].stretches[0]
+    np.testing.assert_array_equal(np.flatnonzero(~masked.valid_mask), np.sort(SPIKED))
+    np.testing.assert_array_equal(np.flatnonzero(~masked.measured), np.sort(SPIKED[:3]))
+    assert len(notes) == 2
+
+
 def test_a_force_that_is_mostly_clipped_is_refused_with_its_limit():
     with pytest.raises(UnusableDataError, match="100 N"):
-        mask_clipping([sine_force(100.0)])
+        mask_invalid_samples([sine_force(100.0)])
 
 
 def test_a_coarse_converter_is_not_mistaken_for_a_defective_one():

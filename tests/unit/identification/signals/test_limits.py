@@ -235,6 +235,20 @@ def test_a_spike_is_twelve_times_the_noise_above_the_local_spread(size, found):
     np.testing.assert_array_equal(np.flatnonzero(find_spikes(values)), found)
 
 
+@pytest.mark.parametrize(("height", "found"), [(90.0, [703]), (-90.0, [703]), (10.0, [])])
+def test_a_single_spike_is_found_where_the_values_around_it_change_by_more(height, found):
+    values = 300.0 * np.sin(np.arange(2000) / 15.0) + NOISE[:2000]
+    values[703] += height
+    np.testing.assert_array_equal(np.flatnonzero(find_spikes(values)), found)
+
+
+def test_a_step_and_a_corner_are_no_spikes():
+    step, corner = NOISE[:2000].copy(), 10.0 * np.abs(np.arange(2000.0) - 1000.0) + NOISE[:2000]
+    step[1000:] += 500.0
+    assert not find_spikes(step).any()
+    assert not find_spikes(corner).any()
+
+
 def test_only_the_largest_deviation_is_a_jump():
     x = 1e-5 * RAMP + 1e-7 * NOISE[:1000]
     x[300] += 1e-3

@@ -28,6 +28,7 @@ from identification.gap.discovery.curve_basis import (
     make_basis,
     make_periodic_basis,
 )
+from identification.gap.noise import DRIFT_CURVE
 from identification.simulate import DamperVariables, make_coil_variables
 
 CURVE_EFFECT = "curve"
@@ -93,6 +94,11 @@ class CurvePlace(NamedTuple):
     def is_delay(self) -> bool:
         """True for an error of the displacement that is proportional to the velocity: a delay that varies."""
         return self.place == "displacement_channel" and "velocity" in self.variables[1:]
+
+    @property
+    def is_drift(self) -> bool:
+        """True for a force over time alone, which slow noise can be as well."""
+        return self.place == "force_channel" and self.is_over_time and not self.period
 
     @property
     def has_drive_factor(self) -> bool:
@@ -300,5 +306,6 @@ def _list_coefficients(count: int) -> tuple[Quantity, ...]:
 
 
 def _make_model(at: CurvePlace, quantities: tuple[Quantity, ...], function: Any) -> EffectModel:
-    form = Form(CURVE_EFFECT, at.action, quantities, ((0.0,) * len(quantities),), function)
-    return EffectModel(Effect(CURVE_EFFECT, STAGE_OF[at.place], at.variables[0], at.label, (form,)), CURVE_EFFECT)
+    name = DRIFT_CURVE if at.is_drift else CURVE_EFFECT
+    form = Form(name, at.action, quantities, ((0.0,) * len(quantities),), function)
+    return EffectModel(Effect(CURVE_EFFECT, STAGE_OF[at.place], at.variables[0], at.label, (form,)), name)

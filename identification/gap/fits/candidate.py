@@ -52,3 +52,7 @@ class Candidate:
     def compute_excess(self, floor: float) -> float:
         """Compute the excess relative to the floor's variance [1], on the worse of fitted and held-out samples."""
         return max((self.train_rmse / floor) ** 2, (self.held_out_rmse / floor) ** 2 - self.chance_excess) - 1.0
+
+    def reaches_floor(self, floor: float) -> bool:
+        """Return True if the error on fitted and, within chance, on held-out samples is nearly the noise floor."""
+        return self.compute_excess(floor) < EXPLAINED_RATIO**2 - 1.0

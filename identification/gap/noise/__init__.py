@@ -4,7 +4,7 @@ from identification.gap.noise.clock_drift import describe_drift_explanation, sub
 from identification.gap.noise.explainable_share import FEATURE_VARIABLES, Explained, ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.simulated_noise import compute_noise_evidence
-from identification.gap.noise.slow_drift import compute_noise_drift, has_drift
+from identification.gap.noise.slow_drift import DRIFT_CURVE, compute_noise_drift, has_drift
 from identification.gap.noise.spectral_line import MAINS_FREQUENCY, find_mains_frequency
 from identification.gap.noise.unpredicted_residual import (
     CHANCE_DEVIATIONS,
@@ -16,6 +16,7 @@ from identification.gap.noise.unpredicted_residual import (
 
 __all__ = [
     "CHANCE_DEVIATIONS",
+    "DRIFT_CURVE",
     "FEATURE_VARIABLES",
     "MAINS_FREQUENCY",
     "Explained",

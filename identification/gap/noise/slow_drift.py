@@ -1,7 +1,8 @@
 """Drift of the zero that slow noise explains.
 
-A fitted drift also follows slow noise. Both differ only in their size: the spectrum of the noise determines the
-variance that it has within the frequencies of a drift. A drift that is hardly larger is noise and not an effect.
+A fitted drift, or a curve over time in its place, also follows slow noise. Both differ only in their size: the
+spectrum of the noise determines the variance that it has within the frequencies of a drift. A drift that is hardly
+larger is noise and not an effect.
 """
 
 import math
@@ -11,9 +12,12 @@ import numpy as np
 from identification.arrays import Array
 from identification.fitting import Problem
 from identification.gap.fits import JointFit
+from identification.simulate import ActiveEffect
 
 _DRIFT = "force_drift"
 """Name of the effect."""
+DRIFT_CURVE = "drift_curve"
+"""Name of the form of a curve over time in the force channel, with the variables by name as its argument."""
 _NOISE_RATIO = 10.0
 """Largest variance of a drift that noise explains, over the expected one [1].
 
@@ -22,7 +26,11 @@ Of 1500 simulated series of 1/f noise, 99 % stayed below 5.7 and 99.8 % below 8.
 
 def has_drift(fit: JointFit) -> bool:
     """Return True if the effects of a fit contain a drift of the zero."""
-    return any(active.effect.name == _DRIFT for active in fit.active_effects)
+    return any(_is_drift(active) for active in fit.active_effects)
+
+
+def _is_drift(active: ActiveEffect) -> bool:
+    return active.effect.name == _DRIFT or active.form.name == DRIFT_CURVE
 
 
 def compute_noise_drift(fit: JointFit, problem: Problem, slow_variance: float) -> Array:
@@ -61,6 +69,8 @@ def _evaluate_drift(fit: JointFit, time: Array, drive: Array) -> Array:
     """Return the drift (N,) [N] of a fit at times (N,) [s]; zeros without one."""
     drift = np.zeros(len(time))
     for active in fit.active_effects:
-        if active.effect.name == _DRIFT:
+        if active.form.name == DRIFT_CURVE:
+            drift = drift + active.form.function({"time": time}, *active.values)
+        elif _is_drift(active):
             drift = drift + active.form.function(time, drive, *active.values)
     return drift

@@ -8,7 +8,7 @@ import numpy as np
 from identification.documents import EffectSet, EffectValue, NamedEffect, Verdict
 from identification.fitting import EffectModel
 from identification.gap.data import EvaluationData, Shrinkage
-from identification.gap.fits import EXPLAINED_RATIO, Candidate
+from identification.gap.fits import Candidate
 from identification.gap.outcome.interval import compute_interval
 from identification.gap.selection import UNKNOWN_THRESHOLD, CandidatePool, Posterior
 
@@ -123,8 +123,7 @@ def decide_verdict(
     unseen = _compute_closed_part(baseline, named, floor)
     if not named.names or max(closed, unseen) < _MIN_NAMED_SHARE:
         return "unexplained"
-    reaches_floor = max(named.train_rmse, named.held_out_rmse) < EXPLAINED_RATIO * floor
-    if reaches_floor or (closed > _EXPLAINED_SHARE and not unknown):
+    if named.reaches_floor(floor) or (closed > _EXPLAINED_SHARE and not unknown):
         return "explained"
     return "partly_explained"
 

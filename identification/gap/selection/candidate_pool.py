@@ -17,7 +17,6 @@ from identification.damper.effects import EFFECTS, Effect
 from identification.fitting import EffectModel, Piece, fit_output_error
 from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import (
-    EXPLAINED_RATIO,
     Candidate,
     FitOptions,
     JointFit,
@@ -140,7 +139,7 @@ class CandidatePool:
 
     def reaches_floor(self, candidate: Candidate) -> bool:
         """Return True if the error on fitted and on held-out samples is nearly the noise floor."""
-        return max(candidate.train_rmse, candidate.held_out_rmse) < EXPLAINED_RATIO * self.floor
+        return candidate.reaches_floor(self.floor)
 
     def collect_evidence(self) -> list[SetEvidence]:
         """Return the evidence of every set."""

@@ -28,3 +28,11 @@ def test_the_relative_excess_is_the_larger_share_of_both_gaps():
 def test_without_a_gap_on_both_sides_the_excess_itself_counts():
     baseline, candidate = make_candidate(3.0, 1.05), make_candidate(1.2, 1.0)
     assert candidate.compute_relative_excess(baseline, FLOOR) == candidate.compute_excess(FLOOR)
+
+
+@pytest.mark.parametrize(
+    ("train", "held_out", "chance", "reaches"),
+    [(1.04, 1.04, 0.0, True), (1.06, 1.0, 0.5, False), (1.0, 1.06, 0.0, False), (1.0, 1.06, 0.05, True)],
+)
+def test_the_held_out_error_reaches_the_floor_within_chance(train, held_out, chance, reaches):
+    assert make_candidate(train, held_out, chance).reaches_floor(FLOOR) == reaches

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from identification.damper.effects import EFFECTS
-from identification.gap.noise import compute_noise_drift
+from identification.damper.effects import EFFECTS, Effect, Form
+from identification.gap.noise import DRIFT_CURVE, compute_noise_drift
 from identification.simulate import ActiveEffect
 
 RATE, COUNT = 100.0, 6000
@@ -50,3 +50,14 @@ def test_other_effects_are_no_drift():
     hum = make_fit("mains_hum", EFFECTS["mains_hum"].forms[0].name, EFFECTS["mains_hum"].forms[0].starts[0])
     assert not compute_noise_drift(hum, make_problem(2), 1e9).any()
     assert len(compute_noise_drift(hum, make_problem(2), 1e9)) == 2 * COUNT
+
+
+@pytest.mark.parametrize(("name", "is_noise"), [(DRIFT_CURVE, True), ("curve", False)])
+def test_a_curve_over_time_in_place_of_a_drift_may_be_noise_as_well(name, is_noise):
+    def follow(variables, size):
+        return size * np.cos(2.0 * np.pi * variables["time"] / 30.0)
+
+    curve = Effect("curve", "force_channel", "time", "", (Form(name, "channel_function", (), (), follow),))
+    fit = SimpleNamespace(active_effects=(ActiveEffect(curve, (3.0,), name),))
+    assert compute_noise_drift(fit, make_problem(), 1.0).any() == is_noise
+    assert not compute_noise_drift(fit, make_problem(), 0.1).any()

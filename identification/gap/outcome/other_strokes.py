@@ -57,12 +57,14 @@ def estimate_error_growth(named: Candidate, baseline: Candidate) -> Array:
     """Estimate by how much the remaining part of the gap is larger on other strokes, (draws,) [1].
 
     Args:
-        named: a set of effects, fitted to all samples.
-        baseline: the law without effects.
+        named: a set of effects.
+        baseline: the law without effects, fitted to the same recordings.
     """
     scales = named.fit.problem.space.scales
     factor = max(1, int(scales.sampling_rate * scales.cycle_duration / _CYCLE_SAMPLES))
-    problem, law = named.fit.problem.decimate(factor), baseline.fit.problem.decimate(factor)
+    problem = named.fit.problem.decimate(factor)
+    # The baseline may have been fitted at another rate, so its unknowns are simulated with these pieces.
+    law = problem.replace_effects(())
     chosen = _choose_samples(problem.pieces)
     variables = np.vstack([_stack_variables(p) for p in problem.pieces])[chosen]
     ranges = np.maximum(np.abs(variables).max(axis=0), np.finfo(float).tiny)

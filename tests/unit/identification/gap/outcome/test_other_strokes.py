@@ -45,6 +45,13 @@ def test_it_is_a_smaller_part_of_a_gap_that_grows_with_the_speed():
     assert fast_large < 0.7 * slow_large
 
 
+def test_the_baseline_may_be_fitted_at_another_rate():
+    named, law = fit(SINGLE, EffectModel.from_name("gas_spring")), fit(SINGLE)
+    slower = SimpleNamespace(problem=law.fit.problem.decimate(4), minimum=law.fit.minimum)
+    found = estimate_error_growth(named, SimpleNamespace(fit=slower))
+    assert np.array_equal(found, estimate_error_growth(named, law))
+
+
 def test_the_same_candidates_give_the_same_growth():
     assert np.array_equal(grow(SINGLE, "gas_spring"), grow(SINGLE, "gas_spring"))
 

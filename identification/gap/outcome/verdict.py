@@ -1,5 +1,6 @@
 """Verdict, named set and its effects, from the candidates and their posterior."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ from identification.fitting import EffectModel
 from identification.gap.data import EvaluationData, Shrinkage
 from identification.gap.fits import Candidate
 from identification.gap.outcome.interval import compute_interval
-from identification.gap.selection import UNKNOWN_THRESHOLD, CandidatePool, Posterior
+from identification.gap.selection import UNKNOWN_THRESHOLD, CandidatePool, Posterior, compute_log_prior
 
 _MIN_NAMED_SHARE = 0.2
 """Smallest part of the gap that a named set closes."""
@@ -18,6 +19,10 @@ _EXPLAINED_SHARE = 0.95
 """Part of the gap above which it counts as explained, unless an unknown cause is more probable than the set."""
 _FLOOR_RATIO = 1.03
 """Threshold on the RMSE of the law relative to the noise floor: below it, nothing is left to explain."""
+_MIN_CHANCE = 0.05
+"""Probability that nothing is missing, above which a law inside the floor's interval is taken for complete."""
+_CERTAIN_ODDS = 100.0
+"""Odds over that noise of the residual's spectrum has to give to effects where that probability is smaller [1]."""
 _AMBIGUOUS_RATIO = 0.5
 """Threshold on the probability of an alternative over that of the named set: above it, the answer is ambiguous."""
 _MAX_ALTERNATIVES = 3
@@ -68,16 +73,32 @@ def _decide_set(
 ) -> NamedSet:
     """Return the verdict with one set of a posterior."""
     baseline, named = pool.baseline, pool.candidates[names]
-    verdict = decide_verdict(baseline, named, pool.floor, pool.no_gap_limits, posterior)
+    is_certain = _is_at_floor(baseline, pool.floor, pool.no_gap_limits) and _exceeds_noise(pool, posterior, named)
+    verdict = decide_verdict(baseline, named, pool.floor, pool.no_gap_limits, posterior, is_certain=is_certain)
     shrinkage = estimate_expected_shrinkage(pool, evaluation, named)
     benefit = shrinkage.expected_benefit
     if verdict == "partly_explained" and not closes_part(shrinkage):
         verdict = "unexplained"
+    if verdict == "unexplained" and is_certain:
+        verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limits)
     if named.names and benefit is not None and benefit < 0.0:
         verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limits)
     if named.names and verdict in ("no_gap", "unexplained"):
         return NamedSet(verdict, baseline, estimate_expected_shrinkage(pool, evaluation, baseline), posterior)
     return NamedSet(verdict, named, shrinkage, posterior)
+
+
+def _exceeds_noise(pool: CandidatePool, posterior: Posterior, named: Candidate) -> bool:
+    """Return True if effects are certain although the error of the law is inside the interval of the noise floor.
+
+    Slow noise makes this interval wide, because few of its periods were recorded. At the frequencies of an effect
+    the noise can be known far better.
+    """
+    if not named.names or posterior.sets.get(frozenset(), 0.0) > _MIN_CHANCE:
+        return False
+    prior_odds = compute_log_prior(frozenset()) - compute_log_prior(named.names)
+    evidence = pool.comparison.compute_noise_evidence(pool.baseline, named)
+    return evidence > prior_odds + math.log(_CERTAIN_ODDS)
 
 
 def estimate_expected_shrinkage(
@@ -97,6 +118,8 @@ def decide_verdict(
     floor: float,
     no_gap_limits: tuple[float, float],
     posterior: Posterior,
+    *,
+    is_certain: bool = False,
 ) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts, and the held-out ones for a part.
 
@@ -110,11 +133,9 @@ def decide_verdict(
         no_gap_limits: RMSE of the baseline on fitted and on held-out samples [N] up to which the verdict is
             ``no_gap``.
         posterior: probabilities of the sets.
+        is_certain: whether noise of the residual's spectrum cannot be what the set explains.
     """
-    fitted_limit, held_out_limit = no_gap_limits
-    at_floor = baseline.held_out_rmse < held_out_limit and baseline.train_rmse < max(
-        _FLOOR_RATIO * floor, fitted_limit
-    )
+    at_floor = _is_at_floor(baseline, floor, no_gap_limits) and not is_certain
     if at_floor or (not named.names and posterior.unknown < UNKNOWN_THRESHOLD):
         return "no_gap"
     baseline_excess = max(baseline.compute_excess(floor), 1e-12)
@@ -126,6 +147,14 @@ def decide_verdict(
     if named.reaches_floor(floor) or (closed > _EXPLAINED_SHARE and not unknown):
         return "explained"
     return "partly_explained"
+
+
+def _is_at_floor(baseline: Candidate, floor: float, no_gap_limits: tuple[float, float]) -> bool:
+    """Return True if the error of the law is inside the interval of the noise floor."""
+    fitted_limit, held_out_limit = no_gap_limits
+    return baseline.held_out_rmse < held_out_limit and baseline.train_rmse < max(
+        _FLOOR_RATIO * floor, fitted_limit
+    )
 
 
 def _compute_closed_part(baseline: Candidate, named: Candidate, floor: float) -> float:

@@ -9,6 +9,7 @@ from identification.gap.selection.posterior import (
     UNKNOWN_THRESHOLD,
     BlockEvidence,
     Posterior,
+    compute_log_prior,
     compute_stage_probabilities,
     normalise_scores,
 )
@@ -29,6 +30,7 @@ __all__ = [
     "SearchSettings",
     "compute_expected_gain",
     "compute_final_posterior",
+    "compute_log_prior",
     "compute_stage_probabilities",
     "find_partial_sets",
     "normalise_scores",

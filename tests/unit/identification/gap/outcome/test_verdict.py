@@ -2,13 +2,16 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from identification.documents import EffectSet
 from identification.fitting import EffectModel
+from identification.gap.data.shrinkage import Shrinkage
 from identification.gap.fits.candidate import NO_GAP_RATIO, Candidate
 from identification.gap.outcome.verdict import (
     build_named_effects,
+    choose_named_set,
     decide_unnamed_verdict,
     decide_verdict,
     is_ambiguous,
@@ -119,6 +122,42 @@ def test_a_named_effect_has_its_probability_in_all_sets_and_an_interval(probabil
 def test_an_answer_is_ambiguous_if_an_alternative_is_half_as_probable(probability, ambiguous):
     alternatives = [EffectSet(effects=["coil_lag"], probability=0.1), EffectSet(effects=[], probability=0.2)]
     assert is_ambiguous(alternatives, probability) == ambiguous
+
+
+@pytest.mark.parametrize(
+    ("empty", "evidence", "verdict"),
+    [
+        (0.04, 20.0, "explained"),
+        (0.06, 20.0, "no_gap"),  # that nothing is missing is not improbable
+        (0.04, 7.0, "no_gap"),  # noise of this spectrum can explain it: the prior odds of one effect are exp(4.2)
+    ],
+)
+def test_certain_effects_are_named_inside_the_interval_of_the_floor(empty, evidence, verdict):
+    candidate, baseline = make_candidate(("gas_spring",), 1.0, 1.0), make_candidate((), 1.06, 1.06)
+    posterior = Posterior({candidate.names: 0.9, frozenset(): empty}, 0.1 - empty)
+    pool = SimpleNamespace(
+        baseline=baseline,
+        candidates={candidate.names: candidate},
+        floor=FLOOR,
+        no_gap_limits=(1.07 * FLOOR,) * 2,
+        comparison=SimpleNamespace(compute_noise_evidence=lambda before, after: evidence),
+        noise_model=SimpleNamespace(
+            estimate_noise=lambda c: FLOOR, sample_other_runs=lambda c, problem: np.zeros((1, 4))
+        ),
+        problems=SimpleNamespace(full=None),
+    )
+    shrinkage = Shrinkage(0.7, 0.1, 0.9, (0.5, 0.95), 0.5)
+    evaluation = SimpleNamespace(force=np.zeros(4), estimate_shrinkage=lambda *errors: shrinkage)
+    chosen = choose_named_set(pool, evaluation, posterior, None)
+    assert chosen.verdict == verdict
+    assert chosen.candidate is (candidate if verdict == "explained" else baseline)
+
+
+def test_certain_effects_that_close_too_little_are_not_named_inside_the_interval_of_the_floor():
+    baseline, candidate = make_candidate((), 1.06, 1.06), make_candidate(("gas_spring",), 1.057, 1.057)
+    posterior = Posterior({candidate.names: 0.9, frozenset(): 0.01}, 0.09)
+    limits = (1.07 * FLOOR,) * 2
+    assert decide_verdict(baseline, candidate, 0.9 * FLOOR, limits, posterior, is_certain=True) == "unexplained"
 
 
 def test_a_baseline_within_the_interval_of_the_floor_has_no_gap():

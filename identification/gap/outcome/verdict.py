@@ -80,7 +80,8 @@ def _decide_set(
     if verdict == "partly_explained" and not closes_part(shrinkage):
         verdict = "unexplained"
     if verdict == "unexplained" and is_certain:
-        verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limits)
+        # Nothing can be named, and the error of the law is inside the interval of the floor.
+        verdict = "no_gap"
     if named.names and benefit is not None and benefit < 0.0:
         verdict = decide_unnamed_verdict(baseline, pool.floor, pool.no_gap_limits)
     if named.names and verdict in ("no_gap", "unexplained"):

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 from fastapi.responses import StreamingResponse
-from pydantic import AwareDatetime, Field
+from pydantic import Field
 
 from bench.audit import (
     AuditEntry,
@@ -17,6 +17,7 @@ from bench.audit import (
     verify_chain,
 )
 from bench.service.context import Context
+from bench.service.requests import ZonedTime
 from bench.service.views import View
 
 router = APIRouter(prefix="/audit", tags=["audit"])
@@ -70,12 +71,8 @@ def list_entries(
     action: Annotated[_Text, Query(description="part of the action")] = "",
     target: Annotated[_Text, Query(description="target, exactly, or one of its ids")] = "",
     text: Annotated[_Text, Query(description="part of the whole entry")] = "",
-    time_from: Annotated[
-        AwareDatetime | None, Query(alias="from", description="earliest time, with a zone")
-    ] = None,
-    time_to: Annotated[
-        AwareDatetime | None, Query(alias="to", description="before this time, with a zone")
-    ] = None,
+    time_from: Annotated[ZonedTime | None, Query(alias="from", description="earliest time, with a zone")] = None,
+    time_to: Annotated[ZonedTime | None, Query(alias="to", description="before this time, with a zone")] = None,
 ) -> AuditPage:
     """List the entries that meet all given conditions, the newest first."""
     wanted = AuditFilter(

@@ -5,11 +5,11 @@ from http import HTTPStatus
 from typing import Annotated
 
 from fastapi import Depends, Query
-from pydantic import AwareDatetime
 
 from bench.catalogue import RunFilter, RunOutcome
 from bench.endings import RunEnding
 from bench.service.problems import ProblemError
+from bench.service.requests import ZonedTime
 
 _NAME = r"^[A-Za-z_][A-Za-z0-9_]*$"
 """Pattern of the names of effects and parameters."""
@@ -24,10 +24,10 @@ def _read_search(
     outcome: RunOutcome | None = None,
     ending: RunEnding | None = None,
     started_from: Annotated[
-        AwareDatetime | None, Query(alias="from", description="earliest start, ISO 8601 with a zone")
+        ZonedTime | None, Query(alias="from", description="earliest start, ISO 8601 with a zone")
     ] = None,
     started_to: Annotated[
-        AwareDatetime | None, Query(alias="to", description="start before this time, ISO 8601 with a zone")
+        ZonedTime | None, Query(alias="to", description="start before this time, ISO 8601 with a zone")
     ] = None,
     effect: Annotated[
         str | None, Query(pattern=_NAME, max_length=_MAX_TEXT, description="named by the newest diagnosis")

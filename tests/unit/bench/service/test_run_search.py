@@ -98,6 +98,8 @@ def test_a_search_is_continued_page_by_page(service):
     ("query", "message"),
     [
         ("from=2026-03-02T10:00:00", "from"),
+        ("from=1772445600", "use ISO 8601 with a zone"),
+        ("to=-1.5e9", "use ISO 8601 with a zone"),
         ("parameter=k0", "parameter_min or parameter_max"),
         ("parameter_min=3", "without parameter"),
         ("parameter=k0&parameter_min=3&parameter_max=2", "3 is above parameter_max 2"),

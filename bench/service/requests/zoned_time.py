@@ -6,7 +6,7 @@ from pydantic import AwareDatetime, BeforeValidator
 
 
 def _refuse_number(value: object) -> object:
-    """Return a value that is no number.
+    """Return a value that is not a number.
 
     Pydantic takes a number for seconds or milliseconds since 1970, depending on its size. The description of the
     interface knows ISO 8601 only.
@@ -18,7 +18,7 @@ def _refuse_number(value: object) -> object:
         float(str(value))
     except ValueError:
         return value
-    raise ValueError("a number is no time; use ISO 8601 with a zone, such as 2026-01-31T08:00:00Z")
+    raise ValueError("a number is not a time; use ISO 8601 with a zone, such as 2026-01-31T08:00:00Z")
 
 
 ZonedTime = Annotated[AwareDatetime, BeforeValidator(_refuse_number)]

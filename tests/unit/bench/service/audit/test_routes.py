@@ -50,7 +50,7 @@ def test_conditions_select_entries(service, entries, query, count):
 def test_seconds_since_1970_are_no_time_of_the_description(client):
     answer = client.get(f"{API}/audit?from=178560719985")
     assert answer.status_code == 422
-    assert "query.from: a number is no time; use ISO 8601 with a zone" in answer.json()["detail"]
+    assert "query.from: a number is not a time; use ISO 8601 with a zone" in answer.json()["detail"]
 
 
 def test_head_and_verification_agree(service, client, entries):

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from identification.arrays import Array, BoolArray
+from identification.signals.harmonic_sums import evaluate_harmonics, make_normal_equations
 
 _FIRST_HARMONICS = 20
 """Number of harmonics tried at first; doubled while high ones are significant, as at the corners of a triangle."""
@@ -151,8 +152,8 @@ def _fit_significant(
     values: Array, weights: Array, count: int, step: float, noise: float
 ) -> tuple[tuple[int, ...], Array]:
     """Return the significant orders among the first ``count`` and their signal (N,); step in cycles a sample."""
-    basis = _make_basis(np.arange(float(len(values))) - 0.5 * len(values), count, step)
-    amplitudes = _regress(basis, values, weights)
+    equations = make_normal_equations(values, weights, count, step)
+    amplitudes = _solve(equations.matrix, equations.moments)
     waves = amplitudes[2:].reshape(-1, 2)
     power = np.sum(waves**2, axis=1)
     # Noise alone gives a cosine and a sine 2 noise² / N each.
@@ -160,7 +161,8 @@ def _fit_significant(
     significant[0] = True
     # Over whole cycles the orders are nearly orthogonal, so no second regression is needed.
     amplitudes[2:] = (waves * significant[:, None]).ravel()
-    return tuple(int(k) + 1 for k in np.flatnonzero(significant)), np.asarray(amplitudes @ basis)
+    orders = tuple(int(k) + 1 for k in np.flatnonzero(significant))
+    return orders, evaluate_harmonics(amplitudes, len(values), step)
 
 
 def _grow_steady_part(
@@ -256,4 +258,8 @@ def _make_basis(position: Array, count: int, step: float) -> Array:
 def _regress(basis: Array, values: Array, weights: Array) -> Array:
     """Return the amplitudes of a weighted least-squares fit, the smallest ones for redundant columns."""
     weighted = basis * weights
-    return np.asarray(np.linalg.lstsq(weighted @ basis.T, weighted @ values, rcond=1e-12)[0])
+    return _solve(weighted @ basis.T, weighted @ values)
+
+
+def _solve(matrix: Array, moments: Array) -> Array:
+    return np.asarray(np.linalg.lstsq(matrix, moments, rcond=1e-12)[0])

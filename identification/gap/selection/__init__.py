@@ -1,8 +1,9 @@
 """Selection of the sets of effects that explain a recording."""
 
 from identification.gap.selection.candidate_pool import CandidatePool, CurveAlternative
+from identification.gap.selection.extension import settle_floor
 from identification.gap.selection.partial_sets import find_partial_sets
-from identification.gap.selection.plan import compute_final_posterior, search_forward, settle_floor
+from identification.gap.selection.plan import compute_final_posterior, search_forward
 from identification.gap.selection.posterior import (
     MAX_TIED_SETS,
     MIN_TIED_PROBABILITY,

@@ -7,6 +7,10 @@ evidence cannot separate the two. A confusable effect therefore pays an addition
 search has already fitted are considered.
 """
 
+from collections.abc import Collection
+
+from identification.gap.fits import Candidate
+from identification.gap.noise import ResidualRegression, take_floor_from_residual
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.neighbours import find_subset, fit_extension
 from identification.gap.selection.posterior import BlockEvidence, compute_complexity_penalty
@@ -35,6 +39,10 @@ def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
     extended = _fit_extensions(pool, names, names | confusable)
     for larger in extended:
         pool.fit_fully(larger)
+    # A larger set can be the first whose residual is noise. Over a lower floor, noise would count as error.
+    if settle_floor(pool, pool.candidates.values()):
+        pool.update_residuals()
+    for larger in extended:
         known, found = pool.candidates[names], pool.candidates[larger]
         if pool.comparison.compute_closed_share(known, found) < pool.settings.min_closed_share:
             continue
@@ -46,6 +54,18 @@ def try_extension(pool: CandidatePool, names: frozenset[str]) -> bool:
         for model in pool.candidates[larger].fit.effects:
             find_subset(pool, pool.candidates[larger], model)
     return bool(accepted)
+
+
+def settle_floor(pool: CandidatePool, candidates: Collection[Candidate]) -> bool:
+    """Take the noise floor from candidates whose residual is noise; return False if the floor stays."""
+    return take_floor_from_residual(
+        pool.noise_model,
+        candidates,
+        ResidualRegression(pool.evaluation, pool.floor),
+        pool.problems.block_length,
+        pool.evaluate,
+        pool.propagate_input_noise,
+    )
 
 
 def _fit_extensions(pool: CandidatePool, names: frozenset[str], without: frozenset[str]) -> list[frozenset[str]]:

@@ -6,18 +6,14 @@ others are tried in its place. All of this uses decimated data. Finally the most
 samples.
 """
 
-from collections.abc import Collection
-
 import numpy as np
 
 from identification.fitting import EffectModel
 from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import (
-    ResidualRegression,
     describe_drift_explanation,
     discard_unsteady_cycles,
     subtract_clock_drift,
-    take_floor_from_residual,
 )
 from identification.gap.selection.candidate_pool import CandidatePool
 from identification.gap.selection.exchange import exchange_effects, exchange_mounting, fit_subsets
@@ -174,18 +170,6 @@ def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
     for name in MOUNTING_EFFECTS:
         if not pool.budget_spent and is_mounting_promising(pool, parent, name):
             fit_mounting(pool, parent, gains, name)
-
-
-def settle_floor(pool: CandidatePool, candidates: Collection[Candidate]) -> bool:
-    """Take the noise floor from candidates whose residual is noise; return False if the floor stays."""
-    return take_floor_from_residual(
-        pool.noise_model,
-        candidates,
-        ResidualRegression(pool.evaluation, pool.floor),
-        pool.problems.block_length,
-        pool.evaluate,
-        pool.propagate_input_noise,
-    )
 
 
 def compute_final_posterior(pool: CandidatePool) -> Posterior:

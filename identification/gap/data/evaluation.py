@@ -109,7 +109,7 @@ class EvaluationData:
         return compute_rmse(values[self.fitted_samples]), compute_rmse(values[self.held_out_samples])
 
     def estimate_shrinkage(
-        self, before: Residual, after: Residual, noise: float, input_noise_squares: Array
+        self, before: Residual, after: Residual, noise: float, input_noise_squares: Array, chance: float = 0.0
     ) -> Shrinkage:
         """Estimate how far the gap shrinks on another run.
 
@@ -118,6 +118,7 @@ class EvaluationData:
             noise: standard deviation of the noise in the recorded force [N].
             input_noise_squares: (runs, N) squared change [N²] of the force simulated with effects, for the input
                 noise of other runs.
+            chance: excess of the held-out mean square over that of the noise which sampling can produce [N²].
         """
         errors = self._compute_cycle_errors(before, after)
         replicates = Replicates(
@@ -126,7 +127,7 @@ class EvaluationData:
             input_noise_squares[:, self.recorded].mean(axis=1),
             float(np.mean(before.values[self.recorded] ** 2)),
         )
-        return estimate_shrinkage(errors, noise, replicates, self.cycles.stroke_count)
+        return estimate_shrinkage(errors, noise, replicates, self.cycles.stroke_count, chance)
 
     def estimate_shares(
         self, before: Residual, after: Residual, without: Mapping[str, Residual], expected: float, noise: float

@@ -100,7 +100,9 @@ class Replicates(NamedTuple):
     """Mean squared residual without effects [N²] over all recorded samples."""
 
 
-def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates, strokes: int) -> Shrinkage:
+def estimate_shrinkage(
+    errors: CycleErrors, noise: float, replicates: Replicates, strokes: int, chance: float = 0.0
+) -> Shrinkage:
     """Estimate the expected shrinkage on another run of the same damper, with an interval (decision 0014).
 
     With effects, two errors remain on another run:
@@ -118,6 +120,7 @@ def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates
         noise: standard deviation of the noise in the recorded force [N].
         replicates: simulations with effects and with new input noise.
         strokes: number of recorded strokes of different amplitude or frequency.
+        chance: excess of the held-out mean square over that of the noise which sampling alone can produce [N²].
     """
     before, after = errors.compute_means()
     if before < (NEAR_FLOOR_RATIO * noise) ** 2:
@@ -125,7 +128,7 @@ def estimate_shrinkage(errors: CycleErrors, noise: float, replicates: Replicates
     if errors.before is errors.after or np.array_equal(errors.before, errors.after):
         return Shrinkage(math.sqrt(before), math.sqrt(after), 0.0, (0.0, 0.0))
     remaining = _sample_remaining_gap(errors, noise, replicates, strokes)
-    benefit = _estimate_benefit(after, noise, replicates)
+    benefit = _estimate_benefit(after - chance, noise, replicates)
     return _summarise(Shrinkage(math.sqrt(before), math.sqrt(after), None, None, benefit, remaining))
 
 
@@ -179,7 +182,8 @@ def estimate_shares(
 def _estimate_benefit(after: float, noise: float, replicates: Replicates) -> float:
     """Estimate the part [1] of the whole run's gap that the effects close if the run is repeated.
 
-    ``after`` [N²] is the mean square on the held-out cycles, where an overfitted set does harm.
+    ``after`` [N²] is the mean square on the held-out cycles, where an overfitted set does harm. Slow noise on these
+    few cycles can exceed its own mean square, so that excess does not count.
     """
     remaining = max(after - noise**2 - replicates.held_out, 0.0) + float(replicates.runs.mean())
     return 1.0 - remaining / max(replicates.before - noise**2, _MIN_GAP_SHARE * noise**2)

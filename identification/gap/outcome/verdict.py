@@ -110,7 +110,8 @@ def estimate_expected_shrinkage(
     input_noise = np.zeros((1, len(evaluation.force)))
     if candidate.names:
         input_noise = pool.noise_model.sample_other_runs(candidate, pool.problems.full)
-    return evaluation.estimate_shrinkage(pool.baseline.residual, candidate.residual, noise, input_noise)
+    chance = candidate.chance_excess * pool.floor**2
+    return evaluation.estimate_shrinkage(pool.baseline.residual, candidate.residual, noise, input_noise, chance)
 
 
 def decide_verdict(

@@ -79,6 +79,20 @@ def test_a_set_that_does_harm_on_held_out_cycles_has_no_benefit():
     assert estimate_shrinkage(errors, NOISE, replicate(), strokes=5).expected_benefit > 0.9
 
 
+def test_slow_noise_that_is_larger_on_the_held_out_cycles_by_chance_is_no_harm():
+    gap = 0.1 * NOISE**2
+    errors = close_gap(gap, 0.0)
+    unlucky = errors._replace(
+        before=errors.before + 2.0 * gap * errors.counts * errors.held_out,
+        after=errors.after + 2.0 * gap * errors.counts * errors.held_out,
+    )
+    benefits = [
+        estimate_shrinkage(unlucky, NOISE, replicate(gap=gap), 5, chance).expected_benefit
+        for chance in (0.0, gap, 3.0 * gap)
+    ]
+    assert benefits == pytest.approx([-1.0, 0.0, 1.0], abs=0.05)
+
+
 def test_input_noise_larger_than_the_gap_leaves_no_benefit():
     gap = 0.1 * NOISE**2
     errors = close_gap(gap, 0.2)

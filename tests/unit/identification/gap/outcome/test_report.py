@@ -64,7 +64,7 @@ def make_builder(
         compute_excess=lambda candidate: candidate.compute_excess(FLOOR),
     )
 
-    def estimate_shrinkage(before, after, noise, input_noise):
+    def estimate_shrinkage(before, after, noise, input_noise, chance):
         return Shrinkage(6.0, float(np.mean(input_noise)), value, (low, 0.95), benefit)
 
     evaluation = SimpleNamespace(

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.independent.plant import Array
+from benchmarks.independent.plant import Array, Plant
 from benchmarks.independent.rig import FieldMap, Rig, follow_with_play
 from benchmarks.independent.strokes import Strokes
 from identification.damper.effects import Stage
@@ -135,22 +135,23 @@ def add_stop(rig: Rig, strength: float, random: np.random.Generator, s: Scales) 
 def loosen(rig: Rig, strength: float, random: np.random.Generator, s: Scales) -> Rig:
     """Add play of the mounting."""
     stiffness = rig.plant.mount_stiffness or s.force / (0.002 * s.length)
-    return _mount(rig, s, gap=0.05 * strength * s.length, mount_stiffness=stiffness)
+    plant = rig.plant._replace(gap=0.05 * strength * s.length)
+    return replace(rig, plant=plant._replace(mount_stiffness=min(stiffness, _find_stiffest(plant, s))))
 
 
 def soften_mounting(rig: Rig, strength: float, random: np.random.Generator, s: Scales) -> Rig:
     """Add a joint between load cell and damper that may harden."""
-    reach = 0.2 * s.length * max(strength, 0.02)
-    hardening = random.choice([0.0, 0.3, 1.0]) * s.force / reach**3
-    return _mount(rig, s, mount_stiffness=s.force / reach, mount_hardening=hardening)
+    reach, ratio = 0.2 * s.length * max(strength, 0.02), random.choice([0.0, 0.3, 1.0])
+    # Where the hardening part alone carries the force, the slope is as many times larger.
+    stiffness = min(s.force / reach, _find_stiffest(rig.plant, s) / (1.0 + 3.0 * ratio))
+    hardening = ratio * stiffness**3 / s.force**2
+    return replace(rig, plant=rig.plant._replace(mount_stiffness=stiffness, mount_hardening=hardening))
 
 
-def _mount(rig: Rig, s: Scales, **changes: float) -> Rig:
-    """Return the rig with a mounting that is not too stiff for the step."""
-    plant = rig.plant._replace(**changes)
+def _find_stiffest(plant: Plant, s: Scales) -> float:
+    """Return the largest stiffness of a mounting that the step can integrate [N/m]."""
     damping = min(plant.c0_base, plant.c0_base + s.drive * plant.c0_slope)
-    stiffest = _STIFFEST * damping / s.strokes.step
-    return replace(rig, plant=plant._replace(mount_stiffness=min(plant.mount_stiffness, stiffest)))
+    return _STIFFEST * damping / s.strokes.step
 
 
 def add_mass(rig: Rig, strength: float, random: np.random.Generator, s: Scales) -> Rig:

@@ -182,8 +182,8 @@ def estimate_shares(
 def _estimate_benefit(after: float, noise: float, replicates: Replicates) -> float:
     """Estimate the part [1] of the whole run's gap that the effects close if the run is repeated.
 
-    ``after`` [N²] is the mean square on the held-out cycles, where an overfitted set does harm. Slow noise on these
-    few cycles can exceed its own mean square, so that excess does not count.
+    ``after`` [N²] is the mean square on the held-out cycles, where an overfitted set does harm, without what slow
+    noise on so few cycles can add by chance.
     """
     remaining = max(after - noise**2 - replicates.held_out, 0.0) + float(replicates.runs.mean())
     return 1.0 - remaining / max(replicates.before - noise**2, _MIN_GAP_SHARE * noise**2)

@@ -19,9 +19,12 @@ from identification.gap.fits import EXPLAINED_RATIO, NO_GAP_RATIO, Candidate, Jo
 from identification.gap.noise.explainable_share import ResidualRegression
 from identification.gap.noise.noise_model import NoiseModel
 from identification.gap.noise.simulated_noise import simulate_noise
+from identification.noise import NoiseFloorEstimate
 
 CHANCE_DEVIATIONS = 4.0
 """Standard deviations by which the logarithm of the scatter of blocks hardly differs from that of noise."""
+_HELD_OUT_DEVIATIONS = 2.0
+"""Standard deviations of the mean square of held-out samples that count as chance."""
 _NOISE_DRAWS = 16
 """Number of draws of noise of the residual's spectrum."""
 
@@ -32,6 +35,7 @@ def take_floor_from_residual(
     regression: ResidualRegression,
     block_length: float,
     evaluate: Callable[[JointFit], Candidate],
+    refit: Callable[[Candidate], Candidate],
     propagate: Callable[[Candidate], Array],
 ) -> bool:
     """Take the floor from the smallest set of effects whose residual is noise; return False if there is none.
@@ -44,24 +48,50 @@ def take_floor_from_residual(
         regression: regression on their residuals on held-out strokes.
         block_length: length of a block [s], part of a stroke.
         evaluate: computes the residual of a fit; a drift that slow noise explains is then a part of it.
+        refit: fits a candidate again to all samples, the held-out ones included.
         propagate: computes the squared change of a candidate's force by the noise of its inputs, (runs, N) [N²].
     """
     lowest = regression.find_explainable_rmse(_select_best(candidates), noise_model.floor, certain=True)
     if lowest < EXPLAINED_RATIO * noise_model.floor:
         return False
     fitted = min(c.train_rmse for c in candidates)
-    adequate = [c for c in candidates if max(c.held_out_rmse / lowest, c.train_rmse / fitted) < EXPLAINED_RATIO]
+    held_out = max(int(np.count_nonzero(regression.evaluation.held_out_samples)), 1)
+    adequate = [
+        c for c in candidates if _is_adequate(c, fitted, lowest, noise_model.describe_residual(c), held_out)
+    ]
     for candidate in sorted(adequate, key=lambda c: (len(c.names), c.held_out_rmse)):
         if not noise_model.may_be_noise(candidate, regression.evaluation):
             continue
         # The form error of an effect may grow with the drive, too, so cycles that show the noise suffice.
         drive = regression.evaluation.drive if noise_model.has_unsteady_cycles else None
-        found = _measure_deviations(noise_model, candidate, drive, propagate(candidate), block_length)
-        if found and max(found.values()) < CHANCE_DEVIATIONS:
+
+        def is_noise(one: Candidate, drive: Array | None = drive) -> bool:
+            found = _measure_deviations(noise_model, one, drive, propagate(one), block_length)
+            return bool(found) and max(found.values()) < CHANCE_DEVIATIONS
+
+        # A held-out stroke can need coordinates that the fitted ones leave open. That is not an error of the law.
+        if is_noise(candidate) or is_noise(refit(candidate)):
             noise_model.estimate = noise_model.describe_residual(candidate)
             noise_model.estimate = noise_model.describe_residual(evaluate(candidate.fit))
             return True
     return False
+
+
+def _is_adequate(
+    candidate: Candidate, fitted: float, lowest: float, noise: NoiseFloorEstimate, held_out: int
+) -> bool:
+    """Return True if the errors of a candidate are nearly the smallest ones, within chance if they are noise.
+
+    Args:
+        candidate: a set of effects.
+        fitted: smallest RMSE on fitted samples [N].
+        lowest: smallest explainable RMSE on held-out samples [N].
+        noise: the noise, if the residual of the candidate is noise.
+        held_out: number of held-out samples.
+    """
+    chance = _HELD_OUT_DEVIATIONS * noise.compute_chance(held_out) * noise.noise**2
+    is_near = candidate.held_out_rmse**2 - chance < (EXPLAINED_RATIO * lowest) ** 2
+    return is_near and candidate.train_rmse < EXPLAINED_RATIO * fitted
 
 
 def discard_unsteady_cycles(

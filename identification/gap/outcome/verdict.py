@@ -1,6 +1,5 @@
 """Verdict, named set and its effects, from the candidates and their posterior."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -11,7 +10,7 @@ from identification.fitting import EffectModel
 from identification.gap.data import EvaluationData, Shrinkage
 from identification.gap.fits import Candidate
 from identification.gap.outcome.interval import compute_interval
-from identification.gap.selection import UNKNOWN_THRESHOLD, CandidatePool, Posterior, compute_log_prior
+from identification.gap.selection import UNKNOWN_THRESHOLD, CandidatePool, Posterior
 
 _MIN_NAMED_SHARE = 0.2
 """Smallest part of the gap that a named set closes."""
@@ -21,8 +20,6 @@ _FLOOR_RATIO = 1.03
 """Threshold on the RMSE of the law relative to the noise floor: below it, nothing is left to explain."""
 _MIN_CHANCE = 0.05
 """Probability that nothing is missing, above which a law inside the floor's interval is taken for complete."""
-_CERTAIN_ODDS = 100.0
-"""Odds over that noise of the residual's spectrum has to give to effects where that probability is smaller [1]."""
 _AMBIGUOUS_RATIO = 0.5
 """Threshold on the probability of an alternative over that of the named set: above it, the answer is ambiguous."""
 _MAX_ALTERNATIVES = 3
@@ -90,16 +87,10 @@ def _decide_set(
 
 
 def _exceeds_noise(pool: CandidatePool, posterior: Posterior, named: Candidate) -> bool:
-    """Return True if effects are certain although the error of the law is inside the interval of the noise floor.
-
-    Slow noise makes this interval wide, because few of its periods were recorded. At the frequencies of an effect
-    the noise can be known far better.
-    """
+    """Return True if effects are certain although the error of the law is inside the interval of the floor."""
     if not named.names or posterior.sets.get(frozenset(), 0.0) > _MIN_CHANCE:
         return False
-    prior_odds = compute_log_prior(frozenset()) - compute_log_prior(named.names)
-    evidence = pool.comparison.compute_noise_evidence(pool.baseline, named)
-    return evidence > prior_odds + math.log(_CERTAIN_ODDS)
+    return pool.comparison.exceeds_noise(pool.baseline, named)
 
 
 def estimate_expected_shrinkage(

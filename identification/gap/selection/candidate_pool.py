@@ -301,6 +301,12 @@ class CandidatePool:
                 break
         return candidate
 
+    def refit_usable_samples(self, candidate: Candidate) -> Candidate:
+        """Refine a candidate on all usable samples, the held-out ones included; it is not kept."""
+        problem = replace(self.problems.full, pieces=self.evaluation.pieces)
+        simulated = split_by_piece(candidate.residual.simulated_force, problem.pieces)
+        return self.evaluate(refit_all_samples(problem, candidate.fit, simulated, self.settings.refit_iterations))
+
     def _find_mains_frequency(self, parent: Candidate) -> float:
         """Find the mains frequency [Hz] in the residual of the longest stretch, which resolves it best."""
         pieces = self.problems.full.pieces

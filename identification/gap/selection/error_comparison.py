@@ -11,15 +11,20 @@ removes little: the same form error returns in every block of a condition, and e
 time.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.gap.data import Cycles, Residual, bound_evidence, compute_evidence
-from identification.gap.fits import Candidate
+from identification.gap.fits import NO_GAP_RATIO, Candidate
 from identification.gap.noise import NoiseModel, compute_noise_evidence
+from identification.gap.selection.posterior import compute_log_prior
 from identification.noise import WhiteningFilter
+
+_CERTAIN_ODDS = 100.0
+"""Odds, beyond the prior ones, at which noise of the residual's spectrum cannot be what an effect explains [1]."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +67,19 @@ class ErrorComparison:
         Slow noise makes neighbouring blocks alike, so block evidence counts the same chance several times.
         """
         return compute_noise_evidence(after.residual, before.residual.values - after.residual.values)
+
+    def exceeds_noise(self, before: Candidate, after: Candidate) -> bool:
+        """Return True if noise of the second residual's spectrum cannot be what its further effects explain.
+
+        Slow noise makes the interval of the floor wide, because few of its periods were recorded. At the
+        frequencies of an effect the noise can be known far better. An effect below the smallest gap does not
+        count, however certain it is.
+        """
+        squares = (float(np.mean(c.residual.values[c.residual.valid] ** 2)) for c in (before, after))
+        if next(squares) < NO_GAP_RATIO**2 * next(squares):
+            return False
+        prior_odds = compute_log_prior(before.names) - compute_log_prior(after.names)
+        return self.compute_noise_evidence(before, after) > prior_odds + math.log(_CERTAIN_ODDS)
 
     def bound_evidence(self, candidate: Candidate) -> float:
         """Compute the block evidence for a candidate at the noise floor over a known one."""

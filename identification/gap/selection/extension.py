@@ -64,6 +64,7 @@ def settle_floor(pool: CandidatePool, candidates: Collection[Candidate]) -> bool
         ResidualRegression(pool.evaluation, pool.floor),
         pool.problems.block_length,
         pool.evaluate,
+        pool.refit_usable_samples,
         pool.propagate_input_noise,
     )
 

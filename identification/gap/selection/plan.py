@@ -9,7 +9,7 @@ samples.
 import numpy as np
 
 from identification.fitting import EffectModel
-from identification.gap.fits import Candidate, replace_effect_unknowns
+from identification.gap.fits import EXPLAINED_RATIO, Candidate, replace_effect_unknowns
 from identification.gap.noise import (
     describe_drift_explanation,
     discard_unsteady_cycles,
@@ -31,6 +31,7 @@ from identification.gap.selection.posterior import (
 )
 from identification.gap.selection.screening import (
     MOUNTING_EFFECTS,
+    ScreeningResult,
     compute_expected_gain,
     list_effect_models,
     select_shortlist,
@@ -47,7 +48,9 @@ def search_forward(pool: CandidatePool) -> None:
         baseline = pool.fit((), [baseline.fit.minimum.unknowns])
     pool.noise_model.update(baseline, pool.problems.full, pool.evaluation)
     pool.noise_model.narrow_floor(baseline, pool.evaluation)
-    if _is_noise(pool, baseline) or _is_explained_by_clocks(pool):
+    if _is_noise(pool, baseline) and not _fit_certain_effects(pool):
+        return
+    if _is_explained_by_clocks(pool):
         return
     beam = [baseline]
     for size, count in enumerate(pool.settings.shortlist_sizes, 1):
@@ -72,8 +75,12 @@ def _refit_law(pool: CandidatePool) -> None:
     """
     best = pool.find_best()
     if best.names and not pool.budget_spent:
-        law = replace_effect_unknowns(best.fit.problem, best.fit.minimum.unknowns, np.empty(0))
-        pool.fit((), [law])
+        _fit_law_from(pool, best)
+
+
+def _fit_law_from(pool: CandidatePool, candidate: Candidate) -> None:
+    """Fit the law alone from the law of a set."""
+    pool.fit((), [replace_effect_unknowns(candidate.fit.problem, candidate.fit.minimum.unknowns, np.empty(0))])
 
 
 def _sort_sets(pool: CandidatePool, size: int) -> list[Candidate]:
@@ -125,6 +132,33 @@ def _is_noise(pool: CandidatePool, baseline: Candidate) -> bool:
     pool.notes.append(f"the noise floor is that at {noise_model.estimate.basis}")
     noise_model.update(baseline, pool.problems.full, pool.evaluation)
     return pool.is_at_floor(baseline)
+
+
+def _fit_certain_effects(pool: CandidatePool) -> bool:
+    """Fit the effects that noise cannot imitate, with the law inside a wide interval of the floor; True if any.
+
+    The evidence in noise of the residual's spectrum then counts for them: excesses cannot tell them from none.
+    """
+    if max(pool.no_gap_limits) <= max(EXPLAINED_RATIO, pool.settings.no_gap_ratio) * pool.floor:
+        return False
+    law, best = frozenset[str](), dict[str, ScreeningResult]()
+    for gain in pool.screen(pool.baseline, law):
+        best.setdefault(gain.effect_model.name, gain)
+    for gain in list(best.values())[: pool.settings.shortlist_sizes[0]]:
+        candidate = fit_extension(pool, pool.baseline, gain)
+        if not pool.comparison.exceeds_noise(pool.baseline, candidate):
+            continue
+        _fit_law_from(pool, candidate)
+        pool.fit_fully(law)
+        pool.fit_fully(candidate.names)
+        known, found = pool.baseline, pool.candidates[candidate.names]
+        if pool.comparison.exceeds_noise(known, found):
+            evidence = pool.comparison.compute_noise_evidence(known, found)
+            pool.block_evidence[candidate.names] = BlockEvidence(law, evidence)
+    if not pool.block_evidence:
+        # Sets that noise can imitate are not alternatives to the law.
+        pool.candidates = {law: pool.baseline}
+    return bool(pool.block_evidence)
 
 
 def _is_gap_negligible(pool: CandidatePool, baseline: Candidate) -> bool:

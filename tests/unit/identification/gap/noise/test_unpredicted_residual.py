@@ -1,6 +1,7 @@
 """Where no cycles repeat, the floor is the residual that no function of stroke, drive and time predicts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,12 @@ import pytest
 from identification.gap.fits import Candidate
 from identification.gap.noise import ResidualRegression, discard_unsteady_cycles, take_floor_from_residual
 from identification.gap.noise.noise_model import NoiseModel
-from identification.gap.noise.unpredicted_residual import CHANCE_DEVIATIONS, compare_scatter, compare_with_drive
+from identification.gap.noise.unpredicted_residual import (
+    CHANCE_DEVIATIONS,
+    _is_adequate,
+    compare_scatter,
+    compare_with_drive,
+)
 from identification.noise import ScaleVariance, measure_scale_variance
 from tests.support.candidate_pools import NOISE, RATE, fit_baseline
 from tests.support.noise import make_pink_noise, make_residual
@@ -42,7 +48,7 @@ def make_candidate(pool, values, *names):
     return candidate
 
 
-def settle(pool, *candidates, input_squares=0.0, unsteady=False, **changes):
+def settle(pool, *candidates, input_squares=0.0, unsteady=False, refit=lambda candidate: candidate, **changes):
     """Return the noise model after candidates with unknown floor, or with a changed estimate."""
     propagated = np.broadcast_to(input_squares, (RUNS, len(pool.evaluation.force)))
     estimate = replace(pool.noise_model.estimate, **{
@@ -58,6 +64,7 @@ def settle(pool, *candidates, input_squares=0.0, unsteady=False, **changes):
         regression,
         pool.problems.block_length,
         lambda fit: find_fitted(candidates, fit),
+        refit,
         lambda candidate: propagated,
     )
     return model
@@ -148,6 +155,25 @@ def test_a_residual_as_the_noise_at_every_known_scale_is_the_floor_beyond_its_in
 def test_an_error_that_is_strong_in_few_blocks_is_not_the_floor(pool):
     bursts = np.where(np.arange(len(pool.evaluation.force)) % 997 < 40, 8.0, 0.5)
     assert not settle(pool, make_candidate(pool, bursts * draw_noise(pool))).estimate.is_known
+
+
+def test_an_error_that_a_fit_to_all_samples_removes_is_none_of_the_law(pool):
+    """The fitted strokes can leave a coordinate open that a held-out one needs."""
+    bursts = np.where(np.arange(len(pool.evaluation.force)) % 997 < 40, 8.0, 1.0)
+    held_out = np.where(pool.evaluation.held_out_samples, bursts, 1.0)
+    candidate = make_candidate(pool, held_out * draw_noise(pool))
+    assert not settle(pool, candidate).estimate.is_known
+    refitted = make_candidate(pool, draw_noise(pool))
+    assert settle(pool, candidate, refit=lambda one: refitted).estimate.is_known
+
+
+@pytest.mark.parametrize(("chance", "adequate"), [(0.0, False), (0.2, True)])
+def test_slow_noise_may_be_larger_on_the_held_out_samples(chance, adequate):
+    """A candidate is not refused for an error that noise of its spectrum has by chance."""
+    candidate = SimpleNamespace(train_rmse=1.0, held_out_rmse=1.2)
+    noise = SimpleNamespace(noise=1.05, compute_chance=lambda samples: chance)
+    assert _is_adequate(candidate, 1.0, 1.0, noise, 1000) is adequate
+    assert not _is_adequate(SimpleNamespace(train_rmse=1.1, held_out_rmse=1.0), 1.0, 1.0, noise, 1000)
 
 
 def test_bursts_by_the_noise_of_the_displacement_leave_the_rest_as_the_floor(pool):

@@ -125,14 +125,14 @@ def test_an_answer_is_ambiguous_if_an_alternative_is_half_as_probable(probabilit
 
 
 @pytest.mark.parametrize(
-    ("empty", "evidence", "verdict"),
+    ("empty", "exceeds_noise", "verdict"),
     [
-        (0.04, 20.0, "explained"),
-        (0.06, 20.0, "no_gap"),  # that nothing is missing is not improbable
-        (0.04, 7.0, "no_gap"),  # noise of this spectrum can explain it: the prior odds of one effect are exp(4.2)
+        (0.04, True, "explained"),
+        (0.06, True, "no_gap"),  # that nothing is missing is not improbable
+        (0.04, False, "no_gap"),
     ],
 )
-def test_certain_effects_are_named_inside_the_interval_of_the_floor(empty, evidence, verdict):
+def test_certain_effects_are_named_inside_the_interval_of_the_floor(empty, exceeds_noise, verdict):
     candidate, baseline = make_candidate(("gas_spring",), 1.0, 1.0), make_candidate((), 1.06, 1.06)
     posterior = Posterior({candidate.names: 0.9, frozenset(): empty}, 0.1 - empty)
     pool = SimpleNamespace(
@@ -140,7 +140,7 @@ def test_certain_effects_are_named_inside_the_interval_of_the_floor(empty, evide
         candidates={candidate.names: candidate},
         floor=FLOOR,
         no_gap_limits=(1.07 * FLOOR,) * 2,
-        comparison=SimpleNamespace(compute_noise_evidence=lambda before, after: evidence),
+        comparison=SimpleNamespace(exceeds_noise=lambda before, after: exceeds_noise),
         noise_model=SimpleNamespace(
             estimate_noise=lambda c: FLOOR, sample_other_runs=lambda c, problem: np.zeros((1, 4))
         ),

@@ -20,9 +20,9 @@ CONDITION = (TIME // 10.0).astype(int)
 CYCLES = Cycles(TIME.astype(int), TIME % 1.0, np.arange(40) // 10, 4 * (StrokeCondition(1.0, 0.01, 1.0),))
 
 
-def make_candidate(values):
+def make_candidate(values, names=frozenset()):
     residual = Residual(values, 0.0 * TIME, 0.0 * TIME, TIME, EVERYWHERE, ((COUNT, RATE),))
-    return SimpleNamespace(residual=residual)
+    return SimpleNamespace(residual=residual, names=names)
 
 
 def make_comparison(noise, white, held_out=EVERYWHERE, input_noise=None):
@@ -70,6 +70,26 @@ def test_a_removed_error_is_evidence_behind_either_filter(slow_noise):
         assert found > 20.0
         assert found == pytest.approx(comparison.bound_evidence(before), rel=0.2)
         assert comparison.compute_evidence(after, before) < 0.0
+
+
+@pytest.mark.parametrize(("size", "certain"), [(0.3, True), (0.1, False)])
+def test_an_effect_is_certain_only_if_it_is_a_gap(slow_noise, size, certain):
+    """At its frequency the noise is so small that both sizes are far above it."""
+    comparison = make_comparison(slow_noise, np.sqrt(0.1))
+    law = make_candidate(slow_noise + size * np.sqrt(2.0) * np.sin(2.0 * np.pi * 150.0 * TIME))
+    found = make_candidate(slow_noise, frozenset({"coil_lag"}))
+    assert comparison.compute_noise_evidence(law, found) > 100.0
+    assert comparison.exceeds_noise(law, found) is certain
+
+
+@pytest.mark.parametrize(("evidence", "certain"), [(20.0, True), (7.0, False)])
+def test_noise_can_imitate_an_effect_with_less_evidence_than_the_prior_odds_and_a_hundred(
+    slow_noise, monkeypatch, evidence, certain
+):
+    """The prior odds of one effect are exp(4.2)."""
+    monkeypatch.setattr(ErrorComparison, "compute_noise_evidence", lambda self, before, after: evidence)
+    law, found = make_candidate(2.0 * slow_noise), make_candidate(slow_noise, frozenset({"coil_lag"}))
+    assert make_comparison(slow_noise, np.sqrt(0.1)).exceeds_noise(law, found) is certain
 
 
 def test_held_out_evidence_ignores_the_other_samples(slow_noise):

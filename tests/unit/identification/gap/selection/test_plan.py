@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from identification.damper.effects import EFFECTS
 from identification.fitting import EffectModel
 from identification.gap.fits import fit_jointly
 from identification.gap.noise import NoiseModel
@@ -20,6 +21,7 @@ from identification.gap.selection.plan import (
 )
 from identification.gap.selection.posterior import compute_complexity_penalty
 from identification.gap.selection.search_settings import QUICK_FIT, SearchSettings
+from identification.simulate import ActiveEffect
 from tests.support.candidate_pools import NOISE, make_pool, make_pool_of, record
 
 BOTH = frozenset({"gas_spring", "moving_mass"})
@@ -72,6 +74,32 @@ def test_a_recording_below_the_gap_ratio_is_not_searched():
     assert len(pool.fitted) == 1
     assert pool.noise_model.updates == [frozenset()]
     assert compute_final_posterior(pool).rank_sets()[0][0] == frozenset()
+
+
+def make_uncertain_pool(*effects):
+    """A pool whose floor has an interval that contains the error of the law."""
+    pool = make_pool(*effects)
+    size = 1.2 * NOISE
+    pool.noise_model.estimate = replace(pool.noise_model.estimate, noise=size, deviation=0.3 * size, scales=())
+    assert _is_gap_negligible(pool, pool.fit_law())
+    return pool
+
+
+def test_an_effect_that_noise_cannot_imitate_is_found_inside_the_interval_of_the_floor():
+    pool = make_uncertain_pool(ActiveEffect(EFFECTS["moving_mass"], (1.5,)))
+    search_forward(pool)
+    found = pool.block_evidence[frozenset({"moving_mass"})]
+    assert found.parent == frozenset()
+    assert found.log_odds > 100.0
+    assert compute_final_posterior(pool).rank_sets()[0][0] == frozenset({"moving_mass"})
+
+
+def test_without_such_an_effect_only_the_law_remains():
+    pool = make_uncertain_pool()
+    search_forward(pool)
+    assert len(pool.fitted) > 2
+    assert set(pool.candidates) == {frozenset()}
+    assert not pool.block_evidence
 
 
 def test_bursts_that_the_cycles_count_as_noise_are_searched_for():

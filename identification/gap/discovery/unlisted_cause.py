@@ -14,7 +14,7 @@ from identification.damper.effects import STAGES, Action, Effect, Place, Stage, 
 from identification.gap.data import compute_residual_correlation_length
 from identification.gap.discovery.curve_effects import CurvePlace
 from identification.gap.discovery.curve_fit import FittedCurve, fit_best_curves, screen_curves
-from identification.gap.fits import Candidate
+from identification.gap.fits import EXPLAINED_RATIO, Candidate
 from identification.gap.selection import (
     BlockEvidence,
     CandidatePool,
@@ -85,24 +85,45 @@ def list_causes(library: Mapping[str, Effect]) -> set[_Cause]:
 def compare_with_curves(pool: CandidatePool, posterior: Posterior) -> Posterior:
     """Return the posterior with the best curve as one of the alternatives.
 
-    Curves are only fitted where the most probable set leaves more than the noise floor; else nothing changes. A
-    curve outside the library stands for an unknown cause. One at the place of an effect stands for that effect in
-    another form, if it alone reaches the floor: several effects that leave more only repair the form of that one.
-    Block evidence can raise the odds of a set far above those that its excess gives, so the curve has it too.
+    Curves are only fitted where the most probable set leaves more than the noise floor, or reaches it by chance
+    or within a wide interval alone; else nothing changes. A curve outside the library stands for an unknown
+    cause. One at the place of an effect stands for that effect in another form, if it alone reaches the floor:
+    several effects that leave more only repair the form of that one. Block evidence can raise the odds of a set
+    far above those that its excess gives, so the curve has it too.
     """
     names = posterior.most_probable_set
-    if not names or pool.reaches_floor(pool.candidates[names]):
+    named = pool.candidates[names]
+    is_low = max(named.train_rmse, named.held_out_rmse) < EXPLAINED_RATIO * pool.floor
+    if not names or (is_low and not pool.has_uncertain_floor):
         return posterior
     best = find_best_curve(pool)
     cause = _name_cause(pool, best) if best else None
     if best is None or cause is None:
         return posterior
-    evidence = BlockEvidence(
-        names, pool.comparison.compute_held_out_evidence(pool.candidates[names], best.candidate)
-    )
-    pool.curve = CurveAlternative(cause, best.candidate, evidence)
+    compare = _compare_in_noise if pool.reaches_floor(named) else _compare_on_held_out_samples
+    evidence = compare(pool, named, best)
+    if evidence is None:
+        return posterior
+    pool.curve = CurveAlternative(cause, best.candidate, BlockEvidence(names, evidence))
     pool.fit_most_probable_set(CandidatePool.compute_posterior)
     return pool.compute_posterior()
+
+
+def _compare_on_held_out_samples(pool: CandidatePool, named: Candidate, best: FittedCurve) -> float | None:
+    """Return the block evidence on held-out samples for a curve over a set of effects."""
+    return pool.comparison.compute_held_out_evidence(named, best.candidate)
+
+
+def _compare_in_noise(pool: CandidatePool, named: Candidate, best: FittedCurve) -> float | None:
+    """Return the evidence for a curve outside the library over effects that may reach the floor; None if small.
+
+    Each coefficient of the curve also fits noise, so it has to bring one to the log likelihood (Akaike 1974).
+    """
+    freedom = len(best.curve.model.quantities)
+    is_listed = not is_unlisted(best.curve.at, pool.library)
+    if is_listed or not pool.comparison.exceeds_noise(named, best.candidate, freedom):
+        return None
+    return pool.comparison.compute_noise_evidence(named, best.candidate) - freedom
 
 
 def find_best_curve(pool: CandidatePool) -> FittedCurve | None:

@@ -71,7 +71,16 @@ def _decide_set(
     """Return the verdict with one set of a posterior."""
     baseline, named = pool.baseline, pool.candidates[names]
     is_certain = _is_at_floor(baseline, pool.floor, pool.no_gap_limits) and _exceeds_noise(pool, posterior, named)
-    verdict = decide_verdict(baseline, named, pool.floor, pool.no_gap_limits, posterior, is_certain=is_certain)
+    is_unlisted = pool.curve is not None and pool.curve.names not in pool.candidates
+    verdict = decide_verdict(
+        baseline,
+        named,
+        pool.floor,
+        pool.no_gap_limits,
+        posterior,
+        is_certain=is_certain,
+        has_unlisted_curve=is_unlisted,
+    )
     shrinkage = estimate_expected_shrinkage(pool, evaluation, named)
     benefit = shrinkage.expected_benefit
     if verdict == "partly_explained" and not closes_part(shrinkage):
@@ -113,6 +122,7 @@ def decide_verdict(
     posterior: Posterior,
     *,
     is_certain: bool = False,
+    has_unlisted_curve: bool = False,
 ) -> Verdict:
     """Decide the verdict; the worse of fitted and held-out samples counts, and the held-out ones for a part.
 
@@ -127,6 +137,7 @@ def decide_verdict(
             ``no_gap``.
         posterior: probabilities of the sets.
         is_certain: whether noise of the residual's spectrum cannot be what the set explains.
+        has_unlisted_curve: whether a curve outside the library is an alternative to the set.
     """
     at_floor = _is_at_floor(baseline, floor, no_gap_limits) and not is_certain
     if at_floor or (not named.names and posterior.unknown < UNKNOWN_THRESHOLD):
@@ -137,7 +148,8 @@ def decide_verdict(
     unseen = _compute_closed_part(baseline, named, floor)
     if not named.names or max(closed, unseen) < _MIN_NAMED_SHARE:
         return "unexplained"
-    if named.reaches_floor(floor) or (closed > _EXPLAINED_SHARE and not unknown):
+    reaches_floor = named.reaches_floor(floor) and not (has_unlisted_curve and unknown)
+    if reaches_floor or (closed > _EXPLAINED_SHARE and not unknown):
         return "explained"
     return "partly_explained"
 

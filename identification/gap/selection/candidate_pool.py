@@ -17,6 +17,7 @@ from identification.damper.effects import EFFECTS, Effect
 from identification.fitting import EffectModel, Piece, fit_output_error
 from identification.gap.data import EvaluationData, split_by_piece
 from identification.gap.fits import (
+    EXPLAINED_RATIO,
     Candidate,
     FitOptions,
     JointFit,
@@ -101,6 +102,12 @@ class CandidatePool:
         """RMSE of the baseline on fitted and on held-out samples [N] up to which the verdict is ``no_gap``."""
         fitted, held_out = self.evaluation.fitted_samples, self.evaluation.held_out_samples
         return self._find_no_gap_limit(fitted), self._find_no_gap_limit(held_out)
+
+    @property
+    def has_uncertain_floor(self) -> bool:
+        """True where the interval of the floor contains errors that would count as explained above a known one."""
+        largest = max(EXPLAINED_RATIO, self.settings.no_gap_ratio)
+        return max(self.no_gap_limits) > largest * self.floor
 
     def _find_no_gap_limit(self, samples: BoolArray) -> float:
         highest = self.noise_model.compute_highest_rmse(max(int(np.count_nonzero(samples)), 1))

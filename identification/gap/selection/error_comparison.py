@@ -68,18 +68,23 @@ class ErrorComparison:
         """
         return compute_noise_evidence(after.residual, before.residual.values - after.residual.values)
 
-    def exceeds_noise(self, before: Candidate, after: Candidate) -> bool:
+    def exceeds_noise(self, before: Candidate, after: Candidate, freedom: int = 0) -> bool:
         """Return True if noise of the second residual's spectrum cannot be what its further effects explain.
 
         Slow noise makes the interval of the floor wide, because few of its periods were recorded. At the
         frequencies of an effect the noise can be known far better. An effect below the smallest gap does not
         count, however certain it is.
+
+        Args:
+            before: a set of effects.
+            after: the same with further effects, or another cause.
+            freedom: evidence that fitted coefficients bring in noise alone (natural logarithm).
         """
         squares = (float(np.mean(c.residual.values[c.residual.valid] ** 2)) for c in (before, after))
         if next(squares) < NO_GAP_RATIO**2 * next(squares):
             return False
         prior_odds = compute_log_prior(before.names) - compute_log_prior(after.names)
-        return self.compute_noise_evidence(before, after) > prior_odds + math.log(_CERTAIN_ODDS)
+        return self.compute_noise_evidence(before, after) > prior_odds + math.log(_CERTAIN_ODDS) + freedom
 
     def bound_evidence(self, candidate: Candidate) -> float:
         """Compute the block evidence for a candidate at the noise floor over a known one."""

@@ -9,7 +9,7 @@ samples.
 import numpy as np
 
 from identification.fitting import EffectModel
-from identification.gap.fits import EXPLAINED_RATIO, Candidate, replace_effect_unknowns
+from identification.gap.fits import Candidate, replace_effect_unknowns
 from identification.gap.noise import (
     describe_drift_explanation,
     discard_unsteady_cycles,
@@ -139,7 +139,7 @@ def _fit_certain_effects(pool: CandidatePool) -> bool:
 
     The evidence in noise of the residual's spectrum then counts for them: excesses cannot tell them from none.
     """
-    if max(pool.no_gap_limits) <= max(EXPLAINED_RATIO, pool.settings.no_gap_ratio) * pool.floor:
+    if not pool.has_uncertain_floor:
         return False
     law, best = frozenset[str](), dict[str, ScreeningResult]()
     for gain in pool.screen(pool.baseline, law):

@@ -95,6 +95,34 @@ def test_a_set_at_the_floor_is_not_compared():
     assert pool.curve is None
 
 
+@pytest.mark.parametrize(("cause", "names"), [(GAIN, {"curve"}), (WAVE, None)])
+def test_a_curve_outside_the_library_is_compared_in_noise_where_the_floor_may_be_reached(
+    monkeypatch, cause, names
+):
+    pool = pool_with(cause).copy()
+    posterior = Posterior({pool.extend("gas_spring"): 0.9}, 0.1)
+    monkeypatch.setattr(pool, "reaches_floor", lambda candidate: True)
+    found = compare_with_curves(pool, posterior)
+    if names is None:
+        assert found is posterior
+        assert pool.curve is None
+    else:
+        assert pool.curve.names == names
+        evidence = pool.comparison.compute_noise_evidence(
+            pool.candidates[frozenset({"gas_spring"})], pool.curve.candidate
+        )
+        assert 0.0 < evidence - pool.curve.evidence.log_odds < 100.0
+        assert found.unknown > 0.9
+
+
+def test_a_curve_that_only_fits_noise_is_no_alternative(monkeypatch):
+    pool = pool_with(active("end_stop")).copy()
+    posterior = Posterior({pool.extend("end_stop"): 0.9}, 0.1)
+    monkeypatch.setattr(type(pool), "has_uncertain_floor", True)
+    assert compare_with_curves(pool, posterior) is posterior
+    assert pool.curve is None
+
+
 def test_without_named_effects_nothing_is_compared():
     pool, posterior = pool_with(GAIN), Posterior({frozenset(): 0.4}, 0.6)
     assert compare_with_curves(pool, posterior) is posterior

@@ -55,6 +55,7 @@ def make_builder(
     pool = SimpleNamespace(
         baseline=candidates[NONE],
         candidates=candidates,
+        curve=None,
         library=EFFECTS,
         floor=FLOOR,
         no_gap_limits=(1.008 * FLOOR,) * 2,

@@ -138,6 +138,7 @@ def test_certain_effects_are_named_inside_the_interval_of_the_floor(empty, excee
     pool = SimpleNamespace(
         baseline=baseline,
         candidates={candidate.names: candidate},
+        curve=None,
         floor=FLOOR,
         no_gap_limits=(1.07 * FLOOR,) * 2,
         comparison=SimpleNamespace(exceeds_noise=lambda before, after: exceeds_noise),
@@ -151,6 +152,18 @@ def test_certain_effects_are_named_inside_the_interval_of_the_floor(empty, excee
     chosen = choose_named_set(pool, evaluation, posterior, None)
     assert chosen.verdict == verdict
     assert chosen.candidate is (candidate if verdict == "explained" else baseline)
+
+
+@pytest.mark.parametrize(
+    ("has_curve", "unknown", "verdict"),
+    [(True, 0.9, "partly_explained"), (True, 0.05, "explained"), (False, 0.9, "explained")],
+)
+def test_a_more_probable_curve_leaves_a_set_at_the_floor_as_a_part(has_curve, unknown, verdict):
+    baseline, candidate = make_candidate((), 2.0, 2.0), make_candidate(("viscous_heating",), 1.0, 1.0)
+    posterior = Posterior({candidate.names: 1.0 - unknown}, unknown)
+    limits = (1.01 * FLOOR,) * 2
+    found = decide_verdict(baseline, candidate, FLOOR, limits, posterior, has_unlisted_curve=has_curve)
+    assert found == verdict
 
 
 def test_certain_effects_that_close_too_little_are_not_named_inside_the_interval_of_the_floor():

@@ -35,6 +35,7 @@ from identification.gap.selection.screening import (
     compute_expected_gain,
     list_effect_models,
     select_shortlist,
+    select_unpredicted,
 )
 
 _CONTACT_ACTIONS = ("connection", "displacement_backlash")
@@ -197,7 +198,11 @@ def _fit_extensions(pool: CandidatePool, parent: Candidate, count: int) -> None:
         count = settings.large_shortlist
     if excess < settings.small_excess and compute_expected_gain(gains[0]) < settings.small_excess_gain:
         return
-    for gain in select_shortlist(gains, count):
+    shortlist = select_shortlist(gains, count)
+    if not shortlist and not parent.names:
+        # A certain error of the law has a cause, even where no linear step finds it.
+        shortlist = select_unpredicted(gains, count)
+    for gain in shortlist:
         if pool.budget_spent:
             return
         fit_extension(pool, parent, gain)

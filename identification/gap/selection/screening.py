@@ -105,6 +105,18 @@ def select_shortlist(gains: Sequence[ScreeningResult], count: int) -> list[Scree
     ]
 
 
+def select_unpredicted(gains: Sequence[ScreeningResult], count: int) -> list[ScreeningResult]:
+    """Return effects for which the linear step predicts a loss in every form, each in its best form.
+
+    Such an effect has no zero size. It is linearised at a size that the recording does not have, which says
+    nothing about its gain.
+    """
+    best: dict[str, ScreeningResult] = {}
+    for gain in gains:
+        best.setdefault(gain.effect_model.name, gain)
+    return [gain for gain in best.values() if compute_expected_gain(gain) < 0.0][:count]
+
+
 def compute_expected_gain(gain: ScreeningResult) -> float:
     """Return the larger of predicted and achieved gain [1]."""
     return max(gain.predicted_gain, gain.achieved_gain)

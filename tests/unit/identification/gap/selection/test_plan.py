@@ -76,6 +76,32 @@ def test_a_recording_below_the_gap_ratio_is_not_searched():
     assert compute_final_posterior(pool).rank_sets()[0][0] == frozenset()
 
 
+def state_gains(pool, monkeypatch, stated):
+    """Let the screening of a pool state some gains by effect, and a negligible one for all others."""
+    screen = pool.screen
+
+    def state(parent, without):
+        found = [(g, stated.get(g.effect_model.name, 0.001)) for g in screen(parent, without)]
+        gains = [replace(g, predicted_gain=value, achieved_gain=value) for g, value in found]
+        return sorted(gains, key=lambda g: -g.predicted_gain)
+
+    monkeypatch.setattr(pool, "screen", state)
+    return pool
+
+
+@pytest.mark.parametrize(("gain", "found"), [(-0.1, True), (0.001, False)])
+def test_an_effect_whose_linear_step_fails_is_fitted_where_no_other_promises_a_gain(monkeypatch, gain, found):
+    pool = state_gains(make_pool("gas_spring"), monkeypatch, {"gas_spring": gain})
+    search_forward(pool)
+    assert (frozenset({"gas_spring"}) in pool.candidates) is found
+
+
+def test_an_effect_whose_linear_step_fails_is_not_fitted_beside_one_that_promises_a_gain(monkeypatch):
+    pool = state_gains(make_pool("gas_spring"), monkeypatch, {"gas_spring": 0.9, "field_saturation": -0.1})
+    search_forward(pool)
+    assert frozenset({"field_saturation"}) not in pool.candidates
+
+
 def make_uncertain_pool(*effects):
     """A pool whose floor has an interval that contains the error of the law."""
     pool = make_pool(*effects)

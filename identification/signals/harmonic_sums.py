@@ -22,7 +22,7 @@ class NormalEquations(NamedTuple):
 
 
 @njit_cached
-def sum_harmonics(values: Array, weights: Array, count: int, step: float) -> tuple[Array, Array]:
+def _sum_harmonics(values: Array, weights: Array, count: int, step: float) -> tuple[Array, Array]:
     """Return sums over the samples: of each order, and of the slope.
 
     Args:
@@ -71,7 +71,7 @@ def make_normal_equations(values: Array, weights: Array, count: int, step: float
         count: number of orders.
         step: frequency of the first order [cycles a sample].
     """
-    sums, (slope_square, slope_moment) = sum_harmonics(values, weights, count, step)
+    sums, (slope_square, slope_moment) = _sum_harmonics(values, weights, count, step)
     cosines, sines = sums[0], sums[1]
     orders = np.arange(1, count + 1)
     total, difference = orders[:, None] + orders, orders[:, None] - orders

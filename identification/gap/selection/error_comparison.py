@@ -80,8 +80,8 @@ class ErrorComparison:
             after: the same with further effects, or another cause.
             freedom: evidence that fitted coefficients bring in noise alone (natural logarithm).
         """
-        squares = (float(np.mean(c.residual.values[c.residual.valid] ** 2)) for c in (before, after))
-        if next(squares) < NO_GAP_RATIO**2 * next(squares):
+        first, second = (float(np.mean(c.residual.values[c.residual.valid] ** 2)) for c in (before, after))
+        if first < NO_GAP_RATIO**2 * second:
             return False
         prior_odds = compute_log_prior(before.names) - compute_log_prior(after.names)
         return self.compute_noise_evidence(before, after) > prior_odds + math.log(_CERTAIN_ODDS) + freedom

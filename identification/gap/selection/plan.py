@@ -31,9 +31,9 @@ from identification.gap.selection.posterior import (
 )
 from identification.gap.selection.screening import (
     MOUNTING_EFFECTS,
-    ScreeningResult,
     compute_expected_gain,
     list_effect_models,
+    select_best_forms,
     select_shortlist,
     select_unpredicted,
 )
@@ -142,10 +142,8 @@ def _fit_certain_effects(pool: CandidatePool) -> bool:
     """
     if not pool.has_uncertain_floor:
         return False
-    law, best = frozenset[str](), dict[str, ScreeningResult]()
-    for gain in pool.screen(pool.baseline, law):
-        best.setdefault(gain.effect_model.name, gain)
-    for gain in list(best.values())[: pool.settings.shortlist_sizes[0]]:
+    law = frozenset[str]()
+    for gain in select_best_forms(pool.screen(pool.baseline, law))[: pool.settings.shortlist_sizes[0]]:
         candidate = fit_extension(pool, pool.baseline, gain)
         if not pool.comparison.exceeds_noise(pool.baseline, candidate):
             continue

@@ -111,10 +111,15 @@ def select_unpredicted(gains: Sequence[ScreeningResult], count: int) -> list[Scr
     Such an effect has no zero size. It is linearised at a size that the recording does not have, which says
     nothing about its gain.
     """
+    return [gain for gain in select_best_forms(gains) if compute_expected_gain(gain) < 0.0][:count]
+
+
+def select_best_forms(gains: Sequence[ScreeningResult]) -> list[ScreeningResult]:
+    """Return each effect in its best form, in the order of the gains."""
     best: dict[str, ScreeningResult] = {}
     for gain in gains:
         best.setdefault(gain.effect_model.name, gain)
-    return [gain for gain in best.values() if compute_expected_gain(gain) < 0.0][:count]
+    return list(best.values())
 
 
 def compute_expected_gain(gain: ScreeningResult) -> float:

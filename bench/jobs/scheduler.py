@@ -12,8 +12,12 @@ from distributed import Scheduler
 from bench.jobs.errors import WorkerError
 from bench.jobs.tls import LOOPBACK, SchedulerLocation, create_security
 
-MAX_ATTEMPTS = 3
-"""Number of times that a job is started before it counts as failed."""
+MAX_ATTEMPTS = 5
+"""Number of times that a job is started before it counts as failed.
+
+A job whose memory is too large kills its worker each time. But starts also end by a power cut or a killed service,
+which are not the job's fault and cannot be told apart afterwards. So the number is larger than a crash needs.
+"""
 
 
 @contextlib.asynccontextmanager

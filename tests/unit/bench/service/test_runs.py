@@ -10,6 +10,7 @@ from bench.catalogue import CatalogueUnavailableError, JobRow, RunRow
 from bench.catalogue.catalogue import Catalogue
 from bench.catalogue.scan import catalogue_log
 from bench.jobs.job_spec import FIT_FILE, REPORT_FILE
+from bench.jobs.scheduler import MAX_ATTEMPTS
 from bench.service.routes import runs
 from tests.support.certificates import issue_certificate, make_certificate, shift
 from tests.support.service_logs import STARTED, write_complete_log, write_empty_log, write_truncated_log
@@ -177,17 +178,17 @@ def test_a_cancelled_job_stays_cancelled(service):
     assert service.get(f"/jobs/{job['id']}")["state"] == "cancelled"
 
 
-def test_a_job_that_never_ends_fails_after_three_attempts(service):
+def test_a_job_that_never_ends_fails_after_its_last_attempt(service):
     run = start(service)
     finish(service, run)
     job = get_last_job(service, run["id"])
-    for _ in range(3):
+    for _ in range(MAX_ATTEMPTS):
         service.report("on_started", job["id"])
-    assert service.get(f"/jobs/{job['id']}")["attempts"] == 3
+    assert service.get(f"/jobs/{job['id']}")["attempts"] == MAX_ATTEMPTS
     service.report("on_started", job["id"])
     found = service.get(f"/jobs/{job['id']}")
-    assert (found["state"], found["attempts"]) == ("failed", 3)
-    assert "3 times" in found["error"]
+    assert (found["state"], found["attempts"]) == ("failed", MAX_ATTEMPTS)
+    assert f"{MAX_ATTEMPTS} times" in found["error"]
     assert service.engine.cancelled == [(job["id"], True)]
 
 

@@ -21,6 +21,7 @@ from bench.agent.state_machine import StateMachine
 from bench.agent.status import (
     collect_warnings,
     describe_bench,
+    find_travel,
     make_instrument_statuses,
     make_limit_statuses,
 )
@@ -31,6 +32,7 @@ from bench.agent_protocol import (
     AgentState,
     AgentStatus,
     BenchDescription,
+    LeaseCommand,
     PrepareCommand,
     Reply,
     RunCommand,
@@ -180,19 +182,12 @@ class Agent:
                 self._space_monitor.describe(),
             ),
             limits=make_limit_statuses(self._interlocks.limits),
-            travel_m=self._find_travel(),
+            travel_m=find_travel(self._rig.actuator),
             drive_kind=self._rig.drive_kind,
             drive_unit=self._rig.drive_unit,
+            lease=self._states.lease.describe(),
             config_identity=self._config_identity,
         )
-
-    def _find_travel(self) -> tuple[float, float] | None:
-        """Return the positions of both end stops [m]; None while the rod's position is not known."""
-        actuator = self._rig.actuator
-        if actuator.reference_state.value in ("unreferenced", "reference_lost"):
-            return None
-        position = next(one for one in actuator.channels if one.name == "actuator_position")
-        return position.low, position.high
 
     def describe(self) -> BenchDescription:
         """Return the description of the bench in the configuration."""
@@ -204,7 +199,7 @@ class Agent:
 
     def run(self, command: RunCommand) -> Reply:
         """Start a run; reply as soon as it is accepted."""
-        if obstacle := self._states.begin_preparing():
+        if obstacle := self._states.begin_preparing(command.sender):
             return Reply(ok=False, error=obstacle, status=self.get_status())
         # Without a lock, because compiling takes time; the state excludes other commands.
         try:
@@ -218,11 +213,16 @@ class Agent:
 
     def prepare(self, command: PrepareCommand) -> Reply:
         """Start a setup step; reply when it is done, or after a moment while it continues."""
-        if obstacle := self._states.begin_preparing():
+        if obstacle := self._states.begin_preparing(command.sender):
             return Reply(ok=False, error=obstacle, status=self.get_status())
         status = self._setup.start(command.step, command.position_m or 0.0)
         failed = status.outcome == "failed"
         return Reply(ok=not failed, error=status.message if failed else "", status=self.get_status())
+
+    def lease(self, command: LeaseCommand) -> Reply:
+        """Give the sender the lease of the bench, renew it, or end it."""
+        obstacle = self._states.lease.take(command)
+        return Reply(ok=not obstacle, error=obstacle, status=self.get_status())
 
     def stop(self) -> Reply:
         """Stop a run or a setup step softly; harmless if nothing is in progress."""

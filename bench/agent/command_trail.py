@@ -9,6 +9,7 @@ from typing import Final
 from bench.agent_protocol import (
     AuditCommand,
     AuditPage,
+    LeaseCommand,
     PrepareCommand,
     Reply,
     ResetCommand,
@@ -39,6 +40,7 @@ class CommandTrail:
         self._path = path
         self._writer = AuditWriter(path)
         self._chain = ""
+        self._lease: LeaseCommand | None = None
 
     def __enter__(self) -> "CommandTrail":
         """Start to write, and record the start of the agent."""
@@ -61,7 +63,14 @@ class CommandTrail:
         return f"{obstacle}; nothing was started, because it could not be recorded" if obstacle else ""
 
     def record(self, command: SentCommand | bytes, peer: str, reply: Reply, *, wait: bool) -> None:
-        """Record a command with its reply; a disk that stalls delays the reply by `WRITE_TIMEOUT` at most."""
+        """Record a command with its reply; a disk that stalls delays the reply by `WRITE_TIMEOUT` at most.
+
+        The renewal of a lease is left out, because it comes every few seconds and changes nothing.
+        """
+        if isinstance(command, LeaseCommand) and reply.ok:
+            is_renewal, self._lease = command == self._lease, command
+            if is_renewal:
+                return
         is_stalled = bool(self._writer.find_obstacle())
         written = self._writer.record(_make_act(command, peer, reply))
         if wait and not is_stalled:

@@ -15,6 +15,7 @@ from bench.agent_protocol import (
     Command,
     CommandServer,
     DescribeCommand,
+    LeaseCommand,
     PauseCommand,
     PrepareCommand,
     Publisher,
@@ -32,7 +33,9 @@ from bench.errors import RunError
 from bench.processes import set_on_signals
 from drivers import DriverError
 
-_BenchCommand: TypeAlias = RunCommand | StopCommand | PauseCommand | AbortCommand | ResetCommand | PrepareCommand
+_BenchCommand: TypeAlias = (
+    RunCommand | StopCommand | PauseCommand | AbortCommand | ResetCommand | PrepareCommand | LeaseCommand
+)
 """Command that acts on the bench."""
 
 
@@ -107,3 +110,5 @@ def _execute(agent: Agent, command: _BenchCommand) -> Reply:
             return agent.reset()
         case PrepareCommand():
             return agent.prepare(command)
+        case LeaseCommand():
+            return agent.lease(command)

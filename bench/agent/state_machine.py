@@ -1,12 +1,48 @@
-"""State of the agent, and the reasons for which it refuses to start or to reset."""
+"""State and lease of the agent, and the reasons for which it refuses to start or to reset."""
 
 import threading
+import time
+from collections.abc import Callable
 
-from bench.agent_protocol import AgentState
+from bench.agent_protocol import AgentState, LeaseCommand, LeaseStatus, Sender
 from bench.recorder import EventReporter
 from bench.rig import Acquisition, Rig
 from bench.safety import Interlocks
 from drivers import DriverError
+
+
+class Lease:
+    """Time for which the bench belongs to one client; it ends by itself, because a client may be killed."""
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """Measure the time by a clock [s]."""
+        self._clock = clock
+        self._actor, self._description, self._end = "", "", float("-inf")
+
+    def take(self, command: LeaseCommand) -> str:
+        """Begin, renew or end the lease of the sender; return the reason of a refusal, empty without one."""
+        if obstacle := self.find_obstacle(command.sender):
+            return obstacle
+        self._actor = command.sender.actor if command.sender is not None else ""
+        self._description, self._end = command.description, self._clock() + command.duration_s
+        return ""
+
+    def find_obstacle(self, sender: Sender | None) -> str:
+        """Return why a sender may not start anything; empty if it may."""
+        if self._remaining <= 0 or (sender is not None and sender.actor == self._actor):
+            return ""
+        return f"{self._description} holds the bench; nothing was started; pause or stop it, or wait for its end"
+
+    def describe(self) -> LeaseStatus | None:
+        """Return the holder; None while nobody holds the bench."""
+        remaining = self._remaining
+        if remaining <= 0:
+            return None
+        return LeaseStatus(holder=self._actor, description=self._description, until_utc_s=time.time() + remaining)
+
+    @property
+    def _remaining(self) -> float:
+        return self._end - self._clock()
 
 
 class StateMachine:
@@ -25,6 +61,7 @@ class StateMachine:
         self._rig, self._interlocks, self._acquisition = rig, interlocks, acquisition
         self._report_event = report_event
         self._current: AgentState = "idle"
+        self.lease = Lease()
         self.lock = threading.RLock()
         """Lock of the state, with which state and runs are read consistently."""
 
@@ -41,11 +78,11 @@ class StateMachine:
             self._current = state
         self._report_event("state", f"agent {state}")
 
-    def begin_preparing(self) -> str:
-        """Change to ``preparing``; return the reason why nothing can be started, empty if it can."""
+    def begin_preparing(self, sender: Sender | None = None) -> str:
+        """Change to ``preparing`` for a sender; return why nothing can be started, empty if something can."""
         # Check and change in one step: of two commands at the same time, only one may start.
         with self.lock:
-            obstacle = self._find_start_obstacle()
+            obstacle = self._find_start_obstacle() or self.lease.find_obstacle(sender)
             if not obstacle:
                 self.change("preparing")
         return obstacle

@@ -8,6 +8,7 @@ from bench.recorder import make_channel_infos
 from bench.rig import Acquisition, RegisteredInstrument, Rig
 from bench.safety import LimitMatrix
 from drivers import Clock
+from drivers.actuator import Actuator
 
 _LIMIT_UNITS = {
     "force": "N",
@@ -80,6 +81,14 @@ def collect_warnings(
             f"{priority_warning}; the drive stops by itself {setpoint_timeout:g} s after the last setpoint"
         )
     return tuple([*warnings, space_warning] if space_warning else warnings)
+
+
+def find_travel(actuator: Actuator) -> tuple[float, float] | None:
+    """Return the positions of both end stops [m]; None while the rod's position is not known."""
+    if actuator.reference_state.value in ("unreferenced", "reference_lost"):
+        return None
+    position = next(one for one in actuator.channels if one.name == "actuator_position")
+    return position.low, position.high
 
 
 def describe_bench(config: BenchConfig, rig: Rig) -> BenchDescription:

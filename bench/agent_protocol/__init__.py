@@ -2,35 +2,39 @@
 
 from bench.agent_protocol.agent_client import AgentClient
 from bench.agent_protocol.command_server import CommandAudit, CommandServer
+from bench.agent_protocol.commands import (
+    AbortCommand,
+    AuditCommand,
+    Command,
+    DescribeCommand,
+    LeaseCommand,
+    PauseCommand,
+    PrepareCommand,
+    ResetCommand,
+    RunCommand,
+    Sender,
+    SentCommand,
+    ShutDownCommand,
+    StatusCommand,
+    StopCommand,
+)
 from bench.agent_protocol.endpoint import AgentEndpoint, derive_samples_address, find_agent, make_endpoint
 from bench.agent_protocol.messages import (
-    AbortCommand,
     AgentEvent,
     AgentState,
     AgentStatus,
-    AuditCommand,
     AuditPage,
     BenchChannel,
     BenchDescription,
     BenchLimit,
-    Command,
-    DescribeCommand,
     InstrumentStatus,
+    LeaseStatus,
     LimitStatus,
     Message,
-    PauseCommand,
-    PrepareCommand,
     Reply,
-    ResetCommand,
-    RunCommand,
     RunOutcome,
     RunStatus,
-    Sender,
-    SentCommand,
     SetupStatus,
-    ShutDownCommand,
-    StatusCommand,
-    StopCommand,
 )
 from bench.agent_protocol.publications import Publisher
 from bench.agent_protocol.sender import get_sender, send_as
@@ -54,6 +58,8 @@ __all__ = [
     "CommandServer",
     "DescribeCommand",
     "InstrumentStatus",
+    "LeaseCommand",
+    "LeaseStatus",
     "LimitStatus",
     "Message",
     "PauseCommand",

@@ -9,7 +9,8 @@ import zmq
 from pydantic import ValidationError
 
 from bench.agent_protocol.command_server import INVALID_COMMAND
-from bench.agent_protocol.messages import Message, Reply, Sender, SentCommand, TimedCommand
+from bench.agent_protocol.commands import Sender, SentCommand, TimedCommand
+from bench.agent_protocol.messages import Message, Reply
 from bench.agent_protocol.publications import Publication, parse_publication
 from bench.agent_protocol.sender import get_sender
 from bench.agent_protocol.sockets import POLL_PERIOD, connect, open_socket
@@ -35,7 +36,7 @@ class AgentClient:
         """Send one command and wait for its reply.
 
         Args:
-            command: one of `bench.agent_protocol.messages.Command`.
+            command: one of `bench.agent_protocol.commands.Command`.
             timeout: [s]
 
         Raises:

@@ -4,20 +4,20 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Final, Protocol
+from typing import Any, Final, Protocol
 
 import zmq
 from pydantic import TypeAdapter, ValidationError
 
-from bench.agent_protocol.messages import (
+from bench.agent_protocol.commands import (
     AbortCommand,
     Command,
     PauseCommand,
-    Reply,
     SentCommand,
     StopCommand,
     TimedCommand,
 )
+from bench.agent_protocol.messages import Reply
 from bench.agent_protocol.sender import describe_peer
 from bench.agent_protocol.sockets import POLL_PERIOD, BoundSocket
 from bench.validation import describe_validation_error
@@ -80,7 +80,9 @@ class CommandServer(BoundSocket):
 
     def _send(self, reply: Reply) -> None:
         # Clients of an older version refuse a field that they do not know, also that of a stop.
-        unknown = {"audit"} if reply.audit is None else None
+        unknown: dict[str, Any] = {} if reply.audit is not None else {"audit": True}
+        if reply.status is not None and reply.status.lease is None:
+            unknown["status"] = {"lease"}
         self._socket.send(reply.model_dump_json(exclude=unknown).encode())
 
 

@@ -1,15 +1,14 @@
-"""Messages between the rig agent and its clients: commands, replies and publications, as JSON except samples.
+"""Replies and publications of the rig agent, as JSON except samples.
 
 Each command is sent to the agent's request socket and is answered by one `Reply`. The publishing socket sends an
 `AgentStatus` at every change and at least four times a second (topic ``status``), events (``event``), and all
 bench samples in live batches (``samples``, see `bench.live`).
 """
 
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field
 
-from bench.calibration import IssuedCertificate, LatestCheck
 from bench.endings import RunEnding
 from bench.setup_steps import SetupStep
 
@@ -26,149 +25,6 @@ class Message(BaseModel):
     """Base class of all messages: frozen, unknown fields refused."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Sender(Message):
-    """Person or program on whose behalf a command is sent, for the audit trail of the agent."""
-
-    actor: str = Field(max_length=300, description="`user:NAME`, `local:ACCOUNT`, `campaign:ID`, `service`, ...")
-    origin: str = Field(default="local", max_length=300, description="address of the client, or `local`")
-    request: str = Field(default="", max_length=100, description="id of the request to the service; empty without")
-
-
-class SentCommand(Message):
-    """Command that is recorded in the audit trail."""
-
-    sender: Sender | None = Field(default=None, description="null from a client of an older version")
-
-
-class TimedCommand(SentCommand):
-    """Command that begins something, clears a trip or ends the agent: refused when its sender no longer waits.
-
-    A command may lie in the queue of an agent that is suspended or starts. Executed later, it would move the rod
-    although its sender was told that no agent replied. A stop, an abort and a pause act whenever they arrive.
-    """
-
-    valid_until_utc_s: float | None = Field(
-        default=None, description="UTC until which it may be executed [s since 1970]; null for any time"
-    )
-
-
-class StatusCommand(Message):
-    """Request of the `AgentStatus`."""
-
-    command: Literal["status"] = "status"
-
-
-class DescribeCommand(Message):
-    """Request of the `BenchDescription`, which stays the same while the agent runs."""
-
-    command: Literal["describe"] = "describe"
-
-
-class RunCommand(TimedCommand):
-    """Start of a run; refused unless the agent is idle. The reply comes as soon as the run is accepted."""
-
-    command: Literal["run"] = "run"
-    method: dict[str, Any] = Field(description="a document `mrbench.method/1`")
-    specimen: str = Field(default="", description="the damper under test")
-    operator: str = Field(default="", description="name of the operator")
-    resume_after: str = Field(
-        default="", description="checkpoint of the method (segment) after which an interrupted run continues"
-    )
-    continues: str = Field(default="", description="id of the run that this one continues; empty without one")
-    certificates: tuple[IssuedCertificate, ...] = Field(
-        default=(), description="calibration certificates that apply to the channels; empty if none are known"
-    )
-    checks: tuple[LatestCheck, ...] = Field(
-        default=(), description="latest check of each channel; empty if none are known"
-    )
-    log: str | None = Field(
-        default=None, description="file of the log; by default named by the run's id, in the agent's folder"
-    )
-
-
-class StopCommand(SentCommand):
-    """Controlled stop of the run: the motion fades out, the coil goes to zero. Harmless without a run."""
-
-    command: Literal["stop"] = "stop"
-
-
-class PauseCommand(SentCommand):
-    """End of the run at its next checkpoint, at rest. Without a later checkpoint the run is played to its end."""
-
-    command: Literal["pause"] = "pause"
-
-
-class AbortCommand(SentCommand):
-    """Trip by a person: coil and actuator are stopped at once, each in its fastest way.
-
-    It latches until a reset, also while nothing moves. Needs no lease.
-    """
-
-    command: Literal["abort"] = "abort"
-
-
-class ResetCommand(TimedCommand):
-    """Reset of a trip whose cause is removed; nothing moves."""
-
-    command: Literal["reset"] = "reset"
-
-
-class PrepareCommand(TimedCommand):
-    """Start of a setup step; refused unless the agent is idle.
-
-    The reply comes when the step is done, or soon while it continues. ``home`` and ``move`` move the rod, and a
-    stop ends both; ``home`` is refused with a specimen clamped.
-    """
-
-    command: Literal["prepare"] = "prepare"
-    step: SetupStep = Field(
-        description="home: seek the reference; move: go to `position_m`; mount, unmount: a specimen has been "
-        "clamped, unclamped; centre: the rod is at the specimen's middle; tare, clear-tare: take the present "
-        "force as zero, or no longer"
-    )
-    position_m: float | None = Field(
-        default=None,
-        description="target of `move` [m], from the specimen's middle, or from home before one is centred",
-    )
-
-    @model_validator(mode="after")
-    def _check_move_position(self) -> Self:
-        if self.step == "move" and self.position_m is None:
-            raise ValueError("move needs position_m; nothing was done")
-        return self
-
-
-class ShutDownCommand(TimedCommand):
-    """End of the agent, with everything at rest."""
-
-    command: Literal["shut_down"] = "shut_down"
-
-
-class AuditCommand(Message):
-    """Request of entries of the agent's own audit trail."""
-
-    command: Literal["audit"] = "audit"
-    chain: str = Field(
-        default="", description="id of the chain that the client knows; with another one, no entries"
-    )
-    after: int = Field(default=0, ge=0, description="number of the last entry that the client has")
-
-
-Command: TypeAlias = Annotated[
-    StatusCommand
-    | AuditCommand
-    | DescribeCommand
-    | RunCommand
-    | StopCommand
-    | PauseCommand
-    | AbortCommand
-    | ResetCommand
-    | PrepareCommand
-    | ShutDownCommand,
-    Field(discriminator="command"),
-]
 
 
 class RunStatus(Message):
@@ -240,6 +96,14 @@ class LimitStatus(Message):
     value: float = Field(description="in the SI unit of the quantity; temperature in degC")
 
 
+class LeaseStatus(Message):
+    """Client that holds the bench: nobody else starts a run or a setup step."""
+
+    holder: str = Field(description="actor of its commands, such as `campaign:ID`")
+    description: str = Field(description="the same for a person")
+    until_utc_s: float = Field(description="UTC at which the lease ends unless it is renewed [s since 1970]")
+
+
 class AgentStatus(Message):
     """State of the agent."""
 
@@ -263,6 +127,7 @@ class AgentStatus(Message):
     )
     drive_kind: str = Field(default="", description="coil_v or coil_a")
     drive_unit: str = Field(default="", description="V or A")
+    lease: LeaseStatus | None = Field(default=None, description="null while nobody holds the bench")
     config_identity: str = Field(default="", description="differs for another content of bench.toml")
     notice: str = Field(
         default="", description="what a person has to do so that the agent has the present bench.toml; else empty"

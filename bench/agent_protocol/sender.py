@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from bench.agent_protocol.messages import Sender
+from bench.agent_protocol.commands import Sender
 
 _PEER = re.compile(r"[^:]*:(\d+):\d+:(\d+)")
 """Peer of a Unix socket, as ZeroMQ names it: host, user, group, process."""

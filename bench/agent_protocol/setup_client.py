@@ -4,8 +4,9 @@ import time
 from pathlib import Path
 
 from bench.agent_protocol.agent_client import AgentClient
+from bench.agent_protocol.commands import PrepareCommand, StatusCommand, StopCommand
 from bench.agent_protocol.endpoint import find_agent
-from bench.agent_protocol.messages import AgentStatus, PrepareCommand, StatusCommand, StopCommand
+from bench.agent_protocol.messages import AgentStatus
 from bench.errors import RunError
 from bench.setup_steps import SetupStep
 

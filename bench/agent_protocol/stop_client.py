@@ -4,16 +4,9 @@ import time
 from pathlib import Path
 
 from bench.agent_protocol.agent_client import AgentClient
+from bench.agent_protocol.commands import AbortCommand, ShutDownCommand, StatusCommand, StopCommand
 from bench.agent_protocol.endpoint import find_agent
-from bench.agent_protocol.messages import (
-    AbortCommand,
-    AgentStatus,
-    Message,
-    RunStatus,
-    ShutDownCommand,
-    StatusCommand,
-    StopCommand,
-)
+from bench.agent_protocol.messages import AgentStatus, Message, RunStatus
 from bench.errors import AgentUnreachableError, RunError
 
 _POLL_PERIOD = 0.2

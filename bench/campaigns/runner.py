@@ -49,6 +49,7 @@ class CampaignRunner:
         """Observe, make one transition, act on it, and let time pass."""
         seen = self._bench.observe(campaign)
         campaign = self._advance(lambda state, now: advance(state, seen, now, self._id))
+        self._bench.keep_lease(campaign)
         active = campaign.state.active
         if active is not None and active.phase == "starting":
             campaign = self._start(campaign)

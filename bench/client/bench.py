@@ -13,7 +13,7 @@ from bench.client.errors import ClientError
 from bench.client.live import LiveSamples, iterate_live
 from bench.client.multipart import Field
 from bench.client.run import Run, RunState, parse_run_state
-from bench.client.session import Session, quote_name
+from bench.client.session import STOP_TIMEOUT, Session, quote_name
 
 _PAGE_SIZE = 50
 """Number of runs requested at a time."""
@@ -329,7 +329,7 @@ class Bench:
         Raises:
             ClientError: the service or its agent cannot be reached.
         """
-        self._session.post(f"{self._path}/stop")
+        self._session.post(f"{self._path}/stop", timeout=STOP_TIMEOUT)
 
     def _add_choice(self, path: str) -> str:
         """Return a path with the name of the bench in its query, if there is one."""

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from bench.client.arrays import Arrays, make_arrays
 from bench.client.errors import ClientError
-from bench.client.session import Session, quote_name
+from bench.client.session import STOP_TIMEOUT, Session, quote_name
 from bench.client.signed_reports import SignedReports
 from bench.validation import describe_validation_error
 
@@ -173,7 +173,7 @@ class Run(SignedReports):
         Raises:
             ClientError: another run is in progress, or the service or its agent cannot be reached.
         """
-        self._session.post(f"{self._path}/stop")
+        self._session.post(f"{self._path}/stop", timeout=STOP_TIMEOUT)
 
     def _wait(self, is_reached: Callable[[RunState], bool], timeout: float, goal: str) -> RunState:
         deadline = time.monotonic() + timeout

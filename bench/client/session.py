@@ -19,10 +19,14 @@ from bench.client.errors import ClientError
 from bench.client.multipart import Field, MultipartBody
 from bench.log import write_atomically
 
-_TIMEOUT = 30.0
-"""Longest time [s] for one reply."""
+_TIMEOUT = 120.0
+"""Longest time [s] for one reply; a comparison, a dry run or a report is made before."""
+STOP_TIMEOUT = 10.0
+"""Longest time [s] for the reply to a stop, after which a person uses the emergency stop."""
 _UPLOAD_TIMEOUT = 600.0
 """Longest time [s] for the reply to an upload, which is imported before."""
+_DOWNLOAD_TIMEOUT = 600.0
+"""Longest time [s] until a file begins to arrive; a report or an export is made before."""
 _CHANNELS_HEADER = "X-Mrbench-Channels"
 """Header of binary samples with name and unit of each channel."""
 _TOKEN_FIELD = "token="
@@ -68,7 +72,13 @@ class Session:
             channels: list[dict[str, str]] = _decode(path, reply.headers.get(_CHANNELS_HEADER, "").encode())
             return reply.read(), channels
 
-    def post(self, path: str, content: Mapping[str, Any] | None = None, key: str | None = None) -> Any:
+    def post(
+        self,
+        path: str,
+        content: Mapping[str, Any] | None = None,
+        key: str | None = None,
+        timeout: float = _TIMEOUT,
+    ) -> Any:
         """Return the reply to POST, decoded from JSON.
 
         Args:
@@ -76,11 +86,13 @@ class Session:
             content: body of the request.
             key: idempotency key; a repeated request with the same key has no further effect, and one whose
                 answer was lost is repeated here, once.
+            timeout: longest time for the reply [s].
 
         Raises:
             ClientError: the service refuses or cannot be reached.
         """
-        return self._send("POST", path, b"" if content is None else json.dumps(content).encode(), key)
+        body = b"" if content is None else json.dumps(content).encode()
+        return self._send("POST", path, body, key, timeout=timeout)
 
     def upload(self, path: str, fields: Sequence[Field], key: str) -> Any:
         """Return the reply to POST of fields and files, decoded from JSON.
@@ -119,7 +131,7 @@ class Session:
             ClientError: the service refuses or cannot be reached, or the download breaks off.
             LogError: the file cannot be written.
         """
-        with write_atomically(to) as partial, self._request("GET", path) as reply:
+        with write_atomically(to) as partial, self._request("GET", path, timeout=_DOWNLOAD_TIMEOUT) as reply:
             try:
                 with partial.open("wb") as file:
                     shutil.copyfileobj(reply, file)

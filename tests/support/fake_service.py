@@ -3,7 +3,8 @@
 import queue
 import time
 
-from bench.agent_protocol.messages import (
+from bench.agent.state_machine import Lease
+from bench.agent_protocol import (
     AbortCommand,
     AgentStatus,
     AuditCommand,
@@ -12,12 +13,15 @@ from bench.agent_protocol.messages import (
     BenchDescription,
     BenchLimit,
     DescribeCommand,
+    LeaseCommand,
     PauseCommand,
+    PrepareCommand,
     Reply,
     ResetCommand,
     RunCommand,
     RunStatus,
     StopCommand,
+    get_sender,
 )
 from bench.errors import AgentUnreachableError
 from bench.methods import parse_method
@@ -39,6 +43,7 @@ class FakeAgent:
         self.defect = None
         self.audit = AuditPage(chain="", before="", lines=())
         self.trail = None
+        self.lease = Lease()
         self.description = BenchDescription(
             name="bench",
             specimen="mounted damper",
@@ -57,9 +62,22 @@ class FakeAgent:
             )
         if isinstance(command, DescribeCommand | AuditCommand):
             return self._answer(command)
+        if isinstance(command, LeaseCommand):
+            return self._take_lease(command)
         self.commands.append(command)
-        if self.refuses:
-            return Reply(ok=False, error=self.refuses, status=self.status)
+        if refusal := self.refuses or self._find_holder(command):
+            return Reply(ok=False, error=refusal, status=self._stamped_status())
+        self._execute(command)
+        return Reply(ok=True, status=self._stamped_status())
+
+    def _take_lease(self, command):
+        error = self.lease.take(command.model_copy(update={"sender": get_sender()}))
+        return Reply(ok=not error, error=error, status=self._stamped_status())
+
+    def _find_holder(self, command):
+        return self.lease.find_obstacle(get_sender()) if isinstance(command, RunCommand | PrepareCommand) else ""
+
+    def _execute(self, command):
         match command:
             case RunCommand():
                 self._begin(command)
@@ -72,7 +90,6 @@ class FakeAgent:
                 self._set(state="tripped", trip="aborted by a person")
             case ResetCommand():
                 self._set(state="idle", trip="")
-        return Reply(ok=True, status=self._stamped_status())
 
     def _answer(self, question):
         if isinstance(question, DescribeCommand):
@@ -90,7 +107,7 @@ class FakeAgent:
         self.published.put(message or self._stamped_status())
 
     def _stamped_status(self):
-        return self.status.model_copy(update={"utc_s": time.time()})
+        return self.status.model_copy(update={"utc_s": time.time(), "lease": self.lease.describe()})
 
     def progress(self, elapsed_s, segment):
         self._set(run=self.status.run.model_copy(update={"elapsed_s": elapsed_s, "segment": segment}))

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from bench.agent_protocol import ShutDownCommand, StatusCommand
 from bench.agent_protocol.agent_client import AgentClient
 from bench.agent_protocol.endpoint import find_agent
-from bench.agent_protocol.messages import ShutDownCommand, StatusCommand
 from bench.log.reader import read_log
 from bench.rig.priority import raise_priority
 from sim_rig.live.clock import RunningClock

@@ -7,7 +7,7 @@ import numpy as np
 from bench.agent.run_executor import RunExecutor
 from bench.agent.supervisor import SafetySupervisor
 from bench.agent.timing import AgentTiming
-from bench.agent_protocol.messages import RunCommand
+from bench.agent_protocol import RunCommand
 from bench.config import BenchConfig
 from bench.errors import InterlockError
 from bench.rig.acquisition import Acquisition, Batch

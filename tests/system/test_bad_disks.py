@@ -12,7 +12,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from bench.agent_protocol.messages import RunCommand
+from bench.agent_protocol import RunCommand
 from bench.log.reader import read_log
 from bench.log.salvage import salvage_log
 from tests.support.faulty_disk import COMMAND as FAULTY_DISK

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from bench.agent_protocol import StatusCommand
 from bench.agent_protocol.agent_client import AgentClient
 from bench.agent_protocol.endpoint import make_endpoint
-from bench.agent_protocol.messages import StatusCommand
 from bench.catalogue import Catalogue, make_sqlite_url, open_database
 from bench.config import AgentSection
 from bench.errors import AgentUnreachableError

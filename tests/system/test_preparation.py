@@ -5,9 +5,9 @@ import subprocess
 
 import pytest
 
+from bench.agent_protocol import PrepareCommand, RunCommand, StatusCommand, StopCommand
 from bench.agent_protocol.agent_client import AgentClient
 from bench.agent_protocol.endpoint import find_agent
-from bench.agent_protocol.messages import PrepareCommand, RunCommand, StatusCommand, StopCommand
 from bench.errors import AgentUnreachableError
 from tests.support.live_bench import COMMAND, DEADLINE, ended, live_bench, method, until
 

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 import numpy as np
 import pytest
 
-from bench.agent_protocol.messages import (
+from bench.agent_protocol import (
     AgentEvent,
     AgentStatus,
     PauseCommand,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bench.agent_protocol.messages import RunCommand, StopCommand
+from bench.agent_protocol import RunCommand, StopCommand
 from bench.checks import compute_records
 from bench.log.reader import read_log
 from tests.support.live_bench import (

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Protocol
@@ -10,11 +11,13 @@ import numpy as np
 
 from bench.agent_protocol import (
     AgentStatus,
+    LeaseCommand,
     Message,
     PauseCommand,
     RunCommand,
     RunStatus,
     StatusCommand,
+    get_sender,
 )
 from bench.campaigns.benches.recovery import make_end_report, recover_execution
 from bench.campaigns.benches.results import read_result
@@ -37,6 +40,10 @@ START_TIMEOUT = 10.0
 """[s] Time limit from an accepted command to the run in the agent's status."""
 READING_LIFETIME = 30.0
 """[s] Age up to which a reading of the thermometer counts."""
+LEASE_TIME = 15.0
+"""[s] Time for which the bench stays with a campaign whose executor was killed."""
+_LEASE_PERIOD = 5.0
+"""[s] Time between two renewals of the lease."""
 _START_PERIOD = 0.1
 """[s] Time between two requests of the status after a start."""
 
@@ -105,6 +112,7 @@ class AgentBench:
         self._name = name
         self._catalogue, self._agent, self._thermometer = catalogue, agent, thermometer
         self._wait, self._sleep = wait, sleep
+        self._has_lease, self._renewal = False, float("-inf")
 
     def check_needs(self, campaign: Campaign, steps: Sequence[Step]) -> None:
         """Check that there is a thermometer if a condition needs one.
@@ -174,6 +182,20 @@ class AgentBench:
         """Ask the agent to end the run at its next checkpoint."""
         self._agent.send_command(PauseCommand())
 
+    def keep_lease(self, campaign: StoredCampaign) -> None:
+        """Keep the lease while the campaign may start something, and end it when it may not."""
+        needs_lease, now = campaign.state.needs_lease, time.monotonic()
+        is_due = needs_lease and now >= self._renewal
+        if not is_due and needs_lease == self._has_lease:
+            return
+        operator = f" of {campaign.state.operator}" if campaign.state.operator else ""
+        command = LeaseCommand(
+            description=f"campaign {campaign.id}{operator}"[:300], duration_s=LEASE_TIME if needs_lease else 0.0
+        )
+        with suppress(BenchError):  # the next observation tells why the bench cannot be used
+            self._agent.send_command(command)
+            self._has_lease, self._renewal = needs_lease, now + _LEASE_PERIOD
+
     def wait(self, campaign: StoredCampaign) -> None:
         """Let time pass until the next observation."""
         self._wait()
@@ -235,6 +257,8 @@ def _find_run(status: AgentStatus, path: Path) -> RunStatus | None:
 def _find_obstacle(status: AgentStatus | None) -> str:
     if status is None:
         return "the rig agent does not answer"
+    if status.lease is not None and status.lease.holder != get_sender().actor:
+        return f"{status.lease.description} holds the bench"
     if status.state == "tripped":
         return f"the rig agent has tripped: {status.trip}; reset it after the cause is removed"
     return "" if status.state == "idle" else f"the rig agent is {status.state}"

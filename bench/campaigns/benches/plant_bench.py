@@ -136,6 +136,9 @@ class PlantBench:
     def request_pause(self, campaign: StoredCampaign) -> None:
         """Do nothing: a run on the plant has ended before a person can ask."""
 
+    def keep_lease(self, campaign: StoredCampaign) -> None:
+        """Do nothing: nobody else can use the simulated plant."""
+
     def wait(self, campaign: StoredCampaign) -> None:
         """Let a rest pass on the simulated clock; else wait in real time for an answer or a command."""
         state = campaign.state

@@ -37,5 +37,8 @@ class CampaignBench(Protocol):
     def request_pause(self, campaign: StoredCampaign) -> None:
         """Ask the run in progress to end at its next checkpoint."""
 
+    def keep_lease(self, campaign: StoredCampaign) -> None:
+        """Keep the lease of the bench, or end it while the campaign waits for a person."""
+
     def wait(self, campaign: StoredCampaign) -> None:
         """Let time pass until the next observation."""

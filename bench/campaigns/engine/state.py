@@ -184,6 +184,12 @@ class CampaignState(FrozenModel):
         return self.active is not None and self.active.phase in ("starting", "stroking")
 
     @property
+    def needs_lease(self) -> bool:
+        """Return whether nobody else may start something; while the campaign waits for a person, others may."""
+        is_free = self.has_ended or self.status == "paused" or self.needs_person or bool(self.waits_for)
+        return not is_free
+
+    @property
     def needs_person(self) -> bool:
         """Return whether the campaign waits for an answer."""
         return self.active is not None and self.active.phase == "asking" and not self.has_ended

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from bench.agent_protocol import AgentStatus, Message, RunCommand, SentCommand, get_sender
+from bench.agent_protocol import AgentStatus, LeaseCommand, Message, RunCommand, SentCommand, get_sender
 from bench.audit import Act, redact
 from bench.campaigns import AgentConnection
 from bench.errors import BenchError
@@ -20,6 +20,7 @@ class RecordedConnection:
             bench: name of the bench, for the record.
         """
         self._connection, self._record, self._bench = connection, record, bench
+        self._lease: LeaseCommand | None = None
 
     def get_status(self) -> AgentStatus:
         """Return the current status.
@@ -40,7 +41,10 @@ class RecordedConnection:
         except BenchError as error:
             self._note(command, str(error))
             raise
-        self._note(command, "ok")
+        if command != self._lease:  # the renewal of a lease changes nothing
+            self._note(command, "ok")
+        if isinstance(command, LeaseCommand):
+            self._lease = command
         return status
 
     def _note(self, command: Message, outcome: str) -> None:

@@ -103,6 +103,9 @@ export class TopBar {
     if (state === "unknown") return this.stale ? `No data for ${fixed(this.age, 0)} s. ${this.failure}` : "";
     if (state === "tripped") return trip;
     if (state === "preparing" && !this.run) return this.status.step?.message ?? "";
+    // A run of the holder is described as any other run.
+    const holder = state === "idle" && this.status?.lease?.description;
+    if (holder) return `Held by ${holder}: pause or stop it to use the bench.`;
     if (!run) return this.status?.step?.message ?? "Ready for a run.";
     const description = `${run.method} on ${run.specimen || "an unnamed specimen"}`;
     if (state === "idle") return `Last run: ${description}: ${[run.outcome, run.reason].filter(Boolean).join(", ")}.`;

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from bench.agent.agent import Agent
-from bench.agent_protocol.messages import AgentEvent, PrepareCommand, RunCommand
+from bench.agent_protocol import AgentEvent, LeaseCommand, PrepareCommand, RunCommand, Sender
 from bench.config import BenchConfig
 from bench.errors import InterlockError
 from bench.safety.limits import Action
@@ -53,6 +53,22 @@ def start_move(agent):
 def latch_trip(agent):
     agent._interlocks.latch("force 1600 N")
     agent._stop_moving("force 1600 N", False)
+
+
+def test_a_held_agent_starts_nothing_for_others_and_stops_for_all(agent):
+    holder, other = Sender(actor="campaign:night"), Sender(actor="user:anna")
+    assert agent.lease(LeaseCommand(description="campaign night", duration_s=15, sender=holder)).ok
+    assert agent.get_status().lease.holder == "campaign:night"
+    for refused in (
+        agent.prepare(PrepareCommand(step="move", position_m=0.01, sender=other)),
+        agent.run(RunCommand(method={}, sender=other)),
+    ):
+        assert refused.error.startswith("campaign night holds the bench; nothing was started")
+    assert agent.prepare(PrepareCommand(step="move", position_m=0.01, sender=holder)).ok
+    assert agent.moving.wait(TIMEOUT)
+    assert agent.stop().ok
+    ended = agent.lease(LeaseCommand(description="campaign night", duration_s=0, sender=holder))
+    assert ended.status.lease is None
 
 
 def test_exceeded_limit_stops_a_setup_move_as_it_stops_a_run(agent):

@@ -16,6 +16,7 @@ from bench.agent_protocol import (
     AuditCommand,
     CommandServer,
     DescribeCommand,
+    LeaseCommand,
     PauseCommand,
     PrepareCommand,
     Reply,
@@ -94,6 +95,20 @@ def test_every_command_that_changes_something_is_recorded_with_its_sender_and_ou
     assert entries[0].new == {"method": {"name": "polka"}, "specimen": "d1"}
     assert entries[1].new == {"step": "home"}
     assert not verify_chain(bench.path).fault
+    bench.__enter__()
+
+
+def test_a_lease_is_recorded_when_it_begins_and_ends_and_not_when_it_is_renewed(bench):
+    begin, end = (LeaseCommand(description="campaign 1", duration_s=time) for time in (15, 0))
+    for command in (begin, begin, begin, end, begin):
+        bench.client.send(command)
+    bench.refused["lease"] = "campaign 2 holds the bench"
+    for command in (begin, begin):
+        bench.client.send(command)
+    bench.__exit__()
+    entries = bench.list_acts()
+    assert [one.new["duration_s"] for one in entries] == [15, 0, 15, 15, 15]
+    assert [one.outcome for one in entries] == ["ok"] * 3 + ["campaign 2 holds the bench"] * 2
     bench.__enter__()
 
 

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from bench.agent.timing import AgentTiming
-from bench.agent_protocol.messages import RunCommand
+from bench.agent_protocol import RunCommand
 from bench.calibration import IssuedCertificate, LatestCheck, list_overdue, read_entry, read_failed
 from bench.config import BenchConfig
 from bench.disk import RESERVE

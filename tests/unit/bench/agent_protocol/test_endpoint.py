@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 import zmq
 
+from bench.agent_protocol import AgentEvent, AgentStatus, Reply, StatusCommand
 from bench.agent_protocol.agent_client import AgentClient
 from bench.agent_protocol.command_server import CommandServer
 from bench.agent_protocol.endpoint import check_socket_path, derive_samples_address, find_agent
-from bench.agent_protocol.messages import AgentEvent, AgentStatus, Reply, StatusCommand
 from bench.agent_protocol.publications import Publisher
 from bench.errors import AgentUnreachableError, ConfigError, RunError
 from tests.support.fake_rig import BENCH_TOML

@@ -2,8 +2,7 @@
 
 import pytest
 
-from bench.agent_protocol import setup_client as module
-from bench.agent_protocol.messages import (
+from bench.agent_protocol import (
     AgentStatus,
     PrepareCommand,
     Reply,
@@ -11,6 +10,7 @@ from bench.agent_protocol.messages import (
     StatusCommand,
     StopCommand,
 )
+from bench.agent_protocol import setup_client as module
 from bench.agent_protocol.setup_client import request_setup_step
 from bench.errors import RunError
 from tests.support.fake_rig import BENCH_TOML

@@ -2,8 +2,7 @@
 
 import pytest
 
-from bench.agent_protocol import stop_client as module
-from bench.agent_protocol.messages import (
+from bench.agent_protocol import (
     AbortCommand,
     AgentStatus,
     Reply,
@@ -13,6 +12,7 @@ from bench.agent_protocol.messages import (
     StatusCommand,
     StopCommand,
 )
+from bench.agent_protocol import stop_client as module
 from bench.agent_protocol.stop_client import request_end, request_stop
 from bench.errors import AgentUnreachableError, RunError
 from tests.support.fake_rig import BENCH_TOML

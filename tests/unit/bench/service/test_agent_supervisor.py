@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from bench.agent_protocol.messages import AgentStatus, Reply, ShutDownCommand, StatusCommand
+from bench.agent_protocol import AgentStatus, Reply, ShutDownCommand, StatusCommand
 from bench.config import compute_identity, load_config
 from bench.errors import AgentUnreachableError
 from bench.service.agent_supervisor import MAX_RESTART_PAUSE, SupervisedAgent

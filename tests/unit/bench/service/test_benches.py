@@ -5,8 +5,16 @@ from prometheus_client.parser import text_string_to_metric_families
 from starlette.websockets import WebSocketDisconnect
 
 from bench.agent import CommandTrail
-from bench.agent_protocol import AbortCommand, AgentStatus, PauseCommand, PrepareCommand, Reply, RunCommand, Sender
-from bench.agent_protocol.messages import AgentEvent
+from bench.agent_protocol import (
+    AbortCommand,
+    AgentEvent,
+    AgentStatus,
+    PauseCommand,
+    PrepareCommand,
+    Reply,
+    RunCommand,
+    Sender,
+)
 from bench.service.benches import BenchSettings
 from tests.support.audit_trails import list_all
 from tests.support.certificates import make_certificate

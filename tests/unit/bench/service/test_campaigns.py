@@ -92,6 +92,40 @@ def test_a_pause_ends_the_run_at_its_checkpoint_and_the_rest_is_continued(servic
     assert stopped["items"][0]["parts"] == ["run-1"]
 
 
+def test_a_campaign_holds_the_bench_until_it_needs_a_person(service):
+    assert service.get("/bench/lease")["holder"] is None
+    campaign = start(service, [{"rest": {"seconds": 600}}, PROMPT])
+    held = service.wait_for("/bench/lease", lambda lease: lease["holder"] == "campaign")
+    assert (held["id"], f"campaign {campaign['id']} of M. Curie holds the bench" in held["description"]) == (
+        campaign["id"],
+        True,
+    )
+    body = {"method": "quick", "specimen": "MR-9"}
+    for path, sent in (("/runs", body), ("/bench/prepare", {"step": "tare"})):
+        refusal = service.post(path, sent, 409)
+        assert f"campaign {campaign['id']} of M. Curie holds the bench" in refusal["detail"]
+        assert "pause or stop it" in refusal["detail"]
+    service.post(f"/campaigns/{campaign['id']}/pause", {})
+    wait(service, campaign, lambda found: found["status"] == "paused")
+    service.wait_for("/bench/lease", lambda lease: lease["holder"] is None)
+    service.post("/bench/prepare", {"step": "tare"})
+    service.post(f"/campaigns/{campaign['id']}/resume", {})
+    service.wait_for("/bench/lease", lambda lease: lease["holder"] == "campaign")
+    service.post(f"/campaigns/{campaign['id']}/stop", {})
+    wait(service, campaign, lambda found: found["status"] == "stopped")
+    service.wait_for("/bench/lease", lambda lease: lease["holder"] is None)
+
+
+def test_a_person_uses_the_bench_while_a_campaign_asks(service):
+    campaign = start(service, [PROMPT, RUN])
+    wait(service, campaign, lambda found: found["question"])
+    service.wait_for("/bench/lease", lambda lease: lease["holder"] is None)
+    service.post("/bench/prepare", {"step": "tare"})
+    service.post(f"/campaigns/{campaign['id']}/answer", {"note": "mounted", "photo": PHOTO})
+    wait_for_command(service, RunCommand)
+    service.wait_for("/bench/lease", lambda lease: lease["holder"] == "campaign")
+
+
 def test_a_restarted_service_continues_and_repeats_no_finished_run(service):
     campaign = start(service, [RUN, RUN])
     wait(service, campaign, lambda found: found["phase"] == "stroking")

@@ -8,7 +8,7 @@ import numpy as np
 import orjson
 import pytest
 
-from bench.agent_protocol.messages import AgentEvent, RunCommand
+from bench.agent_protocol import AgentEvent, RunCommand
 from bench.jobs.progress import JobProgress
 from bench.live import Channel, LiveBatch, decode_batch, parse_channels
 from bench.live.listener import MAX_QUEUED_BATCHES, MAX_UNACKNOWLEDGED

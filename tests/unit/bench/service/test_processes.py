@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from bench.agent_protocol.messages import AgentStatus, Reply, ShutDownCommand
+from bench.agent_protocol import AgentStatus, Reply, ShutDownCommand
 from bench.errors import AgentUnreachableError, ConfigError
 from bench.log_lines import KeyValueFormatter
 from bench.processes import terminate

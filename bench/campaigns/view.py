@@ -148,7 +148,7 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
         current=None if current is None else _make_item(current, units),
         phase="" if active is None else active.phase,
         next=next((_make_item(item, units) for item in state.pending), None),
-        waits_for=state.waits_for,
+        waits_for=state.waits_for or _describe_awaited(state),
         question=_make_question(state, current),
         expected_end=None if state.has_ended else _at(state.updated + estimate_remaining(state)),
         times=state.times,
@@ -162,6 +162,10 @@ def make_view(campaign: StoredCampaign, events: Sequence[CampaignEventRow] = ())
 
 def _at(seconds: float) -> datetime:
     return datetime.fromtimestamp(seconds, UTC)
+
+
+def _describe_awaited(state: CampaignState) -> str:
+    return f"the results of run {state.awaited_run} are awaited, for stop_on" if state.awaited_run else ""
 
 
 def _make_item(item: Item, units: Mapping[str, str]) -> ItemView:

@@ -142,12 +142,12 @@ class PlantBench:
     def wait(self, campaign: StoredCampaign) -> None:
         """Let a rest pass on the simulated clock; else wait in real time for an answer or a command."""
         state = campaign.state
-        if state.active is None and state.status == "running":
+        if state.active is None and state.status == "running" and not state.awaited_run:
             return
         if state.active is not None and state.active.phase == "resting" and state.status == "running":
             step = state.get_item(state.active.item).step
             self._rest(step, max(0.0, (state.active.deadline or self._now) - self._now), campaign)
-        elif state.status == "paused" or state.needs_person:
+        elif state.status == "paused" or state.needs_person or state.awaited_run:
             self._sleep(_POLL_PERIOD)
             self._now += _POLL_PERIOD
 

@@ -11,7 +11,7 @@ from bench.campaigns.engine.conditions import (
     needs_thermometer,
 )
 from bench.campaigns.engine.edits import QueueEdit, apply_edit, collect_edit_methods, parse_edit
-from bench.campaigns.engine.evaluation import find_awaited_run, is_awaiting_diagnosis
+from bench.campaigns.engine.evaluation import is_awaiting_diagnosis
 from bench.campaigns.engine.executions import find_spec, make_method
 from bench.campaigns.engine.machine import advance, recover
 from bench.campaigns.engine.observation import ExecutionReport, Observation
@@ -48,7 +48,6 @@ __all__ = [
     "apply_edit",
     "collect_edit_methods",
     "compute_interval",
-    "find_awaited_run",
     "find_spec",
     "get_half_width",
     "group_runs",

@@ -16,6 +16,8 @@ from bench.campaigns.document import (
 )
 from bench.campaigns.engine.state import CampaignState, ParameterResult, RunFact, RunResult
 
+RESULT_TIMEOUT = 3 * 3600.0
+"""[s] Time limit for the results of a run."""
 MIN_DRIFT_RUNS = 2
 """Smallest number of runs of one kind for which a drift can be computed."""
 
@@ -87,6 +89,36 @@ def find_stop_reason(state: CampaignState) -> str:
         if reason:
             return reason
     return ""
+
+
+def find_awaited_run(state: CampaignState, now: float) -> str:
+    """Return the oldest run whose results a condition of ``stop_on`` still awaits; empty without one."""
+    awaited = (
+        fact.run
+        for fact in _list_unchecked(state)
+        if not state.results.get(fact.run, RunResult()).failure and now - fact.ended < RESULT_TIMEOUT
+    )
+    return next(awaited, "")
+
+
+def describe_unchecked(state: CampaignState) -> str:
+    """Return that ``stop_on`` could not be checked for some runs, as a text; empty if it could for all."""
+    runs = [fact.run for fact in _list_unchecked(state)]
+    return f"stop_on was not checked for runs without results: {', '.join(runs)}" if runs else ""
+
+
+def _list_unchecked(state: CampaignState) -> list[RunFact]:
+    """Return the complete runs without the results that ``stop_on`` needs, oldest first."""
+    if not needs_results(state.campaign, ()):
+        return []
+    is_diagnosis_needed = needs_diagnosis(state.campaign, ())
+    return [
+        fact
+        for fact in state.facts
+        if (result := state.results.get(fact.run)) is None
+        or result.failure
+        or (is_diagnosis_needed and not result.is_diagnosed)
+    ]
 
 
 def _find_verdict(state: CampaignState, verdict: str) -> str:

@@ -2,13 +2,10 @@
 
 from bench.campaigns.document import IntervalGoal, NextStrokeStep, RepeatStep
 from bench.campaigns.engine.changes import change, change_item, end_item, say
-from bench.campaigns.engine.conditions import describe_interval
+from bench.campaigns.engine.conditions import RESULT_TIMEOUT, describe_interval
 from bench.campaigns.engine.endings import fail
 from bench.campaigns.engine.executions import find_base_run, make_execution
 from bench.campaigns.engine.state import Active, CampaignState, Item, RunResult
-
-RESULT_TIMEOUT = 3 * 3600.0
-"""[s] Time limit for the results of a run."""
 
 
 def needs_evaluation(state: CampaignState, item: Item) -> bool:
@@ -17,7 +14,7 @@ def needs_evaluation(state: CampaignState, item: Item) -> bool:
     return (is_repeated or isinstance(item.step, NextStrokeStep)) and not item.resume_after
 
 
-def find_awaited_run(state: CampaignState) -> str:
+def find_evaluated_run(state: CampaignState) -> str:
     """Return the id of the run whose results are awaited; empty if none are."""
     if state.active is None or state.active.phase != "evaluating":
         return ""
@@ -43,7 +40,7 @@ def evaluate(state: CampaignState, now: float, campaign_id: str) -> CampaignStat
     item = state.get_item(active.item)
     if not isinstance(item.step, RepeatStep | NextStrokeStep):
         return end_item(state, now, "done")
-    run = find_awaited_run(state)
+    run = find_evaluated_run(state)
     if not run:
         return fail(state, now, "no complete run precedes it")
     result = state.results.get(run)

@@ -6,7 +6,7 @@ acts. A process that was killed at any moment thus finds where to continue.
 
 from bench.campaigns.document import PromptStep, RestStep, WarmUpStep
 from bench.campaigns.engine.changes import change, change_item, end_campaign, end_item, say
-from bench.campaigns.engine.conditions import find_stop_reason
+from bench.campaigns.engine.conditions import describe_unchecked, find_awaited_run, find_stop_reason
 from bench.campaigns.engine.endings import fail, take_report
 from bench.campaigns.engine.evaluation import evaluate, needs_evaluation
 from bench.campaigns.engine.executions import make_execution
@@ -67,7 +67,7 @@ def _account(state: CampaignState, now: float) -> CampaignState:
 
 def _take_observation(state: CampaignState, seen: Observation, now: float) -> CampaignState:
     is_waiting = state.active is None and not state.has_ended and state.status != "paused"
-    values: dict[str, object] = {"waits_for": seen.obstacle if is_waiting else ""}
+    values: dict[str, object] = {"waits_for": seen.obstacle if is_waiting else "", "awaited_run": ""}
     if seen.temperature_c is not None:
         values["temperature_c"] = seen.temperature_c
     known = {fact.run for fact in state.facts}
@@ -84,10 +84,14 @@ def _begin_next(state: CampaignState, seen: Observation, now: float, campaign_id
     if reason := find_stop_reason(state):
         return end_campaign(state, now, "stopped", reason)
     item = next(iter(state.pending), None)
+    # A person or a rest needs neither the bench nor earlier results.
+    can_begin = item is not None and isinstance(item.step, PromptStep | RestStep)
+    if not can_begin and (awaited := find_awaited_run(state, now)):
+        return change(state, awaited_run=awaited)
     if item is None:
-        return end_campaign(state, now, "done", "all steps have ended")
-    # A person or a rest needs no bench.
-    if seen.obstacle and not isinstance(item.step, PromptStep | RestStep):
+        reasons = "all steps have ended", describe_unchecked(state)
+        return end_campaign(state, now, "done", "; ".join(filter(None, reasons)))
+    if seen.obstacle and not can_begin:
         return _wait_for_bench(state, seen.obstacle, now)
     return _begin(change(state, waits_since=None, is_wait_told=False), item, now, campaign_id)
 

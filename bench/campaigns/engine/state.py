@@ -152,6 +152,8 @@ class CampaignState(FrozenModel):
     """Latest reading of the thermometer."""
     waits_for: str = ""
     """Reason why the bench cannot start the next step; empty if it can."""
+    awaited_run: str = ""
+    """Run whose results a condition of ``stop_on`` needs before the next step; empty without one."""
     waits_since: float | None = None
     """Time since which the bench cannot start it."""
     is_wait_told: bool = False

@@ -31,7 +31,7 @@ function listFacts(campaign) {
   return {
     State: { status, reason },
     "Current step": [step, describePhase(phase)],
-    "Next step": [next ? `${next.id}: ${next.label}` : "none", obstacle && `The bench cannot begin it: ${obstacle}`],
+    "Next step": [next ? `${next.id}: ${next.label}` : "none", obstacle && `It cannot begin yet: ${obstacle}`],
     "Expected end": [end ? instant(end) : "–", end ? "without the time that persons take" : ""],
     "Time in motion": [duration(times.stroking_s), "of complete and incomplete runs"],
     "Time at rest": [duration(times.rest_s)],

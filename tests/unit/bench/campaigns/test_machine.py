@@ -204,6 +204,33 @@ def test_results_stop_a_campaign(condition, reason):
     assert states(bench) == ["done", "done", "pending", "pending"]
 
 
+@pytest.mark.parametrize("condition", [{"drift": {"parameter": "k0", "percent": 5}}, {"verdict": "unexplained"}])
+def test_the_next_run_waits_for_the_results_that_may_stop_the_campaign(condition):
+    rest = {"rest": {"seconds": 60}}
+    bench = SimulatedBench(start([RUN, RUN, rest, RUN], stop_on=[condition]))
+    bench.results = {"run-0": result(100, 1)}
+    for _ in range(30):
+        bench.step()
+    # The rest needs no results; the run after it does.
+    assert states(bench) == ["done", "done", "done", "pending"]
+    assert (bench.state.awaited_run, bench.state.needs_lease) == ("run-1", True)
+    bench.results["run-1"] = result(110, 1, verdict="unexplained")
+    assert bench.run().status == "stopped"
+    assert (states(bench)[-1], bench.state.awaited_run) == ("pending", "")
+
+
+def test_a_campaign_ends_when_the_last_results_have_arrived_or_cannot():
+    stop_on = [{"drift": {"parameter": "k0", "percent": 5}}]
+    bench = SimulatedBench(start([RUN, RUN], stop_on=stop_on))
+    bench.results = {"run-0": result(100, 1)}
+    for _ in range(10):
+        bench.step()
+    assert (states(bench), bench.state.status) == (["done", "done"], "running")
+    bench.results["run-1"] = result(100, 1, failure="identify failed: too few samples")
+    assert bench.run().status == "done"
+    assert bench.state.reason.endswith("stop_on was not checked for runs without results: run-1")
+
+
 def test_a_missing_result_fails_with_its_reason_or_after_its_time():
     goal = {"diagnosis": "settled"}
     step = {"repeat": {"step": RUN, "until": goal, "at_most": 2}}

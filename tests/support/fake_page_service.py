@@ -430,11 +430,12 @@ def run_routes(bench: FakeBench) -> APIRouter:
 
     @router.get("/runs")
     async def runs(request: Request) -> Any:
-        bench.searches.append(dict(request.query_params))
-        wanted = {
-            name: request.query_params[name] for name in ("outcome", "specimen") if name in request.query_params
-        }
+        query = request.query_params
+        bench.searches.append(dict(query))
+        wanted = {name: query[name] for name in ("outcome", "specimen") if name in query}
         found = [one for one in bench.runs.values() if wanted.items() <= one.items()]
+        found = [one for one in found if (one["trashed"] is not None) == (query.get("trash") == "true")]
+        found = [one for one in found if query.get("tag", "") in ("", *one["tags"])]
         return {"items": sorted(found, key=lambda one: one["started"], reverse=True), "next": None}
 
     @router.get("/runs/{run_id}")

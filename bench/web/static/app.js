@@ -47,7 +47,7 @@ const REQUEST_EVERY = { fresh: 400, stale: 3_000 };
 const ASK_AGAIN_MS = 2_000;
 
 const ring = new SampleRing(FIELDS);
-const runView = new RunView();
+const runView = new RunView({ onRun: (run) => runs.update(run) });
 const specimens = new SpecimenList();
 const specimen = new SpecimenView();
 const runs = new RunList({

@@ -14,9 +14,10 @@ import { runAddress, specimenAddress } from "../common/router.js";
 import { factList, foldedSection } from "../common/tables.js";
 
 export class RunView {
-  constructor() {
+  /** Takes a function that receives a run that was changed here, and gives it to all views. */
+  constructor({ onRun }) {
     this.id = null;
-    this.actions = new RunActions({ onRun: (run) => this.update(run), onNote: (id) => id === this.id && this.showFacts() });
+    this.actions = new RunActions({ onRun, onNote: (id) => id === this.id && this.showFacts() });
   }
 
   /** Shows the run of an address: all of it, or its part `report` or `replay` alone. */

@@ -3,7 +3,8 @@
 import { byId } from "../common/format.js";
 
 const FIELDS = [
-  "text", "specimen", "bench", "method", "outcome", "ending", "from", "to", "effect", "parameter", "parameter_min", "parameter_max",
+  "text", "specimen", "bench", "method", "outcome", "ending", "from", "to", "tag", "effect", "parameter", "parameter_min", "parameter_max",
+  "trash",
 ];
 const DAY_MS = 86_400_000;
 
@@ -21,7 +22,7 @@ export class RunSearch {
   go() {
     const query = new URLSearchParams();
     for (const name of FIELDS) {
-      const value = this.form.elements[name].value.trim();
+      const value = readField(this.form.elements[name]);
       if (value) query.set(name, value);
     }
     location.hash = query.size ? `#/runs?${query}` : "#/runs";
@@ -29,7 +30,7 @@ export class RunSearch {
 
   /** Fills the form from the query of an address; returns the conditions for the service. */
   read(query) {
-    for (const name of FIELDS) this.form.elements[name].value = query.get(name) ?? "";
+    for (const name of FIELDS) fillField(this.form.elements[name], query.get(name) ?? "");
     const conditions = {};
     for (const name of FIELDS) if (query.get(name)) conditions[name] = query.get(name);
     if (conditions.from) conditions.from = midnight(conditions.from, 0);
@@ -39,6 +40,15 @@ export class RunSearch {
     if (names.some((name) => name !== "text")) byId("search-more").open = true;
     return conditions;
   }
+}
+
+/** Value of a field; of a checkbox its value if it is ticked, else nothing. */
+const readField = (field) => (field.type === "checkbox" && !field.checked ? "" : field.value.trim());
+
+/** Shows a value in a field; a checkbox is ticked by its own value. */
+function fillField(field, value) {
+  if (field.type === "checkbox") field.checked = value === field.value;
+  else field.value = value;
 }
 
 /** Start of a local day, or of a later one, as UTC; another text stays, so that the service refuses it with a reason. */

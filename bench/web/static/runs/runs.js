@@ -2,7 +2,7 @@
 
 import { get } from "../common/api.js";
 import { shownBench } from "../common/bench.js";
-import { byId, duration, element, localTime, write, zone } from "../common/format.js";
+import { byId, duration, element, instant, localTime, write, zone } from "../common/format.js";
 import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, isUnfinished } from "./run_facts.js";
 import { runAddress, specimenAddress } from "../common/router.js";
@@ -33,6 +33,12 @@ export class RunList {
 
   get isSearch() {
     return Object.keys(this.conditions).length > 0;
+  }
+
+  /** Sentence for a list without runs. */
+  describeEmpty() {
+    if (!this.isSearch) return "No runs yet.";
+    return Object.keys(this.conditions).join() === "trash" ? "The trash is empty." : "No run meets all conditions.";
   }
 
   /** Loads the newest page, or the page before a run. */
@@ -83,7 +89,7 @@ export class RunList {
     if (focused) byId("runs").querySelector(`[data-key="${CSS.escape(focused)}"]`)?.focus();
     this.selection.show();
     write(byId("runs-zone"), `(${zone()})`);
-    write(byId("runs-note"), runs.length ? "" : this.isSearch ? "No run meets all conditions." : "No runs yet.");
+    write(byId("runs-note"), runs.length ? "" : this.describeEmpty());
     write(byId("runs-title"), this.isSearch ? "Found, newest first" : "Newest first");
     byId("older").hidden = !this.next;
     this.onSpecimens([...new Set(runs.map(({ specimen }) => specimen).filter(Boolean))]);
@@ -104,7 +110,7 @@ export class RunList {
       element("td", {}, this.selection.box(run)),
       element("th", { scope: "row", className: "number" }, link, element("small", {}, run.operator), shownBench() && run.bench ? element("small", {}, `on ${run.bench}`) : null),
       element("td", {}, this.specimen(run), element("small", {}, `${run.method}, ${duration(run.duration_s)}`)),
-      element("td", {}, ...describeOutcome(run)),
+      element("td", {}, ...describeOutcome(run), run.trashed ? element("small", { className: "attention" }, `In the trash since ${instant(run.trashed)}`) : null),
       element("td", {}, ...describeFit(run), run.diagnosis ? element("small", {}, `Gap ${describeVerdict(run.diagnosis)}`) : null),
       element("td", {}, ...run.jobs.toReversed().map((job) => element("small", { className: "job" }, describeJob(job)))),
       element("td", { className: "actions" }, ...this.actions.files(run), ...this.actions.work(run), this.actions.answer(run)));

@@ -23,6 +23,7 @@ from bench.catalogue import (
 from bench.checks import find_check_kind
 from bench.jobs import IdentifySettings, JobManager
 from bench.log_lines import RepeatedFailure
+from bench.service.views import LiveEvent
 
 SCAN_PERIOD = 5.0
 """Period of the scans of the data folder [s]."""
@@ -84,17 +85,19 @@ class RunRegistry:
                 # Added last, so that a failed update is tried again with the next status.
                 self._known_states.add(key)
 
-    def record_event(self, event: AgentEvent, bench: str) -> None:
-        """Store an event of a bench with its run in progress; called from any thread.
+    def record_event(self, event: AgentEvent, bench: str) -> LiveEvent:
+        """Store an event of a bench with its run in progress, and return it as listeners get it; from any thread.
 
         A failure, such as a full disk, is logged; the log of the run contains its events in any case.
         """
         status = self._get_statuses()[bench]
-        run = status.run if status and status.run and status.run.outcome is None else None
+        run = status.run.id if status and status.run and status.run.outcome is None else None
         try:
-            self._catalogue.event_journal.record(event.kind, event.text, run.id if run else None, bench)
+            row = self._catalogue.event_journal.record(event.kind, event.text, run, bench)
         except CatalogueUnavailableError as error:
             self._failures[bench].note(error)
+            return LiveEvent(**event.model_dump(), id=None, run=run, bench=bench, at=datetime.now(UTC))
+        return LiveEvent(**event.model_dump(), id=row.id, run=row.run_id, bench=bench, at=row.at)
 
     async def scan(self) -> None:
         """Scan the data folder once; identify also what a kill has left without an identification."""

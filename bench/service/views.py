@@ -7,7 +7,7 @@ from typing import Annotated, Any, Self, TypeAlias
 from fastapi import Query
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from bench.agent_protocol import AgentStatus
+from bench.agent_protocol import AgentEvent, AgentStatus
 from bench.catalogue import JobRow, LogIntegrity, RunOutcome, RunRow, RunState
 from bench.endings import RunEnding
 from bench.jobs import DiagnosisSummary, Job, find_newest_done, make_diagnosis_summary, make_job_view
@@ -52,6 +52,18 @@ class Health(View):
     log_store: str = Field(
         description="`ok`, `not used`, or the number of logs that wait for their copy, and why the store fails"
     )
+
+
+class LiveEvent(AgentEvent):
+    """Event of an agent on the websocket, with its number in the catalogue.
+
+    By the number a client recognises it among the stored events.
+    """
+
+    id: int | None = Field(description="number of the stored event; null if it could not be stored")
+    run: str | None = Field(description="id of the run in progress; null outside runs")
+    bench: str = Field(description="name of the bench")
+    at: datetime = Field(description="UTC")
 
 
 class SetupRequest(View):

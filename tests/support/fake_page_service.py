@@ -7,6 +7,7 @@ import socket
 import sys
 import threading
 import time
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -145,6 +146,7 @@ class FakeBench:
         self.posted: list[tuple[str, Any]] = []
         self.searches: list[dict[str, str]] = []
         self.outbox: list[dict[str, Any]] = []
+        self.events: list[dict[str, Any]] = []
         self.methods: dict[str, Method] = {}
         self.state = "idle"
         self.trip = ""
@@ -170,6 +172,13 @@ class FakeBench:
         self.people, self.trail = FakePeople(), FakeTrail()
         self.approvals: dict[tuple[str, int], dict[str, Any]] = {}
         self.began, self.began_utc = time.monotonic(), time.time()
+
+    def record_event(self, kind: str, text: str) -> dict[str, Any]:
+        """Store an event that happens now; return it as listeners get it."""
+        stored = {"id": len(self.events) + 1, "run": None, "bench": "bench", "kind": kind, "text": text}
+        self.events.append(stored | {"at": datetime.now(UTC).isoformat(), "time_s": None})
+        live = {name: value for name, value in self.events[-1].items() if name != "time_s"}
+        return live | {"time_ns": time.monotonic_ns()}
 
     def status(self) -> dict[str, Any]:
         """Return the status of the agent as it is published."""
@@ -337,8 +346,12 @@ def rig_routes(bench: FakeBench) -> APIRouter:
 
 
 def list_routes(bench: FakeBench) -> APIRouter:
-    """Create the list of the benches, which has one."""
+    """Create the list of the benches, which has one, and that of their events."""
     router = APIRouter()
+
+    @router.get("/events")
+    async def events(limit: int = 200) -> Any:
+        return {"items": bench.events[::-1][:limit], "next": None}
 
     @router.get("/benches")
     async def benches() -> Any:
@@ -551,9 +564,7 @@ def live_routes(bench: FakeBench) -> APIRouter:
 
 async def publish(socket: WebSocket, bench: FakeBench) -> None:
     """Send samples at the rate of the bench, late batches together."""
-    await socket.send_json(
-        {"topic": "event", "data": {"time_ns": 0, "kind": "state", "text": "the agent is ready"}}
-    )
+    await socket.send_json({"topic": "event", "data": bench.record_event("state", "the agent is ready")})
     await socket.send_json({"topic": "clock", "data": {"utc_s": time.time()}})
     await socket.send_json({"topic": "channels", "data": {"channels": describe_channels(CHANNELS), "age_s": 0.0}})
     if bench.last_status is not None:

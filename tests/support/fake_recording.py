@@ -17,9 +17,10 @@ SEGMENTS = [
     {"index": 1, "name": "10mm_1Hz_0.2V", "stretch": "quick", "start_s": 12.0, "stop_s": 22.0},
 ]
 EVENTS = [
-    {"id": 1, "run": "run-1", "time_s": 11.0, "kind": "checkpoint", "text": "after segment 10mm_1Hz_0V"},
-    {"id": 2, "run": "run-1", "time_s": 15.0, "kind": "alarm", "text": "temperature 61 °C"},
+    {"id": 1, "at": "2025-03-04T09:11:41Z", "time_s": 11.0, "kind": "checkpoint", "text": "after 10mm_1Hz_0V"},
+    {"id": 2, "at": "2025-03-04T09:11:45Z", "time_s": 15.0, "kind": "alarm", "text": "temperature 61 °C"},
 ]
+"""Events without the run and the bench."""
 FRAMES = "The raw frames of 5 instruments were decoded again: all 120 readings are equal."
 
 
@@ -33,7 +34,7 @@ def recording_routes() -> APIRouter:
 
     @router.get("/{run_id}/events")
     async def events(run_id: str) -> Any:
-        return {"items": EVENTS, "next": None}
+        return {"items": [one | {"run": run_id, "bench": "bench"} for one in EVENTS], "next": None}
 
     @router.post("/{run_id}/replay")
     async def replay(run_id: str) -> Any:

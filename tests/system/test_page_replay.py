@@ -26,13 +26,20 @@ def test_the_slider_shows_segments_and_events_and_moves_by_mouse_and_keyboard(se
     assert seen["marks"] == [
         "10mm_1Hz_0V, from 1.0 s",
         "10mm_1Hz_0.2V, from 12.0 s",
-        "checkpoint at 11.0 s: after segment 10mm_1Hz_0V",
+        "checkpoint at 11.0 s: after 10mm_1Hz_0V",
         "alarm at 15.0 s: temperature 61 °C",
     ]
     assert seen["text"] == "12.0 s of 24 s, 10mm_1Hz_0.2V"
     assert seen["atEvent"] == 15.0
     assert seen["clicked"] == pytest.approx(6.0, abs=0.5)
     assert seen["stepped"] == pytest.approx(0.1)
+
+
+@browser_test
+def test_the_text_of_a_mark_is_shown_when_it_is_focused_or_pressed(seen):
+    assert seen["segmentText"] == "10mm_1Hz_0.2V, from 12.0 s"
+    assert seen["focusedText"] == ["checkpoint at 11.0 s: after 10mm_1Hz_0V", 12.0]
+    assert seen["pressedText"] == "alarm at 15.0 s: temperature 61 °C"
 
 
 @browser_test

@@ -102,6 +102,17 @@ def test_files_are_listed_with_size_and_hash(seen):
 
 
 @browser_test
+def test_events_are_listed_with_their_time_in_the_recording(seen):
+    head, checkpoint, alarm = (row.split("\t") for row in seen["events"])
+    assert (head[0], head[2]) == ("Time in the recording [s]", "Event")
+    assert re.fullmatch(r"When \(UTC\S*\)", head[1])
+    assert checkpoint[0] == "11.0"
+    assert checkpoint[2] == "checkpoint: after 10mm_1Hz_0V"
+    assert (alarm[0], alarm[2]) == ("15.0", "alarm: temperature 61 °C")
+    assert re.fullmatch(r"2025-03-04 \d\d:11:45", alarm[1])
+
+
+@browser_test
 def test_a_run_is_trashed_after_a_question_that_leaves_stop_usable_and_restored(seen, bench):
     assert "Nothing is deleted." in seen["question"]
     assert seen["stopInQuestion"]

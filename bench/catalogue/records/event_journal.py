@@ -20,8 +20,8 @@ class EventJournal:
         """Use an open database."""
         self._sessions = sessionmaker(engine, expire_on_commit=False)
 
-    def record(self, kind: str, text: str, run_id: str | None, bench: str | None = None) -> None:
-        """Add an event that has just happened.
+    def record(self, kind: str, text: str, run_id: str | None, bench: str | None = None) -> EventRow:
+        """Add an event that has just happened, and return it with its number.
 
         Args:
             kind: kind of the event.
@@ -31,7 +31,9 @@ class EventJournal:
         """
         with self._sessions.begin() as session:
             known = run_id if run_id is not None and session.get(RunRow, run_id) is not None else None
-            session.add(EventRow(run_id=known, bench=bench, at=datetime.now(UTC), kind=kind, text=text))
+            row = EventRow(run_id=known, bench=bench, at=datetime.now(UTC), kind=kind, text=text)
+            session.add(row)
+        return row
 
     def replace(self, run_id: str, events: Sequence[LogEvent]) -> None:
         """Store the events of a complete log in place of those that were recorded live, and mark the alarms."""

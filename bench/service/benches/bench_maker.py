@@ -40,10 +40,10 @@ class BenchMaker:
                 asyncio.run_coroutine_threadsafe(self._registry.observe(status, name), self._loop)
 
         def on_message(topic: str, message: BaseModel | LiveBatch) -> None:
-            publish(topic, message)
             if isinstance(message, AgentEvent):
-                self._registry.record_event(message, name)
-            elif isinstance(message, LiveBatch):
+                message = self._registry.record_event(message, name)
+            publish(topic, message)
+            if isinstance(message, LiveBatch):
                 campaigns.thermometer.take(message)
 
         monitor = AgentMonitor(settings.link, on_message, on_status)

@@ -167,6 +167,7 @@ const link = new LiveLink({
   onReopened: () => {
     withoutRig = false; // the service may have been started again with one
     runs.load(); // changes in the meantime were missed
+    events.load();
     specimen.reload();
   },
 });
@@ -233,6 +234,7 @@ async function begin() {
   }
   form.load();
   runs.load();
+  events.load();
   health.open();
   link.open();
   requestStatus();

@@ -158,14 +158,22 @@ async function trip() {
   seen.bannerStays = await page.locator("#trip").isVisible();
 }
 
+/** Reads the events in a tab that has just been opened, and their number on the service. */
+async function readEvents() {
+  const stored = () => fetch(`${url}/api/v1/events`, { headers: { Authorization: `Bearer ${token}` } }).then((answer) => answer.json());
+  const tab = await page.context().newPage();
+  await tab.goto(`${url}/#/bench`);
+  await makeWaits(tab).hasText("#state-word", "Tripped");
+  await makeWaits(tab).until((count) => document.querySelectorAll("#events time").length >= count, (await stored()).items.length);
+  seen.events = await tab.locator("#events li").allInnerTexts();
+  seen.storedEvents = (await stored()).items.length;
+}
+
 try {
   for (const step of [signIn, readReport]) await step();
   for (const hash of VIEWS) await openDirectly(hash);
   for (const step of [readRun, plan, changeUnits, walk, importFiles, trip]) await step();
-  await page.goto(`${url}/#/bench`);
-  await page.reload();
-  await hasText("#state-word", "Tripped");
-  seen.events = await page.locator("#events li").allInnerTexts();
+  await readEvents();
   console.log(JSON.stringify(seen));
 } finally {
   await close();

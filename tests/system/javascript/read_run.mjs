@@ -66,6 +66,10 @@ async function keepRecords() {
   await files.locator("summary").click();
   await files.locator("table").waitFor();
   seen.files = await files.locator("tbody tr").allInnerTexts();
+  const events = page.getByRole("region", { name: "Events", exact: true });
+  await events.locator("summary").press("Enter");
+  await events.locator("table").waitFor();
+  seen.events = await events.locator("tr").allInnerTexts();
   seen.violations.records = await audit();
   seen.small.records = await findSmall();
 }

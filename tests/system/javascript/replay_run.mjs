@@ -12,6 +12,7 @@ page.on("pageerror", (error) => seen.errors.push(String(error)));
 const { until, hasText } = makeWaits(page);
 const { inspect } = makeChecks(page);
 const slider = page.locator(".timeline input");
+const markText = () => page.locator(".mark-text").innerText();
 const time = async () => Number(await slider.inputValue());
 const displacement = () => page.locator("#run .readings > div").nth(1).innerText();
 /** Waits for a time of the slider and for the extremes of the displacement in the ten seconds before it. */
@@ -38,8 +39,12 @@ async function seek() {
   await page.getByRole("button", { name: "10mm_1Hz_0.2V" }).click();
   await shows(12, "−10.00 … 10.00");
   seen.text = await slider.getAttribute("aria-valuetext");
+  seen.segmentText = await markText();
+  await page.getByRole("button", { name: /^checkpoint at 11.0 s/ }).focus();
+  seen.focusedText = [await markText(), await time()];
   await page.getByRole("button", { name: /^alarm at 15.0 s/ }).click();
   seen.atEvent = await time();
+  seen.pressedText = await markText();
   const { x, y, width, height } = await slider.boundingBox();
   await page.mouse.click(x + width / 4, y + height / 2);
   await hasText("#run .readings", "−5.00 … 5.00");

@@ -12,6 +12,8 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 20];
 /** Recorded time [s] that one request fetches. */
 const CHUNK_S = 10;
 const STEP_S = 0.1;
+/** Largest number of events that one request returns. */
+const MAX_EVENTS = 1000;
 
 export class Replay {
   /** Takes a run, and the element for its view. */
@@ -23,7 +25,7 @@ export class Replay {
 
   /** Loads segments and events and shows the controls; throws a problem without a log. */
   async open() {
-    const [segments, events] = await Promise.all([get(`${this.path}/segments`), get(`${this.path}/events`)]);
+    const [segments, events] = await Promise.all([get(`${this.path}/segments`), get(`${this.path}/events?limit=${MAX_EVENTS}`)]);
     const { items } = events;
     Object.assign(this, { segments: segments.items, events: items.filter(({ time_s: time }) => time !== null && time >= 0) });
     this.driveUnit = segments.drive_unit;
@@ -62,15 +64,20 @@ export class Replay {
     this.clock = element("output", { className: "number" });
     const frames = element("button", { type: "button" }, "Check raw frames");
     frames.addEventListener("click", () => this.checkFrames(frames));
+    // Without a role of its own: a screen reader has read the name of the mark already.
+    this.markText = element("p", { className: "mark-text soft" }, "Press a mark to read it here and to move to its time.");
     return element("div", { className: "replay" },
       element("p", { className: "buttons" }, this.button, element("label", {}, "Speed ", speed), this.clock, frames),
-      element("div", { className: "timeline", role: "group", "aria-label": "Segments and events" }, ...this.marks(), this.slider));
+      element("div", { className: "timeline", role: "group", "aria-label": "Segments and events" }, ...this.marks(), this.slider), this.markText);
   }
 
-  /** Marks of segments and events over the slider; each is a button that moves to its time. */
+  /** Marks of segments and events over the slider. Each is a button: its focus shows its text, a press moves to its time. */
   marks() {
     const place = (time) => `${(100 * time) / this.end}%`;
-    const go = (mark, time) => mark.addEventListener("click", () => this.seek(time));
+    const go = (mark, time) => {
+      for (const kind of ["focus", "click"]) mark.addEventListener(kind, () => this.showMark(mark)); // a touch may give no focus
+      mark.addEventListener("click", () => this.seek(time));
+    };
     const segments = this.segments.map((one) => {
       const mark = element("button", { type: "button", className: "segment", title: `${one.name}, from ${fixed(one.start_s, 1)} s` }, one.name);
       mark.style.left = place(one.start_s);
@@ -86,6 +93,12 @@ export class Replay {
       return mark;
     });
     return [element("div", { className: "segments" }, ...segments), element("div", { className: "marks" }, ...events)];
+  }
+
+  /** Shows the text of a mark, which a tablet shows nowhere else. */
+  showMark(mark) {
+    write(this.markText, mark.title);
+    this.markText.classList.remove("soft");
   }
 
   toggle() {

@@ -7,6 +7,7 @@ import { Replay } from "../live/replay.js";
 import { makeReport } from "./report.js";
 import { RunActions } from "./run_actions.js";
 import { describeFit, describeJob, describeOutcome, describeVerdict, hasReport, isFitted, mayReport } from "./run_facts.js";
+import { RunEvents } from "./run_events.js";
 import { RunRecords } from "./run_records.js";
 import { RunResults } from "./run_results.js";
 import { ReportSignatures } from "./signatures.js";
@@ -62,9 +63,10 @@ export class RunView {
     this.facts = element("section", { "aria-label": "Facts" });
     this.results = new RunResults();
     this.records = new RunRecords(run);
+    this.events = new RunEvents(run.id);
     const { section, body } = foldedSection("Report", { whenOpened: () => this.loadReport() });
     this.report = body;
-    return [this.facts, ...this.results.sections, ...this.records.sections, section, this.makeSignatures(run)];
+    return [this.facts, ...this.results.sections, ...this.records.sections, this.events.section, section, this.makeSignatures(run)];
   }
 
   makeSignatures(run) {
@@ -123,9 +125,9 @@ export class RunView {
 
   /** Loads what a change of the jobs can have changed. */
   async load() {
-    const { run, results, records } = this;
+    const { run, results, records, events } = this;
     if (this.part === "report") await this.loadReport();
-    else await Promise.all([results.load(run), records.load()]);
+    else await Promise.all([results.load(run), records.load(), events.load()]);
     if (this.report?.closest("details")?.open) await this.loadReport();
   }
 

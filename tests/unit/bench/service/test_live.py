@@ -9,6 +9,7 @@ import orjson
 import pytest
 
 from bench.agent_protocol import AgentEvent, RunCommand
+from bench.catalogue import CatalogueUnavailableError
 from bench.jobs.progress import JobProgress
 from bench.live import Channel, LiveBatch, decode_batch, parse_channels
 from bench.live.listener import MAX_QUEUED_BATCHES, MAX_UNACKNOWLEDGED
@@ -62,6 +63,28 @@ def test_messages_of_the_agent_arrive_on_the_websocket(service):
         found = next(batches(socket))
         assert (found.sequence, found.utc_s, found.channels) == (7, 100.0, (("force", "N"),))
         np.testing.assert_array_equal(found.values, [[3.0, math.nan]])
+
+
+def test_a_live_event_has_the_number_and_the_time_of_the_stored_one(service):
+    with subscribe(service) as socket:
+        next(messages(socket, "clock"))  # it listens from now on
+        service.agent.publish(AgentEvent(time_ns=5, kind="alarm", text="temperature 61 degC over 60 degC"))
+        live = next(messages(socket, "event"))
+    (stored,) = service.get("/events")["items"]
+    assert live == {**{name: stored[name] for name in ("id", "run", "bench", "at", "kind", "text")}, "time_ns": 5}
+
+
+def test_an_event_that_cannot_be_stored_arrives_without_a_number(service, monkeypatch):
+    def fail(*given):
+        raise CatalogueUnavailableError("database or disk is full")
+
+    journal = service.client.app.state.context.catalogue.event_journal
+    monkeypatch.setattr(journal, "record", fail)
+    with subscribe(service) as socket:
+        next(messages(socket, "clock"))
+        service.agent.publish(AgentEvent(time_ns=5, kind="trip", text="force 1 900 N"))
+        live = next(messages(socket, "event"))
+    assert (live["id"], live["kind"], live["text"]) == (None, "trip", "force 1 900 N")
 
 
 def test_a_late_client_gets_the_latest_batch_with_its_age(service):

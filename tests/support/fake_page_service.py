@@ -499,8 +499,8 @@ def run_control_routes(bench: FakeBench) -> APIRouter:
 
     @router.post("/jobs/{job_id}/cancel")
     async def cancel(job_id: str) -> Any:
-        job = bench.runs["run-2"]["jobs"][0]
-        job |= {"state": "cancelled"}
+        job = next(job for one in bench.runs.values() for job in one["jobs"] if job["id"] == job_id)
+        job |= {"state": "cancelled", "position": None}
         return job
 
     return router
@@ -511,8 +511,10 @@ def result_routes(bench: FakeBench) -> APIRouter:
     router = APIRouter()
 
     @router.get("/jobs")
-    async def jobs() -> Any:
-        return {"items": [job for one in bench.runs.values() for job in one["jobs"]]}
+    async def jobs(request: Request) -> Any:
+        states = request.query_params.getlist("state")
+        found = [job for one in bench.runs.values() for job in one["jobs"] if job["state"] in states]
+        return {"items": found, "next": None}
 
     @router.get("/runs/{run_id}/fit")
     async def fit(run_id: str) -> Any:

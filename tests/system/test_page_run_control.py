@@ -1,5 +1,6 @@
 """Control of a run, retry of a job, check of a log and search at the web page, in a real browser."""
 
+import json
 import re
 
 import pytest
@@ -42,6 +43,14 @@ def test_the_buttons_call_the_service(seen, bench):
         "runs/run-3/resume",
     ]
     assert [path for path in paths if path in wanted] == wanted
+
+
+@browser_test
+def test_a_retry_asks_for_a_reason_and_sends_it(seen, bench):
+    assert "The job identify is failed: the worker was killed." in seen["question"]
+    assert seen["keptOpen"]
+    sent = [json.loads(body) for path, body in bench.posted if path == "jobs/job-run-3/retry"]
+    assert sent == [{"reason": "more memory"}]
 
 
 @browser_test

@@ -12,6 +12,7 @@ import { CompareView } from "./compare/compare.js";
 import { EventList } from "./bench/events.js";
 import { byId, fixed, write } from "./common/format.js";
 import { HealthStrip } from "./bench/health.js";
+import { JobView } from "./jobs/jobs.js";
 import { greyInstruments, showInstruments, showWarnings } from "./bench/instruments.js";
 import { Limits } from "./live/limits.js";
 import { LiveLink, fillCoilChannel } from "./live/live.js";
@@ -79,6 +80,7 @@ const events = new EventList();
 const plan = new PlanView();
 const campaigns = new CampaignView();
 const comparison = new CompareView();
+const jobs = new JobView({ clock });
 const people = new PeopleView();
 const tokens = new TokenView();
 const audit = new AuditView();
@@ -106,6 +108,7 @@ const router = new Router({
     runs.search(search.read(query));
   },
   compare: (address) => comparison.show(address),
+  jobs: () => jobs.show(),
   run: (address) => runView.show(address),
   specimens: (address) => specimens.show(address),
   specimen: (address) => specimen.show(address),

@@ -44,6 +44,14 @@ try {
 
   await page.goto(`${url}/#/runs/run-3`);
   await page.click("button:has-text('Retry identify')");
+  seen.question = await page.locator("#question-texts").innerText();
+  await page.keyboard.press("Enter"); // refused without a reason
+  seen.keptOpen = await page.locator("#question-dialog").isVisible();
+  await page.click("#question-dialog button[value=cancel]");
+  await page.locator("#question-dialog").waitFor({ state: "hidden" });
+  await page.click("button:has-text('Retry identify')");
+  await page.getByLabel("Reason for the repetition").fill(" more memory ");
+  await page.keyboard.press("Enter");
   await shows("run", "was queued again");
   await page.click("button:has-text('Check log')");
   await shows("run", "The log is changed");

@@ -1,18 +1,21 @@
 // Health of the service in one strip: agent, worker, queue, disk, wires, clocks, log store, calibration. Each entry is a word, with the reason of a fault.
+// The queue leads to its view.
 
 import { get } from "../common/api.js";
 import { byId, element, shortTime, spaced } from "../common/format.js";
+import { keep, refresh } from "../common/refresh.js";
 
 const PERIOD_MS = 5_000;
 /** Error of a clock [s] above which it is marked; a sample lasts a millisecond. */
 const CLOCK_ERROR_S = 1e-3;
 /** Order of the entries, whichever of them arrives first. */
 const ORDER = ["Service", "Agent", "Wires", "Clocks", "Worker", "Queue", "Campaigns", "Disk", "Log store", "Calibration"];
+/** Views that show more of an entry. */
+const VIEWS = { Queue: "#/jobs" };
 
 export class HealthStrip {
   constructor() {
     this.entries = {};
-    this.shown = "";
   }
 
   /** Requests the health now and from then on. */
@@ -50,13 +53,15 @@ export class HealthStrip {
   show(entries) {
     this.entries = entries.Service ? entries : { ...this.entries, ...entries };
     if (entries.Agent) delete this.entries.Service;
-    const text = JSON.stringify(this.entries);
-    if (text === this.shown) return;
-    this.shown = text;
     const shown = ORDER.filter((name) => this.entries[name]).map((name) => [name, this.entries[name]]);
-    byId("health").replaceChildren(...shown.map(([name, { kind, text: words }]) =>
-      element("li", {}, element("span", { className: `mark ${kind}` }, name), ` ${words}`)));
+    refresh(byId("health"), shown, () => shown.map(makeItem));
   }
+}
+
+function makeItem([name, { kind, text }]) {
+  const content = [element("span", { className: `mark ${kind}` }, name), ` ${text}`];
+  const address = VIEWS[name];
+  return element("li", {}, ...(address ? [keep(element("a", { href: address }, ...content), name)] : content));
 }
 
 /** Channels and dates alone; the view of the certificates has the rest. */

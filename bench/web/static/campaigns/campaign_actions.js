@@ -6,7 +6,7 @@ import { hasEnded } from "./campaign_words.js";
 import { openDialog } from "../common/dialogs.js";
 import { byId, element, spaced, write } from "../common/format.js";
 import { encodePhoto } from "./photo.js";
-import { keep, refresh } from "./refresh.js";
+import { keep, refresh } from "../common/refresh.js";
 import { need } from "../common/rights.js";
 import { followOperator, keepOperatorName } from "../common/session.js";
 

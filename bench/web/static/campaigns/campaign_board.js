@@ -3,7 +3,7 @@
 import { CampaignTrends } from "./campaign_trends.js";
 import { countStates, describeDrive, describePhase, hasEnded, markStatus, markStep } from "./campaign_words.js";
 import { byId, duration, element, fixed, instant, spaced } from "../common/format.js";
-import { keep, refresh } from "./refresh.js";
+import { keep, refresh } from "../common/refresh.js";
 import { runAddress } from "../common/router.js";
 
 /** Largest number of steps of one cell that are shown one by one. */

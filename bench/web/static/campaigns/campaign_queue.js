@@ -3,7 +3,7 @@
 import { start } from "../common/api.js";
 import { countStates, describeKind, hasEnded, markStep } from "./campaign_words.js";
 import { byId, element, instant, write } from "../common/format.js";
-import { keep, refresh } from "./refresh.js";
+import { keep, refresh } from "../common/refresh.js";
 import { need } from "../common/rights.js";
 
 const FIRST = 30;

@@ -4,7 +4,7 @@ import { AxesPlot, clearPlots, position } from "../common/axes_plot.js";
 import { describeDrive } from "./campaign_words.js";
 import { element, instant, significant, spaced } from "../common/format.js";
 import { axis, colour, signed } from "../common/plot_style.js";
-import { refresh } from "./refresh.js";
+import { refresh } from "../common/refresh.js";
 import { runAddress } from "../common/router.js";
 import { rowTable } from "../common/tables.js";
 

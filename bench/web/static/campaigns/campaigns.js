@@ -8,7 +8,7 @@ import { isAsking } from "../account/sign_in.js";
 import { CampaignStart } from "./campaign_start.js";
 import { campaignAddress, markStatus } from "./campaign_words.js";
 import { byId, clock, element, localTime, write, zone } from "../common/format.js";
-import { keep, refresh } from "./refresh.js";
+import { keep, refresh } from "../common/refresh.js";
 import { ReportSignatures } from "../runs/signatures.js";
 
 const PERIOD_MS = 2_000;

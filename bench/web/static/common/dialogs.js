@@ -20,11 +20,28 @@ export function onAnswer(id, answer, act) {
  *
  * `texts` are paragraphs that say what will happen; `action` is the word on the button that agrees.
  */
-export function ask({ title, texts, action }) {
+export const ask = ({ title, texts, action }) => openQuestion(title, texts.map((text) => element("p", {}, text)), action);
+
+/** Asks a question that needs a text, with the label of its field. Returns the text; empty if the person did not agree. */
+export async function askForText({ title, texts, label, action, maxLength = 500 }) {
+  const input = element("input", { autocomplete: "off", required: true, maxLength, pattern: ".*\\S.*", title: "Some words" });
+  // Enter would press the first button of the form, which cancels.
+  input.addEventListener("keydown", (event) => {
+    if (event.key !== "Enter") return;
+    event.preventDefault();
+    byId("question-agree").click();
+  });
+  const field = element("p", { className: "field" }, element("label", {}, label, input));
+  const agreed = openQuestion(title, [...texts.map((text) => element("p", {}, text)), field], action);
+  input.focus();
+  return (await agreed) ? input.value.trim() : "";
+}
+
+function openQuestion(title, content, action) {
   const dialog = byId("question-dialog");
   if (dialog.open) return Promise.resolve(false);
   write(byId("question-title"), title);
-  byId("question-texts").replaceChildren(...texts.map((text) => element("p", {}, text)));
+  byId("question-texts").replaceChildren(...content);
   write(byId("question-agree"), action);
   openDialog("question-dialog");
   return new Promise((resolve) => {

@@ -1,5 +1,5 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/plan/METHOD/edit`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`, `#/calibration?check=CHANNEL`, `#/audit`, `#/compare?run=A&run=B`.
+// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`, `#/calibration?check=CHANNEL`, `#/audit`, `#/compare?run=A&run=B`, `#/jobs`.
 // With several benches, each begins with the name of one: `#/@left/bench`.
 
 import { shownBench } from "./bench.js";
@@ -8,7 +8,7 @@ import { byId } from "./format.js";
 /** Views of one thing, by the view of their list. */
 const SINGLE = { runs: "run", specimens: "specimen" };
 /** View of the navigation to which another view belongs. */
-const PARENT = { run: "runs", compare: "runs", specimen: "specimens" };
+const PARENT = { run: "runs", compare: "runs", jobs: "runs", specimen: "specimens" };
 
 /** Returns bench, view, id, part and query of an address; an unknown view is the bench. */
 export function parseAddress(hash) {

@@ -3,7 +3,7 @@
 import { get, post, remove, saveFile, start } from "../common/api.js";
 import { shownBench } from "../common/bench.js";
 import { selectionAddress } from "../compare/compare_address.js";
-import { ask } from "../common/dialogs.js";
+import { ask, askForText } from "../common/dialogs.js";
 import { element, instant } from "../common/format.js";
 import { canResume, hasEnded, isFitted, isUnfinished, mayReport, mayRetry } from "./run_facts.js";
 import { need } from "../common/rights.js";
@@ -54,7 +54,7 @@ export class RunActions {
   work(run) {
     if (run.trashed) return [this.button(run, "restore", "Restore", () => this.restore(run))];
     const unfinished = run.jobs.filter(isUnfinished);
-    if (unfinished.length) return unfinished.map((job) => this.button(run, `cancel-${job.id}`, "Cancel", () => this.cancel(run, job)));
+    if (unfinished.length) return unfinished.map((job) => this.button(run, `cancel-${job.id}`, `Cancel ${job.kind}`, () => this.cancel(run, job)));
     if (run.state === "truncated") return [this.button(run, "repair", "Repair log", () => this.repair(run))];
     if (!hasEnded(run)) return [];
     const made = [this.button(run, "identify", "Identify", () => this.identify(run))];
@@ -66,7 +66,7 @@ export class RunActions {
   more(run) {
     if (run.trashed) return [];
     const made = run.jobs.filter((job) => mayRetry(job)).map((job) =>
-      this.button(run, `retry-${job.id}`, `Retry ${job.kind}`, () => this.retry(run, job)));
+      this.button(run, `retry-${job.id}`, `Retry ${job.kind} …`, () => this.retry(run, job)));
     if (run.log_sha256) made.push(element("a", { className: "button", href: selectionAddress([run.id]) }, "Compare with …"));
     if (run.log_sha256) made.push(this.button(run, "integrity", "Check log", () => this.checkLog(run)));
     if (canResume(run)) made.push(this.button(run, "resume", "Resume", () => this.resume(run)));
@@ -115,9 +115,13 @@ export class RunActions {
     });
   }
 
-  retry(run, job) {
-    return this.attempt(run, "Not requested", async () => {
-      await start(`jobs/${encode(job.id)}/retry`, { reason: "requested in the page" });
+  /** Queues a failed or cancelled job again, with the reason that the person gives. */
+  async retry(run, job) {
+    const texts = [`The job ${job.kind} is ${job.state}${job.error && `: ${job.error}`}. The reason is recorded with it.`];
+    const reason = await askForText({ title: `Repeat the job ${job.kind}?`, texts, label: "Reason for the repetition", action: "Retry" });
+    if (!reason) return;
+    await this.attempt(run, "Not requested", async () => {
+      await start(`jobs/${encode(job.id)}/retry`, { reason });
       return `The job ${job.kind} was queued again.`;
     });
   }

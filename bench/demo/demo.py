@@ -11,7 +11,7 @@ from bench.demo.api_client import ApiClient
 from bench.demo.folder import DemoFolder
 from bench.demo.processes import start_processes
 from bench.demo.recording import await_job, cancel_jobs, record
-from bench.demo.summary import print_answer, print_files, print_truth
+from bench.demo.summary import print_answer, print_files, print_truth, print_way_to_page
 from bench.errors import ReportError, RunError
 from bench.processes import MRBENCH_COMMAND
 from bench.progress import show_progress
@@ -46,6 +46,7 @@ class Demo:
             f"start simulated rig with a hidden effect (seed {self._folder.seed}), agent, service, worker"
         )
         with _handle_termination(), start_processes(self._folder) as page, _stop_jobs(ApiClient(page)) as api:
+            self._print_line(f"the page is open while the demo runs: {page}")
             self._find_effect(api)
             print_answer(self._folder, console)
             self._announce("open the truth")
@@ -56,6 +57,8 @@ class Demo:
             if serve:
                 with contextlib.suppress(KeyboardInterrupt):
                     self._keep_serving(api, page, console)
+            else:
+                print_way_to_page(console)
 
     def _keep_serving(self, api: ApiClient, page: str, console: Console) -> None:
         """Record further runs, which the page shows as they are made, and wait for Ctrl-C."""
@@ -108,7 +111,11 @@ class Demo:
 
     def _announce(self, step: str) -> None:
         self._step += 1
-        self._progress_console.print(f"{self._step}/{self._steps} {step}", highlight=False)
+        self._print_line(f"{self._step}/{self._steps} {step}")
+
+    def _print_line(self, text: str) -> None:
+        """Print a line unbroken, because a broken address cannot be opened."""
+        self._progress_console.print(text, highlight=False, soft_wrap=True)
 
 
 def _run_mrbench(*arguments: object) -> None:

@@ -61,6 +61,12 @@ def print_files(demo: DemoFolder, console: Console) -> None:
         console.print(f"  {name:<15} {path}  {note}".rstrip(), highlight=False, soft_wrap=True)
 
 
+def print_way_to_page(console: Console) -> None:
+    """Print how the page stays open, because it closes with the demo."""
+    text = "The page has closed with the demo. mrbench demo --serve keeps it open, with three recorded runs."
+    console.print(f"\n{text}", highlight=False, soft_wrap=True)
+
+
 def _read_unseen(demo: DemoFolder) -> Prediction | None:
     return None if demo.prediction is None else read_prediction(demo.prediction)
 

@@ -1,9 +1,13 @@
 """``mrbench demo`` as a process."""
 
 import json
+import re
 import subprocess
 import sys
+import time
 from pathlib import Path
+from urllib.error import URLError
+from urllib.request import urlopen
 
 import pytest
 
@@ -11,6 +15,7 @@ from bench.agent_protocol import StatusCommand
 from bench.agent_protocol.agent_client import AgentClient
 from bench.agent_protocol.endpoint import make_endpoint
 from bench.catalogue import Catalogue, make_sqlite_url, open_database
+from bench.client import Bench
 from bench.config import AgentSection
 from bench.errors import AgentUnreachableError
 from bench.log.reader import read_log
@@ -23,6 +28,8 @@ pytestmark = [pytest.mark.wire, pytest.mark.timeout(1000)]
 COMMAND = Path(sys.executable).parent / "mrbench"
 SEED = 1
 """Default seed of the demo."""
+PAGE = re.compile(r"http://127\.0\.0\.1:\d+/#token=\S+")
+"""Address of the page, with the token."""
 
 
 def mrbench(*arguments):
@@ -62,6 +69,18 @@ def test_each_step_is_announced_on_standard_error(demo):
         "5/6 open the truth",
         "6/6 write the report",
     ]
+
+
+def test_the_address_of_the_page_comes_before_the_first_recording(demo):
+    lines = demo[0].stderr.splitlines()
+    (place,) = [number for number, line in enumerate(lines) if PAGE.search(line)]
+    assert lines[place - 1].startswith("1/6")
+    assert lines[place + 1].startswith("2/6")
+
+
+def test_the_end_says_how_the_page_stays_open(demo):
+    last = demo[0].stdout.splitlines()[-1]
+    assert "mrbench demo --serve keeps it open, with three recorded runs" in last
 
 
 def test_the_log_was_recorded_over_the_wires_and_is_clean(demo):
@@ -182,3 +201,41 @@ def test_a_folder_that_cannot_be_created_gives_a_one_line_message(tmp_path):
     assert result.returncode == 1
     assert result.stderr.count("\n") == 1
     assert "cannot be created" in result.stderr
+
+
+@pytest.fixture
+def served(tmp_path):
+    """Return the process of a demo that keeps serving, and the file with its progress."""
+    command = [str(COMMAND), "demo", "--quick", "--serve", "--out", str(tmp_path / "demo")]
+    with (tmp_path / "errors").open("w") as errors, (tmp_path / "output").open("w") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=errors, env=ENVIRONMENT)
+    yield process, tmp_path / "errors"
+    if process.poll() is None:
+        process.terminate()
+        process.wait()
+
+
+def wait_while_running(process, errors, find):
+    """Return what is found as soon as there is something; fail once the process has ended without it."""
+    while not (found := find()):
+        assert process.poll() is None, errors.read_text()
+        time.sleep(0.1)
+    return found
+
+
+def test_a_demo_with_serve_shows_three_runs_until_it_is_terminated(served):
+    process, errors = served
+    page = wait_while_running(process, errors, lambda: PAGE.search(errors.read_text()))[0]
+    with urlopen(page.partition("#")[0]) as answer:
+        assert b"mrbench" in answer.read()
+    assert not (errors.parent / "demo" / "fit.json").exists()
+    wait_while_running(process, errors, lambda: "three runs are recorded" in errors.read_text())
+    runs = Bench(page).list_runs()
+    assert {run.method for run in runs} == {"quick", "validation", "multisine"}
+    assert {run.state for run in runs} == {"ended"}
+    process.terminate()
+    process.wait()
+    assert process.returncode == 0, errors.read_text()
+    with pytest.raises(URLError):
+        urlopen(page.partition("#")[0])
+    assert PAGE.search((errors.parent / "output").read_text())[0] == page

@@ -4,10 +4,12 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from fastapi.responses import FileResponse, Response
+from fastapi.responses import FileResponse
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive, Scope, Send
+
+from bench.service.requests import NOT_MODIFIED, is_known, make_not_modified
 
 
 class SnapshotResponse(FileResponse):
@@ -40,23 +42,17 @@ class SnapshotResponse(FileResponse):
         Raises:
             HTTPException: the requested range is invalid, or outside the file.
         """
-        if _is_known(Headers(scope=scope).get("if-none-match", ""), self.headers["etag"]):
-            await Response(status_code=HTTPStatus.NOT_MODIFIED, headers={"ETag": self.headers["etag"]})(
-                scope, receive, send
-            )
+        tag = self.headers["etag"]
+        if is_known(Headers(scope=scope).get("if-none-match"), tag):
+            await make_not_modified(tag)(scope, receive, send)
             return
         await super().__call__(scope, receive, _limit_length(send))
 
 
 def describe_file(*media_types: str) -> dict[int | str, dict[str, Any]]:
     """Describe a file as the answer of a route, for OpenAPI."""
-    return {HTTPStatus.OK: {"description": "the file", "content": {media_type: {} for media_type in media_types}}}
-
-
-def _is_known(known: str, tag: str) -> bool:
-    """Return whether a list of tags, or `*`, contains the tag of a file."""
-    tags = [one.strip().removeprefix("W/") for one in known.split(",")]
-    return "*" in tags or tag in tags
+    content: dict[str, Any] = {media_type: {} for media_type in media_types}
+    return {HTTPStatus.OK: {"description": "the file", "content": content}, **NOT_MODIFIED}
 
 
 def _limit_length(send: Send) -> Send:

@@ -241,11 +241,6 @@ def make_run_view(row: RunRow, jobs: list[JobRow], *statuses: AgentStatus | None
     )
 
 
-def make_run_tag(row: RunRow) -> str:
-    """Return the entity tag of what a person may change on a run."""
-    return f'"{row.revision}"'
-
-
 def _find_progress(row: RunRow, statuses: Iterable[AgentStatus | None]) -> RunProgress | None:
     runs = (status.run for status in statuses if status is not None)
     run = next((run for run in runs if run is not None and run.id == row.id), None)

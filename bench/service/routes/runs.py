@@ -18,11 +18,21 @@ from bench.methods import Method, compile_method, parse_method
 from bench.service.benches import ServedBench
 from bench.service.context import Context, ServiceContext
 from bench.service.problems import ProblemError, make_conflict
-from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, find_first_request, get_operator
+from bench.service.requests import (
+    IDEMPOTENT,
+    NOT_MODIFIED,
+    IdempotentRoute,
+    KnownTags,
+    Sender,
+    find_first_request,
+    get_operator,
+    make_tag,
+    send_unless_known,
+)
 from bench.service.routes.planning import find_method
 from bench.service.routes.run_search import RunSearch
 from bench.service.run_registry import make_run_row
-from bench.service.views import Run, RunPage, StartRunRequest, make_run_tag, make_run_view
+from bench.service.views import Run, RunPage, StartRunRequest, make_run_view
 
 router = APIRouter(prefix="/runs", tags=["runs"], route_class=IdempotentRoute)
 _START_TIMEOUT = 5.0
@@ -196,15 +206,16 @@ def list_runs(
     return RunPage(items=tuple(context.make_run_views(*page)), next=page[-1].id if len(rows) > limit else None)
 
 
-@router.get("/{run_id}")
-def get_run(run_id: str, context: Context, response: Response) -> Run:
+@router.get("/{run_id}", response_model=Run, responses=NOT_MODIFIED)
+def get_run(run_id: str, context: Context, known: KnownTags = None) -> Response:
     """Return one run with its progress, its jobs and the result of its newest fit.
 
-    The header `ETag` names the state of what a person may change, for `If-Match` of `PATCH`.
+    The header `ETag` names this answer, for `If-None-Match`. Its first part names the state of what a person may
+    change, for `If-Match` of `PATCH`.
     """
     row = context.get_run(run_id)
-    response.headers["ETag"] = make_run_tag(row)
-    return context.make_run_views(row)[0]
+    view = context.make_run_views(row)[0]
+    return send_unless_known(view, make_tag(view, row.revision), known)
 
 
 @router.post("/{run_id}/stop")

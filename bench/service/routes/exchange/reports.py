@@ -15,13 +15,15 @@ from bench.jobs import DIAGNOSIS_FILE, FIT_FILE, REPORT_FILE
 from bench.report.formats import REPORT_FORMATS, ReportFormat
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse
+from bench.service.requests import NOT_MODIFIED
 from bench.service.routes.exchange.offers import MEDIA_TYPES
 from bench.service.routes.results import check_complete
 from bench.service.transfer import run_command, send_temporary_file
 
 router = APIRouter(prefix="/runs", tags=["results"])
 _FILES: dict[int | str, dict[str, Any]] = {
-    200: {"description": "the report", "content": {MEDIA_TYPES[one]: {} for one in REPORT_FORMATS}}
+    200: {"description": "the report", "content": {MEDIA_TYPES[one]: {} for one in REPORT_FORMATS}},
+    **NOT_MODIFIED,
 }
 _DOCUMENTS = {"identify": ("--fit", FIT_FILE), "diagnose": ("--diagnosis", DIAGNOSIS_FILE)}
 """Option of the report and file of each kind of job."""

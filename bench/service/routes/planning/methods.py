@@ -10,7 +10,14 @@ from bench.catalogue import SHIPPED_VERSION, ApprovalRow, MethodRow
 from bench.methods import Method, compile_method, list_shipped_methods, load_method
 from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
-from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender
+from bench.service.requests import (
+    IDEMPOTENT,
+    NOT_MODIFIED,
+    IdempotentRoute,
+    KnownTags,
+    Sender,
+    send_unless_known,
+)
 from bench.service.routes.planning.method_library import (
     StoredMethod,
     describe_facts,
@@ -78,16 +85,20 @@ def _store(context: ServiceContext, method: Method) -> tuple[StoredMethod, bool]
     return StoredMethod(method, stored.version, stored.created), is_new
 
 
-@router.get("/{name}", response_model_exclude_defaults=True)
-def get_method(name: str, context: Context) -> Method:
-    """Return the document of the newest version of a method."""
-    return find_method(context, name).method
+@router.get("/{name}", response_model=Method, responses=NOT_MODIFIED)
+def get_method(name: str, context: Context, known: KnownTags = None) -> Response:
+    """Return the document of the newest version of a method; the header `ETag` is the hash of its content."""
+    return _send(find_method(context, name), known)
 
 
-@router.get("/{name}/{version:int}", response_model_exclude_defaults=True)
-def get_method_version(name: str, version: int, context: Context) -> Method:
-    """Return the document of a version of a method."""
-    return find_method(context, name, version).method
+@router.get("/{name}/{version:int}", response_model=Method, responses=NOT_MODIFIED)
+def get_method_version(name: str, version: int, context: Context, known: KnownTags = None) -> Response:
+    """Return the document of a version of a method; the header `ETag` is the hash of its content."""
+    return _send(find_method(context, name, version), known)
+
+
+def _send(found: StoredMethod, known: str | None) -> Response:
+    return send_unless_known(found.method, f'"{found.method.compute_sha256()}"', known, exclude_defaults=True)
 
 
 @router.get("/{name}/versions")

@@ -3,13 +3,23 @@
 from http import HTTPStatus
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Query, Response
+from fastapi import APIRouter, Query, Response
 
 from bench.catalogue import Specimen
 from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
-from bench.service.problems import MEDIA_TYPE, ProblemError, make_conflict, make_not_found
-from bench.service.requests import IDEMPOTENT, IdempotentRoute
+from bench.service.problems import ProblemError, make_conflict, make_not_found
+from bench.service.requests import (
+    IDEMPOTENT,
+    NOT_MODIFIED,
+    PRECONDITIONS,
+    ExpectedTag,
+    IdempotentRoute,
+    KnownTags,
+    is_expected,
+    make_tag,
+    send_unless_known,
+)
 from bench.service.routes.planning.views import (
     SpecimenChange,
     SpecimenLimits,
@@ -19,11 +29,6 @@ from bench.service.routes.planning.views import (
 )
 
 router = APIRouter(prefix="/specimens", tags=["specimens"], route_class=IdempotentRoute)
-_PROBLEM = {"content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
-_PRECONDITIONS: dict[int | str, dict[str, Any]] = {
-    412: {"description": "The specimen was changed meanwhile", **_PROBLEM},
-    428: {"description": "The header If-Match is missing", **_PROBLEM},
-}
 
 
 @router.get("")
@@ -47,39 +52,45 @@ def register_specimen(request: SpecimenRequest, context: Context, response: Resp
     if not context.catalogue.specimens.describe(request.serial, 0, _make_values(request)):
         detail = f"specimen {request.serial} has a description; change it with PATCH"
         raise make_conflict("specimen-registered", "The specimen is registered", detail)
-    found = _get_specimen(context, request.serial)
-    response.headers["ETag"] = _make_tag(found)
-    return _make_view(found)
+    return _show(context, request.serial, response)
 
 
-@router.get("/{serial:path}")
-def get_specimen(serial: str, context: Context, response: Response) -> SpecimenView:
-    """Return one specimen; the header `ETag` names the state of its description, for `If-Match`."""
+@router.get("/{serial:path}", response_model=SpecimenView, responses=NOT_MODIFIED)
+def get_specimen(serial: str, context: Context, known: KnownTags = None) -> Response:
+    """Return one specimen; the header `ETag` names this answer, its first part the state of the description."""
     found = _get_specimen(context, serial)
-    response.headers["ETag"] = _make_tag(found)
-    return _make_view(found)
+    view = _make_view(found)
+    return send_unless_known(view, make_tag(view, found.revision), known)
 
 
-@router.patch("/{serial:path}", responses=_PRECONDITIONS)
+@router.patch("/{serial:path}", responses=PRECONDITIONS)
 def change_specimen(
     serial: str,
     change: SpecimenChange,
     context: Context,
     response: Response,
-    if_match: Annotated[str | None, Header(description="`ETag` of the description that was read")] = None,
+    expected: ExpectedTag = None,
 ) -> SpecimenView:
     """Change the description of a specimen; fields that are left out stay as they are."""
     found = _get_specimen(context, serial)
-    if if_match is None:
+    if expected is None:
         detail = f"send the ETag of specimen {serial} as If-Match, so that no other change is lost"
         raise ProblemError(HTTPStatus.PRECONDITION_REQUIRED, "if-match-missing", "If-Match is missing", detail)
     values = _make_values(change)
     note_old(_make_view(found).model_dump(mode="json", include=set(values)))
-    is_seen = if_match == _make_tag(found)
+    is_seen = is_expected(expected, found.revision)
     if not is_seen or not context.catalogue.specimens.describe(serial, found.revision, values):
         detail = f"specimen {serial} was changed meanwhile; read it again and repeat the change"
         raise ProblemError(HTTPStatus.PRECONDITION_FAILED, "changed-meanwhile", "Changed meanwhile", detail)
-    return get_specimen(serial, context, response)
+    return _show(context, serial, response)
+
+
+def _show(context: ServiceContext, serial: str, response: Response) -> SpecimenView:
+    """Return the view of a specimen after a change, with its tag in the header."""
+    found = _get_specimen(context, serial)
+    view = _make_view(found)
+    response.headers["ETag"] = make_tag(view, found.revision)
+    return view
 
 
 def _get_specimen(context: ServiceContext, serial: str) -> Specimen:
@@ -96,10 +107,6 @@ def _make_values(change: SpecimenChange) -> dict[str, Any]:
     if "limits" in values:
         values["limits"] = change.limits.model_dump(exclude_none=True)
     return values
-
-
-def _make_tag(specimen: Specimen) -> str:
-    return f'"{specimen.revision}"'
 
 
 def _make_view(specimen: Specimen) -> SpecimenView:

@@ -1,25 +1,28 @@
 """Routes of notes and tags: an append-only layer beside the log, which never changes."""
 
 from http import HTTPStatus
-from typing import Annotated, Any
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Response
 
 from bench.catalogue import NoteRow
 from bench.service.audit import note_old
 from bench.service.context import Context
-from bench.service.problems import MEDIA_TYPE, ProblemError
-from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, get_author
+from bench.service.problems import ProblemError
+from bench.service.requests import (
+    IDEMPOTENT,
+    PRECONDITIONS,
+    ExpectedTag,
+    IdempotentRoute,
+    Sender,
+    get_author,
+    is_expected,
+    make_tag,
+)
 from bench.service.routes.recordings.events import After, Limit
 from bench.service.routes.recordings.views import NotePage, NoteRequest, NoteView, RunChange
-from bench.service.views import Run, make_run_tag
+from bench.service.views import Run
 
 router = APIRouter(prefix="/runs", tags=["recordings"], route_class=IdempotentRoute)
-_PROBLEM = {"content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
-_PRECONDITIONS: dict[int | str, dict[str, Any]] = {
-    412: {"description": "The run was changed meanwhile", **_PROBLEM},
-    428: {"description": "The header If-Match is missing", **_PROBLEM},
-}
 
 
 @router.get("/{run_id}/notes")
@@ -40,30 +43,31 @@ def add_note(run_id: str, request: NoteRequest, context: Context, sender: Sender
     )
 
 
-@router.patch("/{run_id}", responses=_PRECONDITIONS)
+@router.patch("/{run_id}", responses=PRECONDITIONS)
 def change_run(
     run_id: str,
     change: RunChange,
     context: Context,
     response: Response,
     sender: Sender,
-    if_match: Annotated[str | None, Header(description="`ETag` of `GET /runs/{run_id}`")] = None,
+    expected: ExpectedTag = None,
 ) -> Run:
     """Change the tags of a run, and note who did; refused if the run was changed since it was read."""
     row = context.get_run(run_id)
-    if if_match is None:
+    if expected is None:
         detail = "PATCH needs the header If-Match with the ETag of GET /runs/{id}; read the run first"
         raise ProblemError(HTTPStatus.PRECONDITION_REQUIRED, "if-match-missing", "If-Match is missing", detail)
     note_old({"tags": row.tags})
-    is_current = if_match in ("*", make_run_tag(row))
+    is_current = is_expected(expected, row.revision)
     notebook = context.catalogue.notebook
     author = get_author(sender, change.author)
     changed = notebook.change_tags(run_id, author, change.tags, row.revision) if is_current else None
     if changed is None:
         detail = f"run {run_id} was changed meanwhile; read it again and repeat the change"
         raise ProblemError(HTTPStatus.PRECONDITION_FAILED, "changed-meanwhile", "Changed meanwhile", detail)
-    response.headers["ETag"] = make_run_tag(changed)
-    return context.make_run_views(changed)[0]
+    view = context.make_run_views(changed)[0]
+    response.headers["ETag"] = make_tag(view, changed.revision)
+    return view
 
 
 def _make_view(row: NoteRow) -> NoteView:

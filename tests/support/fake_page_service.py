@@ -21,6 +21,7 @@ from bench.errors import MethodError
 from bench.live import Channel, LiveBatch, describe_channels
 from bench.methods import Method, compile_method, compute_envelope, load_method, parse_method
 from bench.service.routes.planning.previews import make_preview
+from tests.support.fake_batches import FakeBatches, batch_routes
 from tests.support.fake_campaigns import FakeCampaigns, campaign_routes
 from tests.support.fake_certificates import add_certificate_routes
 from tests.support.fake_comparison import comparison_routes
@@ -272,6 +273,7 @@ def application(bench: FakeBench) -> FastAPI:
     others = (
         recording_routes(),
         comparison_routes(),
+        batch_routes(FakeBatches(bench.runs)),
         analysis_routes(),
         record_routes(bench.records, problem),
         campaign_routes(FakeCampaigns()),

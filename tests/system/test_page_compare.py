@@ -10,6 +10,8 @@ from tests.support.fake_comparison import TRUNCATED
 from tests.support.fake_page_service import TOKEN, FakeBench, served
 from tests.support.page_in_browser import browser_test, operate_page
 
+NOTHING_SELECTED = "Select two or more runs with complete logs to compare them, or any number to analyse them."
+
 
 @pytest.fixture(scope="module")
 def seen():
@@ -33,8 +35,9 @@ def test_the_fake_service_returns_comparisons_of_the_product():
 @browser_test
 def test_runs_are_selected_with_the_keyboard_and_stay_selected_over_a_search(seen):
     assert seen["errors"] == []
-    assert seen["nothing"] == ["Select two or more runs with complete logs, to compare them.", True]
-    assert re.fullmatch(r"1 run is selected, run of .*\. Select the runs to compare with it\.", seen["one"][0])
+    assert seen["nothing"] == [NOTHING_SELECTED, True]
+    one = r"1 run is selected, run of .*\. Select the runs to compare with it, or analyse it\."
+    assert re.fullmatch(one, seen["one"][0])
     assert (seen["one"][1], seen["truncated"]) == (True, True)
     assert sorted(seen["kept"]) == ["run-1", "run-3"]
     assert seen["two"].startswith("2 runs are selected; the others are compared with run of 2025-03-04")

@@ -2,6 +2,7 @@
 
 import { Account } from "./account/account.js";
 import { AuditView } from "./account/audit_trail.js";
+import { BatchView } from "./batches/batch_view.js";
 import { BenchList } from "./bench/bench_list.js";
 import { benchPath } from "./common/bench.js";
 import { get, readSession } from "./common/api.js";
@@ -81,6 +82,7 @@ const plan = new PlanView();
 const campaigns = new CampaignView();
 const comparison = new CompareView();
 const jobs = new JobView({ clock });
+const batch = new BatchView();
 const people = new PeopleView();
 const tokens = new TokenView();
 const audit = new AuditView();
@@ -109,6 +111,7 @@ const router = new Router({
   },
   compare: (address) => comparison.show(address),
   jobs: () => jobs.show(),
+  batches: (address) => batch.show(address),
   run: (address) => runView.show(address),
   specimens: (address) => specimens.show(address),
   specimen: (address) => specimen.show(address),
@@ -128,6 +131,7 @@ offerUnits(() => {
   specimen.relabel();
   runView.relabel();
   comparison.relabel();
+  batch.relabel();
   checks.list();
 });
 

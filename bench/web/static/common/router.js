@@ -1,5 +1,6 @@
 // Views of the page by their addresses: `#/bench`, `#/plan/METHOD`, `#/plan/METHOD/edit`, `#/runs?specimen=S`, `#/runs/ID`, `#/runs/ID/report`,
-// `#/runs/ID/replay`, `#/specimens/SERIAL`, `#/campaigns/ID`, `#/calibration?check=CHANNEL`, `#/audit`, `#/compare?run=A&run=B`, `#/jobs`.
+// `#/runs/ID/replay`, `#/batches/ID`, `#/jobs`, `#/specimens/SERIAL`, `#/campaigns/ID`, `#/calibration?check=CHANNEL`, `#/audit`,
+// `#/compare?run=A&run=B`.
 // With several benches, each begins with the name of one: `#/@left/bench`.
 
 import { shownBench } from "./bench.js";
@@ -8,7 +9,7 @@ import { byId } from "./format.js";
 /** Views of one thing, by the view of their list. */
 const SINGLE = { runs: "run", specimens: "specimen" };
 /** View of the navigation to which another view belongs. */
-const PARENT = { run: "runs", compare: "runs", jobs: "runs", specimen: "specimens" };
+const PARENT = { run: "runs", compare: "runs", jobs: "runs", batches: "runs", specimen: "specimens" };
 
 /** Returns bench, view, id, part and query of an address; an unknown view is the bench. */
 export function parseAddress(hash) {
@@ -42,6 +43,9 @@ function decode(text) {
 
 /** Address of a run, or of one of its parts. */
 export const runAddress = (id, part = "") => `#/runs/${encodeURIComponent(id)}${part && `/${part}`}`;
+
+/** Address of a batch. */
+export const batchAddress = (id) => `#/batches/${encodeURIComponent(id)}`;
 
 /** Address of a specimen. */
 export const specimenAddress = (serial) => `#/specimens/${encodeURIComponent(serial)}`;

@@ -5,6 +5,7 @@ import { makeDriveTable, makeParameterTable } from "./fit_tables.js";
 import { element, spaced } from "../common/format.js";
 import { makeNextStroke } from "./next_stroke.js";
 import { DiagnosisPart } from "./run_diagnosis.js";
+import { loadChanges, makeChanges } from "./result_changes.js";
 import { describeMissing, findDone, isFitted } from "./run_facts.js";
 import { ForceComparison } from "./run_force.js";
 import { foldedSection } from "../common/tables.js";
@@ -31,13 +32,14 @@ export class RunResults {
     Object.assign(this, { run, done });
     if (isKnown) return this.showMissing();
     const path = `runs/${encodeURIComponent(run.id)}`;
-    const [fit, diagnosis, calibrated] = await Promise.all([
+    const [fit, diagnosis, calibrated, fitChanges, diagnosisChanges] = await Promise.all([
       isFitted(run) ? get(`${path}/fit`) : null, findDone(run, "diagnose") ? get(`${path}/diagnosis`) : null,
       isFitted(run) ? get(`${path}/fit/calibration`).catch(() => null) : null, // a fit of several logs has none
+      loadChanges(run, "identify"), loadChanges(run, "diagnose"),
     ]);
     const driveUnit = fit?.drive_unit ?? (diagnosis && (await get(`${path}/segments`)).drive_unit);
     if (run !== this.run) return; // another state of the run was shown meanwhile
-    this.documents = { fit, diagnosis, calibrated, driveUnit };
+    this.documents = { fit, diagnosis, calibrated, driveUnit, fitChanges, diagnosisChanges };
     this.showDiagnosis();
     this.showFit();
     this.showMissing();
@@ -75,10 +77,13 @@ export class RunResults {
   }
 
   showProvenance() {
-    const { fit, diagnosis } = this.documents;
-    const origins = [...(fit ? [describeOrigin("Fit", fit)] : []), ...(diagnosis ? [describeOrigin("Diagnosis", diagnosis)] : [])];
-    this.provenance.section.hidden = !origins.length;
-    this.provenance.body.replaceChildren(...origins.flat());
+    const { fit, diagnosis, fitChanges, diagnosisChanges } = this.documents;
+    const parts = [
+      ...(fit ? [...describeOrigin("Fit", fit), ...makeChanges("Fit", fitChanges)] : []),
+      ...(diagnosis ? [...describeOrigin("Diagnosis", diagnosis), ...makeChanges("Diagnosis", diagnosisChanges)] : []),
+    ];
+    this.provenance.section.hidden = !parts.length;
+    this.provenance.body.replaceChildren(...parts);
   }
 
   /** Shows everything in changed units. */

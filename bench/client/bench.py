@@ -6,24 +6,25 @@ from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
+from bench.client.calibration import Calibration, CheckName
 from bench.client.campaign import Campaign
 from bench.client.errors import ClientError
+from bench.client.job import Job
 from bench.client.live import LiveSamples, iterate_live
 from bench.client.multipart import Field
-from bench.client.run import Run, RunState, parse_run_state
+from bench.client.run import Run
 from bench.client.session import STOP_TIMEOUT, Session, quote_name
+from bench.client.states import RunState, parse_run_state
 
 _PAGE_SIZE = 50
 """Number of runs requested at a time."""
 _MOST_METHODS = 500
 """Largest number of listed methods."""
-CheckName: TypeAlias = Literal["zero", "shunt"]
-"""Kind of a check."""
 
 
-class Bench:
+class Bench(Calibration):
     """Bench behind a service.
 
     Args:
@@ -39,8 +40,7 @@ class Bench:
     def __init__(
         self, url: str, token: str | None = None, certificate: Path | None = None, name: str | None = None
     ) -> None:
-        self._session = Session(url, token, certificate)
-        self._name = name
+        super().__init__(Session(url, token, certificate), name)
         self._path = "/bench" if name is None else f"/benches/{quote_name(name)}"
         self._choice = {} if name is None else {"bench": name}  # a service of an older version knows no name
 
@@ -71,6 +71,10 @@ class Bench:
     def run(self, run_id: str) -> Run:
         """Return a run by its id; nothing is requested yet."""
         return Run(self._session, run_id)
+
+    def job(self, job_id: str) -> Job:
+        """Return a job by its id; nothing is requested yet."""
+        return Job(self._session, job_id)
 
     def list_runs(self, limit: int = _PAGE_SIZE, **search: str | float | datetime) -> list[RunState]:
         """Return the runs that meet all conditions, the newest first.
@@ -186,101 +190,6 @@ class Bench:
         """
         return list(self._session.get("/campaigns", limit=limit)["items"])
 
-    def list_certificates(self, channel: str | None = None) -> list[dict[str, Any]]:
-        """Return the newest version of every calibration certificate, with its state.
-
-        Args:
-            channel: only those of this channel; None for all.
-
-        Raises:
-            ClientError: there is no such channel, or the service cannot be reached.
-        """
-        return list(self._session.get("/certificates", channel=channel)["items"])
-
-    def add_certificate(self, certificate: Mapping[str, Any]) -> dict[str, Any]:
-        """Store a calibration certificate and return it with its id.
-
-        Args:
-            certificate: document `mrbench.certificate/1`.
-
-        Raises:
-            ClientError: the certificate is refused or stored already, or the service cannot be reached.
-        """
-        return dict(self._session.post(self._add_choice("/certificates"), certificate, key=uuid.uuid4().hex))
-
-    def correct_certificate(self, certificate_id: str, reason: str, **changes: object) -> dict[str, Any]:
-        """Store a correction of a certificate as its next version, and return that.
-
-        Args:
-            certificate_id: id of the certificate.
-            reason: reason of the correction.
-            changes: new values of date, due, points, uncertainty, standard or note.
-
-        Raises:
-            ClientError: the correction is refused, or the service cannot be reached.
-        """
-        return dict(
-            self._session.patch(f"/certificates/{quote_name(certificate_id)}", {"reason": reason, **changes})
-        )
-
-    def withdraw_certificate(self, certificate_id: str, reason: str) -> dict[str, Any]:
-        """Withdraw a certificate, which stays visible, and return it.
-
-        Raises:
-            ClientError: it is withdrawn already, or the service cannot be reached.
-        """
-        return dict(self._session.delete(f"/certificates/{quote_name(certificate_id)}", reason=reason))
-
-    def list_checks(
-        self, channel: str | None = None, limit: int = _PAGE_SIZE, check: CheckName = "zero"
-    ) -> list[dict[str, Any]]:
-        """Return the newest records of checks, one for each run and channel.
-
-        Args:
-            channel: only those of this channel; None for all.
-            limit: largest number of records.
-            check: `zero` for the mean at rest, `shunt` for the change of the force by the shunt.
-
-        Raises:
-            ClientError: there is no such channel or check, or the service cannot be reached.
-        """
-        page = self._session.get("/checks", channel=channel, limit=limit, bench=self._name, check=check)
-        return list(page["items"])
-
-    def get_check_chart(
-        self, channel: str, specimen: str | None = None, check: CheckName = "zero"
-    ) -> dict[str, Any]:
-        """Return the control chart of a channel: centre, limits, points, state in words.
-
-        Args:
-            channel: such as `force`.
-            specimen: mounted damper during the checks; None for that of the latest check.
-            check: kind of the checks, `zero` or `shunt`.
-
-        Raises:
-            ClientError: there is no such channel or check, or the service cannot be reached.
-        """
-        path = f"/checks/{quote_name(channel)}/chart"
-        return dict(self._session.get(path, specimen=specimen, bench=self._name, check=check))
-
-    def begin_check_baseline(
-        self, channel: str, reason: str, specimen: str | None = None, check: CheckName = "zero"
-    ) -> dict[str, Any]:
-        """Let only checks from now on count in the chart of a channel, and return that chart.
-
-        Args:
-            channel: such as `force`.
-            reason: reason, such as a repair, for people.
-            specimen: mounted damper during the checks; None for that of the latest check.
-            check: kind of the checks, `zero` or `shunt`.
-
-        Raises:
-            ClientError: it is refused, or the service cannot be reached.
-        """
-        path = self._add_choice(f"/checks/{quote_name(channel)}/baseline")
-        request = {"reason": reason, "specimen": specimen, "check": check}
-        return dict(self._session.post(path, request, key=uuid.uuid4().hex))
-
     def start_zero_check(self, specimen: str, operator: str = "") -> Run:
         """Start the zero check of this bench: the rod rests at the middle without drive for 25 s.
 
@@ -331,9 +240,21 @@ class Bench:
         """
         self._session.post(f"{self._path}/stop", timeout=STOP_TIMEOUT)
 
-    def _add_choice(self, path: str) -> str:
-        """Return a path with the name of the bench in its query, if there is one."""
-        return path if self._name is None else f"{path}?bench={quote_name(self._name)}"
+    def abort(self) -> None:
+        """Stop coil and actuator at once by the path of a trip; it latches until `reset`, also if nothing moves.
+
+        Raises:
+            ClientError: the service or its agent cannot be reached.
+        """
+        self._session.post(f"{self._path}/abort", timeout=STOP_TIMEOUT)
+
+    def reset(self) -> None:
+        """Reset a trip whose cause is removed; nothing moves.
+
+        Raises:
+            ClientError: the cause is not removed, or the service or its agent cannot be reached.
+        """
+        self._session.post(f"{self._path}/reset")
 
     def _iterate_runs(self, page_size: int, conditions: Mapping[str, str | float]) -> Iterator[RunState]:
         before = None

@@ -1,80 +1,21 @@
 """One run of the service."""
 
 import time
-from collections.abc import Callable
-from datetime import datetime
+import uuid
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
 from bench.client.arrays import Arrays, make_arrays
 from bench.client.errors import ClientError
+from bench.client.job import Job
 from bench.client.session import STOP_TIMEOUT, Session, quote_name
 from bench.client.signed_reports import SignedReports
-from bench.validation import describe_validation_error
+from bench.client.states import RunState, parse_run_state
+from bench.log import Format
 
 _POLL_PERIOD = 0.5
 """Time [s] between two requests while a script waits."""
-_UNFINISHED_JOBS = ("queued", "running")
-_IDENTIFIED_OUTCOMES = ("clean", "lossy")
-"""Outcomes of a run of the bench that the service identifies by itself."""
-
-
-class JobState(BaseModel):
-    """Job of a run; the service may send further fields."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore")
-
-    id: str
-    kind: str
-    state: str
-    error: str = ""
-
-    @property
-    def is_finished(self) -> bool:
-        """Return whether the job is done, failed or cancelled."""
-        return self.state not in _UNFINISHED_JOBS
-
-
-class RunState(BaseModel):
-    """State of a run when it was requested; the service may send further fields."""
-
-    model_config = ConfigDict(frozen=True, extra="ignore")
-
-    id: str
-    method: str
-    specimen: str
-    operator: str
-    bench: str | None = None
-    """Name of the bench in the service; None in runs of older versions and in imports."""
-    source: str = "run"
-    """run for a run of the bench, import for a recording made elsewhere."""
-    state: str
-    """running, ended or truncated."""
-    ending: str | None = None
-    """completed, stopped, aborted or tripped; None while it is running or if unknown."""
-    outcome: str | None = None
-    """State of the log: clean, lossy, truncated or incomplete."""
-    reason: str = ""
-    started: datetime | None = None
-    """UTC."""
-    duration_s: float | None = None
-    """Planned or recorded duration [s]."""
-    rmse_n: float | None = None
-    """Force error of the newest fit [N]."""
-    noise_floor_n: float | None = None
-    """Noise floor of the force [N]."""
-    jobs: tuple[JobState, ...] = ()
-
-    @property
-    def is_evaluated(self) -> bool:
-        """Return whether the run has ended and all its jobs are finished.
-
-        The service queues the identification of a run shortly after its end, so a run without jobs may await it.
-        """
-        awaits_job = self.source == "run" and self.outcome in _IDENTIFIED_OUTCOMES and not self.jobs
-        return self.state != "running" and not awaits_job and all(job.is_finished for job in self.jobs)
 
 
 class Run(SignedReports):
@@ -149,6 +90,72 @@ class Run(SignedReports):
         """
         return dict(self._session.get(f"{self._path}/fit"))
 
+    def diagnosis(self) -> dict[str, Any]:
+        """Return the newest diagnosis, `mrbench.diagnosis/1`.
+
+        Raises:
+            ClientError: there is none, or the service cannot be reached.
+        """
+        return dict(self._session.get(f"{self._path}/diagnosis"))
+
+    def identify(self, **settings: object) -> Job:
+        """Request an identification, and return its job; an equal one that is done or unfinished is not repeated.
+
+        Args:
+            settings: as of `POST /runs/ID/identify`: stages, hold_out, hold_out_after, budget_s, time_limit_s.
+
+        Raises:
+            ClientError: a setting is refused, the log is not complete, or the service cannot be reached.
+        """
+        return self._request_job("identify", settings)
+
+    def diagnose(self, **settings: object) -> Job:
+        """Request a diagnosis, and return its job; an equal one that is done or unfinished is not repeated.
+
+        Args:
+            settings: as of `POST /runs/ID/diagnose`: hold_out, hold_out_after, discover, residual, model,
+                time_limit_s.
+
+        Raises:
+            ClientError: a setting is refused, the log is not complete, or the service cannot be reached.
+        """
+        return self._request_job("diagnose", settings)
+
+    def list_notes(self) -> list[dict[str, Any]]:
+        """Return all notes, the oldest first; a change of the tags is a note, too.
+
+        Raises:
+            ClientError: there is no such run, or the service cannot be reached.
+        """
+        return list(self._iterate_notes())
+
+    def add_note(self, text: str, author: str) -> dict[str, Any]:
+        """Add a note, which is never changed, and return it.
+
+        Args:
+            text: text of the note.
+            author: name of the person.
+
+        Raises:
+            ClientError: text or author is empty or too long, or the service cannot be reached.
+        """
+        request = {"author": author, "text": text}
+        return dict(self._session.post(f"{self._path}/notes", request, key=uuid.uuid4().hex))
+
+    def export(self, to: Path, file_format: Format | None = None) -> Path:
+        """Download the samples for other tools, in SI units, and return the path of the file.
+
+        Args:
+            to: file to write.
+            file_format: csv, parquet or mat; by default the ending of the file.
+
+        Raises:
+            ClientError: the log is not complete, there is no such format, or the download breaks off.
+            LogError: the file cannot be written.
+        """
+        wanted = file_format or to.suffix.removeprefix(".")
+        return self._session.download(f"{self._path}/export?format={quote_name(wanted)}", to)
+
     def download_log(self, to: Path) -> Path:
         """Download the log (MCAP) and return its path.
 
@@ -175,6 +182,50 @@ class Run(SignedReports):
         """
         self._session.post(f"{self._path}/stop", timeout=STOP_TIMEOUT)
 
+    def abort(self) -> None:
+        """Stop the run at once by the path of a trip, which latches until `Bench.reset`; harmless after its end.
+
+        Raises:
+            ClientError: another run is in progress, or the service or its agent cannot be reached.
+        """
+        self._session.post(f"{self._path}/abort", timeout=STOP_TIMEOUT)
+
+    def pause(self) -> str:
+        """End the run at its next checkpoint, at rest; return in words where this will be.
+
+        Raises:
+            ClientError: the run has ended, another one is in progress, or the service or its agent cannot be
+                reached.
+        """
+        status = self._session.post(f"{self._path}/pause")
+        return str((status["run"] or {}).get("pause", ""))
+
+    def resume(self, after: str = "") -> "Run":
+        """Start a run that continues this one after a checkpoint, and return the new run.
+
+        Args:
+            after: name of the checkpoint; by default the last one that was passed.
+
+        Raises:
+            ClientError: the run was completed or passed no checkpoint, the start is refused, or the service or its
+                agent cannot be reached.
+        """
+        started = self._session.post(f"{self._path}/resume", {"after": after}, key=uuid.uuid4().hex)
+        return Run(self._session, str(started["id"]))
+
+    def _request_job(self, kind: str, settings: dict[str, object]) -> Job:
+        job = self._session.post(f"{self._path}/{kind}", settings, key=uuid.uuid4().hex)
+        return Job(self._session, str(job["id"]))
+
+    def _iterate_notes(self) -> Iterator[dict[str, Any]]:
+        after = None
+        while True:
+            page = self._session.get(f"{self._path}/notes", after=after)
+            yield from page["items"]
+            after = page["next"]
+            if after is None:
+                return
+
     def _wait(self, is_reached: Callable[[RunState], bool], timeout: float, goal: str) -> RunState:
         deadline = time.monotonic() + timeout
         while not is_reached(state := self.get_state()):
@@ -182,16 +233,3 @@ class Run(SignedReports):
                 raise ClientError(f"run {self.id} has not {goal} within {timeout:g} s; its state is {state.state}")
             time.sleep(_POLL_PERIOD)
         return state
-
-
-def parse_run_state(content: Any) -> RunState:
-    """Return the state in a reply of the service.
-
-    Raises:
-        ClientError: it is not the state of a run.
-    """
-    try:
-        return RunState.model_validate(content)
-    except ValidationError as error:
-        reason = describe_validation_error(error, "the run")
-        raise ClientError(f"the reply is not a run ({reason}); use a client of the service's version") from error

@@ -114,7 +114,7 @@ def test_jobs_are_waited_for(service, bench):
     while not (jobs := run.get_state().jobs):
         assert time.monotonic() < deadline
         time.sleep(0.05)
-    bench._session.post(f"/jobs/{jobs[0].id}/cancel")
+    bench.job(jobs[0].id).cancel()
     assert "cancelled" in {job.state for job in run.wait_for_jobs(TIMEOUT).jobs}
 
 

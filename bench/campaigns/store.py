@@ -8,7 +8,15 @@ from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from typing import NamedTuple
 
-from bench.campaigns.document import Campaign, CampaignError, Methods, collect_step_methods
+from bench.campaigns.document import (
+    Campaign,
+    CampaignError,
+    Methods,
+    collect_step_methods,
+    expand_campaign,
+    list_runs,
+    prefer_methods,
+)
 from bench.campaigns.engine import (
     CampaignState,
     Message,
@@ -46,6 +54,15 @@ class CampaignStore:
     def __init__(self, catalogue: Catalogue) -> None:
         self.catalogue = catalogue
         self.table = catalogue.campaigns
+
+    def find_method(self, name: str, version: int | None = None) -> Method | None:
+        """Return a version of a stored or shipped method, by default its newest; None if there is no such version.
+
+        Raises:
+            MethodError: the stored document is invalid.
+        """
+        found = self.catalogue.method_library.find(name, version)
+        return None if found is None else found.method
 
     def create(
         self, campaign: Campaign, methods: Methods, bench: str, now: float, operator: str = ""
@@ -102,10 +119,17 @@ class CampaignStore:
         return [_parse(row) for row in rows if bench is None or row.bench == bench]
 
     def find_unfinished(self, campaign: Campaign, methods: Methods, bench: str) -> StoredCampaign | None:
-        """Return the campaign of an equal document that has not ended on a bench, or None."""
-        key = compute_key(campaign, methods)
-        rows = self.table.list_in_progress()
-        return next((_parse(row) for row in rows if (row.key, row.bench) == (key, bench)), None)
+        """Return the campaign of an equal document that has not ended on a bench, or None.
+
+        A version of a method that was stored since makes no difference, because a campaign keeps its methods.
+        """
+        named = {run.method for run in list_runs(expand_campaign(campaign)) if isinstance(run.method, str)}
+        followed = {name for name in named if self.find_method(name) is not None}
+        for row in self.table.list_in_progress():
+            kept = {name: method for name, method in _parse_methods(row).items() if name in followed}
+            if row.bench == bench and row.key == compute_key(campaign, {**methods, **kept}):
+                return _parse(row)
+        return None
 
     def update(self, campaign_id: str, transition: Transition, methods: Methods | None = None) -> StoredCampaign:
         """Replace the state of a campaign by that after a transition.
@@ -137,18 +161,21 @@ class CampaignStore:
 
         Args:
             campaign_id: id of the campaign.
-            edit: the edit; methods of its steps are added to those of the campaign.
+            edit: the edit; methods of its steps are added to those of the campaign. A method that the campaign has
+                is that of the campaign, also if a newer version is stored.
             now: UTC [s].
             who: person or program.
 
         Raises:
             CampaignError: there is no such campaign, or the edit is not possible in its present state.
         """
-        methods = collect_step_methods(collect_edit_methods(edit))
         present = self.get(campaign_id).methods
+        methods = collect_step_methods(collect_edit_methods(edit), prefer_methods(present, self.find_method))
         for name, method in methods.items():
             if present.get(name, method) != method:
-                raise CampaignError(f"the campaign has another method {name}; give yours a name of its own")
+                raise CampaignError(
+                    f"the campaign has another method or version {name}; use that, or give yours a name of its own"
+                )
         known = present | dict(methods)
         return self.update(campaign_id, lambda state: apply_edit(state, edit, known, now, who), methods)
 
@@ -167,8 +194,12 @@ def _dump_method(method: Method) -> object:
 
 
 def _parse(row: CampaignRow) -> StoredCampaign:
-    methods = {name: Method.model_validate(document) for name, document in row.methods.items()}
-    return StoredCampaign(row.id, row.bench, row.created, methods, CampaignState.model_validate(row.state))
+    state = CampaignState.model_validate(row.state)
+    return StoredCampaign(row.id, row.bench, row.created, _parse_methods(row), state)
+
+
+def _parse_methods(row: CampaignRow) -> dict[str, Method]:
+    return {name: Method.model_validate(document) for name, document in row.methods.items()}
 
 
 def _make_events(campaign_id: str, state: CampaignState) -> Sequence[CampaignEventRow]:

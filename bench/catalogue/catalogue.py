@@ -20,6 +20,7 @@ from bench.catalogue.planning import (
     CertificateStore,
     CheckStore,
     IdempotencyKeys,
+    MethodLibrary,
     MethodStore,
     SpecimenStore,
 )
@@ -42,6 +43,7 @@ class Catalogue:
         self.job_queue = JobQueue(engine)
         self.idempotency_keys = IdempotencyKeys(engine)
         self.specimens, self.methods = SpecimenStore(engine), MethodStore(engine)
+        self.method_library = MethodLibrary(self.methods)
         self.approvals = ApprovalStore(engine)
         self.certificates, self.checks = CertificateStore(engine), CheckStore(engine)
         self.campaigns = CampaignTable(engine)

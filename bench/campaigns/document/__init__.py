@@ -1,5 +1,12 @@
 """Campaign documents: steps, expansion of a matrix, methods of the runs, and the dry run of a whole campaign."""
 
+from bench.campaigns.document.collection import (
+    FindMethod,
+    collect_methods,
+    collect_step_methods,
+    find_shipped_method,
+    prefer_methods,
+)
 from bench.campaigns.document.document import (
     AnyStep,
     Campaign,
@@ -43,8 +50,6 @@ from bench.campaigns.document.strokes import (
     WARM_UP_METHOD,
     Methods,
     add_strokes,
-    collect_methods,
-    collect_step_methods,
     get_method_name,
     list_runs,
     make_run_method,
@@ -59,6 +64,7 @@ __all__ = [
     "CampaignError",
     "CampaignPlan",
     "DiagnosisGoal",
+    "FindMethod",
     "IntervalGoal",
     "Mail",
     "Matrix",
@@ -86,6 +92,7 @@ __all__ = [
     "expand_campaign",
     "find_next_run",
     "find_run",
+    "find_shipped_method",
     "format_plan",
     "get_method_name",
     "get_step_kind",
@@ -95,4 +102,5 @@ __all__ = [
     "make_warm_up",
     "parse_campaign",
     "plan_campaign",
+    "prefer_methods",
 ]

@@ -55,7 +55,7 @@ class Matrix(FrozenModel):
         min_length=1, description="Serial numbers of the dampers."
     )
     methods: tuple[str | dict[str, Any], ...] = Field(
-        min_length=1, description="Names of shipped methods, or documents mrbench.method/1."
+        min_length=1, description="Names of methods, or documents mrbench.method/1."
     )
     drives: tuple[Annotated[float, Field(ge=0)] | None, ...] = Field(
         default=(None,), min_length=1, description="[V or A] constant drives; null for the method's own."

@@ -113,7 +113,8 @@ def describe_step(step: Step, methods: Methods) -> str:
     if run is not None:
         name = get_method_name(run)
         drive = "" if run.drive is None else f" at {run.drive:g} {methods[name].drive_unit}"
-        text = f"{name}{drive} on {run.specimen}"
+        version = "" if run.method_version is None else f" version {run.method_version}"
+        text = f"{name}{version}{drive} on {run.specimen}"
         return f"{text}, at most {step.repeat.at_most} times" if isinstance(step, RepeatStep) else text
     if isinstance(step, RestStep):
         seconds, target = step.rest.seconds, step.rest.until_temperature_c

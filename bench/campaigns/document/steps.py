@@ -14,10 +14,19 @@ class RunSpec(FrozenModel):
     """One run of a method on a specimen."""
 
     specimen: str = Field(min_length=1, max_length=200, description="Serial number of the damper.")
-    method: str | dict[str, Any] = Field(description="Name of a shipped method, or a document mrbench.method/1.")
+    method: str | dict[str, Any] = Field(description="Name of a method, or a document mrbench.method/1.")
+    method_version: PositiveInt | None = Field(
+        default=None, description="[1] version of a named method; null for its newest at the start."
+    )
     drive: float | None = Field(
         default=None, ge=0, description="[V or A] constant drive of all segments, instead of the method's own."
     )
+
+    @model_validator(mode="after")
+    def _check_version(self) -> Self:
+        if self.method_version is not None and not isinstance(self.method, str):
+            raise ValueError("method_version is that of a named method; leave it out with a document")
+        return self
 
 
 class RunStep(FrozenModel):

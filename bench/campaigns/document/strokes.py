@@ -6,12 +6,9 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from bench.campaigns.document.document import Campaign
 from bench.campaigns.document.errors import CampaignDocumentError
-from bench.campaigns.document.expansion import expand_campaign
 from bench.campaigns.document.steps import RunSpec, Step, find_run
-from bench.errors import MethodError
-from bench.methods import Method, list_shipped_methods, load_method, parse_method
+from bench.methods import Method
 from bench.validation import describe_validation_error
 
 WARM_UP_METHOD = "warm_up"
@@ -22,49 +19,9 @@ Methods = Mapping[str, Method]
 """Methods of a campaign by name."""
 
 
-def collect_methods(campaign: Campaign, *, allow_files: bool = False) -> dict[str, Method]:
-    """Return all methods of a campaign by name, fixed for its whole duration.
-
-    Args:
-        campaign: the campaign.
-        allow_files: whether a method may be named by its file.
-
-    Raises:
-        CampaignDocumentError: a method is missing or invalid, or two different ones have the same name.
-    """
-    return collect_step_methods(expand_campaign(campaign), allow_files=allow_files)
-
-
-def collect_step_methods(steps: Iterable[Step], *, allow_files: bool = False) -> dict[str, Method]:
-    """Return the methods of steps by name.
-
-    Raises:
-        CampaignDocumentError: a method is missing or invalid, or two different ones have the same name.
-    """
-    methods: dict[str, Method] = {}
-    for run in list_runs(steps):
-        method = _load(run.method, allow_files=allow_files)
-        if methods.setdefault(method.name, method) != method:
-            raise CampaignDocumentError(f"two different methods are named {method.name}; give each its own name")
-        make_run_method(methods, run)
-    return methods
-
-
 def list_runs(steps: Iterable[Step]) -> list[RunSpec]:
     """Return the runs of all steps with a method of their own."""
     return [run for step in steps if (run := find_run(step)) is not None]
-
-
-def _load(method: str | Mapping[str, Any], *, allow_files: bool) -> Method:
-    try:
-        if not isinstance(method, str):
-            return parse_method(method, "the method of a run")
-        if not allow_files and method not in list_shipped_methods():
-            names = ", ".join(list_shipped_methods())
-            raise CampaignDocumentError(f"there is no method {method[:80]}; the methods are {names}")
-        return load_method(method)
-    except MethodError as error:
-        raise CampaignDocumentError(str(error)) from None
 
 
 def get_method_name(run: RunSpec) -> str:

@@ -146,7 +146,7 @@ def _insert(
     for step in steps:
         run = find_run(step)
         if run is not None and get_method_name(run) not in methods:
-            raise CampaignError(f"there is no method {get_method_name(run)}; give a shipped one or its document")
+            raise CampaignError(f"there is no method {get_method_name(run)}; give a stored one or its document")
     state, added = make_items(state, steps, methods)
     items = (*state.items[:index], *added, *state.items[index:])
     return change(state, items=items), added

@@ -86,7 +86,7 @@ def find_or_create(store: CampaignStore, path: Path, operator: str, executor: st
         BenchError: the campaign is invalid or cannot be run, or another one holds the bench.
     """
     document = load_campaign(path)
-    methods = collect_methods(document, allow_files=True)
+    methods = collect_methods(document, store.find_method, allow_files=True)
     unfinished = store.find_unfinished(document, methods, executor)
     if unfinished is not None:
         return unfinished

@@ -4,7 +4,17 @@ from pathlib import Path
 
 import typer
 
-from bench.campaigns import collect_methods, format_plan, load_campaign, plan_campaign
+from bench.campaigns import (
+    Campaign,
+    Methods,
+    collect_methods,
+    find_shipped_method,
+    format_plan,
+    load_campaign,
+    plan_campaign,
+)
+from bench.catalogue import has_catalogue
+from bench.commands.campaign.catalogue import open_store
 from bench.disk import RESERVE, find_free_space
 from bench.runs import assess_design
 
@@ -14,7 +24,7 @@ def plan(path: Path, data: Path, *, quick: bool, as_json: bool) -> None:
 
     Args:
         path: file of the campaign.
-        data: data folder, for the free space.
+        data: data folder, for the free space and the stored methods; it need not exist.
         quick: leave out what the strokes can identify.
         as_json: print JSON instead of text.
 
@@ -23,6 +33,14 @@ def plan(path: Path, data: Path, *, quick: bool, as_json: bool) -> None:
     """
     document = load_campaign(path)
     free = find_free_space(data).free - RESERVE
-    methods = collect_methods(document, allow_files=True)
+    methods = _collect(document, data)
     made = plan_campaign(document, methods, None if quick else assess_design, free)
     typer.echo(made.model_dump_json(by_alias=True, indent=2) if as_json else "\n".join(format_plan(made)))
+
+
+def _collect(document: Campaign, data: Path) -> Methods:
+    """Return the methods of a campaign; without a catalogue only shipped ones have names."""
+    if not has_catalogue(data):
+        return collect_methods(document, find_shipped_method, allow_files=True)
+    with open_store(data) as store:
+        return collect_methods(document, store.find_method, allow_files=True)

@@ -14,7 +14,6 @@ from bench.campaigns import (
     PlantBench,
     StoredCampaign,
     collect_methods,
-    expand_campaign,
     load_campaign,
     lock_campaign,
     make_view,
@@ -61,8 +60,7 @@ def _find_or_create(
     store: CampaignStore, path: Path, scenario: str, operator: str, *, is_new: bool
 ) -> StoredCampaign:
     document = load_campaign(path)
-    methods = collect_methods(document, allow_files=True)
-    expand_campaign(document)
+    methods = collect_methods(document, store.find_method, allow_files=True)
     bench = f"scenario {scenario}"
     unfinished = None if is_new else store.find_unfinished(document, methods, bench)
     if unfinished is not None:

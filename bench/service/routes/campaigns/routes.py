@@ -19,12 +19,14 @@ from bench.campaigns import (
     answer,
     collect_edit_methods,
     collect_methods,
+    collect_step_methods,
     expand_campaign,
     make_view,
     needs_results,
     parse_campaign,
     pause,
     plan_campaign,
+    prefer_methods,
     resume,
     send_test,
     stop,
@@ -91,7 +93,7 @@ def _start(
 ) -> CampaignView:
     executor, store = bench.campaigns, context.campaign_store
     document = parse_campaign(content, "the request")
-    methods = collect_methods(document)
+    methods = collect_methods(document, store.find_method)
     plan = plan_campaign(document, methods)
     if not executor.is_local:
         raise CampaignError("the agent writes its logs on another machine; campaigns need them in the data folder")
@@ -104,7 +106,7 @@ def _start(
     steps = expand_campaign(document)
     if needs_results(document, steps) and worker != "ok":
         raise CampaignError(f"a condition of the campaign needs identifications, but there is no worker: {worker}")
-    check_approvals(context, document, steps)
+    check_approvals(context, document, steps, methods)
     if plan.problems:
         raise CampaignError(f"the campaign cannot be run: {plan.problems[0]}")
     executor.bench.check_needs(document, steps)
@@ -117,7 +119,8 @@ def plan(request: PlanCampaignRequest, context: Context) -> CampaignPlan:
     """Return the dry run of a campaign: time, heat, disk and limits; nothing is started."""
     document = parse_campaign(request.campaign, "the request")
     free = find_free_space(context.data).free - RESERVE
-    return plan_campaign(document, collect_methods(document), None, free)
+    methods = collect_methods(document, context.campaign_store.find_method)
+    return plan_campaign(document, methods, None, free)
 
 
 @router.get("/campaigns/{campaign_id}")
@@ -132,7 +135,9 @@ def edit_campaign(campaign_id: str, request: EditRequest, context: Context, send
     store = context.campaign_store
     stored = _get(store, campaign_id)
     note_old(_describe(stored))
-    check_approvals(context, stored.state.campaign, collect_edit_methods(request.edit))
+    steps = collect_edit_methods(request.edit)
+    methods = collect_step_methods(steps, prefer_methods(stored.methods, store.find_method))
+    check_approvals(context, stored.state.campaign, steps, methods)
     now = stored.read_time()
     return _show(store, store.edit(campaign_id, request.edit, now, get_author(sender, request.who)))
 

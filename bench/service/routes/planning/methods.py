@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 
-from bench.catalogue import SHIPPED_VERSION, ApprovalRow, MethodRow
+from bench.catalogue import SHIPPED_VERSION, ApprovalRow, MethodRow, StoredMethod
 from bench.methods import Method, compile_method, list_shipped_methods, load_method
 from bench.service.audit import note_old
 from bench.service.context import Context, ServiceContext
@@ -18,13 +18,7 @@ from bench.service.requests import (
     Sender,
     send_unless_known,
 )
-from bench.service.routes.planning.method_library import (
-    StoredMethod,
-    describe_facts,
-    find_method,
-    list_methods,
-    list_versions,
-)
+from bench.service.routes.planning.method_library import describe_facts, find_method, list_versions
 from bench.service.routes.planning.views import MethodPage, MethodSummary, MethodVersions
 from bench.service.views import BenchChoice
 
@@ -44,7 +38,8 @@ def list_all_methods(
 ) -> MethodPage:
     """List the newest version of each method, in the order of the names; unusable ones say why."""
     drive_kind = _find_drive_kind(context, bench)
-    found = [one for one in list_methods(context) if before is None or one.method.name > before]
+    newest = context.catalogue.method_library.list_newest()
+    found = [one for one in newest if before is None or one.method.name > before]
     approvals = context.catalogue.approvals.find(describe_facts(one.method).sha256 for one in found[:limit])
     items = tuple(_summarise(one, drive_kind, approvals) for one in found[:limit])
     return MethodPage(items=items, next=items[-1].name if len(found) > limit else None)

@@ -241,6 +241,28 @@ def test_a_plan_starts_nothing(service):
     assert service.get("/campaigns")["items"] == []
 
 
+def test_a_campaign_runs_the_stored_version_and_keeps_it(service):
+    titles = ["second version", "third version"]
+    document = service.get("/methods/quick")
+    service.post("/methods", document | {"title": titles[0]}, 201)
+    planned = service.post("/campaigns/plan", {"campaign": {"name": "n", "steps": [RUN]}})
+    assert [one["method"] for one in planned["methods"]] == ["quick"]
+    campaign = start(service, [RUN, RUN])
+    service.post("/methods", document | {"title": titles[1]}, 201)
+    assert wait_for_command(service, RunCommand).method["title"] == titles[0]
+    finish(service)
+    assert wait_for_command(service, RunCommand, 2).method["title"] == titles[0]
+    edit = {"edit": "add", "steps": [{"run": {**RUN["run"], "method_version": 3}}]}
+    answer = service.client.patch(f"/api/v1/campaigns/{campaign['id']}", json={"edit": edit})
+    assert "another method or version quick" in answer.json()["detail"]
+
+
+def test_a_campaign_runs_the_version_that_it_names(service):
+    service.post("/methods", service.get("/methods/quick") | {"title": "second version"}, 201)
+    start(service, [{"run": {**RUN["run"], "method_version": 1}}])
+    assert wait_for_command(service, RunCommand).method == service.get("/methods/quick/1")
+
+
 def test_unknown_campaigns_and_missing_recipients_are_told(service):
     assert service.client.get("/api/v1/campaigns/none").status_code == 404
     service.post("/campaigns/none/pause", {}, 404)

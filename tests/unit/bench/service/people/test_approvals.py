@@ -70,6 +70,14 @@ def test_a_campaign_can_require_approved_methods(engineer):
     assert engineer.get(f"/campaigns/{started.json()['id']}")["name"] == "n"
 
 
+def test_the_approved_version_is_the_one_that_a_campaign_runs(engineer):
+    engineer.send("POST", "/methods", {**engineer.get("/methods/quick"), "title": "another content"})
+    engineer.send("POST", "/methods/quick/1/approval")
+    assert "not approved: quick" in start(engineer, [RUN], methods="approved").json()["detail"]
+    named = {"run": {**RUN["run"], "method_version": 1}}
+    assert start(engineer, [named], methods="approved").status_code == 201
+
+
 def test_an_edit_cannot_bring_in_a_method_that_is_not_approved(engineer):
     engineer.send("POST", "/methods/quick/1/approval")
     path = f"/campaigns/{start(engineer, [RUN, RUN], methods='approved').json()['id']}"

@@ -17,6 +17,7 @@ from bench.campaigns.document import (
     CampaignPlan,
     FindMethod,
     Methods,
+    NoWorkerError,
     collect_methods,
     collect_step_methods,
     expand_campaign,
@@ -50,11 +51,12 @@ from bench.campaigns.engine import (
 )
 from bench.campaigns.notifications import NotificationSender, send_due, send_test
 from bench.campaigns.runner import CampaignRunner, lock_campaign
-from bench.campaigns.store import CampaignStore, StoredCampaign
+from bench.campaigns.store import SIMULATED, CampaignStore, StoredCampaign
 from bench.campaigns.view import CampaignView, ItemView, TrendPoint, TrendView, make_trends, make_view
 from bench.campaigns.view_text import format_view
 
 __all__ = [
+    "SIMULATED",
     "WARM_UP_METHOD",
     "AgentBench",
     "AgentConnection",
@@ -74,6 +76,7 @@ __all__ = [
     "ItemView",
     "Message",
     "Methods",
+    "NoWorkerError",
     "NotificationSender",
     "ParameterResult",
     "PlantBench",

@@ -12,6 +12,7 @@ from bench.campaigns.document import (
     Campaign,
     CampaignError,
     Methods,
+    Step,
     collect_step_methods,
     expand_campaign,
     list_runs,
@@ -25,11 +26,14 @@ from bench.campaigns.engine import (
     collect_edit_methods,
     start_campaign,
 )
+from bench.campaigns.needs import check_approvals, check_worker
 from bench.catalogue import CampaignChange, CampaignEventRow, CampaignNotificationRow, CampaignRow, Catalogue
 from bench.methods import Method
 
 NOTIFIED_KINDS = ("person_needed", "held_back", "ended")
 """Kinds of messages that the recipients of a campaign get."""
+SIMULATED = "scenario "
+"""Beginning of the name of a simulated plant as an executor; the name of its scenario follows."""
 Transition = Callable[[CampaignState], CampaignState]
 
 
@@ -47,11 +51,23 @@ class StoredCampaign(NamedTuple):
         """Return the UTC [s]; where the clock has gone back, the time of the latest change of the campaign."""
         return max(time.time(), self.state.updated)
 
+    @property
+    def is_simulated(self) -> bool:
+        """True if it runs on the simulated plant, which moves no damper and identifies its runs itself."""
+        return self.bench.startswith(SIMULATED)
+
 
 class CampaignStore:
     """Campaigns of one catalogue; safe from any thread and process."""
 
-    def __init__(self, catalogue: Catalogue) -> None:
+    def __init__(self, catalogue: Catalogue, describe_worker: Callable[[], str] | None = None) -> None:
+        """Use a catalogue.
+
+        Args:
+            catalogue: catalogue of the data folder.
+            describe_worker: returns `ok`, or the reason why there is no worker; None where that is not known.
+        """
+        self._describe_worker = describe_worker
         self.catalogue = catalogue
         self.table = catalogue.campaigns
 
@@ -63,6 +79,23 @@ class CampaignStore:
         """
         found = self.catalogue.method_library.find(name, version)
         return None if found is None else found.method
+
+    def check_needs(self, campaign: Campaign, steps: Sequence[Step], methods: Methods) -> None:
+        """Check that a campaign may run on a bench, or that steps may be added to it.
+
+        Args:
+            campaign: document of the campaign.
+            steps: its steps, or those that are added.
+            methods: methods of these steps by name.
+
+        Raises:
+            CampaignError: a method is not approved although the campaign requires it.
+            NoWorkerError: a condition needs results of runs, and no worker is connected.
+            RunError: the state of the workers is not known.
+        """
+        check_approvals(self.catalogue.approvals, campaign, steps, methods)
+        if self._describe_worker is not None:
+            check_worker(campaign, steps, self._describe_worker)
 
     def create(
         self, campaign: Campaign, methods: Methods, bench: str, now: float, operator: str = ""
@@ -167,17 +200,26 @@ class CampaignStore:
             who: person or program.
 
         Raises:
-            CampaignError: there is no such campaign, or the edit is not possible in its present state.
+            CampaignError: there is no such campaign, the edit is not possible in its present state, or a step that
+                it adds can never be done, see `check_needs`.
         """
-        present = self.get(campaign_id).methods
-        methods = collect_step_methods(collect_edit_methods(edit), prefer_methods(present, self.find_method))
+        stored, steps = self.get(campaign_id), collect_edit_methods(edit)
+        present = stored.methods
+        methods = collect_step_methods(steps, prefer_methods(present, self.find_method))
         for name, method in methods.items():
             if present.get(name, method) != method:
                 raise CampaignError(
                     f"the campaign has another method or version {name}; use that, or give yours a name of its own"
                 )
+        if not stored.is_simulated:
+            self.check_needs(_leave_out_stops(stored.state.campaign), steps, methods)
         known = present | dict(methods)
         return self.update(campaign_id, lambda state: apply_edit(state, edit, known, now, who), methods)
+
+
+def _leave_out_stops(campaign: Campaign) -> Campaign:
+    """Return a campaign without its conditions to stop, which were checked at its start."""
+    return campaign.model_copy(update={"stop_on": ()})
 
 
 def compute_key(campaign: Campaign, methods: Methods) -> str:

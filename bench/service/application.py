@@ -27,6 +27,7 @@ from bench.service import problems
 from bench.service.access import Access, Authenticator, PeopleStores
 from bench.service.audit import AuditTrail
 from bench.service.benches import BenchMaker, BenchSettings, ServedBenches
+from bench.service.campaigns import WorkerState
 from bench.service.context import ServiceContext
 from bench.service.middleware import (
     AccessCheckMiddleware,
@@ -182,7 +183,9 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
     job_manager = JobManager(catalogue, engine, on_job_changed, local_logs.locate)
     audit = AuditTrail(settings.data, {bench.name: bench.link.send for bench in settings.benches})
     registry = RunRegistry(catalogue, job_manager, lambda: benches.find_statuses(), on_run_changed)
-    maker = BenchMaker(catalogue, registry, audit, asyncio.get_running_loop())
+    loop = asyncio.get_running_loop()
+    worker = WorkerState(engine, loop)
+    maker = BenchMaker(catalogue, registry, audit, worker.describe, loop)
     benches = ServedBenches([maker.make(bench) for bench in settings.benches])
     context = ServiceContext(
         Authenticator(settings.access, PeopleStores(catalogue.users, catalogue.tokens, catalogue.sessions)),
@@ -193,7 +196,7 @@ def _make_context(settings: AppSettings, catalogue: Catalogue, engine: JobEngine
         registry,
         SpaceMonitor(settings.data),
         SampleStore(settings.data),
-        CampaignStore(catalogue),
+        CampaignStore(catalogue, worker.describe),
         audit,
         local_logs,
         provider=None if settings.oidc is None else Provider(settings.oidc),

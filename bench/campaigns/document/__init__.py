@@ -21,7 +21,7 @@ from bench.campaigns.document.document import (
     load_campaign,
     parse_campaign,
 )
-from bench.campaigns.document.errors import CampaignDocumentError, CampaignError
+from bench.campaigns.document.errors import CampaignDocumentError, CampaignError, NoWorkerError
 from bench.campaigns.document.expansion import expand_campaign
 from bench.campaigns.document.plan import (
     CampaignPlan,
@@ -71,6 +71,7 @@ __all__ = [
     "MatrixSteps",
     "Methods",
     "NextStrokeStep",
+    "NoWorkerError",
     "PromptSpec",
     "PromptStep",
     "Recipient",

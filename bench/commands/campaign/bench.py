@@ -10,6 +10,7 @@ from bench.campaigns import (
     CampaignStore,
     StoredCampaign,
     collect_methods,
+    expand_campaign,
     load_campaign,
     make_view,
     plan_campaign,
@@ -94,6 +95,7 @@ def find_or_create(store: CampaignStore, path: Path, operator: str, executor: st
         raise CampaignError(f"campaign {held[0].id} holds the bench; stop it, or wait for its end")
     if problems := plan_campaign(document, methods).problems:
         raise CampaignError(f"the campaign cannot be run: {problems[0]}")
+    store.check_needs(document, expand_campaign(document), methods)
     created = store.create(document, methods, executor, time.time(), operator)
     record(store.catalogue.folder, "campaign run", created.id, {}, {"name": document.name, "operator": operator})
     return created

@@ -7,6 +7,7 @@ from pathlib import Path
 import typer
 
 from bench.campaigns import (
+    SIMULATED,
     CampaignRunner,
     CampaignStore,
     Message,
@@ -61,7 +62,7 @@ def _find_or_create(
 ) -> StoredCampaign:
     document = load_campaign(path)
     methods = collect_methods(document, store.find_method, allow_files=True)
-    bench = f"scenario {scenario}"
+    bench = f"{SIMULATED}{scenario}"
     unfinished = None if is_new else store.find_unfinished(document, methods, bench)
     if unfinished is not None:
         typer.echo(f"{unfinished.id} is not finished and continues; --new starts again", err=True)

@@ -1,6 +1,7 @@
 """Creation of a bench: its objects, connected with those that all benches share."""
 
 import asyncio
+from collections.abc import Callable
 
 from pydantic import BaseModel
 
@@ -18,7 +19,12 @@ class BenchMaker:
     """Maker of the benches of one service."""
 
     def __init__(
-        self, catalogue: Catalogue, registry: RunRegistry, audit: AuditTrail, loop: asyncio.AbstractEventLoop
+        self,
+        catalogue: Catalogue,
+        registry: RunRegistry,
+        audit: AuditTrail,
+        describe_worker: Callable[[], str],
+        loop: asyncio.AbstractEventLoop,
     ) -> None:
         """Use what all benches share.
 
@@ -26,9 +32,11 @@ class BenchMaker:
             catalogue: catalogue of the data folder.
             registry: records the runs of all benches.
             audit: audit trail of the service.
+            describe_worker: returns `ok`, or the reason why there is no worker; called outside the loop.
             loop: event loop of the service.
         """
         self._catalogue, self._registry, self._audit, self._loop = catalogue, registry, audit, loop
+        self._describe_worker = describe_worker
 
     def make(self, settings: BenchSettings) -> ServedBench:
         """Return a bench; its threads are not started."""
@@ -48,5 +56,7 @@ class BenchMaker:
 
         monitor = AgentMonitor(settings.link, on_message, on_status)
         recorded = RecordedConnection(monitor, self._audit.record, name)
-        campaigns = CampaignExecutor(self._catalogue, recorded, name, is_local=settings.has_local_logs)
+        campaigns = CampaignExecutor(
+            self._catalogue, recorded, name, self._describe_worker, is_local=settings.has_local_logs
+        )
         return ServedBench(name, monitor, live, campaigns, settings.has_local_logs)

@@ -17,16 +17,12 @@ from bench.campaigns import (
     CampaignView,
     StoredCampaign,
     answer,
-    collect_edit_methods,
     collect_methods,
-    collect_step_methods,
     expand_campaign,
     make_view,
-    needs_results,
     parse_campaign,
     pause,
     plan_campaign,
-    prefer_methods,
     resume,
     send_test,
     stop,
@@ -38,7 +34,6 @@ from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse, describe_file
 from bench.service.problems import make_conflict, make_not_found
 from bench.service.requests import IDEMPOTENT, IdempotentRoute, Sender, get_author, get_operator
-from bench.service.routes.campaigns.approvals import check_approvals
 from bench.service.routes.campaigns.photos import get_media_type, save_photo
 from bench.service.routes.campaigns.views import (
     AnswerRequest,
@@ -80,17 +75,14 @@ async def start_campaign(
     request: StartCampaignRequest, context: Context, response: Response, sender: Sender
 ) -> CampaignView:
     """Start a campaign on the bench; it continues after any crash. Refused if a condition can never be met."""
-    worker = await context.engine.describe_state()
     operator = get_operator(sender, request.operator)
     bench = context.benches.get(request.bench)
-    campaign = await asyncio.to_thread(_start, context, bench, request.campaign, operator, worker)
+    campaign = await asyncio.to_thread(_start, context, bench, request.campaign, operator)
     response.headers["Location"] = f"/api/v1/campaigns/{campaign.id}"
     return campaign
 
 
-def _start(
-    context: ServiceContext, bench: ServedBench, content: dict[str, Any], operator: str, worker: str
-) -> CampaignView:
+def _start(context: ServiceContext, bench: ServedBench, content: dict[str, Any], operator: str) -> CampaignView:
     executor, store = bench.campaigns, context.campaign_store
     document = parse_campaign(content, "the request")
     methods = collect_methods(document, store.find_method)
@@ -103,13 +95,9 @@ def _start(
             "The bench is held",
             f"campaign {held[0].id} is in progress; stop it, or wait for its end",
         )
-    steps = expand_campaign(document)
-    if needs_results(document, steps) and worker != "ok":
-        raise CampaignError(f"a condition of the campaign needs identifications, but there is no worker: {worker}")
-    check_approvals(context, document, steps, methods)
     if plan.problems:
         raise CampaignError(f"the campaign cannot be run: {plan.problems[0]}")
-    executor.bench.check_needs(document, steps)
+    executor.check_start(document, expand_campaign(document), methods)
     campaign = store.create(document, methods, bench.executor, time.time(), operator)
     return _show(store, campaign)
 
@@ -135,9 +123,6 @@ def edit_campaign(campaign_id: str, request: EditRequest, context: Context, send
     store = context.campaign_store
     stored = _get(store, campaign_id)
     note_old(_describe(stored))
-    steps = collect_edit_methods(request.edit)
-    methods = collect_step_methods(steps, prefer_methods(stored.methods, store.find_method))
-    check_approvals(context, stored.state.campaign, steps, methods)
     now = stored.read_time()
     return _show(store, store.edit(campaign_id, request.edit, now, get_author(sender, request.who)))
 

@@ -7,12 +7,14 @@ import pytest
 from typer import BadParameter
 
 from bench import cli
-from bench.campaigns import CampaignError
+from bench.campaigns import CampaignError, collect_methods, load_campaign
+from bench.campaigns.engine.edits import AddEdit
 from bench.commands.campaign.bench import check_served, find_or_create
 from bench.commands.campaign.catalogue import open_store
 from bench.commands.campaign.control import control
 from bench.commands.campaign.report import report
 from bench.config import write_benches
+from bench.methods import load_method
 from tests.support.audit_trails import list_all
 from tests.support.campaign_reports import STARTED, make_result, run_step, store_campaign
 from tests.support.message_servers import serve_webhook
@@ -94,6 +96,35 @@ def test_the_queue_is_edited_and_stopped_by_the_command_line_also_without_a_serv
     assert (acts[2].old, acts[2].new) == ({"status": "running"}, {"operator": "B"})
     assert {one.target for one in acts} == {view["id"]}
     assert acts[0].actor.startswith("local:")
+
+
+RUN = {"run": {"specimen": "MR-1", "method": "quick"}}
+
+
+def test_methods_that_are_not_approved_are_refused_on_the_command_line(tmp_path):
+    def add(method):
+        steps = [{"run": {"specimen": "MR-1", "method": method}}]
+        edit = json.dumps({"edit": "add", "steps": steps})
+        control("edit", "", tmp_path / "data", "B", note=None, choice=None, edit=edit, as_json=True)
+
+    path = write(tmp_path / "a.json", steps=[RUN], methods="approved")
+    with open_store(tmp_path / "data", is_created=True) as store:
+        with pytest.raises(CampaignError, match="not approved: quick"):
+            find_or_create(store, path, "B", "agent")
+        assert store.list_campaigns(1) == []
+        store.catalogue.approvals.approve(load_method("quick").compute_sha256(), "The engineer")
+        started = find_or_create(store, path, "B", "agent")
+        add("quick")
+        with pytest.raises(CampaignError, match="not approved: validation"):
+            add("validation")
+        assert len(store.get(started.id).state.items) == 2
+
+
+def test_the_simulated_plant_needs_no_approval(tmp_path):
+    with open_store(tmp_path / "data", is_created=True) as store:
+        document = load_campaign(write(tmp_path / "a.json", steps=[RUN], methods="approved"))
+        made = store.create(document, collect_methods(document), "scenario default", 1.0)
+        assert len(store.edit(made.id, AddEdit(edit="add", steps=(RUN,)), 2.0).state.items) == 2
 
 
 def test_the_newest_campaign_is_reported_without_a_service(tmp_path, capsys):

@@ -8,12 +8,13 @@ import pytest
 
 from bench import cli
 from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
-from bench.campaigns import collect_methods, parse_campaign
+from bench.campaigns import CampaignStore, collect_methods, parse_campaign
 from tests.support.certificates import make_certificate
 from tests.support.message_servers import find_closed_port, serve_webhook
 from tests.support.service_logs import write_complete_log
 
 RUN = {"run": {"specimen": "MR-1", "method": "quick"}}
+REPEAT = {"repeat": {"step": RUN, "until": {"parameter": "k0", "ci_percent": 2}, "at_most": 3}}
 PROMPT = {"prompt": {"text": "Mount the next specimen", "note": True, "photo": True}}
 COOL = {"rest": {"until_temperature_c": 25}}
 PHOTO = base64.b64encode(b"\xff\xd8\xff\xe0 a photo").decode()
@@ -220,8 +221,57 @@ def test_a_campaign_that_cannot_be_met_is_refused_at_the_start(service, steps, m
 
 def test_a_condition_on_results_needs_a_worker(service):
     service.engine.state = "no worker is connected"
-    repeat = {"repeat": {"step": RUN, "until": {"parameter": "k0", "ci_percent": 2}, "at_most": 3}}
-    assert "no worker is connected" in start(service, [repeat], 409)["detail"]
+    assert "no worker is connected" in start(service, [REPEAT], 409)["detail"]
+
+
+def test_an_edit_whose_condition_needs_a_worker_is_refused_without_one(service):
+    campaign = start(service, [PROMPT], stop_on=[{"drift": {"parameter": "k0", "percent": 5}}])
+    service.engine.state = "no worker is connected"
+    path = f"/api/v1/campaigns/{campaign['id']}"
+
+    def add(step):
+        return service.client.patch(path, json={"edit": {"edit": "add", "steps": [step]}})
+
+    refused = add(REPEAT)
+    assert refused.status_code == 409
+    assert "no worker is connected" in refused.json()["detail"]
+    assert len(service.get(f"/campaigns/{campaign['id']}")["items"]) == 1
+    # The conditions that stop the campaign were checked at its start.
+    assert add(RUN).status_code == 200
+    service.engine.state = "ok"
+    assert add(REPEAT).status_code == 200
+
+
+def create_on_command_line(service, steps, **more):
+    """Store a campaign without the checks of the service, as another process may."""
+    document = parse_campaign({"name": "night", "steps": steps, **more}, "the test")
+    store = CampaignStore(service.client.app.state.context.catalogue)
+    return store.create(document, collect_methods(document), "agent", time.time())
+
+
+def test_a_campaign_without_its_worker_ends_with_that_reason(service, monkeypatch):
+    monkeypatch.setattr("bench.service.campaigns.executor.WORKER_TIME", 0.0)
+    service.engine.state = "no worker; start one: mrbench worker"
+    campaign = create_on_command_line(service, [RUN, REPEAT])
+    ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
+    assert "no worker; start one" in ended["reason"]
+    assert not [one for one in service.agent.commands if isinstance(one, RunCommand)]
+
+
+def test_a_worker_may_connect_after_the_start_of_the_service(service):
+    service.engine.state = "no worker; start one: mrbench worker"
+    campaign = create_on_command_line(service, [REPEAT])
+    time.sleep(0.2)  # some looks of the executor
+    assert service.get(f"/campaigns/{campaign.id}")["status"] == "running"
+    assert not [one for one in service.agent.commands if isinstance(one, RunCommand)]
+    service.engine.state = "ok"
+    wait_for_command(service, RunCommand)
+
+
+def test_a_campaign_whose_methods_are_not_approved_ends_with_that_reason(service):
+    campaign = create_on_command_line(service, [RUN], methods="approved")
+    ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
+    assert "not approved: quick" in ended["reason"]
 
 
 def test_a_thermometer_makes_a_condition_on_the_temperature_possible(service):

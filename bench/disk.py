@@ -47,6 +47,14 @@ def find_free_space(folder: Path) -> FreeSpace:
         raise RunError(f"{existing}: the free space is not known ({error.strerror}); check the disk") from None
 
 
+def find_usable_space(folder: Path) -> int | None:
+    """Return the space for logs where a folder is, less the reserve [byte]; None if the disk cannot be asked."""
+    try:
+        return max(0, find_free_space(folder).free - RESERVE)
+    except RunError:
+        return None
+
+
 def _find_obstacle(folder: Path) -> str:
     """Return the reason why nothing can be written to a folder; empty if it can."""
     if os.statvfs(folder).f_flag & os.ST_RDONLY:

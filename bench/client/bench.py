@@ -22,6 +22,8 @@ _PAGE_SIZE = 50
 """Number of runs requested at a time."""
 _MOST_METHODS = 500
 """Largest number of listed methods."""
+_ASSESSMENT_TIMEOUT = 600.0
+"""Longest time [s] for the dry run of a campaign, which assesses each method."""
 
 
 class Bench(Calibration):
@@ -161,13 +163,19 @@ class Bench(Calibration):
         request = {"campaign": campaign, "operator": operator, **self._choice}
         return self.campaign(str(self._session.post("/campaigns", request, key=uuid.uuid4().hex)["id"]))
 
-    def plan_campaign(self, campaign: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the dry run of a campaign: time, heat, disk and limits; nothing is started.
+    def plan_campaign(self, campaign: Mapping[str, Any], *, identifiability: bool = True) -> dict[str, Any]:
+        """Return the dry run of a campaign: time, heat, disk, limits and identifiability; nothing is started.
+
+        Args:
+            campaign: document `mrbench.campaign/1`.
+            identifiability: assess what each method can identify, which takes some seconds for each.
 
         Raises:
             ClientError: the campaign is invalid, or the service cannot be reached.
         """
-        return dict(self._session.post("/campaigns/plan", {"campaign": campaign}))
+        quick = {} if identifiability else {"identifiability": False}
+        request = {"campaign": campaign, **quick, **self._choice}
+        return dict(self._session.post("/campaigns/plan", request, timeout=_ASSESSMENT_TIMEOUT))
 
     def find_campaign(self) -> Campaign | None:
         """Return the campaign that holds the bench, or None.

@@ -62,6 +62,7 @@ NIGHT = {
 }
 REFUSED = "the webhook at hooks.example.org was not notified: the connection was refused"
 RESULT = "night@example.org was not notified: there is no mail server; set MRBENCH_SMTP=smtp://HOST:PORT"
+IDENTIFIABLE = "k0 to 3 %"
 UNTIDY = {3: ("failed", "displacement 26.4 mm is above the limit of 26.25 mm"), 4: ("skipped", "deleted"),
           12: ("held_back", "held back after 2 crashes of the bench: killed")}  # fmt: skip
 ASKING = 18
@@ -195,7 +196,8 @@ def campaign_routes(campaigns: FakeCampaigns) -> APIRouter:
     async def plan(wanted: PlanCampaignRequest) -> Any:
         try:
             document = parse_campaign(wanted.campaign, "the request")
-            return plan_campaign(document, collect_methods(document), None, 42_000_000_000)
+            assess = (lambda programme: {"messages": [IDENTIFIABLE]}) if wanted.identifiability else None
+            return plan_campaign(document, collect_methods(document), assess, 42_000_000_000)
         except CampaignError as error:
             return refuse(error)
 

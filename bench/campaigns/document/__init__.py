@@ -28,9 +28,11 @@ from bench.campaigns.document.plan import (
     describe_step,
     estimate_durations,
     find_next_run,
+    find_problems,
     format_plan,
     plan_campaign,
 )
+from bench.campaigns.document.planned_methods import FindObstacles
 from bench.campaigns.document.steps import (
     DiagnosisGoal,
     IntervalGoal,
@@ -65,6 +67,7 @@ __all__ = [
     "CampaignPlan",
     "DiagnosisGoal",
     "FindMethod",
+    "FindObstacles",
     "IntervalGoal",
     "Mail",
     "Matrix",
@@ -92,6 +95,7 @@ __all__ = [
     "estimate_durations",
     "expand_campaign",
     "find_next_run",
+    "find_problems",
     "find_run",
     "find_shipped_method",
     "format_plan",

@@ -1,12 +1,19 @@
 """Dry run of a whole campaign: time, heat, disk, limits, and what each method can identify."""
 
-from collections.abc import Callable, Iterable
-from typing import Any, Literal, TypeAlias
+from collections.abc import Iterable
+from typing import Literal
 
 from pydantic import Field
 
 from bench.campaigns.document.document import Campaign
 from bench.campaigns.document.expansion import expand_campaign
+from bench.campaigns.document.planned_methods import (
+    Assessment,
+    FindObstacles,
+    PlannedMethod,
+    count_runs,
+    plan_methods,
+)
 from bench.campaigns.document.steps import (
     NextStrokeStep,
     RepeatStep,
@@ -19,14 +26,11 @@ from bench.campaigns.document.steps import (
 )
 from bench.campaigns.document.strokes import Methods, get_method_name, make_run_method, make_warm_up
 from bench.disk import estimate_log_size
-from bench.errors import RunError
-from bench.methods import Method, Programme, compile_method, compute_envelope, compute_heat, list_checkpoints
+from bench.methods import Method, compile_method, compute_heat
 from bench.validation import FrozenModel
 
 CHANNELS = 6
 """Number of channels at the full rate in the estimate of a log's size."""
-Assessment: TypeAlias = Callable[[Programme], dict[str, Any]]
-"""Function that returns the foresight document of a programme, such as `bench.runs.assess_design`."""
 
 
 class PlannedStep(FrozenModel):
@@ -39,20 +43,6 @@ class PlannedStep(FrozenModel):
     longest_s: float | None = Field(description="[s] longest duration; null for a step that waits for a person.")
     heat_j: float = Field(description="[J] heat that the damper dissipates at most.")
     log_bytes: int = Field(description="[byte] largest expected size of its logs.")
-
-
-class PlannedMethod(FrozenModel):
-    """One method with one drive, as often as the campaign runs it."""
-
-    method: str = Field(description="Name of the method.")
-    drive: float | None = Field(description="Constant drive in the unit of the drive; null for the method's own.")
-    drive_unit: str = Field(description="Unit of the drive: V or A.")
-    runs: int = Field(description="[1] number of runs.")
-    duration_s: float = Field(description="[s] duration of one run.")
-    force_n: float = Field(description="[N] largest expected force.")
-    verdict: str = Field(description="Whether the expected force stays below the limit of the method.")
-    checkpoints: int = Field(description="[1] number of checkpoints.")
-    identifiability: tuple[str, ...] = Field(description="Findings on what its strokes can identify.")
 
 
 class CampaignPlan(FrozenModel):
@@ -71,10 +61,18 @@ class CampaignPlan(FrozenModel):
     methods: tuple[PlannedMethod, ...] = Field(description="Methods with their drives.")
     steps: tuple[PlannedStep, ...] = Field(description="Steps in order.")
     problems: tuple[str, ...] = Field(description="Reasons against a start; empty without any.")
+    bench_unknown: str = Field(
+        default="", description="Reason why drive and limits of the bench are not known; empty if they are."
+    )
 
 
 def plan_campaign(
-    campaign: Campaign, methods: Methods, assess: Assessment | None = None, free_bytes: int | None = None
+    campaign: Campaign,
+    methods: Methods,
+    assess: Assessment | None = None,
+    free_bytes: int | None = None,
+    find_obstacles: FindObstacles | None = None,
+    bench_unknown: str = "",
 ) -> CampaignPlan:
     """Return the dry run of a campaign.
 
@@ -83,13 +81,16 @@ def plan_campaign(
         methods: its methods by name.
         assess: assesses what strokes identify; None leaves that out.
         free_bytes: free space for logs [byte]; None if it is not known.
+        find_obstacles: compares a method with a bench; None if the bench is not known.
+        bench_unknown: reason why it is not known.
 
     Raises:
         CampaignError: a method does not fit its use.
         MethodError: a method cannot be compiled within its limits.
     """
-    planned = _plan_steps(expand_campaign(campaign), methods)
-    used = _plan_methods(expand_campaign(campaign), methods, assess)
+    steps = expand_campaign(campaign)
+    planned = _plan_steps(steps, methods)
+    used = plan_methods(steps, methods, assess, find_obstacles)
     log_bytes = sum(step.log_bytes for step in planned)
     return CampaignPlan(
         campaign=campaign.name,
@@ -102,7 +103,30 @@ def plan_campaign(
         methods=used,
         steps=planned,
         problems=tuple(_find_problems(used, log_bytes, free_bytes)),
+        bench_unknown=bench_unknown,
     )
+
+
+def find_problems(
+    steps: tuple[Step, ...],
+    methods: Methods,
+    free_bytes: int | None = None,
+    find_obstacles: FindObstacles | None = None,
+) -> tuple[str, ...]:
+    """Return the reasons against the start of steps: limits of methods and bench, and the disk.
+
+    Args:
+        steps: expanded steps in order.
+        methods: their methods by name.
+        free_bytes: free space for logs [byte]; None if it is not known.
+        find_obstacles: compares a method with a bench; None if the bench is not known.
+
+    Raises:
+        CampaignError: a method does not fit its use.
+        MethodError: a method cannot be compiled within its limits.
+    """
+    log_bytes = sum(step.log_bytes for step in _plan_steps(steps, methods))
+    return tuple(_find_problems(plan_methods(steps, methods, None, find_obstacles), log_bytes, free_bytes))
 
 
 def describe_step(step: Step, methods: Methods) -> str:
@@ -162,7 +186,7 @@ class _StepPlanner:
         if run is None:
             return (0.0, 0.0, 0.0, 0)
         duration, heat, size = self.measure(make_run_method(self._methods, run))
-        times = _count_runs(step)
+        times = count_runs(step)
         return (duration, duration * times, heat * times, size * times)
 
     def _plan_warm_up(self, step: WarmUpStep, run: RunSpec | None) -> tuple[float, ...]:
@@ -171,12 +195,6 @@ class _StepPlanner:
         method = make_warm_up(make_run_method(self._methods, run), step.warm_up.cycles)
         duration, heat, size = self.measure(method)
         return (duration, duration if step.warm_up.cycles else step.warm_up.timeout_s, heat, size)
-
-
-def _count_runs(step: Step) -> int:
-    if isinstance(step, RepeatStep):
-        return step.repeat.at_most
-    return step.next_stroke.at_most if isinstance(step, NextStrokeStep) else 1
 
 
 def _plan_steps(steps: tuple[Step, ...], methods: Methods) -> tuple[PlannedStep, ...]:
@@ -199,50 +217,12 @@ def _plan_steps(steps: tuple[Step, ...], methods: Methods) -> tuple[PlannedStep,
     return tuple(planned)
 
 
-def _plan_methods(
-    steps: tuple[Step, ...], methods: Methods, assess: Assessment | None
-) -> tuple[PlannedMethod, ...]:
-    counts: dict[tuple[str, float | None], int] = {}
-    for step in steps:
-        if (run := find_run(step)) is not None:
-            key = (get_method_name(run), run.drive)
-            counts[key] = counts.get(key, 0) + _count_runs(step)
-    return tuple(_plan_method(methods, key, count, assess) for key, count in counts.items())
-
-
-def _plan_method(
-    methods: Methods, key: tuple[str, float | None], count: int, assess: Assessment | None
-) -> PlannedMethod:
-    name, drive = key
-    method = make_run_method(methods, RunSpec(specimen="any", method=name, drive=drive))
-    programme = compile_method(method)
-    envelope = compute_envelope(programme)
-    return PlannedMethod(
-        method=name,
-        drive=drive,
-        drive_unit=method.drive_unit,
-        runs=count,
-        duration_s=programme.duration,
-        force_n=envelope.total.force_n,
-        verdict=envelope.verdict,
-        checkpoints=len(list_checkpoints(programme)),
-        identifiability=_assess(programme, assess),
-    )
-
-
-def _assess(programme: Programme, assess: Assessment | None) -> tuple[str, ...]:
-    if assess is None:
-        return ()
-    try:
-        return tuple(assess(programme).get("messages", ()))
-    except RunError as error:  # a bench without the identification package can still plan
-        return (str(error),)
-
-
 def _find_problems(methods: Iterable[PlannedMethod], log_bytes: int, free_bytes: int | None) -> Iterable[str]:
     for method in methods:
         if method.verdict != "within limits":
             yield f"method {method.method}: {method.verdict} (expected {method.force_n:.0f} N)"
+        drive = "" if method.drive is None else f" at {method.drive:g} {method.drive_unit}"
+        yield from (f"method {method.method}{drive}: {obstacle}" for obstacle in method.obstacles)
     if free_bytes is not None and log_bytes > free_bytes:
         yield (
             f"the logs need up to {log_bytes / 1e9:.3f} GB, {free_bytes / 1e9:.3f} GB are free; "

@@ -11,13 +11,14 @@ from bench.campaigns import (
     StoredCampaign,
     collect_methods,
     expand_campaign,
+    find_problems,
     load_campaign,
     make_view,
-    plan_campaign,
 )
 from bench.commands.audit import record
 from bench.commands.campaign.catalogue import open_store
 from bench.config import choose_bench, find_bench, find_place, get_executor, load_config
+from bench.disk import find_usable_space
 from bench.folder_lock import is_locked
 
 _POLL_PERIOD = 0.5
@@ -93,9 +94,10 @@ def find_or_create(store: CampaignStore, path: Path, operator: str, executor: st
         return unfinished
     if held := store.list_in_progress(executor):
         raise CampaignError(f"campaign {held[0].id} holds the bench; stop it, or wait for its end")
-    if problems := plan_campaign(document, methods).problems:
+    steps = expand_campaign(document)
+    store.check_needs(document, steps, methods)
+    if problems := find_problems(steps, methods, find_usable_space(store.catalogue.folder)):
         raise CampaignError(f"the campaign cannot be run: {problems[0]}")
-    store.check_needs(document, expand_campaign(document), methods)
     created = store.create(document, methods, executor, time.time(), operator)
     record(store.catalogue.folder, "campaign run", created.id, {}, {"name": document.name, "operator": operator})
     return created

@@ -15,7 +15,7 @@ from bench.campaigns import (
 )
 from bench.catalogue import has_catalogue
 from bench.commands.campaign.catalogue import open_store
-from bench.disk import RESERVE, find_free_space
+from bench.disk import find_usable_space
 from bench.runs import assess_design
 
 
@@ -32,9 +32,8 @@ def plan(path: Path, data: Path, *, quick: bool, as_json: bool) -> None:
         BenchError: the campaign is invalid.
     """
     document = load_campaign(path)
-    free = find_free_space(data).free - RESERVE
     methods = _collect(document, data)
-    made = plan_campaign(document, methods, None if quick else assess_design, free)
+    made = plan_campaign(document, methods, None if quick else assess_design, find_usable_space(data))
     typer.echo(made.model_dump_json(by_alias=True, indent=2) if as_json else "\n".join(format_plan(made)))
 
 

@@ -57,6 +57,11 @@ class BenchMaker:
         monitor = AgentMonitor(settings.link, on_message, on_status)
         recorded = RecordedConnection(monitor, self._audit.record, name)
         campaigns = CampaignExecutor(
-            self._catalogue, recorded, name, self._describe_worker, is_local=settings.has_local_logs
+            self._catalogue,
+            recorded,
+            name,
+            self._describe_worker,
+            monitor.describe_bench,
+            is_local=settings.has_local_logs,
         )
         return ServedBench(name, monitor, live, campaigns, settings.has_local_logs)

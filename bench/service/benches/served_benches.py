@@ -3,7 +3,8 @@
 from collections.abc import Iterator, Sequence
 from http import HTTPStatus
 
-from bench.agent_protocol import AgentStatus
+from bench.agent_protocol import AgentStatus, BenchDescription
+from bench.errors import AgentUnreachableError
 from bench.service.benches.served_bench import ServedBench
 from bench.service.problems import ProblemError, make_conflict, shorten
 
@@ -53,6 +54,22 @@ class ServedBenches:
             raise make_conflict("several-benches", "Several benches", detail)
         detail = f"there is no bench {shorten(name)}; this service has {names}"
         raise ProblemError(HTTPStatus.NOT_FOUND, "not-found", "Not found", detail)
+
+    def describe(self, name: str | None) -> tuple[BenchDescription | None, str]:
+        """Return what the agent says about a bench, or None with the reason why it is not known.
+
+        Args:
+            name: name of the bench; None for the only one.
+
+        Raises:
+            ProblemError: there is no bench with this name.
+        """
+        if name is None and self.are_several:
+            return None, f"the service has several benches; name one of {', '.join(self.names)}"
+        try:
+            return self.get(name).monitor.describe_bench(), ""
+        except AgentUnreachableError as error:
+            return None, str(error)
 
     def find_by_executor(self, executor: str) -> ServedBench | None:
         """Return the bench of an executor of campaigns; None for a simulated plant."""

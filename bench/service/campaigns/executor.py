@@ -3,9 +3,10 @@
 import logging
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Self
 
-from bench.agent_protocol import Sender, send_as
+from bench.agent_protocol import BenchDescription, Sender, send_as
 from bench.campaigns import (
     AgentBench,
     AgentConnection,
@@ -18,11 +19,15 @@ from bench.campaigns import (
     NoWorkerError,
     StoredCampaign,
     Thermometer,
+    find_problems,
     stop,
 )
 from bench.catalogue import Catalogue
 from bench.config import get_executor
+from bench.disk import find_usable_space
+from bench.errors import AgentUnreachableError, MethodError
 from bench.log_lines import RepeatedFailure
+from bench.service.bench_check import list_obstacles
 from bench.threads import BackgroundThread
 
 PERIOD = 0.5
@@ -44,6 +49,7 @@ class CampaignExecutor(BackgroundThread):
         agent: AgentConnection,
         bench: str,
         describe_worker: Callable[[], str],
+        describe_bench: Callable[[], BenchDescription],
         *,
         is_local: bool,
     ) -> None:
@@ -54,6 +60,7 @@ class CampaignExecutor(BackgroundThread):
             agent: connection to the agent.
             bench: name of the bench in the service.
             describe_worker: returns `ok`, or the reason why there is no worker; called outside the event loop.
+            describe_bench: returns drive and limits of the bench.
             is_local: whether the agent writes into the data folder; else nothing is executed.
         """
         super().__init__(f"campaigns-{bench}")
@@ -62,7 +69,7 @@ class CampaignExecutor(BackgroundThread):
         self.store = CampaignStore(catalogue, describe_worker)
         self.thermometer = Thermometer()
         self.is_local = is_local
-        self._started = time.monotonic()
+        self._describe_bench, self._started = describe_bench, time.monotonic()
         self._failures = RepeatedFailure(_LOG, "campaign_failed", "campaign_continues")
         self.bench = AgentBench(
             catalogue, agent, self.thermometer, lambda: self._stopping.wait(PERIOD), name=bench
@@ -81,11 +88,20 @@ class CampaignExecutor(BackgroundThread):
             methods: its methods by name.
 
         Raises:
-            CampaignError: a condition can never be met, or a method may not be run.
+            CampaignError: a condition can never be met, a method may not be run or exceeds the bench, the logs do
+                not fit on the disk, or the agent does not answer.
+            MethodError: a method cannot be compiled within its limits.
             RunError: the state of the workers is not known.
         """
         self.store.check_needs(campaign, steps, methods)
         self.bench.check_needs(campaign, steps)
+        try:
+            find_obstacles = partial(list_obstacles, self._describe_bench())
+        except AgentUnreachableError as error:
+            raise CampaignError(f"the limits of the bench are not known: {error}") from None
+        free = find_usable_space(self.store.catalogue.folder)
+        if problems := find_problems(tuple(steps), methods, free, find_obstacles):
+            raise CampaignError(f"the campaign cannot be run: {problems[0]}")
 
     def _run(self) -> None:
         while not self._stopping.is_set():
@@ -113,7 +129,7 @@ class CampaignExecutor(BackgroundThread):
             return True
         try:
             self.check_start(state.campaign, [item.step for item in state.items], campaign.methods)
-        except CampaignError as error:
+        except (CampaignError, MethodError) as error:
             # After a restart of the service, its worker connects some seconds later.
             if isinstance(error, NoWorkerError) and time.monotonic() - self._started < WORKER_TIME:
                 return False

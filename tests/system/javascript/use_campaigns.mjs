@@ -186,6 +186,7 @@ async function begin() {
   const document = { name: "morning", steps };
   await page.setInputFiles("#campaign-file", { name: "morning.json", mimeType: "application/json", buffer: Buffer.from(JSON.stringify(document)) });
   await hasText("#campaign-plan", "Dry run of morning");
+  await hasText("#campaign-plan", "k0 to 3 %");
   await page.click("#campaign-plan summary");
   seen.plan = await text("#campaign-plan");
   await check("start");

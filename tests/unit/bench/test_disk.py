@@ -15,6 +15,7 @@ from bench.disk import (
     describe_low_space,
     estimate_log_size,
     find_free_space,
+    find_usable_space,
 )
 from bench.errors import RunError
 
@@ -40,6 +41,20 @@ def test_little_space_is_a_warning_with_value_and_limit(tmp_path):
 
 def test_a_folder_that_does_not_exist_yet_has_the_space_of_its_parent(tmp_path):
     assert find_free_space(tmp_path / "a" / "b").free > 0
+
+
+def test_the_usable_space_leaves_the_reserve_and_is_not_known_without_an_answer(tmp_path, monkeypatch):
+    usage = SimpleNamespace(free=RESERVE + 7)
+    monkeypatch.setattr(shutil, "disk_usage", lambda folder: usage)
+    assert find_usable_space(tmp_path) == 7
+    usage.free = 5
+    assert find_usable_space(tmp_path) == 0
+
+    def fail(folder):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(shutil, "disk_usage", fail)
+    assert find_usable_space(tmp_path) is None
 
 
 def test_the_disk_is_asked_at_intervals(tmp_path, monkeypatch):

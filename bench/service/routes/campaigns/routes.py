@@ -3,6 +3,7 @@
 import asyncio
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
@@ -27,8 +28,9 @@ from bench.campaigns import (
     send_test,
     stop,
 )
-from bench.disk import RESERVE, find_free_space
+from bench.disk import find_usable_space
 from bench.service.audit import note_old
+from bench.service.bench_check import list_obstacles
 from bench.service.benches import ServedBench
 from bench.service.context import Context, ServiceContext
 from bench.service.files import SnapshotResponse, describe_file
@@ -47,6 +49,7 @@ from bench.service.routes.campaigns.views import (
     TestMessageResult,
     make_summary,
 )
+from bench.service.routes.planning import assess_programme
 from bench.service.views import BenchChoice
 
 router = APIRouter(tags=["campaigns"], route_class=IdempotentRoute)
@@ -86,7 +89,6 @@ def _start(context: ServiceContext, bench: ServedBench, content: dict[str, Any],
     executor, store = bench.campaigns, context.campaign_store
     document = parse_campaign(content, "the request")
     methods = collect_methods(document, store.find_method)
-    plan = plan_campaign(document, methods)
     if not executor.is_local:
         raise CampaignError("the agent writes its logs on another machine; campaigns need them in the data folder")
     if held := store.list_in_progress(bench.executor):
@@ -95,8 +97,6 @@ def _start(context: ServiceContext, bench: ServedBench, content: dict[str, Any],
             "The bench is held",
             f"campaign {held[0].id} is in progress; stop it, or wait for its end",
         )
-    if plan.problems:
-        raise CampaignError(f"the campaign cannot be run: {plan.problems[0]}")
     executor.check_start(document, expand_campaign(document), methods)
     campaign = store.create(document, methods, bench.executor, time.time(), operator)
     return _show(store, campaign)
@@ -104,11 +104,18 @@ def _start(context: ServiceContext, bench: ServedBench, content: dict[str, Any],
 
 @router.post("/campaigns/plan")
 def plan(request: PlanCampaignRequest, context: Context) -> CampaignPlan:
-    """Return the dry run of a campaign: time, heat, disk and limits; nothing is started."""
+    """Return the dry run of a campaign: time, heat, disk, limits and identifiability; nothing is started."""
     document = parse_campaign(request.campaign, "the request")
-    free = find_free_space(context.data).free - RESERVE
     methods = collect_methods(document, context.campaign_store.find_method)
-    return plan_campaign(document, methods, None, free)
+    bench, unknown = context.benches.describe(request.bench)
+    return plan_campaign(
+        document,
+        methods,
+        assess_programme if request.identifiability else None,
+        find_usable_space(context.data),
+        None if bench is None else partial(list_obstacles, bench),
+        unknown,
+    )
 
 
 @router.get("/campaigns/{campaign_id}")

@@ -23,6 +23,10 @@ class PlanCampaignRequest(View):
     """Request of a dry run."""
 
     campaign: dict[str, Any] = Field(description="document `mrbench.campaign/1`")
+    identifiability: bool = Field(
+        default=True, description="also assess what each method can identify, which takes some seconds for each"
+    )
+    bench: BenchName | None = Field(default=None, description="name of the bench; needed if there are several")
 
 
 class CommandRequest(View):

@@ -9,6 +9,7 @@ from bench.service.routes.planning import (
     specimens,
     trends,
 )
+from bench.service.routes.planning.assessments import assess_programme
 from bench.service.routes.planning.certificates import describe_calibration
 from bench.service.routes.planning.method_library import find_method
 
@@ -23,4 +24,4 @@ ROUTERS = (
 )
 """All routers; those with longer paths come first."""
 
-__all__ = ["ROUTERS", "describe_calibration", "find_method"]
+__all__ = ["ROUTERS", "assess_programme", "describe_calibration", "find_method"]

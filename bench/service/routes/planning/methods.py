@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 from bench.catalogue import SHIPPED_VERSION, ApprovalRow, MethodRow, StoredMethod
 from bench.methods import Method, compile_method, list_shipped_methods, load_method
 from bench.service.audit import note_old
+from bench.service.bench_check import describe_drive_obstacle
 from bench.service.context import Context, ServiceContext
 from bench.service.requests import (
     IDEMPOTENT,
@@ -26,7 +27,6 @@ router = APIRouter(prefix="/methods", tags=["methods"], route_class=IdempotentRo
 _SAME: dict[int | str, dict[str, Any]] = {
     200: {"description": "a version with this content is stored, and is returned", "model": MethodSummary}
 }
-_DRIVE_WORDS = {"coil_v": "coil voltage", "coil_a": "coil current", "driver_command_v": "command of a driver"}
 
 
 @router.get("")
@@ -161,11 +161,3 @@ def _summarise(one: StoredMethod, drive_kind: str, approvals: Mapping[str, Appro
         usable=not obstacle,
         obstacle=obstacle,
     )
-
-
-def describe_drive_obstacle(method: Method, drive_kind: str) -> str:
-    """Return why a bench with a drive cannot run a method; empty if it can, or if the drive is not known."""
-    if not drive_kind or drive_kind == method.drive_kind:
-        return ""
-    own, other = _DRIVE_WORDS[method.drive_kind], _DRIVE_WORDS.get(drive_kind, drive_kind)
-    return f"the method sets the {own}, this bench the {other}"

@@ -3,12 +3,14 @@
 import { post, start } from "../common/api.js";
 import { withBench } from "../common/bench.js";
 import { describeDrive, describeKind } from "./campaign_words.js";
-import { duration, element, significant, write, byId } from "../common/format.js";
+import { duration, element, sentence, significant, write, byId } from "../common/format.js";
 import { QUANTITIES } from "../common/quantities.js";
 import { followOperator } from "../common/session.js";
 import { factList, table } from "../common/tables.js";
 
 const PLAN_TIMEOUT_MS = 120_000;
+/** Time [ms] that the assessment of all methods may take. */
+const ASSESSMENT_MS = 600_000;
 /** Largest number of steps of a dry run that are listed. */
 const MAX_STEPS = 100;
 
@@ -52,9 +54,11 @@ export class CampaignStart {
     this.forget("Computing the dry run …");
     try {
       const campaign = JSON.parse(text);
-      const plan = await post("campaigns/plan", { campaign }, PLAN_TIMEOUT_MS);
+      const plan = await post("campaigns/plan", withBench({ campaign, identifiability: false }), PLAN_TIMEOUT_MS);
       if (text !== byId("campaign-document").value) return; // it was changed meanwhile
-      byId("campaign-plan").replaceChildren(...describePlan(plan));
+      const words = element("div", {}, element("p", { className: "soft" }, "Assessing the strokes, for some seconds …"));
+      byId("campaign-plan").replaceChildren(...describePlan(plan, words));
+      if (plan.methods.length) fillIdentifiability(campaign, words);
       this.planned = campaign;
       byId("campaign-begin").disabled = plan.problems.length > 0;
       this.note(plan.problems.length ? "The campaign cannot be started; see the problems." : "Dry run of this document; it can be started.", plan.problems.length > 0);
@@ -77,7 +81,20 @@ export class CampaignStart {
   }
 }
 
-function describePlan(plan) {
+/** Fills in what each method can identify, which is computed after everything else, because it takes longer. */
+async function fillIdentifiability(campaign, words) {
+  try {
+    const { methods } = await post("campaigns/plan", withBench({ campaign }), ASSESSMENT_MS);
+    words.replaceChildren(...methods.flatMap((one) => [
+      element("h4", {}, `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`),
+      element("ul", { className: "words" }, ...one.identifiability.map((line) => element("li", {}, sentence(line)))),
+    ]));
+  } catch (problem) {
+    words.replaceChildren(element("p", { className: "problem" }, problem.after("Not assessed")));
+  }
+}
+
+function describePlan(plan, words) {
   const { duration_s: expected, longest_s: longest, stroking_s: moving, heat_j: heat, log_bytes: size, free_bytes: free } = plan;
   const rows = {
     Steps: `${plan.steps.length}`,
@@ -87,18 +104,21 @@ function describePlan(plan) {
     "Heat, at most": `${significant(heat / 1e3, 3)} kJ`,
     "Logs, at most": `${significant(size / 1e6, 3)} MB${free === null ? "" : `; the disk has ${significant(free / 1e9, 3)} GB free`}`,
   };
+  const problems = plan.problems.map((text) => `Problem: ${text}`);
+  if (plan.bench_unknown) problems.push(`Limits of the bench are not known: ${plan.bench_unknown}`);
+  const identifiability = plan.methods.length ? [element("h3", {}, "What the strokes can identify"), words] : [];
   return [
     element("h3", {}, `Dry run of ${plan.campaign}`),
-    element("ul", { className: "warnings", "aria-label": "Problems" }, ...plan.problems.map((text) => element("li", {}, `Problem: ${text}`))),
+    element("ul", { className: "warnings", "aria-label": "Problems" }, ...problems.map((text) => element("li", {}, text))),
     factList(rows),
-    makeMethodTable(plan.methods), makeStepTable(plan.steps),
+    makeMethodTable(plan.methods), ...identifiability, makeStepTable(plan.steps),
   ];
 }
 
 function makeMethodTable(methods) {
   const { scale, unit } = QUANTITIES.force;
   return table("Methods", ["Method", "Runs", "One run", "Force, at most", "Limits", "Checkpoints"], methods.map((one) => [
-    `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, one.verdict, one.checkpoints,
+    `${one.method}, ${describeDrive(one.drive, one.drive_unit)}`, one.runs, duration(one.duration_s), `${significant(one.force_n * scale)} ${unit}`, [one.verdict, ...one.obstacles].join("; "), one.checkpoints,
   ]));
 }
 

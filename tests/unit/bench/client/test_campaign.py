@@ -38,5 +38,6 @@ def test_a_script_starts_edits_answers_and_stops_a_campaign(bench, tmp_path):
     assert [one["id"] for one in bench.list_campaigns()] == [campaign.id]
     assert bench.find_campaign() is None
     assert bench.plan_campaign({"name": "night", "steps": [REST]})["duration_s"] == 900
+    assert bench.plan_campaign({"name": "night", "steps": [REST]}, identifiability=False)["methods"] == []
     with pytest.raises(ClientError, match="at least one step"):
         bench.start_campaign({"name": "night", "steps": []})

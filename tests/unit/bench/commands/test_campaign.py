@@ -120,6 +120,14 @@ def test_methods_that_are_not_approved_are_refused_on_the_command_line(tmp_path)
         assert len(store.get(started.id).state.items) == 2
 
 
+def test_logs_that_do_not_fit_on_the_disk_are_refused_on_the_command_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("bench.commands.campaign.bench.find_usable_space", lambda folder: 1000)
+    with open_store(tmp_path / "data", is_created=True) as store:
+        with pytest.raises(CampaignError, match=r"the logs need up to .* GB are free"):
+            find_or_create(store, write(tmp_path / "a.json", steps=[RUN]), "B", "agent")
+        assert store.list_campaigns(1) == []
+
+
 def test_the_simulated_plant_needs_no_approval(tmp_path):
     with open_store(tmp_path / "data", is_created=True) as store:
         document = load_campaign(write(tmp_path / "a.json", steps=[RUN], methods="approved"))

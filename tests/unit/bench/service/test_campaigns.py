@@ -9,6 +9,7 @@ import pytest
 from bench import cli
 from bench.agent_protocol import InstrumentStatus, PauseCommand, RunCommand
 from bench.campaigns import CampaignStore, collect_methods, parse_campaign
+from bench.service.routes.planning import assessments
 from tests.support.certificates import make_certificate
 from tests.support.message_servers import find_closed_port, serve_webhook
 from tests.support.service_logs import write_complete_log
@@ -286,17 +287,80 @@ def test_a_thermometer_makes_a_condition_on_the_temperature_possible(service):
 
 
 def test_a_plan_starts_nothing(service):
-    plan = service.post("/campaigns/plan", {"campaign": {"name": "night", "steps": [RUN, RUN]}})
+    plan = make_plan(service, [RUN, RUN], identifiability=False)
     assert plan["stroking_s"] == pytest.approx(46.2)
+    assert (plan["problems"], plan["bench_unknown"], plan["methods"][0]["identifiability"]) == ([], "", [])
     assert service.get("/campaigns")["items"] == []
+
+
+def make_plan(service, steps, **more):
+    return service.post("/campaigns/plan", {"campaign": {"name": "night", "steps": steps}, **more})
+
+
+def test_a_plan_says_what_each_method_can_identify_and_assesses_equal_ones_once(service, monkeypatch):
+    assessed = []
+
+    def assess(programme, command):
+        assessed.append(programme.method.name)
+        return {"messages": [f"{len(assessed)}. k0 to 3 %"]}
+
+    monkeypatch.setattr("bench.service.routes.planning.assessments.assess_design", assess)
+    assessments._assess.cache_clear()
+    steps = [RUN, RUN, {"run": {**RUN["run"], "drive": 0.2}}]
+    plans = [make_plan(service, steps) for _ in range(2)]
+    assert [one["identifiability"] for one in plans[0]["methods"]] == [["1. k0 to 3 %"], ["2. k0 to 3 %"]]
+    assert plans[0]["methods"] == plans[1]["methods"]
+    assert len(assessed) == 2
+    assessments._assess.cache_clear()
+
+
+def limit_force(service, force):
+    """Set the force at which the bench stops [N]."""
+    limit = service.agent.description.limits["force"].model_copy(update={"controlled_stop": force})
+    service.agent.description = service.agent.description.model_copy(update={"limits": {"force": limit}})
+
+
+def test_a_step_that_exceeds_the_bench_is_refused_before_the_start(service):
+    limit_force(service, 300.0)
+    problem = "method quick: force 647.9 N exceeds the bench's 300 N"
+    plan = make_plan(service, [RUN], identifiability=False)
+    assert plan["problems"] == [problem]
+    assert plan["methods"][0]["obstacles"] == ["force 647.9 N exceeds the bench's 300 N"]
+    assert problem in start(service, [RUN], 409)["detail"]
+    campaign = create_on_command_line(service, [RUN])
+    ended = wait(service, {"id": campaign.id}, lambda found: found["status"] == "stopped")
+    assert problem in ended["reason"]
+    limit_force(service, 2000.0)
+    start(service, [RUN])
+
+
+def test_a_method_for_another_drive_is_refused_before_the_start(service):
+    service.agent.description = service.agent.description.model_copy(update={"drive_kind": "coil_a"})
+    problem = "method quick: the method sets the coil voltage, this bench the coil current"
+    assert make_plan(service, [RUN], identifiability=False)["problems"] == [problem]
+    assert problem in start(service, [RUN], 409)["detail"]
+
+
+def test_logs_that_do_not_fit_on_the_disk_are_refused_before_the_start(service, monkeypatch):
+    for user in ("routes.campaigns.routes", "campaigns.executor"):
+        monkeypatch.setattr(f"bench.service.{user}.find_usable_space", lambda folder: 1000)
+    assert "0.000 GB are free" in make_plan(service, [RUN], identifiability=False)["problems"][0]
+    assert "0.000 GB are free" in start(service, [RUN], 409)["detail"]
+
+
+def test_a_plan_without_an_agent_says_that_the_bench_is_not_known(service):
+    service.agent.reachable = False
+    plan = make_plan(service, [RUN], identifiability=False)
+    assert plan["bench_unknown"].startswith("no rig agent answered")
+    assert plan["problems"] == []
+    assert "no bench far" in service.post("/campaigns/plan", {"campaign": {"name": "n", "steps": [RUN]},
+                                          "bench": "far"}, 404)["detail"]  # fmt: skip
 
 
 def test_a_campaign_runs_the_stored_version_and_keeps_it(service):
     titles = ["second version", "third version"]
     document = service.get("/methods/quick")
     service.post("/methods", document | {"title": titles[0]}, 201)
-    planned = service.post("/campaigns/plan", {"campaign": {"name": "n", "steps": [RUN]}})
-    assert [one["method"] for one in planned["methods"]] == ["quick"]
     campaign = start(service, [RUN, RUN])
     service.post("/methods", document | {"title": titles[1]}, 201)
     assert wait_for_command(service, RunCommand).method["title"] == titles[0]

@@ -4,7 +4,7 @@ import pytest
 
 from bench.errors import RunError
 from bench.methods import load_method
-from bench.service.routes.planning import dry_runs
+from bench.service.routes.planning import assessments
 
 DESIGN = {"schema": "mrbench.foresight/1", "messages": ["k0 to 3 %"]}
 
@@ -12,10 +12,10 @@ DESIGN = {"schema": "mrbench.foresight/1", "messages": ["k0 to 3 %"]}
 @pytest.fixture
 def assessed(monkeypatch):
     calls = []
-    monkeypatch.setattr(dry_runs, "assess_design", lambda programme, command: calls.append(command) or DESIGN)
-    dry_runs._assess.cache_clear()
+    monkeypatch.setattr(assessments, "assess_design", lambda programme, command: calls.append(command) or DESIGN)
+    assessments._assess.cache_clear()
     yield calls
-    dry_runs._assess.cache_clear()
+    assessments._assess.cache_clear()
 
 
 def test_the_forecast_names_peaks_heat_disk_and_identifiability(service, assessed):
@@ -54,7 +54,7 @@ def test_without_a_bench_or_an_assessment_the_reason_is_given(service, assessed,
     def fail(programme, command):
         raise RunError("the planned strokes were not assessed: no such command")
 
-    monkeypatch.setattr(dry_runs, "assess_design", fail)
+    monkeypatch.setattr(assessments, "assess_design", fail)
     service.agent.reachable = False
     found = service.post("/methods/dry-run", {"method": "quick"}, 200)
     assert found["bench"]["unknown"].startswith("no rig agent answered")

@@ -1,0 +1,44 @@
+"""Comparison of a method with a bench, before anything moves."""
+
+from bench.agent_protocol import BenchDescription
+from bench.methods import Envelope, Method
+
+_DRIVE_WORDS = {"coil_v": "coil voltage", "coil_a": "coil current", "driver_command_v": "command of a driver"}
+_PEAKS = {"force": ("force_n", 1.0, "N"), "displacement": ("displacement_m", 1e3, "mm"),
+          "actuator_velocity": ("velocity_mps", 1e3, "mm/s")}  # fmt: skip
+"""Peak that each limit of the bench is compared with: its field, and factor and unit for people."""
+_ACTIONS = ("hold", "controlled_stop", "trip")
+"""Actions of the bench that end a motion."""
+
+
+def describe_drive_obstacle(method: Method, drive_kind: str) -> str:
+    """Return why a bench with a drive cannot run a method; empty if it can, or if the drive is not known."""
+    if not drive_kind or drive_kind == method.drive_kind:
+        return ""
+    own, other = _DRIVE_WORDS[method.drive_kind], _DRIVE_WORDS.get(drive_kind, drive_kind)
+    return f"the method sets the {own}, this bench the {other}"
+
+
+def list_obstacles(bench: BenchDescription, method: Method, envelope: Envelope) -> list[str]:
+    """Return the reasons why a bench would refuse or stop a run of a method; none if it would not.
+
+    Args:
+        bench: drive and limits of the bench.
+        method: the method.
+        envelope: its peaks.
+    """
+    return [*filter(None, [describe_drive_obstacle(method, bench.drive_kind)]), *_find_excesses(bench, envelope)]
+
+
+def _find_excesses(bench: BenchDescription, envelope: Envelope) -> list[str]:
+    """Return a sentence for each peak beyond a limit of the bench that ends a motion."""
+    found = []
+    for name, (field, factor, unit) in _PEAKS.items():
+        peak, limit = getattr(envelope.total, field), bench.limits.get(name)
+        values = [] if limit is None else [value for action in _ACTIONS if (value := getattr(limit, action))]
+        if values and peak > min(values):
+            words = name.replace("_", " ")
+            found.append(
+                f"{words} {peak * factor:.4g} {unit} exceeds the bench's {min(values) * factor:.4g} {unit}"
+            )
+    return found
